@@ -1,0 +1,40 @@
+// Geometric augmentations of the coloured key view (METHOD.md "Stage 1c"). Luminance, colour and a
+// validity mask go through one and the same sampling map; chroma is never mixed across a hard
+// shuffle edge (nearest sampling there). Pure functions of the generator; thread-safe.
+#pragma once
+
+#include "core/base/image.h"
+#include "core/base/random.h"
+
+namespace color3d {
+
+struct AugmentOptions {
+  int crop_px = 256;
+  // Mild set (default): scale, horizontal flip, elastic, perspective, small L jitter.
+  double min_scale = 0.7;
+  double max_scale = 1.4;
+  double flip_probability = 0.5;
+  double elastic_probability = 0.7;
+  double elastic_alpha_px = 15.0;
+  double elastic_sigma_px = 50.0;
+  double perspective_probability = 0.5;
+  double luminance_jitter = 2.0;  // +- L units offset, and the same share of contrast
+  // The paper's additions: rotations by 90 degrees with flips, and an 8x8 grid shuffle.
+  double rot90_probability = 0.0;
+  double shuffle_probability = 0.0;
+  int shuffle_grid = 8;
+  static AugmentOptions Paper();
+};
+
+struct AugmentedSample {
+  Image luminance;  // 1 channel, crop_px x crop_px
+  Image ab;         // 2 channels
+  Image valid;      // 1 channel: 1 where the sample lies inside the source picture
+};
+
+AugmentedSample Augment(const Image& luminance,
+                        const Image& ab,
+                        const AugmentOptions& options,
+                        Random& random);
+
+}  // namespace color3d

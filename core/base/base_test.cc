@@ -1,0 +1,120 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numeric>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/base/subprocess.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+
+TEST(Sha256, MatchesPublishedVectors) {
+  EXPECT_EQ(Sha256Hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(Sha256Hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_TRUE(IsSha256Hex(Sha256Hex("x")));
+  EXPECT_FALSE(IsSha256Hex("ABC"));
+}
+
+TEST(Files, WriteIsAtomicAndReadable) {
+  ScratchFolder scratch;
+  const fs::path path = scratch.path() / "value.bin";
+  WriteFileAtomic(path, "one");
+  WriteFileAtomic(path, std::string("two\0three", 9));
+  EXPECT_EQ(ReadFile(path), std::string("two\0three", 9));
+  EXPECT_EQ(DigestFile(path).sha256, Sha256Hex(std::string("two\0three", 9)));
+  EXPECT_EQ(ListFiles(scratch.path()), std::vector<std::string>{"value.bin"});
+}
+
+TEST(Files, ErrorsNameThePathAndLeaveNothing) {
+  ScratchFolder scratch;
+  try {
+    WriteFileAtomic(scratch.path() / "missing" / "x", "y");
+    FAIL() << "wrote into a folder that does not exist";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kNotFound);
+    EXPECT_NE(std::string(e.what()).find("missing"), std::string::npos);
+  }
+  EXPECT_THROW(ReadFile(scratch.path() / "absent"), Error);
+  EXPECT_THROW(ReadFile(scratch.path()), Error);
+  EXPECT_TRUE(ListFiles(scratch.path()).empty());
+}
+
+TEST(Files, UnsafePathsAreRecognised) {
+  for (const char* good : {"a.jpg", "images/a b.jpg", "x/..y/z"}) {
+    EXPECT_TRUE(IsSafeRelativePath(good)) << good;
+  }
+  for (const char* bad : {"", "/etc/passwd", "../a", "a/../b", "a//b", "a/.", "a\\b", "a/\n"}) {
+    EXPECT_FALSE(IsSafeRelativePath(bad)) << bad;
+  }
+}
+
+TEST(ThreadPool, CoversEveryIndexOnceAndRethrows) {
+  ThreadPool pool(3);
+  std::vector<int> hits(1000, 0);
+  pool.ForEach(1000, [&](int64_t i, int) { ++hits[i]; });
+  pool.ForRanges(1000, [&](int64_t begin, int64_t end, int) {
+    for (int64_t i = begin; i < end; ++i) ++hits[i];
+  });
+  for (int h : hits) ASSERT_EQ(h, 2);
+  EXPECT_THROW(pool.ForEach(100, [](int64_t i, int) { if (i == 57) throw InvalidArgument("x"); }),
+               Error);
+  int64_t sum = 0;
+  ThreadPool single(1);
+  single.ForEach(10, [&](int64_t i, int) { sum += i; });
+  EXPECT_EQ(sum, 45);
+}
+
+TEST(Random, IsReproducibleAndResumable) {
+  Random first(7);
+  Random second(7);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(first.NextUint32(), second.NextUint32());
+  Random resumed(first.state());
+  EXPECT_EQ(first.NextUint32(), resumed.NextUint32());
+  double mean = 0.0;
+  double square = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    const double x = first.NextNormal();
+    mean += x / 20000;
+    square += x * x / 20000;
+  }
+  EXPECT_NEAR(mean, 0.0, 0.03);
+  EXPECT_NEAR(square, 1.0, 0.05);
+}
+
+TEST(Subprocess, ReportsExitCodeLogTimeoutAndCancellation) {
+  ScratchFolder scratch;
+  CancellationToken cancel;
+  SubprocessOptions options;
+  options.arguments = {"sh", "-c", "echo $COLOR3D_TEST; exit 3"};
+  options.environment = {"COLOR3D_TEST=hello"};
+  options.log_path = scratch.path() / "log";
+  EXPECT_EQ(RunSubprocess(options, cancel).exit_code, 3);
+  EXPECT_EQ(ReadFile(options.log_path), "hello\n");
+
+  options.arguments = {"sh", "-c", "sleep 60 & wait"};
+  options.timeout = std::chrono::seconds(0);
+  EXPECT_TRUE(RunSubprocess(options, cancel).timed_out);
+
+  options.timeout = std::chrono::seconds(60);
+  cancel.Cancel();
+  EXPECT_THROW(RunSubprocess(options, cancel), Error);
+
+  options.arguments = {"color3d-no-such-program"};
+  CancellationToken fresh;
+  try {
+    RunSubprocess(options, fresh);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kFailedPrecondition);
+  }
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,59 @@
+// The one error type of the method library, the stores and the workers.
+// Thrown by value, caught by const reference; immutable, so safe to share between threads.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace color3d {
+
+// Same meaning as the canonical codes of gRPC, without depending on gRPC.
+enum class ErrorCode {
+  kCancelled,
+  kInvalidArgument,     // the input is wrong whatever the state of the system
+  kDeadlineExceeded,
+  kNotFound,
+  kAlreadyExists,
+  kFailedPrecondition,  // right input, wrong state: do something else first
+  kResourceExhausted,   // disk, memory, quota
+  kAborted,             // lost a race (a lease, an etag): start again
+  kUnimplemented,
+  kInternal,            // our own bug
+  kUnavailable,         // try again later
+  kDataLoss,            // stored bytes are not what was written
+};
+
+// `message` names the offending value and what to do about it, in one line.
+class Error : public std::runtime_error {
+ public:
+  Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  ErrorCode code() const { return code_; }
+
+ private:
+  ErrorCode code_;
+};
+
+inline const char* ErrorCodeName(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kCancelled: return "CANCELLED";
+    case ErrorCode::kInvalidArgument: return "INVALID_ARGUMENT";
+    case ErrorCode::kDeadlineExceeded: return "DEADLINE_EXCEEDED";
+    case ErrorCode::kNotFound: return "NOT_FOUND";
+    case ErrorCode::kAlreadyExists: return "ALREADY_EXISTS";
+    case ErrorCode::kFailedPrecondition: return "FAILED_PRECONDITION";
+    case ErrorCode::kResourceExhausted: return "RESOURCE_EXHAUSTED";
+    case ErrorCode::kAborted: return "ABORTED";
+    case ErrorCode::kUnimplemented: return "UNIMPLEMENTED";
+    case ErrorCode::kInternal: return "INTERNAL";
+    case ErrorCode::kUnavailable: return "UNAVAILABLE";
+    case ErrorCode::kDataLoss: return "DATA_LOSS";
+  }
+  return "INTERNAL";
+}
+
+inline Error InvalidArgument(const std::string& message) {
+  return Error(ErrorCode::kInvalidArgument, message);
+}
+
+}  // namespace color3d

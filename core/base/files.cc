@@ -1,0 +1,165 @@
+#include "core/base/files.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+[[noreturn]] void ThrowErrno(const std::string& what, const fs::path& path) {
+  const int error = errno;
+  ErrorCode code = ErrorCode::kInternal;
+  std::string remedy;
+  if (error == ENOSPC || error == EDQUOT) {
+    code = ErrorCode::kResourceExhausted;
+    remedy = "; free some disk space";
+  } else if (error == EACCES || error == EPERM || error == EROFS) {
+    code = ErrorCode::kFailedPrecondition;
+    remedy = "; check the permissions";
+  } else if (error == ENOENT || error == ENOTDIR) {
+    code = ErrorCode::kNotFound;
+  }
+  throw Error(code, what + " " + path.string() + ": " + std::strerror(error) + remedy);
+}
+
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int fd) : fd_(fd) {}
+  ~FileDescriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+void SyncFolder(const fs::path& folder) {
+  FileDescriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() >= 0) ::fsync(fd.get());
+}
+
+}  // namespace
+
+std::string ReadFile(const fs::path& path, int64_t max_bytes) {
+  FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (fd.get() < 0) ThrowErrno("cannot open", path);
+  struct stat status {};
+  if (::fstat(fd.get(), &status) != 0) ThrowErrno("cannot read", path);
+  if (S_ISDIR(status.st_mode)) throw InvalidArgument(path.string() + " is a folder, not a file");
+  if (status.st_size > max_bytes) {
+    throw Error(ErrorCode::kResourceExhausted,
+                path.string() + " has " + std::to_string(status.st_size) +
+                    " bytes, more than the " + std::to_string(max_bytes) + " allowed here");
+  }
+  std::string bytes(static_cast<size_t>(status.st_size), '\0');
+  size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got = ::read(fd.get(), bytes.data() + done, bytes.size() - done);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) ThrowErrno("cannot read", path);
+    if (got == 0) break;
+    done += static_cast<size_t>(got);
+  }
+  bytes.resize(done);
+  return bytes;
+}
+
+void PublishFile(const fs::path& temporary, const fs::path& final_path) {
+  {
+    FileDescriptor fd(::open(temporary.c_str(), O_RDONLY | O_CLOEXEC));
+    if (fd.get() < 0 || ::fsync(fd.get()) != 0) ThrowErrno("cannot sync", temporary);
+  }
+  if (::rename(temporary.c_str(), final_path.c_str()) != 0) ThrowErrno("cannot write", final_path);
+  SyncFolder(final_path.parent_path());
+}
+
+void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
+  static std::atomic<uint64_t> counter{0};
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  const fs::path temporary =
+      folder / ("." + path.filename().string() + "." + std::to_string(::getpid()) + "." +
+                std::to_string(counter.fetch_add(1)) + ".part");
+  try {
+    {
+      FileDescriptor fd(
+          ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+      if (fd.get() < 0) ThrowErrno("cannot create", temporary);
+      size_t done = 0;
+      while (done < bytes.size()) {
+        const ssize_t put = ::write(fd.get(), bytes.data() + done, bytes.size() - done);
+        if (put < 0 && errno == EINTR) continue;
+        if (put < 0) ThrowErrno("cannot write", path);
+        done += static_cast<size_t>(put);
+      }
+    }
+    PublishFile(temporary, fs::path(folder) / path.filename());
+  } catch (...) {
+    ::unlink(temporary.c_str());
+    throw;
+  }
+}
+
+std::vector<std::string> ListFiles(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    throw Error(ErrorCode::kNotFound, folder.string() + " is not a folder");
+  }
+  std::vector<std::string> files;
+  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied);
+  for (const fs::recursive_directory_iterator end; it != end; ++it) {
+    const std::string name = it->path().filename().string();
+    if (!name.empty() && name[0] == '.') {
+      if (it->is_directory(error)) it.disable_recursion_pending();
+      continue;
+    }
+    if (it->is_regular_file(error)) {
+      files.push_back(it->path().lexically_relative(folder).generic_string());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+bool IsSafeRelativePath(std::string_view path) {
+  if (path.empty() || path.size() > 1024 || path.front() == '/') return false;
+  size_t start = 0;
+  while (start <= path.size()) {
+    size_t end = path.find('/', start);
+    if (end == std::string_view::npos) end = path.size();
+    const std::string_view part = path.substr(start, end - start);
+    if (part.empty() || part == "." || part == ".." || part.size() > 255) return false;
+    for (char c : part) {
+      if (static_cast<unsigned char>(c) < 32 || c == '\\' || c == 127) return false;
+    }
+    start = end + 1;
+  }
+  return true;
+}
+
+ScratchFolder::ScratchFolder(const fs::path& parent) {
+  std::error_code error;
+  fs::create_directories(parent, error);
+  std::string pattern = (parent / "color3d-XXXXXX").string();
+  if (::mkdtemp(pattern.data()) == nullptr) ThrowErrno("cannot create a folder in", parent);
+  path_ = pattern;
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code error;
+  fs::remove_all(path_, error);
+}
+
+}  // namespace color3d

@@ -1,0 +1,44 @@
+// Small file helpers. Every write is whole or absent: temporary file, fsync, rename.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace color3d {
+
+// Whole file as bytes. Throws Error{kNotFound} or Error{kDataLoss}; kResourceExhausted above
+// `max_bytes`.
+std::string ReadFile(const std::filesystem::path& path, int64_t max_bytes = int64_t{1} << 34);
+
+// Replaces `path` atomically and durably. Throws Error{kResourceExhausted} when the disk is full,
+// kFailedPrecondition when the folder cannot be written.
+void WriteFileAtomic(const std::filesystem::path& path, std::string_view bytes);
+
+// Makes a finished temporary file durable under its final name (fsync, rename, fsync of folder).
+void PublishFile(const std::filesystem::path& temporary, const std::filesystem::path& final_path);
+
+// Regular files below `folder`, recursively, as sorted relative paths with '/' separators. Hidden
+// files are left out. Throws Error{kNotFound} when there is no such folder.
+std::vector<std::string> ListFiles(const std::filesystem::path& folder);
+
+// True when `path` is relative, not empty, and has no "..", ".", empty or NUL component, no
+// backslash and no control character: safe to join to a folder of ours.
+bool IsSafeRelativePath(std::string_view path);
+
+// Creates a fresh folder under `parent` and removes it, with all in it, when destroyed.
+class ScratchFolder {
+ public:
+  explicit ScratchFolder(const std::filesystem::path& parent = std::filesystem::temp_directory_path());
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,93 @@
+#include "core/base/parallel.h"
+
+#include <algorithm>
+#include <atomic>
+
+namespace color3d {
+
+ThreadPool::ThreadPool(int threads) {
+  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  for (int i = 1; i < threads; ++i) workers_.emplace_back([this, i] { WorkerLoop(i); });
+}
+
+ThreadPool::~ThreadPool() {
+  {
+    std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  start_.notify_all();
+  for (std::thread& worker : workers_) worker.join();
+}
+
+void ThreadPool::WorkerLoop(int thread) {
+  uint64_t seen = 0;
+  while (true) {
+    const std::function<void(int)>* task = nullptr;
+    {
+      std::unique_lock lock(mutex_);
+      start_.wait(lock, [&] { return stopping_ || generation_ != seen; });
+      if (stopping_) return;
+      seen = generation_;
+      task = task_;
+    }
+    std::exception_ptr failure;
+    try {
+      (*task)(thread);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+    std::lock_guard lock(mutex_);
+    if (failure && !failure_) failure_ = failure;
+    if (--running_ == 0) done_.notify_one();
+  }
+}
+
+void ThreadPool::Run(const std::function<void(int)>& task) {
+  {
+    std::lock_guard lock(mutex_);
+    task_ = &task;
+    failure_ = nullptr;
+    running_ = static_cast<int>(workers_.size());
+    ++generation_;
+  }
+  start_.notify_all();
+  std::exception_ptr failure;
+  try {
+    task(0);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  std::unique_lock lock(mutex_);
+  done_.wait(lock, [&] { return running_ == 0; });
+  task_ = nullptr;
+  if (!failure) failure = failure_;
+  if (failure) std::rethrow_exception(failure);
+}
+
+void ThreadPool::ForEach(int64_t count,
+                         const std::function<void(int64_t index, int thread)>& body) {
+  if (count <= 0) return;
+  std::atomic<int64_t> next{0};
+  std::atomic<bool> failed{false};
+  Run([&](int thread) {
+    try {
+      for (int64_t i; !failed && (i = next.fetch_add(1)) < count;) body(i, thread);
+    } catch (...) {
+      failed = true;
+      throw;
+    }
+  });
+}
+
+void ThreadPool::ForRanges(
+    int64_t count, const std::function<void(int64_t begin, int64_t end, int thread)>& body) {
+  if (count <= 0) return;
+  const int64_t threads = thread_count();
+  Run([&](int thread) {
+    const int64_t begin = count * thread / threads;
+    const int64_t end = count * (thread + 1) / threads;
+    if (begin < end) body(begin, end, thread);
+  });
+}
+
+}  // namespace color3d

@@ -1,0 +1,103 @@
+#include "core/base/subprocess.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <thread>
+
+#include "core/base/error.h"
+
+extern char** environ;
+
+namespace color3d {
+namespace {
+
+// The program's full path, found as a shell would; empty when there is none.
+std::string FindProgram(const std::string& name) {
+  if (name.find('/') != std::string::npos) return ::access(name.c_str(), X_OK) == 0 ? name : "";
+  const char* path = std::getenv("PATH");
+  std::string folders = path != nullptr ? path : "/usr/local/bin:/usr/bin:/bin";
+  size_t start = 0;
+  while (start <= folders.size()) {
+    size_t end = folders.find(':', start);
+    if (end == std::string::npos) end = folders.size();
+    const std::string candidate = folders.substr(start, end - start) + "/" + name;
+    if (::access(candidate.c_str(), X_OK) == 0) return candidate;
+    start = end + 1;
+  }
+  return "";
+}
+
+}  // namespace
+
+SubprocessResult RunSubprocess(const SubprocessOptions& options, const CancellationToken& cancel) {
+  const std::string program = FindProgram(options.arguments.at(0));
+  if (program.empty()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                options.arguments[0] + " is not installed; run deploy/install-deps.sh");
+  }
+  // Everything the child needs is prepared before fork: only async-signal-safe calls after it.
+  std::vector<char*> arguments;
+  for (const std::string& a : options.arguments) arguments.push_back(const_cast<char*>(a.c_str()));
+  arguments.push_back(nullptr);
+  std::vector<char*> environment;
+  for (const std::string& e : options.environment) {
+    environment.push_back(const_cast<char*>(e.c_str()));
+  }
+  for (char** e = environ; *e != nullptr; ++e) environment.push_back(*e);
+  environment.push_back(nullptr);
+  const std::string log = options.log_path.empty() ? "/dev/null" : options.log_path.string();
+  const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  if (log_fd < 0) {
+    throw Error(ErrorCode::kFailedPrecondition, "cannot write " + log + ": " + strerror(errno));
+  }
+  const int null_fd = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const pid_t parent = ::getpid();
+  const auto start = std::chrono::steady_clock::now();
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::setpgid(0, 0);
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent) ::_exit(127);
+    ::dup2(null_fd, 0);
+    ::dup2(log_fd, 1);
+    ::dup2(log_fd, 2);
+    ::execve(program.c_str(), arguments.data(), environment.data());
+    ::_exit(127);
+  }
+  ::close(log_fd);
+  ::close(null_fd);
+  if (child < 0) throw Error(ErrorCode::kResourceExhausted, "cannot start " + program);
+  // Also here: whichever side runs first, the group exists before it may have to be killed.
+  ::setpgid(child, child);
+
+  SubprocessResult result;
+  int status = 0;
+  bool killed = false;
+  auto nap = std::chrono::milliseconds(1);
+  while (true) {
+    const pid_t done = ::waitpid(child, &status, WNOHANG);
+    if (done == child || (done < 0 && errno != EINTR)) break;
+    const auto elapsed = std::chrono::steady_clock::now() - start;
+    if (!killed && (cancel.IsCancelled() || elapsed > options.timeout)) {
+      result.timed_out = !cancel.IsCancelled();
+      killed = true;
+    }
+    if (killed) ::kill(-child, SIGKILL);
+    std::this_thread::sleep_for(nap);
+    nap = std::min(nap * 2, std::chrono::milliseconds(50));
+  }
+  result.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (killed && !result.timed_out) cancel.ThrowIfCancelled();
+  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return result;
+}
+
+}  // namespace color3d

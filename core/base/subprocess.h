@@ -1,0 +1,31 @@
+// Runs a child program with a time limit, a log file and cancellation; never leaves one behind.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/cancellation.h"
+
+namespace color3d {
+
+struct SubprocessOptions {
+  std::vector<std::string> arguments;    // arguments[0] is looked up on PATH
+  std::vector<std::string> environment;  // "NAME=value", added to ours
+  std::filesystem::path log_path;        // stdout and stderr are appended here; empty: discarded
+  std::chrono::seconds timeout{3600};
+};
+
+struct SubprocessResult {
+  int exit_code = 0;  // 128 + signal when killed
+  bool timed_out = false;
+  double seconds = 0.0;
+};
+
+// Starts the child in its own process group, waits, and kills the whole group on time-out or
+// cancellation (then throws Error{kCancelled}). The child dies with us. Throws
+// Error{kFailedPrecondition} when the program is not installed.
+SubprocessResult RunSubprocess(const SubprocessOptions& options, const CancellationToken& cancel);
+
+}  // namespace color3d

@@ -1,0 +1,18 @@
+// Colour difference and colourfulness (METHOD.md "Metrics"). Pure functions, thread-safe.
+#pragma once
+
+#include "core/color/lab.h"
+
+namespace color3d {
+
+// CIEDE2000 with kL = kC = kH = 1 (Sharma, Wu, Dalal 2005; checked against their 34 pairs).
+double DeltaE00(const LabColor& x, const LabColor& y);
+
+// Mean CIEDE2000 over two 3-channel Lab images of equal size.
+double MeanDeltaE00(const Image& lab_x, const Image& lab_y);
+
+// Hasler & Suesstrunk 2003, signed opponent channels, of a 3-channel sRGB image in 0..1 (the
+// formula works on 0..255).
+double Colourfulness(const Image& srgb);
+
+}  // namespace color3d

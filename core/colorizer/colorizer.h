@@ -1,0 +1,62 @@
+// The personalized colorizer (METHOD.md "Stage 1d"): frozen ConvNeXt encoder, Conv-Adapters and a
+// per-scene decoder, trained on one coloured key view; L in, ab out. No torch in this interface.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/base/cancellation.h"
+#include "core/base/image.h"
+#include "core/base/progress.h"
+#include "core/encoder/encoder.h"
+
+namespace color3d {
+
+struct ColorizerOptions {
+  enum class Recipe {
+    kOurs,   // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
+    kPaper,  // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
+  };
+  Recipe recipe = Recipe::kOurs;
+  int iterations = 800;      // 0..100000
+  double time_limit_seconds = 0.0;  // > 0: the schedule is shortened to end in time
+  int max_side_px = 400;     // of the key view during training, 64..2048
+  int crop_px = 256;         // 64..1024, clipped to the picture
+  double consistency_weight = 0.0;  // the paper's A4 term; 0 = off
+  int threads = 0;
+  uint64_t seed = 1;
+  void Validate() const;
+};
+
+// Immutable once trained; thread-safe to use.
+class Colorizer {
+ public:
+  virtual ~Colorizer() = default;
+  // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
+  // than the training size are coloured at that size and upsampled guided by L.
+  virtual Image Colorize(const Image& luminance) const = 0;
+  // Colorizer file: versioned header, encoder digest, adapters, decoder, training curve.
+  virtual std::string Serialize() const = 0;
+};
+
+// `luminance`: 1 channel; `ab`: 2 channels, Lab units, same size, undistorted key view. Reports
+// "train_l1_ab" and, on views of the key that are never trained on (held-out augmentations),
+// "validation_delta_e00". Gradient clipping; a non-finite loss restores the last good state with
+// half the step and warns. Resumable.
+std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
+                                                const Image& luminance,
+                                                const Image& ab,
+                                                const ColorizerOptions& options,
+                                                CheckpointStore& checkpoints,
+                                                ProgressObserver& progress,
+                                                const CancellationToken& cancel);
+
+// Throws Error{kInvalidArgument} on a damaged file, kFailedPrecondition when it was trained on
+// another encoder (both digests are named).
+std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
+                                               std::shared_ptr<const Encoder> encoder,
+                                               int threads = 0);
+
+}  // namespace color3d

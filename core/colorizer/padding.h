@@ -1,0 +1,12 @@
+// Borders that bring a picture to a multiple of the network's stride.
+#pragma once
+
+#include <torch/types.h>
+
+namespace color3d {
+
+// [1,C,H,W] extended to the right and downwards to multiples of `multiple` by reflection
+// (replication where the picture is too small to reflect).
+torch::Tensor PadToMultiple(const torch::Tensor& x, int multiple);
+
+}  // namespace color3d

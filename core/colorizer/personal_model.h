@@ -1,0 +1,99 @@
+// The trained part of a colorizer: per-scene decoder and Conv-Adapters around the shared frozen
+// encoder (METHOD.md "Stage 1d"). Torch in the interface; used inside core/colorizer only.
+// Forward() is const: any number of threads may call it while nobody changes the parameters.
+#pragma once
+
+#include <torch/types.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/random.h"
+#include "core/encoder/convnext.h"
+
+namespace color3d {
+
+struct PersonalModelConfig {
+  std::vector<int> widths{32, 64, 96, 128};  // decoder channels at the encoder's taps, fine to coarse
+  bool instance_norm = false;  // per picture (paper); otherwise statistics frozen from the key view
+  bool adapters = false;       // Conv-Adapters in every block of the stages >= first_adapter_stage
+  int first_adapter_stage = 0;
+  int adapter_kernel = 7;
+  int adapter_reduction = 8;  // gamma
+};
+
+class PersonalModel {
+ public:
+  // Random start, the same for the same generator. `encoder` must outlive the model. The adapters
+  // start at zero and the head at (0, 0) plus `mean_ab` (Lab units / kAbScale).
+  PersonalModel(const ConvNext& encoder,
+                const PersonalModelConfig& config,
+                const std::array<float, 2>& mean_ab,
+                Random& random);
+
+  const PersonalModelConfig& config() const { return config_; }
+
+  // ab / kAbScale at the first tap's stride, [B,2,H/s,W/s], of L [B,1,H,W] (0..100); H and W are
+  // multiples of the last tap's stride.
+  torch::Tensor Forward(const torch::Tensor& luminance) const;
+  // The same from taps that are already there (without adapters).
+  torch::Tensor Decode(const std::vector<torch::Tensor>& taps, const torch::Tensor& luminance) const;
+  std::vector<torch::Tensor> Taps(const torch::Tensor& luminance) const;
+
+  // Takes mean and deviation of every normalised activation from this picture, layer after layer,
+  // and keeps them from now on. No effect with instance norm.
+  void FreezeStatistics(const torch::Tensor& luminance);
+
+  // Everything that Forward depends on, in a fixed order: first what is trained, then the frozen
+  // statistics. The tensors share storage with the model.
+  const std::vector<std::pair<std::string, torch::Tensor>>& parameters() const {
+    return parameters_;
+  }
+  const std::vector<std::pair<std::string, torch::Tensor>>& statistics() const {
+    return statistics_;
+  }
+  void RequireGradients(bool on);
+
+ private:
+  struct Norm {
+    torch::Tensor weight, bias;      // trained
+    torch::Tensor mean, inverse_deviation;  // frozen
+  };
+  struct ResidualBlock {
+    torch::Tensor conv1, bias1, conv2, bias2;
+    Norm norm;
+  };
+  struct Level {
+    torch::Tensor fuse, fuse_bias;
+    Norm norm;
+    std::vector<ResidualBlock> blocks;
+  };
+  struct Adapter {
+    torch::Tensor grouped, grouped_bias, pointwise, pointwise_bias, scale;
+  };
+
+  torch::Tensor NewParameter(const std::string& name, std::vector<int64_t> shape, double deviation,
+                             Random& random);
+  torch::Tensor NewConstant(const std::string& name, std::vector<int64_t> shape, float value);
+  Norm NewNorm(const std::string& name, int64_t channels);
+  void AddLevel(const std::string& name, int64_t in, int64_t out, Random& random);
+  void AddAdapters(Random& random);
+  torch::Tensor Normalise(const Norm& norm, const torch::Tensor& x) const;
+  torch::Tensor RunBlock(const ResidualBlock& block, const torch::Tensor& x) const;
+  torch::Tensor Adapt(int stage, int block, const torch::Tensor& x) const;
+
+  const ConvNext& encoder_;
+  PersonalModelConfig config_;
+  std::vector<Level> levels_;  // fine to coarse
+  std::vector<std::vector<Adapter>> adapters_;
+  torch::Tensor head_, head_bias_;
+  bool measuring_statistics_ = false;
+  std::vector<std::pair<std::string, torch::Tensor>> parameters_;
+  std::vector<std::pair<std::string, torch::Tensor>> statistics_;
+};
+
+// The network's output times this is ab in Lab units.
+inline constexpr float kAbScale = 110.0f;
+
+}  // namespace color3d

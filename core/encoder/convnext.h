@@ -1,0 +1,67 @@
+// ConvNeXt as frozen feature extractor, with torch in the interface: for the colorizer only.
+// Immutable after construction; Taps() may be called from any number of threads.
+#pragma once
+
+#include <torch/types.h>
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/encoder/convnext_config.h"
+#include "core/encoder/encoder.h"
+#include "core/encoder/weight_map.h"
+
+namespace color3d {
+
+// [1,1,H,W] float tensor (a copy) of a 1-channel picture, and back.
+torch::Tensor TensorFromImage(const Image& image);  // [1,C,H,W]
+Image ImageFromTensor(const torch::Tensor& tensor);  // [1,C,H,W] or [C,H,W], any memory format
+
+class ConvNext : public Encoder {
+ public:
+  // Added to the output of a block's depth-wise convolution: gets the block's input [B,C,h,w] and
+  // returns the same shape, or an undefined tensor for nothing.
+  using BlockAdapter = std::function<torch::Tensor(int stage, int block, const torch::Tensor&)>;
+
+  // Throws Error{kInvalidArgument} naming the first weight that is missing, unexpected or has
+  // another shape than `config` asks for.
+  ConvNext(const ConvNextConfig& config, const WeightMap& weights, std::string description);
+
+  const ConvNextConfig& config() const { return config_; }
+  const std::string& digest() const override { return digest_; }
+  const std::string& description() const override { return description_; }
+  std::vector<double> Describe(const Image& luminance) const override;
+  Image DeepFeatures(const Image& luminance) const override;
+
+  // Network input [B,3,H,W] of L [B,1,H,W] (0..100): the grey picture Lab(L,0,0) in sRGB,
+  // normalised with ImageNet's statistics.
+  torch::Tensor Input(const torch::Tensor& luminance) const;
+  // norm0 .. norm3: taps [B, dims[i], H / Stride(i), W / Stride(i)], channels-last. H and W must be
+  // multiples of the last stride. Gradients flow to the adapter, never to the frozen weights.
+  std::vector<torch::Tensor> Taps(const torch::Tensor& input,
+                                  const BlockAdapter& adapter = {}) const;
+
+ private:
+  struct Block {
+    torch::Tensor dwconv_weight, dwconv_bias, norm_weight, norm_bias;
+    torch::Tensor pwconv1_weight, pwconv1_bias, pwconv2_weight, pwconv2_bias, gamma;
+  };
+  struct Stage {
+    torch::Tensor down_weight, down_bias, down_norm_weight, down_norm_bias;
+    torch::Tensor norm_weight, norm_bias;
+    std::vector<Block> blocks;
+  };
+  torch::Tensor RunBlock(const Block& block,
+                         const torch::Tensor& x,
+                         const torch::Tensor& adapted) const;
+  torch::Tensor DeepTap(const Image& luminance, int max_side_px) const;
+
+  ConvNextConfig config_;
+  std::string digest_;
+  std::string description_;
+  std::vector<Stage> stages_;
+};
+
+}  // namespace color3d

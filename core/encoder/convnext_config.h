@@ -1,0 +1,24 @@
+// Sizes of a ConvNeXt (Liu et al. 2022). Plain value, no torch.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace color3d {
+
+struct ConvNextConfig {
+  // Stem: one strided convolution. The published networks use 4x4 stride 4 (taps at strides 4..32);
+  // ours looks 8x8 at stride 2, because chroma has to be predicted at stride 2 to be sharp.
+  int stem_kernel = 8;
+  int stem_stride = 2;
+  std::vector<int> dims{32, 64, 128, 192};  // channels per stage; each stage halves the size
+  std::vector<int> depths{1, 1, 2, 1};      // blocks per stage
+
+  int StageCount() const { return static_cast<int>(dims.size()); }
+  // Stride of a stage's tap in pixels of the input picture.
+  int Stride(int stage) const { return stem_stride << stage; }
+  // One line that names everything that the weights do not say; enters the digest.
+  std::string ToString() const;
+};
+
+}  // namespace color3d

@@ -1,0 +1,17 @@
+// Weights for the embedded encoder until pre-trained ones are shipped: random features that resemble
+// a scattering transform (Bruna & Mallat 2013). Deterministic: our own generator, no torch.
+#pragma once
+
+#include <cstdint>
+
+#include "core/encoder/convnext_config.h"
+#include "core/encoder/weight_map.h"
+
+namespace color3d {
+
+// Complete set of weights for `config`, named as in the published ConvNeXt state dicts. The stem
+// holds Gabor and difference-of-Gaussians filters, depth-wise filters are smooth random low- and
+// band-passes, 1x1 layers are random with orthogonal rows.
+WeightMap RandomFeatureWeights(const ConvNextConfig& config, uint64_t seed);
+
+}  // namespace color3d

@@ -1,0 +1,43 @@
+// Decoding, encoding and resampling of pictures (OpenCV inside, never in this interface).
+// Pure functions, thread-safe.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "core/base/image.h"
+#include "core/image/probe.h"
+
+namespace color3d {
+
+// Picture as stored in a file: sRGB in 0..1, 1 channel (grey) or 3 (RGB), EXIF orientation applied,
+// 8- or 16-bit precision kept. With `keep_alpha`, PNG alpha is a last channel (2 or 4 channels).
+// Throws Error{kInvalidArgument} naming `file_name` (see ProbeImage) or when decoding fails.
+Image DecodeImage(std::string_view bytes, const std::string& file_name, bool keep_alpha = false);
+Image ReadImage(const std::filesystem::path& path, bool keep_alpha = false);
+
+// True when a 3-channel sRGB image has no colour: every |R-G|, |G-B| <= `tolerance` (0..1) for at
+// least 99.5 % of the pixels. 1-channel images are grey.
+bool IsGray(const Image& srgb, float tolerance = 0.02f);
+
+// Bytes of a file; values are clamped to 0..1. 1 or 3 channels (4 with alpha for PNG).
+std::string EncodePng8(const Image& image);
+std::string EncodePng16(const Image& image);
+std::string EncodeJpeg(const Image& image, int quality = 92);
+
+// Area averaging down, bicubic-free bilinear up; any channel count.
+Image Resize(const Image& image, int width, int height);
+// Resized so that the longer side is at most `max_side_px` (never enlarged). <= 0: a copy.
+Image FitWithin(const Image& image, int max_side_px);
+
+// ab maps (2 channels, Lab units) as 16-bit PNG: R = (a+128)/255, G = (b+128)/255, B = confidence
+// in 0..1 (1 when `confidence` is empty). Lossless to 0.004 Lab units.
+std::string EncodeAbPng(const Image& ab, const Image& confidence = {});
+struct AbMap {
+  Image ab;          // 2 channels, Lab units
+  Image confidence;  // 1 channel, 0..1
+};
+AbMap DecodeAbPng(std::string_view bytes, const std::string& file_name);
+
+}  // namespace color3d

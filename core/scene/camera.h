@@ -1,0 +1,44 @@
+// Pinhole camera, lens distortion and rigid pose. Conventions as COLMAP: x right, y down, z
+// forward; pixel centres at +0.5 (the pixel in the upper left corner covers [0,1]x[0,1]).
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+
+namespace color3d {
+
+// Undistorted pinhole intrinsics, px.
+struct Camera {
+  int width = 0;
+  int height = 0;
+  double fx = 0.0;
+  double fy = 0.0;
+  double cx = 0.0;
+  double cy = 0.0;
+
+  // The same camera for an image resized to width x height px.
+  Camera Scaled(int new_width, int new_height) const;
+  // Scaled so that the longer side is at most max_side_px; unchanged when it is, or for <= 0.
+  Camera FitWithin(int max_side_px) const;
+};
+
+// Brown-Conrady (OpenCV order k1 k2 p1 p2 k3 k4 k5 k6) or Kannala-Brandt fisheye (k1..k4).
+struct Distortion {
+  enum class Model { kNone, kBrown, kFisheye };
+  Model model = Model::kNone;
+  std::array<double, 8> k{};
+};
+
+// x_cam = rotation * x_world + translation.
+struct Pose {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d Center() const { return -(rotation.conjugate() * translation); }
+  Eigen::Vector3d Apply(const Eigen::Vector3d& world) const {
+    return rotation * world + translation;
+  }
+};
+
+}  // namespace color3d

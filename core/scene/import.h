@@ -1,0 +1,60 @@
+// From a folder of files to a posed Scene: finds what kind of input it is, reads poses or runs
+// structure-from-motion, undistorts cameras, and checks everything at the door.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/progress.h"
+#include "core/scene/scene.h"
+
+namespace color3d {
+
+enum class SceneLayout { kPhotos, kColmap, kTransforms };
+
+struct ImportOptions {
+  // Hold out every eighth view (sorted by name; the first, ninth, ...) for evaluation.
+  bool hold_out_every_eighth = false;
+  // Structure-from-motion (only when the input has no poses).
+  int sfm_max_image_side_px = 1600;  // 256..4096
+  int sfm_max_features = 4096;       // 512..16384, per photo
+  std::chrono::seconds sfm_timeout{3600};
+  int threads = 0;                   // 0: all
+  void Validate() const;             // throws Error{kInvalidArgument}
+};
+
+struct ImportResult {
+  Scene scene;
+  SceneLayout layout = SceneLayout::kPhotos;
+  bool ran_structure_from_motion = false;
+  bool undistorted = false;            // some camera had lens distortion
+  int photos_found = 0;
+  int photos_registered = 0;
+  std::vector<std::string> warnings;
+};
+
+// `scene_folder` holds photos (directly or in images/), or a COLMAP model (sparse/0, sparse or the
+// folder itself; text or binary) with images/, or transforms.json with the photos that it names.
+// With poses of several kinds, COLMAP's wins. `scratch_folder` receives structure-from-motion's
+// files and sfm.log. Throws Error: an empty folder, one photo, unreadable photos, a model whose
+// images are missing, non-finite numbers, photos that do not overlap (how many registered and why
+// it may have failed).
+ImportResult ImportScene(const std::filesystem::path& scene_folder,
+                         const std::filesystem::path& scratch_folder,
+                         const ImportOptions& options,
+                         ProgressObserver& progress,
+                         const CancellationToken& cancel);
+
+// Readers on their own. The returned views have `image_file` relative to `scene_folder`.
+Scene ReadColmapModel(const std::filesystem::path& model_folder,
+                      const std::filesystem::path& scene_folder);
+Scene ReadTransformsJson(const std::filesystem::path& json_file,
+                         const std::filesystem::path& scene_folder);
+// Writers for round trips and for users who want to look at the poses elsewhere.
+void WriteColmapText(const Scene& scene, const std::filesystem::path& model_folder);
+void WriteTransformsJson(const Scene& scene, const std::filesystem::path& json_file);
+
+}  // namespace color3d

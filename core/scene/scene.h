@@ -1,0 +1,52 @@
+// A posed scene: views with cameras, sparse points, and where the photographs are. A plain value;
+// serialised as scene.json, the output of the import stage and the input of every later one.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/camera.h"
+
+namespace color3d {
+
+struct View {
+  std::string name;        // unique in the scene: the photo's path relative to the images folder
+  std::string image_file;  // path of the photo relative to the scene's folder
+  // Camera of the *undistorted* picture at full size, and of the photo as captured.
+  Camera camera;
+  Camera captured_camera;
+  Distortion distortion;  // of captured_camera
+  Pose cam_from_world;
+  bool held_out = false;  // used for evaluation only, never by any trainer
+};
+
+struct SparsePoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double reprojection_error_px = 0.0;  // < 0: unknown
+  std::vector<int> views;              // indices of the views that observe it, ascending
+};
+
+struct Scene {
+  std::vector<View> views;  // sorted by name
+  std::vector<SparsePoint> points;
+  // Subtracted from all world coordinates on import (geo-referenced scenes); add on export.
+  Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
+
+  std::vector<int> TrainingViews() const;
+  std::vector<int> HeldOutViews() const;
+  // Index of a view by name (or by file stem when that is unique); throws Error{kNotFound} naming
+  // a few that exist.
+  int FindView(std::string_view name) const;
+  // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
+  double Extent() const;
+};
+
+std::string SceneToJson(const Scene& scene);
+// Throws Error{kInvalidArgument} naming the offending field.
+Scene SceneFromJson(std::string_view json);
+
+}  // namespace color3d

@@ -1,0 +1,41 @@
+// Pictures of a scene's views: decoded, undistorted, reduced to a working size, converted to L, and
+// kept in a cache with a byte budget, so that memory does not grow with the number of photos.
+// Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "core/base/image.h"
+#include "core/scene/scene.h"
+
+namespace color3d {
+
+class ViewImages {
+ public:
+  // `scene` and the files below `scene_folder` must outlive this object. Working size: the longer
+  // side of every picture is at most max_side_px (<= 0: full size).
+  ViewImages(const Scene& scene,
+             std::filesystem::path scene_folder,
+             int max_side_px,
+             int64_t cache_budget_bytes = int64_t{1} << 30);
+  ~ViewImages();
+
+  // Camera of the picture that Luminance() and Srgb() return.
+  Camera WorkingCamera(int view) const;
+  // 1 channel, L in 0..100, captured precision.
+  std::shared_ptr<const Image> Luminance(int view) const;
+  // 3 channels, sRGB 0..1 (grey photos: three equal channels). Not cached.
+  Image Srgb(int view) const;
+  // Any picture (1..4 channels) that has the size of the view's photo as captured, after EXIF
+  // orientation: undistorted and reduced in the same way. Throws Error{kInvalidArgument} with both
+  // sizes when the size is another.
+  Image Undistort(int view, const Image& captured) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace color3d

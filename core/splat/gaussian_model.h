@@ -1,0 +1,41 @@
+// Lab-space Gaussians as structure-of-arrays float buffers (METHOD.md "Stage 2"). A plain value.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/scene.h"
+
+namespace color3d {
+
+// Raw (pre-activation) parameters. Row i of an n-wide buffer is [i*n, (i+1)*n).
+struct GaussianModel {
+  int channels = 1;   // 1: luminance only (warm-up); 3: L', a', b'
+  int sh_degree = 0;  // of luminance, 0..3
+  int chroma_sh_degree = 0;  // of a' and b', 0..1
+
+  std::vector<float> position;       // 3: world
+  std::vector<float> log_scale;      // 3: scale = exp
+  std::vector<float> rotation;       // 4: quaternion w x y z, not normalised
+  std::vector<float> opacity_logit;  // 1: opacity = sigmoid
+  // Spherical harmonics, (degree + 1)^2 coefficients; the value of a channel is 0.5 + sum for L',
+  // and kNeutralChroma + sum for a' and b' (so all-zero chroma coefficients are exactly neutral).
+  std::vector<float> sh_l;
+  std::vector<float> sh_a;  // empty when channels == 1
+  std::vector<float> sh_b;
+
+  size_t size() const { return opacity_logit.size(); }
+};
+
+// One Gaussian per sparse point: scale from the mean distance to its 3 nearest neighbours, opacity
+// 0.1, luminance 0.5. Throws Error{kInvalidArgument} when the scene has no points.
+GaussianModel InitialGaussians(const Scene& scene);
+
+// Native file, with a versioned header and a checksum: all of the model, bit for bit.
+std::string SerializeGaussians(const GaussianModel& model);
+// Throws Error{kInvalidArgument} on anything else (wrong magic, newer version, truncated, NaN).
+GaussianModel ParseGaussians(std::string_view bytes);
+
+}  // namespace color3d

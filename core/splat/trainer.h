@@ -1,0 +1,75 @@
+// The two halves of Lab Gaussian reconstruction: luminance geometry (the paper's warm-up, one
+// channel), then chroma on it (METHOD.md "Stage 2"). Deterministic for a seed and a thread count.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/image.h"
+#include "core/base/parallel.h"
+#include "core/base/progress.h"
+#include "core/scene/scene.h"
+#include "core/scene/view_images.h"
+#include "core/splat/gaussian_model.h"
+
+namespace color3d {
+
+struct GeometryOptions {
+  int iterations = 3000;            // 0..100000
+  int max_gaussians = 150'000;      // hard cap, 1..10,000,000
+  int sh_degree = 2;                // of luminance at the end, 0..3
+  double ssim_weight = 0.2;         // lambda of (1 - SSIM), 0..1
+  double edge_weight = 1.0;         // of the Charbonnier-Laplacian term, 0..10
+  double densify_gradient = 2e-4;   // NDC units
+  double learning_rate_scale = 1.0; // on all learning rates, 1e-3..1e3
+  uint64_t seed = 1;
+  void Validate() const;
+};
+
+struct ChromaOptions {
+  int iterations = 600;    // of Adam on a', b' coefficients after the closed-form start, 0..100000
+  int chroma_sh_degree = 0;  // 0..1
+  double ssim_weight = 0.2;
+  uint64_t seed = 1;
+  void Validate() const;
+};
+
+// Trains on the training views of `scene` at the working size of `images`. Reports curves
+// "train_l1_l" (running mean of |L'-L'_true|) and "heldout_psnr_l_db" (when there are held-out
+// views, a few times). Resumes from and saves to `checkpoints`. Non-finite values never survive: the
+// last good state is restored with a smaller step, and a warning tells. Throws
+// Error{kInvalidArgument} for a scene without points in front of any camera, Error{kCancelled}.
+GaussianModel TrainGeometry(const Scene& scene,
+                            const ViewImages& images,
+                            const GeometryOptions& options,
+                            ThreadPool& pool,
+                            CheckpointStore& checkpoints,
+                            ProgressObserver& progress,
+                            const CancellationToken& cancel);
+
+// Target chroma of one training view at the working size: 2 channels (Lab units) and an optional
+// 1-channel weight 0..1 (empty: all 1).
+struct ChromaTarget {
+  Image ab;
+  Image weight;
+};
+using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
+
+// Expands a 1-channel model to L', a', b' and fits chroma with geometry fixed: closed form first
+// (visibility-weighted mean per Gaussian), then Adam on 0.8 L1 + 0.2 (1 - SSIM) of a', b'.
+// Gaussians that no training view sees get their nearest seen neighbours' chroma. Curve:
+// "train_l1_ab" (Lab units).
+GaussianModel FitChroma(const GaussianModel& geometry,
+                        const Scene& scene,
+                        const ViewImages& images,
+                        const ChromaTargetSource& targets,
+                        const ChromaOptions& options,
+                        ThreadPool& pool,
+                        CheckpointStore& checkpoints,
+                        ProgressObserver& progress,
+                        const CancellationToken& cancel);
+
+}  // namespace color3d

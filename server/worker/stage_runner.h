@@ -1,0 +1,67 @@
+// The seam between the worker loop (leases, blobs, heartbeats) and the method library: the loop
+// prepares files, the runner turns the job's spec into one core stage and leaves its results as
+// files. The only folder of the server that links the method library is server/worker.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/progress.h"
+
+namespace color3d {
+
+// What the report tells of the other jobs of a ColorizeScene graph.
+struct JobSummary {
+  std::string kind;
+  std::string state;        // "SUCCEEDED", "SKIPPED", ...
+  std::string skip_reason;  // why the plan left it out
+  double seconds = 0.0;     // of computing, over all attempts (of the original run when cached)
+  bool cached = false;
+  int64_t peak_memory_bytes = 0;
+  std::vector<std::string> warnings;
+};
+
+// Files by digest, for blobs that a spec names (key colour, truth).
+class BlobSource {
+ public:
+  virtual ~BlobSource() = default;
+  // A read-only file with these bytes; valid while the stage runs. Throws Error{kNotFound}.
+  virtual std::filesystem::path Fetch(const std::string& sha256) = 0;
+};
+
+struct StageRun {
+  std::string job_name;  // "jobs/..."
+  std::string spec;      // serialised color3d.v1.JobSpec
+  std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
+  // Artifacts of the jobs that this one depends on, by artifact name (read-only files).
+  std::map<std::string, std::filesystem::path> inputs;
+  std::filesystem::path output_folder;   // empty; what the runner leaves here may be published
+  std::filesystem::path scratch_folder;  // empty; deleted afterwards
+  std::vector<JobSummary> graph;         // the root job only: its children
+  int threads = 1;
+};
+
+struct StageOutput {
+  std::vector<std::string> files;        // relative paths below output_folder = artifact names
+  std::vector<std::string> passed_on;    // names of `inputs` to publish again under the same name
+};
+
+class StageRunner {
+ public:
+  virtual ~StageRunner() = default;
+  // Runs one attempt. Throws Error; anything else that escapes is an internal error of ours.
+  virtual StageOutput Run(const StageRun& run,
+                          BlobSource& blobs,
+                          CheckpointStore& checkpoints,
+                          ProgressObserver& progress,
+                          const CancellationToken& cancel) = 0;
+};
+
+// The real one (stage_runner.cc): every stage of core/stage.
+std::unique_ptr<StageRunner> MakeStageRunner();
+
+}  // namespace color3d
