@@ -25,8 +25,8 @@ LabColor LabFromSrgb(const RgbColor& srgb);
 // May leave 0..1: out-of-gamut values are returned as they are.
 RgbColor SrgbFromLabUnclamped(const LabColor& lab);
 // In 0..1: chroma is reduced at constant L and hue until the colour fits, continuously in `lab`.
-// Not by channel clipping, but for the last 1.3 % of red: the gamut's bright yellow edge is not
-// convex, and there clipping red costs at most 0.84 CIEDE2000 where strict reduction would halve
+// Channels are not clipped, but for up to 1.3 % of red at L 90..100: the gamut's bright yellow edge
+// is not convex, and there clipping costs at most 0.84 CIEDE2000 where strict reduction would halve
 // the chroma of colours that miss the gamut by a hair. L outside 0..100 becomes black or white.
 RgbColor SrgbFromLab(const LabColor& lab);
 

@@ -20,10 +20,10 @@ struct ColorizerOptions {
     kPaper,  // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
   };
   Recipe recipe = Recipe::kOurs;
-  int iterations = 800;      // 0..100000
+  int iterations = 800;             // 0..100000
   double time_limit_seconds = 0.0;  // > 0: the schedule is shortened to end in time
-  int max_side_px = 400;     // of the key view during training, 64..2048
-  int crop_px = 256;         // 64..1024, clipped to the picture
+  int max_side_px = 400;            // of the key view during training, 64..2048
+  int crop_px = 256;                // 64..1024, clipped to the picture
   double consistency_weight = 0.0;  // the paper's A4 term; 0 = off
   int threads = 0;
   uint64_t seed = 1;

@@ -5,6 +5,9 @@
 
 namespace color3d {
 
+// METHOD.md "Stage 1d": every picture is padded to multiples of 32.
+inline constexpr int kPadMultiple = 32;
+
 // [1,C,H,W] extended to the right and downwards to multiples of `multiple` by reflection
 // (replication where the picture is too small to reflect).
 torch::Tensor PadToMultiple(const torch::Tensor& x, int multiple);

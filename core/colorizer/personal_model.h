@@ -5,6 +5,7 @@
 
 #include <torch/types.h>
 
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,7 +16,8 @@
 namespace color3d {
 
 struct PersonalModelConfig {
-  std::vector<int> widths{32, 64, 96, 128};  // decoder channels at the encoder's taps, fine to coarse
+  std::vector<int> widths{
+      32, 64, 96, 128};        // decoder channels at the encoder's taps, fine to coarse
   bool instance_norm = false;  // per picture (paper); otherwise statistics frozen from the key view
   bool adapters = false;       // Conv-Adapters in every block of the stages >= first_adapter_stage
   int first_adapter_stage = 0;
@@ -33,12 +35,15 @@ class PersonalModel {
                 Random& random);
 
   const PersonalModelConfig& config() const { return config_; }
+  const std::string& EncoderDigest() const { return encoder_.digest(); }
+  int OutputStride() const { return encoder_.config().stem_stride; }
 
   // ab / kAbScale at the first tap's stride, [B,2,H/s,W/s], of L [B,1,H,W] (0..100); H and W are
   // multiples of the last tap's stride.
   torch::Tensor Forward(const torch::Tensor& luminance) const;
   // The same from taps that are already there (without adapters).
-  torch::Tensor Decode(const std::vector<torch::Tensor>& taps, const torch::Tensor& luminance) const;
+  torch::Tensor Decode(const std::vector<torch::Tensor>& taps,
+                       const torch::Tensor& luminance) const;
   std::vector<torch::Tensor> Taps(const torch::Tensor& luminance) const;
 
   // Takes mean and deviation of every normalised activation from this picture, layer after layer,
@@ -54,10 +59,13 @@ class PersonalModel {
     return statistics_;
   }
   void RequireGradients(bool on);
+  // Runs the decoder in bfloat16 (parameters, head and loss stay float32). For training only, where
+  // the processor multiplies it natively.
+  void set_bfloat16(bool on) { bfloat16_ = on; }
 
  private:
   struct Norm {
-    torch::Tensor weight, bias;      // trained
+    torch::Tensor weight, bias;             // trained
     torch::Tensor mean, inverse_deviation;  // frozen
   };
   struct ResidualBlock {
@@ -73,12 +81,15 @@ class PersonalModel {
     torch::Tensor grouped, grouped_bias, pointwise, pointwise_bias, scale;
   };
 
-  torch::Tensor NewParameter(const std::string& name, std::vector<int64_t> shape, double deviation,
+  torch::Tensor NewParameter(const std::string& name,
+                             std::vector<int64_t> shape,
+                             double deviation,
                              Random& random);
   torch::Tensor NewConstant(const std::string& name, std::vector<int64_t> shape, float value);
   Norm NewNorm(const std::string& name, int64_t channels);
   void AddLevel(const std::string& name, int64_t in, int64_t out, Random& random);
   void AddAdapters(Random& random);
+  torch::Tensor Working(const torch::Tensor& x) const;
   torch::Tensor Normalise(const Norm& norm, const torch::Tensor& x) const;
   torch::Tensor RunBlock(const ResidualBlock& block, const torch::Tensor& x) const;
   torch::Tensor Adapt(int stage, int block, const torch::Tensor& x) const;
@@ -89,6 +100,7 @@ class PersonalModel {
   std::vector<std::vector<Adapter>> adapters_;
   torch::Tensor head_, head_bias_;
   bool measuring_statistics_ = false;
+  bool bfloat16_ = false;
   std::vector<std::pair<std::string, torch::Tensor>> parameters_;
   std::vector<std::pair<std::string, torch::Tensor>> statistics_;
 };

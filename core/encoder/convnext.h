@@ -16,7 +16,7 @@
 namespace color3d {
 
 // [1,1,H,W] float tensor (a copy) of a 1-channel picture, and back.
-torch::Tensor TensorFromImage(const Image& image);  // [1,C,H,W]
+torch::Tensor TensorFromImage(const Image& image);   // [1,C,H,W]
 Image ImageFromTensor(const torch::Tensor& tensor);  // [1,C,H,W] or [C,H,W], any memory format
 
 class ConvNext : public Encoder {

@@ -27,9 +27,9 @@ struct ColorHint {
 };
 
 struct HintOptions {
-  double sigma = 2.0;             // L difference (0..100) at which two neighbours stop to agree, > 0
-  int max_side_px = 1024;         // solved at this size, upsampled guided by L; 64..8192
-  double tolerance = 1e-6;        // relative residual of the conjugate gradients
+  double sigma = 2.0;       // L difference (0..100) at which two neighbours stop to agree, > 0
+  int max_side_px = 1024;   // solved at this size, upsampled guided by L; 64..8192
+  double tolerance = 1e-6;  // relative residual of the conjugate gradients
   int max_iterations = 2000;
   void Validate() const;
 };

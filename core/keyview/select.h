@@ -32,14 +32,14 @@ struct KeyViewSelection {
 };
 
 // features[i] is view i's descriptor (any length >= 1, all equal). H_i = -sum_j P_ij log P_ij with
-// P the row softmax of S / temperature, S the cosine similarities; ties to the lowest index. Zero or
-// non-finite descriptors are set aside with a warning. Throws Error{kInvalidArgument} for no views
-// or when no descriptor is usable.
+// P the row softmax of S / temperature, S the cosine similarities; ties to the lowest index. Zero
+// or non-finite descriptors are set aside with a warning. Throws Error{kInvalidArgument} for no
+// views or when no descriptor is usable.
 KeyViewSelection SelectKeyViewByEntropy(const std::vector<std::vector<double>>& features,
                                         const KeyViewOptions& options);
 
-// mean_distance[i][j]: how badly view i explains view j (mean nearest-neighbour distance of j's deep
-// features to i's). Chooses the row with the smallest mean over j != i.
+// mean_distance[i][j]: how badly view i explains view j (mean nearest-neighbour distance of j's
+// deep features to i's). Chooses the row with the smallest mean over j != i.
 KeyViewSelection SelectKeyViewByCoverage(const std::vector<std::vector<double>>& mean_distance,
                                          const std::vector<std::vector<double>>& features,
                                          const KeyViewOptions& options);

@@ -22,18 +22,18 @@ struct ImportOptions {
   int sfm_max_image_side_px = 1600;  // 256..4096
   int sfm_max_features = 4096;       // 512..16384, per photo
   std::chrono::seconds sfm_timeout{3600};
-  int threads = 0;                   // 0: all
-  void Validate() const;             // throws Error{kInvalidArgument}
+  int threads = 0;        // 0: all
+  void Validate() const;  // throws Error{kInvalidArgument}
 };
 
 struct ImportResult {
   Scene scene;
   SceneLayout layout = SceneLayout::kPhotos;
   bool ran_structure_from_motion = false;
-  bool undistorted = false;            // some camera had lens distortion
+  bool undistorted = false;  // some camera had lens distortion
   int photos_found = 0;
   int photos_registered = 0;
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings;  // for the report; not sent to the observer
 };
 
 // `scene_folder` holds photos (directly or in images/), or a COLMAP model (sparse/0, sparse or the
@@ -41,7 +41,8 @@ struct ImportResult {
 // With poses of several kinds, COLMAP's wins. `scratch_folder` receives structure-from-motion's
 // files and sfm.log. Throws Error: an empty folder, one photo, unreadable photos, a model whose
 // images are missing, non-finite numbers, photos that do not overlap (how many registered and why
-// it may have failed).
+// it may have failed). Scenes far from the origin (cameras' mean beyond 1e3) are recentred; points
+// with fewer than 2 observations are dropped; poses without points get 20 000 seeded random ones.
 ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const std::filesystem::path& scratch_folder,
                          const ImportOptions& options,

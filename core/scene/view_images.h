@@ -1,6 +1,7 @@
 // Pictures of a scene's views: decoded, undistorted, reduced to a working size, converted to L, and
 // kept in a cache with a byte budget, so that memory does not grow with the number of photos.
-// Thread-safe.
+// Thread-safe. Resampled as sRGB (bicubic at up to twice the working size, then area-averaged), so
+// that Luminance() is exactly the L of Srgb().
 #pragma once
 
 #include <cstdint>

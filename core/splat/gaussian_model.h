@@ -12,8 +12,8 @@ namespace color3d {
 
 // Raw (pre-activation) parameters. Row i of an n-wide buffer is [i*n, (i+1)*n).
 struct GaussianModel {
-  int channels = 1;   // 1: luminance only (warm-up); 3: L', a', b'
-  int sh_degree = 0;  // of luminance, 0..3
+  int channels = 1;          // 1: luminance only (warm-up); 3: L', a', b'
+  int sh_degree = 0;         // of luminance, 0..3
   int chroma_sh_degree = 0;  // of a' and b', 0..1
 
   std::vector<float> position;       // 3: world

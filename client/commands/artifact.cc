@@ -1,0 +1,82 @@
+#include <algorithm>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/results.h"
+#include "client/lib/job_watch.h"
+#include "client/lib/names.h"
+#include "client/lib/text.h"
+
+namespace color3d::client {
+namespace {
+
+struct ArtifactOptions {
+  std::string job;
+  std::string name;  // empty: all
+  std::string out;
+};
+
+ExitCode RunList(const Context& context, const ArtifactOptions& options) {
+  Connection connection(context.server, *context.interrupt);
+  const v1::Job job = GetJob(connection, ResourceName(options.job, "jobs"));
+  if (context.json) {
+    nlohmann::ordered_json artifacts = nlohmann::ordered_json::array();
+    for (const v1::Artifact& artifact : job.artifacts()) artifacts.push_back(ToJson(artifact));
+    PrintJson({{"job", job.name()}, {"artifacts", artifacts}});
+    return ExitCode::kOk;
+  }
+  std::vector<std::vector<std::string>> rows = {{"NAME", "SIZE", "TYPE"}};
+  for (const v1::Artifact& artifact : job.artifacts()) {
+    rows.push_back(
+        {artifact.name(), HumanBytes(artifact.digest().size_bytes()), artifact.media_type()});
+  }
+  PrintText(Table(rows));
+  return ExitCode::kOk;
+}
+
+ExitCode RunDownload(const Context& context, const ArtifactOptions& options) {
+  Connection connection(context.server, *context.interrupt);
+  const v1::Job job = GetJob(connection, ResourceName(options.job, "jobs"));
+  std::vector<v1::Artifact> artifacts(job.artifacts().begin(), job.artifacts().end());
+  if (!options.name.empty()) artifacts = {FindArtifact(job, options.name)};
+  if (artifacts.empty()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                job.name() + " has no artifacts: it is " + StateName(job.state()) +
+                    "; they come when it has succeeded");
+  }
+  PrepareOut(options.out);
+  ProgressDisplay display(context.json);
+  const auto names = DownloadArtifacts(connection, artifacts, options.out, display);
+  if (context.json) {
+    PrintJson({{"job", job.name()}, {"out", options.out}, {"files", names}});
+  } else {
+    PrintText(std::to_string(names.size()) + (names.size() == 1 ? " file" : " files") + " in " +
+              options.out + "\n" + (options.name.empty() ? Summary(options.out) : ""));
+  }
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddArtifactCommands(CLI::App& app, Context& context) {
+  CLI::App* artifact = app.add_subcommand("artifact", "Results of jobs");
+  artifact->require_subcommand(1)->fallthrough();
+  const auto options = std::make_shared<ArtifactOptions>();
+
+  CLI::App* list = artifact->add_subcommand("list", "Names and sizes");
+  list->fallthrough()->add_option("JOB", options->job, "jobs/ID")->required();
+  list->callback([&context, options] {
+    context.action = [&context, options] { return RunList(context, *options); };
+  });
+
+  CLI::App* download = artifact->add_subcommand("download", "Fetch one result, or all");
+  download->fallthrough();
+  download->add_option("JOB", options->job, "jobs/ID")->required();
+  download->add_option("NAME", options->name, "Of the artifact, e.g. scene.ply");
+  download->add_option("-o,--out", options->out, "Folder to write to")->required();
+  download->callback([&context, options] {
+    context.action = [&context, options] { return RunDownload(context, *options); };
+  });
+}
+
+}  // namespace color3d::client

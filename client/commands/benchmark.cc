@@ -1,0 +1,143 @@
+#include "client/commands/benchmark.h"
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "client/commands/follow.h"
+#include "client/commands/results.h"
+#include "client/lib/blob_transfer.h"
+#include "client/lib/gray_copies.h"
+#include "client/lib/job_watch.h"
+#include "client/lib/scene_upload.h"
+#include "core/base/files.h"
+
+namespace color3d::client {
+namespace {
+
+constexpr int kPhotosToLookAt = 5;
+constexpr size_t kMinPhotos = 3;
+
+struct BenchmarkView {
+  std::string name;
+  std::string image_file;  // path in the scene
+  bool held_out = false;
+};
+
+std::vector<BenchmarkView> ParseViews(const std::string& scene_json) {
+  try {
+    std::vector<BenchmarkView> views;
+    const auto json = nlohmann::json::parse(scene_json);
+    for (const auto& view : json.at("views")) {
+      views.push_back({view.at("name"), view.at("image_file"), view.at("held_out")});
+    }
+    return views;
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ErrorCode::kDataLoss,
+                std::string("scene.json from the server cannot be read: ") + e.what());
+  }
+}
+
+std::string ParseKeyView(const std::string& key_view_json) {
+  try {
+    return nlohmann::json::parse(key_view_json).at("view");
+  } catch (const nlohmann::json::exception& e) {
+    throw Error(ErrorCode::kDataLoss,
+                std::string("key_view.json from the server cannot be read: ") + e.what());
+  }
+}
+
+struct Selection {
+  std::vector<BenchmarkView> views;
+  std::string key_view;
+};
+
+Selection SelectKeyView(Connection& connection,
+                        const Context& context,
+                        const ColorizeOptions& options,
+                        const std::string& scene,
+                        ProgressDisplay& display) {
+  const v1::Job import_job = SubmitJob(connection, ImportSpec(options, scene));
+  v1::JobSpec spec = SelectSpec(options, scene);
+  spec.add_inputs(import_job.name());
+  const v1::Job select_job = SubmitJob(connection, spec);
+  if (!Follow(connection, {import_job.name(), select_job.name()}, context, display)) {
+    throw CommandFailure(ExitCode::kDetached,
+                         "interrupted before the benchmark's colouring was submitted; run the same "
+                         "command again (finished stages are not repeated)");
+  }
+  const v1::Job imported = GetJob(connection, import_job.name());
+  RequireSuccess(connection, context, imported);
+  const v1::Job selected = GetJob(connection, select_job.name());
+  RequireSuccess(connection, context, selected);
+  return {ParseViews(ReadArtifact(connection, imported, "scene.json")),
+          ParseKeyView(ReadArtifact(connection, selected, "key_view.json"))};
+}
+
+}  // namespace
+
+void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& cancel) {
+  const std::string root = folder.root.string();
+  if (folder.photos.size() < kMinPhotos) {
+    throw InvalidArgument(root + " contains " + std::to_string(folder.photos.size()) +
+                          " photographs; --benchmark needs at least " + std::to_string(kMinPhotos));
+  }
+  const ColorCount count = CountColorPhotos(folder, kPhotosToLookAt, cancel);
+  if (count.MostlyColor()) return;
+  throw InvalidArgument("the photographs in " + root + " are monochrome (" +
+                        std::to_string(count.looked_at - count.in_color) + " of " +
+                        std::to_string(count.looked_at) +
+                        " looked at); --benchmark drops the colour of colour photos and scores "
+                        "against it: leave it out");
+}
+
+v1::JobSpec PrepareBenchmark(Connection& connection,
+                             const Context& context,
+                             const ColorizeOptions& options,
+                             const PhotoFolder& folder,
+                             ProgressDisplay& display) {
+  const ScratchFolder scratch;
+  display.Say("benchmark: dropping the colour of " + std::to_string(folder.photos.size()) +
+              " photos");
+  const GrayCopies copies = MakeGrayCopies(folder, scratch.path(), *context.interrupt);
+  const v1::Scene scene = UploadScene(
+      connection,
+      BuildManifest(copies.folder, *context.interrupt),
+      std::filesystem::absolute(folder.root).filename().string() + " (grey)",
+      [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
+  const Selection selection = SelectKeyView(connection, context, options, scene.name(), display);
+
+  std::map<std::string, const LocalFile*> originals;
+  for (const LocalFile& photo : folder.photos) originals[photo.path] = &photo;
+  v1::JobSpec spec = ColorizeSpec(options, scene.name());
+  v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
+  colorize->set_key_view(selection.key_view);
+  std::vector<UploadFile> uploads;
+  for (const BenchmarkView& view : selection.views) {
+    const auto original = originals.find(view.image_file);
+    const bool is_key = view.name == selection.key_view;
+    if (original == originals.end() || (!is_key && !view.held_out)) continue;
+    const bool has_color = copies.in_color.contains(view.image_file);
+    if (is_key && !has_color) {
+      throw InvalidArgument("the key view " + view.name +
+                            " is monochrome itself; choose one in colour with --key-view");
+    }
+    if (!has_color) continue;  // nothing to score against
+    uploads.push_back({original->second->file, DigestFile(original->second->file)});
+    const v1::Digest digest = ToProto(uploads.back().digest);
+    if (is_key) {
+      *colorize->mutable_key_color()->mutable_image() = digest;
+    } else {
+      v1::TruthImage* truth = colorize->add_truth();
+      truth->set_view(view.name);
+      *truth->mutable_image() = digest;
+    }
+  }
+  UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
+    display.OnTransfer("uploading true colours", done, total);
+  });
+  display.Say("key view " + selection.key_view + "; " + std::to_string(colorize->truth_size()) +
+              " views are held out and scored");
+  return spec;
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,232 @@
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "client/commands/benchmark.h"
+#include "client/commands/colorize_options.h"
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/follow.h"
+#include "client/commands/results.h"
+#include "client/lib/blob_transfer.h"
+#include "client/lib/job_watch.h"
+#include "client/lib/names.h"
+#include "client/lib/scene_upload.h"
+#include "client/lib/text.h"
+#include "core/base/files.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+class Colorize {
+ public:
+  Colorize(const Context& context, const ColorizeOptions& options)
+      : context_(context), options_(options), out_(options.out), display_(context.json) {}
+
+  ExitCode Run() {
+    folder_ = CollectPhotos(options_.photos);
+    options_.CheckFiles();
+    RequireOutBesidePhotos(out_, folder_);
+    if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
+    for (const std::string& note : folder_.notes) PrintNote(context_, note);
+    PrepareOut(out_);
+    connection_ = std::make_unique<Connection>(context_.server, *context_.interrupt);
+    if (options_.benchmark) {
+      return Finish(PrepareBenchmark(*connection_, context_, options_, folder_, display_));
+    }
+    const std::string scene = Upload();
+    return options_.HasColor() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
+  }
+
+ private:
+  std::string Upload() {
+    const auto entries = BuildManifest(folder_, *context_.interrupt);
+    const std::string name = fs::absolute(folder_.root).filename().string();
+    const v1::Scene scene =
+        UploadScene(*connection_, entries, name, [&](int64_t done, int64_t total) {
+          display_.OnTransfer("uploading", done, total);
+        });
+    display_.Say(scene.name() + ": " + std::to_string(scene.photo_count()) + " photos");
+    return scene.name();
+  }
+
+  // The view that the user's colour belongs to; empty: the server selects.
+  std::string KeyView() const {
+    if (!options_.key_view.empty()) return options_.key_view;
+    // A file that is called like a photo is that photo, whatever was selected before.
+    const fs::path colored = options_.key_color.empty() ? options_.hints : options_.key_color;
+    const std::string same_stem = PhotoOfSameStem(folder_, colored);
+    if (!same_stem.empty()) return same_stem;
+    std::error_code none;
+    if (!fs::is_regular_file(out_ / "key_view.json", none)) return "";
+    const auto json = nlohmann::json::parse(
+        ReadFile(out_ / "key_view.json"), nullptr, /*allow_exceptions=*/false);
+    if (!json.is_object() || !json.contains("view") || !json["view"].is_string()) return "";
+    const std::string view = json["view"];
+    // From another scene? Then it says nothing about this one.
+    const bool known =
+        std::any_of(folder_.photos.begin(), folder_.photos.end(), [&](const LocalFile& photo) {
+          return Stem(photo.path) == Stem(view);
+        });
+    return known ? view : "";
+  }
+
+  v1::JobSpec ColorSpec(const std::string& scene) {
+    v1::JobSpec spec = ColorizeSpec(options_, scene);
+    v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
+    colorize->set_key_view(KeyView());
+    const std::string file = options_.key_color.empty() ? options_.hints : options_.key_color;
+    const FileDigest digest = DigestFile(file);
+    v1::KeyColorSource* source = colorize->mutable_key_color();
+    if (!options_.key_color.empty()) {
+      *source->mutable_image() = ToProto(digest);
+    } else if (fs::path(file).extension() == ".json") {
+      *source->mutable_points() = ToProto(digest);
+    } else {
+      *source->mutable_strokes() = ToProto(digest);
+    }
+    UploadMissing(*connection_, {{file, digest}}, [](int64_t, int64_t) {});
+    display_.Say("key view " + (colorize->key_view().empty() ? std::string("will be selected")
+                                                             : colorize->key_view()));
+    return spec;
+  }
+
+  // Submits, follows and downloads; or returns at once with --detach.
+  ExitCode Finish(const v1::JobSpec& spec) {
+    const v1::Job submitted = SubmitJob(*connection_, spec);
+    if (options_.detach) return Detached(submitted);
+    const v1::Job job = FollowToSuccess({submitted.name()});
+    const auto files = Download(job);
+    if (context_.json) {
+      const auto metrics = Metrics();
+      PrintJson({{"job", job.name()},
+                 {"scene", spec.scene()},
+                 {"state", StateName(job.state())},
+                 {"out", out_.string()},
+                 {"files", files},
+                 {"metrics", metrics}});
+    } else {
+      PrintText(Summary(out_));
+    }
+    return ExitCode::kOk;
+  }
+
+  ExitCode SelectOnly(const std::string& scene) {
+    std::vector<std::string> jobs;
+    v1::JobSpec spec = SelectSpec(options_, scene);
+    if (options_.hold_out) {
+      jobs.push_back(SubmitJob(*connection_, ImportSpec(options_, scene)).name());
+      spec.add_inputs(jobs.back());
+    }
+    const v1::Job submitted = SubmitJob(*connection_, spec);
+    if (options_.detach) return Detached(submitted);
+    jobs.push_back(submitted.name());
+    const v1::Job job = FollowToSuccess(jobs);
+    const auto files = Download(job);
+    const auto key_view = nlohmann::json::parse(
+        ReadFile(out_ / "key_view.json"), nullptr, /*allow_exceptions=*/false);
+    const std::string view = key_view.is_object() ? key_view.value("view", "") : "";
+    if (context_.json) {
+      PrintJson({{"job", job.name()},
+                 {"scene", scene},
+                 {"state", StateName(job.state())},
+                 {"out", out_.string()},
+                 {"files", files},
+                 {"key_view", view}});
+    } else {
+      PrintText(HowToGoOn(view));
+    }
+    return ExitCode::kOk;
+  }
+
+  std::string HowToGoOn(const std::string& view) const {
+    const std::string picture = (out_ / "key_view.png").string();
+    const std::string again = "  color3d " + ShellLine(context_.arguments);
+    return "The key view is " + view + ", saved as " + picture +
+           ".\nColour it by any means and keep its size, then run\n" + again +
+           " --key-color COLOURED.png\nor paint a few colour strokes on a transparent PNG of its "
+           "size (or list points as JSON), then run\n" +
+           again + " --hints STROKES.png\n";
+  }
+
+  ExitCode Detached(const v1::Job& job) {
+    if (context_.json) {
+      PrintJson({{"job", job.name()}, {"scene", job.spec().scene()}, {"detached", true}});
+    } else {
+      PrintText(job.name() + "\n");
+      PrintNote(context_, ReattachHint(context_, job.name(), out_.string()));
+    }
+    return ExitCode::kOk;
+  }
+
+  // The last of `jobs`, once all have ended and it has succeeded.
+  v1::Job FollowToSuccess(const std::vector<std::string>& jobs) {
+    if (!Follow(*connection_, jobs, context_, display_)) {
+      throw CommandFailure(ExitCode::kDetached,
+                           "detached; " + jobs.back() + " goes on; " +
+                               ReattachHint(context_, jobs.back(), out_.string()));
+    }
+    for (const std::string& name : jobs) {
+      const v1::Job job = GetJob(*connection_, name);
+      RequireSuccess(*connection_, context_, job);
+      if (!context_.json) PrintWarnings(job);
+      if (name == jobs.back()) return job;
+    }
+    throw Error(ErrorCode::kInternal, "no job was submitted");
+  }
+
+  void PrintWarnings(const v1::Job& job) {
+    for (const std::string& warning : job.warnings()) PrintNote(context_, warning);
+    for (const v1::Job& child : ListChildren(*connection_, job.name())) {
+      for (const std::string& warning : child.warnings()) {
+        PrintNote(context_, child.kind() + ": " + warning);
+      }
+    }
+  }
+
+  std::vector<std::string> Download(const v1::Job& job) {
+    try {
+      return DownloadArtifacts(
+          *connection_, {job.artifacts().begin(), job.artifacts().end()}, out_, display_);
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::kCancelled) throw;
+      throw CommandFailure(
+          ExitCode::kDetached,
+          job.name() + " is done, its results are partly here; fetch them with `" +
+              CommandLine(context_, {"artifact", "download", job.name(), "-o", out_.string()}) +
+              "`");
+    }
+  }
+
+  nlohmann::ordered_json Metrics() const {
+    std::error_code none;
+    if (!fs::is_regular_file(out_ / "metrics.json", none)) return nullptr;
+    auto metrics = nlohmann::ordered_json::parse(
+        ReadFile(out_ / "metrics.json"), nullptr, /*allow_exceptions=*/false);
+    return metrics.is_discarded() ? nlohmann::ordered_json() : metrics;
+  }
+
+  const Context& context_;
+  const ColorizeOptions& options_;
+  const fs::path out_;
+  ProgressDisplay display_;
+  PhotoFolder folder_;
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace
+
+void AddColorizeCommand(CLI::App& app, Context& context) {
+  const auto options = std::make_shared<ColorizeOptions>();
+  CLI::App* colorize = app.add_subcommand(
+      "colorize",
+      "Photos to a coloured 3D scene. Without --key-color or --hints: selects the photo to colour");
+  colorize->fallthrough();
+  DeclareOptions(*colorize, options.get());
+  colorize->callback([&context, options] {
+    context.action = [&context, options] { return Colorize(context, *options).Run(); };
+  });
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,168 @@
+#include "client/commands/colorize_options.h"
+
+#include <nlohmann/json.hpp>
+
+#include "client/lib/names.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/image/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+v1::Preset PresetOf(const std::string& name) {
+  if (name == "best") return v1::PRESET_BEST;
+  if (name == "paper") return v1::PRESET_PAPER;
+  return v1::PRESET_FAST;
+}
+
+void RequireImage(const std::string& option, const std::string& file) {
+  std::error_code none;
+  if (!fs::is_regular_file(file, none)) {
+    throw Error(ErrorCode::kNotFound,
+                option + ": there is no file " + file + "; give the coloured key view");
+  }
+  try {
+    ProbeImage(ReadFile(file), file);
+  } catch (const Error& e) {
+    throw Error(e.code(), option + ": " + e.what());
+  }
+}
+
+void RequirePoints(const std::string& file) {
+  const std::string format = R"([{"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}, ...])";
+  const auto json = nlohmann::json::parse(ReadFile(file), nullptr, /*allow_exceptions=*/false);
+  if (!json.is_array() || json.empty()) {
+    throw InvalidArgument("--hints: " + file + " is not a JSON list of points: " + format);
+  }
+}
+
+fs::path Canonical(const fs::path& path) {
+  std::error_code error;
+  const fs::path canonical = fs::weakly_canonical(fs::absolute(path), error);
+  return error ? fs::absolute(path) : canonical;
+}
+
+// "a/b/" and "a/b" are one folder.
+bool IsWithin(const fs::path& path, const fs::path& folder) {
+  const fs::path relative = path.lexically_relative(folder);
+  return !relative.empty() && *relative.begin() != "..";
+}
+
+}  // namespace
+
+void ColorizeOptions::CheckFiles() const {
+  if (!key_color.empty()) RequireImage("--key-color", key_color);
+  if (hints.empty()) return;
+  if (fs::path(hints).extension() == ".json") {
+    RequirePoints(hints);
+  } else {
+    RequireImage("--hints", hints);
+  }
+}
+
+void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
+  app.add_option("PHOTOS",
+                 o->photos,
+                 "Folder of photos, or one with images/ and a COLMAP model (sparse/0), or with "
+                 "transforms.json and its photos")
+      ->required();
+  app.add_option("-o,--out", o->out, "Folder for the results")->required();
+  CLI::Option* color =
+      app.add_option("--key-color", o->key_color, "The key view, coloured (JPEG, PNG or TIFF)");
+  CLI::Option* hints = app.add_option(
+      "--hints",
+      o->hints,
+      "Colour strokes (PNG of the key view's size, transparent elsewhere) or points (JSON)");
+  app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");
+  app.add_option("--preset", o->preset, "How much time quality is worth: fast, best or paper")
+      ->capture_default_str()
+      ->check([](const std::string& name) -> std::string {
+        if (name == "fast" || name == "best" || name == "paper") return "";
+        return "'" + name + "' is unknown; known presets are fast, best and paper";
+      });
+  CLI::Option* benchmark = app.add_flag(
+      "--benchmark", o->benchmark, "Photos in colour: drop their colour and score against it");
+  color->excludes(hints)->excludes(benchmark);
+  hints->excludes(benchmark);
+  app.add_flag("--detach", o->detach, "Return when the job is submitted");
+  app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
+  app.add_option("--seed", o->seed, "Same seed, same machine: same result");
+  app.add_option("--max-side", o->max_side_px, "Longer side of the working pictures, px")
+      ->check(CLI::Range(64, 4096));
+  app.add_option("--geometry-iterations", o->geometry_iterations, "Of luminance Gaussians")
+      ->check(CLI::Range(0, 100'000));
+  app.add_option("--max-gaussians", o->max_gaussians, "Hard cap")->check(CLI::Range(1, 10'000'000));
+  app.add_option("--colorizer-iterations", o->colorizer_iterations, "Of the scene's colorizer")
+      ->check(CLI::Range(0, 100'000));
+  app.add_option("--chroma-iterations", o->chroma_iterations, "After the closed-form start")
+      ->check(CLI::Range(0, 100'000));
+}
+
+v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene) {
+  v1::JobSpec spec;
+  spec.set_scene(scene);
+  spec.set_seed(options.seed);
+  return spec;
+}
+
+v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene) {
+  v1::JobSpec spec = CommonSpec(options, scene);
+  v1::ImportSceneSpec* import_scene = spec.mutable_import_scene();
+  if (options.hold_out || options.benchmark) import_scene->set_hold_out_every_eighth(true);
+  return spec;
+}
+
+v1::JobSpec SelectSpec(const ColorizeOptions& options, const std::string& scene) {
+  v1::JobSpec spec = CommonSpec(options, scene);
+  v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
+  if (!options.key_view.empty()) {
+    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+    select->set_view(options.key_view);
+  } else if (PresetOf(options.preset) == v1::PRESET_PAPER) {
+    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_ENTROPY);
+  }
+  return spec;
+}
+
+v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene) {
+  v1::JobSpec spec = CommonSpec(options, scene);
+  v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
+  colorize->set_preset(PresetOf(options.preset));
+  if (options.max_side_px) colorize->set_max_side_px(*options.max_side_px);
+  if (options.hold_out || options.benchmark) {
+    colorize->mutable_import_scene()->set_hold_out_every_eighth(true);
+  }
+  if (options.geometry_iterations) {
+    colorize->mutable_reconstruct_geometry()->set_iterations(*options.geometry_iterations);
+  }
+  if (options.max_gaussians) {
+    colorize->mutable_reconstruct_geometry()->set_max_gaussians(*options.max_gaussians);
+  }
+  if (options.colorizer_iterations) {
+    colorize->mutable_personalize()->set_iterations(*options.colorizer_iterations);
+  }
+  if (options.chroma_iterations) {
+    colorize->mutable_solve_chroma()->set_iterations(*options.chroma_iterations);
+  }
+  return spec;
+}
+
+void RequireOutBesidePhotos(const fs::path& out, const PhotoFolder& folder) {
+  const fs::path folder_out = Canonical(out);
+  bool inside = false;
+  for (const LocalFile& photo : folder.photos) {
+    inside = inside || Canonical(photo.file.parent_path()) == folder_out;
+    // images/ is read at any depth.
+    inside = inside || (photo.path.starts_with("images/") &&
+                        IsWithin(folder_out, Canonical(folder.root / "images")));
+    if (inside) break;
+  }
+  if (!inside) return;
+  throw InvalidArgument("-o " + out.string() +
+                        " is where the photographs are: the results would be taken for photos the "
+                        "next time; name another folder");
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,51 @@
+// Options of `color3d colorize`, their checks, and the job specs that they mean.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "client/lib/photo_folder.h"
+#include "color3d/v1/job.pb.h"
+
+namespace color3d::client {
+
+struct ColorizeOptions {
+  std::string photos;
+  std::string out;
+  std::string key_color;  // coloured key view
+  std::string hints;      // strokes, or points as .json
+  std::string key_view;   // view name or stem; empty: selected
+  std::string preset = "fast";
+  bool benchmark = false;
+  bool detach = false;
+  bool hold_out = false;
+  uint64_t seed = 0;  // 0: the server's default
+  std::optional<int> max_side_px;
+  std::optional<int> geometry_iterations;
+  std::optional<int> max_gaussians;
+  std::optional<int> colorizer_iterations;
+  std::optional<int> chroma_iterations;
+
+  bool HasColor() const { return !key_color.empty() || !hints.empty(); }
+  // What can be said without the server: throws Error when the key colour is missing or not an
+  // image, or the hints cannot be read.
+  void CheckFiles() const;
+};
+
+void DeclareOptions(CLI::App& app, ColorizeOptions* options);
+
+// A spec with scene and seed, and no stage yet.
+v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene);
+v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene);
+// The key view by the preset's strategy, or `options.key_view`.
+v1::JobSpec SelectSpec(const ColorizeOptions& options, const std::string& scene);
+// Everything but key view, key colour and truth.
+v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene);
+
+// Throws Error{kInvalidArgument} when results in `out` would be taken for photos by the next run.
+void RequireOutBesidePhotos(const std::filesystem::path& out, const PhotoFolder& folder);
+
+}  // namespace color3d::client

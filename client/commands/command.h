@@ -1,0 +1,44 @@
+// What all commands share: global options, the interrupt flag, and how one is run.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "client/lib/connection.h"
+#include "client/lib/exit_code.h"
+
+namespace color3d::client {
+
+struct Context {
+  std::string server = kDefaultServer;
+  bool json = false;
+  // Set by the first Ctrl-C; the second one ends the program at once.
+  const CancellationToken* interrupt = nullptr;
+  std::vector<std::string> arguments;  // as typed, without the program's name
+  // What the command line asks for; set while it is parsed.
+  std::function<ExitCode()> action;
+};
+
+// Ends the program with this code; what() is the line for the user, empty when all has been said.
+class CommandFailure : public std::runtime_error {
+ public:
+  CommandFailure(ExitCode code, const std::string& message)
+      : std::runtime_error(message), code_(code) {}
+  ExitCode code() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+// Each declares its commands in `app`; `context` must outlive it.
+void AddColorizeCommand(CLI::App& app, Context& context);
+void AddInspectCommand(CLI::App& app, Context& context);
+void AddSceneCommands(CLI::App& app, Context& context);
+void AddJobCommands(CLI::App& app, Context& context);
+void AddArtifactCommands(CLI::App& app, Context& context);
+void AddServerCommands(CLI::App& app, Context& context);
+
+}  // namespace color3d::client

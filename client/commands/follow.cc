@@ -1,0 +1,84 @@
+#include "client/commands/follow.h"
+
+#include "client/lib/job_watch.h"
+#include "client/lib/names.h"
+#include "client/lib/text.h"
+
+namespace color3d::client {
+
+v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec) {
+  v1::CreateJobRequest request;
+  *request.mutable_spec() = spec;
+  request.set_request_id(NewUuid());
+  return connection.Call(&v1::JobService::Stub::CreateJob, connection.jobs(), request);
+}
+
+std::string CommandLine(const Context& context, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "color3d");
+  if (context.server != kDefaultServer) {
+    arguments.push_back("--server");
+    arguments.push_back(context.server);
+  }
+  return ShellLine(arguments);
+}
+
+std::string ReattachHint(const Context& context, const std::string& job, const std::string& out) {
+  std::string hint = "attach again with `" + CommandLine(context, {"job", "watch", job}) + "`";
+  if (!out.empty()) {
+    hint += ", fetch the results with `" +
+            CommandLine(context, {"artifact", "download", job, "-o", out}) + "`";
+  }
+  return hint;
+}
+
+bool Follow(Connection& connection,
+            const std::vector<std::string>& jobs,
+            const Context& context,
+            ProgressDisplay& display) {
+  const auto keep_going = [&] {
+    display.OnTick();
+    return !context.interrupt->IsCancelled();
+  };
+  const auto on_event = [&](const v1::JobEvent& event) { display.OnEvent(event); };
+  try {
+    const WatchEnd end = WatchJobs(connection, jobs, on_event, keep_going);
+    display.Clear();
+    return end == WatchEnd::kFinished;
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::kUnavailable) throw;
+    display.Clear();
+    throw CommandFailure(ExitCode::kUnreachable,
+                         "lost the server at " + connection.address() +
+                             "; what it had accepted goes on when it is back: " +
+                             ReattachHint(context, jobs.back(), ""));
+  }
+}
+
+void RequireSuccess(Connection& connection, const Context& context, const v1::Job& job) {
+  if (job.state() == v1::Job::STATE_SUCCEEDED) return;
+  if (job.state() == v1::Job::STATE_CANCELLED) {
+    throw CommandFailure(ExitCode::kJobFailed,
+                         job.name() + " was cancelled; `" +
+                             CommandLine(context, {"job", "retry", job.name()}) + "` goes on");
+  }
+  // The stage that is to blame: the first failed child, or the job itself.
+  v1::Job blamed = job;
+  for (const v1::Job& child : ListChildren(connection, job.name())) {
+    if (child.state() != v1::Job::STATE_FAILED) continue;
+    blamed = child;
+    break;
+  }
+  std::string reason = blamed.error().message();
+  if (reason.empty()) reason = blamed.skip_reason();
+  if (reason.empty()) reason = "it is " + StateName(blamed.state());
+  const ExitCode code = ExitCodeOf(blamed);
+  std::string message =
+      "the stage " + StageName(blamed) + " failed (" + blamed.name() + "): " + reason;
+  if (code == ExitCode::kJobFailed) {
+    message += "; `" + CommandLine(context, {"job", "retry", job.name()}) +
+               "` goes on from its last checkpoint";
+  }
+  throw CommandFailure(code == ExitCode::kOk ? ExitCode::kJobFailed : code, message);
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,32 @@
+// Submitting jobs and following them to their end, with what the user is told on the way.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/commands/command.h"
+#include "client/commands/progress_display.h"
+#include "client/lib/connection.h"
+#include "color3d/v1/job.pb.h"
+
+namespace color3d::client {
+
+v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec);
+
+// True when all have ended; false when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable}
+// that says how to attach again when the server stays away.
+bool Follow(Connection& connection,
+            const std::vector<std::string>& jobs,
+            const Context& context,
+            ProgressDisplay& display);
+
+// "the job goes on; attach again with ..., then fetch ...". `out` may be empty.
+std::string ReattachHint(const Context& context, const std::string& job, const std::string& out);
+
+// Throws CommandFailure that names the stage and why, unless the job has succeeded.
+void RequireSuccess(Connection& connection, const Context& context, const v1::Job& job);
+
+// "color3d ARGUMENTS", with --server when it was given.
+std::string CommandLine(const Context& context, std::vector<std::string> arguments);
+
+}  // namespace color3d::client

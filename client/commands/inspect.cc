@@ -1,0 +1,42 @@
+#include <nlohmann/json.hpp>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/lib/gray_copies.h"
+
+namespace color3d::client {
+namespace {
+
+constexpr int kMaxPhotos = 24;
+
+ExitCode RunInspect(const Context& context, const std::string& photos) {
+  const PhotoFolder folder = CollectPhotos(photos);
+  const ColorCount count = CountColorPhotos(folder, kMaxPhotos, *context.interrupt);
+  const std::string kind = count.MostlyColor() ? "colour" : "monochrome";
+  if (context.json) {
+    PrintJson({{"kind", kind},
+               {"photos", count.photos},
+               {"looked_at", count.looked_at},
+               {"in_colour", count.in_color},
+               {"monochrome", count.looked_at - count.in_color}});
+  } else {
+    PrintText(kind + ": " + std::to_string(count.in_color) + " of " +
+              std::to_string(count.looked_at) + " photos looked at are in colour (" +
+              std::to_string(count.photos) + " photos)\n");
+  }
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddInspectCommand(CLI::App& app, Context& context) {
+  auto photos = std::make_shared<std::string>();
+  CLI::App* inspect = app.add_subcommand("inspect", "Are these photos in colour or monochrome?");
+  inspect->fallthrough();
+  inspect->add_option("PHOTOS", *photos, "Folder of photos")->required();
+  inspect->callback([&context, photos] {
+    context.action = [&context, photos] { return RunInspect(context, *photos); };
+  });
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,209 @@
+#include <google/protobuf/util/json_util.h>
+
+#include <iostream>
+#include <iterator>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/follow.h"
+#include "client/lib/job_watch.h"
+#include "client/lib/names.h"
+#include "client/lib/text.h"
+#include "core/base/files.h"
+
+namespace color3d::client {
+namespace {
+
+constexpr int64_t kMaxSpecBytes = 4 << 20;
+
+std::vector<std::string> JobRow(const v1::Job& job) {
+  const v1::Progress& progress = job.progress();
+  const std::string steps = progress.total_steps() > 0 ? std::to_string(progress.step()) + "/" +
+                                                             std::to_string(progress.total_steps())
+                                                       : "-";
+  return {job.name(),
+          job.kind(),
+          StateName(job.state()) + (job.cached() ? " (cached)" : ""),
+          steps,
+          HumanSeconds(progress.seconds()),
+          HumanTime(job.create_time())};
+}
+
+const std::vector<std::string> kJobHeading = {
+    "JOB", "KIND", "STATE", "STEP", "SECONDS", "CREATED (UTC)"};
+
+void PrintJob(const Context& context, const v1::Job& job) {
+  if (context.json) {
+    PrintJson(job);
+  } else {
+    PrintText(job.name() + "  " + job.kind() + "  " + StateName(job.state()) + "\n");
+  }
+}
+
+ExitCode RunSubmit(const Context& context, const std::string& file) {
+  const std::string text = file == "-" ? std::string(std::istreambuf_iterator<char>(std::cin), {})
+                                       : ReadFile(file, kMaxSpecBytes);
+  v1::JobSpec spec;
+  const auto status = google::protobuf::util::JsonStringToMessage(text, &spec);
+  if (!status.ok()) {
+    throw InvalidArgument(file + " is not a JobSpec in JSON: " + std::string(status.message()));
+  }
+  Connection connection(context.server, *context.interrupt);
+  PrintJob(context, SubmitJob(connection, spec));
+  return ExitCode::kOk;
+}
+
+ExitCode RunList(const Context& context, const std::string& parent, int limit) {
+  Connection connection(context.server, *context.interrupt);
+  v1::ListJobsResponse all;
+  v1::ListJobsRequest request;
+  request.set_parent(parent);
+  do {
+    request.set_page_size(std::min(1000, limit - all.jobs_size()));
+    auto page = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
+    all.mutable_jobs()->MergeFrom(page.jobs());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty() && all.jobs_size() < limit);
+  if (context.json) {
+    PrintJson(all);
+    return ExitCode::kOk;
+  }
+  std::vector<std::vector<std::string>> rows = {kJobHeading};
+  for (const v1::Job& job : all.jobs()) rows.push_back(JobRow(job));
+  PrintText(Table(rows));
+  return ExitCode::kOk;
+}
+
+ExitCode RunShow(const Context& context, const std::string& name) {
+  Connection connection(context.server, *context.interrupt);
+  const v1::Job job = GetJob(connection, ResourceName(name, "jobs"));
+  if (context.json) {
+    PrintJson(job);
+    return ExitCode::kOk;
+  }
+  std::string text = job.name() + "\nkind       " + job.kind() + "\nscene      " +
+                     job.spec().scene() + "\nstate      " + StateName(job.state()) +
+                     (job.cached() ? " (cached)" : "") + "\nattempt    " +
+                     std::to_string(job.attempt()) + " of " + std::to_string(job.max_attempts()) +
+                     "\nartifacts  " + std::to_string(job.artifacts_size()) + "\n";
+  if (!job.parent().empty()) text += "parent     " + job.parent() + "\n";
+  if (job.state() == v1::Job::STATE_RUNNING) text += "progress   " + ProgressLine(job, 200) + "\n";
+  if (job.has_error()) text += "error      " + DescribeStatus(job.error()) + "\n";
+  if (!job.skip_reason().empty()) text += "left out   " + job.skip_reason() + "\n";
+  for (const std::string& warning : job.warnings()) text += "warning    " + warning + "\n";
+  const auto children = ListChildren(connection, job.name());
+  if (!children.empty()) {
+    std::vector<std::vector<std::string>> rows = {kJobHeading};
+    for (const v1::Job& child : children) rows.push_back(JobRow(child));
+    text += Table(rows);
+  }
+  PrintText(text);
+  return ExitCode::kOk;
+}
+
+ExitCode RunWatch(const Context& context, const std::string& text) {
+  Connection connection(context.server, *context.interrupt);
+  const std::string name = ResourceName(text, "jobs");
+  ProgressDisplay display(context.json);
+  if (!Follow(connection, {name}, context, display)) {
+    throw CommandFailure(ExitCode::kDetached,
+                         "detached; " + name + " goes on; " + ReattachHint(context, name, ""));
+  }
+  const v1::Job job = GetJob(connection, name);
+  RequireSuccess(connection, context, job);
+  PrintJob(context, job);
+  return ExitCode::kOk;
+}
+
+ExitCode RunCancel(const Context& context, const std::string& name) {
+  Connection connection(context.server, *context.interrupt);
+  v1::CancelJobRequest request;
+  request.set_name(ResourceName(name, "jobs"));
+  request.set_request_id(NewUuid());
+  PrintJob(context, connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request));
+  return ExitCode::kOk;
+}
+
+ExitCode RunRetry(const Context& context, const std::string& name, bool from_scratch) {
+  Connection connection(context.server, *context.interrupt);
+  v1::RetryJobRequest request;
+  request.set_name(ResourceName(name, "jobs"));
+  request.set_from_scratch(from_scratch);
+  request.set_request_id(NewUuid());
+  PrintJob(context, connection.Call(&v1::JobService::Stub::RetryJob, connection.jobs(), request));
+  return ExitCode::kOk;
+}
+
+ExitCode RunDelete(const Context& context, const std::string& name) {
+  Connection connection(context.server, *context.interrupt);
+  v1::DeleteJobRequest request;
+  request.set_name(ResourceName(name, "jobs"));
+  request.set_request_id(NewUuid());
+  const auto response =
+      connection.Call(&v1::JobService::Stub::DeleteJob, connection.jobs(), request);
+  if (context.json) {
+    PrintJson(response);
+  } else {
+    PrintText("deleted " + request.name() + "\n");
+  }
+  return ExitCode::kOk;
+}
+
+// A subcommand of `job` that takes one job's name.
+CLI::App* AddNamed(CLI::App* job,
+                   Context& context,
+                   const std::string& command,
+                   const std::string& help,
+                   std::function<ExitCode(const Context&, const std::string&)> run) {
+  const auto name = std::make_shared<std::string>();
+  CLI::App* app = job->add_subcommand(command, help);
+  app->fallthrough()->add_option("NAME", *name, "jobs/ID")->required();
+  app->callback([&context, name, run] {
+    context.action = [&context, name, run] { return run(context, *name); };
+  });
+  return app;
+}
+
+}  // namespace
+
+void AddJobCommands(CLI::App& app, Context& context) {
+  CLI::App* job = app.add_subcommand("job", "Jobs: the stages of the method");
+  job->require_subcommand(1)->fallthrough();
+  const auto file = std::make_shared<std::string>();
+  const auto parent = std::make_shared<std::string>();
+  const auto limit = std::make_shared<int>(50);
+  const auto from_scratch = std::make_shared<bool>(false);
+
+  CLI::App* submit = job->add_subcommand("submit", "Submit a job");
+  submit->fallthrough();
+  submit->add_option("SPEC", *file, "JobSpec as JSON (protobuf mapping); - reads stdin")
+      ->required();
+  submit->callback([&context, file] {
+    context.action = [&context, file] { return RunSubmit(context, *file); };
+  });
+
+  CLI::App* list = job->add_subcommand("list", "Newest first");
+  list->fallthrough();
+  list->add_option("PARENT", *parent, "Only those of jobs/ID or scenes/ID");
+  list->add_option("--limit", *limit, "At most this many")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  list->callback([&context, parent, limit] {
+    context.action = [&context, parent, limit] { return RunList(context, *parent, *limit); };
+  });
+
+  AddNamed(job, context, "show", "One job with its stages", RunShow);
+  AddNamed(job, context, "watch", "Follow a job to its end", RunWatch);
+  AddNamed(job, context, "cancel", "Cancel a job and its stages", RunCancel);
+  AddNamed(job, context, "delete", "Delete a finished job", RunDelete);
+  AddNamed(job,
+           context,
+           "retry",
+           "Go on with a failed or cancelled job from its last checkpoint",
+           [from_scratch](const Context& c, const std::string& name) {
+             return RunRetry(c, name, *from_scratch);
+           })
+      ->add_flag("--from-scratch", *from_scratch, "Forget the checkpoint");
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,46 @@
+// Progress on stderr: one redrawn line on a terminal, else a line at the end of every stage and at
+// most one in 10 s between. Not thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "color3d/v1/job.pb.h"
+
+namespace color3d::client {
+
+class ProgressDisplay {
+ public:
+  // A quiet one (--json) prints nothing.
+  explicit ProgressDisplay(bool quiet);
+  ~ProgressDisplay();
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  void OnEvent(const v1::JobEvent& event);
+  // Now and then while jobs are followed: says so when nothing runs for a while.
+  void OnTick();
+  // A transfer or another loop of ours, in bytes.
+  void OnTransfer(const std::string& what, int64_t done_bytes, int64_t total_bytes);
+  // A line of its own.
+  void Say(const std::string& line);
+  // Takes the redrawn line away.
+  void Clear();
+
+ private:
+  void Draw(const std::string& line);
+  int Width() const;
+  bool SomethingRuns() const;
+
+  const bool quiet_;
+  const bool terminal_;
+  bool drawn_ = false;
+  std::chrono::steady_clock::time_point last_;
+  std::map<std::string, bool> ended_;  // by job name
+  std::map<std::string, v1::Job::State> unfinished_;
+  std::chrono::steady_clock::time_point idle_since_;
+};
+
+}  // namespace color3d::client

@@ -1,0 +1,148 @@
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/progress_display.h"
+#include "client/lib/names.h"
+#include "client/lib/scene_upload.h"
+#include "client/lib/text.h"
+
+namespace color3d::client {
+namespace {
+
+std::string LayoutName(v1::Scene::Layout layout) {
+  switch (layout) {
+    case v1::Scene::LAYOUT_PHOTOS:
+      return "photos";
+    case v1::Scene::LAYOUT_COLMAP:
+      return "colmap";
+    case v1::Scene::LAYOUT_TRANSFORMS:
+      return "transforms";
+    default:
+      return "-";
+  }
+}
+
+std::string SceneState(const v1::Scene& scene) {
+  return scene.state() == v1::Scene::STATE_ACTIVE ? "ACTIVE" : "UPLOADING";
+}
+
+ExitCode RunCreate(const Context& context, const std::string& photos) {
+  const PhotoFolder folder = CollectPhotos(photos);
+  for (const std::string& note : folder.notes) PrintNote(context, note);
+  Connection connection(context.server, *context.interrupt);
+  ProgressDisplay display(context.json);
+  const auto entries = BuildManifest(folder, *context.interrupt);
+  const v1::Scene scene = UploadScene(
+      connection,
+      entries,
+      std::filesystem::absolute(folder.root).filename().string(),
+      [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
+  display.Clear();
+  if (context.json) {
+    PrintJson(scene);
+  } else {
+    PrintText(scene.name() + "\n");
+  }
+  return ExitCode::kOk;
+}
+
+ExitCode RunList(const Context& context, int limit) {
+  Connection connection(context.server, *context.interrupt);
+  v1::ListScenesResponse all;
+  v1::ListScenesRequest request;
+  do {
+    request.set_page_size(std::min(1000, limit - all.scenes_size()));
+    auto page = connection.Call(&v1::SceneService::Stub::ListScenes, connection.scenes(), request);
+    all.mutable_scenes()->MergeFrom(page.scenes());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty() && all.scenes_size() < limit);
+  if (context.json) {
+    PrintJson(all);
+    return ExitCode::kOk;
+  }
+  std::vector<std::vector<std::string>> rows = {
+      {"SCENE", "STATE", "LAYOUT", "PHOTOS", "CREATED (UTC)", "FOLDER"}};
+  for (const v1::Scene& scene : all.scenes()) {
+    rows.push_back({scene.name(),
+                    SceneState(scene),
+                    LayoutName(scene.layout()),
+                    std::to_string(scene.photo_count()),
+                    HumanTime(scene.create_time()),
+                    scene.display_name()});
+  }
+  PrintText(Table(rows));
+  return ExitCode::kOk;
+}
+
+ExitCode RunShow(const Context& context, const std::string& name) {
+  Connection connection(context.server, *context.interrupt);
+  v1::GetSceneRequest request;
+  request.set_name(ResourceName(name, "scenes"));
+  const auto scene =
+      connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request);
+  if (context.json) {
+    PrintJson(scene);
+    return ExitCode::kOk;
+  }
+  PrintText(scene.name() + "\nstate    " + SceneState(scene) + "\nlayout   " +
+            LayoutName(scene.layout()) + "\nphotos   " + std::to_string(scene.photo_count()) +
+            "\nfolder   " + scene.display_name() + "\ncreated  " + HumanTime(scene.create_time()) +
+            "\n");
+  std::vector<std::vector<std::string>> rows = {{"FILE", "SIZE"}};
+  for (const v1::SceneFile& file : scene.files()) {
+    rows.push_back({file.path(), HumanBytes(file.digest().size_bytes())});
+  }
+  PrintText(Table(rows));
+  return ExitCode::kOk;
+}
+
+ExitCode RunDelete(const Context& context, const std::string& name) {
+  Connection connection(context.server, *context.interrupt);
+  v1::DeleteSceneRequest request;
+  request.set_name(ResourceName(name, "scenes"));
+  request.set_request_id(NewUuid());
+  const auto response =
+      connection.Call(&v1::SceneService::Stub::DeleteScene, connection.scenes(), request);
+  if (context.json) {
+    PrintJson(response);
+  } else {
+    PrintText("deleted " + request.name() + "\n");
+  }
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddSceneCommands(CLI::App& app, Context& context) {
+  CLI::App* scene = app.add_subcommand("scene", "Scenes that the server holds");
+  scene->require_subcommand(1)->fallthrough();
+  const auto text = std::make_shared<std::string>();
+  const auto limit = std::make_shared<int>(50);
+
+  CLI::App* create = scene->add_subcommand("create", "Upload a folder of photos");
+  create->fallthrough()->add_option("PHOTOS", *text, "Folder of photos")->required();
+  create->callback([&context, text] {
+    context.action = [&context, text] { return RunCreate(context, *text); };
+  });
+
+  CLI::App* list = scene->add_subcommand("list", "Newest first");
+  list->fallthrough();
+  list->add_option("--limit", *limit, "At most this many")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  list->callback([&context, limit] {
+    context.action = [&context, limit] { return RunList(context, *limit); };
+  });
+
+  CLI::App* show = scene->add_subcommand("show", "One scene with its files");
+  show->fallthrough()->add_option("NAME", *text, "scenes/ID")->required();
+  show->callback(
+      [&context, text] { context.action = [&context, text] { return RunShow(context, *text); }; });
+
+  CLI::App* remove = scene->add_subcommand("delete", "Delete a scene");
+  remove->fallthrough()->add_option("NAME", *text, "scenes/ID")->required();
+  remove->callback([&context, text] {
+    context.action = [&context, text] { return RunDelete(context, *text); };
+  });
+}
+
+}  // namespace color3d::client

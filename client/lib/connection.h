@@ -1,0 +1,90 @@
+// A connection to one server: its stubs, time limits and retries. Thread-safe; no call blocks
+// longer than its time limit.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "client/lib/rpc_error.h"
+#include "color3d/v1/blob.grpc.pb.h"
+#include "color3d/v1/job.grpc.pb.h"
+#include "color3d/v1/scene.grpc.pb.h"
+#include "color3d/v1/server.grpc.pb.h"
+#include "core/base/cancellation.h"
+#include "google/bytestream/bytestream.grpc.pb.h"
+
+namespace color3d::client {
+
+inline constexpr char kDefaultServer[] = "127.0.0.1:50551";
+
+// Waits between attempts: 0.2 s, doubling up to 3 s, while less than `patience` has passed since
+// the last success. Not thread-safe.
+class Backoff {
+ public:
+  explicit Backoff(std::chrono::milliseconds patience = std::chrono::seconds(30));
+  // Something worked: be patient anew.
+  void Reset();
+  // False when patience is over; else sleeps. Throws Error{kCancelled} as soon as `cancel` is set.
+  bool Wait(const CancellationToken& cancel);
+
+ private:
+  std::chrono::milliseconds patience_;
+  std::chrono::milliseconds next_;
+  std::chrono::steady_clock::time_point since_;
+};
+
+class Connection {
+ public:
+  // Waits at most 4 s for the server. `cancel` must outlive the connection; it ends retries and
+  // transfers. Throws Error{kUnavailable} that says how to start a server.
+  Connection(const std::string& address, const CancellationToken& cancel);
+
+  const std::string& address() const { return address_; }
+  const CancellationToken& cancel() const { return cancel_; }
+
+  v1::SceneService::Stub& scenes() { return *scenes_; }
+  v1::JobService::Stub& jobs() { return *jobs_; }
+  v1::BlobService::Stub& blobs() { return *blobs_; }
+  v1::ServerService::Stub& server() { return *server_; }
+  google::bytestream::ByteStream::Stub& bytes() { return *bytes_; }
+
+  // One unary call, e.g. Call(&v1::JobService::Stub::GetJob, connection.jobs(), request). Repeated
+  // while the server cannot be reached (requests that create something carry a request_id, so that
+  // is safe). Throws RpcError.
+  template <typename Stub, typename Request, typename Response>
+  Response Call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                Stub& stub,
+                const Request& request,
+                std::chrono::seconds time_limit = std::chrono::seconds(30)) {
+    Response response;
+    Retry(
+        [&](grpc::ClientContext* context) {
+          response.Clear();
+          return (stub.*method)(context, request, &response);
+        },
+        time_limit);
+    return response;
+  }
+
+ private:
+  void Retry(const std::function<grpc::Status(grpc::ClientContext*)>& call,
+             std::chrono::seconds time_limit);
+
+  std::string address_;
+  const CancellationToken& cancel_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::SceneService::Stub> scenes_;
+  std::unique_ptr<v1::JobService::Stub> jobs_;
+  std::unique_ptr<v1::BlobService::Stub> blobs_;
+  std::unique_ptr<v1::ServerService::Stub> server_;
+  std::unique_ptr<google::bytestream::ByteStream::Stub> bytes_;
+};
+
+// "cannot reach a server at ...: start one with ...".
+Error UnreachableError(const std::string& address);
+
+}  // namespace color3d::client

@@ -1,0 +1,108 @@
+#include <fstream>
+
+#include "client/lib/blob_transfer.h"
+#include "client/lib/names.h"
+#include "core/base/files.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+namespace bs = google::bytestream;
+
+// A stream that delivers nothing for long is cut by its time limit, so a range stays small.
+constexpr int64_t kRangeBytes = int64_t{16} << 20;
+constexpr std::chrono::seconds kRangeTimeLimit{300};
+
+class Download {
+ public:
+  Download(Connection& connection, const FileDigest& digest, fs::path part)
+      : connection_(connection), digest_(digest), part_(std::move(part)) {}
+
+  // Leaves the whole verified blob in the part file.
+  void Run(const std::function<void(int64_t)>& progress) {
+    std::error_code none;
+    received_ = fs::exists(part_, none) ? static_cast<int64_t>(fs::file_size(part_, none)) : 0;
+    if (received_ > digest_.size_bytes) fs::remove(part_, none), received_ = 0;
+    Backoff backoff;
+    while (received_ < digest_.size_bytes) {
+      connection_.cancel().ThrowIfCancelled();
+      const int64_t before = received_;
+      const grpc::Status status = ReceiveRange(progress);
+      if (received_ > before) backoff.Reset();
+      if (status.ok() && received_ > before) continue;
+      if (!status.ok() && !RpcError(status).IsTransient() &&
+          status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) {
+        throw RpcError(status);
+      }
+      if (!backoff.Wait(connection_.cancel())) throw UnreachableError(connection_.address());
+    }
+    if (digest_.size_bytes == 0) std::ofstream(part_, std::ios::binary);
+    if (DigestFile(part_).sha256 == digest_.sha256) return;
+    fs::remove(part_, none);
+    throw Error(ErrorCode::kDataLoss,
+                "the bytes received for blob " + digest_.sha256 +
+                    " do not have this digest; run the command again");
+  }
+
+ private:
+  grpc::Status ReceiveRange(const std::function<void(int64_t)>& progress) {
+    std::ofstream output(part_, std::ios::binary | std::ios::app);
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kRangeTimeLimit);
+    bs::ReadRequest request;
+    request.set_resource_name(BlobResource(digest_));
+    request.set_read_offset(received_);
+    request.set_read_limit(std::min(kRangeBytes, digest_.size_bytes - received_));
+    const auto stream = connection_.bytes().Read(&context, request);
+    bs::ReadResponse response;
+    while (stream->Read(&response)) {
+      output.write(response.data().data(), static_cast<std::streamsize>(response.data().size()));
+      if (!output.flush()) {
+        context.TryCancel();
+        stream->Finish();
+        throw Error(
+            ErrorCode::kResourceExhausted,
+            "cannot write " + part_.string() + "; free some disk space and run the command again");
+      }
+      received_ += static_cast<int64_t>(response.data().size());
+      progress(received_);
+      if (connection_.cancel().IsCancelled()) context.TryCancel();
+    }
+    const grpc::Status status = stream->Finish();
+    connection_.cancel().ThrowIfCancelled();
+    return status;
+  }
+
+  Connection& connection_;
+  const FileDigest digest_;
+  const fs::path part_;
+  int64_t received_ = 0;
+};
+
+bool HoldsAlready(const fs::path& path, const FileDigest& digest) {
+  std::error_code none;
+  if (!fs::is_regular_file(path, none)) return false;
+  if (static_cast<int64_t>(fs::file_size(path, none)) != digest.size_bytes) return false;
+  return DigestFile(path).sha256 == digest.sha256;
+}
+
+}  // namespace
+
+void DownloadBlob(Connection& connection,
+                  const FileDigest& digest,
+                  const fs::path& path,
+                  const std::function<void(int64_t)>& progress) {
+  if (HoldsAlready(path, digest)) return progress(digest.size_bytes);
+  std::error_code error;
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
+  if (error) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot create the folder " + path.parent_path().string() + ": " + error.message());
+  }
+  const fs::path part = path.parent_path() / (".color3d-" + digest.sha256.substr(0, 16) + ".part");
+  Download(connection, digest, part).Run(progress);
+  PublishFile(part, path);
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,157 @@
+#include "client/lib/job_watch.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+namespace color3d::client {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr milliseconds kTick{200};
+constexpr std::chrono::seconds kPatience{60};
+// The server sends a keepalive every 30 s: a stream that is silent for longer is dead.
+constexpr std::chrono::seconds kSilence{100};
+// The present state of all jobs comes first; a stream that broke sooner may have sent part of it.
+constexpr std::chrono::seconds kSnapshotTime{2};
+
+// One WatchJobs stream, read on a thread of its own so that the caller stays responsive.
+class Stream {
+ public:
+  Stream(v1::JobService::Stub& stub, const v1::WatchJobsRequest& request)
+      : reader_(stub.WatchJobs(&context_, request)), thread_([this] { Loop(); }) {}
+  ~Stream() {
+    context_.TryCancel();
+    {
+      std::lock_guard lock(mutex_);
+      stopping_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+
+  // The next event; nullopt after `limit` or at the end.
+  std::optional<v1::JobEvent> Next(milliseconds limit) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, limit, [this] { return !events_.empty() || ended_; });
+    if (events_.empty()) return std::nullopt;
+    v1::JobEvent event = std::move(events_.front());
+    events_.pop_front();
+    changed_.notify_all();
+    return event;
+  }
+  // Set when the stream has ended and all its events were taken.
+  std::optional<grpc::Status> End() {
+    std::lock_guard lock(mutex_);
+    if (!ended_ || !events_.empty()) return std::nullopt;
+    return status_;
+  }
+
+ private:
+  static constexpr size_t kMaxWaiting = 256;
+
+  void Loop() {
+    v1::JobEvent event;
+    while (reader_->Read(&event)) {
+      std::unique_lock lock(mutex_);
+      events_.push_back(event);
+      changed_.notify_all();
+      // Whoever takes events slowly slows the stream down.
+      changed_.wait(lock, [this] { return events_.size() < kMaxWaiting || stopping_; });
+    }
+    const grpc::Status status = reader_->Finish();
+    std::lock_guard lock(mutex_);
+    status_ = status;
+    ended_ = true;
+    changed_.notify_all();
+  }
+
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::JobEvent>> reader_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<v1::JobEvent> events_;
+  bool stopping_ = false;
+  bool ended_ = false;
+  grpc::Status status_;
+  std::thread thread_;
+};
+
+}  // namespace
+
+WatchEnd WatchJobs(Connection& connection,
+                   const std::vector<std::string>& names,
+                   const std::function<void(const v1::JobEvent&)>& on_event,
+                   const std::function<bool()>& keep_going) {
+  Backoff backoff(kPatience);
+  const CancellationToken never;
+  int64_t revision = 0;
+  while (true) {
+    v1::WatchJobsRequest request;
+    for (const std::string& name : names) request.add_names(name);
+    request.set_after_revision(revision);
+    Stream stream(connection.jobs(), request);
+    const auto begun = steady_clock::now();
+    auto heard = begun;
+    int64_t newest = revision;
+    std::optional<grpc::Status> end;
+    while (!(end = stream.End())) {
+      if (!keep_going()) return WatchEnd::kStopped;
+      const auto event = stream.Next(kTick);
+      if (!event) {
+        if (steady_clock::now() - heard > kSilence) break;
+        continue;
+      }
+      heard = steady_clock::now();
+      backoff.Reset();
+      newest = std::max(newest, event->revision());
+      if (event->has_job()) on_event(*event);
+    }
+    if (end && end->ok()) return WatchEnd::kFinished;
+    if (revision > 0 || steady_clock::now() - begun > kSnapshotTime) revision = newest;
+    if (!end) continue;
+    const RpcError error(*end);
+    if (error.grpc_code() == grpc::StatusCode::OUT_OF_RANGE && revision > 0) {
+      revision = 0;  // the events in between are gone: take the present state
+      continue;
+    }
+    // A draining server may be back soon, with the same jobs.
+    if (error.grpc_code() != grpc::StatusCode::UNAVAILABLE) throw error;
+    if (!keep_going()) return WatchEnd::kStopped;
+    if (!backoff.Wait(never)) throw error;
+  }
+}
+
+v1::Job GetJob(Connection& connection, const std::string& name) {
+  v1::GetJobRequest request;
+  request.set_name(name);
+  return connection.Call(&v1::JobService::Stub::GetJob, connection.jobs(), request);
+}
+
+std::vector<v1::Job> ListChildren(Connection& connection, const std::string& name) {
+  std::vector<v1::Job> jobs;
+  v1::ListJobsRequest request;
+  request.set_parent(name);
+  request.set_page_size(1000);
+  do {
+    auto response = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
+    for (v1::Job& job : *response.mutable_jobs()) jobs.push_back(std::move(job));
+    request.set_page_token(response.next_page_token());
+  } while (!request.page_token().empty());
+  std::reverse(jobs.begin(), jobs.end());
+  return jobs;
+}
+
+bool IsFinished(v1::Job::State state) {
+  return state == v1::Job::STATE_SUCCEEDED || state == v1::Job::STATE_FAILED ||
+         state == v1::Job::STATE_CANCELLED || state == v1::Job::STATE_SKIPPED;
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,36 @@
+// Which files of a user's folder make up a scene. Reads names only, never writes. Pure functions of
+// the file system, thread-safe.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace color3d::client {
+
+struct LocalFile {
+  std::string path;            // in the scene, '/' separators, e.g. "images/0001.jpg"
+  std::filesystem::path file;  // where its bytes are
+};
+
+struct PhotoFolder {
+  std::filesystem::path root;
+  std::vector<LocalFile> photos;       // sorted by path
+  std::vector<LocalFile> model_files;  // of a COLMAP model or transforms.json, sorted by path
+  std::vector<std::string> notes;      // what the user may want to know, one line each
+
+  std::vector<LocalFile> AllFiles() const;
+};
+
+// Photos (.jpg .jpeg .png .tif .tiff) are taken from images/, at any depth, when there is one with
+// photos; else from `root` itself and from the subfolders that transforms.json names. Also taken: a
+// COLMAP model in sparse/0, sparse or `root`, and transforms.json. Nothing else. Throws Error: no
+// such folder, a file instead of a folder, no photos, one photo, more than 10,000 files, names that
+// are not safe or not UTF-8.
+PhotoFolder CollectPhotos(const std::filesystem::path& root);
+
+// The photo whose file stem is that of `file` ("x/0007_coloured.png" has the stem "0007_coloured"),
+// as a view's name: relative to images/. Empty when none or several have it.
+std::string PhotoOfSameStem(const PhotoFolder& folder, const std::filesystem::path& file);
+
+}  // namespace color3d::client

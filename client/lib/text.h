@@ -1,0 +1,37 @@
+// Numbers and jobs as people read them. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "color3d/v1/job.pb.h"
+#include "google/protobuf/timestamp.pb.h"
+
+namespace color3d::client {
+
+std::string HumanBytes(int64_t bytes);     // "812 B", "3.2 MB"
+std::string HumanSeconds(double seconds);  // "0.4 s", "72 s", "1 h 02 min"
+std::string HumanClock(double seconds);    // "0:09", "12:34", "1:02:03", for what is left
+std::string HumanTime(
+    const google::protobuf::Timestamp& time);  // "2026-01-31 12:00:05" (UTC) or "-"
+
+// "SUCCEEDED" for STATE_SUCCEEDED.
+std::string StateName(v1::Job::State state);
+
+// What a stage is called on the screen: the job's kind, but "report" for the last stage of a
+// colorize_scene job.
+std::string StageName(const v1::Job& job);
+
+// A running stage in at most `width` columns: name, bar, step, message, error, time left.
+std::string ProgressLine(const v1::Job& job, int width);
+// An ended stage: seconds and "(cached)", "left out: reason", "failed: reason" or "cancelled".
+std::string EndLine(const v1::Job& job);
+
+// A line that a POSIX shell reads as these arguments.
+std::string ShellLine(const std::vector<std::string>& arguments);
+
+// Columns padded to the widest cell, two spaces between; the first row is the heading.
+std::string Table(const std::vector<std::vector<std::string>>& rows);
+
+}  // namespace color3d::client

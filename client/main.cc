@@ -1,0 +1,62 @@
+// color3d: the command line of the Color3D service. Exit codes: client/lib/exit_code.h.
+#include <signal.h>
+
+#include <iostream>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+
+namespace color3d::client {
+namespace {
+
+// Signal handlers reach nothing but globals.
+CancellationToken interrupt;
+
+void OnInterrupt(int) { interrupt.Cancel(); }
+
+void HandleInterrupt() {
+  struct sigaction action {};
+  action.sa_handler = OnInterrupt;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second Ctrl-C ends the program
+  ::sigaction(SIGINT, &action, nullptr);
+}
+
+int Main(int argc, char** argv) {
+  Context context;
+  context.interrupt = &interrupt;
+  context.arguments.assign(argv + 1, argv + argc);
+  CLI::App app("Turns monochrome photos of a scene into a coloured 3D scene.", "color3d");
+  app.require_subcommand(1);
+  app.set_help_all_flag("--help-all", "Help for all commands");
+  app.footer(
+      "Exit codes: 0 done, 1 the job failed or was cancelled, 2 wrong usage or input, 3 no server, "
+      "4 no room, 130 detached.");
+  app.add_option("--server", context.server, "Address of the server")
+      ->envname("COLOR3D_SERVER")
+      ->capture_default_str();
+  app.add_flag("--json", context.json, "Print one JSON object instead of text");
+  AddColorizeCommand(app, context);
+  AddInspectCommand(app, context);
+  AddSceneCommands(app, context);
+  AddJobCommands(app, context);
+  AddArtifactCommands(app, context);
+  AddServerCommands(app, context);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);  // --help
+    std::cerr << "color3d: " << e.what() << "; see `color3d --help`" << std::endl;
+    return static_cast<int>(ExitCode::kBadInput);
+  }
+  HandleInterrupt();
+  try {
+    return static_cast<int>(context.action());
+  } catch (const std::exception& e) {
+    return static_cast<int>(ReportException(context, e));
+  }
+}
+
+}  // namespace
+}  // namespace color3d::client
+
+int main(int argc, char** argv) { return color3d::client::Main(argc, argv); }

@@ -1,0 +1,314 @@
+#include "core/augment/augment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+struct Point {
+  double x = 0.0;
+  double y = 0.0;
+};
+
+// Largest share by which the perspective map shrinks or stretches at the middle of an edge, and the
+// largest rotation that goes with it.
+constexpr double kMaxForeshortening = 0.12;
+constexpr double kMaxTilt = 6.0 * std::numbers::pi / 180.0;
+
+void Check(const Image& luminance, const Image& ab, const AugmentOptions& options) {
+  if (luminance.channels != 1 || ab.channels != 2 || luminance.Empty() ||
+      luminance.width != ab.width || luminance.height != ab.height) {
+    throw InvalidArgument("augmentation takes L (1 channel) and ab (2 channels) of one size, got " +
+                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
+                          " and " + std::to_string(ab.width) + "x" + std::to_string(ab.height));
+  }
+  if (options.crop_px < 1 || options.shuffle_grid < 1 || !(options.min_scale > 0.0) ||
+      !(options.max_scale >= options.min_scale) || !(options.elastic_sigma_px > 0.0)) {
+    throw InvalidArgument(
+        "augmentation needs crop_px >= 1, shuffle_grid >= 1, 0 < min_scale <= max_scale and "
+        "elastic_sigma_px > 0");
+  }
+}
+
+// Smooth random displacement: cubic B-spline over nodes that are uniform in -alpha..alpha px and
+// lie sigma px apart, so that it never exceeds alpha.
+class ElasticField {
+ public:
+  ElasticField(int size_px, double alpha_px, double sigma_px, Random& random)
+      : spacing_(sigma_px), nodes_(static_cast<int>(size_px / sigma_px) + 5) {
+    offsets_.resize(static_cast<size_t>(nodes_) * nodes_);
+    for (Point& offset : offsets_) {
+      offset.x = random.NextUniform(-alpha_px, alpha_px);
+      offset.y = random.NextUniform(-alpha_px, alpha_px);
+    }
+  }
+
+  Point At(double x, double y) const {
+    const Weights wx = At(x);
+    const Weights wy = At(y);
+    Point sum;
+    for (int j = 0; j < 4; ++j) {
+      for (int i = 0; i < 4; ++i) {
+        const Point& node = offsets_[static_cast<size_t>(wy.first + j) * nodes_ + wx.first + i];
+        sum.x += wy.value[j] * wx.value[i] * node.x;
+        sum.y += wy.value[j] * wx.value[i] * node.y;
+      }
+    }
+    return sum;
+  }
+
+ private:
+  struct Weights {
+    int first = 0;
+    double value[4] = {};
+  };
+  Weights At(double position) const {
+    const double cell = std::clamp(position / spacing_, 0.0, static_cast<double>(nodes_ - 4));
+    Weights weights;
+    weights.first = std::min(static_cast<int>(cell), nodes_ - 4);
+    const double t = cell - weights.first;
+    weights.value[0] = (1 - t) * (1 - t) * (1 - t) / 6.0;
+    weights.value[1] = (3 * t * t * t - 6 * t * t + 4) / 6.0;
+    weights.value[2] = (-3 * t * t * t + 3 * t * t + 3 * t + 1) / 6.0;
+    weights.value[3] = t * t * t / 6.0;
+    return weights;
+  }
+
+  double spacing_;
+  int nodes_;
+  std::vector<Point> offsets_;
+};
+
+// p -> R p / (1 + g . p) about the middle of the crop; the identity by default.
+struct Perspective {
+  double cosine = 1.0;
+  double sine = 0.0;
+  double gx = 0.0;
+  double gy = 0.0;
+
+  static Perspective Draw(Random& random) {
+    Perspective map;
+    const double angle = random.NextUniform(-kMaxTilt, kMaxTilt);
+    map.cosine = std::cos(angle);
+    map.sine = std::sin(angle);
+    map.gx = random.NextUniform(-kMaxForeshortening, kMaxForeshortening);
+    map.gy = random.NextUniform(-kMaxForeshortening, kMaxForeshortening);
+    return map;
+  }
+  // `half` is half of the crop's side; the result is relative to the middle, too.
+  Point Apply(double x, double y, double half) const {
+    const double w = 1.0 + (gx * x + gy * y) / half;
+    return {(cosine * x - sine * y) / w, (sine * x + cosine * y) / w};
+  }
+};
+
+// One drawn augmentation: where each pixel of the crop is read in the source. The order, seen from
+// the source, is the paper's: turn and flip, shuffle, scale, elastic, perspective, crop.
+class SamplingMap {
+ public:
+  SamplingMap(int width, int height, const AugmentOptions& options, Random& random)
+      : width_(width), height_(height), crop_(options.crop_px) {
+    flip_x_ = random.NextUniform() < options.flip_probability;
+    quarter_turns_ = random.NextUniform() < options.rot90_probability
+                         ? static_cast<int>(random.NextBelow(4))
+                         : 0;
+    if (quarter_turns_ % 2 == 1) std::swap(width_, height_);
+    if (random.NextUniform() < options.shuffle_probability) DrawShuffle(options, random);
+    const double log_scale =
+        random.NextUniform(std::log(options.min_scale), std::log(options.max_scale));
+    step_ = std::exp(-log_scale);
+    if (random.NextUniform() < options.elastic_probability) {
+      elastic_.emplace_back(crop_, options.elastic_alpha_px, options.elastic_sigma_px, random);
+    }
+    if (random.NextUniform() < options.perspective_probability) {
+      perspective_ = Perspective::Draw(random);
+    }
+    center_.x = DrawCenter(width_, random);
+    center_.y = DrawCenter(height_, random);
+  }
+
+  struct Source {
+    Point position;  // pixel centres at whole numbers
+    // Pixels that may take part in the interpolation, inclusive.
+    int min_x = 0, max_x = 0, min_y = 0, max_y = 0;
+    bool inside = false;
+  };
+
+  Source At(int x, int y) const {
+    const double half = 0.5 * crop_;
+    // From here on continuous coordinates: a pixel covers [i, i + 1].
+    Point p = perspective_.Apply(x + 0.5 - half, y + 0.5 - half, half);
+    if (!elastic_.empty()) {
+      const Point offset = elastic_[0].At(x + 0.5, y + 0.5);
+      p.x += offset.x;
+      p.y += offset.y;
+    }
+    p = {center_.x + p.x * step_, center_.y + p.y * step_};
+    Source source;
+    source.inside = p.x >= 0.0 && p.y >= 0.0 && p.x <= width_ && p.y <= height_;
+    p = {Reflect(p.x, width_), Reflect(p.y, height_)};
+    source.max_x = width_ - 1;
+    source.max_y = height_ - 1;
+    if (!cells_.empty()) Unshuffle(p, source);
+    Unturn(p, source);
+    source.position = {p.x - 0.5, p.y - 0.5};
+    return source;
+  }
+
+ private:
+  // Whole crop inside the picture when it fits; in the middle when it does not.
+  double DrawCenter(int side, Random& random) const {
+    const double half = 0.5 * crop_ * step_;
+    const double u = random.NextUniform();
+    return side > 2.0 * half ? half + u * (side - 2.0 * half) : 0.5 * side;
+  }
+
+  void DrawShuffle(const AugmentOptions& options, Random& random) {
+    // Cells of one size, so that each fits the place of any other; the remainder stays in place.
+    grid_ = options.shuffle_grid;
+    cell_width_ = width_ / grid_;
+    cell_height_ = height_ / grid_;
+    if (cell_width_ == 0 || cell_height_ == 0) return;
+    cells_.resize(static_cast<size_t>(grid_) * grid_);
+    std::iota(cells_.begin(), cells_.end(), 0);
+    for (size_t i = cells_.size() - 1; i > 0; --i) {
+      std::swap(cells_[i], cells_[random.NextBelow(static_cast<uint32_t>(i + 1))]);
+    }
+  }
+
+  void Unshuffle(Point& p, Source& source) const {
+    const int column = static_cast<int>(p.x) / cell_width_;
+    const int row = static_cast<int>(p.y) / cell_height_;
+    if (column >= grid_ || row >= grid_) return;
+    const int from = cells_[static_cast<size_t>(row) * grid_ + column];
+    const int left = from % grid_ * cell_width_;
+    const int top = from / grid_ * cell_height_;
+    p.x += left - column * cell_width_;
+    p.y += top - row * cell_height_;
+    source.min_x = left;
+    source.max_x = left + cell_width_ - 1;
+    source.min_y = top;
+    source.max_y = top + cell_height_ - 1;
+  }
+
+  // Undoes the quarter turns and the flip: coordinates of the turned picture -> of the source.
+  void Unturn(Point& p, Source& source) const {
+    int width = width_;
+    int height = height_;
+    for (int i = 0; i < quarter_turns_; ++i) {
+      // One quarter turn back; the sides swap.
+      p = {p.y, width - p.x};
+      const Source turned = source;
+      source.min_x = turned.min_y;
+      source.max_x = turned.max_y;
+      source.min_y = width - 1 - turned.max_x;
+      source.max_y = width - 1 - turned.min_x;
+      std::swap(width, height);
+    }
+    if (flip_x_) {
+      p.x = width - p.x;
+      const int min_x = width - 1 - source.max_x;
+      source.max_x = width - 1 - source.min_x;
+      source.min_x = min_x;
+    }
+  }
+
+  static double Reflect(double value, double side) {
+    const double period = 2.0 * side;
+    value = std::fmod(value, period);
+    if (value < 0.0) value += period;
+    return std::min(value, period - value);
+  }
+
+  int width_;  // of the turned picture
+  int height_;
+  int crop_;
+  bool flip_x_ = false;
+  int quarter_turns_ = 0;
+  int grid_ = 0;
+  int cell_width_ = 0;
+  int cell_height_ = 0;
+  std::vector<int> cells_;  // cells_[place] = cell of the turned picture that is shown there
+  double step_ = 1.0;       // source px per crop px
+  Point center_;
+  std::vector<ElasticField> elastic_;  // none or one
+  Perspective perspective_;
+};
+
+// Two pixels and the weight of the second along one axis.
+struct Tap {
+  int first = 0;
+  int second = 0;
+  float weight = 0.0f;
+};
+
+Tap MakeTap(double position, int low, int high) {
+  const double clamped = std::clamp(position, static_cast<double>(low), static_cast<double>(high));
+  Tap tap;
+  tap.first = static_cast<int>(clamped);
+  tap.second = std::min(tap.first + 1, high);
+  tap.weight = static_cast<float>(clamped - tap.first);
+  return tap;
+}
+
+float Sample(const float* plane, int stride, const Tap& x, const Tap& y) {
+  const float* row0 = plane + static_cast<size_t>(y.first) * stride;
+  const float* row1 = plane + static_cast<size_t>(y.second) * stride;
+  const float top = row0[x.first] + x.weight * (row0[x.second] - row0[x.first]);
+  const float bottom = row1[x.first] + x.weight * (row1[x.second] - row1[x.first]);
+  return top + y.weight * (bottom - top);
+}
+
+}  // namespace
+
+AugmentOptions AugmentOptions::Paper() {
+  AugmentOptions options;
+  options.crop_px = 320;
+  options.min_scale = 1.0;
+  options.max_scale = 1.0;
+  options.luminance_jitter = 0.0;
+  options.rot90_probability = 0.5;
+  options.shuffle_probability = 0.7;
+  return options;
+}
+
+AugmentedSample Augment(const Image& luminance,
+                        const Image& ab,
+                        const AugmentOptions& options,
+                        Random& random) {
+  Check(luminance, ab, options);
+  const SamplingMap map(luminance.width, luminance.height, options, random);
+  const float offset =
+      static_cast<float>(random.NextUniform(-options.luminance_jitter, options.luminance_jitter));
+  const float contrast = 1.0f + 0.01f * static_cast<float>(random.NextUniform(
+                                            -options.luminance_jitter, options.luminance_jitter));
+  const int side = options.crop_px;
+  AugmentedSample sample{Image(side, side, 1), Image(side, side, 2), Image(side, side, 1)};
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const SamplingMap::Source source = map.At(x, y);
+      const Tap tap_x = MakeTap(source.position.x, source.min_x, source.max_x);
+      const Tap tap_y = MakeTap(source.position.y, source.min_y, source.max_y);
+      const float l = Sample(luminance.Plane(0), luminance.width, tap_x, tap_y);
+      // No jitter must leave L bit for bit as it is.
+      sample.luminance.At(0, y, x) =
+          options.luminance_jitter > 0.0
+              ? std::clamp(50.0f + contrast * (l - 50.0f) + offset, 0.0f, 100.0f)
+              : l;
+      sample.ab.At(0, y, x) = Sample(ab.Plane(0), ab.width, tap_x, tap_y);
+      sample.ab.At(1, y, x) = Sample(ab.Plane(1), ab.width, tap_x, tap_y);
+      sample.valid.At(0, y, x) = source.inside ? 1.0f : 0.0f;
+    }
+  }
+  return sample;
+}
+
+}  // namespace color3d

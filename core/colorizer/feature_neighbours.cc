@@ -1,0 +1,257 @@
+#include "core/colorizer/feature_neighbours.h"
+
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/colorizer/padding.h"
+#include "core/colorizer/tensor_archive.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace {
+
+constexpr int64_t kQueriesAtOnce = 1024;
+// Local means and deviations of L: windows in cells of the answer grid.
+constexpr int kWindows[] = {1, 3, 9};
+constexpr int64_t kStatisticsChannels = 7;  // L, and mean and deviation per window
+constexpr double kEigenvalueFloor = 0.02;   // share of the largest eigenvalue
+
+// Mean over a (2 radius + 1)^2 window, clipped at the borders.
+torch::Tensor WindowMean(const torch::Tensor& x, int radius) {
+  return torch::avg_pool2d(x,
+                           {2 * radius + 1, 2 * radius + 1},
+                           {1, 1},
+                           {radius, radius},
+                           /*ceil_mode=*/false,
+                           /*count_include_pad=*/false);
+}
+
+// [1,K,h,w]: local statistics of L, which normalised encoder features have lost.
+torch::Tensor LuminanceStatistics(const torch::Tensor& luminance, int stride) {
+  const torch::Tensor l = torch::avg_pool2d(luminance / 100.0, {stride, stride});
+  const torch::Tensor ll = torch::avg_pool2d((luminance / 100.0).square(), {stride, stride});
+  std::vector<torch::Tensor> maps{l};
+  for (int radius : kWindows) {
+    const torch::Tensor mean = WindowMean(l, radius);
+    const torch::Tensor variance = (WindowMean(ll, radius) - mean.square()).clamp_min(0.0);
+    maps.push_back(mean);
+    maps.push_back((variance + 1e-5).sqrt());
+  }
+  return torch::cat(maps, 1);
+}
+
+// Brings a tap to the answer grid: [cells, channels].
+torch::Tensor OnGrid(const torch::Tensor& tap, int64_t height, int64_t width) {
+  torch::Tensor x = tap;
+  if (x.size(2) > height) {
+    const int64_t factor = x.size(2) / height;
+    x = torch::avg_pool2d(x, {factor, factor});
+  } else if (x.size(2) < height) {
+    x = torch::upsample_bilinear2d(x, {height, width}, /*align_corners=*/false);
+  }
+  return x[0].flatten(1).t();
+}
+
+struct Projection {
+  torch::Tensor mean;    // [C]
+  torch::Tensor matrix;  // [C, D]: standardise, rotate, whiten
+};
+
+// Whitening to the leading principal components, in float64. `weight` scales the block so that each
+// kind of feature takes the share of the distance that it is given.
+Projection Whiten(const torch::Tensor& samples, int64_t dims, double weight) {
+  const torch::Tensor x = samples.to(torch::kFloat64);
+  const torch::Tensor mean = x.mean(0);
+  const torch::Tensor inverse_deviation = (x.var(0, /*unbiased=*/false) + 1e-8).rsqrt();
+  const torch::Tensor standardised = (x - mean) * inverse_deviation;
+  const torch::Tensor covariance =
+      torch::mm(standardised.t(), standardised) / static_cast<double>(x.size(0));
+  torch::Tensor values, vectors;
+  std::tie(values, vectors) = torch::linalg_eigh(covariance);  // ascending
+  dims = std::min<int64_t>(dims, x.size(1));
+  values = values.slice(0, x.size(1) - dims);
+  vectors = vectors.slice(1, x.size(1) - dims);
+  const torch::Tensor floor = values.max() * kEigenvalueFloor;
+  const torch::Tensor scale =
+      weight / static_cast<double>(dims) / (values.clamp_min(0.0) + floor + 1e-12);
+  Projection projection;
+  projection.mean = mean.to(torch::kFloat32);
+  projection.matrix = (inverse_deviation.unsqueeze(1) * vectors * scale.sqrt()).to(torch::kFloat32);
+  return projection;
+}
+
+torch::Tensor SampleRows(int64_t count, int64_t wanted, Random& random) {
+  std::vector<int64_t> rows(count);
+  std::iota(rows.begin(), rows.end(), int64_t{0});
+  const int64_t taken = std::min(count, wanted);
+  for (int64_t i = 0; i < taken; ++i) {
+    std::swap(rows[i], rows[i + random.NextBelow(static_cast<uint32_t>(count - i))]);
+  }
+  return torch::tensor(std::vector<int64_t>(rows.begin(), rows.begin() + taken), torch::kInt64);
+}
+
+// Raw features of a picture's cells: one block per tap, then L statistics: [cells, channels] each.
+std::vector<torch::Tensor> RawBlocks(const std::vector<torch::Tensor>& taps,
+                                     const torch::Tensor& luminance,
+                                     int stride) {
+  const int64_t height = luminance.size(2) / stride;
+  const int64_t width = luminance.size(3) / stride;
+  std::vector<torch::Tensor> blocks;
+  for (const torch::Tensor& tap : taps) blocks.push_back(OnGrid(tap, height, width));
+  blocks.push_back(OnGrid(LuminanceStatistics(luminance, stride), height, width));
+  return blocks;
+}
+
+// Height of every cell in the picture, unit variance over the picture times sqrt(weight):
+// [cells,1].
+torch::Tensor VerticalPosition(const torch::Tensor& luminance,
+                               int stride,
+                               int picture_height,
+                               double weight) {
+  const int64_t height = luminance.size(2) / stride;
+  const int64_t width = luminance.size(3) / stride;
+  const torch::Tensor y = (torch::arange(height, torch::kFloat32) + 0.5) * stride / picture_height;
+  return (y * std::sqrt(12.0 * weight)).unsqueeze(1).expand({height, width}).reshape({-1, 1});
+}
+
+}  // namespace
+
+FeatureNeighbours::FeatureNeighbours(const ConvNext& encoder,
+                                     const Image& luminance,
+                                     const Image& ab,
+                                     const FeatureNeighboursOptions& options,
+                                     Random random,
+                                     const CancellationToken& cancel)
+    : options_(options) {
+  torch::NoGradGuard no_grad;
+  const int multiple = encoder.config().Stride(encoder.config().StageCount() - 1);
+  std::vector<std::vector<torch::Tensor>> blocks(encoder.config().StageCount() + 1);
+  std::vector<torch::Tensor> positions;
+  std::vector<torch::Tensor> colors;
+  for (double scale : options.scales) {
+    cancel.ThrowIfCancelled();
+    const int width = std::max(1, static_cast<int>(std::lround(luminance.width * scale)));
+    const int height = std::max(1, static_cast<int>(std::lround(luminance.height * scale)));
+    const torch::Tensor l =
+        PadToMultiple(TensorFromImage(Resize(luminance, width, height)), multiple);
+    const torch::Tensor c = PadToMultiple(TensorFromImage(Resize(ab, width, height)), multiple);
+    const std::vector<torch::Tensor> raw =
+        RawBlocks(encoder.Taps(encoder.Input(l)), l, options.stride);
+    for (size_t i = 0; i < raw.size(); ++i) blocks[i].push_back(raw[i]);
+    positions.push_back(VerticalPosition(l, options.stride, height, options.position_weight));
+    colors.push_back(torch::avg_pool2d(c, {options.stride, options.stride})[0].flatten(1).t());
+  }
+  const torch::Tensor all_colors = torch::cat(colors);
+  const torch::Tensor rows = SampleRows(all_colors.size(0), options.bank_size, random);
+  std::vector<torch::Tensor> bank;
+  for (size_t i = 0; i < blocks.size(); ++i) {
+    const torch::Tensor samples = torch::cat(blocks[i]).index_select(0, rows);
+    const bool is_tap = i + 1 < blocks.size();
+    const Projection projection = Whiten(
+        samples, options.dims_per_tap, is_tap ? options.tap_weights[i] : options.luminance_weight);
+    state_["mean." + std::to_string(i)] = projection.mean;
+    state_["matrix." + std::to_string(i)] = projection.matrix;
+    bank.push_back(torch::mm(samples - projection.mean, projection.matrix));
+  }
+  bank.push_back(torch::cat(positions).index_select(0, rows));
+  // Rounded to half precision here, so that a colorizer read from its file answers the same.
+  state_["bank"] = torch::cat(bank, 1).to(torch::kHalf).to(torch::kFloat32);
+  state_["colors"] =
+      all_colors.index_select(0, rows).to(torch::kHalf).to(torch::kFloat32).contiguous();
+}
+
+FeatureNeighbours::FeatureNeighbours(const FeatureNeighboursOptions& options,
+                                     std::map<std::string, torch::Tensor> state)
+    : options_(options), state_(std::move(state)) {}
+
+std::unique_ptr<FeatureNeighbours> FeatureNeighbours::FromArchive(
+    const ConvNext& encoder,
+    const FeatureNeighboursOptions& options,
+    const std::string& what,
+    Archive& archive) {
+  // Shapes that follow from the encoder; only the number of bank entries is the file's own.
+  std::map<std::string, std::vector<int64_t>> shapes;
+  int64_t columns = 1;  // vertical position
+  for (int i = 0; i <= encoder.config().StageCount(); ++i) {
+    const int64_t in =
+        i < encoder.config().StageCount() ? encoder.config().dims[i] : kStatisticsChannels;
+    const int64_t out = std::min<int64_t>(options.dims_per_tap, in);
+    shapes["mean." + std::to_string(i)] = {in};
+    shapes["matrix." + std::to_string(i)] = {in, out};
+    columns += out;
+  }
+  const auto colors = archive.arrays.find("neighbours.colors");
+  if (colors == archive.arrays.end() || colors->second.shape.empty() ||
+      colors->second.shape[0] < 1) {
+    throw InvalidArgument(what + " lacks the colours of the feature neighbours");
+  }
+  const int64_t entries = colors->second.shape[0];
+  shapes["colors"] = {entries, 2};
+  shapes["bank"] = {entries, columns};
+  std::map<std::string, torch::Tensor> state;
+  NamedTensors tensors;
+  for (const auto& [name, shape] : shapes) {
+    state[name] = torch::empty(shape, torch::kFloat32);
+    tensors.emplace_back(name, state[name]);
+  }
+  TakeTensors(tensors, "neighbours.", what, archive);
+  return std::make_unique<FeatureNeighbours>(options, std::move(state));
+}
+
+torch::Tensor FeatureNeighbours::Features(const std::vector<torch::Tensor>& taps,
+                                          const torch::Tensor& luminance,
+                                          int picture_height) const {
+  const std::vector<torch::Tensor> raw = RawBlocks(taps, luminance, options_.stride);
+  std::vector<torch::Tensor> parts;
+  for (size_t i = 0; i < raw.size(); ++i) {
+    const std::string index = std::to_string(i);
+    parts.push_back(torch::mm(raw[i] - state_.at("mean." + index), state_.at("matrix." + index)));
+  }
+  parts.push_back(
+      VerticalPosition(luminance, options_.stride, picture_height, options_.position_weight));
+  return torch::cat(parts, 1);
+}
+
+FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor& queries) const {
+  torch::NoGradGuard no_grad;
+  const torch::Tensor& bank = state_.at("bank");
+  const torch::Tensor transposed = bank.t();
+  const torch::Tensor bank_squares = bank.square().sum(1);
+  // A column of ones sums the weights in the same product.
+  const torch::Tensor colors = torch::cat({state_.at("colors"), torch::ones({bank.size(0), 1})}, 1);
+  std::vector<torch::Tensor> answers;
+  std::vector<torch::Tensor> distances;
+  for (int64_t begin = 0; begin < queries.size(0); begin += kQueriesAtOnce) {
+    const torch::Tensor q =
+        queries.slice(0, begin, std::min(begin + kQueriesAtOnce, queries.size(0)));
+    // |q - b|^2 without |q|^2, which is the same for all b.
+    torch::Tensor d = torch::addmm(bank_squares, q, transposed, /*beta=*/1.0, /*alpha=*/-2.0);
+    const torch::Tensor best = std::get<0>(d.min(1, /*keepdim=*/true));
+    const torch::Tensor nearest = (best + q.square().sum(1, /*keepdim=*/true)).clamp_min(0.0);
+    const torch::Tensor inverse_width =
+        1.0 / (options_.temperature * (nearest + options_.distance_floor));
+    d.sub_(best).mul_(-inverse_width).exp_();
+    const torch::Tensor sums = torch::mm(d, colors);
+    answers.push_back(sums.slice(1, 0, 2) / sums.slice(1, 2, 3));
+    distances.push_back(nearest.squeeze(1));
+  }
+  return {torch::cat(answers), torch::cat(distances)};
+}
+
+NeighbourColors FeatureNeighbours::Lookup(const std::vector<torch::Tensor>& taps,
+                                          const torch::Tensor& luminance,
+                                          int picture_height) const {
+  torch::NoGradGuard no_grad;
+  const Matches matches = LookupFeatures(Features(taps, luminance, picture_height));
+  const int64_t height = luminance.size(2) / options_.stride;
+  const int64_t width = luminance.size(3) / options_.stride;
+  return {matches.ab.t().reshape({2, height, width}), matches.distance.reshape({height, width})};
+}
+
+}  // namespace color3d

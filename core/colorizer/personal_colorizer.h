@@ -1,0 +1,46 @@
+// The finished colorizer: shared encoder, trained model, feature neighbours. Used inside
+// core/colorizer only. Immutable and thread-safe.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/colorizer/colorizer.h"
+#include "core/colorizer/feature_neighbours.h"
+#include "core/colorizer/personal_model.h"
+#include "core/colorizer/recipe.h"
+#include "core/colorizer/trainer.h"
+
+namespace color3d {
+
+class PersonalColorizer : public Colorizer {
+ public:
+  struct Parts {
+    std::shared_ptr<const ConvNext> encoder;
+    ColorizerOptions options;
+    std::unique_ptr<PersonalModel> model;           // refers to *encoder
+    std::unique_ptr<FeatureNeighbours> neighbours;  // may be null
+    std::vector<TrainingPoint> curve;
+  };
+  // Rounds the model's parameters to half precision, as they are stored.
+  explicit PersonalColorizer(Parts parts);
+
+  Image Colorize(const Image& luminance) const override;
+  std::string Serialize() const override;
+
+  static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
+                                                      std::shared_ptr<const ConvNext> encoder,
+                                                      int threads);
+
+ private:
+  // [1,2,H/s,W/s] ab in Lab units of a padded L [1,1,H,W]; `picture_height` before padding.
+  torch::Tensor Predict(const torch::Tensor& luminance, int picture_height) const;
+  Image ColorizeAtTrainingSize(const Image& luminance) const;
+
+  Parts parts_;
+  TrainingRecipe recipe_;
+  double neighbour_share_ = 1.0;
+};
+
+}  // namespace color3d

@@ -1,0 +1,30 @@
+// What a ColorizerOptions::Recipe means in numbers. Torch types come along with the model's sizes;
+// used inside core/colorizer only.
+#pragma once
+
+#include "core/augment/augment.h"
+#include "core/colorizer/colorizer.h"
+#include "core/colorizer/feature_neighbours.h"
+#include "core/colorizer/personal_model.h"
+
+namespace color3d {
+
+struct TrainingRecipe {
+  PersonalModelConfig model;
+  AugmentOptions augment;
+  double first_learning_rate = 1e-3;
+  double last_learning_rate = 1e-6;  // cosine
+  int warmup_iterations = 20;
+  double max_gradient_norm = 1.0;
+  bool neighbours = true;
+  FeatureNeighboursOptions neighbour_options;
+  // Share of the neighbours in the blend with a decoder trained for many iterations. One trained
+  // for a few weighs less: share + (1 - share) exp(-iterations / trust_iterations).
+  double neighbour_share = 0.5;
+  double trust_iterations = 100.0;
+  bool flip_average = false;  // mean of the picture and its mirror image: twice the time for 0.05
+};
+
+TrainingRecipe RecipeFor(const ColorizerOptions& options);
+
+}  // namespace color3d

@@ -1,0 +1,247 @@
+#include "core/encoder/convnext.h"
+
+#include <torch/torch.h>
+
+#include <cmath>
+#include <cstring>
+#include <set>
+#include <utility>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/encoder/random_features.h"
+#include "core/encoder/torch_errors.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace {
+
+constexpr double kNormEpsilon = 1e-6;
+constexpr int kDescribeSidePx = 256;
+constexpr int kDeepSidePx = 384;
+
+std::string DigestOf(const ConvNextConfig& config, const WeightMap& weights) {
+  Sha256 hash;
+  hash.Update(config.ToString());
+  for (const auto& [name, array] : weights) {
+    std::string shape = "\n" + name;
+    for (int64_t size : array.shape) shape += " " + std::to_string(size);
+    hash.Update(shape + "\n");
+    hash.Update(
+        {reinterpret_cast<const char*>(array.values.data()), array.values.size() * sizeof(float)});
+  }
+  return hash.FinishHex();
+}
+
+// Hands out weights by name, checks shapes, and remembers what was asked for.
+class WeightReader {
+ public:
+  explicit WeightReader(const WeightMap& weights) : weights_(weights) {}
+
+  torch::Tensor Take(const std::string& name, std::vector<int64_t> shape) {
+    const auto found = weights_.find(name);
+    if (found == weights_.end()) {
+      throw InvalidArgument("the encoder weights lack \"" + name + "\"");
+    }
+    if (found->second.shape != shape) {
+      throw InvalidArgument("encoder weight \"" + name + "\" has another shape than its config");
+    }
+    used_.insert(name);
+    torch::Tensor tensor = torch::empty(shape, torch::kFloat32);
+    std::memcpy(tensor.data_ptr<float>(),
+                found->second.values.data(),
+                found->second.values.size() * sizeof(float));
+    return shape.size() == 4 ? tensor.contiguous(at::MemoryFormat::ChannelsLast) : tensor;
+  }
+  void ExpectAllUsed() const {
+    for (const auto& [name, array] : weights_) {
+      if (!used_.count(name)) throw InvalidArgument("unknown encoder weight \"" + name + "\"");
+    }
+  }
+
+ private:
+  const WeightMap& weights_;
+  std::set<std::string> used_;
+};
+
+// Layer norm over the channels of [B,C,H,W]; free of copies when x is channels-last.
+torch::Tensor ChannelNorm(const torch::Tensor& x,
+                          const torch::Tensor& weight,
+                          const torch::Tensor& bias) {
+  return torch::layer_norm(x.permute({0, 2, 3, 1}), {x.size(1)}, weight, bias, kNormEpsilon)
+      .permute({0, 3, 1, 2});
+}
+
+void CheckLuminance(const Image& luminance) {
+  if (luminance.channels != 1 || luminance.Empty()) {
+    throw InvalidArgument("the encoder takes a picture with 1 channel (L), this one has " +
+                          std::to_string(luminance.channels));
+  }
+}
+
+// sRGB grey of L (0..100), elementwise: inverse CIE f, then the sRGB transfer function
+// (METHOD.md "Colour"; the scalar reference is GrayFromLuminance).
+torch::Tensor GrayFromLuminanceTensor(const torch::Tensor& luminance) {
+  const torch::Tensor f = (luminance + 16.0) / 116.0;
+  const torch::Tensor y = torch::where(luminance > 8.0, f * f * f, luminance * (27.0 / 24389.0));
+  const torch::Tensor linear = y.clamp(0.0, 1.0);
+  return torch::where(
+      linear > 0.0031308, 1.055 * linear.clamp_min(1e-6).pow(1.0 / 2.4) - 0.055, 12.92 * linear);
+}
+
+}  // namespace
+
+std::string ConvNextConfig::ToString() const {
+  std::string text =
+      "convnext stem " + std::to_string(stem_kernel) + "/" + std::to_string(stem_stride) + " dims";
+  for (int dim : dims) text += " " + std::to_string(dim);
+  text += " depths";
+  for (int depth : depths) text += " " + std::to_string(depth);
+  return text;
+}
+
+torch::Tensor TensorFromImage(const Image& image) {
+  torch::Tensor tensor =
+      torch::empty({1, image.channels, image.height, image.width}, torch::kFloat32);
+  std::memcpy(tensor.data_ptr<float>(), image.data.data(), image.data.size() * sizeof(float));
+  return tensor;
+}
+
+Image ImageFromTensor(const torch::Tensor& tensor) {
+  const torch::Tensor planar =
+      (tensor.dim() == 4 ? tensor[0] : tensor).to(torch::kFloat32).contiguous();
+  Image image(static_cast<int>(planar.size(2)),
+              static_cast<int>(planar.size(1)),
+              static_cast<int>(planar.size(0)));
+  std::memcpy(image.data.data(), planar.data_ptr<float>(), image.data.size() * sizeof(float));
+  return image;
+}
+
+ConvNext::ConvNext(const ConvNextConfig& config, const WeightMap& weights, std::string description)
+    : config_(config), digest_(DigestOf(config, weights)), description_(std::move(description)) {
+  WeightReader reader(weights);
+  for (int i = 0; i < config.StageCount(); ++i) {
+    Stage stage;
+    const int64_t c = config.dims[i];
+    const std::string down = "downsample_layers." + std::to_string(i) + ".";
+    if (i == 0) {
+      stage.down_weight =
+          reader.Take(down + "0.weight", {c, 3, config.stem_kernel, config.stem_kernel});
+      stage.down_bias = reader.Take(down + "0.bias", {c});
+      stage.down_norm_weight = reader.Take(down + "1.weight", {c});
+      stage.down_norm_bias = reader.Take(down + "1.bias", {c});
+    } else {
+      const int64_t before = config.dims[i - 1];
+      stage.down_norm_weight = reader.Take(down + "0.weight", {before});
+      stage.down_norm_bias = reader.Take(down + "0.bias", {before});
+      stage.down_weight = reader.Take(down + "1.weight", {c, before, 2, 2});
+      stage.down_bias = reader.Take(down + "1.bias", {c});
+    }
+    for (int j = 0; j < config.depths[i]; ++j) {
+      const std::string name = "stages." + std::to_string(i) + "." + std::to_string(j) + ".";
+      Block block;
+      block.dwconv_weight = reader.Take(name + "dwconv.weight", {c, 1, 7, 7});
+      block.dwconv_bias = reader.Take(name + "dwconv.bias", {c});
+      block.norm_weight = reader.Take(name + "norm.weight", {c});
+      block.norm_bias = reader.Take(name + "norm.bias", {c});
+      block.pwconv1_weight = reader.Take(name + "pwconv1.weight", {4 * c, c});
+      block.pwconv1_bias = reader.Take(name + "pwconv1.bias", {4 * c});
+      block.pwconv2_weight = reader.Take(name + "pwconv2.weight", {c, 4 * c});
+      block.pwconv2_bias = reader.Take(name + "pwconv2.bias", {c});
+      block.gamma = reader.Take(name + "gamma", {c});
+      stage.blocks.push_back(std::move(block));
+    }
+    stage.norm_weight = reader.Take("norm" + std::to_string(i) + ".weight", {c});
+    stage.norm_bias = reader.Take("norm" + std::to_string(i) + ".bias", {c});
+    stages_.push_back(std::move(stage));
+  }
+  reader.ExpectAllUsed();
+}
+
+torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {
+  torch::NoGradGuard no_grad;
+  const torch::Tensor gray = GrayFromLuminanceTensor(luminance);
+  const torch::Tensor mean = torch::tensor({0.485f, 0.456f, 0.406f}).view({1, 3, 1, 1});
+  const torch::Tensor deviation = torch::tensor({0.229f, 0.224f, 0.225f}).view({1, 3, 1, 1});
+  return ((gray - mean) / deviation).contiguous(at::MemoryFormat::ChannelsLast);
+}
+
+torch::Tensor ConvNext::RunBlock(const Block& block,
+                                 const torch::Tensor& x,
+                                 const torch::Tensor& adapted) const {
+  const int64_t c = x.size(1);
+  torch::Tensor y = torch::conv2d(
+      x, block.dwconv_weight, block.dwconv_bias, /*stride=*/1, /*padding=*/3, /*dilation=*/1, c);
+  if (adapted.defined()) y = y + adapted;
+  y = torch::layer_norm(
+      y.permute({0, 2, 3, 1}), {c}, block.norm_weight, block.norm_bias, kNormEpsilon);
+  y = torch::gelu(torch::linear(y, block.pwconv1_weight, block.pwconv1_bias));
+  y = torch::linear(y, block.pwconv2_weight, block.pwconv2_bias) * block.gamma;
+  return x + y.permute({0, 3, 1, 2});
+}
+
+std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
+                                          const BlockAdapter& adapter) const {
+  std::vector<torch::Tensor> taps;
+  torch::Tensor x = input;
+  for (int i = 0; i < config_.StageCount(); ++i) {
+    const Stage& stage = stages_[i];
+    if (i == 0) {
+      const int border = (config_.stem_kernel - config_.stem_stride) / 2;
+      if (border > 0) x = torch::replication_pad2d(x, {border, border, border, border});
+      x = torch::conv2d(x, stage.down_weight, stage.down_bias, config_.stem_stride);
+      x = ChannelNorm(x, stage.down_norm_weight, stage.down_norm_bias);
+    } else {
+      x = ChannelNorm(x, stage.down_norm_weight, stage.down_norm_bias);
+      x = torch::conv2d(x, stage.down_weight, stage.down_bias, /*stride=*/2);
+    }
+    for (size_t j = 0; j < stage.blocks.size(); ++j) {
+      torch::Tensor adapted;
+      if (adapter) adapted = adapter(i, static_cast<int>(j), x);
+      x = RunBlock(stage.blocks[j], x, adapted);
+    }
+    taps.push_back(ChannelNorm(x, stage.norm_weight, stage.norm_bias));
+  }
+  return taps;
+}
+
+torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px) const {
+  CheckLuminance(luminance);
+  torch::NoGradGuard no_grad;
+  const Image small = FitWithin(luminance, max_side_px);
+  const int stride = config_.Stride(config_.StageCount() - 1);
+  const int right = (stride - small.width % stride) % stride;
+  const int bottom = (stride - small.height % stride) % stride;
+  torch::Tensor tensor = TensorFromImage(small);
+  // Replication has no limit on the border's width, unlike reflection: 1x1 pictures are fine.
+  if (right > 0 || bottom > 0) tensor = torch::replication_pad2d(tensor, {0, right, 0, bottom});
+  return Taps(Input(tensor)).back();
+}
+
+std::vector<double> ConvNext::Describe(const Image& luminance) const {
+  return WithTorchErrors("encoder", [&] {
+    const torch::Tensor tap = DeepTap(luminance, kDescribeSidePx)[0].flatten(1).to(torch::kFloat64);
+    const torch::Tensor pooled =
+        torch::cat({tap.mean(1), tap.std(1, /*unbiased=*/false)}).contiguous();
+    const double* values = pooled.data_ptr<double>();
+    return std::vector<double>(values, values + pooled.numel());
+  });
+}
+
+Image ConvNext::DeepFeatures(const Image& luminance) const {
+  return WithTorchErrors("encoder",
+                         [&] { return ImageFromTensor(DeepTap(luminance, kDeepSidePx)); });
+}
+
+std::shared_ptr<const Encoder> Encoder::Embedded() {
+  const ConvNextConfig config;
+  constexpr uint64_t kSeed = 2026;
+  // Built anew for each caller that asks: 0.7 M weights take some milliseconds, and nothing global
+  // outlives the caller.
+  return std::make_shared<const ConvNext>(
+      config,
+      RandomFeatureWeights(config, kSeed),
+      "embedded ConvNeXt, " + config.ToString() + ", seeded random features");
+}
+
+}  // namespace color3d

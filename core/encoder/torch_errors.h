@@ -1,0 +1,27 @@
+// Turns torch's exceptions into ours, at the modules that call torch.
+#pragma once
+
+#include <c10/util/Exception.h>
+
+#include <string>
+#include <utility>
+
+#include "core/base/error.h"
+
+namespace color3d {
+
+// Calls `body`; a c10::Error becomes Error{kInternal}, or kResourceExhausted when memory ran out.
+// `what` starts the message.
+template <typename Body>
+auto WithTorchErrors(const char* what, Body&& body) {
+  try {
+    return std::forward<Body>(body)();
+  } catch (const c10::Error& error) {
+    const std::string text = error.what_without_backtrace();
+    const bool memory = text.find("allocate memory") != std::string::npos;
+    throw Error(memory ? ErrorCode::kResourceExhausted : ErrorCode::kInternal,
+                std::string(what) + ": " + text.substr(0, text.find('\n')));
+  }
+}
+
+}  // namespace color3d

@@ -1,0 +1,191 @@
+#include "core/image/codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/image/orientation.h"
+
+namespace color3d {
+namespace {
+
+// OpenCV keeps colours as B, G, R (, A).
+int PlaneOfChannel(int channel, int channels) {
+  return channels >= 3 && channel < 3 ? 2 - channel : channel;
+}
+
+template <typename Sample>
+Image PlanarFromMat(const cv::Mat& mat, float scale) {
+  const int channels = mat.channels();
+  Image image(mat.cols, mat.rows, channels);
+  for (int y = 0; y < mat.rows; ++y) {
+    const Sample* row = mat.ptr<Sample>(y);
+    for (int c = 0; c < channels; ++c) {
+      float* out = image.Plane(PlaneOfChannel(c, channels)) + static_cast<size_t>(y) * mat.cols;
+      for (int x = 0; x < mat.cols; ++x) out[x] = scale * static_cast<float>(row[x * channels + c]);
+    }
+  }
+  return image;
+}
+
+template <typename Sample>
+cv::Mat MatFromPlanar(const Image& image, int type, float scale) {
+  const int channels = image.channels;
+  cv::Mat mat(image.height, image.width, CV_MAKETYPE(type, channels));
+  for (int y = 0; y < image.height; ++y) {
+    Sample* row = mat.ptr<Sample>(y);
+    for (int c = 0; c < channels; ++c) {
+      const float* in =
+          image.Plane(PlaneOfChannel(c, channels)) + static_cast<size_t>(y) * image.width;
+      for (int x = 0; x < image.width; ++x) {
+        // The comparison's order sends NaN to 0.
+        const float v = in[x] > 0.0f ? std::min(in[x], 1.0f) : 0.0f;
+        row[x * channels + c] = static_cast<Sample>(v * scale + 0.5f);
+      }
+    }
+  }
+  return mat;
+}
+
+// EXIF 2.3, tag 274: where the stored row 0 and column 0 belong in the picture.
+Image Oriented(const Image& stored, int orientation) {
+  if (orientation == 1) return stored;
+  const bool swap = OrientationSwapsSides(orientation);
+  Image image(
+      swap ? stored.height : stored.width, swap ? stored.width : stored.height, stored.channels);
+  const bool flip_x = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+  const bool flip_y = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+  for (int c = 0; c < stored.channels; ++c) {
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        int sx = swap ? y : x;
+        int sy = swap ? x : y;
+        if (flip_x) sx = stored.width - 1 - sx;
+        if (flip_y) sy = stored.height - 1 - sy;
+        image.At(c, y, x) = stored.At(c, sy, sx);
+      }
+    }
+  }
+  return image;
+}
+
+// Keeps the colour planes (and alpha, when wanted) that the file really has: OpenCV expands grey
+// with alpha to four channels.
+Image SelectChannels(Image image, const ImageInfo& info, bool keep_alpha) {
+  const bool gray = info.channels <= 2;
+  const bool has_alpha = image.channels == 4;
+  const int colours = gray ? 1 : std::min(image.channels, 3);
+  const bool alpha = has_alpha && keep_alpha;
+  if (image.channels == colours + (alpha ? 1 : 0)) return image;
+  Image out(image.width, image.height, colours + (alpha ? 1 : 0));
+  const size_t n = image.PlaneSize();
+  std::copy_n(image.data.begin(), n * colours, out.data.begin());
+  if (alpha) std::copy_n(image.Plane(3), n, out.Plane(colours));
+  return out;
+}
+
+cv::Mat DecodeStored(std::string_view bytes, const std::string& file_name, const ImageInfo& info) {
+  const std::string tiff = info.format == ImageFormat::kTiff ? TiffAsStored(bytes) : std::string();
+  const std::string_view source = tiff.empty() ? bytes : std::string_view(tiff);
+  cv::Mat mat;
+  try {
+    const cv::Mat input(
+        1, static_cast<int>(source.size()), CV_8U, const_cast<char*>(source.data()));
+    mat = cv::imdecode(input, cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception& e) {
+    throw InvalidArgument(file_name + " cannot be decoded (" + e.err + "); save it again");
+  }
+  if (mat.empty()) {
+    throw InvalidArgument(file_name +
+                          " cannot be decoded: its image data is damaged or of a rare "
+                          "kind; save it again as JPEG or PNG");
+  }
+  if (mat.cols != info.width || mat.rows != info.height) {
+    throw InvalidArgument(file_name + " is damaged: its header and its data differ in size");
+  }
+  return mat;
+}
+
+std::string Encode(const cv::Mat& mat, const char* extension, const std::vector<int>& parameters) {
+  try {
+    std::vector<uchar> bytes;
+    if (cv::imencode(extension, mat, bytes, parameters)) {
+      return std::string(bytes.begin(), bytes.end());
+    }
+  } catch (const cv::Exception& e) {
+    throw Error(ErrorCode::kInternal, "encoding " + std::string(extension) + " failed: " + e.err);
+  }
+  throw Error(ErrorCode::kInternal, "encoding " + std::string(extension) + " failed");
+}
+
+void CheckEncodable(const Image& image, bool alpha_allowed) {
+  const int c = image.channels;
+  if (image.Empty() || !(c == 1 || c == 3 || (alpha_allowed && c == 4))) {
+    throw InvalidArgument("cannot encode an image of " + std::to_string(image.width) + " x " +
+                          std::to_string(image.height) + " px and " + std::to_string(c) +
+                          " channels");
+  }
+}
+
+}  // namespace
+
+Image DecodeImage(std::string_view bytes, const std::string& file_name, bool keep_alpha) {
+  const ImageInfo info = ProbeImage(bytes, file_name);
+  const cv::Mat mat = DecodeStored(bytes, file_name, info);
+  Image image;
+  if (mat.depth() == CV_8U) {
+    image = PlanarFromMat<uint8_t>(mat, 1.0f / 255.0f);
+  } else if (mat.depth() == CV_16U) {
+    image = PlanarFromMat<uint16_t>(mat, 1.0f / 65535.0f);
+    // OpenCV turns 8-bit ones over, but not these (scans of film).
+    if (info.min_is_white) {
+      for (float& v : image.data) v = 1.0f - v;
+    }
+  } else {
+    throw InvalidArgument(file_name + " has neither 8 nor 16 bits per channel; save it as such");
+  }
+  image = SelectChannels(std::move(image), info, keep_alpha);
+  return Oriented(image, ReadOrientation(bytes));
+}
+
+Image ReadImage(const std::filesystem::path& path, bool keep_alpha) {
+  return DecodeImage(ReadFile(path), path.filename().string(), keep_alpha);
+}
+
+bool IsGray(const Image& srgb, float tolerance) {
+  if (srgb.channels <= 2) return true;
+  const size_t n = srgb.PlaneSize();
+  const float* r = srgb.Plane(0);
+  const float* g = srgb.Plane(1);
+  const float* b = srgb.Plane(2);
+  size_t coloured = 0;
+  for (size_t i = 0; i < n; ++i) {
+    if (std::abs(r[i] - g[i]) > tolerance || std::abs(g[i] - b[i]) > tolerance) ++coloured;
+  }
+  return static_cast<double>(coloured) <= 0.005 * static_cast<double>(n);
+}
+
+std::string EncodePng8(const Image& image) {
+  CheckEncodable(image, true);
+  return Encode(MatFromPlanar<uint8_t>(image, CV_8U, 255.0f), ".png", {});
+}
+
+std::string EncodePng16(const Image& image) {
+  CheckEncodable(image, true);
+  return Encode(MatFromPlanar<uint16_t>(image, CV_16U, 65535.0f), ".png", {});
+}
+
+std::string EncodeJpeg(const Image& image, int quality) {
+  CheckEncodable(image, false);
+  if (quality < 1 || quality > 100) {
+    throw InvalidArgument("JPEG quality is " + std::to_string(quality) + "; it must be 1..100");
+  }
+  return Encode(
+      MatFromPlanar<uint8_t>(image, CV_8U, 255.0f), ".jpg", {cv::IMWRITE_JPEG_QUALITY, quality});
+}
+
+}  // namespace color3d

@@ -1,0 +1,55 @@
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace {
+
+Image ResizeWith(const Image& image, int width, int height, int interpolation) {
+  Image out(width, height, image.channels);
+  try {
+    for (int c = 0; c < image.channels; ++c) {
+      const cv::Mat from(image.height, image.width, CV_32F, const_cast<float*>(image.Plane(c)));
+      cv::Mat to(height, width, CV_32F, out.Plane(c));
+      cv::resize(from, to, to.size(), 0, 0, interpolation);
+    }
+  } catch (const cv::Exception& e) {
+    throw Error(ErrorCode::kInternal, "resizing failed: " + e.err);
+  }
+  return out;
+}
+
+}  // namespace
+
+Image Resize(const Image& image, int width, int height) {
+  if (image.Empty() || width < 1 || height < 1) {
+    throw InvalidArgument("cannot resize " + std::to_string(image.width) + " x " +
+                          std::to_string(image.height) + " px to " + std::to_string(width) + " x " +
+                          std::to_string(height) + " px");
+  }
+  if (width == image.width && height == image.height) return image;
+  // Down first, each side on its own, then up: area averaging is for shrinking only.
+  const int down_width = std::min(width, image.width);
+  const int down_height = std::min(height, image.height);
+  Image out = down_width == image.width && down_height == image.height
+                  ? image
+                  : ResizeWith(image, down_width, down_height, cv::INTER_AREA);
+  if (width == out.width && height == out.height) return out;
+  return ResizeWith(out, width, height, cv::INTER_LINEAR);
+}
+
+Image FitWithin(const Image& image, int max_side_px) {
+  const int side = std::max(image.width, image.height);
+  if (max_side_px <= 0 || side <= max_side_px) return image;
+  const double scale = static_cast<double>(max_side_px) / side;
+  return Resize(image,
+                std::max(1, static_cast<int>(std::lround(image.width * scale))),
+                std::max(1, static_cast<int>(std::lround(image.height * scale))));
+}
+
+}  // namespace color3d

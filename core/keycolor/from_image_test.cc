@@ -1,0 +1,117 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/base/random.h"
+#include "core/color/lab.h"
+#include "core/keycolor/keycolor.h"
+
+namespace color3d {
+namespace {
+
+// A Lab picture with structure in L and colour, inside the sRGB gamut.
+Image MakeLab(int width, int height) {
+  Image lab(width, height, 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      lab.At(0, y, x) = 50.0f + 15.0f * std::sin(0.3f * x) + 10.0f * std::cos(0.2f * y);
+      lab.At(1, y, x) = 15.0f * std::sin(0.05f * x);
+      lab.At(2, y, x) = 20.0f * std::cos(0.07f * y);
+    }
+  }
+  return lab;
+}
+
+Image LuminanceOf(const Image& lab) {
+  Image l(lab.width, lab.height, 1);
+  std::copy_n(lab.data.begin(), l.data.size(), l.data.begin());
+  return l;
+}
+
+std::string MessageOf(const Image& luminance, const Image& coloured) {
+  try {
+    KeyColorFromImage(luminance, coloured);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    return error.what();
+  }
+  return "";
+}
+
+TEST(KeyColorFromImageTest, ReturnsTheChroma) {
+  const Image lab = MakeLab(60, 40);
+  const Image ab = KeyColorFromImage(LuminanceOf(lab), SrgbFromLab(lab));
+  ASSERT_EQ(ab.channels, 2);
+  for (int y = 0; y < 40; ++y) {
+    for (int x = 0; x < 60; ++x) {
+      ASSERT_NEAR(ab.At(0, y, x), lab.At(1, y, x), 0.02f);
+      ASSERT_NEAR(ab.At(1, y, x), lab.At(2, y, x), 0.02f);
+    }
+  }
+}
+
+TEST(KeyColorFromImageTest, AChangedToneCurveIsStillTheSamePicture) {
+  Image lab = MakeLab(60, 40);
+  const Image luminance = LuminanceOf(lab);
+  for (size_t i = 0; i < lab.PlaneSize(); ++i) lab.data[i] = 20.0f + 0.6f * lab.data[i];
+  EXPECT_EQ(MessageOf(luminance, SrgbFromLab(lab)), "");
+}
+
+TEST(KeyColorFromImageTest, AnotherSizeIsRefusedWithBothSizes) {
+  const Image lab = MakeLab(60, 40);
+  const std::string message = MessageOf(Image(61, 40, 1), SrgbFromLab(lab));
+  EXPECT_NE(message.find("60x40"), std::string::npos) << message;
+  EXPECT_NE(message.find("61x40"), std::string::npos) << message;
+}
+
+TEST(KeyColorFromImageTest, AGrayPictureIsRefused) {
+  Image lab = MakeLab(60, 40);
+  const Image luminance = LuminanceOf(lab);
+  for (int c = 1; c < 3; ++c) std::fill_n(lab.Plane(c), lab.PlaneSize(), 0.5f);
+  EXPECT_NE(MessageOf(luminance, SrgbFromLab(lab)).find("has no colour"), std::string::npos);
+  EXPECT_NE(MessageOf(luminance, Image(60, 40, 1, 0.5f)).find("has no colour"), std::string::npos);
+}
+
+TEST(KeyColorFromImageTest, ASmallColouredObjectIsColour) {
+  Image lab = MakeLab(60, 40);
+  const Image luminance = LuminanceOf(lab);
+  for (int c = 1; c < 3; ++c) std::fill_n(lab.Plane(c), lab.PlaneSize(), 0.0f);
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) lab.At(2, y, x) = 30.0f;
+  }
+  EXPECT_EQ(MessageOf(luminance, SrgbFromLab(lab)), "");
+}
+
+TEST(KeyColorFromImageTest, AnotherPictureIsRefused) {
+  const Image lab = MakeLab(60, 40);
+  Image other(60, 40, 1);
+  Random random(1);
+  for (float& value : other.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
+  EXPECT_NE(MessageOf(other, SrgbFromLab(lab)).find("does not look like the key view"),
+            std::string::npos);
+  // A negative of the picture is another picture, too.
+  Image negative = LuminanceOf(lab);
+  for (float& value : negative.data) value = 100.0f - value;
+  EXPECT_NE(MessageOf(negative, SrgbFromLab(lab)), "");
+}
+
+TEST(KeyColorFromImageTest, FlatPicturesHaveADefinedAnswer) {
+  Image coloured(20, 20, 3, 0.4f);
+  std::fill_n(coloured.Plane(0), coloured.PlaneSize(), 0.6f);
+  EXPECT_EQ(MessageOf(Image(20, 20, 1, 50.0f), coloured), "");
+  const Image structured = LuminanceOf(MakeLab(20, 20));
+  EXPECT_NE(MessageOf(structured, coloured), "");
+}
+
+TEST(KeyColorFromImageTest, NonFiniteValuesAreRefused) {
+  const Image lab = MakeLab(20, 20);
+  Image coloured = SrgbFromLab(lab);
+  coloured.data[3] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(MessageOf(LuminanceOf(lab), coloured), "");
+}
+
+}  // namespace
+}  // namespace color3d

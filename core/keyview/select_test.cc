@@ -1,0 +1,209 @@
+#include "core/keyview/select.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/random.h"
+
+namespace color3d {
+namespace {
+
+using Matrix = std::vector<std::vector<double>>;
+
+Matrix RandomFeatures(int views, int dims, uint64_t seed) {
+  Random random(seed);
+  Matrix features(views, std::vector<double>(dims));
+  for (auto& row : features) {
+    for (double& value : row) value = random.NextUniform(-0.2, 1.0);
+  }
+  return features;
+}
+
+KeyViewOptions Entropy() {
+  KeyViewOptions options;
+  options.strategy = KeyViewStrategy::kEntropy;
+  options.outlier_guard = false;
+  return options;
+}
+
+// The formula as METHOD.md writes it, step by step.
+std::vector<double> DirectEntropies(const Matrix& features, double temperature, bool exclude_self) {
+  const size_t n = features.size();
+  Matrix unit = features;
+  for (auto& row : unit) {
+    double norm = 0.0;
+    for (double value : row) norm += value * value;
+    for (double& value : row) value /= std::sqrt(norm);
+  }
+  std::vector<double> entropies;
+  for (size_t i = 0; i < n; ++i) {
+    std::vector<double> p(n, 0.0);
+    double sum = 0.0;
+    for (size_t j = 0; j < n; ++j) {
+      if (exclude_self && i == j) continue;
+      double s = 0.0;
+      for (size_t d = 0; d < unit[i].size(); ++d) s += unit[i][d] * unit[j][d];
+      sum += p[j] = std::exp(s / temperature);
+    }
+    double h = 0.0;
+    for (double value : p) {
+      if (value > 0.0) h -= value / sum * std::log(value / sum);
+    }
+    entropies.push_back(h);
+  }
+  return entropies;
+}
+
+TEST(SelectKeyViewTest, EntropyAgreesWithTheDirectFormula) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    for (bool exclude_self : {false, true}) {
+      for (double temperature : {1.0, 0.1}) {
+        const Matrix features = RandomFeatures(17, 6, seed);
+        KeyViewOptions options = Entropy();
+        options.temperature = temperature;
+        options.exclude_self = exclude_self;
+        const KeyViewSelection selection = SelectKeyViewByEntropy(features, options);
+        const std::vector<double> direct = DirectEntropies(features, temperature, exclude_self);
+        size_t best = 0;
+        for (size_t i = 0; i < direct.size(); ++i) {
+          if (direct[i] > direct[best]) best = i;
+        }
+        EXPECT_EQ(selection.index, static_cast<int>(best));
+        for (const RankedView& view : selection.ranking) {
+          EXPECT_NEAR(view.score, direct[view.index], 1e-12);
+        }
+        EXPECT_NEAR(selection.margin, selection.ranking[0].score - selection.ranking[1].score, 0.0);
+      }
+    }
+  }
+}
+
+TEST(SelectKeyViewTest, ScaleOfADescriptorDoesNotMatter) {
+  Matrix features = RandomFeatures(9, 5, 3);
+  const KeyViewSelection before = SelectKeyViewByEntropy(features, Entropy());
+  for (double& value : features[4]) value *= 1e200;  // squares would overflow
+  for (double& value : features[5]) value *= 1e-200;
+  const KeyViewSelection after = SelectKeyViewByEntropy(features, Entropy());
+  ASSERT_EQ(before.ranking.size(), after.ranking.size());
+  for (size_t i = 0; i < before.ranking.size(); ++i) {
+    EXPECT_EQ(before.ranking[i].index, after.ranking[i].index);
+    EXPECT_NEAR(before.ranking[i].score, after.ranking[i].score, 1e-12);
+  }
+}
+
+TEST(SelectKeyViewTest, TinyTemperatureIsFinite) {
+  KeyViewOptions options = Entropy();
+  options.temperature = 1e-6;
+  const KeyViewSelection selection = SelectKeyViewByEntropy(RandomFeatures(8, 4, 2), options);
+  for (const RankedView& view : selection.ranking) EXPECT_TRUE(std::isfinite(view.score));
+}
+
+TEST(SelectKeyViewTest, DuplicatesTieToTheLowestIndex) {
+  const Matrix features(7, std::vector<double>{0.3, 0.5, 0.1});
+  const KeyViewSelection selection = SelectKeyViewByEntropy(features, {});
+  EXPECT_EQ(selection.index, 0);
+  EXPECT_EQ(selection.margin, 0.0);
+  EXPECT_TRUE(selection.warnings.empty());
+  for (size_t i = 0; i < 7; ++i) {
+    EXPECT_EQ(selection.ranking[i].index, static_cast<int>(i));
+    EXPECT_NEAR(selection.ranking[i].score, std::log(7.0), 1e-12);
+  }
+}
+
+TEST(SelectKeyViewTest, OneViewIsTheKeyView) {
+  for (bool exclude_self : {false, true}) {
+    KeyViewOptions options = Entropy();
+    options.exclude_self = exclude_self;
+    const KeyViewSelection selection = SelectKeyViewByEntropy({{1.0, 2.0}}, options);
+    EXPECT_EQ(selection.index, 0);
+    EXPECT_EQ(selection.ranking[0].score, 0.0);
+  }
+  EXPECT_EQ(SelectKeyViewByCoverage({{0.0}}, {{1.0, 2.0}}, {}).index, 0);
+}
+
+TEST(SelectKeyViewTest, UnusableDescriptorsAreSetAsideWithAWarning) {
+  Matrix features = RandomFeatures(6, 4, 1);
+  features[0].assign(4, 0.0);
+  features[2][1] = std::numeric_limits<double>::quiet_NaN();
+  features[3][0] = std::numeric_limits<double>::infinity();
+  const KeyViewSelection selection = SelectKeyViewByEntropy(features, Entropy());
+  ASSERT_EQ(selection.warnings.size(), 1u);
+  EXPECT_NE(selection.warnings[0].find("0, 2, 3"), std::string::npos) << selection.warnings[0];
+  EXPECT_TRUE(selection.index == 1 || selection.index >= 4);
+  for (int i = 3; i < 6; ++i) EXPECT_TRUE(selection.ranking[i].set_aside);
+}
+
+TEST(SelectKeyViewTest, NoUsableDescriptorIsAnError) {
+  EXPECT_THROW(SelectKeyViewByEntropy({}, {}), Error);
+  EXPECT_THROW(SelectKeyViewByEntropy({{0.0, 0.0}, {0.0, 0.0}}, {}), Error);
+  EXPECT_THROW(SelectKeyViewByEntropy({{1.0, 0.0}, {0.0}}, {}), Error);
+}
+
+// A chain of views, each like its neighbours, and one frame equally unlike all.
+Matrix ChainWithOutlier(int views, int outlier) {
+  Random random(42);
+  const int dims = 400;
+  Matrix features(views, std::vector<double>(dims));
+  std::vector<double> common(dims);
+  for (double& value : common) value = random.NextNormal();
+  for (int i = 0; i < views; ++i) {
+    for (int d = 0; d < dims; ++d) {
+      // A bump that moves along the chain on top of what all views share.
+      const double position = (i + 0.5) / views * dims;
+      const double bump = 4.0 * std::exp(-std::pow((d - position) / 60.0, 2));
+      features[i][d] = i == outlier ? random.NextNormal() : common[d] + bump;
+    }
+  }
+  return features;
+}
+
+TEST(SelectKeyViewTest, OutlierGuardSetsTheOutlierAside) {
+  const Matrix features = ChainWithOutlier(100, 37);
+  const KeyViewSelection unguarded = SelectKeyViewByEntropy(features, Entropy());
+  EXPECT_EQ(unguarded.index, 37) << "the formula's weakness that the guard is for";
+  KeyViewOptions options = Entropy();
+  options.outlier_guard = true;
+  const KeyViewSelection guarded = SelectKeyViewByEntropy(features, options);
+  EXPECT_NE(guarded.index, 37);
+  EXPECT_FALSE(guarded.warnings.empty());
+  bool found = false;
+  for (const RankedView& view : guarded.ranking) {
+    if (view.index == 37) found = view.set_aside;
+  }
+  EXPECT_TRUE(found);
+  EXPECT_FALSE(guarded.ranking[0].set_aside);
+}
+
+TEST(SelectKeyViewTest, CoverageTakesTheRowWithTheSmallestMean) {
+  const Matrix distance{{0.0, 5.0, 5.0}, {2.0, 0.0, 2.0}, {1.0, 4.0, 0.0}};
+  const KeyViewSelection selection = SelectKeyViewByCoverage(distance, RandomFeatures(3, 4, 1), {});
+  EXPECT_EQ(selection.index, 1);
+  EXPECT_DOUBLE_EQ(selection.ranking[0].score, -2.0);
+  EXPECT_DOUBLE_EQ(selection.margin, 0.5);
+}
+
+TEST(SelectKeyViewTest, ManualChoiceWins) {
+  KeyViewOptions options;
+  options.strategy = KeyViewStrategy::kManual;
+  options.manual_index = 5;
+  const KeyViewSelection selection = SelectKeyViewByEntropy(RandomFeatures(8, 4, 9), options);
+  EXPECT_EQ(selection.index, 5);
+  EXPECT_EQ(selection.ranking.size(), 8u);
+  options.manual_index = 8;
+  EXPECT_THROW(SelectKeyViewByEntropy(RandomFeatures(8, 4, 9), options), Error);
+}
+
+TEST(SelectKeyViewTest, RefusesBadOptionsAndShapes) {
+  KeyViewOptions options;
+  options.temperature = 0.0;
+  EXPECT_THROW(SelectKeyViewByEntropy(RandomFeatures(3, 2, 1), options), Error);
+  EXPECT_THROW(SelectKeyViewByCoverage({{0.0}}, RandomFeatures(3, 2, 1), {}), Error);
+  EXPECT_THROW(SelectKeyViewByCoverage({{0.0}, {0.0}}, RandomFeatures(2, 2, 1), {}), Error);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,132 @@
+#include "core/report/curves.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstring>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+std::string NumberText(double value) {
+  char buffer[64];
+  const auto end = std::to_chars(buffer, buffer + sizeof(buffer), value).ptr;
+  return std::string(buffer, end);
+}
+
+double NumberFrom(std::string_view text, int line) {
+  double value = 0.0;
+  const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (result.ec != std::errc() || result.ptr != text.data() + text.size()) {
+    throw InvalidArgument("curves, line " + std::to_string(line) + ": \"" + std::string(text) +
+                          "\" is not a number");
+  }
+  return value;
+}
+
+constexpr std::string_view kHeader = "stage,seconds,iteration,error_name,value";
+
+}  // namespace
+
+std::string CurvesToCsv(const std::vector<CurvePoint>& points) {
+  std::string csv(kHeader);
+  csv += '\n';
+  for (const CurvePoint& p : points) {
+    csv += p.stage + ',' + NumberText(p.seconds) + ',' + std::to_string(p.iteration) + ',' +
+           p.error_name + ',' + NumberText(p.value) + '\n';
+  }
+  return csv;
+}
+
+std::vector<CurvePoint> CurvesFromCsv(std::string_view csv) {
+  std::vector<CurvePoint> points;
+  int line_number = 0;
+  while (!csv.empty()) {
+    const size_t end = csv.find('\n');
+    std::string_view line = csv.substr(0, end);
+    csv.remove_prefix(end == std::string_view::npos ? csv.size() : end + 1);
+    ++line_number;
+    if (line.empty() || line == kHeader) continue;
+    std::vector<std::string_view> fields;
+    while (true) {
+      const size_t comma = line.find(',');
+      fields.push_back(line.substr(0, comma));
+      if (comma == std::string_view::npos) break;
+      line.remove_prefix(comma + 1);
+    }
+    if (fields.size() != 5) {
+      throw InvalidArgument("curves, line " + std::to_string(line_number) + " has " +
+                            std::to_string(fields.size()) + " fields instead of 5");
+    }
+    CurvePoint point;
+    point.stage = fields[0];
+    point.seconds = NumberFrom(fields[1], line_number);
+    point.iteration = static_cast<int64_t>(NumberFrom(fields[2], line_number));
+    point.error_name = fields[3];
+    point.value = NumberFrom(fields[4], line_number);
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
+CurveRecorder::CurveRecorder(std::string stage,
+                             ProgressObserver& outer,
+                             CheckpointStore& checkpoints)
+    : stage_(std::move(stage)), outer_(outer), checkpoints_(checkpoints) {}
+
+double CurveRecorder::Seconds() const {
+  return earlier_seconds_ +
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+}
+
+void CurveRecorder::OnProgress(int64_t step, int64_t total_steps, const std::string& message) {
+  outer_.OnProgress(step, total_steps, message);
+}
+
+void CurveRecorder::OnError(int64_t iteration, const std::string& error_name, double value) {
+  if (std::isfinite(value)) {
+    std::lock_guard lock(mutex_);
+    points_.push_back({stage_, Seconds(), iteration, error_name, value});
+  }
+  outer_.OnError(iteration, error_name, value);
+}
+
+void CurveRecorder::OnWarning(const std::string& message) { outer_.OnWarning(message); }
+
+std::vector<CurvePoint> CurveRecorder::points() const {
+  std::lock_guard lock(mutex_);
+  return points_;
+}
+
+// Layout of a wrapped checkpoint: seconds (float64), length of the CSV (uint64), CSV, trainer state.
+void CurveRecorder::Save(const std::string& state) {
+  const double seconds = Seconds();
+  const std::string csv = CurvesToCsv(points());
+  const uint64_t length = csv.size();
+  std::string bytes(sizeof(seconds) + sizeof(length), '\0');
+  std::memcpy(bytes.data(), &seconds, sizeof(seconds));
+  std::memcpy(bytes.data() + sizeof(seconds), &length, sizeof(length));
+  bytes += csv;
+  bytes += state;
+  checkpoints_.Save(bytes);
+}
+
+std::optional<std::string> CurveRecorder::Load() {
+  std::optional<std::string> bytes = checkpoints_.Load();
+  constexpr size_t kPrefix = sizeof(double) + sizeof(uint64_t);
+  if (!bytes || bytes->size() < kPrefix) return std::nullopt;
+  double seconds = 0.0;
+  uint64_t length = 0;
+  std::memcpy(&seconds, bytes->data(), sizeof(seconds));
+  std::memcpy(&length, bytes->data() + sizeof(seconds), sizeof(length));
+  if (length > bytes->size() - kPrefix || !std::isfinite(seconds)) {
+    throw Error(ErrorCode::kDataLoss, "the checkpoint of " + stage_ + " is damaged");
+  }
+  std::lock_guard lock(mutex_);
+  points_ = CurvesFromCsv(std::string_view(*bytes).substr(kPrefix, length));
+  earlier_seconds_ = seconds;
+  return bytes->substr(kPrefix + length);
+}
+
+}  // namespace color3d

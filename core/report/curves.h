@@ -1,0 +1,57 @@
+// Error-against-time curves: every stage that iterates leaves (seconds, iteration, error) points.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/progress.h"
+
+namespace color3d {
+
+struct CurvePoint {
+  std::string stage;
+  double seconds = 0.0;  // of computing since the stage began, over all attempts
+  int64_t iteration = 0;
+  std::string error_name;
+  double value = 0.0;
+};
+
+// "stage,seconds,iteration,error_name,value" with one header line.
+std::string CurvesToCsv(const std::vector<CurvePoint>& points);
+// Throws Error{kInvalidArgument} naming the line.
+std::vector<CurvePoint> CurvesFromCsv(std::string_view csv);
+
+// Sits between a stage and the outer observer: stamps errors with the time and keeps them. Also
+// wraps the checkpoints, so that a resumed stage's curve and clock go on where they stopped.
+// Thread-safe for OnProgress/OnError/OnWarning.
+class CurveRecorder : public ProgressObserver, public CheckpointStore {
+ public:
+  // Both references must outlive the recorder.
+  CurveRecorder(std::string stage, ProgressObserver& outer, CheckpointStore& checkpoints);
+
+  void OnProgress(int64_t step, int64_t total_steps, const std::string& message) override;
+  void OnError(int64_t iteration, const std::string& error_name, double value) override;
+  void OnWarning(const std::string& message) override;
+
+  std::optional<std::string> Load() override;
+  bool WantsSave() override { return checkpoints_.WantsSave(); }
+  void Save(const std::string& state) override;
+
+  double Seconds() const;
+  std::vector<CurvePoint> points() const;
+
+ private:
+  std::string stage_;
+  ProgressObserver& outer_;
+  CheckpointStore& checkpoints_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  double earlier_seconds_ = 0.0;
+  mutable std::mutex mutex_;
+  std::vector<CurvePoint> points_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,38 @@
+// The report: one self-contained HTML file (pictures inside, no scripts, nothing fetched).
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/report/curves.h"
+#include "core/report/scene_plan.h"
+
+namespace color3d {
+
+// Bytes of a JPEG or PNG file with a caption.
+struct ReportPicture {
+  std::string caption;
+  std::string bytes;
+};
+
+// Pictures of one view side by side.
+struct ReportRow {
+  std::string title;
+  std::vector<ReportPicture> pictures;
+};
+
+struct ReportData {
+  std::string title;
+  std::string summary;  // one paragraph of plain text
+  ReportRow key_view;
+  std::vector<ReportRow> views;
+  std::vector<std::pair<std::string, double>> metrics;
+  std::vector<CurvePoint> curves;
+  std::vector<PlanStep> plan;
+  std::vector<std::string> warnings;
+};
+
+std::string RenderReport(const ReportData& data);
+
+}  // namespace color3d

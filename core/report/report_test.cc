@@ -1,0 +1,97 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.h"
+#include "core/report/curves.h"
+#include "core/report/plot.h"
+#include "core/report/report_page.h"
+#include "core/report/scene_plan.h"
+
+namespace color3d {
+namespace {
+
+class MemoryCheckpoints : public CheckpointStore {
+ public:
+  std::optional<std::string> Load() override { return saved_; }
+  bool WantsSave() override { return true; }
+  void Save(const std::string& state) override { saved_ = state; }
+
+ private:
+  std::optional<std::string> saved_;
+};
+
+TEST(Curves, CsvRoundTrip) {
+  const std::vector<CurvePoint> points{{"geometry", 0.1, 10, "train_l1_l", 1e-7},
+                                       {"geometry", 12.75, 1000000, "heldout_psnr_l_db", 22.5}};
+  const auto back = CurvesFromCsv(CurvesToCsv(points));
+  ASSERT_EQ(back.size(), 2u);
+  EXPECT_EQ(back[0].value, 1e-7);
+  EXPECT_EQ(back[1].iteration, 1000000);
+  EXPECT_EQ(back[1].error_name, "heldout_psnr_l_db");
+  EXPECT_THROW(CurvesFromCsv("a,b,c\n"), Error);
+  EXPECT_THROW(CurvesFromCsv("a,x,1,e,2\n"), Error);
+}
+
+TEST(CurveRecorder, ResumesPointsAndClock) {
+  MemoryCheckpoints checkpoints;
+  NullObserver outer;
+  {
+    CurveRecorder first("stage", outer, checkpoints);
+    EXPECT_FALSE(first.Load().has_value());
+    first.OnError(1, "error", 3.0);
+    first.OnError(2, "error", std::numeric_limits<double>::quiet_NaN());  // never recorded
+    first.Save("trainer state");
+  }
+  CurveRecorder second("stage", outer, checkpoints);
+  EXPECT_EQ(second.Load().value(), "trainer state");
+  second.OnError(3, "error", 2.0);
+  const auto points = second.points();
+  ASSERT_EQ(points.size(), 2u);
+  EXPECT_EQ(points[0].iteration, 1);
+  EXPECT_EQ(points[1].iteration, 3);
+  EXPECT_GE(points[1].seconds, points[0].seconds);
+}
+
+TEST(CurveRecorder, RefusesADamagedCheckpoint) {
+  MemoryCheckpoints checkpoints;
+  NullObserver outer;
+  checkpoints.Save(std::string(16, '\xff'));
+  CurveRecorder recorder("stage", outer, checkpoints);
+  EXPECT_THROW(recorder.Load(), Error);
+}
+
+TEST(ScenePlan, LeavesOutWhatTheSceneDoesNotNeed) {
+  PlanFacts facts;
+  facts.has_poses = true;
+  facts.views = 20;
+  const auto plan = PlanFromJson(PlanToJson(PlanScene(facts)));
+  int left_out = 0;
+  for (const PlanStep& s : plan) {
+    EXPECT_FALSE(s.reason.empty()) << s.step;
+    EXPECT_TRUE(s.step != "structure_from_motion" || !s.needed);
+    EXPECT_TRUE(s.step != "luminance_geometry" || s.needed);
+    left_out += !s.needed;
+  }
+  EXPECT_GE(left_out, 5);
+  facts.has_poses = false;
+  EXPECT_TRUE(PlanScene(facts)[0].needed);
+  EXPECT_THROW(PlanFromJson("[{\"step\": 3}]"), Error);
+}
+
+TEST(Report, EscapesTextAndPlotsConstantCurves) {
+  ReportData data;
+  data.title = "<script>";
+  data.views = {{"view & more", {{"a \"caption\"", std::string("\xff\xd8jpeg")}}}};
+  data.curves = {{"s", 1.0, 1, "e", 2.0}, {"s", 1.0, 2, "e", 2.0}};
+  const std::string html = RenderReport(data);
+  EXPECT_EQ(html.find("<script>"), std::string::npos);
+  EXPECT_NE(html.find("&lt;script&gt;"), std::string::npos);
+  EXPECT_NE(html.find("data:image/jpeg;base64,/9hqcGVn"), std::string::npos);
+  EXPECT_EQ(html.find("nan"), std::string::npos);
+  EXPECT_NE(html.find("polyline"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,102 @@
+#include "core/report/scene_plan.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+// Rough costs measured on two cores (seconds); the report sets measured ones beside them.
+constexpr double kSecondsPerSfmPair = 0.2;
+constexpr double kSecondsPerRemapMegapixel = 0.01;
+constexpr double kSecondsPerFeatureMegapixel = 0.5;
+
+double SfmSeconds(const PlanFacts& f) {
+  return 1.0 * f.views + kSecondsPerSfmPair * f.views * (f.views - 1) / 2.0;
+}
+
+PlanStep Step(std::string name, bool needed, std::string reason, double seconds) {
+  return {std::move(name), needed, std::move(reason), seconds, -1.0};
+}
+
+}  // namespace
+
+std::vector<PlanStep> PlanScene(const PlanFacts& f) {
+  const double megapixels = f.views * f.megapixels_per_view;
+  std::vector<PlanStep> plan;
+  plan.push_back(Step("structure_from_motion",
+                      !f.has_poses,
+                      f.has_poses ? "the scene comes with camera poses"
+                                  : "the photos come without camera poses",
+                      SfmSeconds(f)));
+  plan.push_back(Step("undistortion",
+                      f.has_distortion,
+                      f.has_distortion ? "the cameras have lens distortion"
+                                       : "no camera has lens distortion",
+                      kSecondsPerRemapMegapixel * megapixels));
+  plan.push_back(Step("random_points",
+                      !f.has_sparse_points,
+                      f.has_sparse_points ? "the scene has sparse points to start from"
+                                          : "the scene has no sparse points to start from",
+                      0.1));
+  plan.push_back(Step("key_view_selection",
+                      !f.key_view_given,
+                      f.key_view_given ? "the key view was given"
+                                       : "the key view is chosen by feature coverage",
+                      kSecondsPerFeatureMegapixel * megapixels));
+  plan.push_back(Step("luminance_geometry", true, "every scene needs geometry", 0.0));
+  plan.push_back(Step("personalization", true, "the key view's colours must reach every view", 0.0));
+  plan.push_back(Step("chroma", true, "a and b are fitted on the finished geometry", 0.0));
+  plan.push_back(Step("warm_up_in_three_channels",
+                      false,
+                      "three identical luminance channels are one channel: one is rasterised",
+                      0.0));
+  plan.push_back(Step("view_dependent_chroma",
+                      false,
+                      "chroma is low-frequency in angle: degree 0 suffices unless asked for",
+                      0.0));
+  plan.push_back(Step("deformation_over_time",
+                      f.time_varying,
+                      f.time_varying ? "the input is film" : "all photos show one moment",
+                      0.0));
+  plan.push_back(Step("evaluation",
+                      f.has_truth,
+                      f.has_truth ? "true colours of held-out views were given"
+                                  : "no true colours were given",
+                      0.0));
+  return plan;
+}
+
+std::string PlanToJson(const std::vector<PlanStep>& steps) {
+  nlohmann::ordered_json array = nlohmann::ordered_json::array();
+  for (const PlanStep& s : steps) {
+    nlohmann::ordered_json entry{{"step", s.step},
+                                 {"needed", s.needed},
+                                 {"reason", s.reason},
+                                 {"estimated_seconds", s.estimated_seconds}};
+    if (s.measured_seconds >= 0.0) entry["measured_seconds"] = s.measured_seconds;
+    array.push_back(std::move(entry));
+  }
+  return array.dump(1) + "\n";
+}
+
+std::vector<PlanStep> PlanFromJson(std::string_view json) {
+  try {
+    std::vector<PlanStep> steps;
+    for (const auto& entry : nlohmann::json::parse(json)) {
+      PlanStep s;
+      s.step = entry.at("step");
+      s.needed = entry.at("needed");
+      s.reason = entry.at("reason");
+      s.estimated_seconds = entry.at("estimated_seconds");
+      s.measured_seconds = entry.value("measured_seconds", -1.0);
+      steps.push_back(std::move(s));
+    }
+    return steps;
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument(std::string("plan.json is damaged: ") + e.what());
+  }
+}
+
+}  // namespace color3d

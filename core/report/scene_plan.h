@@ -1,0 +1,39 @@
+// The scene plan: every step of the method, needed or left out, with the reason and the cost. Made
+// before work starts, completed with measured seconds afterwards.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace color3d {
+
+struct PlanStep {
+  std::string step;    // e.g. "structure_from_motion"
+  bool needed = true;
+  std::string reason;  // one sentence
+  double estimated_seconds = 0.0;  // of this machine's threads; what leaving it out saves, if left out
+  double measured_seconds = -1.0;  // < 0: not run, or not measured on its own
+};
+
+// What the plan depends on.
+struct PlanFacts {
+  bool has_poses = false;
+  bool has_distortion = false;
+  bool has_sparse_points = true;
+  bool time_varying = false;  // film or several moments
+  bool has_truth = false;
+  bool key_view_given = false;
+  int views = 0;
+  int training_views = 0;
+  double megapixels_per_view = 0.0;  // at working size
+  int threads = 1;
+};
+
+std::vector<PlanStep> PlanScene(const PlanFacts& facts);
+
+std::string PlanToJson(const std::vector<PlanStep>& steps);
+// Throws Error{kInvalidArgument}.
+std::vector<PlanStep> PlanFromJson(std::string_view json);
+
+}  // namespace color3d

@@ -1,0 +1,70 @@
+// COLMAP's sparse model as its files hold it, before it becomes a Scene. For this folder only.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scene/camera.h"
+
+namespace color3d {
+
+struct ColmapCamera {
+  Camera camera;  // as captured
+  Distortion distortion;
+};
+
+struct ColmapObservation {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  int64_t point_id = -1;  // -1: no 3D point
+};
+
+struct ColmapImage {
+  std::string name;
+  uint32_t camera_id = 0;
+  Pose cam_from_world;
+  std::vector<ColmapObservation> observations;
+};
+
+struct ColmapPoint {
+  uint64_t id = 0;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double error_px = -1.0;
+  std::vector<uint32_t> image_ids;  // of its track, as stored
+};
+
+struct ColmapModel {
+  std::map<uint32_t, ColmapCamera> cameras;
+  std::map<uint32_t, ColmapImage> images;
+  std::vector<ColmapPoint> points;
+};
+
+// True when the folder has a cameras.bin or cameras.txt.
+bool IsColmapFolder(const std::filesystem::path& folder);
+
+// Binary when there is a cameras.bin, else text. Throws Error{kInvalidArgument} naming file and
+// place for anything that is cut short, inconsistent or not finite.
+ColmapModel LoadColmapModel(const std::filesystem::path& folder);
+
+// Shared by the two readers. `model` is COLMAP's name ("SIMPLE_RADIAL"); `place` opens the message.
+int ColmapParameterCount(const std::string& model, const std::string& place);
+std::string ColmapModelName(int model_id, const std::string& place);
+ColmapCamera MakeColmapCamera(const std::string& model,
+                              uint64_t width,
+                              uint64_t height,
+                              const std::vector<double>& parameters,
+                              const std::string& place);
+// Normalises the quaternion; refuses zero and non-finite ones.
+Pose MakeColmapPose(const double (&qvec_wxyz)[4],
+                    const double (&tvec)[3],
+                    const std::string& place);
+void CheckColmapPoint(const ColmapPoint& point, const std::string& place);
+
+ColmapModel LoadColmapBinary(const std::filesystem::path& folder);
+ColmapModel LoadColmapText(const std::filesystem::path& folder);
+
+}  // namespace color3d

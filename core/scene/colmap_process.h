@@ -1,0 +1,53 @@
+// COLMAP's program as a child process: one log, one time limit for all commands, progress counted
+// from the log. For this folder only. Not thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/progress.h"
+#include "core/scene/import.h"
+
+namespace color3d {
+
+// What one command prints while it works, and how often in all.
+struct ColmapPhase {
+  std::string message;  // "matching photos"
+  std::string mark;     // in the log, once per step
+  int64_t total = 0;
+};
+
+class ColmapProcess {
+ public:
+  // The arguments outlive the object. The clock of options.sfm_timeout starts now.
+  ColmapProcess(std::filesystem::path log,
+                const ImportOptions& options,
+                ProgressObserver& progress,
+                const CancellationToken& cancel);
+
+  const std::filesystem::path& log() const { return log_; }
+  // The value of COLMAP's thread options.
+  std::string Threads() const;
+
+  // Runs `colmap arguments...` and returns the exit code. Throws Error: kDeadlineExceeded,
+  // kCancelled, kFailedPrecondition when COLMAP is not installed.
+  int Run(const std::vector<std::string>& arguments, const ColmapPhase& phase);
+  // Another exit code than 0 is Error{kInternal} with the last line of the log.
+  void RunOrThrow(const std::vector<std::string>& arguments, const ColmapPhase& phase);
+
+ private:
+  [[noreturn]] void ThrowTooSlow() const;
+  std::string LastLogLine() const;
+
+  std::filesystem::path log_;
+  const ImportOptions& options_;
+  ProgressObserver& progress_;
+  const CancellationToken& cancel_;
+  std::chrono::steady_clock::time_point deadline_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,201 @@
+#include "core/scene/import.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+#include "core/scene/colmap_model.h"
+#include "core/scene/lens.h"
+#include "core/scene/photos.h"
+#include "core/scene/sfm.h"
+#include "core/scene/sparse_cloud.h"
+#include "core/scene/transforms_json.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kFarFromOrigin = 1e3;
+constexpr int kRandomPoints = 20'000;
+constexpr uint64_t kRandomPointSeed = 1;
+constexpr int kHoldOutEvery = 8;
+constexpr size_t kMinTrainingViews = 2;
+
+void CheckRange(const char* field, int64_t value, int64_t low, int64_t high) {
+  if (value < low || value > high) {
+    throw InvalidArgument(std::string("import option ") + field + " is " + std::to_string(value) +
+                          "; it must be " + std::to_string(low) + ".." + std::to_string(high));
+  }
+}
+
+// The folder of the COLMAP model, or an empty path.
+fs::path FindColmapFolder(const fs::path& scene_folder) {
+  for (const char* folder : {"sparse/0", "sparse", "colmap/sparse/0", "."}) {
+    const fs::path candidate = (scene_folder / folder).lexically_normal();
+    if (IsColmapFolder(candidate)) return candidate;
+  }
+  return {};
+}
+
+std::string FirstNames(const std::vector<std::string>& names, size_t count) {
+  std::string text;
+  for (size_t i = 0; i < std::min(names.size(), count); ++i) {
+    text += (i == 0 ? "" : ", ") + names[i];
+  }
+  return text + (names.size() > count ? ", ..." : "");
+}
+
+// Float32 carries 7 digits: a scene in geographic coordinates would lose all detail.
+void Recentre(ImportResult* result) {
+  Scene& scene = result->scene;
+  double largest = 0.0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const View& view : scene.views) {
+    const Eigen::Vector3d center = view.cam_from_world.Center();
+    largest = std::max(largest, center.cwiseAbs().maxCoeff());
+    mean += center / static_cast<double>(scene.views.size());
+  }
+  for (const SparsePoint& point : scene.points) {
+    largest = std::max(largest, point.position.cwiseAbs().maxCoeff());
+  }
+  if (largest <= kFarFromOrigin || mean.cwiseAbs().maxCoeff() <= kFarFromOrigin) return;
+  for (View& view : scene.views) {
+    view.cam_from_world.translation += view.cam_from_world.rotation * mean;
+  }
+  for (SparsePoint& point : scene.points) point.position -= mean;
+  scene.world_offset += mean;
+  result->warnings.push_back(
+      "the scene lies far from the origin; its coordinates are kept relative "
+      "to the cameras' mean and put back on export");
+}
+
+void DropWeakPoints(Scene* scene) {
+  auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
+  scene->points.erase(std::remove_if(scene->points.begin(), scene->points.end(), weak),
+                      scene->points.end());
+}
+
+void AddRandomPointsWhenEmpty(ImportResult* result) {
+  Scene& scene = result->scene;
+  if (!scene.points.empty()) return;
+  scene.points = RandomPoints(scene, kRandomPoints, kRandomPointSeed);
+  if (scene.points.empty()) {
+    throw InvalidArgument(
+        "the scene has no sparse points, and its cameras look at nothing in "
+        "common; check the poses");
+  }
+  result->warnings.push_back(
+      "the scene has poses but no sparse points; reconstruction starts from " +
+      std::to_string(scene.points.size()) + " random ones");
+}
+
+void HoldOut(ImportResult* result) {
+  std::vector<View>& views = result->scene.views;
+  const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
+  if (views.size() < held_out + kMinTrainingViews) {
+    result->warnings.push_back("no view is held out for evaluation: the scene has only " +
+                               std::to_string(views.size()));
+    return;
+  }
+  for (size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].held_out = true;
+}
+
+void ImportPhotos(const fs::path& scene_folder,
+                  const fs::path& scratch_folder,
+                  const ImportOptions& options,
+                  ProgressObserver& progress,
+                  const CancellationToken& cancel,
+                  ImportResult* result) {
+  std::vector<Photo> photos = ListPhotos(scene_folder);
+  result->photos_found = static_cast<int>(photos.size());
+  if (photos.empty()) {
+    throw InvalidArgument(scene_folder.string() + " contains no photographs (JPEG, PNG, TIFF)");
+  }
+  for (size_t i = 0; i < photos.size(); ++i) {
+    cancel.ThrowIfCancelled();
+    progress.OnProgress(
+        static_cast<int64_t>(i), static_cast<int64_t>(photos.size()), "checking photos");
+    ProbePhoto(scene_folder, &photos[i]);
+  }
+  if (photos.size() == 1) {
+    throw InvalidArgument(scene_folder.string() + " contains one photograph (" + photos[0].name +
+                          "); at least 3 photos from different places are needed");
+  }
+  SfmResult sfm =
+      RunStructureFromMotion(photos, scene_folder, scratch_folder, options, progress, cancel);
+  result->scene = std::move(sfm.scene);
+  result->ran_structure_from_motion = true;
+  if (sfm.unplaced.empty()) return;
+  const bool few = 2 * result->scene.views.size() < photos.size();
+  result->warnings.push_back((few ? "only " : "") + std::to_string(result->scene.views.size()) +
+                             " of " + std::to_string(photos.size()) +
+                             " photos could be placed; the others share too few features "
+                             "with them and were left out: " +
+                             FirstNames(sfm.unplaced, 5));
+}
+
+void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
+  const std::vector<Photo> photos = ListPhotos(scene_folder);
+  result->photos_found = static_cast<int>(std::max(photos.size(), result->scene.views.size()));
+  std::vector<std::string> files;
+  for (const View& view : result->scene.views) files.push_back(view.image_file);
+  std::sort(files.begin(), files.end());
+  std::vector<std::string> unposed;
+  for (const Photo& photo : photos) {
+    if (!std::binary_search(files.begin(), files.end(), photo.file)) unposed.push_back(photo.name);
+  }
+  if (unposed.empty()) return;
+  result->warnings.push_back(std::to_string(unposed.size()) +
+                             " photos have no pose and were left out: " + FirstNames(unposed, 5));
+}
+
+}  // namespace
+
+void ImportOptions::Validate() const {
+  CheckRange("sfm_max_image_side_px", sfm_max_image_side_px, 256, 4096);
+  CheckRange("sfm_max_features", sfm_max_features, 512, 16384);
+  CheckRange("sfm_timeout", sfm_timeout.count(), 1, 7 * 24 * 3600);
+  CheckRange("threads", threads, 0, 1024);
+}
+
+ImportResult ImportScene(const fs::path& scene_folder,
+                         const fs::path& scratch_folder,
+                         const ImportOptions& options,
+                         ProgressObserver& progress,
+                         const CancellationToken& cancel) {
+  options.Validate();
+  cancel.ThrowIfCancelled();
+  std::error_code error;
+  if (!fs::is_directory(scene_folder, error)) {
+    throw Error(ErrorCode::kNotFound, scene_folder.string() + " is not a folder");
+  }
+  ImportResult result;
+  const fs::path colmap_folder = FindColmapFolder(scene_folder);
+  if (!colmap_folder.empty()) {
+    result.layout = SceneLayout::kColmap;
+    result.scene = ReadColmapModel(colmap_folder, scene_folder);
+    WarnOfUnposedPhotos(scene_folder, &result);
+  } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
+    result.layout = SceneLayout::kTransforms;
+    result.scene =
+        LoadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
+    WarnOfUnposedPhotos(scene_folder, &result);
+  } else {
+    ImportPhotos(scene_folder, scratch_folder, options, progress, cancel, &result);
+  }
+  Scene& scene = result.scene;
+  if (scene.views.size() < kMinTrainingViews) {
+    throw InvalidArgument("the scene has only " + std::to_string(scene.views.size()) +
+                          " posed view; at least 2 are needed");
+  }
+  result.photos_registered = static_cast<int>(scene.views.size());
+  result.undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
+    return !IsUndistorted(v.distortion);
+  });
+  DropWeakPoints(&scene);
+  Recentre(&result);
+  AddRandomPointsWhenEmpty(&result);
+  if (options.hold_out_every_eighth) HoldOut(&result);
+  return result;
+}
+
+}  // namespace color3d

@@ -1,0 +1,198 @@
+#include "core/scene/import.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/scene/sfm_photos.h"
+#include "core/scene/sparse_cloud.h"
+#include "core/scene/test_scenes.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class Import : public testing::Test {
+ protected:
+  ImportResult Run() {
+    return ImportScene(folder_.path(), scratch_.path(), options_, progress_, {});
+  }
+  std::string Said() {
+    return Refusal([&] { Run(); });
+  }
+  void WritePhoto(const std::string& name, int width = 48, int height = 32) {
+    fs::create_directories((folder_.path() / name).parent_path());
+    WriteFileAtomic(folder_.path() / name, EncodePng8(GradientPhoto(width, height, 1)));
+  }
+  ScratchFolder folder_;
+  ScratchFolder scratch_;
+  ImportOptions options_;
+  RecordingObserver progress_;
+};
+
+TEST_F(Import, BadInputsSayWhatIsWrong) {
+  EXPECT_THAT(Said(), HasSubstr("contains no photographs (JPEG, PNG, TIFF)"));
+  WriteFileAtomic(folder_.path() / "readme.txt", "hello");
+  EXPECT_THAT(Said(), HasSubstr("contains no photographs"));
+  WritePhoto("one.png");
+  EXPECT_THAT(Said(), HasSubstr("at least 3 photos from different places are needed"));
+  WriteFileAtomic(folder_.path() / "notes.jpg", "Buy milk.");
+  EXPECT_EQ(Said(), "notes.jpg is not an image (JPEG, PNG or TIFF)");
+  const std::string png = EncodePng8(GradientPhoto(48, 32, 1));
+  WriteFileAtomic(folder_.path() / "notes.jpg", png.substr(0, png.size() / 2));
+  EXPECT_THAT(Said(), HasSubstr("notes.jpg is truncated"));
+  EXPECT_THROW(ImportScene("/no/such/folder", scratch_.path(), options_, progress_, {}), Error);
+}
+
+TEST_F(Import, OptionsAreChecked) {
+  options_.sfm_max_features = 10;
+  EXPECT_THAT(Said(), HasSubstr("sfm_max_features is 10; it must be 512..16384"));
+  options_ = {};
+  options_.sfm_max_image_side_px = 10000;
+  EXPECT_THAT(Said(), HasSubstr("sfm_max_image_side_px"));
+  options_ = {};
+  options_.sfm_timeout = std::chrono::seconds(0);
+  EXPECT_THAT(Said(), HasSubstr("sfm_timeout"));
+  options_ = {};
+  options_.threads = -1;
+  EXPECT_THAT(Said(), HasSubstr("threads"));
+}
+
+TEST_F(Import, ColmapWinsOverTransforms) {
+  const Scene scene = ArcScene(9);
+  WritePhotos(scene, folder_.path());
+  WritePhoto("images/extra.png");
+  WriteTransformsJson(scene, folder_.path() / "transforms.json");
+  EXPECT_EQ(Run().layout, SceneLayout::kTransforms);
+  for (const char* place : {"colmap/sparse/0", "sparse", "sparse/0"}) {
+    WriteColmapText(scene, folder_.path() / place);
+    const ImportResult result = Run();
+    EXPECT_EQ(result.layout, SceneLayout::kColmap) << place;
+    EXPECT_EQ(result.photos_found, 10);
+    EXPECT_EQ(result.photos_registered, 9);
+    EXPECT_FALSE(result.undistorted);
+    EXPECT_EQ(result.scene.points.size(), 50u);
+    ASSERT_EQ(result.warnings.size(), 1u);
+    EXPECT_THAT(result.warnings[0], HasSubstr("extra.png"));
+  }
+}
+
+TEST_F(Import, EveryEighthIsHeldOut) {
+  const Scene scene = ArcScene(17);
+  WritePhotos(scene, folder_.path());
+  WriteColmapText(scene, folder_.path());
+  EXPECT_TRUE(Run().scene.HeldOutViews().empty());
+  options_.hold_out_every_eighth = true;
+  EXPECT_EQ(Run().scene.HeldOutViews(), std::vector<int>({0, 8, 16}));
+}
+
+TEST_F(Import, TwoViewsAreNotHeldOut) {
+  const Scene scene = ArcScene(2);
+  WritePhotos(scene, folder_.path());
+  WriteColmapText(scene, folder_.path());
+  options_.hold_out_every_eighth = true;
+  const ImportResult result = Run();
+  EXPECT_TRUE(result.scene.HeldOutViews().empty());
+  ASSERT_EQ(result.warnings.size(), 1u);
+  EXPECT_THAT(result.warnings[0], HasSubstr("no view is held out"));
+}
+
+TEST_F(Import, GeographicCoordinatesAreRecentred) {
+  Scene scene = ArcScene(4);
+  WritePhotos(scene, folder_.path());
+  scene.world_offset = {4.5e5, 5.3e6, 410.0};
+  WriteColmapText(scene, folder_.path());
+  const ImportResult result = Run();
+  EXPECT_GT(result.scene.world_offset.norm(), 1e6);
+  for (size_t i = 0; i < scene.points.size(); ++i) {
+    const Eigen::Vector3d& p = result.scene.points[i].position;
+    EXPECT_LT(p.norm(), 10.0);
+    EXPECT_LT(
+        (p + result.scene.world_offset - scene.points[i].position - scene.world_offset).norm(),
+        1e-6);
+    for (size_t v = 0; v < 4; ++v) {
+      EXPECT_LT((result.scene.views[v].cam_from_world.Apply(p) -
+                 scene.views[v].cam_from_world.Apply(scene.points[i].position))
+                    .norm(),
+                1e-6);
+    }
+  }
+}
+
+TEST_F(Import, PointsThatOneViewSeesAreDropped) {
+  Scene scene = ArcScene(3);
+  scene.points[0].views = {1};
+  scene.points[1].views = {0, 2};
+  WritePhotos(scene, folder_.path());
+  WriteColmapText(scene, folder_.path());
+  EXPECT_EQ(Run().scene.points.size(), 49u);
+}
+
+TEST_F(Import, PosesWithoutPointsGetRandomOnesThatViewsSee) {
+  const Scene scene = ArcScene(8);
+  WritePhotos(scene, folder_.path());
+  WriteTransformsJson(scene, folder_.path() / "transforms.json");
+  const ImportResult result = Run();
+  ASSERT_EQ(result.scene.points.size(), 20000u);
+  EXPECT_THAT(result.warnings.at(0), HasSubstr("20000 random ones"));
+  for (const SparsePoint& point : result.scene.points) {
+    ASSERT_GE(point.views.size(), 2u);
+    for (int v : point.views) {
+      const View& view = result.scene.views[v];
+      const Eigen::Vector3d p = view.cam_from_world.Apply(point.position);
+      ASSERT_GT(p.z(), 0.0);
+      const Eigen::Vector2d pixel = ProjectPinhole(view.camera, p);
+      ASSERT_TRUE(pixel.x() >= 0 && pixel.x() < view.camera.width);
+    }
+  }
+  EXPECT_EQ(SceneToJson(Run().scene), SceneToJson(result.scene));  // the same every time
+}
+
+TEST(SparseCloud, FocusOfConvergingParallelAndDivergingCameras) {
+  EXPECT_LT(FocusPoint(ArcScene(7)).norm(), 0.05);
+  Scene parallel = ArcScene(5);
+  for (int i = 0; i < 5; ++i) {
+    parallel.views[i].cam_from_world.rotation.setIdentity();
+    parallel.views[i].cam_from_world.translation = Eigen::Vector3d(-i, 0, 0);
+  }
+  const Eigen::Vector3d focus = FocusPoint(parallel);
+  EXPECT_NEAR(focus.x(), 2.0, 1e-6);
+  EXPECT_NEAR(focus.z(), 6.0, 1e-6);  // three baselines of 2
+  Scene diverging = ArcScene(5);
+  for (View& view : diverging.views) {
+    const Eigen::Vector3d c = view.cam_from_world.Center();
+    view.cam_from_world = LookAt(c, 2.0 * c);
+  }
+  const Eigen::Vector3d ahead = FocusPoint(diverging);
+  int in_front = 0;
+  for (const View& view : diverging.views) in_front += view.cam_from_world.Apply(ahead).z() > 0;
+  EXPECT_GE(in_front, 3);
+}
+
+TEST(SparseCloud, CamerasInOnePlaceOrWithoutOverlapStillGivePoints) {
+  Scene one_place = ArcScene(3);
+  for (View& view : one_place.views) view.cam_from_world = one_place.views[0].cam_from_world;
+  EXPECT_EQ(RandomPoints(one_place, 500, 1).size(), 500u);
+  Scene apart = ArcScene(2);
+  apart.views[0].cam_from_world = LookAt({0, 0, 0.1}, {0, 0, 5});
+  apart.views[1].cam_from_world = LookAt({0, 0, -0.1}, {0, 0, -5});
+  EXPECT_GT(RandomPoints(apart, 100, 1).size(), 0u);
+}
+
+TEST(FeatureImage, DullPhotosAreStretchedOthersNot) {
+  Image dull = GradientPhoto(64, 64, 1);
+  for (float& v : dull.data) v = 0.4f + 0.1f * v;
+  const Image stretched = FeatureImage(dull, 1000);
+  const auto [low, high] = std::minmax_element(stretched.data.begin(), stretched.data.end());
+  EXPECT_GT(*high - *low, 0.9f);
+  const Image bright = GradientPhoto(64, 64, 1);
+  EXPECT_EQ(FeatureImage(bright, 1000).data, bright.data);
+  EXPECT_EQ(FeatureImage(GradientPhoto(64, 48, 3), 32).width, 32);
+  for (float v : FeatureImage(Image(8, 8, 1, 0.5f), 100).data) EXPECT_LE(v, 1.0f);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,70 @@
+#include "core/scene/scene.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+std::string_view Stem(std::string_view name) {
+  const size_t slash = name.rfind('/');
+  const size_t dot = name.rfind('.');
+  if (dot == std::string_view::npos || dot == 0) return name;
+  if (slash != std::string_view::npos && dot <= slash + 1) return name;
+  return name.substr(0, dot);
+}
+
+}  // namespace
+
+std::vector<int> Scene::TrainingViews() const {
+  std::vector<int> indices;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (!views[i].held_out) indices.push_back(static_cast<int>(i));
+  }
+  return indices;
+}
+
+std::vector<int> Scene::HeldOutViews() const {
+  std::vector<int> indices;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (views[i].held_out) indices.push_back(static_cast<int>(i));
+  }
+  return indices;
+}
+
+int Scene::FindView(std::string_view name) const {
+  int by_stem = -1;
+  int stems = 0;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (views[i].name == name) return static_cast<int>(i);
+    if (Stem(views[i].name) == Stem(name)) {
+      by_stem = static_cast<int>(i);
+      ++stems;
+    }
+  }
+  if (stems == 1) return by_stem;
+  std::string known;
+  for (size_t i = 0; i < std::min<size_t>(views.size(), 3); ++i) {
+    known += (i == 0 ? "" : ", ") + views[i].name;
+  }
+  throw Error(ErrorCode::kNotFound,
+              "the scene has no view named " + std::string(name) +
+                  (views.empty() ? "; it has no views"
+                                 : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
+}
+
+double Scene::Extent() const {
+  const std::vector<int> training = TrainingViews();
+  if (training.empty()) return 1.0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (int i : training) mean += views[i].cam_from_world.Center();
+  mean /= static_cast<double>(training.size());
+  double radius = 0.0;
+  for (int i : training) {
+    radius = std::max(radius, (views[i].cam_from_world.Center() - mean).norm());
+  }
+  return radius > 0.0 ? 1.1 * radius : 1.0;
+}
+
+}  // namespace color3d

@@ -1,0 +1,242 @@
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/scene/scene.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kFormat = "color3d.scene";
+constexpr int kVersion = 1;
+
+json Vector3ToJson(const Eigen::Vector3d& v) { return json::array({v.x(), v.y(), v.z()}); }
+
+json CameraToJson(const Camera& c) {
+  return {{"width", c.width},
+          {"height", c.height},
+          {"fx", c.fx},
+          {"fy", c.fy},
+          {"cx", c.cx},
+          {"cy", c.cy}};
+}
+
+const char* ModelName(Distortion::Model model) {
+  switch (model) {
+    case Distortion::Model::kNone:
+      return "none";
+    case Distortion::Model::kBrown:
+      return "brown";
+    case Distortion::Model::kFisheye:
+      return "fisheye";
+  }
+  return "none";
+}
+
+// Reads fields and names the place ("views[3].camera.fx") when one is wrong.
+class Field {
+ public:
+  Field(const json& value, std::string place) : value_(value), place_(std::move(place)) {}
+
+  Error Wrong(const std::string& wanted) const {
+    return InvalidArgument("scene: " + place_ + " must be " + wanted);
+  }
+  Field operator[](const char* key) const {
+    if (!value_.is_object()) throw Wrong("an object");
+    const auto it = value_.find(key);
+    const std::string place = place_.empty() ? key : place_ + "." + key;
+    if (it == value_.end()) throw InvalidArgument("scene: " + place + " is missing");
+    return Field(*it, place);
+  }
+  Field operator[](size_t index) const {
+    return Field(value_.at(index), place_ + "[" + std::to_string(index) + "]");
+  }
+  size_t ArraySize() const {
+    if (!value_.is_array()) throw Wrong("a list");
+    return value_.size();
+  }
+  double Number() const {
+    if (!value_.is_number()) throw Wrong("a number");
+    const double v = value_.get<double>();
+    if (!std::isfinite(v)) throw Wrong("finite");
+    return v;
+  }
+  double PositiveNumber() const {
+    const double v = Number();
+    if (!(v > 0.0)) throw Wrong("positive");
+    return v;
+  }
+  int Integer(int low, int high) const {
+    if (!value_.is_number_integer()) throw Wrong("a whole number");
+    // Values above the range of int64 are read as unsigned.
+    if (value_.is_number_unsigned() && value_.get<uint64_t>() > uint64_t{INT32_MAX}) {
+      throw Wrong("at most " + std::to_string(high));
+    }
+    const int64_t v = value_.get<int64_t>();
+    if (v < low || v > high) {
+      throw Wrong(std::to_string(low) + ".." + std::to_string(high) + ", not " + std::to_string(v));
+    }
+    return static_cast<int>(v);
+  }
+  bool Boolean() const {
+    if (!value_.is_boolean()) throw Wrong("true or false");
+    return value_.get<bool>();
+  }
+  std::string Text() const {
+    if (!value_.is_string()) throw Wrong("a text");
+    return value_.get<std::string>();
+  }
+  std::string RelativePath() const {
+    const std::string path = Text();
+    if (!IsSafeRelativePath(path)) throw Wrong("a relative path without '..'");
+    return path;
+  }
+  Eigen::Vector3d Vector3() const {
+    if (ArraySize() != 3) throw Wrong("3 numbers");
+    return {(*this)[size_t{0}].Number(), (*this)[1].Number(), (*this)[2].Number()};
+  }
+
+ private:
+  const json& value_;
+  std::string place_;
+};
+
+Camera CameraFromJson(const Field& field) {
+  constexpr int kMaxSidePx = 1'000'000;
+  return {field["width"].Integer(1, kMaxSidePx),
+          field["height"].Integer(1, kMaxSidePx),
+          field["fx"].PositiveNumber(),
+          field["fy"].PositiveNumber(),
+          field["cx"].Number(),
+          field["cy"].Number()};
+}
+
+Distortion DistortionFromJson(const Field& field) {
+  Distortion distortion;
+  const std::string model = field["model"].Text();
+  if (model == "brown") {
+    distortion.model = Distortion::Model::kBrown;
+  } else if (model == "fisheye") {
+    distortion.model = Distortion::Model::kFisheye;
+  } else if (model != "none") {
+    throw field["model"].Wrong("none, brown or fisheye");
+  }
+  const Field k = field["k"];
+  if (k.ArraySize() != distortion.k.size()) throw k.Wrong("8 numbers");
+  for (size_t i = 0; i < distortion.k.size(); ++i) distortion.k[i] = k[i].Number();
+  return distortion;
+}
+
+Pose PoseFromJson(const Field& field) {
+  const Field q = field["rotation_wxyz"];
+  if (q.ArraySize() != 4) throw q.Wrong("4 numbers");
+  Pose pose;
+  pose.rotation =
+      Eigen::Quaterniond(q[size_t{0}].Number(), q[1].Number(), q[2].Number(), q[3].Number());
+  if (std::abs(pose.rotation.norm() - 1.0) > 1e-6) throw q.Wrong("a unit quaternion");
+  pose.translation = field["translation"].Vector3();
+  return pose;
+}
+
+View ViewFromJson(const Field& field) {
+  View view;
+  view.name = field["name"].RelativePath();
+  view.image_file = field["image_file"].RelativePath();
+  view.camera = CameraFromJson(field["camera"]);
+  view.captured_camera = CameraFromJson(field["captured_camera"]);
+  view.distortion = DistortionFromJson(field["distortion"]);
+  view.cam_from_world = PoseFromJson(field["cam_from_world"]);
+  view.held_out = field["held_out"].Boolean();
+  return view;
+}
+
+// [x, y, z, error, [views]]: there may be a million of them.
+SparsePoint PointFromJson(const Field& field, int view_count) {
+  if (field.ArraySize() != 5) throw field.Wrong("[x, y, z, error, [views]]");
+  SparsePoint point;
+  point.position = {field[size_t{0}].Number(), field[1].Number(), field[2].Number()};
+  point.reprojection_error_px = field[3].Number();
+  const Field views = field[4];
+  const size_t count = views.ArraySize();
+  point.views.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
+    point.views.push_back(views[i].Integer(0, view_count - 1));
+    if (i > 0 && point.views[i] <= point.views[i - 1]) throw views.Wrong("ascending");
+  }
+  return point;
+}
+
+}  // namespace
+
+std::string SceneToJson(const Scene& scene) {
+  json views = json::array();
+  for (const View& view : scene.views) {
+    const Eigen::Quaterniond& q = view.cam_from_world.rotation;
+    views.push_back(
+        {{"name", view.name},
+         {"image_file", view.image_file},
+         {"camera", CameraToJson(view.camera)},
+         {"captured_camera", CameraToJson(view.captured_camera)},
+         {"distortion", {{"model", ModelName(view.distortion.model)}, {"k", view.distortion.k}}},
+         {"cam_from_world",
+          {{"rotation_wxyz", json::array({q.w(), q.x(), q.y(), q.z()})},
+           {"translation", Vector3ToJson(view.cam_from_world.translation)}}},
+         {"held_out", view.held_out}});
+  }
+  json points = json::array();
+  for (const SparsePoint& point : scene.points) {
+    points.push_back(json::array({point.position.x(),
+                                  point.position.y(),
+                                  point.position.z(),
+                                  point.reprojection_error_px,
+                                  point.views}));
+  }
+  const json root = {{"format", kFormat},
+                     {"version", kVersion},
+                     {"world_offset", Vector3ToJson(scene.world_offset)},
+                     {"views", std::move(views)},
+                     {"points", std::move(points)}};
+  try {
+    return root.dump();
+  } catch (const json::exception& e) {  // a name that is not UTF-8
+    throw InvalidArgument(std::string("scene cannot be written as JSON: ") + e.what());
+  }
+}
+
+Scene SceneFromJson(std::string_view text) {
+  json root;
+  try {
+    root = json::parse(text);
+  } catch (const json::exception& e) {
+    throw InvalidArgument(std::string("scene: not JSON: ") + e.what());
+  }
+  const Field field(root, "");
+  if (!root.is_object()) throw InvalidArgument("scene: must be a JSON object");
+  if (field["format"].Text() != kFormat) throw field["format"].Wrong(kFormat);
+  if (field["version"].Integer(1, INT32_MAX) != kVersion) {
+    throw field["version"].Wrong(std::to_string(kVersion) + "; update color3d to read it");
+  }
+  Scene scene;
+  scene.world_offset = field["world_offset"].Vector3();
+  const Field views = field["views"];
+  const size_t view_count = views.ArraySize();
+  std::set<std::string> names;
+  for (size_t i = 0; i < view_count; ++i) {
+    scene.views.push_back(ViewFromJson(views[i]));
+    if (!names.insert(scene.views.back().name).second) throw views[i]["name"].Wrong("unique");
+  }
+  const Field points = field["points"];
+  const size_t point_count = points.ArraySize();
+  scene.points.reserve(point_count);
+  for (size_t i = 0; i < point_count; ++i) {
+    scene.points.push_back(PointFromJson(points[i], static_cast<int>(view_count)));
+  }
+  return scene;
+}
+
+}  // namespace color3d

@@ -1,0 +1,98 @@
+#include "core/scene/scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/scene/test_scenes.h"
+
+namespace color3d {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Scene, HoldsOutAndFindsViews) {
+  Scene scene = ArcScene(5);
+  scene.views[0].held_out = true;
+  EXPECT_EQ(scene.HeldOutViews(), std::vector<int>({0}));
+  EXPECT_EQ(scene.TrainingViews(), std::vector<int>({1, 2, 3, 4}));
+  EXPECT_EQ(scene.FindView("0003.png"), 2);
+  EXPECT_EQ(scene.FindView("0003"), 2);
+  EXPECT_EQ(scene.FindView("0003.jpg"), 2);
+  EXPECT_THAT(Refusal([&] { scene.FindView("fern"); }),
+              HasSubstr("no view named fern; it has 0001.png, 0002.png, 0003.png, ..."));
+  scene.views[1].name = "0003.jpg";  // two of one stem: only the full name will do
+  EXPECT_EQ(scene.FindView("0003.jpg"), 1);
+  EXPECT_THROW(scene.FindView("0003"), Error);
+  EXPECT_THROW(Scene().FindView("a"), Error);
+}
+
+TEST(Scene, ExtentIsOfTrainingCameras) {
+  Scene scene = ArcScene(3);
+  for (int i = 0; i < 3; ++i) {
+    scene.views[i].cam_from_world = {};
+    scene.views[i].cam_from_world.translation = Eigen::Vector3d(i == 2 ? 1000.0 : -2.0 * i, 0, 0);
+  }
+  scene.views[2].held_out = true;
+  EXPECT_NEAR(scene.Extent(), 1.1, 1e-12);
+  scene.views[1].held_out = true;
+  EXPECT_EQ(scene.Extent(), 1.0);
+  EXPECT_EQ(Scene().Extent(), 1.0);
+}
+
+TEST(Scene, JsonKeepsEveryBit) {
+  Scene scene = ArcScene(4, {Distortion::Model::kBrown, {-0.1, 0.01, 1e-3, 2e-3}});
+  scene.views[2].held_out = true;
+  scene.views[3].distortion = {Distortion::Model::kFisheye, {0.1}};
+  scene.world_offset = {1.0 / 3.0, 5e6, -1e-9};
+  scene.points[4].views = {1, 3};
+  const std::string text = SceneToJson(scene);
+  const Scene again = SceneFromJson(text);
+  EXPECT_EQ(SceneToJson(again), text);
+  ASSERT_EQ(again.views.size(), 4u);
+  EXPECT_EQ(again.views[2].cam_from_world.rotation.coeffs(),
+            scene.views[2].cam_from_world.rotation.coeffs());
+  EXPECT_EQ(again.points[4].position, scene.points[4].position);
+  EXPECT_EQ(again.points[4].views, std::vector<int>({1, 3}));
+  EXPECT_EQ(again.world_offset, scene.world_offset);
+  EXPECT_TRUE(again.views[2].held_out);
+  EXPECT_EQ(again.views[3].distortion.model, Distortion::Model::kFisheye);
+}
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(Scene, BrokenJsonIsRefusedByField) {
+  const std::string good = SceneToJson(ArcScene(3));
+  EXPECT_EQ(Refusal([&] { SceneFromJson(good); }), "");
+  const auto said = [&](const std::string& from, const std::string& to) {
+    return Refusal([&] { SceneFromJson(Replaced(good, from, to)); });
+  };
+  EXPECT_THAT(said("\"fx\":50.0", "\"fx\":-50.0"),
+              HasSubstr("views[0].camera.fx must be positive"));
+  EXPECT_THAT(said("\"fx\":50.0", "\"fx\":null"), HasSubstr("camera.fx must be a number"));
+  EXPECT_THAT(said("\"fx\":50.0", "\"fx\":1e999"), HasSubstr("not JSON"));
+  EXPECT_THAT(said("\"width\":48", "\"width\":18446744073709551615"), HasSubstr("width"));
+  EXPECT_THAT(said("\"width\":48", "\"width\":0"), HasSubstr("width must be 1..1000000, not 0"));
+  EXPECT_THAT(said("images/0001.png", "../../etc/passwd"),
+              HasSubstr("image_file must be a relative"));
+  EXPECT_THAT(said("\"0002.png\"", "\"0001.png\""), HasSubstr("views[1].name must be unique"));
+  EXPECT_THAT(said("[0,1,2]", "[0,1,7]"), HasSubstr("points[0]"));
+  EXPECT_THAT(said("[0,1,2]", "[2,1,0]"), HasSubstr("ascending"));
+  EXPECT_THAT(said("\"version\":1", "\"version\":9"), HasSubstr("version must be 1"));
+  EXPECT_THAT(said("color3d.scene", "other"), HasSubstr("format"));
+  EXPECT_THAT(said("\"held_out\":false", "\"held_out\":3"), HasSubstr("held_out"));
+  EXPECT_THAT(said("\"rotation_wxyz\":[", "\"rotation_wxyz\":[7,"), HasSubstr("4 numbers"));
+  EXPECT_THAT(Refusal([] { SceneFromJson("[]"); }), HasSubstr("object"));
+  EXPECT_THAT(Refusal([] { SceneFromJson("{}"); }), HasSubstr("format is missing"));
+  for (size_t length = 0; length < good.size(); length += 97) {
+    EXPECT_NE(Refusal([&] { SceneFromJson(good.substr(0, length)); }), "") << length;
+  }
+}
+
+}  // namespace
+}  // namespace color3d

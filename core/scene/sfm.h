@@ -1,0 +1,34 @@
+// Structure-from-motion: COLMAP 3.8 as child processes on the CPU, without a display. For this
+// folder only.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/progress.h"
+#include "core/scene/import.h"
+#include "core/scene/photos.h"
+
+namespace color3d {
+
+struct SfmResult {
+  Scene scene;  // the views that were placed, with their points; cameras at the photos' full size
+  std::vector<std::string> unplaced;  // names of the other photos
+};
+
+// `photos` have been probed and are at least 2. Reduced 8-bit grey copies, COLMAP's database and
+// sfm.log are left in `scratch_folder`. Tries again with exhaustive matching, then with a straight
+// lens and a small first angle, then with loose thresholds, while fewer than half of the photos
+// find a place; models with too few points or an absurd lens do not count. Throws Error: fewer than
+// 3 placed (kInvalidArgument), COLMAP not installed (kFailedPrecondition), too slow
+// (kDeadlineExceeded), cancelled.
+SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
+                                 const std::filesystem::path& scene_folder,
+                                 const std::filesystem::path& scratch_folder,
+                                 const ImportOptions& options,
+                                 ProgressObserver& progress,
+                                 const CancellationToken& cancel);
+
+}  // namespace color3d

@@ -1,0 +1,107 @@
+#include "core/scene/sparse_cloud.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/random.h"
+#include "core/scene/lens.h"
+
+namespace color3d {
+namespace {
+
+Eigen::Vector3d ViewingDirection(const View& view) {
+  return view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+}
+
+Eigen::Vector3d MeanCenter(const Scene& scene) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const View& view : scene.views) mean += view.cam_from_world.Center();
+  return mean / static_cast<double>(scene.views.size());
+}
+
+// Largest distance of a camera from their mean; 1 when all stand in one place.
+double Baseline(const Scene& scene, const Eigen::Vector3d& mean) {
+  double radius = 0.0;
+  for (const View& view : scene.views) {
+    radius = std::max(radius, (view.cam_from_world.Center() - mean).norm());
+  }
+  return radius > 1e-12 ? radius : 1.0;
+}
+
+bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
+  const Eigen::Vector3d p = view.cam_from_world.Apply(world);
+  if (p.z() < near) return false;
+  const Eigen::Vector2d pixel = ProjectPinhole(view.camera, p);
+  return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < view.camera.width &&
+         pixel.y() < view.camera.height;
+}
+
+bool MostLookAt(const Scene& scene, const Eigen::Vector3d& world) {
+  size_t in_front = 0;
+  for (const View& view : scene.views) in_front += view.cam_from_world.Apply(world).z() > 0.0;
+  return 2 * in_front > scene.views.size();
+}
+
+}  // namespace
+
+Eigen::Vector3d FocusPoint(const Scene& scene) {
+  const Eigen::Vector3d mean = MeanCenter(scene);
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  for (const View& view : scene.views) direction += ViewingDirection(view);
+  const double coherence = direction.norm() / static_cast<double>(scene.views.size());
+  const Eigen::Vector3d fallback =
+      coherence > 1e-3
+          ? Eigen::Vector3d(mean + 3.0 * Baseline(scene, mean) * direction.normalized())
+          : mean;
+  // Least squares: minimise sum |(I - d d^T)(x - c)|^2 + w |x - fallback|^2.
+  constexpr double kPull = 1e-3;
+  Eigen::Matrix3d a = kPull * Eigen::Matrix3d::Identity();
+  Eigen::Vector3d b = kPull * fallback;
+  for (const View& view : scene.views) {
+    const Eigen::Vector3d d = ViewingDirection(view);
+    const Eigen::Matrix3d normal =
+        (Eigen::Matrix3d::Identity() - d * d.transpose()) / static_cast<double>(scene.views.size());
+    a += normal;
+    b += normal * view.cam_from_world.Center();
+  }
+  const Eigen::Vector3d focus = a.ldlt().solve(b);
+  // Axes that diverge meet behind the cameras, which is of no use.
+  return MostLookAt(scene, focus) ? focus : fallback;
+}
+
+std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed) {
+  std::vector<SparsePoint> points;
+  if (scene.views.empty() || count <= 0) return points;
+  const Eigen::Vector3d focus = FocusPoint(scene);
+  double distance = 0.0;
+  for (const View& view : scene.views) distance += (view.cam_from_world.Center() - focus).norm();
+  distance = std::max(distance / static_cast<double>(scene.views.size()), 1e-6);
+  // Cameras that look outward from one place: the scene is around them.
+  if (!MostLookAt(scene, focus)) {
+    distance = std::max(distance, 5.0 * Baseline(scene, MeanCenter(scene)));
+  }
+  const double half_side = 0.75 * distance;
+  const double near = 0.15 * distance;
+  const size_t wanted_views = std::max<size_t>(2, (scene.views.size() + 3) / 4);
+  // Views that do not overlap at all would never give a point: after enough misses one view does.
+  const int64_t patience = int64_t{10} * count;
+  Random random(seed);
+  for (int64_t attempt = 0; attempt < 2 * patience; ++attempt) {
+    if (static_cast<int>(points.size()) == count) break;
+    SparsePoint point;
+    for (int k = 0; k < 3; ++k) {
+      point.position[k] = focus[k] + random.NextUniform(-half_side, half_side);
+    }
+    for (size_t i = 0; i < scene.views.size(); ++i) {
+      if (Sees(scene.views[i], point.position, near)) point.views.push_back(static_cast<int>(i));
+    }
+    const bool relaxed = attempt >= patience;
+    if (point.views.size() < (relaxed ? 1 : std::min(wanted_views, scene.views.size()))) continue;
+    point.reprojection_error_px = -1.0;
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
+}  // namespace color3d

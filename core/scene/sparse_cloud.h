@@ -1,0 +1,21 @@
+// A start for reconstruction when a scene comes with poses but without sparse points. For this
+// folder only.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/scene/scene.h"
+
+namespace color3d {
+
+// The point closest to all optical axes, in front of the cameras. When the axes are nearly parallel
+// it is pulled to where they would meet if the scene were three baselines away.
+Eigen::Vector3d FocusPoint(const Scene& scene);
+
+// Up to `count` points, uniform in the part of a box around the focus that at least two (or a
+// quarter, whichever is more) of the views see. Deterministic for a seed. Each lists the views
+// whose picture it falls into; the reprojection error is -1 (unknown).
+std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed);
+
+}  // namespace color3d

@@ -1,0 +1,209 @@
+#include "core/splat/binning.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "core/base/error.h"
+#include "core/splat/ellipse.h"
+
+namespace color3d {
+
+using namespace splat_internal;  // NOLINT: the kernels' own vocabulary
+
+// The spans of sixteen Gaussians at once, row by row of tiles.
+void TileBinner::SpansOfSixteen(const SplatBuffer& splats,
+                                int width,
+                                int64_t first,
+                                int lanes,
+                                int thread,
+                                std::vector<Span>& scratch,
+                                TileLists& lists) {
+  alignas(64) float column[kSplatColor][16];
+  alignas(64) float visible[16] = {};
+  for (int lane = 0; lane < 16; ++lane) {
+    const bool drawn = lane < lanes && splats.depth_key[first + lane] != 0;
+    visible[lane] = drawn ? 1.0f : 0.0f;
+    const float* s = splats.rows.data() + (first + lane) * splats.row_floats;
+    for (int k = 0; k < kSplatColor; ++k) column[k][lane] = drawn ? s[k] : 1.0f;
+  }
+  using simd::F32;
+  using simd::I32;
+  const F32 u = simd::Load(column[kU]), v = simd::Load(column[kV]);
+  const Ellipse<F32> e = MakeEllipse(simd::Load(column[kInvX]),
+                                     simd::Load(column[kSlope]),
+                                     simd::Load(column[kInvY]),
+                                     simd::Load(column[kLog2Opacity]));
+  constexpr float kPerTile = 1.0f / kTileSide;
+  const F32 zero = simd::Broadcast(0.0f);
+  const F32 tiles_x = simd::Broadcast(static_cast<float>(lists.tiles_x));
+  const F32 tiles_y = simd::Broadcast(static_cast<float>(lists.tiles_y));
+  // Pixel centres are at +0.5: pixels i with low <= i <= high lie inside; ceil(low) as trunc of
+  // low + (1 - tiny) after clamping.
+  const F32 top = v - e.y_reach - (0.5f + kBoundSlackPx) + 0.999f;
+  const F32 bottom = v + e.y_reach - (0.5f - kBoundSlackPx);
+  const I32 first_row = __builtin_convertvector(simd::Clamp(top * kPerTile, zero, tiles_y), I32);
+  const I32 end_row =
+      __builtin_convertvector(simd::Clamp(bottom * kPerTile + 1.0f, zero, tiles_y), I32);
+  const I32 shown = simd::Load(visible) > 0.5f;
+  const I32 row_count = (end_row - first_row) & (end_row > first_row) & shown;
+  int most = 0;
+  for (int lane = 0; lane < lanes; ++lane) most = std::max(most, row_count[lane]);
+  const F32 last_pixel = simd::Broadcast(static_cast<float>(width - 1));
+  for (int k = 0; k < most; ++k) {
+    const F32 y0 = __builtin_convertvector((first_row + k) * kTileSide, F32) + 0.5f - v;
+    F32 left, right;
+    BandExtent(e, y0, y0 + static_cast<float>(kTileSide - 1), &left, &right);
+    left = u + left - 0.5f + 0.999f;
+    right = simd::Min(u + right - 0.5f, last_pixel);
+    const I32 begin = __builtin_convertvector(simd::Clamp(left * kPerTile, zero, tiles_x), I32);
+    const I32 end =
+        __builtin_convertvector(simd::Clamp(right * kPerTile + 1.0f, zero, tiles_x), I32);
+    for (int lane = 0; lane < lanes; ++lane) {
+      scratch[k * 16 + lane] = {static_cast<uint16_t>(begin[lane]),
+                                static_cast<uint16_t>(std::max(begin[lane], end[lane]))};
+    }
+  }
+  std::vector<Span>& spans = spans_[thread];
+  for (int lane = 0; lane < lanes; ++lane) {
+    uint32_t pairs = 0;
+    rows_[first + lane] = {static_cast<uint32_t>(spans.size()),
+                           static_cast<uint16_t>(first_row[lane]),
+                           static_cast<uint16_t>(row_count[lane]),
+                           static_cast<uint16_t>(thread)};
+    for (int k = 0; k < row_count[lane]; ++k) {
+      const Span span = scratch[k * 16 + lane];
+      pairs += span.end - span.begin;
+      spans.push_back(span);
+    }
+    lists.first_pair[first + lane + 1] = pairs;
+  }
+}
+
+void TileBinner::FindSpans(const SplatBuffer& splats,
+                           int width,
+                           int64_t begin,
+                           int64_t end,
+                           int thread,
+                           TileLists& lists) {
+  spans_[thread].clear();
+  std::vector<Span> scratch(static_cast<size_t>(lists.tiles_y) * 16);
+  for (int64_t i = begin; i < end; i += 16) {
+    const int lanes = static_cast<int>(std::min<int64_t>(16, end - i));
+    SpansOfSixteen(splats, width, i, lanes, thread, scratch, lists);
+  }
+}
+
+// Least significant digit radix sort, 11 bits a pass: stable, so ties keep the index order.
+void TileBinner::SortByDepth(const SplatBuffer& splats) {
+  constexpr int kDigits = 2048;
+  order_.clear();
+  keys_.clear();
+  for (size_t i = 0; i < splats.depth_key.size(); ++i) {
+    if (splats.depth_key[i] == 0) continue;
+    order_.push_back(static_cast<uint32_t>(i));
+    keys_.push_back(splats.depth_key[i]);
+  }
+  order_scratch_.resize(order_.size());
+  keys_scratch_.resize(order_.size());
+  for (int shift = 0; shift < 32; shift += 11) {
+    std::array<uint32_t, kDigits> start{};
+    for (const uint32_t key : keys_) ++start[key >> shift & (kDigits - 1)];
+    uint32_t sum = 0;
+    bool one_digit = false;
+    for (uint32_t& s : start) {
+      one_digit = one_digit || s == keys_.size();
+      sum += std::exchange(s, sum);
+    }
+    if (one_digit) continue;
+    for (size_t i = 0; i < keys_.size(); ++i) {
+      const uint32_t to = start[keys_[i] >> shift & (kDigits - 1)]++;
+      keys_scratch_[to] = keys_[i];
+      order_scratch_[to] = order_[i];
+    }
+    keys_.swap(keys_scratch_);
+    order_.swap(order_scratch_);
+  }
+}
+
+// Counting sort into tiles that keeps the depth order: each thread takes a contiguous piece of it.
+void TileBinner::FillLists(ThreadPool& pool, TileLists& lists) {
+  const size_t tiles = static_cast<size_t>(lists.tile_count());
+  const int threads = pool.thread_count();
+  chunk_counts_.assign(tiles * threads, 0);
+  footprints_.resize(order_.size());
+  pool.ForRanges(static_cast<int64_t>(order_.size()), [&](int64_t begin, int64_t end, int) {
+    for (int64_t k = begin; k < end; ++k) {
+      const uint32_t gaussian = order_[k];
+      const RowRange& rows = rows_[gaussian];
+      footprints_[k] = {spans_[rows.owner].data() + rows.first_span,
+                        gaussian,
+                        lists.first_pair[gaussian],
+                        rows.first_row,
+                        rows.rows};
+    }
+  });
+  const auto for_each_tile = [&](int64_t begin, int64_t end, auto&& visit) {
+    for (int64_t k = begin; k < end; ++k) {
+      const Footprint& f = footprints_[k];
+      if (k + 8 < end) __builtin_prefetch(footprints_[k + 8].spans);
+      uint32_t pair = f.first_pair;
+      for (int r = 0; r < f.rows; ++r) {
+        const uint32_t base = static_cast<uint32_t>((f.first_row + r) * lists.tiles_x);
+        for (uint32_t x = f.spans[r].begin; x < f.spans[r].end; ++x) {
+          visit(base + x, f.gaussian, pair++);
+        }
+      }
+    }
+  };
+  const int64_t visible = static_cast<int64_t>(order_.size());
+  pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
+    uint32_t* counts = chunk_counts_.data() + tiles * thread;
+    for_each_tile(begin, end, [&](uint32_t tile, uint32_t, uint32_t) { ++counts[tile]; });
+  });
+  uint32_t sum = 0;
+  for (size_t tile = 0; tile < tiles; ++tile) {
+    lists.tile_begin[tile] = sum;
+    for (int t = 0; t < threads; ++t) sum += std::exchange(chunk_counts_[tiles * t + tile], sum);
+  }
+  lists.tile_begin[tiles] = sum;
+  pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
+    uint32_t* next = chunk_counts_.data() + tiles * thread;
+    for_each_tile(begin, end, [&](uint32_t tile, uint32_t gaussian, uint32_t pair) {
+      const uint32_t to = next[tile]++;
+      lists.gaussian[to] = gaussian;
+      lists.pair[to] = pair;
+    });
+  });
+}
+
+void TileBinner::Bin(
+    const SplatBuffer& splats, int width, int height, ThreadPool& pool, TileLists& lists) {
+  lists.tiles_x = (width + kTileSide - 1) / kTileSide;
+  lists.tiles_y = (height + kTileSide - 1) / kTileSide;
+  const int64_t count = static_cast<int64_t>(splats.depth_key.size());
+  spans_.resize(pool.thread_count());
+  rows_.resize(count);
+  lists.first_pair.assign(count + 1, 0);
+  lists.tile_begin.assign(lists.tile_count() + 1, 0);
+  pool.ForRanges(count, [&](int64_t begin, int64_t end, int thread) {
+    FindSpans(splats, width, begin, end, thread, lists);
+  });
+  uint64_t total = 0;
+  for (int64_t i = 1; i <= count; ++i) {
+    total += lists.first_pair[i];
+    lists.first_pair[i] = static_cast<uint32_t>(total);
+  }
+  if (total > static_cast<uint64_t>(std::numeric_limits<int32_t>::max())) {
+    throw Error(ErrorCode::kResourceExhausted,
+                "the Gaussians cover " + std::to_string(total) +
+                    " (tile, Gaussian) pairs, more than 2^31; use fewer or smaller Gaussians, or "
+                    "a smaller picture");
+  }
+  lists.gaussian.resize(total);
+  lists.pair.resize(total);
+  SortByDepth(splats);
+  FillLists(pool, lists);
+}
+
+}  // namespace color3d

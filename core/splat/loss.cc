@@ -1,0 +1,238 @@
+#include "core/splat/loss.h"
+
+#include <algorithm>
+
+#include "core/splat/simd.h"
+
+namespace color3d {
+
+using simd::Broadcast;
+using simd::F32;
+using simd::Mask;
+
+namespace {
+
+constexpr int kReach = 5;  // of the 11-tap window
+constexpr int kPad = 16;   // zeros on either side of a row buffer
+// exp(-k^2 / (2 1.5^2)) / sum for k = 0..5.
+constexpr float kTaps[kReach + 1] = {
+    0.26601172f, 0.21300554f, 0.10936069f, 0.036000773f, 0.0075987581f, 0.0010283801f};
+
+struct Terms {
+  const PlaneBuffer& x;
+  const PlaneBuffer& y;
+  const PlaneBuffer* weight;
+  const float* zeros;    // a row of zeros with kPad more on either side
+  float l1, ssim, edge;  // weights divided by the number of terms of the mean
+  PlaneBuffer& d_mean;
+  PlaneBuffer& d_square;
+  PlaneBuffer& d_product;
+  PlaneBuffer& d_laplacian;
+  PlaneBuffer& gradient;
+};
+
+const float* RowOrZeros(const PlaneBuffer& p, int c, int y, const float* zeros) {
+  return y >= 0 && y < p.height ? p.Row(c, y) : zeros;
+}
+
+F32 BlurAlongRow(const float* p) {
+  F32 sum = kTaps[0] * simd::Load(p);
+  for (int k = 1; k <= kReach; ++k) {
+    sum = sum + kTaps[k] * (simd::Load(p - k) + simd::Load(p + k));
+  }
+  return sum;
+}
+
+// Pixel weights, zero beyond the picture's width.
+F32 PixelWeights(const Terms& t, int y, int x0) {
+  const F32 column = simd::LaneIndex() + static_cast<float>(x0);
+  const Mask inside = simd::Less(column, Broadcast(static_cast<float>(t.x.width)));
+  const F32 w = t.weight == nullptr ? Broadcast(1.0f) : simd::Load(t.weight->Row(0, y) + x0);
+  return simd::SelectOrZero(inside, w);
+}
+
+// Vertical blur of x, y, x^2, y^2, xy of row r into five padded row buffers.
+void BlurColumns(const Terms& t, int c, int r, float* const out[5]) {
+  const float *xs[2 * kReach + 1], *ys[2 * kReach + 1];
+  for (int k = -kReach; k <= kReach; ++k) {
+    xs[k + kReach] = RowOrZeros(t.x, c, r + k, t.zeros);
+    ys[k + kReach] = RowOrZeros(t.y, c, r + k, t.zeros);
+  }
+  for (int j = 0; j < t.x.stride; j += simd::kLanes) {
+    const F32 x0 = simd::Load(xs[kReach] + j), y0 = simd::Load(ys[kReach] + j);
+    F32 sx = kTaps[0] * x0, sy = kTaps[0] * y0;
+    F32 sxx = sx * x0, syy = sy * y0, sxy = sx * y0;
+    for (int k = 1; k <= kReach; ++k) {
+      const F32 xa = simd::Load(xs[kReach - k] + j), xb = simd::Load(xs[kReach + k] + j);
+      const F32 ya = simd::Load(ys[kReach - k] + j), yb = simd::Load(ys[kReach + k] + j);
+      sx = sx + kTaps[k] * (xa + xb);
+      sy = sy + kTaps[k] * (ya + yb);
+      sxx = sxx + kTaps[k] * (xa * xa + xb * xb);
+      syy = syy + kTaps[k] * (ya * ya + yb * yb);
+      sxy = sxy + kTaps[k] * (xa * ya + xb * yb);
+    }
+    simd::Store(out[0] + j, sx);
+    simd::Store(out[1] + j, sy);
+    simd::Store(out[2] + j, sxx);
+    simd::Store(out[3] + j, syy);
+    simd::Store(out[4] + j, sxy);
+  }
+}
+
+// 1 - SSIM of row r, its derivatives by the blurred moments, and L1's value.
+void StructureRow(const Terms& t, int c, int r, float* scratch, double* sums) {
+  float* rows[5];
+  for (int k = 0; k < 5; ++k) {
+    rows[k] = scratch + k * (t.x.stride + 2 * kPad) + kPad;
+    std::fill_n(rows[k] - kPad, kPad, 0.0f);
+    std::fill_n(rows[k] + t.x.stride, kPad, 0.0f);
+  }
+  BlurColumns(t, c, r, rows);
+  F32 l1 = {}, dissimilarity = {};
+  const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
+  for (int j = 0; j < t.x.stride; j += simd::kLanes) {
+    const F32 w = PixelWeights(t, r, j);
+    const F32 d = simd::Load(x + j) - simd::Load(y + j);
+    l1 = l1 + w * simd::Max(d, -d);
+    const F32 mx = BlurAlongRow(rows[0] + j), my = BlurAlongRow(rows[1] + j);
+    const F32 sx = BlurAlongRow(rows[2] + j) - mx * mx;
+    const F32 sy = BlurAlongRow(rows[3] + j) - my * my;
+    const F32 sxy = BlurAlongRow(rows[4] + j) - mx * my;
+    const F32 a1 = 2.0f * mx * my + kSsimC1, a2 = 2.0f * sxy + kSsimC2;
+    const F32 b1 = simd::Reciprocal(mx * mx + my * my + kSsimC1);
+    const F32 b2 = simd::Reciprocal(sx + sy + kSsimC2);
+    const F32 ssim = a1 * a2 * b1 * b2;
+    dissimilarity = dissimilarity + w * (1.0f - ssim);
+    const F32 scale = -t.ssim * w;
+    simd::Store(t.d_square.Row(c, r) + j, -scale * ssim * b2);
+    simd::Store(t.d_product.Row(c, r) + j, scale * 2.0f * a1 * b1 * b2);
+    simd::Store(t.d_mean.Row(c, r) + j,
+                scale * 2.0f * (my * (a2 - a1) * b1 * b2 - mx * ssim * (b1 - b2)));
+  }
+  sums[0] = simd::HorizontalSum(l1);
+  sums[1] = simd::HorizontalSum(dissimilarity);
+}
+
+// Charbonnier of the Laplacian of x - y on row r's inner pixels, and its derivative.
+void EdgeRow(const Terms& t, int c, int r, double* sum) {
+  const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
+  const int stride = t.x.stride;
+  float* out = t.d_laplacian.Row(c, r);
+  F32 total = {};
+  for (int j = 0; j < stride; j += simd::kLanes) {
+    const auto difference = [&](int offset) {
+      return simd::Load(x + j + offset) - simd::Load(y + j + offset);
+    };
+    const F32 laplacian = difference(-1) + difference(1) + difference(-stride) +
+                          difference(stride) - 4.0f * difference(0);
+    const F32 column = simd::LaneIndex() + static_cast<float>(j);
+    const Mask inner = simd::And(simd::GreaterEqual(column, Broadcast(1.0f)),
+                                 simd::Less(column, Broadcast(static_cast<float>(t.x.width - 1))));
+    const F32 w = simd::SelectOrZero(inner, PixelWeights(t, r, j));
+    const F32 charbonnier =
+        simd::Sqrt(laplacian * laplacian + kCharbonnierEpsilon * kCharbonnierEpsilon);
+    total = total + w * charbonnier;
+    simd::Store(out + j, t.edge * w * laplacian / charbonnier);
+  }
+  *sum = simd::HorizontalSum(total);
+}
+
+// dL/dx of row r: the adjoint of the blur, L1's sign, the adjoint of the Laplacian.
+void GradientRow(const Terms& t, int c, int r, float* scratch) {
+  const PlaneBuffer* maps[3] = {&t.d_mean, &t.d_square, &t.d_product};
+  const int stride = t.x.stride;
+  float* rows[3];
+  for (int m = 0; m < 3; ++m) {
+    rows[m] = scratch + m * (stride + 2 * kPad) + kPad;
+    std::fill_n(rows[m] - kPad, kPad, 0.0f);
+    std::fill_n(rows[m] + stride, kPad, 0.0f);
+    const float* taps[2 * kReach + 1];
+    for (int k = -kReach; k <= kReach; ++k) {
+      taps[k + kReach] = RowOrZeros(*maps[m], c, r + k, t.zeros);
+    }
+    for (int j = 0; j < stride; j += simd::kLanes) {
+      F32 sum = kTaps[0] * simd::Load(taps[kReach] + j);
+      for (int k = 1; k <= kReach; ++k) {
+        sum =
+            sum + kTaps[k] * (simd::Load(taps[kReach - k] + j) + simd::Load(taps[kReach + k] + j));
+      }
+      simd::Store(rows[m] + j, sum);
+    }
+  }
+  const bool inner = r > 0 && r + 1 < t.x.height;  // the border rows' own term is zero
+  const float* here = inner ? t.d_laplacian.Row(c, r) : t.zeros;
+  const float* up = RowOrZeros(t.d_laplacian, c, r - 1, t.zeros);
+  const float* down = RowOrZeros(t.d_laplacian, c, r + 1, t.zeros);
+  const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
+  for (int j = 0; j < stride; j += simd::kLanes) {
+    const F32 xv = simd::Load(x + j), yv = simd::Load(y + j);
+    const F32 w = PixelWeights(t, r, j);
+    const F32 d = xv - yv;
+    const F32 sign = simd::SelectOrZero(simd::Less(Broadcast(0.0f), d), Broadcast(1.0f)) -
+                     simd::SelectOrZero(simd::Less(d, Broadcast(0.0f)), Broadcast(1.0f));
+    F32 g = BlurAlongRow(rows[0] + j) + 2.0f * xv * BlurAlongRow(rows[1] + j) +
+            yv * BlurAlongRow(rows[2] + j);
+    g = g + t.l1 * w * sign;
+    g = g + simd::Load(up + j) + simd::Load(down + j) + simd::Load(here + j - 1) +
+        simd::Load(here + j + 1) - 4.0f * simd::Load(here + j);
+    const F32 column = simd::LaneIndex() + static_cast<float>(j);
+    const Mask inside = simd::Less(column, Broadcast(static_cast<float>(t.x.width)));
+    simd::Store(t.gradient.Row(c, r) + j, simd::SelectOrZero(inside, g));
+  }
+}
+
+}  // namespace
+
+LossValue ImageLoss::Evaluate(const PlaneBuffer& x,
+                              const PlaneBuffer& y,
+                              const PlaneBuffer* pixel_weight,
+                              const LossWeights& weights,
+                              ThreadPool& pool,
+                              PlaneBuffer& gradient) {
+  for (PlaneBuffer* p : {&d_mean_, &d_square_, &d_product_, &d_laplacian_, &gradient}) {
+    p->Reset(x.width, x.height, x.channels);
+  }
+  zeros_.assign(x.stride + 2 * kPad, 0.0f);
+  scratch_.resize(pool.thread_count());
+  for (AlignedFloats& s : scratch_) s.resize(5 * (static_cast<size_t>(x.stride) + 2 * kPad));
+  const int64_t rows = static_cast<int64_t>(x.channels) * x.height;
+  row_sums_.assign(rows * 3, 0.0);
+  const double pixels = static_cast<double>(x.width) * x.height * x.channels;
+  const double inner = x.width > 2 && x.height > 2
+                           ? static_cast<double>(x.width - 2) * (x.height - 2) * x.channels
+                           : 1.0;
+  const bool edge = weights.edge > 0.0f && x.width > 2 && x.height > 2;
+  const Terms t{x,
+                y,
+                pixel_weight,
+                zeros_.data() + kPad,
+                static_cast<float>(weights.l1 / pixels),
+                static_cast<float>(weights.ssim / pixels),
+                static_cast<float>(weights.edge / inner),
+                d_mean_,
+                d_square_,
+                d_product_,
+                d_laplacian_,
+                gradient};
+  if (!edge) std::fill(d_laplacian_.data.begin(), d_laplacian_.data.end(), 0.0f);
+  pool.ForEach(rows, [&](int64_t i, int thread) {
+    const int c = static_cast<int>(i / x.height), r = static_cast<int>(i % x.height);
+    StructureRow(t, c, r, scratch_[thread].data(), &row_sums_[3 * i]);
+    if (edge && r > 0 && r + 1 < x.height) EdgeRow(t, c, r, &row_sums_[3 * i + 2]);
+  });
+  pool.ForEach(rows, [&](int64_t i, int thread) {
+    const simd::ScopedFlushToZero flush;
+    GradientRow(
+        t, static_cast<int>(i / x.height), static_cast<int>(i % x.height), scratch_[thread].data());
+  });
+  LossValue value;
+  for (int64_t i = 0; i < rows; ++i) {
+    value.l1 += row_sums_[3 * i] / pixels;
+    value.ssim += row_sums_[3 * i + 1] / pixels;
+    value.edge += row_sums_[3 * i + 2] / inner;
+  }
+  value.total = weights.l1 * value.l1 + weights.ssim * value.ssim + weights.edge * value.edge;
+  return value;
+}
+
+}  // namespace color3d

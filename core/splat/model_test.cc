@@ -1,0 +1,233 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <sstream>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/random.h"
+#include "core/color/lab.h"
+#include "core/splat/export.h"
+#include "core/splat/neighbors.h"
+#include "core/splat/render.h"
+#include "core/splat/rgb_harmonics.h"
+
+namespace color3d {
+namespace {
+
+GaussianModel RandomModel(size_t count, int channels, int degree, int chroma_degree) {
+  Random random(3);
+  GaussianModel m;
+  m.channels = channels;
+  m.sh_degree = degree;
+  m.chroma_sh_degree = chroma_degree;
+  const auto fill = [&](std::vector<float>& buffer, int width, double size) {
+    for (size_t i = 0; i < count * width; ++i) {
+      buffer.push_back(static_cast<float>(size * random.NextNormal()));
+    }
+  };
+  fill(m.position, 3, 1.0);
+  fill(m.log_scale, 3, 1.0);
+  fill(m.rotation, 4, 1.0);
+  fill(m.opacity_logit, 1, 1.0);
+  fill(m.sh_l, (degree + 1) * (degree + 1), 0.2);
+  if (channels == 3) {
+    fill(m.sh_a, (chroma_degree + 1) * (chroma_degree + 1), 0.15);
+    fill(m.sh_b, (chroma_degree + 1) * (chroma_degree + 1), 0.15);
+  }
+  return m;
+}
+
+TEST(GaussianFileTest, RoundTripsBitForBit) {
+  for (const auto& m :
+       {RandomModel(13, 1, 2, 0), RandomModel(7, 3, 3, 1), RandomModel(0, 1, 0, 0)}) {
+    const GaussianModel back = ParseGaussians(SerializeGaussians(m));
+    EXPECT_EQ(back.channels, m.channels);
+    EXPECT_EQ(back.position, m.position);
+    EXPECT_EQ(back.log_scale, m.log_scale);
+    EXPECT_EQ(back.rotation, m.rotation);
+    EXPECT_EQ(back.opacity_logit, m.opacity_logit);
+    EXPECT_EQ(back.sh_l, m.sh_l);
+    EXPECT_EQ(back.sh_a, m.sh_a);
+    EXPECT_EQ(back.sh_b, m.sh_b);
+  }
+}
+
+void ExpectRefused(const std::string& bytes, const std::string& why) {
+  try {
+    ParseGaussians(bytes);
+    FAIL() << "accepted: " << why;
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(e.what(), testing::HasSubstr(why));
+  }
+}
+
+std::string Signed(std::string content) { return content + Sha256Hex(content); }
+
+TEST(GaussianFileTest, HostileBytesAreRefused) {
+  const std::string good = SerializeGaussians(RandomModel(13, 3, 1, 0));
+  const std::string content = good.substr(0, good.size() - 64);
+  ExpectRefused("", "only 0 bytes");
+  for (size_t n = 0; n < good.size(); n += 11) {
+    EXPECT_THROW(ParseGaussians(std::string_view(good).substr(0, n)), Error);
+  }
+  std::string bytes = good;
+  bytes[0] = 'X';
+  ExpectRefused(bytes, "C3DGAUSS");
+  bytes = good;
+  bytes[8] = 99;
+  ExpectRefused(bytes, "version 99");
+  bytes = good;
+  bytes[100] ^= 1;
+  ExpectRefused(bytes, "checksum");
+  bytes = content;
+  const uint64_t huge = ~uint64_t{0} / 8;
+  std::memcpy(bytes.data() + 24, &huge, 8);
+  ExpectRefused(Signed(bytes), "claims");
+  bytes = content;
+  const float nan = std::nanf("");
+  std::memcpy(bytes.data() + 40, &nan, 4);
+  ExpectRefused(Signed(bytes), "not finite");
+}
+
+TEST(InitialGaussiansTest, ScaleIsTheMeanDistanceToTheNeighbours) {
+  Scene scene;
+  EXPECT_THROW(InitialGaussians(scene), Error);
+  for (const double x : {0.0, 1.0, 2.0, 3.0}) {
+    SparsePoint p;
+    p.position = {x, 0.0, 0.0};
+    scene.points.push_back(p);
+  }
+  const GaussianModel m = InitialGaussians(scene);
+  ASSERT_EQ(m.size(), 4u);
+  EXPECT_NEAR(std::exp(m.log_scale[0]), std::sqrt((1.0 + 4.0 + 9.0) / 3.0), 1e-5);
+  EXPECT_NEAR(std::exp(m.log_scale[3]), std::sqrt((1.0 + 1.0 + 4.0) / 3.0), 1e-5);
+  EXPECT_NEAR(1.0 / (1.0 + std::exp(-m.opacity_logit[2])), 0.1, 1e-6);
+  EXPECT_EQ(m.sh_l[1], 0.0f);
+}
+
+TEST(InitialGaussiansTest, EqualPointsAndALonePointHaveASize) {
+  Scene scene;
+  scene.points.resize(1);
+  EXPECT_TRUE(std::isfinite(InitialGaussians(scene).log_scale[0]));
+  scene.points.resize(50);
+  for (const float s : InitialGaussians(scene).log_scale) EXPECT_TRUE(std::isfinite(s));
+}
+
+TEST(NeighborTreeTest, AgreesWithSearchingAll) {
+  Random random(6);
+  std::vector<NeighborTree::Point> points(500);
+  for (auto& p : points) {
+    for (float& v : p) v = static_cast<float>(random.NextNormal());
+  }
+  points[7] = points[8];  // duplicates
+  const NeighborTree tree(points);
+  std::vector<NeighborTree::Neighbor> near;
+  for (int q = 0; q < 50; ++q) {
+    const NeighborTree::Point query = points[q];
+    tree.Find(query, 4, near);
+    std::vector<float> all;
+    for (const auto& p : points) {
+      float d = 0.0f;
+      for (int k = 0; k < 3; ++k) d += (p[k] - query[k]) * (p[k] - query[k]);
+      all.push_back(d);
+    }
+    std::sort(all.begin(), all.end());
+    ASSERT_EQ(near.size(), 4u);
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(near[k].squared_distance, all[k]);
+  }
+}
+
+TEST(ExportTest, FittedHarmonicsReproduceTheColours) {
+  GaussianModel m = RandomModel(40, 3, 2, 1);
+  for (float& v : m.sh_a) v *= 0.2f;  // inside the gamut mostly
+  for (float& v : m.sh_b) v *= 0.2f;
+  const RgbHarmonicsFitter fitter(m.sh_degree);
+  double worst = 0.0;
+  for (size_t i = 0; i < m.size(); ++i) {
+    const Eigen::MatrixX3d colors = fitter.Colors(m, i);
+    EXPECT_GE(colors.minCoeff(), 0.0);
+    EXPECT_LE(colors.maxCoeff(), 1.0);
+    const Eigen::MatrixX3d back = ((fitter.Basis() * fitter.Fit(colors)).array() + 0.5).matrix();
+    worst = std::max(worst, (back - colors).cwiseAbs().mean());
+  }
+  EXPECT_LT(worst, 0.05);
+}
+
+TEST(ExportTest, ADiffuseColourIsExact) {
+  GaussianModel m = RandomModel(1, 3, 0, 0);
+  m.sh_l = {0.3f};
+  m.sh_a = {0.1f};
+  m.sh_b = {-0.05f};
+  const double c0 = 0.28209479177387814;
+  const RgbColor rgb =
+      SrgbFromLab(LabColor{100.0 * (0.5 + c0 * 0.3f), 255.0 * c0 * 0.1f, -255.0 * c0 * 0.05f});
+  const RgbHarmonicsFitter fitter(0);
+  const Eigen::MatrixX3d sh = fitter.Fit(fitter.Colors(m, 0));
+  EXPECT_NEAR(0.5 + c0 * sh(0, 0), rgb.r, 1e-6);
+  EXPECT_NEAR(0.5 + c0 * sh(0, 1), rgb.g, 1e-6);
+  EXPECT_NEAR(0.5 + c0 * sh(0, 2), rgb.b, 1e-6);
+}
+
+TEST(ExportTest, PlyHasTheStandardLayout) {
+  ThreadPool pool(2);
+  GaussianModel m = RandomModel(5, 3, 1, 0);
+  for (int k = 0; k < 4; ++k) m.rotation[k] = 0.0f;
+  const std::string bytes = EncodeGaussianPly(m, {100.0, 200.0, 300.0}, pool);
+  const size_t end = bytes.find("end_header\n") + 11;
+  std::istringstream header(bytes.substr(0, end));
+  std::vector<std::string> names;
+  std::string line;
+  while (std::getline(header, line)) {
+    if (line.rfind("property float ", 0) == 0) names.push_back(line.substr(15));
+  }
+  EXPECT_THAT(bytes, testing::StartsWith("ply\nformat binary_little_endian 1.0\n"));
+  EXPECT_THAT(bytes, testing::HasSubstr("element vertex 5\n"));
+  ASSERT_EQ(names.size(), 17u + 9u);
+  EXPECT_EQ(names[6], "f_dc_0");
+  EXPECT_EQ(names[9], "f_rest_0");
+  EXPECT_EQ(names[18], "opacity");
+  EXPECT_EQ(names.back(), "rot_3");
+  ASSERT_EQ(bytes.size(), end + 5 * names.size() * sizeof(float));
+  std::vector<float> row(names.size());
+  std::memcpy(row.data(), bytes.data() + end, row.size() * sizeof(float));
+  EXPECT_NEAR(row[0], m.position[0] + 100.0, 1e-4);
+  EXPECT_EQ(row[18], m.opacity_logit[0]);
+  EXPECT_EQ(row[19], m.log_scale[0]);
+  EXPECT_EQ(row[22], 1.0f);  // a zero quaternion becomes the identity
+  EXPECT_EQ(row[23], 0.0f);
+}
+
+TEST(RenderViewTest, GivesLabUnitsDepthAndOpacity) {
+  ThreadPool pool(2);
+  GaussianModel m;
+  m.channels = 3;
+  m.position = {0.0f, 0.0f, 2.0f};
+  m.log_scale = {-1.0f, -1.0f, -1.0f};
+  m.rotation = {1.0f, 0.0f, 0.0f, 0.0f};
+  m.opacity_logit = {3.0f};
+  m.sh_l = {0.0f};
+  m.sh_a = {0.5f};
+  m.sh_b = {0.0f};
+  const Camera camera{41, 31, 40.0, 40.0, 20.5, 15.5};
+  const RenderedView view = RenderView(m, camera, Pose(), pool, 0.5f);
+  const float alpha = 1.0f / (1.0f + std::exp(-3.0f));
+  EXPECT_NEAR(view.opacity.At(0, 15, 20), alpha, 1e-4);
+  EXPECT_NEAR(view.depth.At(0, 15, 20), 2.0f, 1e-4);
+  EXPECT_NEAR(view.lab.At(0, 15, 20), 50.0f, 1e-3);
+  EXPECT_NEAR(view.lab.At(1, 15, 20), alpha * 255.0f * 0.28209479f * 0.5f, 1e-2);
+  EXPECT_NEAR(view.lab.At(2, 15, 20), 0.0f, 1e-3);
+  const RenderedView empty =
+      RenderView(m, camera, Pose{Eigen::Quaterniond::Identity(), {0, 0, -9}}, pool, 0.25f);
+  EXPECT_NEAR(empty.lab.At(0, 0, 0), 25.0f, 1e-4);
+  EXPECT_NEAR(empty.lab.At(1, 0, 0), 0.0f, 1e-4);
+  EXPECT_EQ(empty.depth.At(0, 0, 0), 0.0f);
+  m.sh_b.clear();
+  EXPECT_THROW(RenderView(m, camera, Pose(), pool), Error);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,49 @@
+// Forward and backward pass of one picture, with buffers that are kept between pictures. Internal
+// to the splat module. Not thread-safe; uses the pool's threads.
+#pragma once
+
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/splat/binning.h"
+#include "core/splat/parameter_block.h"
+#include "core/splat/projection.h"
+#include "core/splat/rasterizer.h"
+
+namespace color3d {
+
+class SplatPipeline {
+ public:
+  // Draws `parameters`; `background` has one number per channel. With `depth_channel` a last
+  // channel holds sum(alpha T depth).
+  void Forward(const ParameterBlock& parameters,
+               const ColorSpec& color,
+               const RasterCamera& camera,
+               const float* background,
+               bool depth_channel,
+               ThreadPool& pool);
+  const PlaneBuffer& color() const { return color_; }
+  const PlaneBuffer& transmittance() const { return transmittance_; }
+  size_t pair_count() const { return lists_.pair_count(); }
+
+  // Gradient by the parameters of the last Forward (same arguments, no depth channel).
+  void Backward(const ParameterBlock& parameters,
+                const ColorSpec& color,
+                const RasterCamera& camera,
+                const PlaneBuffer& d_color,
+                GradientScope scope,
+                ThreadPool& pool,
+                ParameterBlock& gradient,
+                DensifyStatistics* statistics = nullptr);
+
+ private:
+  SplatBuffer splats_;
+  TileBinner binner_;
+  TileLists lists_;
+  std::vector<uint16_t> block_masks_;
+  AlignedFloats pair_gradient_;
+  PlaneBuffer color_;
+  PlaneBuffer transmittance_;
+};
+
+}  // namespace color3d

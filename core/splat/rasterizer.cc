@@ -1,0 +1,394 @@
+#include "core/splat/rasterizer.h"
+
+#include <algorithm>
+
+#include "core/splat/ellipse.h"
+
+namespace color3d {
+
+using namespace splat_internal;  // NOLINT: the kernels' own vocabulary
+using simd::Broadcast;
+using simd::F32;
+using simd::I32;
+using simd::Mask;
+
+namespace {
+
+constexpr int kBlocks = 16;  // of 4x4 pixels in a tile: block b is at column b % 4, row b / 4
+constexpr float kLog2MinAlpha = -7.9943534f;
+constexpr float kLog2MaxAlpha = -0.014499569f;  // log2(0.99)
+
+inline F32 LaneX() { return F32{0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3}; }
+inline F32 LaneY() { return F32{0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3}; }
+
+struct Tile {
+  int index;
+  int x0, y0;  // first pixel
+  uint32_t begin, end;
+};
+
+Tile TileAt(const TileLists& lists, int64_t index) {
+  Tile t;
+  t.index = static_cast<int>(index);
+  t.x0 = t.index % lists.tiles_x * kTileSide;
+  t.y0 = t.index / lists.tiles_x * kTileSide;
+  t.begin = lists.tile_begin[index];
+  t.end = lists.tile_begin[index + 1];
+  return t;
+}
+
+F32 LoadBlock(const PlaneBuffer& image, int channel, const Tile& tile, int block) {
+  alignas(64) float values[16];
+  const int x = tile.x0 + block % 4 * 4, y = tile.y0 + block / 4 * 4;
+  for (int r = 0; r < 4; ++r) std::copy_n(image.Row(channel, y + r) + x, 4, values + 4 * r);
+  return simd::Load(values);
+}
+
+void StoreBlock(PlaneBuffer& image, int channel, const Tile& tile, int block, F32 value) {
+  alignas(64) float values[16];
+  simd::Store(values, value);
+  const int x = tile.x0 + block % 4 * 4, y = tile.y0 + block / 4 * 4;
+  for (int r = 0; r < 4; ++r) std::copy_n(values + 4 * r, 4, image.Row(channel, y + r) + x);
+}
+
+// 1 inside the picture, 0 outside: pixels outside are finished before they begin.
+F32 InitialTransmittance(int width, int height, const Tile& tile, int block) {
+  const F32 x = LaneX() + static_cast<float>(tile.x0 + block % 4 * 4);
+  const F32 y = LaneY() + static_cast<float>(tile.y0 + block / 4 * 4);
+  const Mask inside = simd::And(simd::Less(x, Broadcast(static_cast<float>(width))),
+                                simd::Less(y, Broadcast(static_cast<float>(height))));
+  return simd::SelectOrZero(inside, Broadcast(1.0f));
+}
+
+// Sixteen list entries, planar.
+struct Chunk {
+  alignas(64) float column[kSplatColor + 4][16];
+  int count;
+};
+
+template <int kChannels>
+void LoadChunk(const SplatBuffer& splats, const uint32_t* gaussian, int count, Chunk& chunk) {
+  constexpr int kRow = SplatRowFloats(kChannels);
+  chunk.count = count;
+  for (int j = 0; j < count; ++j) {
+    const float* row = splats.rows.data() + static_cast<size_t>(gaussian[j]) * kRow;
+    for (int k = 0; k < kSplatColor + kChannels; ++k) chunk.column[k][j] = row[k];
+  }
+  for (int j = count; j < 16; ++j) {
+    for (int k = 0; k < kSplatColor; ++k) chunk.column[k][j] = 1.0f;
+  }
+}
+
+// Bit b of masks[j]: the ellipse of entry j touches pixel centres of block b.
+void BlockMasks(const Chunk& chunk, const Tile& tile, uint16_t* masks) {
+  const F32 u = simd::Load(chunk.column[kU]), v = simd::Load(chunk.column[kV]);
+  const Ellipse<F32> e = MakeEllipse(simd::Load(chunk.column[kInvX]),
+                                     simd::Load(chunk.column[kSlope]),
+                                     simd::Load(chunk.column[kInvY]),
+                                     simd::Load(chunk.column[kLog2Opacity]));
+  const F32 reach = e.y_reach + kBoundSlackPx, zero = Broadcast(0.0f), four = Broadcast(4.0f);
+  I32 bits = {};
+  for (int row = 0; row < 4; ++row) {
+    const F32 low = (static_cast<float>(tile.y0 + 4 * row) + 0.5f) - v;
+    const F32 high = low + 3.0f;
+    F32 left, right;
+    BandExtent(e, low, high, &left, &right);
+    const F32 origin = u - (static_cast<float>(tile.x0) + 0.5f);
+    const F32 begin = simd::Clamp((origin + left + 0.999f) * 0.25f, zero, four);
+    const F32 end = simd::Clamp((origin + right + 4.0f) * 0.25f, zero, four);
+    const I32 first = __builtin_convertvector(begin, I32);
+    const I32 last = __builtin_convertvector(end, I32);  // one past
+    const I32 one = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    const I32 span = ((one << last) - (one << first)) << (4 * row);
+    const I32 meets = (low < reach) & (high > -reach) & (last > first);
+    bits |= span & meets;
+  }
+  for (int j = 0; j < chunk.count; ++j) masks[j] = static_cast<uint16_t>(bits[j]);
+}
+
+uint32_t AliveBlocks(const F32* transmittance) {
+  uint32_t alive = 0;
+  for (int b = 0; b < kBlocks; ++b) {
+    const Mask m = simd::GreaterEqual(transmittance[b], Broadcast(kMinTransmittance));
+    alive |= (simd::Any(m) ? 1u : 0u) << b;
+  }
+  return alive;
+}
+
+// The blocks to visit, entry after entry, as 16 * entry + block. One flat list instead of nested
+// loops over rows and columns: mispredicted loop exits cost as much as the arithmetic.
+struct WorkList {
+  int32_t item[16 * kBlocks + 16];
+  int begin[17];  // of each entry's items
+};
+
+void BuildWorkList(const Chunk& chunk, const uint16_t* masks, uint32_t alive, WorkList& work) {
+  int count = 0;
+  for (int j = 0; j < chunk.count; ++j) {
+    work.begin[j] = count;
+    const uint32_t mask = masks[j] & alive;
+#if COLOR3D_AVX512
+    const __m512i first = _mm512_set1_epi32(16 * j);
+    const __m512i blocks = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    _mm512_storeu_si512(
+        work.item + count,
+        _mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), _mm512_add_epi32(first, blocks)));
+    count += __builtin_popcount(mask);
+#else
+    for (uint32_t bits = mask; bits != 0; bits &= bits - 1) {
+      work.item[count++] = 16 * j + __builtin_ctz(bits);
+    }
+#endif
+  }
+  work.begin[chunk.count] = count;
+}
+
+// What the exponent of entry j in block b is made of: e = e_lane[j] + e_block[j][b],
+// dy = LaneY() + dy_block[j][b].
+struct Offsets {
+  F32 e_lane[16];
+  alignas(64) float e_block[16][kBlocks];
+  alignas(64) float dy_block[16][kBlocks];
+};
+
+void ComputeOffsets(const Chunk& chunk, const Tile& tile, Offsets& o) {
+  const F32 block_x = {0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12};
+  const F32 block_y = {0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12};
+  for (int j = 0; j < chunk.count; ++j) {
+    const F32 slope = Broadcast(chunk.column[kSlope][j]);
+    const F32 dy = block_y + ((static_cast<float>(tile.y0) + 0.5f) - chunk.column[kV][j]);
+    const F32 dx = block_x + ((static_cast<float>(tile.x0) + 0.5f) - chunk.column[kU][j]);
+    o.e_lane[j] = LaneX() - slope * LaneY();
+    simd::Store(o.e_block[j], dx - slope * dy);
+    simd::Store(o.dy_block[j], dy);
+  }
+}
+
+template <int kChannels>
+void ForwardTile(const SplatBuffer& splats,
+                 const TileLists& lists,
+                 const float* background,
+                 const Tile& tile,
+                 PlaneBuffer& color,
+                 PlaneBuffer* transmittance,
+                 uint16_t* block_masks) {
+  F32 t[kBlocks], sum[kChannels][kBlocks];
+  for (int b = 0; b < kBlocks; ++b) {
+    t[b] = InitialTransmittance(color.width, color.height, tile, b);
+    for (int c = 0; c < kChannels; ++c) sum[c][b] = Broadcast(0.0f);
+  }
+  Chunk chunk;
+  WorkList work;
+  Offsets offsets;
+  for (uint32_t begin = tile.begin; begin < tile.end; begin += 16) {
+    const int count = static_cast<int>(std::min<uint32_t>(16, tile.end - begin));
+    const uint32_t alive = AliveBlocks(t);
+    if (alive == 0) break;
+    LoadChunk<kChannels>(splats, lists.gaussian.data() + begin, count, chunk);
+    BlockMasks(chunk, tile, block_masks + begin);
+    BuildWorkList(chunk, block_masks + begin, alive, work);
+    ComputeOffsets(chunk, tile, offsets);
+    for (int k = 0; k < work.begin[count]; ++k) {
+      const int j = work.item[k] >> 4, b = work.item[k] & 15;
+      const F32 e = offsets.e_lane[j] + offsets.e_block[j][b];
+      const F32 dy = LaneY() + offsets.dy_block[j][b];
+      const F32 exponent = chunk.column[kLog2Opacity][j] - chunk.column[kInvY][j] * (dy * dy) -
+                           chunk.column[kInvX][j] * (e * e);
+      const Mask live = simd::And(simd::GreaterEqual(exponent, Broadcast(kLog2MinAlpha)),
+                                  simd::GreaterEqual(t[b], Broadcast(kMinTransmittance)));
+      const F32 alpha =
+          simd::SelectOrZero(live, simd::Min(simd::Exp2(exponent), Broadcast(kMaxAlpha)));
+      const F32 weight = alpha * t[b];
+      t[b] = t[b] - weight;
+      for (int c = 0; c < kChannels; ++c) {
+        sum[c][b] = sum[c][b] + weight * chunk.column[kSplatColor + c][j];
+      }
+    }
+  }
+  for (int b = 0; b < kBlocks; ++b) {
+    for (int c = 0; c < kChannels; ++c) {
+      StoreBlock(color, c, tile, b, sum[c][b] + t[b] * background[c]);
+    }
+    if (transmittance != nullptr) StoreBlock(*transmittance, 0, tile, b, t[b]);
+  }
+}
+
+// A tile's pixels on the way front to back.
+template <int kChannels>
+struct BackwardPixels {
+  F32 t[kBlocks];             // transmittance before the next entry
+  F32 rest[kBlocks];          // dL/dC . (colour still to come)
+  F32 d[kChannels][kBlocks];  // dL/dC
+
+  BackwardPixels(const PlaneBuffer& color, const PlaneBuffer& d_color, const Tile& tile) {
+    for (int b = 0; b < kBlocks; ++b) {
+      t[b] = InitialTransmittance(color.width, color.height, tile, b);
+      rest[b] = Broadcast(0.0f);
+      for (int c = 0; c < kChannels; ++c) {
+        d[c][b] = LoadBlock(d_color, c, tile, b);
+        rest[b] = rest[b] + d[c][b] * LoadBlock(color, c, tile, b);
+      }
+    }
+  }
+};
+
+// One entry: its gradient row to `out`, and the pixels moved behind it.
+template <int kChannels>
+inline void BackwardEntry(const Chunk& chunk,
+                          const Offsets& offsets,
+                          const WorkList& work,
+                          int j,
+                          BackwardPixels<kChannels>& pixels,
+                          float* out) {
+  constexpr int kRow = SplatRowFloats(kChannels);
+  F32 w0 = {}, we1 = {}, wy1 = {}, wee = {}, wey = {}, wyy = {}, wc[kChannels] = {};
+  const F32 inv_x = Broadcast(chunk.column[kInvX][j]), inv_y = Broadcast(chunk.column[kInvY][j]);
+  for (int k = work.begin[j]; k < work.begin[j + 1]; ++k) {
+    const int b = work.item[k] & 15;
+    const F32 e = offsets.e_lane[j] + offsets.e_block[j][b];
+    const F32 dy = LaneY() + offsets.dy_block[j][b];
+    const F32 exponent = chunk.column[kLog2Opacity][j] - inv_y * (dy * dy) - inv_x * (e * e);
+    const F32 t_before = pixels.t[b];
+    const Mask live = simd::And(simd::GreaterEqual(exponent, Broadcast(kLog2MinAlpha)),
+                                simd::GreaterEqual(t_before, Broadcast(kMinTransmittance)));
+    const F32 alpha =
+        simd::SelectOrZero(live, simd::Min(simd::Exp2(exponent), Broadcast(kMaxAlpha)));
+    const F32 weight = alpha * t_before;
+    F32 dc = pixels.d[0][b] * chunk.column[kSplatColor][j];
+    wc[0] = wc[0] + weight * pixels.d[0][b];
+    for (int c = 1; c < kChannels; ++c) {
+      dc = dc + pixels.d[c][b] * chunk.column[kSplatColor + c][j];
+      wc[c] = wc[c] + weight * pixels.d[c][b];
+    }
+    const F32 gain = dc * weight;
+    const F32 left = pixels.rest[b] - gain;
+    pixels.rest[b] = left;
+    pixels.t[b] = t_before - weight;
+    // alpha dL/d(alpha) = alpha (T dc - rest / (1 - alpha)); zero where alpha is capped.
+    F32 w = gain - left * alpha * simd::Reciprocal(1.0f - alpha);
+    w = simd::SelectOrZero(simd::Less(exponent, Broadcast(kLog2MaxAlpha)), w);
+    const F32 we = w * e, wy = w * dy;
+    w0 = w0 + w;
+    we1 = we1 + we;
+    wy1 = wy1 + wy;
+    wee = wee + we * e;
+    wey = wey + we * dy;
+    wyy = wyy + wy * dy;
+  }
+  F32 sums[kGradientColor + 4] = {w0, we1, wy1, wee, wey, wyy};
+  for (int c = 0; c < kChannels; ++c) sums[kGradientColor + c] = wc[c];
+  simd::HorizontalSums8(sums, out);
+  for (int k = 8; k < kRow; ++k) {
+    out[k] = k < kGradientColor + kChannels ? simd::HorizontalSum(sums[k]) : 0.0f;
+  }
+}
+
+template <int kChannels>
+void BackwardTile(const SplatBuffer& splats,
+                  const TileLists& lists,
+                  const uint16_t* block_masks,
+                  const PlaneBuffer& color,
+                  const PlaneBuffer& d_color,
+                  const Tile& tile,
+                  float* pair_gradient) {
+  constexpr int kRow = SplatRowFloats(kChannels);
+  BackwardPixels<kChannels> pixels(color, d_color, tile);
+  Chunk chunk;
+  WorkList work;
+  Offsets offsets;
+  uint32_t begin = tile.begin;
+  for (; begin < tile.end; begin += 16) {
+    const int count = static_cast<int>(std::min<uint32_t>(16, tile.end - begin));
+    const uint32_t alive = AliveBlocks(pixels.t);
+    if (alive == 0) break;
+    LoadChunk<kChannels>(splats, lists.gaussian.data() + begin, count, chunk);
+    BuildWorkList(chunk, block_masks + begin, alive, work);
+    ComputeOffsets(chunk, tile, offsets);
+    for (int j = 0; j < count; ++j) {
+      BackwardEntry(chunk,
+                    offsets,
+                    work,
+                    j,
+                    pixels,
+                    pair_gradient + static_cast<size_t>(lists.pair[begin + j]) * kRow);
+    }
+  }
+  // Entries behind the last visible surface.
+  for (; begin < tile.end; ++begin) {
+    std::fill_n(pair_gradient + static_cast<size_t>(lists.pair[begin]) * kRow, kRow, 0.0f);
+  }
+}
+
+template <int kChannels>
+void ForwardTiles(const SplatBuffer& splats,
+                  const TileLists& lists,
+                  const float* background,
+                  ThreadPool& pool,
+                  PlaneBuffer& color,
+                  PlaneBuffer* transmittance,
+                  uint16_t* block_masks) {
+  pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
+    ForwardTile<kChannels>(
+        splats, lists, background, TileAt(lists, index), color, transmittance, block_masks);
+  });
+}
+
+template <int kChannels>
+void BackwardTiles(const SplatBuffer& splats,
+                   const TileLists& lists,
+                   const uint16_t* block_masks,
+                   const PlaneBuffer& color,
+                   const PlaneBuffer& d_color,
+                   ThreadPool& pool,
+                   float* pair_gradient) {
+  pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
+    const simd::ScopedFlushToZero flush;
+    BackwardTile<kChannels>(
+        splats, lists, block_masks, color, d_color, TileAt(lists, index), pair_gradient);
+  });
+}
+
+}  // namespace
+
+void RasterizeForward(const SplatBuffer& splats,
+                      const TileLists& lists,
+                      const float* background,
+                      ThreadPool& pool,
+                      PlaneBuffer& color,
+                      PlaneBuffer* transmittance,
+                      std::vector<uint16_t>& block_masks) {
+  block_masks.resize(lists.pair_count() + 16);
+  uint16_t* masks = block_masks.data();
+  switch (splats.channels) {
+    case 1:
+      return ForwardTiles<1>(splats, lists, background, pool, color, transmittance, masks);
+    case 2:
+      return ForwardTiles<2>(splats, lists, background, pool, color, transmittance, masks);
+    case 3:
+      return ForwardTiles<3>(splats, lists, background, pool, color, transmittance, masks);
+    default:
+      return ForwardTiles<4>(splats, lists, background, pool, color, transmittance, masks);
+  }
+}
+
+void RasterizeBackward(const SplatBuffer& splats,
+                       const TileLists& lists,
+                       const std::vector<uint16_t>& block_masks,
+                       const PlaneBuffer& color,
+                       const PlaneBuffer& d_color,
+                       ThreadPool& pool,
+                       AlignedFloats& pair_gradient) {
+  pair_gradient.resize(lists.pair_count() * splats.row_floats);
+  const uint16_t* masks = block_masks.data();
+  float* out = pair_gradient.data();
+  switch (splats.channels) {
+    case 1:
+      return BackwardTiles<1>(splats, lists, masks, color, d_color, pool, out);
+    case 2:
+      return BackwardTiles<2>(splats, lists, masks, color, d_color, pool, out);
+    default:
+      return BackwardTiles<3>(splats, lists, masks, color, d_color, pool, out);
+  }
+}
+
+}  // namespace color3d

@@ -1,0 +1,147 @@
+#include "core/splat/trainer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/splat/chroma_fit.h"
+#include "core/splat/geometry_trainer.h"
+#include "core/splat/projection.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kMaxSampledViews = 8;  // per sparse point
+constexpr float kShDc = 0.28209479177387814f;
+
+// Also refuses NaN.
+void CheckRange(const char* name, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  throw InvalidArgument(std::string(name) + " = " + std::to_string(value) + " is not in " +
+                        std::to_string(low) + " .. " + std::to_string(high));
+}
+
+std::vector<PosedCamera> Posed(const Scene& scene,
+                               const ViewImages& images,
+                               const std::vector<int>& views) {
+  std::vector<PosedCamera> posed;
+  for (const int view : views) {
+    posed.push_back({view, images.WorkingCamera(view), scene.views[view].cam_from_world});
+  }
+  return posed;
+}
+
+// Pixel of a world point, or false when it is not in front of the camera or not in the picture.
+bool PixelOf(const PosedCamera& view, const Eigen::Vector3d& world, int* x, int* y) {
+  const Eigen::Vector3d p = view.cam_from_world.Apply(world);
+  if (!(p.z() > kNearPlane)) return false;
+  const double u = view.camera.fx * p.x() / p.z() + view.camera.cx;
+  const double v = view.camera.fy * p.y() / p.z() + view.camera.cy;
+  if (!(u >= 0.0 && v >= 0.0 && u < view.camera.width && v < view.camera.height)) return false;
+  *x = static_cast<int>(u);
+  *y = static_cast<int>(v);
+  return true;
+}
+
+// Luminance of each sparse point where training views observe it, as a better start than grey. View
+// by view, so that each picture is read once. Returns how many points some training view has before
+// it.
+size_t SampleInitialLuminance(const Scene& scene,
+                              const GeometryProblem& problem,
+                              GaussianModel& model) {
+  std::vector<double> sum(scene.points.size(), 0.0);
+  std::vector<int> count(scene.points.size(), 0);
+  std::vector<char> in_front(scene.points.size(), 0);
+  for (const PosedCamera& view : problem.training) {
+    const std::shared_ptr<const Image> luminance = problem.luminance(view.view);
+    for (size_t i = 0; i < scene.points.size(); ++i) {
+      const SparsePoint& point = scene.points[i];
+      int x = 0, y = 0;
+      if (!PixelOf(view, point.position, &x, &y)) continue;
+      in_front[i] = 1;
+      if (count[i] >= kMaxSampledViews ||
+          !std::binary_search(point.views.begin(), point.views.end(), view.view)) {
+        continue;
+      }
+      sum[i] += luminance->At(0, y, x);
+      ++count[i];
+    }
+  }
+  for (size_t i = 0; i < scene.points.size(); ++i) {
+    if (count[i] == 0) continue;
+    const float value = static_cast<float>(0.01 * sum[i] / count[i]);
+    if (std::isfinite(value)) model.sh_l[i] = (value - 0.5f) / kShDc;
+  }
+  return static_cast<size_t>(std::count(in_front.begin(), in_front.end(), 1));
+}
+
+}  // namespace
+
+void GeometryOptions::Validate() const {
+  CheckRange("iterations", iterations, 0, 100'000);
+  CheckRange("max_gaussians", max_gaussians, 1, 10'000'000);
+  CheckRange("sh_degree", sh_degree, 0, 3);
+  CheckRange("ssim_weight", ssim_weight, 0.0, 1.0);
+  CheckRange("edge_weight", edge_weight, 0.0, 10.0);
+  CheckRange("densify_gradient", densify_gradient, 1e-9, 1e9);
+  CheckRange("learning_rate_scale", learning_rate_scale, 1e-3, 1e3);
+}
+
+void ChromaOptions::Validate() const {
+  CheckRange("iterations", iterations, 0, 100'000);
+  CheckRange("chroma_sh_degree", chroma_sh_degree, 0, 1);
+  CheckRange("ssim_weight", ssim_weight, 0.0, 1.0);
+}
+
+GaussianModel TrainGeometry(const Scene& scene,
+                            const ViewImages& images,
+                            const GeometryOptions& options,
+                            ThreadPool& pool,
+                            CheckpointStore& checkpoints,
+                            ProgressObserver& progress,
+                            const CancellationToken& cancel) {
+  return TrainGeometryTuned(
+      scene, images, options, GeometryTuning(), pool, checkpoints, progress, cancel);
+}
+
+GaussianModel TrainGeometryTuned(const Scene& scene,
+                                 const ViewImages& images,
+                                 const GeometryOptions& options,
+                                 const GeometryTuning& tuning,
+                                 ThreadPool& pool,
+                                 CheckpointStore& checkpoints,
+                                 ProgressObserver& progress,
+                                 const CancellationToken& cancel) {
+  options.Validate();
+  GeometryProblem problem;
+  problem.training = Posed(scene, images, scene.TrainingViews());
+  problem.held_out = Posed(scene, images, scene.HeldOutViews());
+  problem.luminance = [&images](int view) { return images.Luminance(view); };
+  problem.extent = scene.Extent();
+  GaussianModel initial = InitialGaussians(scene);
+  if (SampleInitialLuminance(scene, problem, initial) == 0) {
+    throw InvalidArgument("none of the " + std::to_string(scene.points.size()) +
+                          " sparse points lies in front of a training camera (nearer than " +
+                          std::to_string(kNearPlane) +
+                          " world units does not count); check the poses and the scene's scale");
+  }
+  return TrainGeometryOn(problem, initial, options, tuning, pool, checkpoints, progress, cancel);
+}
+
+GaussianModel FitChroma(const GaussianModel& geometry,
+                        const Scene& scene,
+                        const ViewImages& images,
+                        const ChromaTargetSource& targets,
+                        const ChromaOptions& options,
+                        ThreadPool& pool,
+                        CheckpointStore& checkpoints,
+                        ProgressObserver& progress,
+                        const CancellationToken& cancel) {
+  ChromaProblem problem;
+  problem.training = Posed(scene, images, scene.TrainingViews());
+  problem.targets = targets;
+  return FitChromaOn(geometry, problem, options, pool, checkpoints, progress, cancel);
+}
+
+}  // namespace color3d

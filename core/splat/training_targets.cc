@@ -1,0 +1,52 @@
+#include "core/splat/training_targets.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+
+PlaneBuffer PlanesFromImage(const Image& image, float offset, float scale) {
+  PlaneBuffer planes(image.width, image.height, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (int y = 0; y < image.height; ++y) {
+      const float* in = image.Plane(c) + static_cast<size_t>(y) * image.width;
+      float* out = planes.Row(c, y);
+      for (int x = 0; x < image.width; ++x) out[x] = (in[x] + offset) * scale;
+    }
+  }
+  return planes;
+}
+
+int SizeAtLevel(int size_px, int level) {
+  return std::max(1, (size_px + (1 << level) / 2) >> level);
+}
+
+std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view, int level) {
+  const auto found = kept_.find({view.view, level});
+  if (found != kept_.end()) return found->second;
+  const std::shared_ptr<const Image> image = luminance_(view.view);
+  if (image->channels != 1 || image->width != view.camera.width ||
+      image->height != view.camera.height) {
+    throw InvalidArgument("view " + std::to_string(view.view) + ": luminance is " +
+                          std::to_string(image->width) + "x" + std::to_string(image->height) +
+                          " px, its camera " + std::to_string(view.camera.width) + "x" +
+                          std::to_string(view.camera.height));
+  }
+  auto planes = std::make_shared<const PlaneBuffer>(PlanesFromImage(
+      level == 0
+          ? *image
+          : Resize(*image, SizeAtLevel(image->width, level), SizeAtLevel(image->height, level)),
+      0.0f,
+      0.01f));
+  const int64_t bytes = static_cast<int64_t>(planes->data.size() * sizeof(float));
+  if (used_bytes_ + bytes <= budget_bytes_) {
+    used_bytes_ += bytes;
+    kept_[{view.view, level}] = planes;
+  }
+  return planes;
+}
+
+}  // namespace color3d

@@ -1,0 +1,91 @@
+#include "core/stage/artifacts.h"
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/image/codec.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+std::string StageThatMakes(std::string_view name) {
+  using namespace artifact;
+  const std::pair<std::string_view, const char*> makers[] = {
+      {kScene, "import_scene"},        {kImportFacts, "import_scene"},
+      {kKeyView, "select_key_view"},   {kKeyViewGray, "select_key_view"},
+      {kKeyColor, "colorize_key_view"}, {kColorizer, "personalize"},
+      {kViewsAb, "colorize_views"},    {kGeometry, "reconstruct_geometry"},
+      {kModel, "solve_chroma"},        {kPly, "export"},
+      {kRenders, "render"},            {kScores, "evaluate"}};
+  for (const auto& [prefix, kind] : makers) {
+    if (name.starts_with(prefix)) return kind;
+  }
+  return "another";
+}
+
+std::string ViewArtifact(std::string_view folder, const View& view, std::string_view extension) {
+  const std::filesystem::path stem = std::filesystem::path(view.name).replace_extension();
+  return std::string(folder) + stem.generic_string() + std::string(extension);
+}
+
+void CheckStemsAreUnique(const Scene& scene) {
+  std::map<std::string, std::string> seen;
+  for (const View& view : scene.views) {
+    const auto [found, fresh] = seen.emplace(ViewArtifact("", view, ""), view.name);
+    if (!fresh) {
+      throw InvalidArgument(found->second + " and " + view.name +
+                            " differ only in their extension; remove or rename one of them");
+    }
+  }
+}
+
+std::string ImportFactsToJson(const ImportFacts& f) {
+  return nlohmann::ordered_json{{"layout", f.layout},
+                                {"ran_structure_from_motion", f.ran_structure_from_motion},
+                                {"undistorted", f.undistorted},
+                                {"random_points", f.random_points},
+                                {"photos_found", f.photos_found},
+                                {"photos_registered", f.photos_registered}}
+             .dump(1) +
+         "\n";
+}
+
+ImportFacts ImportFactsFromJson(std::string_view json) {
+  try {
+    const auto value = nlohmann::json::parse(json);
+    ImportFacts f;
+    f.layout = value.at("layout");
+    f.ran_structure_from_motion = value.at("ran_structure_from_motion");
+    f.undistorted = value.at("undistorted");
+    f.random_points = value.at("random_points");
+    f.photos_found = value.at("photos_found");
+    f.photos_registered = value.at("photos_registered");
+    return f;
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument(std::string("import.json is damaged: ") + e.what());
+  }
+}
+
+Scene ReadScene(const StageContext& context) {
+  return SceneFromJson(context.ReadInput(artifact::kScene));
+}
+
+int ReadKeyView(const StageContext& context, const Scene& scene) {
+  try {
+    const auto value = nlohmann::json::parse(context.ReadInput(artifact::kKeyView));
+    return scene.FindView(value.at("view").get<std::string>());
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument(std::string("key_view.json is damaged: ") + e.what());
+  }
+}
+
+Image ReadViewAb(const StageContext& context, const View& view, int width, int height) {
+  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  AbMap map = DecodeAbPng(context.ReadInput(name), name);
+  if (map.ab.width == width && map.ab.height == height) return std::move(map.ab);
+  return Resize(map.ab, width, height);
+}
+
+}  // namespace color3d

@@ -1,0 +1,27 @@
+#include "core/image/codec.h"
+#include "core/scene/view_images.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+
+void RunColorizeViews(int max_side_px, StageContext& context) {
+  if (max_side_px < 64 || max_side_px > 4096) {
+    throw InvalidArgument("max_side_px is " + std::to_string(max_side_px) +
+                          "; it must be 64 to 4096");
+  }
+  const Scene scene = ReadScene(context);
+  const auto colorizer = LoadColorizer(
+      context.ReadInput(artifact::kColorizer), Encoder::Embedded(), context.threads());
+  const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
+  const auto total = static_cast<int64_t>(scene.views.size());
+  for (int64_t i = 0; i < total; ++i) {
+    context.cancel().ThrowIfCancelled();
+    const View& view = scene.views[static_cast<size_t>(i)];
+    const Image ab = colorizer->Colorize(*images.Luminance(static_cast<int>(i)));
+    context.WriteOutput(ViewArtifact(artifact::kViewsAb, view, ".png"), EncodeAbPng(ab));
+    context.progress().OnProgress(i + 1, total, "colouring " + view.name);
+  }
+}
+
+}  // namespace color3d

@@ -1,0 +1,43 @@
+#include "core/base/files.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+namespace {
+
+const char* LayoutName(SceneLayout layout) {
+  switch (layout) {
+    case SceneLayout::kPhotos: return "photos";
+    case SceneLayout::kColmap: return "colmap";
+    case SceneLayout::kTransforms: return "transforms";
+  }
+  return "photos";
+}
+
+}  // namespace
+
+void RunImportScene(const ImportOptions& options, StageContext& context) {
+  options.Validate();
+  const ImportResult result = ImportScene(context.scene_folder(),
+                                          context.scratch_folder(),
+                                          options,
+                                          context.progress(),
+                                          context.cancel());
+  CheckStemsAreUnique(result.scene);
+  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
+  ImportFacts facts;
+  facts.layout = LayoutName(result.layout);
+  facts.ran_structure_from_motion = result.ran_structure_from_motion;
+  facts.undistorted = result.undistorted;
+  facts.random_points = !result.scene.points.empty() && result.scene.points[0].views.empty();
+  facts.photos_found = result.photos_found;
+  facts.photos_registered = result.photos_registered;
+  context.progress().OnError(
+      result.photos_found, "photos_without_pose", result.photos_found - result.photos_registered);
+  context.WriteOutput(artifact::kScene, SceneToJson(result.scene));
+  context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
+  const std::filesystem::path log = context.scratch_folder() / artifact::kSfmLog;
+  if (std::filesystem::exists(log)) context.WriteOutput(artifact::kSfmLog, ReadFile(log));
+}
+
+}  // namespace color3d

@@ -1,0 +1,58 @@
+#include "core/splat/render.h"
+
+#include <algorithm>
+
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+namespace {
+
+std::vector<int> ViewsToRender(const RenderOptions& options, const Scene& scene) {
+  std::vector<int> views;
+  for (const std::string& name : options.views) views.push_back(scene.FindView(name));
+  if (!views.empty()) return views;
+  views = scene.HeldOutViews();
+  if (views.empty()) {
+    for (size_t i = 0; i < scene.views.size(); ++i) views.push_back(static_cast<int>(i));
+  }
+  const size_t count = views.size();
+  const size_t wanted = std::min(count, static_cast<size_t>(options.max_views));
+  std::vector<int> spread;
+  for (size_t i = 0; i < wanted; ++i) spread.push_back(views[i * count / wanted]);
+  return spread;
+}
+
+}  // namespace
+
+void RenderOptions::Validate() const {
+  if (max_views < 1 || max_views > 1000) {
+    throw InvalidArgument("max_views is " + std::to_string(max_views) + "; it must be 1 to 1000");
+  }
+  if (max_side_px < 64 || max_side_px > 4096) {
+    throw InvalidArgument("max_side_px is " + std::to_string(max_side_px) +
+                          "; it must be 64 to 4096");
+  }
+}
+
+void RunRender(const RenderOptions& options, StageContext& context) {
+  options.Validate();
+  const Scene scene = ReadScene(context);
+  const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
+  ThreadPool pool(context.threads());
+  const std::vector<int> views = ViewsToRender(options, scene);
+  for (size_t i = 0; i < views.size(); ++i) {
+    context.cancel().ThrowIfCancelled();
+    const View& view = scene.views[views[i]];
+    const RenderedView rendered = RenderView(
+        model, view.camera.FitWithin(options.max_side_px), view.cam_from_world, pool);
+    context.WriteOutput(ViewArtifact(artifact::kRenders, view, ".png"),
+                        EncodePng8(SrgbFromLab(rendered.lab)));
+    context.progress().OnProgress(
+        static_cast<int64_t>(i) + 1, static_cast<int64_t>(views.size()), "rendering " + view.name);
+  }
+}
+
+}  // namespace color3d

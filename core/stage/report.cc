@@ -1,0 +1,171 @@
+#include "core/report/report_page.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/base/parallel.h"
+#include "core/image/codec.h"
+#include "core/report/curves.h"
+#include "core/report/scene_plan.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kReportSidePx = 540;
+
+// A picture for the page: small enough to embed many.
+ReportPicture Picture(const StageContext& context, const std::string& name, std::string caption) {
+  const Image image = DecodeImage(context.ReadInput(name), name);
+  return {std::move(caption), EncodeJpeg(FitWithin(image, kReportSidePx), 88)};
+}
+
+// Keys in the order in which people read them.
+ordered_json CollectMetrics(const std::vector<StageSummary>& stages, StageContext& context) {
+  ordered_json metrics = ordered_json::object();
+  if (context.HasInput(artifact::kScores)) {
+    const auto mean = ordered_json::parse(context.ReadInput(artifact::kScores)).at("mean");
+    for (const char* name : {"psnr_rgb", "ssim_rgb", "psnr_l", "ab_rmse", "delta_e00",
+                             "delta_e00_chroma", "delta_e00_chroma_2d", "delta_e00_grey",
+                             "colourfulness", "colourfulness_truth"}) {
+      metrics[name] = mean.at(name);
+    }
+  }
+  if (context.HasInput(artifact::kModel)) {
+    metrics["gaussians"] = ParseGaussians(context.ReadInput(artifact::kModel)).size();
+  }
+  double total = 0.0;
+  int64_t peak = 0;
+  for (const StageSummary& s : stages) {
+    total += s.seconds;
+    peak = std::max(peak, s.peak_memory_bytes);
+  }
+  metrics["seconds_total"] = total;
+  for (const StageSummary& s : stages) {
+    if (s.state == "SUCCEEDED") metrics["seconds_" + s.kind] = s.seconds;
+  }
+  if (peak > 0) metrics["peak_memory_bytes"] = peak;
+  return metrics;
+}
+
+std::vector<CurvePoint> CollectCurves(const StageContext& context) {
+  std::vector<CurvePoint> curves;
+  for (const std::string& name : context.InputsBelow(artifact::kCurves)) {
+    const auto points = CurvesFromCsv(context.ReadInput(name));
+    curves.insert(curves.end(), points.begin(), points.end());
+  }
+  return curves;
+}
+
+double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kind) {
+  for (const StageSummary& s : stages) {
+    if (s.kind == kind && s.state == "SUCCEEDED") return s.seconds;
+  }
+  return -1.0;
+}
+
+std::vector<PlanStep> CollectPlan(const Scene& scene,
+                                  const std::vector<StageSummary>& stages,
+                                  const StageContext& context) {
+  const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
+  const auto key_view = ordered_json::parse(context.ReadInput(artifact::kKeyView));
+  PlanFacts plan_facts;
+  plan_facts.has_poses = !facts.ran_structure_from_motion;
+  plan_facts.has_distortion = facts.undistorted;
+  plan_facts.has_sparse_points = !facts.random_points;
+  plan_facts.has_truth = context.HasInput(artifact::kScores);
+  plan_facts.key_view_given = key_view.at("strategy") == "manual";
+  plan_facts.views = static_cast<int>(scene.views.size());
+  plan_facts.training_views = static_cast<int>(scene.TrainingViews().size());
+  plan_facts.threads = context.threads();
+  const Camera camera = scene.views.at(0).camera.FitWithin(kReportSidePx);
+  plan_facts.megapixels_per_view = 1e-6 * camera.width * camera.height;
+  std::vector<PlanStep> plan = PlanScene(plan_facts);
+  const std::pair<const char*, const char*> stage_of[] = {
+      {"structure_from_motion", "import_scene"}, {"key_view_selection", "select_key_view"},
+      {"luminance_geometry", "reconstruct_geometry"}, {"personalization", "personalize"},
+      {"chroma", "solve_chroma"}, {"evaluation", "evaluate"}};
+  for (PlanStep& step : plan) {
+    for (const auto& [name, kind] : stage_of) {
+      if (step.needed && step.step == name) step.measured_seconds = SecondsOf(stages, kind);
+    }
+  }
+  for (const StageSummary& s : stages) {
+    if (s.state == "SKIPPED" && s.kind != "evaluate") {
+      plan.push_back({s.kind, false, s.skip_reason, 0.0, -1.0});
+    }
+  }
+  return plan;
+}
+
+std::string Summary(const Scene& scene, const ordered_json& metrics, const std::string& key) {
+  std::string text = std::to_string(scene.views.size()) + " views (" +
+                     std::to_string(scene.HeldOutViews().size()) +
+                     " held out), all colours from the key view " + key + ". " +
+                     std::to_string(metrics.value("gaussians", 0)) + " Gaussians in " +
+                     std::to_string(static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5)) +
+                     " s of computing.";
+  return text;
+}
+
+std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context) {
+  std::vector<ReportRow> rows;
+  for (const View& view : scene.views) {
+    const std::string render = ViewArtifact(artifact::kRenders, view, ".png");
+    if (!context.HasInput(render)) continue;
+    ReportRow row{view.name + (view.held_out ? " (held out)" : ""), {}};
+    const std::string truth = ViewArtifact(artifact::kTruths, view, ".jpg");
+    const std::string direct = ViewArtifact(artifact::kColored2d, view, ".jpg");
+    if (context.HasInput(truth)) row.pictures.push_back(Picture(context, truth, "truth"));
+    row.pictures.push_back(Picture(context, render, "rendered from the coloured 3D scene"));
+    if (context.HasInput(direct)) {
+      row.pictures.push_back(Picture(context, direct, "the colorizer on the monochrome photo"));
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+void PassOnResults(StageContext& context) {
+  using namespace artifact;
+  for (const char* name : {kPly, kModel, kColorizer, kKeyView, kKeyViewGray, kKeyViewColored,
+                           kSfmLog}) {
+    if (context.HasInput(name)) context.PassOn(name);
+  }
+  for (const std::string& name : context.InputsBelow(kRenders)) context.PassOn(name);
+}
+
+}  // namespace
+
+void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
+  const Scene scene = ReadScene(context);
+  const int key = ReadKeyView(context, scene);
+  const ordered_json metrics = CollectMetrics(stages, context);
+
+  ReportData data;
+  data.title = "Color3D: " + std::to_string(scene.views.size()) + " views in colour";
+  data.summary = Summary(scene, metrics, scene.views[key].name);
+  data.key_view = {scene.views[key].name,
+                   {Picture(context, artifact::kKeyViewGray, "as captured"),
+                    Picture(context, artifact::kKeyViewColored, "as coloured by the user")}};
+  data.views = ViewRows(scene, context);
+  for (const auto& [name, value] : metrics.items()) {
+    data.metrics.emplace_back(name, value.get<double>());
+  }
+  data.curves = CollectCurves(context);
+  data.plan = CollectPlan(scene, stages, context);
+  for (const StageSummary& s : stages) {
+    for (const std::string& w : s.warnings) data.warnings.push_back(s.kind + ": " + w);
+  }
+  context.WriteOutput(artifact::kMetrics, metrics.dump(1) + "\n");
+  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(data.curves));
+  context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));
+  context.WriteOutput(artifact::kReport, RenderReport(data));
+  PassOnResults(context);
+}
+
+}  // namespace color3d

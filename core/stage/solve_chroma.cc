@@ -1,0 +1,59 @@
+#include <algorithm>
+#include <map>
+#include <mutex>
+
+#include "core/image/codec.h"
+#include "core/scene/view_images.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+namespace {
+
+// Longer side at which the views were coloured: chroma is fitted at that size.
+int ColoredSide(const StageContext& context, const View& view) {
+  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  const ImageInfo info = ProbeImage(context.ReadInput(name), name);
+  return std::max(info.width, info.height);
+}
+
+}  // namespace
+
+void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
+  options.Validate();
+  const Scene scene = ReadScene(context);
+  const int key = ReadKeyView(context, scene);
+  const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
+  const ViewImages images(
+      scene, context.scene_folder(), ColoredSide(context, scene.views[key]));
+  const AbMap key_color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+
+  std::map<int, std::shared_ptr<const ChromaTarget>> cache;
+  std::mutex mutex;
+  const ChromaTargetSource targets = [&](int view) {
+    std::lock_guard lock(mutex);
+    auto& target = cache[view];
+    if (!target) {
+      const Camera camera = images.WorkingCamera(view);
+      auto made = std::make_shared<ChromaTarget>();
+      // The key view's colours are the user's own; the others are the colorizer's prediction.
+      made->ab = view == key ? Resize(key_color.ab, camera.width, camera.height)
+                             : ReadViewAb(context, scene.views[view], camera.width, camera.height);
+      target = std::move(made);
+    }
+    return target;
+  };
+  ThreadPool pool(context.threads());
+  const GaussianModel model = FitChroma(geometry,
+                                        scene,
+                                        images,
+                                        targets,
+                                        options,
+                                        pool,
+                                        context.checkpoints(),
+                                        context.progress(),
+                                        context.cancel());
+  context.WriteOutput(artifact::kModel, SerializeGaussians(model));
+}
+
+}  // namespace color3d

@@ -1,0 +1,52 @@
+#include "core/stage/stage.h"
+
+#include "core/base/files.h"
+#include "core/stage/artifacts.h"
+
+namespace color3d {
+
+StageContext::StageContext(Setup setup,
+                           CheckpointStore& checkpoints,
+                           ProgressObserver& progress,
+                           const CancellationToken& cancel)
+    : setup_(std::move(setup)), checkpoints_(checkpoints), progress_(progress), cancel_(cancel) {}
+
+std::filesystem::path StageContext::Input(const std::string& name) const {
+  const auto found = setup_.inputs.find(name);
+  if (found == setup_.inputs.end()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "this stage needs " + name + ", which a " + StageThatMakes(name) +
+                    " job makes: name one among the inputs");
+  }
+  return found->second;
+}
+
+std::vector<std::string> StageContext::InputsBelow(std::string_view prefix) const {
+  std::vector<std::string> names;
+  for (const auto& [name, path] : setup_.inputs) {
+    if (name.starts_with(prefix)) names.push_back(name);
+  }
+  return names;
+}
+
+std::string StageContext::ReadInput(const std::string& name) const {
+  return ReadFile(Input(name));
+}
+
+void StageContext::WriteOutput(const std::string& name, std::string_view bytes) {
+  if (!IsSafeRelativePath(name)) {
+    throw InvalidArgument("\"" + name + "\" cannot name an artifact; rename the photo");
+  }
+  const std::filesystem::path path = setup_.output_folder / name;
+  std::error_code error;
+  std::filesystem::create_directories(path.parent_path(), error);
+  WriteFileAtomic(path, bytes);
+  outputs_.push_back(name);
+}
+
+void StageContext::PassOn(const std::string& name) {
+  Input(name);
+  passed_on_.push_back(name);
+}
+
+}  // namespace color3d

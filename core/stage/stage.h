@@ -1,0 +1,68 @@
+// What every stage gets and gives: files in, named files out. One file per job kind beside this one:
+// typed options in, artifacts out, checkpoints, progress and cancellation through the context.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/progress.h"
+
+namespace color3d {
+
+// Lives for one run of one stage, on one thread.
+class StageContext {
+ public:
+  struct Setup {
+    std::filesystem::path scene_folder;    // the scene's files, read-only
+    std::map<std::string, std::filesystem::path> inputs;  // artifacts of earlier stages by name
+    std::filesystem::path output_folder;   // artifacts are left here under their names
+    std::filesystem::path scratch_folder;  // free to use, deleted by the caller
+    int threads = 1;
+    uint64_t seed = 1;
+  };
+
+  // The references must outlive the context.
+  StageContext(Setup setup,
+               CheckpointStore& checkpoints,
+               ProgressObserver& progress,
+               const CancellationToken& cancel);
+
+  const std::filesystem::path& scene_folder() const { return setup_.scene_folder; }
+  const std::filesystem::path& scratch_folder() const { return setup_.scratch_folder; }
+  int threads() const { return setup_.threads; }
+  uint64_t seed() const { return setup_.seed; }
+  CheckpointStore& checkpoints() { return checkpoints_; }
+  ProgressObserver& progress() { return progress_; }
+  const CancellationToken& cancel() const { return cancel_; }
+
+  bool HasInput(const std::string& name) const { return setup_.inputs.contains(name); }
+  // File of an input artifact. Throws Error{kFailedPrecondition} naming the artifact and the stage
+  // that makes it.
+  std::filesystem::path Input(const std::string& name) const;
+  // Names of the inputs that begin with `prefix`, sorted.
+  std::vector<std::string> InputsBelow(std::string_view prefix) const;
+  std::string ReadInput(const std::string& name) const;
+
+  // Writes an artifact, atomically.
+  void WriteOutput(const std::string& name, std::string_view bytes);
+  // An input that this stage publishes again under its name.
+  void PassOn(const std::string& name);
+
+  const std::vector<std::string>& outputs() const { return outputs_; }
+  const std::vector<std::string>& passed_on() const { return passed_on_; }
+
+ private:
+  Setup setup_;
+  CheckpointStore& checkpoints_;
+  ProgressObserver& progress_;
+  const CancellationToken& cancel_;
+  std::vector<std::string> outputs_;
+  std::vector<std::string> passed_on_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,81 @@
+// Every stage of the method: options, and the function that runs it. What each reads and leaves is
+// said beside it; names are in artifacts.h. All throw Error and leave nothing half-written.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/colorizer/colorizer.h"
+#include "core/keycolor/keycolor.h"
+#include "core/keyview/select.h"
+#include "core/scene/import.h"
+#include "core/splat/trainer.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+// The scene's files -> scene.json, import.json (and sfm.log).
+void RunImportScene(const ImportOptions& options, StageContext& context);
+
+struct SelectKeyViewOptions {
+  KeyViewOptions selection;
+  std::string view;  // for KeyViewStrategy::kManual: name or unique file stem
+};
+// scene.json -> key_view.json, key_view.png. Only training views can win.
+void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
+
+struct ColorizeKeyViewOptions {
+  enum class Source { kImage, kStrokes, kPoints };
+  Source source = Source::kImage;
+  std::filesystem::path file;  // picture, strokes or JSON points
+  HintOptions hints;
+};
+// scene.json, key_view.json -> key_color.png, key_view_coloured.png.
+void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
+
+// scene.json, key_view.json, key_color.png -> colorizer.c3c.
+void RunPersonalize(const ColorizerOptions& options, StageContext& context);
+
+// scene.json, colorizer.c3c -> views_ab/*.png for every view at max_side_px (64..4096).
+void RunColorizeViews(int max_side_px, StageContext& context);
+
+// scene.json -> geometry.c3g, trained at max_side_px (64..4096).
+void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
+
+// scene.json, key_view.json, key_color.png, views_ab/*, geometry.c3g -> model.c3g.
+void RunSolveChroma(const ChromaOptions& options, StageContext& context);
+
+// scene.json, model.c3g -> scene.ply.
+void RunExport(StageContext& context);
+
+struct RenderOptions {
+  std::vector<std::string> views;  // by name; empty: held-out views, or evenly spread ones
+  int max_views = 12;              // 1..1000, for the empty list
+  int max_side_px = 500;           // 64..4096
+  void Validate() const;
+};
+// scene.json, model.c3g -> renders/*.png.
+void RunRender(const RenderOptions& options, StageContext& context);
+
+struct TruthFile {
+  std::string view;
+  std::filesystem::path file;
+};
+// scene.json, model.c3g, views_ab/* -> scores.json, truths/*.jpg, coloured_views/*.jpg.
+void RunEvaluate(const std::vector<TruthFile>& truth, StageContext& context);
+
+// What became of the other stages of the graph.
+struct StageSummary {
+  std::string kind;
+  std::string state;
+  std::string skip_reason;
+  double seconds = 0.0;
+  int64_t peak_memory_bytes = 0;
+  std::vector<std::string> warnings;
+};
+// All of the above -> metrics.json, curves.csv, plan.json, report.html, and the results of the
+// other stages passed on.
+void RunReport(const std::vector<StageSummary>& stages, StageContext& context);
+
+}  // namespace color3d

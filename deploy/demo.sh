@@ -1,0 +1,79 @@
+#!/usr/bin/env bash
+# Builds Color3D, starts its server, colours one scene end to end and says where the report is.
+#   deploy/demo.sh [PHOTOS] [OUT] [-- options of "color3d colorize"]
+# PHOTOS: a folder of photos, alone or with a COLMAP model (sparse/0) or transforms.json. Photos in
+# colour are run as a benchmark: their colour is dropped, one key view keeps its own, and the result
+# is scored against the truth. For monochrome photos the demo selects the key view and says how to
+# go on. Without PHOTOS a small procedural room is rendered first. OUT: default color3d-demo.
+set -euo pipefail
+here=$(pwd)
+root=$(cd "$(dirname "$0")/.." && pwd)
+
+positional=()
+while [ "$#" -gt 0 ] && [ "$1" != "--" ]; do
+  case "$1" in
+    -h | --help) sed -n '2,8p' "$0" | cut -c3-; exit 0 ;;
+    *) positional+=("$1") ;;
+  esac
+  shift
+done
+[ "$#" -eq 0 ] || shift # the "--"
+options=("$@")
+photos=${positional[0]:-}
+out=${positional[1]:-$here/color3d-demo}
+if [ -n "$photos" ] && [ ! -d "$photos" ]; then
+  echo "demo: $photos is not a folder of photos" >&2
+  exit 2
+fi
+
+"$root/deploy/install-deps.sh"
+cmake -S "$root" -B "$root/build" -G Ninja -DCMAKE_BUILD_TYPE=Release >/dev/null
+cmake --build "$root/build"
+bin="$root/build/bin"
+
+mkdir -p "$out"
+out=$(cd "$out" && pwd)
+if [ -z "$photos" ]; then
+  photos="$out/room"
+  echo "demo: rendering a procedural room into $photos"
+  "$bin/color3d-make-scene" "$photos" --views 16 --width 480 --height 360
+fi
+
+store="$out/server"
+mkdir -p "$store"
+rm -f "$store/address"
+"$bin/color3d-server" serve --listen 127.0.0.1:0 --data-dir "$store" --port-file "$store/address" \
+  >"$store/server.log" 2>&1 &
+server=$!
+stop_server() {
+  kill "$server" 2>/dev/null || true
+  wait "$server" 2>/dev/null || true
+}
+trap stop_server EXIT
+trap 'exit 130' INT TERM
+for _ in $(seq 150); do
+  [ ! -s "$store/address" ] || break
+  if ! kill -0 "$server" 2>/dev/null; then
+    echo "demo: the server did not start:" >&2
+    tail -n 5 "$store/server.log" >&2
+    exit 1
+  fi
+  sleep 0.2
+done
+COLOR3D_SERVER=$(cat "$store/address")
+export COLOR3D_SERVER
+echo "demo: the server listens on $COLOR3D_SERVER, its store is $store"
+
+mode=()
+if "$bin/color3d" inspect "$photos" | grep -q '^colour'; then
+  mode=(--benchmark)
+  echo "demo: the photos are in colour: their colour is dropped and the result scored against it"
+fi
+"$bin/color3d" colorize "$photos" -o "$out" "${mode[@]}" "${options[@]}"
+
+if [ -f "$out/report.html" ]; then
+  echo "demo: the report is $out/report.html"
+else
+  echo "demo: colour $out/key_view.png by any means, then:"
+  echo "  deploy/demo.sh $photos $out -- --key-color COLOURED.png"
+fi

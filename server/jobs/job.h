@@ -1,0 +1,120 @@
+// The records of the job store: plain values, no behaviour beyond names of states.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+
+namespace color3d {
+
+// Milliseconds since the Unix epoch. Injected so that tests own time.
+using Clock = std::function<int64_t()>;
+Clock SystemClock();
+
+enum class JobState { kBlocked, kQueued, kRunning, kSucceeded, kFailed, kCancelled, kSkipped };
+
+// "BLOCKED", "QUEUED", ... as stored and as shown to people.
+const char* JobStateName(JobState state);
+// Throws Error{kDataLoss} for a name that is none.
+JobState JobStateFromName(std::string_view name);
+inline bool IsFinished(JobState state) {
+  return state == JobState::kSucceeded || state == JobState::kFailed ||
+         state == JobState::kCancelled || state == JobState::kSkipped;
+}
+
+struct ArtifactRecord {
+  std::string name;  // path-like, unique in its job
+  FileDigest digest;
+  std::string media_type;
+};
+
+struct ProgressRecord {
+  int64_t step = 0;
+  int64_t total_steps = 0;  // 0: unknown
+  std::string message;
+  std::string error_name;  // empty: none yet
+  double error_value = 0.0;
+  double seconds = 0.0;       // of computing, over all attempts
+  double eta_seconds = -1.0;  // < 0: unknown
+};
+
+struct JobError {
+  ErrorCode code = ErrorCode::kInternal;
+  std::string reason;  // UPPER_SNAKE_CASE
+  std::string message;
+};
+
+struct JobRecord {
+  int64_t id = 0;      // grows with creation
+  std::string name;    // "jobs/..."
+  std::string parent;  // name of the submitted job that this one was made for; empty: submitted
+  std::string kind;
+  std::string scene;  // "scenes/..."
+  std::string spec;   // opaque bytes of the job's options
+  JobState state = JobState::kBlocked;
+  bool cancel_requested = false;
+  int priority = 100;
+  int attempt = 0;
+  int max_attempts = 3;
+  int64_t lease_epoch = 0;
+  ProgressRecord progress;
+  std::vector<ArtifactRecord> artifacts;  // of succeeded jobs
+  std::optional<JobError> error;
+  std::string skip_reason;
+  bool skipped_by_plan = false;  // at creation; not because an input failed
+  bool cached = false;
+  std::vector<std::string> warnings;
+  std::optional<FileDigest> checkpoint;
+  int64_t create_ms = 0;
+  int64_t start_ms = 0;  // 0: not yet
+  int64_t end_ms = 0;
+  std::string worker;
+  int64_t revision = 0;
+  int64_t peak_memory_bytes = 0;
+};
+
+// What the owner of a running job shows to prove that it still is: every write of a worker names
+// the epoch of its claim, and is refused once another claim has raised it.
+struct Lease {
+  int64_t job_id = 0;
+  int64_t epoch = 0;
+};
+
+enum class SceneState { kUploading, kActive };
+enum class StoredLayout { kUnknown, kPhotos, kColmap, kTransforms };
+
+struct SceneFileRecord {
+  std::string path;
+  FileDigest digest;
+};
+
+struct SceneRecord {
+  int64_t id = 0;
+  std::string name;  // "scenes/..."
+  std::string display_name;
+  SceneState state = SceneState::kUploading;
+  StoredLayout layout = StoredLayout::kUnknown;
+  int photo_count = 0;
+  std::vector<SceneFileRecord> files;  // left empty in lists
+  int64_t create_ms = 0;
+  int64_t commit_ms = 0;
+};
+
+struct WorkerRecord {
+  std::string worker_id;
+  int64_t pid = 0;
+  std::string job;  // empty: idle
+  int64_t memory_bytes = 0;
+  int64_t heartbeat_ms = 0;
+};
+
+// 16 random lower-case hexadecimal digits, from the system's random source.
+std::string NewId();
+
+}  // namespace color3d

@@ -1,0 +1,289 @@
+#include "server/jobs/planner.h"
+
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+
+#include <map>
+#include <utility>
+
+#include "server/jobs/presets.h"
+#include "server/jobs/spec_check.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+std::string Serialize(const google::protobuf::Message& message) {
+  std::string bytes;
+  google::protobuf::io::StringOutputStream stream(&bytes);
+  google::protobuf::io::CodedOutputStream coded(&stream);
+  coded.SetSerializationDeterministic(true);
+  message.SerializeToCodedStream(&coded);
+  coded.Trim();
+  return bytes;
+}
+
+// The kinds whose artifacts each kind reads, and what they are called when one is missing.
+struct Need {
+  const char* provider;
+  const char* artifact;
+};
+constexpr Need kScene = {"import_scene", "scene.json"};
+constexpr Need kKeyView = {"select_key_view", "key_view.json"};
+constexpr Need kKeyColor = {"colorize_key_view", "key_color.png"};
+constexpr Need kColorizer = {"personalize", "colorizer.c3c"};
+constexpr Need kViewsAb = {"colorize_views", "views_ab/*"};
+constexpr Need kGeometry = {"reconstruct_geometry", "geometry.c3g"};
+constexpr Need kModel = {"solve_chroma", "model.c3g"};
+
+const std::vector<Need>& NeedsOf(const std::string& kind) {
+  static const std::map<std::string, std::vector<Need>> needs = {
+      {"import_scene", {}},
+      {"select_key_view", {kScene}},
+      {"colorize_key_view", {kScene, kKeyView}},
+      {"personalize", {kScene, kKeyView, kKeyColor}},
+      {"colorize_views", {kScene, kColorizer}},
+      {"reconstruct_geometry", {kScene}},
+      {"solve_chroma", {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry}},
+      {"export", {kScene, kModel}},
+      {"render", {kScene, kModel}},
+      {"evaluate", {kScene, kKeyView, kKeyColor, kViewsAb, kModel}},
+  };
+  return needs.at(kind);
+}
+
+// These stages need no decision of the user's, so a job of their own brings what it lacks along.
+bool CreatesPrerequisites(const std::string& kind) {
+  return kind == "select_key_view" || kind == "reconstruct_geometry" || kind == "colorize_key_view";
+}
+
+// Writes the preset's values into the unset fields of a stage's options.
+void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec) {
+  if (spec->has_select_key_view()) {
+    auto* s = spec->mutable_select_key_view();
+    if (s->strategy() == v1::SelectKeyViewSpec::STRATEGY_UNSPECIFIED) {
+      s->set_strategy(preset.strategy);
+    }
+  } else if (spec->has_personalize()) {
+    auto* s = spec->mutable_personalize();
+    if (s->recipe() == v1::PersonalizeSpec::RECIPE_UNSPECIFIED) s->set_recipe(preset.recipe);
+    if (!s->has_iterations()) s->set_iterations(preset.personalize_iterations);
+  } else if (spec->has_colorize_views()) {
+    auto* s = spec->mutable_colorize_views();
+    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
+  } else if (spec->has_reconstruct_geometry()) {
+    auto* s = spec->mutable_reconstruct_geometry();
+    if (!s->has_iterations()) s->set_iterations(preset.geometry_iterations);
+    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
+    if (!s->has_max_gaussians()) s->set_max_gaussians(preset.max_gaussians);
+  } else if (spec->has_solve_chroma()) {
+    auto* s = spec->mutable_solve_chroma();
+    if (!s->has_iterations()) s->set_iterations(preset.chroma_iterations);
+  } else if (spec->has_render()) {
+    auto* s = spec->mutable_render();
+    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
+  }
+}
+
+class GraphBuilder {
+ public:
+  GraphBuilder(const v1::JobSpec& submitted, const std::vector<JobRecord>& inputs);
+  NewGraph BuildStage();
+  NewGraph BuildColorizeScene();
+
+ private:
+  // A fresh spec with the submitted job's scene, seed and cache policy.
+  v1::JobSpec Common() const;
+  v1::JobSpec DefaultSpec(const std::string& kind) const;
+  // Appends the job with edges to the providers of all it needs; earlier jobs of the graph first,
+  // then given inputs, then (when allowed) prerequisites made for it.
+  void Add(v1::JobSpec spec, const std::string& skip_reason = "");
+  void Provide(const Need& need, const std::string& for_kind, NewJob* job);
+  void AddSceneStages(const v1::ColorizeSceneSpec& options);
+
+  const v1::JobSpec& submitted_;
+  std::string submitted_kind_;
+  PresetValues preset_;
+  int max_side_px_ = 0;
+  std::map<std::string, JobRecord> given_;  // by kind
+  std::map<std::string, int> planned_;      // by kind
+  NewGraph graph_;
+};
+
+GraphBuilder::GraphBuilder(const v1::JobSpec& submitted, const std::vector<JobRecord>& inputs)
+    : submitted_(submitted), submitted_kind_(KindOf(submitted)) {
+  preset_ = ValuesOf(submitted.colorize_scene().preset());
+  max_side_px_ = submitted.colorize_scene().has_max_side_px()
+                     ? submitted.colorize_scene().max_side_px()
+                     : preset_.max_side_px;
+  graph_.scene = submitted.scene();
+  for (const JobRecord& input : inputs) {
+    if (input.scene != submitted.scene()) {
+      throw InvalidArgument("the input " + input.name + " belongs to '" + input.scene +
+                            "', the job to '" + submitted.scene() + "'");
+    }
+    const auto [it, fresh] = given_.emplace(input.kind, input);
+    if (!fresh && it->second.name != input.name) {
+      throw InvalidArgument("both inputs " + it->second.name + " and " + input.name + " are " +
+                            input.kind + " jobs; give one of them");
+    }
+  }
+}
+
+v1::JobSpec GraphBuilder::Common() const {
+  v1::JobSpec spec;
+  spec.set_scene(submitted_.scene());
+  spec.set_seed(submitted_.seed() != 0 ? submitted_.seed() : 1);
+  spec.set_skip_cache(submitted_.skip_cache());
+  return spec;
+}
+
+v1::JobSpec GraphBuilder::DefaultSpec(const std::string& kind) const {
+  v1::JobSpec spec = Common();
+  if (kind == "import_scene") spec.mutable_import_scene();
+  if (kind == "select_key_view") spec.mutable_select_key_view();
+  return spec;
+}
+
+void GraphBuilder::Provide(const Need& need, const std::string& for_kind, NewJob* job) {
+  const auto planned = planned_.find(need.provider);
+  if (planned != planned_.end()) {
+    job->inputs.push_back(planned->second);
+    return;
+  }
+  const auto given = given_.find(need.provider);
+  if (given != given_.end()) {
+    const JobRecord& input = given->second;
+    if (IsFinished(input.state) && input.state != JobState::kSucceeded) {
+      throw ServiceError(ErrorCode::kFailedPrecondition,
+                         "INPUT_MISSING",
+                         for_kind + " needs " + need.artifact + ", but the input " + input.name +
+                             " is " + JobStateName(input.state) + "; retry it first");
+    }
+    job->input_jobs.push_back(input.name);
+    return;
+  }
+  if (!CreatesPrerequisites(submitted_kind_)) {
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "INPUT_MISSING",
+                       for_kind + " needs " + need.artifact + "; add the " + need.provider +
+                           " job of this scene to spec.inputs");
+  }
+  Add(DefaultSpec(need.provider));
+  job->inputs.push_back(planned_.at(need.provider));
+}
+
+void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
+  NewJob job;
+  job.kind = KindOf(spec);
+  job.skip_reason = skip_reason;
+  for (const Need& need : NeedsOf(job.kind)) Provide(need, job.kind, &job);
+  ApplyPreset(preset_, max_side_px_, &spec);
+  job.spec = Serialize(spec);
+  for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
+  planned_[job.kind] = static_cast<int>(graph_.jobs.size());
+  graph_.jobs.push_back(std::move(job));
+}
+
+NewGraph GraphBuilder::BuildStage() {
+  v1::JobSpec spec = submitted_;
+  if (spec.seed() == 0) spec.set_seed(1);
+  const bool nothing_to_do =
+      spec.has_export_() && spec.export_().has_ply() && !spec.export_().ply();
+  Add(std::move(spec), nothing_to_do ? "export.ply is false: there is nothing to export" : "");
+  return std::move(graph_);
+}
+
+void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
+  v1::JobSpec spec = Common();
+  *spec.mutable_import_scene() = options.import_scene();
+  Add(spec);
+
+  spec = Common();
+  *spec.mutable_select_key_view() = options.select_key_view();
+  if (!options.key_view().empty()) {
+    spec.mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+    spec.mutable_select_key_view()->set_view(options.key_view());
+  }
+  Add(spec);
+
+  spec = Common();
+  *spec.mutable_colorize_key_view() = options.colorize_key_view();
+  if (options.has_key_color()) {
+    *spec.mutable_colorize_key_view()->mutable_source() = options.key_color();
+  }
+  Add(spec);
+
+  spec = Common();
+  *spec.mutable_reconstruct_geometry() = options.reconstruct_geometry();
+  Add(spec);
+
+  spec = Common();
+  *spec.mutable_personalize() = options.personalize();
+  Add(spec);
+
+  spec = Common();
+  spec.mutable_colorize_views();
+  Add(spec);
+
+  spec = Common();
+  *spec.mutable_solve_chroma() = options.solve_chroma();
+  Add(spec);
+
+  spec = Common();
+  spec.mutable_export_()->set_ply(true);
+  Add(spec);
+
+  spec = Common();
+  *spec.mutable_render() = options.render();
+  Add(spec);
+
+  spec = Common();
+  *spec.mutable_evaluate()->mutable_truth() = options.truth();
+  Add(spec, options.truth().empty() ? "no true colours were given" : "");
+}
+
+NewGraph GraphBuilder::BuildColorizeScene() {
+  if (submitted_.inputs_size() > 0) {
+    throw InvalidArgument(
+        "inputs is set, but colorize_scene makes everything itself (equal work is taken from the "
+        "stage cache); leave it empty");
+  }
+  AddSceneStages(submitted_.colorize_scene());
+  NewJob root;
+  root.kind = "colorize_scene";
+  v1::JobSpec spec = submitted_;
+  if (spec.seed() == 0) spec.set_seed(1);
+  root.spec = Serialize(spec);
+  for (size_t i = 0; i < graph_.jobs.size(); ++i) root.inputs.push_back(static_cast<int>(i));
+  for (const FileDigest& digest : SpecBlobs(spec)) root.blobs.push_back(digest.sha256);
+  graph_.jobs.push_back(std::move(root));
+  return std::move(graph_);
+}
+
+}  // namespace
+
+NewGraph PlanJob(const v1::JobSpec& spec, const std::vector<JobRecord>& inputs) {
+  CheckSpec(spec);
+  GraphBuilder builder(spec, inputs);
+  return spec.has_colorize_scene() ? builder.BuildColorizeScene() : builder.BuildStage();
+}
+
+StageKeyPart KeyPartOf(const std::string& serialized_spec) {
+  v1::JobSpec spec;
+  if (!spec.ParseFromString(serialized_spec)) {
+    throw Error(ErrorCode::kDataLoss, "the stored spec of the job cannot be read");
+  }
+  StageKeyPart part;
+  part.skip_cache = spec.skip_cache();
+  if (spec.has_colorize_scene()) return part;
+  const std::string kind = KindOf(spec);
+  // Where the work happens is no part of what it is: equal scenes give equal results.
+  spec.clear_scene();
+  spec.clear_inputs();
+  spec.clear_skip_cache();
+  part.bytes = kind + '\n' + Serialize(spec);
+  return part;
+}
+
+}  // namespace color3d

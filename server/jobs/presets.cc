@@ -1,0 +1,35 @@
+#include "server/jobs/presets.h"
+
+namespace color3d {
+
+PresetValues ValuesOf(v1::Preset preset) {
+  PresetValues values;
+  switch (preset) {
+    case v1::PRESET_BEST:
+      values.max_side_px = 800;
+      values.personalize_iterations = 1500;
+      values.geometry_iterations = 10'000;
+      values.max_gaussians = 120'000;
+      values.chroma_iterations = 800;
+      break;
+    case v1::PRESET_PAPER:
+      values.max_side_px = 1600;
+      values.strategy = v1::SelectKeyViewSpec::STRATEGY_ENTROPY;
+      values.recipe = v1::PersonalizeSpec::RECIPE_PAPER;
+      values.personalize_iterations = 4000;
+      values.geometry_iterations = 15'000;
+      values.max_gaussians = 2'000'000;
+      values.chroma_iterations = 15'000;
+      break;
+    default:
+      values.max_side_px = 500;
+      values.personalize_iterations = 500;
+      values.geometry_iterations = 3000;
+      values.max_gaussians = 60'000;
+      values.chroma_iterations = 300;
+      break;
+  }
+  return values;
+}
+
+}  // namespace color3d

@@ -1,0 +1,21 @@
+// The one table of what a preset means for each stage.
+#pragma once
+
+#include "color3d/v1/stage.pb.h"
+
+namespace color3d {
+
+struct PresetValues {
+  int max_side_px = 0;  // of all working pictures
+  v1::SelectKeyViewSpec::Strategy strategy = v1::SelectKeyViewSpec::STRATEGY_COVERAGE;
+  v1::PersonalizeSpec::Recipe recipe = v1::PersonalizeSpec::RECIPE_COLOR3D;
+  int personalize_iterations = 0;
+  int geometry_iterations = 0;
+  int max_gaussians = 0;
+  int chroma_iterations = 0;
+};
+
+// PRESET_UNSPECIFIED is PRESET_FAST.
+PresetValues ValuesOf(v1::Preset preset);
+
+}  // namespace color3d

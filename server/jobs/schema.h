@@ -1,0 +1,92 @@
+// Tables of the SQLite job store. Times are milliseconds since the epoch from the injected clock.
+#pragma once
+
+namespace color3d {
+
+constexpr int kSchemaVersion = 1;
+
+constexpr char kSchema[] = R"sql(
+create table scene(
+  scene_id integer primary key autoincrement,
+  name text not null unique, display_name text not null,
+  active integer not null default 0, layout integer not null default 0,
+  photo_count integer not null default 0,
+  create_ms integer not null, commit_ms integer not null default 0);
+create table scene_file(
+  scene_id integer not null references scene on delete cascade,
+  path text not null, sha256 text not null, size_bytes integer not null,
+  primary key(scene_id, path)) without rowid;
+create index scene_file_blob on scene_file(sha256);
+
+create table job(
+  job_id integer primary key autoincrement,
+  name text not null unique, parent text not null default '',
+  kind text not null, scene text not null, spec blob not null,
+  state text not null check(state in(
+    'BLOCKED','QUEUED','RUNNING','SUCCEEDED','FAILED','CANCELLED','SKIPPED')),
+  cancel_requested integer not null default 0,
+  priority integer not null default 100, run_after_ms integer not null default 0,
+  attempt integer not null default 0, max_attempts integer not null default 3,
+  lost_attempts integer not null default 0,
+  lease_epoch integer not null default 0, lease_owner text not null default '',
+  lease_expires_ms integer,
+  progress_step integer not null default 0, progress_total integer not null default 0,
+  progress_message text not null default '', progress_error_name text not null default '',
+  progress_error_value real not null default 0, seconds real not null default 0,
+  eta_seconds real not null default -1,
+  error_code integer, error_reason text not null default '',
+  error_message text not null default '',
+  skip_reason text not null default '', skipped_by_plan integer not null default 0,
+  cached integer not null default 0, warnings text not null default '',
+  checkpoint_sha256 text not null default '', checkpoint_bytes integer not null default 0,
+  stage_key text not null default '',
+  create_ms integer not null, start_ms integer not null default 0,
+  end_ms integer not null default 0,
+  revision integer not null default 0, peak_memory_bytes integer not null default 0,
+  check((state='RUNNING') = (lease_expires_ms is not null)),
+  check((state in('SUCCEEDED','FAILED','CANCELLED','SKIPPED')) = (end_ms <> 0)));
+create index job_claim on job(priority, job_id) where state='QUEUED';
+create index job_lease on job(lease_expires_ms) where state='RUNNING';
+create index job_parent on job(parent, job_id);
+create index job_scene on job(scene, job_id);
+create index job_stage on job(stage_key) where stage_key <> '';
+
+create table job_dependency(
+  input_id integer not null references job on delete cascade,
+  job_id integer not null references job on delete cascade,
+  primary key(job_id, input_id)) without rowid;
+create index job_dependant on job_dependency(input_id);
+create table job_blob(
+  job_id integer not null references job on delete cascade, sha256 text not null,
+  primary key(job_id, sha256)) without rowid;
+create index job_blob_digest on job_blob(sha256);
+create table artifact(
+  job_id integer not null references job on delete cascade,
+  name text not null, sha256 text not null, size_bytes integer not null,
+  media_type text not null,
+  primary key(job_id, name)) without rowid;
+create index artifact_blob on artifact(sha256);
+create table job_attempt(
+  job_id integer not null references job on delete cascade, epoch integer not null,
+  worker text not null, start_ms integer not null, end_ms integer not null default 0,
+  outcome text not null default '',
+  primary key(job_id, epoch)) without rowid;
+create table job_event(
+  revision integer primary key autoincrement,
+  job_id integer not null references job on delete cascade,
+  progress integer not null, state text not null, attempt integer not null,
+  at_ms integer not null);
+create index job_event_job on job_event(job_id, revision);
+
+create table request_id(
+  method text not null, id text not null, body_sha256 text not null,
+  resource text not null, at_ms integer not null,
+  primary key(method, id)) without rowid;
+create table worker(
+  worker_id text primary key, pid integer not null, job text not null,
+  memory_bytes integer not null, heartbeat_ms integer not null) without rowid;
+create table meta(name text primary key, value integer not null) without rowid;
+insert into meta values('compacted_revision', 0);
+)sql";
+
+}  // namespace color3d

@@ -1,0 +1,285 @@
+#include "server/jobs/spec_check.h"
+
+#include <google/protobuf/message.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <sstream>
+
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+struct Range {
+  double low;
+  double high;
+};
+
+// Ranges as documented in stage.proto, by message and field.
+const std::map<std::string, Range>& Ranges() {
+  static const std::map<std::string, Range> ranges = {
+      {"ImportSceneSpec.sfm_max_image_side_px", {256, 4096}},
+      {"ImportSceneSpec.sfm_max_features", {512, 16384}},
+      {"ImportSceneSpec.sfm_timeout_seconds", {10, 86400}},
+      {"SelectKeyViewSpec.temperature", {1e-3, 1e3}},
+      {"ColorizeKeyViewSpec.hint_sigma", {0.1, 50}},
+      {"GenerateAugmentationsSpec.samples", {0, 64}},
+      {"PersonalizeSpec.iterations", {0, 100'000}},
+      {"PersonalizeSpec.time_limit_seconds", {0, 86400}},
+      {"PersonalizeSpec.max_side_px", {64, 2048}},
+      {"PersonalizeSpec.crop_px", {64, 1024}},
+      {"PersonalizeSpec.consistency_weight", {0, 10}},
+      {"ColorizeViewsSpec.max_side_px", {64, 4096}},
+      {"CarryColorSpec.max_reprojection_px", {0.1, 10}},
+      {"ReconstructGeometrySpec.iterations", {0, 100'000}},
+      {"ReconstructGeometrySpec.max_side_px", {64, 4096}},
+      {"ReconstructGeometrySpec.max_gaussians", {1, 10'000'000}},
+      {"ReconstructGeometrySpec.sh_degree", {0, 3}},
+      {"ReconstructGeometrySpec.ssim_weight", {0, 1}},
+      {"ReconstructGeometrySpec.edge_weight", {0, 10}},
+      {"SolveChromaSpec.iterations", {0, 100'000}},
+      {"SolveChromaSpec.chroma_sh_degree", {0, 1}},
+      {"SolveChromaSpec.ssim_weight", {0, 1}},
+      {"ReconstructDynamicSpec.frames_per_second", {0.1, 1000}},
+      {"ReconstructDynamicSpec.coarse_iterations", {0, 100'000}},
+      {"ReconstructDynamicSpec.fine_iterations", {0, 100'000}},
+      {"ReconstructDenseSpec.max_side_px", {64, 4096}},
+      {"RenderSpec.max_views", {1, 1000}},
+      {"RenderSpec.max_side_px", {64, 4096}},
+      {"ColorizeSceneSpec.max_side_px", {64, 4096}},
+  };
+  return ranges;
+}
+
+constexpr int kMaxRepeated = 10'000;
+constexpr size_t kMaxTextBytes = 4096;
+
+std::string Text(double value) {
+  std::ostringstream out;
+  out.precision(12);
+  out << value;
+  return out.str();
+}
+
+[[noreturn]] void Reject(const std::string& path, const std::string& why) {
+  throw ServiceError(ErrorCode::kInvalidArgument, "BAD_OPTION", path + why, {{path, path + why}});
+}
+
+void CheckNumber(const FieldDescriptor* field, double value, const std::string& path) {
+  if (!std::isfinite(value)) Reject(path, " is not a finite number");
+  const std::string key = field->containing_type()->name() + "." + field->name();
+  const auto range = Ranges().find(key);
+  if (range == Ranges().end()) return;
+  if (value < range->second.low || value > range->second.high) {
+    Reject(path,
+           " is " + Text(value) + "; the range is " + Text(range->second.low) + " to " +
+               Text(range->second.high));
+  }
+}
+
+void CheckEnum(const FieldDescriptor* field, int value, const std::string& path) {
+  if (field->enum_type()->FindValueByNumber(value) != nullptr) return;
+  std::string known;
+  for (int i = 1; i < field->enum_type()->value_count(); ++i) {
+    known += (i > 1 ? ", " : "") + field->enum_type()->value(i)->name();
+  }
+  Reject(path, " is " + std::to_string(value) + ", which is none of " + known);
+}
+
+void CheckMessage(const Message& message, const std::string& path);
+
+void CheckSingular(const Message& message, const FieldDescriptor* field, const std::string& path) {
+  const Reflection* reflection = message.GetReflection();
+  switch (field->cpp_type()) {
+    case FieldDescriptor::CPPTYPE_MESSAGE:
+      return CheckMessage(reflection->GetMessage(message, field), path);
+    case FieldDescriptor::CPPTYPE_ENUM:
+      return CheckEnum(field, reflection->GetEnumValue(message, field), path);
+    case FieldDescriptor::CPPTYPE_INT32:
+      return CheckNumber(field, reflection->GetInt32(message, field), path);
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      return CheckNumber(field, reflection->GetDouble(message, field), path);
+    case FieldDescriptor::CPPTYPE_STRING:
+      if (reflection->GetString(message, field).size() > kMaxTextBytes) {
+        Reject(path, " is longer than " + std::to_string(kMaxTextBytes) + " bytes");
+      }
+      return;
+    default:
+      return;
+  }
+}
+
+void CheckRepeated(const Message& message, const FieldDescriptor* field, const std::string& path) {
+  const Reflection* reflection = message.GetReflection();
+  const int count = reflection->FieldSize(message, field);
+  if (count > kMaxRepeated) {
+    Reject(path,
+           " has " + std::to_string(count) + " entries; at most " + std::to_string(kMaxRepeated) +
+               " are allowed");
+  }
+  if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return;
+  for (int i = 0; i < count; ++i) {
+    CheckMessage(reflection->GetRepeatedMessage(message, field, i),
+                 path + "[" + std::to_string(i) + "]");
+  }
+}
+
+void CheckDigest(const v1::Digest& digest, const std::string& path) {
+  if (!IsSha256Hex(digest.sha256())) {
+    Reject(path, ".sha256 must be 64 lower-case hexadecimal digits");
+  }
+  if (digest.size_bytes() < 1) {
+    Reject(path, ".size_bytes is " + std::to_string(digest.size_bytes()) + "; it must be positive");
+  }
+}
+
+// Field by field, in depth; `path` is how the client would write the field.
+void CheckMessage(const Message& message, const std::string& path) {
+  if (const auto* digest = dynamic_cast<const v1::Digest*>(&message)) {
+    return CheckDigest(*digest, path);
+  }
+  std::vector<const FieldDescriptor*> fields;
+  message.GetReflection()->ListFields(message, &fields);
+  for (const FieldDescriptor* field : fields) {
+    const std::string field_path = path.empty() ? field->name() : path + "." + field->name();
+    if (field->is_repeated()) {
+      CheckRepeated(message, field, field_path);
+    } else {
+      CheckSingular(message, field, field_path);
+    }
+  }
+}
+
+[[noreturn]] void NotBuilt(const std::string& what, const std::string& remedy) {
+  throw ServiceError(ErrorCode::kUnimplemented, "NOT_BUILT", what + " is not built yet; " + remedy);
+}
+
+void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
+  const std::string remedy = "give key_color.image, .strokes or .points";
+  switch (source.source_case()) {
+    case v1::KeyColorSource::kImage:
+    case v1::KeyColorSource::kStrokes:
+    case v1::KeyColorSource::kPoints:
+      return;
+    case v1::KeyColorSource::kReference:
+      NotBuilt(path + ".reference", remedy);
+    case v1::KeyColorSource::kPrompt:
+      NotBuilt(path + ".prompt", remedy);
+    case v1::KeyColorSource::kAutomatic:
+      NotBuilt(path + ".automatic", remedy);
+    case v1::KeyColorSource::kBackend:
+      NotBuilt(path + ".backend", remedy);
+    case v1::KeyColorSource::SOURCE_NOT_SET:
+      break;
+  }
+  Reject(path,
+         " is required: the key view in colour (image, strokes or points). To learn which photo is "
+         "the key view, first run select_key_view and read its artifact key_view.json");
+}
+
+void CheckTruth(const google::protobuf::RepeatedPtrField<v1::TruthImage>& truth,
+                const std::string& path) {
+  for (int i = 0; i < truth.size(); ++i) {
+    const std::string entry = path + "[" + std::to_string(i) + "]";
+    if (truth[i].view().empty()) Reject(entry, ".view is empty; name the view");
+    if (!truth[i].has_image()) Reject(entry, ".image is missing");
+  }
+}
+
+void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
+  if (spec.strategy() == v1::SelectKeyViewSpec::STRATEGY_MANUAL && spec.view().empty()) {
+    Reject(path, ".view is required with STRATEGY_MANUAL: the name of a photo");
+  }
+}
+
+void CheckColorizeScene(const v1::ColorizeSceneSpec& spec) {
+  const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
+  CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
+  if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  CheckTruth(spec.truth(), "truth");
+}
+
+}  // namespace
+
+std::string KindOf(const v1::JobSpec& spec) {
+  const google::protobuf::OneofDescriptor* stage = spec.GetDescriptor()->FindOneofByName("stage");
+  const FieldDescriptor* field = spec.GetReflection()->GetOneofFieldDescriptor(spec, stage);
+  if (field == nullptr) {
+    throw InvalidArgument("spec has no stage; set one, e.g. spec.colorize_scene");
+  }
+  return field->name();
+}
+
+const std::vector<std::string>& BuiltKinds() {
+  static const std::vector<std::string> kinds = {"colorize_scene",
+                                                 "import_scene",
+                                                 "select_key_view",
+                                                 "colorize_key_view",
+                                                 "personalize",
+                                                 "colorize_views",
+                                                 "reconstruct_geometry",
+                                                 "solve_chroma",
+                                                 "export",
+                                                 "render",
+                                                 "evaluate"};
+  return kinds;
+}
+
+void CheckSpec(const v1::JobSpec& spec) {
+  const std::string kind = KindOf(spec);
+  const auto& kinds = BuiltKinds();
+  if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) {
+    NotBuilt(kind, "GetServerInfo lists the job kinds that are");
+  }
+  CheckMessage(spec, "");
+  if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene());
+  if (spec.has_colorize_key_view()) {
+    CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
+  }
+  if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  if (spec.has_evaluate()) {
+    CheckTruth(spec.evaluate().truth(), "evaluate.truth");
+    if (spec.evaluate().truth().empty()) {
+      Reject("evaluate.truth", " is empty; give at least one view with its true colours");
+    }
+  }
+}
+
+namespace {
+
+void CollectDigests(const Message& message, std::map<std::string, FileDigest>* digests) {
+  if (const auto* digest = dynamic_cast<const v1::Digest*>(&message)) {
+    (*digests)[digest->sha256()] = {digest->sha256(), digest->size_bytes()};
+    return;
+  }
+  const Reflection* reflection = message.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const FieldDescriptor* field : fields) {
+    if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
+    if (!field->is_repeated()) {
+      CollectDigests(reflection->GetMessage(message, field), digests);
+      continue;
+    }
+    for (int i = 0; i < reflection->FieldSize(message, field); ++i) {
+      CollectDigests(reflection->GetRepeatedMessage(message, field, i), digests);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<FileDigest> SpecBlobs(const v1::JobSpec& spec) {
+  std::map<std::string, FileDigest> digests;
+  CollectDigests(spec, &digests);
+  std::vector<FileDigest> result;
+  for (const auto& [sha256, digest] : digests) result.push_back(digest);
+  return result;
+}
+
+}  // namespace color3d

@@ -1,0 +1,27 @@
+// The door for job options: every enum value known, every number in the range that stage.proto
+// documents, every digest well formed, nothing asked for that is not built.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "color3d/v1/job.pb.h"
+#include "core/base/digest.h"
+
+namespace color3d {
+
+// The stage's field name in JobSpec, e.g. "personalize". Throws Error{kInvalidArgument} when the
+// spec has no stage.
+std::string KindOf(const v1::JobSpec& spec);
+
+// Kinds that can run, in the order of the pipeline.
+const std::vector<std::string>& BuiltKinds();
+
+// Throws Error: kInvalidArgument naming field, value and range; kUnimplemented naming the kind or
+// the colour source.
+void CheckSpec(const v1::JobSpec& spec);
+
+// Every digest that the spec names, without repetition.
+std::vector<FileDigest> SpecBlobs(const v1::JobSpec& spec);
+
+}  // namespace color3d

@@ -1,0 +1,98 @@
+// color3d-server: `serve` answers RPCs and supervises workers; `worker` becomes color3d-worker, the
+// program beside this one that links the method library.
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <iostream>
+
+#include "core/base/error.h"
+#include "server/ops/process.h"
+#include "server/serve.h"
+
+namespace color3d {
+namespace {
+
+// Flags of the group "" are hidden: they are for tests.
+void AddServe(CLI::App* serve, ServeOptions* options) {
+  serve->add_option("--listen", options->listen, "HOST:PORT (port 0: any free one) or unix:PATH")
+      ->capture_default_str();
+  serve->add_option("--data-dir", options->data_folder, "Where jobs and files are kept")
+      ->required();
+  serve->add_option("--workers", options->workers, "Worker processes; each runs one job at a time")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  serve->add_option("--threads", options->threads, "Threads of each worker; 0: share the machine's")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");
+  serve->add_option("--log-level", options->log_level, "trace, debug, info, warn, error, off")
+      ->capture_default_str();
+  serve->add_flag(
+      "--insecure-any-address",
+      options->insecure_any_address,
+      "Allow --listen on other than loopback addresses; there is no authentication yet");
+  serve->add_option("--reserve-mib", options->reserve_mib, "Disk space to keep free, MiB")
+      ->check(CLI::Range(0, 1 << 30))
+      ->capture_default_str();
+  serve
+      ->add_option("--max-unfinished-jobs",
+                   options->max_unfinished_jobs,
+                   "Jobs that may wait or run at one time")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  serve->add_option("--drain-seconds", options->drain_seconds, "Longest time to stop after SIGTERM")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+  serve->add_option("--worker-program", options->worker_program)->group("");
+  serve->add_option("--lease-seconds", options->lease_seconds)->group("");
+  serve->add_option("--heartbeat-seconds", options->heartbeat_seconds)->group("");
+  serve->add_option("--checkpoint-seconds", options->checkpoint_seconds)->group("");
+  serve->add_option("--stuck-seconds", options->stuck_seconds)->group("");
+  serve->add_option("--retry-backoff-ms", options->retry_backoff_ms)->group("");
+  serve->add_option("--max-attempts", options->max_attempts)->group("");
+  serve->add_option("--stop-grace-seconds", options->stop_grace_seconds)->group("");
+  serve->add_option("--worker-backoff-ms", options->worker_backoff_ms)->group("");
+}
+
+// Replaces this process by color3d-worker with the arguments after "worker".
+int ExecWorker(char** argv) {
+  const std::string program = (ProgramFolder() / "color3d-worker").string();
+  argv[1] = const_cast<char*>(program.c_str());
+  ::execv(program.c_str(), argv + 1);
+  std::cerr << "color3d-server: cannot start " << program << ": " << std::strerror(errno)
+            << "; install color3d-worker beside color3d-server\n";
+  return 2;
+}
+
+int Main(int argc, char** argv) {
+  if (argc > 1 && std::string(argv[1]) == "worker") return ExecWorker(argv);
+  ServeOptions options;
+  CLI::App app("Color3D server: colours 3D scenes from monochrome photographs.");
+  app.set_version_flag("--version", COLOR3D_VERSION);
+  CLI::App* serve = app.add_subcommand("serve", "Answer RPCs and run jobs");
+  app.add_subcommand("worker", "Run jobs of a server's data directory (see worker --help)");
+  app.require_subcommand(1);
+  AddServe(serve, &options);
+  CLI11_PARSE(app, argc, argv);
+  // Our own checks say more than gRPC's log does.
+  ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
+  try {
+    Serve(options);
+    return 0;
+  } catch (const Error& e) {
+    std::cerr << "color3d-server: " << e.what() << "\n";
+    return 2;
+  } catch (const std::exception& e) {
+    std::cerr << "color3d-server: unexpected: " << e.what() << "\n";
+    return 1;
+  }
+}
+
+}  // namespace
+}  // namespace color3d
+
+int main(int argc, char** argv) { return color3d::Main(argc, argv); }

@@ -1,0 +1,24 @@
+// Facts about this process from /proc, and its log.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace color3d {
+
+// Resident memory now; 0 when unknown.
+int64_t ResidentMemoryBytes();
+
+// Largest resident memory since the last reset (or since the start, where the kernel cannot reset).
+int64_t PeakMemoryBytes();
+void ResetPeakMemory();
+
+// The folder that holds the running program.
+std::filesystem::path ProgramFolder();
+
+// Log lines to stderr, and to `file` too unless empty. Throws Error{kInvalidArgument} for a level
+// that is none of trace, debug, info, warn, error, off.
+void SetUpLog(const std::string& name, const std::string& level, const std::filesystem::path& file);
+
+}  // namespace color3d

@@ -1,0 +1,362 @@
+// The real server process with worker processes that run scripted stages, under signals and kills.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "core/base/files.h"
+#include "core/base/random.h"
+#include "server/jobs/sqlite_db.h"
+#include "server/rpc/rpc_test_support.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::ScriptedSpec;
+using testing::TestClient;
+
+void SleepMs(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
+
+// One `color3d-server serve` on a data folder.
+class ServerProcess {
+ public:
+  ServerProcess(const fs::path& folder, std::vector<std::string> extra, int workers = 1) {
+    const fs::path port_file = folder / "port";
+    fs::remove(port_file);
+    std::vector<std::string> arguments = {COLOR3D_SERVER,
+                                          "serve",
+                                          "--listen",
+                                          "127.0.0.1:0",
+                                          "--port-file",
+                                          port_file,
+                                          "--data-dir",
+                                          folder / "data",
+                                          "--worker-program",
+                                          COLOR3D_TEST_WORKER,
+                                          "--workers",
+                                          std::to_string(workers),
+                                          "--threads",
+                                          "1",
+                                          "--lease-seconds",
+                                          "1",
+                                          "--heartbeat-seconds",
+                                          "0.2",
+                                          "--checkpoint-seconds",
+                                          "0",
+                                          "--retry-backoff-ms",
+                                          "50",
+                                          "--worker-backoff-ms",
+                                          "100",
+                                          "--reserve-mib",
+                                          "0",
+                                          "--log-level",
+                                          "warn"};
+    arguments.insert(arguments.end(), extra.begin(), extra.end());
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::execv(COLOR3D_SERVER, argv.data());
+      ::_exit(127);
+    }
+    for (int i = 0; i < 200 && !fs::exists(port_file); ++i) SleepMs(50);
+    std::ifstream(port_file) >> address_;
+    client_ = std::make_unique<TestClient>(address_);
+  }
+  ~ServerProcess() {
+    if (pid_ != 0) Signal(SIGKILL), Wait();
+  }
+  TestClient& client() { return *client_; }
+  pid_t pid() const { return pid_; }
+  void Signal(int signal) { ::kill(pid_, signal); }
+  // Exit status, or 128 + signal.
+  int Wait() {
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    pid_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  std::vector<pid_t> Workers() {
+    v1::ServerInfo info;
+    grpc::ClientContext context;
+    client_->server->GetServerInfo(&context, {}, &info);
+    std::vector<pid_t> pids;
+    for (const v1::WorkerInfo& worker : info.workers()) {
+      pids.push_back(static_cast<pid_t>(worker.pid()));
+    }
+    return pids;
+  }
+
+ private:
+  pid_t pid_ = 0;
+  std::string address_;
+  std::unique_ptr<TestClient> client_;
+};
+
+// Steps of a trace ("step pid" lines) in order, and the processes that did them.
+struct Trace {
+  std::vector<int> steps;
+  std::set<int> processes;
+};
+Trace ParseTrace(const std::string& text) {
+  Trace trace;
+  std::stringstream stream(text.substr(text.find('\n') + 1));
+  int step = 0;
+  int process = 0;
+  while (stream >> step >> process) {
+    trace.steps.push_back(step);
+    trace.processes.insert(process);
+  }
+  return trace;
+}
+std::vector<int> Range(int count) {
+  std::vector<int> range;
+  for (int i = 0; i < count; ++i) range.push_back(i);
+  return range;
+}
+
+void WaitForStep(TestClient& client, const std::string& name, int64_t step) {
+  for (int i = 0; i < 400; ++i) {
+    if (client.Get(name).progress().step() >= step) return;
+    SleepMs(25);
+  }
+  FAIL() << name << " made no progress";
+}
+
+class ProcessTest : public ::testing::Test {
+ protected:
+  ScratchFolder scratch_;
+};
+
+TEST_F(ProcessTest, WholeGraphThenTheSameFromTheCache) {
+  ServerProcess server(scratch_.path(), {}, 2);
+  TestClient& client = server.client();
+  v1::JobSpec spec;
+  spec.set_scene(client.MakeScene().name());
+  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = client.Upload("key");
+  const v1::Job first = client.WaitFinished(client.Create(spec).name());
+  ASSERT_EQ(first.state(), v1::Job::STATE_SUCCEEDED) << first.DebugString();
+  std::set<std::string> names;
+  for (const v1::Artifact& artifact : first.artifacts()) names.insert(artifact.name());
+  EXPECT_EQ(names, (std::set<std::string>{"report.html", "scene.ply"}));
+  EXPECT_GT(first.peak_memory_bytes(), 0);
+  EXPECT_THAT(client.Download(first.artifacts(0).digest()), HasSubstr("colorize_scene"));
+  const v1::Job second = client.WaitFinished(client.Create(spec).name());
+  EXPECT_EQ(second.state(), v1::Job::STATE_SUCCEEDED);
+  for (const v1::Job& child : client.Children(second.name())) {
+    EXPECT_EQ(child.cached(), child.kind() != "evaluate") << child.kind();
+  }
+  spec.set_skip_cache(true);
+  const v1::Job third = client.WaitFinished(client.Create(spec).name());
+  for (const v1::Job& child : client.Children(third.name())) EXPECT_FALSE(child.cached());
+  const fs::path left_over = scratch_.path() / "data" / "scratch";
+  for (int i = 0; i < 100 && !fs::is_empty(left_over); ++i) SleepMs(20);
+  EXPECT_TRUE(fs::is_empty(left_over));
+}
+
+TEST_F(ProcessTest, FailuresAreReportedWithTheirReason) {
+  ServerProcess server(scratch_.path(), {"--stuck-seconds", "1", "--stop-grace-seconds", "0.5"});
+  TestClient& client = server.client();
+  const std::string scene = client.MakeScene().name();
+  const auto run = [&](const std::string& script) {
+    return client.WaitFinished(client.Create(ScriptedSpec(scene, script)).name());
+  };
+  v1::Job job = run("throw");
+  EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
+  EXPECT_EQ(job.error().code(), static_cast<int>(grpc::StatusCode::INVALID_ARGUMENT));
+  EXPECT_THAT(job.error().message(), HasSubstr("scripted failure"));
+  EXPECT_EQ(job.attempt(), 1);
+  job = run("oom");
+  EXPECT_EQ(job.error().code(), static_cast<int>(grpc::StatusCode::RESOURCE_EXHAUSTED));
+  job = run("unavailable_once,steps=2");
+  EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << "tried again";
+  EXPECT_EQ(job.attempt(), 2);
+  job = run("crash");
+  EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
+  EXPECT_EQ(job.attempt(), 3);
+  EXPECT_THAT(job.error().message(), HasSubstr("worker died"));
+  job = run("hang");
+  EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
+  EXPECT_EQ(job.error().code(), static_cast<int>(grpc::StatusCode::DEADLINE_EXCEEDED));
+  EXPECT_EQ(run("steps=1").state(), v1::Job::STATE_SUCCEEDED) << "the service lives on";
+}
+
+TEST_F(ProcessTest, RunningJobIsCancelledSoon) {
+  ServerProcess server(scratch_.path(), {});
+  TestClient& client = server.client();
+  const std::string name =
+      client.Create(ScriptedSpec(client.MakeScene().name(), "steps=1000,ms=50")).name();
+  WaitForStep(client, name, 2);
+  v1::CancelJobRequest request;
+  request.set_name(name);
+  grpc::ClientContext context;
+  v1::Job job;
+  ASSERT_TRUE(client.jobs->CancelJob(&context, request, &job).ok());
+  EXPECT_TRUE(job.cancel_requested());
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(client.WaitFinished(name).state(), v1::Job::STATE_CANCELLED);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
+}
+
+TEST_F(ProcessTest, TerminationReleasesTheJobAndTheNextServerGoesOn) {
+  std::string name;
+  int64_t steps_before = 0;
+  {
+    ServerProcess server(scratch_.path(), {});
+    TestClient& client = server.client();
+    name = client.Create(ScriptedSpec(client.MakeScene().name(), "steps=40,ms=50")).name();
+    WaitForStep(client, name, 5);
+    steps_before = client.Get(name).progress().step();
+    const auto start = std::chrono::steady_clock::now();
+    server.Signal(SIGTERM);
+    EXPECT_EQ(server.Wait(), 0);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  }
+  {
+    SqliteDatabase db(scratch_.path() / "data" / "jobs.db");
+    SqliteStatement job(db.handle(), "select state, attempt from job where name=?");
+    job.Bind(name);
+    ASSERT_TRUE(job.Step());
+    EXPECT_EQ(job.Text(0), "QUEUED");
+    EXPECT_EQ(job.Int(1), 0) << "a drain does not count";
+  }
+  ServerProcess server(scratch_.path(), {});
+  const v1::Job job = server.client().WaitFinished(name);
+  EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
+  EXPECT_EQ(job.attempt(), 1);
+  const Trace trace = ParseTrace(server.client().Download(job.artifacts(0).digest()));
+  EXPECT_EQ(trace.steps, Range(40));
+  EXPECT_EQ(trace.processes.size(), 2u) << "it went on from step " << steps_before;
+}
+
+TEST_F(ProcessTest, SecondSignalEndsAtOnce) {
+  ServerProcess server(scratch_.path(), {"--stop-grace-seconds", "1"});
+  TestClient& client = server.client();
+  const std::string name = client.Create(ScriptedSpec(client.MakeScene().name(), "hang")).name();
+  for (int i = 0; i < 200 && client.Get(name).state() != v1::Job::STATE_RUNNING; ++i) SleepMs(25);
+  server.Signal(SIGTERM);
+  SleepMs(300);
+  const auto start = std::chrono::steady_clock::now();
+  server.Signal(SIGTERM);
+  EXPECT_EQ(server.Wait(), 1);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
+}
+
+TEST_F(ProcessTest, KilledServerTakesItsWorkersAlongAndLosesNothing) {
+  std::string name;
+  std::vector<pid_t> workers;
+  {
+    ServerProcess server(scratch_.path(), {});
+    TestClient& client = server.client();
+    name = client.Create(ScriptedSpec(client.MakeScene().name(), "steps=40,ms=50")).name();
+    WaitForStep(client, name, 3);
+    workers = server.Workers();
+    server.Signal(SIGKILL);
+    server.Wait();
+  }
+  ASSERT_FALSE(workers.empty());
+  for (const pid_t worker : workers) {
+    for (int i = 0; i < 200 && ::kill(worker, 0) == 0; ++i) SleepMs(25);
+    EXPECT_NE(::kill(worker, 0), 0) << "an orphan stays";
+  }
+  ServerProcess server(scratch_.path(), {});
+  const v1::Job job = server.client().WaitFinished(name);
+  EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
+  EXPECT_EQ(ParseTrace(server.client().Download(job.artifacts(0).digest())).steps, Range(40));
+}
+
+TEST_F(ProcessTest, IdleServerIsSmall) {
+  ServerProcess server(scratch_.path(), {});
+  server.client().MakeScene();
+  v1::ServerInfo info;
+  grpc::ClientContext context;
+  ASSERT_TRUE(server.client().server->GetServerInfo(&context, {}, &info).ok());
+  EXPECT_LT(info.memory_bytes(), int64_t{60} << 20);
+  EXPECT_GT(info.memory_bytes(), int64_t{1} << 20);
+}
+
+// Kills workers, or stops them for longer than their lease so that they come back as zombies.
+int Torment(ServerProcess& server, Random& random) {
+  const std::vector<pid_t> workers = server.Workers();
+  if (workers.empty()) return 0;
+  const pid_t victim = workers[random.NextBelow(static_cast<uint32_t>(workers.size()))];
+  if (random.NextUniform() < 0.5) {
+    ::kill(victim, SIGKILL);
+  } else {
+    ::kill(victim, SIGSTOP);
+    SleepMs(1300);
+    ::kill(victim, SIGCONT);
+  }
+  return 1;
+}
+
+// Repeated (job, step) lines of the unfenced log: what would go wrong without the fence.
+int RepeatedEffects(const fs::path& log) {
+  std::map<std::string, int> counts;
+  std::ifstream stream(log);
+  std::string line;
+  while (std::getline(stream, line)) ++counts[line];
+  int repeated = 0;
+  for (const auto& [effect, count] : counts) repeated += count > 1 ? 1 : 0;
+  return repeated;
+}
+
+TEST_F(ProcessTest, ChaosEveryEffectExactlyOnce) {
+  constexpr int kJobs = 8;
+  constexpr int kSteps = 12;  // of 150 ms: every job outlives its lease of one second
+  const fs::path effects = scratch_.path() / "effects.log";
+  ::setenv("COLOR3D_TEST_EFFECTS", effects.c_str(), 1);
+  ServerProcess server(scratch_.path(), {"--max-attempts", "100"}, 2);
+  ::unsetenv("COLOR3D_TEST_EFFECTS");
+  TestClient& client = server.client();
+  const std::string scene = client.MakeScene().name();
+  std::vector<std::string> names;
+  for (int i = 0; i < kJobs; ++i) {
+    names.push_back(client.Create(ScriptedSpec(scene, "steps=12,ms=150", i + 1)).name());
+  }
+  constexpr uint64_t kSeed = 20240607;
+  SCOPED_TRACE("seed " + std::to_string(kSeed));
+  Random random(kSeed);
+  int torments = 0;
+  const auto start = std::chrono::steady_clock::now();
+  while (std::chrono::steady_clock::now() - start < std::chrono::seconds(15)) {
+    SleepMs(200 + static_cast<int>(random.NextBelow(500)));
+    torments += Torment(server, random);
+  }
+  EXPECT_GE(torments, 8);
+  int shared_jobs = 0;
+  for (const std::string& name : names) {
+    const v1::Job job = client.WaitFinished(name, 120);
+    ASSERT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.DebugString();
+    ASSERT_EQ(job.artifacts_size(), 1);
+    const Trace trace = ParseTrace(client.Download(job.artifacts(0).digest()));
+    EXPECT_EQ(trace.steps, Range(kSteps)) << name;
+    shared_jobs += trace.processes.size() > 1 ? 1 : 0;
+  }
+  EXPECT_GT(shared_jobs, 0) << "no job was ever taken over: the test proves nothing";
+  EXPECT_GT(RepeatedEffects(effects), 0) << "negative control: unfenced effects do repeat";
+  server.Signal(SIGTERM);
+  EXPECT_EQ(server.Wait(), 0);
+  SqliteDatabase db(scratch_.path() / "data" / "jobs.db");
+  SqliteStatement wins(db.handle(),
+                       "select count(*), count(distinct job_id) from job_attempt "
+                       "where outcome='SUCCEEDED'");
+  ASSERT_TRUE(wins.Step());
+  EXPECT_EQ(wins.Int(0), 2 * kJobs) << "each job and its import succeeded once";
+  EXPECT_EQ(wins.Int(1), 2 * kJobs);
+  SqliteStatement running(db.handle(), "select count(*) from job where state='RUNNING'");
+  ASSERT_TRUE(running.Step());
+  EXPECT_EQ(running.Int(0), 0);
+}
+
+}  // namespace
+}  // namespace color3d

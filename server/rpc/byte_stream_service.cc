@@ -1,0 +1,181 @@
+// google.bytestream.ByteStream: both reactors hand each chunk to the executor, one at a time, so a
+// stream never holds more than one chunk in memory and never blocks a gRPC thread.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "server/rpc/blob_service.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+using google::bytestream::ReadRequest;
+using google::bytestream::ReadResponse;
+using google::bytestream::WriteRequest;
+using google::bytestream::WriteResponse;
+
+constexpr int64_t kReadChunkBytes = 256 << 10;
+
+class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
+ public:
+  BlobReader(const RpcParts& parts, const ReadRequest& request) : parts_(parts), request_(request) {
+    parts_.executor.Post([this] { Step(); });
+  }
+  ~BlobReader() override {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  void OnWriteDone(bool ok) override {
+    if (!ok) return Finish(grpc::Status::CANCELLED);
+    parts_.executor.Post([this] { Step(); });
+  }
+  // Called after Finish and after the last Step, which was what finished.
+  void OnDone() override { delete this; }
+
+ private:
+  // Opens at the first call; then reads and sends one chunk, or finishes.
+  void Step() {
+    bool more = false;
+    const grpc::Status status = Guard([&] {
+      if (fd_ < 0) Open();
+      more = NextChunk();
+    });
+    if (!status.ok() || !more) return Finish(status);
+    StartWrite(&response_);
+  }
+
+  void Open() {
+    const FileDigest digest = ParseBlobName(request_.resource_name());
+    if (!parts_.blobs.Touch(digest)) {
+      throw ServiceError(
+          ErrorCode::kNotFound, "BLOB_MISSING", "'" + request_.resource_name() + "' is not stored");
+    }
+    if (request_.read_offset() < 0 || request_.read_limit() < 0) {
+      throw InvalidArgument("read_offset and read_limit must not be negative");
+    }
+    if (request_.read_offset() > digest.size_bytes) {
+      throw ServiceError(ErrorCode::kInvalidArgument,
+                         "OFFSET_BEYOND_END",
+                         "read_offset is " + std::to_string(request_.read_offset()) +
+                             ", the blob has " + std::to_string(digest.size_bytes) + " bytes");
+    }
+    offset_ = request_.read_offset();
+    end_ = digest.size_bytes;
+    if (request_.read_limit() > 0) end_ = std::min(end_, offset_ + request_.read_limit());
+    fd_ = ::open(parts_.blobs.Fetch(digest.sha256).c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd_ < 0) throw Error(ErrorCode::kInternal, "cannot open a stored blob");
+  }
+
+  bool NextChunk() {
+    if (offset_ >= end_) return false;
+    std::string* data = response_.mutable_data();
+    data->resize(static_cast<size_t>(std::min(kReadChunkBytes, end_ - offset_)));
+    const ssize_t got = ::pread(fd_, data->data(), data->size(), offset_);
+    if (got <= 0) {
+      throw Error(ErrorCode::kDataLoss, "'" + request_.resource_name() + "' is shorter on disk");
+    }
+    data->resize(static_cast<size_t>(got));
+    offset_ += got;
+    return true;
+  }
+
+  const RpcParts& parts_;
+  const ReadRequest request_;
+  ReadResponse response_;
+  int fd_ = -1;
+  int64_t offset_ = 0;
+  int64_t end_ = 0;
+};
+
+class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
+ public:
+  BlobWriter(const RpcParts& parts, WriteResponse* response) : parts_(parts), response_(response) {
+    StartRead(&request_);
+  }
+  void OnReadDone(bool ok) override {
+    parts_.executor.Post([this, ok] { ok ? Consume() : EndOfStream(); });
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  void Consume() {
+    bool finished = false;
+    const grpc::Status status = Guard([&] { finished = Store(); });
+    if (status.ok() && !finished) return StartRead(&request_);
+    writer_.reset();
+    Finish(status);
+  }
+
+  // True when the RPC is answered.
+  bool Store() {
+    if (static_cast<int64_t>(request_.data().size()) > parts_.limits.max_chunk_bytes) {
+      throw InvalidArgument("a chunk of " + std::to_string(request_.data().size()) +
+                            " bytes; at most " + std::to_string(parts_.limits.max_chunk_bytes) +
+                            " are allowed");
+    }
+    if (!writer_) {
+      const UploadName name = ParseUploadName(request_.resource_name());
+      const UploadStatus status = parts_.uploads.Status(name);
+      if (status.complete) {  // somebody else has stored the same bytes
+        response_->set_committed_size(status.committed_size);
+        return true;
+      }
+      writer_ = parts_.uploads.Open(name, request_.write_offset());
+      resource_ = request_.resource_name();
+    } else if (!request_.resource_name().empty() && request_.resource_name() != resource_) {
+      throw InvalidArgument("resource_name changes within the stream");
+    }
+    writer_->Append(request_.write_offset(), request_.data());
+    if (!request_.finish_write()) return false;
+    response_->set_committed_size(writer_->Sync());
+    writer_->Finish();
+    return true;
+  }
+
+  // The client stopped without finish_write, or the connection broke: keep what came.
+  void EndOfStream() {
+    const grpc::Status status = Guard([&] {
+      if (!writer_) throw InvalidArgument("the stream ended before its first message");
+      response_->set_committed_size(writer_->Sync());
+    });
+    writer_.reset();
+    Finish(status);
+  }
+
+  const RpcParts& parts_;
+  WriteResponse* response_;
+  WriteRequest request_;
+  std::string resource_;
+  std::unique_ptr<UploadStore::Writer> writer_;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<ReadResponse>* ByteStreamServiceImpl::Read(grpc::CallbackServerContext*,
+                                                                    const ReadRequest* request) {
+  return new BlobReader(parts_, *request);
+}
+
+grpc::ServerReadReactor<WriteRequest>* ByteStreamServiceImpl::Write(grpc::CallbackServerContext*,
+                                                                    WriteResponse* response) {
+  return new BlobWriter(parts_, response);
+}
+
+grpc::ServerUnaryReactor* ByteStreamServiceImpl::QueryWriteStatus(
+    grpc::CallbackServerContext* context,
+    const google::bytestream::QueryWriteStatusRequest* request,
+    google::bytestream::QueryWriteStatusResponse* response) {
+  return AnswerUnary(parts_,
+                     context,
+                     request,
+                     response,
+                     [this](const auto& in, google::bytestream::QueryWriteStatusResponse* out) {
+                       const UploadStatus status =
+                           parts_.uploads.Status(ParseUploadName(in.resource_name()));
+                       out->set_committed_size(status.committed_size);
+                       out->set_complete(status.complete);
+                     });
+}
+
+}  // namespace color3d

@@ -1,0 +1,34 @@
+// Store records as messages of the public API, resource names and page tokens.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "color3d/v1/colorizer.pb.h"
+#include "color3d/v1/job.pb.h"
+#include "color3d/v1/scene.pb.h"
+#include "server/jobs/job_store.h"
+
+namespace color3d {
+
+v1::Digest ToProto(const FileDigest& digest);
+v1::Scene ToProto(const SceneRecord& scene);
+v1::Job ToProto(const JobRecord& job);
+// Name, parent, kind, state, attempt, progress and revision only.
+v1::Job ToProgressProto(const JobRecord& job);
+v1::Colorizer ToProto(const ColorizerRecord& colorizer);
+google::protobuf::Timestamp ToTimestamp(int64_t ms);
+
+// Throws Error{kInvalidArgument} unless `name` is "<collection>/<id>" with a plausible id.
+void CheckName(std::string_view name, std::string_view collection);
+// Throws Error{kInvalidArgument} naming the digest.
+FileDigest FromProto(const v1::Digest& digest);
+
+// Page tokens are opaque to clients: the id of the last row, bound to the listing they belong to.
+std::string MakePageToken(int64_t last_id, const std::string& listing);
+// 0 for an empty token. Throws Error{kInvalidArgument} for one of another listing.
+int64_t ParsePageToken(const std::string& token, const std::string& listing);
+// 1..1000; 0 means 50.
+int PageSize(int requested);
+
+}  // namespace color3d

@@ -1,0 +1,92 @@
+#include "server/rpc/info_services.h"
+
+#include <algorithm>
+
+#include "server/jobs/spec_check.h"
+#include "server/ops/process.h"
+#include "server/rpc/convert.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+class RefuseColorizeImages final
+    : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse> {
+ public:
+  RefuseColorizeImages() {
+    Finish(ToGrpcStatus(ServiceError(
+        ErrorCode::kUnimplemented,
+        "NOT_BUILT",
+        "ColorizeImages is not built yet; submit a colorize_views job for the scene instead")));
+  }
+  void OnDone() override { delete this; }
+};
+
+}  // namespace
+
+grpc::ServerUnaryReactor* ColorizerServiceImpl::GetColorizer(grpc::CallbackServerContext* context,
+                                                             const v1::GetColorizerRequest* request,
+                                                             v1::Colorizer* response) {
+  return AnswerUnary(
+      parts_, context, request, response, [this](const auto& in, v1::Colorizer* out) {
+        CheckName(in.name(), "colorizers");
+        *out = ToProto(parts_.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
+      });
+}
+
+grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
+    grpc::CallbackServerContext* context,
+    const v1::ListColorizersRequest* request,
+    v1::ListColorizersResponse* response) {
+  return AnswerUnary(
+      parts_, context, request, response, [this](const auto& in, v1::ListColorizersResponse* out) {
+        if (!in.scene().empty()) CheckName(in.scene(), "scenes");
+        const std::string listing = "colorizers of " + in.scene();
+        const size_t size = PageSize(in.page_size());
+        const auto colorizers = parts_.store.ListColorizers(
+            in.scene(), ParsePageToken(in.page_token(), listing), static_cast<int>(size) + 1);
+        for (size_t i = 0; i < std::min(size, colorizers.size()); ++i) {
+          *out->add_colorizers() = ToProto(colorizers[i]);
+        }
+        if (colorizers.size() > size) {
+          out->set_next_page_token(MakePageToken(colorizers[size - 1].id, listing));
+        }
+      });
+}
+
+grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>*
+ColorizerServiceImpl::ColorizeImages(grpc::CallbackServerContext*) {
+  return new RefuseColorizeImages();
+}
+
+grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerContext* context,
+                                                           const v1::GetServerInfoRequest* request,
+                                                           v1::ServerInfo* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto&, v1::ServerInfo* out) {
+    out->set_version(parts_.version);
+    for (const std::string& kind : BuiltKinds()) out->add_job_kinds(kind);
+    v1::Limits* limits = out->mutable_limits();
+    limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
+    limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);
+    limits->set_max_pixels_per_image(parts_.limits.max_pixels_per_image);
+    limits->set_max_image_side_px(parts_.limits.max_image_side_px);
+    limits->set_max_unfinished_jobs(parts_.limits.max_unfinished_jobs);
+    limits->set_max_chunk_bytes(parts_.limits.max_chunk_bytes);
+    for (const WorkerRecord& worker : parts_.store.ListWorkers()) {
+      v1::WorkerInfo* entry = out->add_workers();
+      entry->set_worker_id(worker.worker_id);
+      entry->set_pid(worker.pid);
+      entry->set_job(worker.job);
+      entry->set_memory_bytes(worker.memory_bytes);
+      entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
+    }
+    out->set_draining(parts_.draining.load());
+    out->set_memory_bytes(ResidentMemoryBytes());
+    out->set_disk_free_bytes(parts_.blobs.FreeBytes());
+    const JobCounts counts = parts_.store.CountJobs();
+    out->set_queued_jobs(counts.queued);
+    out->set_running_jobs(counts.running);
+  });
+}
+
+}  // namespace color3d

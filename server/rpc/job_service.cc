@@ -1,0 +1,160 @@
+#include "server/rpc/job_service.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+#include "server/jobs/planner.h"
+#include "server/jobs/spec_check.h"
+#include "server/rpc/convert.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+void RequireNotDraining(const RpcParts& parts) {
+  if (!parts.draining.load()) return;
+  throw ServiceError(
+      ErrorCode::kUnavailable,
+      "DRAINING",
+      "the server is shutting down and takes no new jobs; try again when it is back");
+}
+
+void CheckBlobs(const RpcParts& parts, const v1::JobSpec& spec) {
+  std::vector<FieldViolation> missing;
+  for (const FileDigest& digest : SpecBlobs(spec)) {
+    if (!parts.blobs.Touch(digest)) {
+      missing.push_back(
+          {digest.sha256, "is not stored with " + std::to_string(digest.size_bytes) + " bytes"});
+    }
+  }
+  if (missing.empty()) return;
+  throw ServiceError(ErrorCode::kFailedPrecondition,
+                     "BLOB_MISSING",
+                     "the spec names " + std::to_string(missing.size()) +
+                         " blobs that are not uploaded, first " + missing[0].field +
+                         "; upload them and try again",
+                     missing);
+}
+
+// The jobs that spec.inputs names, with their children.
+std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec) {
+  if (spec.inputs_size() > 100) {
+    throw InvalidArgument("spec.inputs has " + std::to_string(spec.inputs_size()) +
+                          " entries; at most 100 are allowed");
+  }
+  std::vector<JobRecord> inputs;
+  for (const std::string& name : spec.inputs()) {
+    CheckName(name, "jobs");
+    inputs.push_back(parts.store.GetJob(name));
+    for (JobRecord& child : parts.store.ListChildren(name)) inputs.push_back(std::move(child));
+  }
+  return inputs;
+}
+
+JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& request) {
+  const RequestKey key = KeyOf("CreateJob", request);
+  if (const auto existing = parts.store.FindRequest(key)) return parts.store.GetJob(*existing);
+  RequireNotDraining(parts);
+  if (!request.has_spec()) throw InvalidArgument("spec is required");
+  CheckName(request.spec().scene(), "scenes");
+  const int priority = request.has_priority() ? request.priority() : 100;
+  if (priority < 0 || priority > 1000) {
+    throw InvalidArgument("priority is " + std::to_string(priority) + "; the range is 0 to 1000");
+  }
+  CheckSpec(request.spec());
+  CheckBlobs(parts, request.spec());
+  NewGraph graph = PlanJob(request.spec(), LoadInputs(parts, request.spec()));
+  graph.priority = priority;
+  JobRecord job = parts.store.CreateGraph(graph, key, parts.limits.max_unfinished_jobs);
+  spdlog::info(
+      "[job={}] accepted {} of {} ({} jobs)", job.name, job.kind, job.scene, graph.jobs.size());
+  return job;
+}
+
+void ListJobPage(const RpcParts& parts,
+                 const v1::ListJobsRequest& request,
+                 v1::ListJobsResponse* response) {
+  JobFilter filter;
+  if (request.parent().rfind("scenes/", 0) == 0) {
+    CheckName(request.parent(), "scenes");
+    filter.scene = request.parent();
+  } else if (!request.parent().empty()) {
+    CheckName(request.parent(), "jobs");
+    filter.parent = request.parent();
+  }
+  const std::string listing = "jobs of " + request.parent();
+  const size_t size = PageSize(request.page_size());
+  const int64_t before = ParsePageToken(request.page_token(), listing);
+  const auto jobs = parts.store.ListJobs(filter, before, static_cast<int>(size) + 1);
+  for (size_t i = 0; i < std::min(size, jobs.size()); ++i) *response->add_jobs() = ToProto(jobs[i]);
+  if (jobs.size() > size) {
+    response->set_next_page_token(MakePageToken(jobs[size - 1].id, listing));
+  }
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* JobServiceImpl::CreateJob(grpc::CallbackServerContext* context,
+                                                    const v1::CreateJobRequest* request,
+                                                    v1::Job* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    *out = ToProto(CreateJobRecord(parts_, in));
+  });
+}
+
+grpc::ServerUnaryReactor* JobServiceImpl::GetJob(grpc::CallbackServerContext* context,
+                                                 const v1::GetJobRequest* request,
+                                                 v1::Job* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    CheckName(in.name(), "jobs");
+    *out = ToProto(parts_.store.GetJob(in.name()));
+  });
+}
+
+grpc::ServerUnaryReactor* JobServiceImpl::ListJobs(grpc::CallbackServerContext* context,
+                                                   const v1::ListJobsRequest* request,
+                                                   v1::ListJobsResponse* response) {
+  return AnswerUnary(
+      parts_, context, request, response, [this](const auto& in, v1::ListJobsResponse* out) {
+        ListJobPage(parts_, in, out);
+      });
+}
+
+grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext* context,
+                                                    const v1::CancelJobRequest* request,
+                                                    v1::Job* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    CheckName(in.name(), "jobs");
+    *out = ToProto(parts_.store.Cancel(in.name(), KeyOf("CancelJob", in)));
+    spdlog::info("[job={}] cancellation asked for", in.name());
+  });
+}
+
+grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* context,
+                                                   const v1::RetryJobRequest* request,
+                                                   v1::Job* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    CheckName(in.name(), "jobs");
+    RequireNotDraining(parts_);
+    *out = ToProto(parts_.store.Retry(in.name(), in.from_scratch(), KeyOf("RetryJob", in)));
+    spdlog::info("[job={}] retried", in.name());
+  });
+}
+
+grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext* context,
+                                                    const v1::DeleteJobRequest* request,
+                                                    v1::DeleteJobResponse* response) {
+  return AnswerUnary(
+      parts_, context, request, response, [this](const auto& in, v1::DeleteJobResponse*) {
+        CheckName(in.name(), "jobs");
+        parts_.store.Delete(in.name(), KeyOf("DeleteJob", in));
+      });
+}
+
+grpc::ServerWriteReactor<v1::JobEvent>* JobServiceImpl::WatchJobs(
+    grpc::CallbackServerContext*, const v1::WatchJobsRequest* request) {
+  return hub_.Watch(*request);
+}
+
+}  // namespace color3d

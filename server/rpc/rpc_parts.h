@@ -1,0 +1,70 @@
+// What every RPC service is given: stores, executor, limits. References outlive the services.
+#pragma once
+
+#include <google/protobuf/message.h>
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/server_callback.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "server/jobs/job_store.h"
+#include "server/rpc/error_mapping.h"
+#include "server/rpc/executor.h"
+#include "server/storage/blob_store.h"
+#include "server/storage/upload_store.h"
+
+namespace color3d {
+
+struct ServiceLimits {
+  int64_t max_blob_bytes = int64_t{8} << 30;
+  int max_files_per_scene = 10'000;
+  int64_t max_pixels_per_image = 200'000'000;
+  int max_image_side_px = 30'000;
+  int max_unfinished_jobs = 2'000;
+  int max_chunk_bytes = 2 << 20;
+};
+
+struct RpcParts {
+  JobStore& store;
+  BlobStore& blobs;
+  UploadStore& uploads;
+  Executor& executor;
+  const std::atomic<bool>& draining;
+  ServiceLimits limits;
+  Clock clock;
+  std::string version;
+};
+
+// Answers a unary call from the executor: `body(request, response)` may block and throw.
+template <typename Request, typename Response, typename Body>
+grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
+                                      grpc::CallbackServerContext* context,
+                                      const Request* request,
+                                      Response* response,
+                                      Body body) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const bool accepted = parts.executor.TryPost([reactor, request, response, body] {
+    reactor->Finish(Guard([&] { body(*request, response); }));
+  });
+  if (!accepted) reactor->Finish(OverloadedStatus());
+  return reactor;
+}
+
+// "8-4-4-4-12" hexadecimal digits, or empty. Throws Error{kInvalidArgument} otherwise.
+void CheckRequestId(const std::string& request_id);
+std::string DigestOfMessage(const google::protobuf::Message& message);
+
+// Idempotency key of a request: method, its request_id, and a digest of everything else.
+template <typename Request>
+RequestKey KeyOf(const std::string& method, const Request& request) {
+  CheckRequestId(request.request_id());
+  if (request.request_id().empty()) return {};
+  Request body = request;
+  body.clear_request_id();
+  return {method, request.request_id(), DigestOfMessage(body)};
+}
+
+}  // namespace color3d

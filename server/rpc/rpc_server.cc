@@ -1,0 +1,149 @@
+#include "server/rpc/rpc_server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <netdb.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "server/rpc/blob_service.h"
+#include "server/rpc/info_services.h"
+#include "server/rpc/job_service.h"
+#include "server/rpc/scene_service.h"
+
+namespace color3d {
+namespace {
+
+struct HostPort {
+  std::string host;
+  std::string port;
+};
+
+HostPort SplitListen(const std::string& listen) {
+  const size_t colon = listen.rfind(':');
+  if (colon == std::string::npos || colon + 1 == listen.size()) {
+    throw InvalidArgument("cannot listen on '" + listen +
+                          "': it must be HOST:PORT, e.g. "
+                          "127.0.0.1:50551");
+  }
+  std::string host = listen.substr(0, colon);
+  if (host.size() > 1 && host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
+  }
+  return {host, listen.substr(colon + 1)};
+}
+
+// gRPC does not say why it could not bind: try it with a plain socket first.
+void CheckAddress(const std::string& listen) {
+  if (listen.rfind("unix:", 0) == 0) return;
+  const HostPort address = SplitListen(listen);
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  const int failed = ::getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found);
+  if (failed != 0) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot listen on " + listen + ": " + ::gai_strerror(failed) +
+                    "; choose another with --listen");
+  }
+  const int fd = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const int on = 1;
+  ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
+  const bool bound = ::bind(fd, found->ai_addr, found->ai_addrlen) == 0 && ::listen(fd, 1) == 0;
+  const int error = errno;
+  ::close(fd);
+  ::freeaddrinfo(found);
+  if (bound) return;
+  const std::string why = error == EADDRINUSE ? "the address is in use (is another server running?)"
+                                              : std::string(std::strerror(error));
+  throw Error(ErrorCode::kFailedPrecondition,
+              "cannot listen on " + listen + ": " + why + "; choose another with --listen");
+}
+
+}  // namespace
+
+bool IsLoopback(const std::string& listen) {
+  if (listen.rfind("unix:", 0) == 0) return true;
+  const std::string host = SplitListen(listen).host;
+  return host == "localhost" || host == "::1" || host.rfind("127.", 0) == 0;
+}
+
+struct RpcServer::Services {
+  Services(const RpcParts& parts, WatchHub& hub)
+      : scenes(parts),
+        blobs(parts),
+        bytes(parts),
+        jobs(parts, hub),
+        colorizers(parts),
+        server(parts) {}
+  SceneServiceImpl scenes;
+  BlobServiceImpl blobs;
+  ByteStreamServiceImpl bytes;
+  JobServiceImpl jobs;
+  ColorizerServiceImpl colorizers;
+  ServerServiceImpl server;
+};
+
+RpcServer::RpcServer(const RpcServerOptions& options,
+                     JobStore& store,
+                     BlobStore& blobs,
+                     UploadStore& uploads,
+                     const Clock& clock) {
+  CheckAddress(options.listen);
+  executor_ = std::make_unique<Executor>(options.executor_threads);
+  parts_.reset(new RpcParts{
+      store, blobs, uploads, *executor_, draining_, options.limits, clock, options.version});
+  hub_ = std::make_unique<WatchHub>(*parts_, options.watch);
+  services_ = std::make_unique<Services>(*parts_, *hub_);
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port);
+  // Without this two servers could share a port, each answering half of the calls.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 60'000);
+  builder.SetMaxReceiveMessageSize(16 << 20);
+  for (grpc::Service* service : {static_cast<grpc::Service*>(&services_->scenes),
+                                 static_cast<grpc::Service*>(&services_->blobs),
+                                 static_cast<grpc::Service*>(&services_->bytes),
+                                 static_cast<grpc::Service*>(&services_->jobs),
+                                 static_cast<grpc::Service*>(&services_->colorizers),
+                                 static_cast<grpc::Service*>(&services_->server)}) {
+    builder.RegisterService(service);
+  }
+  server_ = builder.BuildAndStart();
+  if (!server_) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot listen on " + options.listen + "; choose another with --listen");
+  }
+  address_ = options.listen.rfind("unix:", 0) == 0
+                 ? options.listen
+                 : options.listen.substr(0, options.listen.rfind(':') + 1) + std::to_string(port);
+}
+
+RpcServer::~RpcServer() { Shutdown(std::chrono::milliseconds(0)); }
+
+void RpcServer::StartDraining() {
+  draining_ = true;
+  server_->GetHealthCheckService()->SetServingStatus(false);
+  hub_->Drain();
+}
+
+void RpcServer::Shutdown(std::chrono::milliseconds grace) {
+  if (!server_) return;
+  hub_->Drain();
+  server_->Shutdown(std::chrono::system_clock::now() + grace);
+  server_->Wait();
+  server_.reset();
+  hub_.reset();  // its streams are all done now
+  executor_.reset();
+}
+
+}  // namespace color3d

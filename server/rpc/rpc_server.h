@@ -1,0 +1,60 @@
+// All gRPC services on one port. Owns the services, the executor and the watch hub.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "server/rpc/rpc_parts.h"
+#include "server/rpc/watch_hub.h"
+
+namespace grpc {
+class Server;
+}
+
+namespace color3d {
+
+struct RpcServerOptions {
+  std::string listen = "127.0.0.1:50551";  // port 0: any free one
+  int executor_threads = 6;
+  ServiceLimits limits;
+  WatchTiming watch;
+  std::string version = "0";
+};
+
+class RpcServer {
+ public:
+  // Starts to answer. Throws Error{kFailedPrecondition} when the address is in use or no address of
+  // this machine, in one line with the remedy. The stores outlive the server.
+  RpcServer(const RpcServerOptions& options,
+            JobStore& store,
+            BlobStore& blobs,
+            UploadStore& uploads,
+            const Clock& clock);
+  ~RpcServer();
+  RpcServer(const RpcServer&) = delete;
+  RpcServer& operator=(const RpcServer&) = delete;
+
+  // "127.0.0.1:50551" with the port that was bound.
+  const std::string& address() const { return address_; }
+  // Health turns NOT_SERVING, new jobs are refused, watch streams end with UNAVAILABLE.
+  void StartDraining();
+  // Waits for open RPCs at most this long, then cancels them.
+  void Shutdown(std::chrono::milliseconds grace);
+
+ private:
+  struct Services;
+  std::string address_;
+  std::atomic<bool> draining_{false};
+  std::unique_ptr<Executor> executor_;
+  std::unique_ptr<RpcParts> parts_;
+  std::unique_ptr<WatchHub> hub_;
+  std::unique_ptr<Services> services_;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+// Whether the address can be reached from this machine only (loopback or a Unix socket).
+bool IsLoopback(const std::string& listen);
+
+}  // namespace color3d

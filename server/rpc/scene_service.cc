@@ -1,0 +1,128 @@
+#include "server/rpc/scene_service.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/base/files.h"
+#include "server/rpc/convert.h"
+#include "server/rpc/scene_validation.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+void CheckSceneId(const std::string& id) {
+  if (id.empty()) return;
+  const bool good =
+      id.size() >= 4 && id.size() <= 63 && id[0] >= 'a' && id[0] <= 'z' &&
+      id.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
+  if (!good) {
+    throw InvalidArgument("scene_id '" + id.substr(0, 80) +
+                          "' must be 4 to 63 characters of [a-z0-9-], the first a letter");
+  }
+}
+
+SceneRecord ToRecord(const v1::CreateSceneRequest& request, const ServiceLimits& limits) {
+  CheckSceneId(request.scene_id());
+  if (request.display_name().size() > 200) {
+    throw InvalidArgument("display_name has " + std::to_string(request.display_name().size()) +
+                          " bytes; at most 200 are allowed");
+  }
+  if (request.files_size() < 1 || request.files_size() > limits.max_files_per_scene) {
+    throw InvalidArgument("files has " + std::to_string(request.files_size()) +
+                          " entries; the range is 1 to " +
+                          std::to_string(limits.max_files_per_scene));
+  }
+  SceneRecord record;
+  record.name = "scenes/" + (request.scene_id().empty() ? "s" + NewId() : request.scene_id());
+  record.display_name = request.display_name();
+  std::set<std::string> paths;
+  for (const v1::SceneFile& file : request.files()) {
+    if (!IsSafeRelativePath(file.path())) {
+      throw ServiceError(ErrorCode::kInvalidArgument,
+                         "UNSAFE_PATH",
+                         "the path '" + file.path().substr(0, 200) +
+                             "' must be relative, with '/' separators and without '..'",
+                         {{"files.path", file.path().substr(0, 200)}});
+    }
+    if (!paths.insert(file.path()).second) {
+      throw InvalidArgument("the path '" + file.path() + "' is there twice");
+    }
+    record.files.push_back({file.path(), FromProto(file.digest())});
+  }
+  // "a" and "a/b" cannot both be files.
+  for (const std::string& path : paths) {
+    for (size_t slash = path.find('/'); slash != std::string::npos;
+         slash = path.find('/', slash + 1)) {
+      if (paths.count(path.substr(0, slash)) > 0) {
+        throw InvalidArgument("'" + path.substr(0, slash) + "' is both a file and a folder");
+      }
+    }
+  }
+  return record;
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerContext* context,
+                                                        const v1::CreateSceneRequest* request,
+                                                        v1::Scene* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
+    const RequestKey key = KeyOf("CreateScene", in);
+    *out = ToProto(parts_.store.CreateScene(ToRecord(in, parts_.limits), key));
+  });
+}
+
+grpc::ServerUnaryReactor* SceneServiceImpl::GetScene(grpc::CallbackServerContext* context,
+                                                     const v1::GetSceneRequest* request,
+                                                     v1::Scene* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
+    CheckName(in.name(), "scenes");
+    *out = ToProto(parts_.store.GetScene(in.name()));
+  });
+}
+
+grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerContext* context,
+                                                       const v1::ListScenesRequest* request,
+                                                       v1::ListScenesResponse* response) {
+  return AnswerUnary(
+      parts_, context, request, response, [this](const auto& in, v1::ListScenesResponse* out) {
+        const size_t size = PageSize(in.page_size());
+        const int64_t before = ParsePageToken(in.page_token(), "scenes");
+        const auto scenes = parts_.store.ListScenes(before, static_cast<int>(size) + 1);
+        for (size_t i = 0; i < std::min(size, scenes.size()); ++i) {
+          *out->add_scenes() = ToProto(scenes[i]);
+        }
+        if (scenes.size() > size) {
+          out->set_next_page_token(MakePageToken(scenes[size - 1].id, "scenes"));
+        }
+      });
+}
+
+grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerContext* context,
+                                                        const v1::CommitSceneRequest* request,
+                                                        v1::Scene* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
+    CheckName(in.name(), "scenes");
+    const RequestKey key = KeyOf("CommitScene", in);
+    const SceneRecord scene = parts_.store.GetScene(in.name());
+    if (scene.state == SceneState::kActive) {  // committed before: immutable, nothing to check
+      *out = ToProto(scene);
+      return;
+    }
+    const SceneCheck check = CheckScene(scene, parts_.blobs, parts_.limits);
+    *out = ToProto(parts_.store.ActivateScene(scene.name, check.layout, check.photo_count, key));
+  });
+}
+
+grpc::ServerUnaryReactor* SceneServiceImpl::DeleteScene(grpc::CallbackServerContext* context,
+                                                        const v1::DeleteSceneRequest* request,
+                                                        v1::DeleteSceneResponse* response) {
+  return AnswerUnary(
+      parts_, context, request, response, [this](const auto& in, v1::DeleteSceneResponse*) {
+        CheckName(in.name(), "scenes");
+        parts_.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
+      });
+}
+
+}  // namespace color3d

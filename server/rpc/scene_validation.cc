@@ -1,0 +1,169 @@
+#include "server/rpc/scene_validation.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/base/files.h"
+#include "core/image/probe.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+// A file's bytes mapped read-only: pages come and go, the heap does not grow.
+class MappedFile {
+ public:
+  MappedFile(const fs::path& path, int64_t size) : size_(static_cast<size_t>(size)) {
+    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd >= 0 && size_ > 0) data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, fd, 0);
+    if (fd >= 0) ::close(fd);
+  }
+  ~MappedFile() {
+    if (data_ != MAP_FAILED) ::munmap(data_, size_);
+  }
+  MappedFile(const MappedFile&) = delete;
+  MappedFile& operator=(const MappedFile&) = delete;
+  std::string_view bytes() const {
+    if (data_ == MAP_FAILED) return {};
+    return {static_cast<const char*>(data_), size_};
+  }
+
+ private:
+  void* data_ = MAP_FAILED;
+  size_t size_;
+};
+
+std::string BaseName(const std::string& path) { return path.substr(path.rfind('/') + 1); }
+std::string Folder(const std::string& path) {
+  const size_t slash = path.rfind('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash);
+}
+
+// Folders that hold some file of a COLMAP model, with the stems that are there.
+std::map<std::string, std::set<std::string>> ModelFolders(
+    const std::vector<SceneFileRecord>& files) {
+  static const std::set<std::string> kNames = {
+      "cameras.bin", "cameras.txt", "images.bin", "images.txt", "points3D.bin", "points3D.txt"};
+  std::map<std::string, std::set<std::string>> folders;
+  for (const SceneFileRecord& file : files) {
+    const std::string name = BaseName(file.path);
+    if (kNames.count(name) > 0) folders[Folder(file.path)].insert(name);
+  }
+  return folders;
+}
+
+bool IsWholeModel(const std::set<std::string>& names) {
+  for (const char* ending : {".bin", ".txt"}) {
+    bool whole = true;
+    for (const char* stem : {"cameras", "images", "points3D"}) {
+      whole = whole && names.count(std::string(stem) + ending) > 0;
+    }
+    if (whole) return true;
+  }
+  return false;
+}
+
+void CheckTransforms(const std::string& path,
+                     std::string_view bytes,
+                     std::vector<FieldViolation>* violations) {
+  const nlohmann::json json = nlohmann::json::parse(bytes, nullptr, /*allow_exceptions=*/false);
+  if (json.is_discarded() || !json.is_object()) {
+    violations->push_back({path, "is not a JSON object"});
+  } else if (!json.contains("frames") || !json["frames"].is_array() || json["frames"].empty()) {
+    violations->push_back({path, "has no \"frames\""});
+  }
+}
+
+// One file's violations; counts it when it is a good photograph.
+void CheckFile(const SceneFileRecord& file,
+               const BlobStore& blobs,
+               const ServiceLimits& limits,
+               SceneCheck* check,
+               std::vector<FieldViolation>* violations) {
+  if (!blobs.Touch(file.digest)) {
+    violations->push_back({file.path, "was not uploaded (blob " + file.digest.sha256 + ")"});
+    return;
+  }
+  const bool is_photo = HasImageExtension(file.path);
+  const bool is_transforms = BaseName(file.path) == "transforms.json";
+  if (!is_photo && !is_transforms) return;
+  const MappedFile mapped(blobs.Fetch(file.digest.sha256), file.digest.size_bytes);
+  if (is_transforms) return CheckTransforms(file.path, mapped.bytes(), violations);
+  try {
+    ImageLimits image_limits;
+    image_limits.max_pixels = limits.max_pixels_per_image;
+    image_limits.max_side_px = limits.max_image_side_px;
+    ProbeImage(mapped.bytes(), file.path, image_limits);
+    ++check->photo_count;
+  } catch (const Error& e) {
+    violations->push_back({file.path, e.what()});
+  }
+}
+
+[[noreturn]] void ThrowInvalid(const SceneRecord& scene,
+                               const std::vector<FieldViolation>& violations) {
+  std::string message = scene.name + ": ";
+  for (size_t i = 0; i < std::min<size_t>(3, violations.size()); ++i) {
+    const FieldViolation& violation = violations[i];
+    if (i > 0) message += "; ";
+    // Probe errors already begin with the file's name.
+    const bool named =
+        violation.field.empty() || violation.description.find(violation.field) != std::string::npos;
+    message += (named ? "" : violation.field + " ") + violation.description;
+  }
+  if (violations.size() > 3) {
+    message += "; and " + std::to_string(violations.size() - 3) + " more files";
+  }
+  throw ServiceError(ErrorCode::kInvalidArgument, "SCENE_INVALID", message, violations);
+}
+
+}  // namespace
+
+StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
+  if (!ModelFolders(files).empty()) return StoredLayout::kColmap;
+  for (const SceneFileRecord& file : files) {
+    if (BaseName(file.path) == "transforms.json") return StoredLayout::kTransforms;
+  }
+  return StoredLayout::kPhotos;
+}
+
+SceneCheck CheckScene(const SceneRecord& scene,
+                      const BlobStore& blobs,
+                      const ServiceLimits& limits) {
+  SceneCheck check;
+  std::vector<FieldViolation> violations;
+  check.layout = DetectLayout(scene.files);
+  const auto folders = ModelFolders(scene.files);
+  const bool has_model = std::any_of(folders.begin(), folders.end(), [](const auto& folder) {
+    return IsWholeModel(folder.second);
+  });
+  if (!folders.empty() && !has_model) {
+    const auto& [folder, names] = *folders.begin();
+    violations.push_back({folder.empty() ? *names.begin() : folder + "/" + *names.begin(),
+                          "belongs to a COLMAP model that is not whole: cameras, images and "
+                          "points3D are needed, all .bin or all .txt"});
+  }
+  size_t missing = 0;
+  for (const SceneFileRecord& file : scene.files) {
+    const size_t before = violations.size();
+    CheckFile(file, blobs, limits, &check, &violations);
+    missing += violations.size() - before;
+  }
+  if (missing == 0 && check.photo_count == 0) {
+    violations.push_back({"", "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff)"});
+  } else if (missing == 0 && check.photo_count == 1) {
+    violations.push_back(
+        {"", "the scene holds one photograph; at least 3 that overlap are needed"});
+  }
+  if (!violations.empty()) ThrowInvalid(scene, violations);
+  return check;
+}
+
+}  // namespace color3d

@@ -1,0 +1,25 @@
+// What CommitScene checks before a scene becomes immutable: every blob there, every file what it
+// claims to be, enough photographs, a layout we know.
+#pragma once
+
+#include "server/jobs/job.h"
+#include "server/rpc/rpc_parts.h"
+#include "server/storage/blob_store.h"
+
+namespace color3d {
+
+struct SceneCheck {
+  StoredLayout layout = StoredLayout::kPhotos;
+  int photo_count = 0;
+};
+
+// Throws ServiceError{kInvalidArgument, SCENE_INVALID} with one violation for each bad file; its
+// message names the first three and counts the rest.
+SceneCheck CheckScene(const SceneRecord& scene,
+                      const BlobStore& blobs,
+                      const ServiceLimits& limits);
+
+// Which kind of input the paths look like; COLMAP wins over transforms.json.
+StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files);
+
+}  // namespace color3d

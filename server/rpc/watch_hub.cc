@@ -1,0 +1,342 @@
+#include "server/rpc/watch_hub.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <deque>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "server/rpc/convert.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+using SteadyClock = std::chrono::steady_clock;
+constexpr int kEventsPerFetch = 64;
+}  // namespace
+
+// One stream. gRPC calls (StartWrite, Finish) are decided under the mutex and made outside it: they
+// may call back into this object on the same thread. `writing_` or `finished_` marks them as
+// decided.
+class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
+ public:
+  JobWatcher(WatchHub& hub, const v1::WatchJobsRequest& request)
+      : hub_(hub), parts_(hub.parts_), request_(request) {}
+
+  // Keeps itself alive until OnDone; the executor and the hub hold references too.
+  void Start(const std::shared_ptr<JobWatcher>& self) {
+    self_ = self;
+    hub_.Register(self);
+    parts_.executor.Post([self] { self->Begin(); });
+  }
+
+  // From the poller: something happened to these jobs.
+  void Poke(const std::set<int64_t>& changed_jobs) {
+    {
+      std::lock_guard lock(mutex_);
+      bool mine = false;
+      for (const int64_t id : ids_) mine = mine || changed_jobs.count(id) > 0;
+      if (!mine) return;
+      dirty_ = true;
+    }
+    Pump();
+  }
+
+  // From the poller, every round: deferred progress and keepalive.
+  void Tick() {
+    {
+      std::lock_guard lock(mutex_);
+      if (!begun_ || finished_) return;
+      const auto now = SteadyClock::now();
+      for (auto it = deferred_.begin(); it != deferred_.end();) {
+        if (now - progress_sent_[it->first] < interval_) {
+          ++it;
+          continue;
+        }
+        progress_sent_[it->first] = now;
+        Queue(std::move(it->second));
+        it = deferred_.erase(it);
+      }
+      if (queue_.empty() && !writing_ && now - last_write_ > hub_.timing_.keepalive) {
+        v1::JobEvent event;
+        event.set_kind(v1::JobEvent::KIND_KEEPALIVE);
+        *event.mutable_time() = ToTimestamp(parts_.clock());
+        Queue(std::move(event));
+      }
+    }
+    Pump();
+  }
+
+  void End(const grpc::Status& status) {
+    {
+      std::lock_guard lock(mutex_);
+      if (!end_) end_ = status;
+      queue_.clear();
+    }
+    Pump();
+  }
+
+  void OnWriteDone(bool ok) override {
+    {
+      std::lock_guard lock(mutex_);
+      writing_ = false;
+      last_write_ = SteadyClock::now();
+    }
+    ok ? Pump() : End(grpc::Status::CANCELLED);
+  }
+  void OnCancel() override { End(grpc::Status::CANCELLED); }
+  void OnDone() override {
+    hub_.Unregister(this);
+    self_.reset();
+  }
+
+ private:
+  // On the executor: checks the request, then sends the present state or goes on from a revision.
+  void Begin() {
+    const grpc::Status status = Guard([&] {
+      const int interval =
+          request_.has_min_progress_interval_ms() ? request_.min_progress_interval_ms() : 500;
+      if (interval < 50 || interval > 60'000) {
+        throw InvalidArgument("min_progress_interval_ms is " + std::to_string(interval) +
+                              "; the range is 50 to 60000");
+      }
+      if (request_.names_size() < 1 || request_.names_size() > 100) {
+        throw InvalidArgument("names has " + std::to_string(request_.names_size()) +
+                              " entries; the range is 1 to 100");
+      }
+      if (request_.after_revision() < 0) throw InvalidArgument("after_revision is negative");
+      for (const std::string& name : request_.names()) CheckName(name, "jobs");
+      const std::vector<int64_t> ids =
+          parts_.store.ResolveWatch({request_.names().begin(), request_.names().end()});
+      JobsSnapshot snapshot;
+      if (request_.after_revision() == 0) snapshot = parts_.store.Snapshot(ids);
+      std::lock_guard lock(mutex_);
+      interval_ = std::chrono::milliseconds(interval);
+      ids_ = ids;
+      cursor_ = request_.after_revision() == 0 ? snapshot.revision : request_.after_revision();
+      sent_revision_ = request_.after_revision();
+      for (const JobRecord& job : snapshot.jobs) {
+        Queue(StateEvent(job, job.revision, job.end_ms != 0 ? job.end_ms : parts_.clock()));
+      }
+      begun_ = true;
+      dirty_ = true;
+      last_write_ = SteadyClock::now();
+    });
+    status.ok() ? Pump() : End(status);
+  }
+
+  // On the executor: the next events of the watched jobs.
+  void Fetch() {
+    const grpc::Status status = Guard([&] {
+      // Asked first: when all had finished before the events were read, those are complete.
+      const bool all_finished = parts_.store.AllFinished(ids_);
+      const auto events = parts_.store.EventsSince(cursor_, ids_, kEventsPerFetch);
+      std::vector<int64_t> changed;
+      for (const EventRecord& event : events) changed.push_back(event.job_id);
+      std::map<int64_t, JobRecord> jobs;
+      if (!changed.empty()) {
+        for (JobRecord& job : parts_.store.Snapshot(changed).jobs) {
+          const int64_t id = job.id;
+          jobs.emplace(id, std::move(job));
+        }
+      }
+      std::lock_guard lock(mutex_);
+      for (const EventRecord& event : events) {
+        cursor_ = event.revision;
+        const auto job = jobs.find(event.job_id);
+        if (job != jobs.end()) Take(event, job->second);
+      }
+      if (events.size() == kEventsPerFetch) {
+        dirty_ = true;
+      } else if (all_finished && !end_) {
+        end_ = grpc::Status::OK;
+      }
+    });
+    {
+      std::lock_guard lock(mutex_);
+      fetching_ = false;
+    }
+    status.ok() ? Pump() : End(status);
+  }
+
+  // With the mutex held.
+  void Take(const EventRecord& event, const JobRecord& job) {
+    if (event.kind == EventKind::kState) {
+      deferred_.erase(job.id);
+      JobRecord then = job;
+      if (then.state != event.state) {  // it has moved on since; what came later is not shown yet
+        then.state = event.state;
+        then.artifacts.clear();
+        then.error.reset();
+        then.end_ms = 0;
+      }
+      then.attempt = event.attempt;
+      Queue(StateEvent(then, event.revision, event.time_ms));
+      return;
+    }
+    v1::JobEvent progress;
+    progress.set_revision(event.revision);
+    progress.set_kind(v1::JobEvent::KIND_PROGRESS);
+    *progress.mutable_time() = ToTimestamp(event.time_ms);
+    *progress.mutable_job() = ToProgressProto(job);
+    const auto now = SteadyClock::now();
+    if (now - progress_sent_[job.id] < interval_) {
+      deferred_[job.id] = std::move(progress);
+    } else {
+      progress_sent_[job.id] = now;
+      deferred_.erase(job.id);
+      Queue(std::move(progress));
+    }
+  }
+
+  static v1::JobEvent StateEvent(const JobRecord& job, int64_t revision, int64_t time_ms) {
+    v1::JobEvent event;
+    event.set_revision(revision);
+    event.set_kind(v1::JobEvent::KIND_STATE);
+    *event.mutable_time() = ToTimestamp(time_ms);
+    *event.mutable_job() = ToProto(job);
+    event.mutable_job()->set_revision(revision);
+    return event;
+  }
+
+  // With the mutex held. Revisions never go back: deferred progress takes the newest one sent.
+  void Queue(v1::JobEvent event) {
+    sent_revision_ = std::max(sent_revision_, event.revision());
+    event.set_revision(sent_revision_);
+    queue_.push_back(std::move(event));
+  }
+
+  // Does the one thing that can be done next.
+  void Pump() {
+    enum class Next { kNothing, kWrite, kFetch, kFinish } next = Next::kNothing;
+    grpc::Status status;
+    std::shared_ptr<JobWatcher> self;
+    {
+      std::lock_guard lock(mutex_);
+      if (finished_ || writing_) return;  // self_ may be gone once finished
+      self = self_;
+      if (!queue_.empty()) {
+        current_ = std::move(queue_.front());
+        queue_.pop_front();
+        writing_ = true;
+        next = Next::kWrite;
+      } else if (end_) {
+        finished_ = true;
+        status = *end_;
+        next = Next::kFinish;
+      } else if (begun_ && dirty_ && !fetching_) {
+        dirty_ = false;
+        fetching_ = true;
+        next = Next::kFetch;
+      }
+    }
+    if (next == Next::kWrite) StartWrite(&current_);
+    if (next == Next::kFinish) Finish(status);
+    if (next == Next::kFetch) parts_.executor.Post([self] { self->Fetch(); });
+  }
+
+  WatchHub& hub_;
+  const RpcParts& parts_;
+  const v1::WatchJobsRequest request_;
+  std::shared_ptr<JobWatcher> self_;
+
+  std::mutex mutex_;
+  std::vector<int64_t> ids_;  // fixed once begun_
+  std::chrono::milliseconds interval_{500};
+  int64_t cursor_ = 0;         // events up to here were taken
+  int64_t sent_revision_ = 0;  // newest that was queued for the client
+  std::deque<v1::JobEvent> queue_;
+  v1::JobEvent current_;  // being written
+  std::map<int64_t, v1::JobEvent> deferred_;
+  std::map<int64_t, SteadyClock::time_point> progress_sent_;
+  SteadyClock::time_point last_write_;
+  std::optional<grpc::Status> end_;
+  bool begun_ = false;
+  bool dirty_ = false;
+  bool fetching_ = false;
+  bool writing_ = false;
+  bool finished_ = false;
+};
+
+WatchHub::WatchHub(const RpcParts& parts, WatchTiming timing) : parts_(parts), timing_(timing) {
+  revision_ = parts_.store.NewestRevision();
+  thread_ = std::thread([this] { Loop(); });
+}
+
+WatchHub::~WatchHub() {
+  Drain();
+  {
+    std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const v1::WatchJobsRequest& request) {
+  auto watcher = std::make_shared<JobWatcher>(*this, request);
+  watcher->Start(watcher);
+  bool draining = false;
+  {
+    std::lock_guard lock(mutex_);
+    draining = draining_;
+  }
+  if (draining) watcher->End(DrainingStatus());
+  return watcher.get();
+}
+
+void WatchHub::Drain() {
+  std::vector<std::shared_ptr<JobWatcher>> all;
+  {
+    std::lock_guard lock(mutex_);
+    draining_ = true;
+    for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
+  }
+  for (const auto& watcher : all) watcher->End(DrainingStatus());
+}
+
+void WatchHub::Register(const std::shared_ptr<JobWatcher>& watcher) {
+  std::lock_guard lock(mutex_);
+  watchers_[watcher.get()] = watcher;
+}
+
+void WatchHub::Unregister(JobWatcher* watcher) {
+  std::lock_guard lock(mutex_);
+  watchers_.erase(watcher);
+}
+
+void WatchHub::Loop() {
+  std::unique_lock lock(mutex_);
+  while (!wake_.wait_for(lock, timing_.poll, [this] { return stopping_; })) {
+    lock.unlock();
+    try {
+      Poll();
+    } catch (const Error& e) {
+      spdlog::warn("cannot read job events: {}", e.what());
+    }
+    lock.lock();
+  }
+}
+
+void WatchHub::Poll() {
+  std::set<int64_t> changed;
+  while (true) {
+    const auto events = parts_.store.EventsSince(revision_, 500);
+    for (const EventRecord& event : events) changed.insert(event.job_id);
+    if (!events.empty()) revision_ = events.back().revision;
+    if (events.size() < 500) break;
+  }
+  std::vector<std::shared_ptr<JobWatcher>> all;
+  {
+    std::lock_guard lock(mutex_);
+    for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
+  }
+  for (const auto& watcher : all) {
+    if (!changed.empty()) watcher->Poke(changed);
+    watcher->Tick();
+  }
+}
+
+}  // namespace color3d

@@ -1,0 +1,158 @@
+#include "server/serve.h"
+
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "server/jobs/sqlite_job_store.h"
+#include "server/maintenance.h"
+#include "server/ops/process.h"
+#include "server/rpc/rpc_server.h"
+#include "server/storage/blob_store.h"
+#include "server/storage/data_folder.h"
+#include "server/storage/upload_store.h"
+#include "server/worker/supervisor.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+std::chrono::milliseconds Milliseconds(double seconds) {
+  return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
+}
+
+void CheckOptions(const ServeOptions& options) {
+  if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
+  if (!IsLoopback(options.listen) && !options.insecure_any_address) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "refusing to listen on " + options.listen +
+                    ": there is no authentication yet, anybody who reaches the port could use it; "
+                    "listen on 127.0.0.1, or say --insecure-any-address in a network you trust");
+  }
+}
+
+SupervisorOptions WorkerSetup(const ServeOptions& options) {
+  SupervisorOptions setup;
+  setup.program =
+      options.worker_program.empty() ? ProgramFolder() / "color3d-worker" : options.worker_program;
+  if (options.workers > 0 && ::access(setup.program.c_str(), X_OK) != 0) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot find the worker program " + setup.program.string() +
+                    "; install color3d-worker beside color3d-server, or say --workers 0");
+  }
+  setup.workers = options.workers;
+  const int machine = std::max(1u, std::thread::hardware_concurrency());
+  const int threads =
+      options.threads > 0 ? options.threads : std::max(1, machine / std::max(1, options.workers));
+  setup.arguments = {"--data-dir",
+                     options.data_folder.string(),
+                     "--threads",
+                     std::to_string(threads),
+                     "--log-level",
+                     options.log_level,
+                     "--lease-seconds",
+                     std::to_string(options.lease_seconds),
+                     "--heartbeat-seconds",
+                     std::to_string(options.heartbeat_seconds),
+                     "--checkpoint-seconds",
+                     std::to_string(options.checkpoint_seconds),
+                     "--stuck-seconds",
+                     std::to_string(options.stuck_seconds),
+                     "--drain-grace-seconds",
+                     std::to_string(options.drain_seconds * 0.75),
+                     "--stop-grace-seconds",
+                     std::to_string(options.stop_grace_seconds),
+                     "--retry-backoff-ms",
+                     std::to_string(options.retry_backoff_ms),
+                     "--reserve-mib",
+                     std::to_string(options.reserve_mib)};
+  setup.max_backoff = std::chrono::milliseconds(options.worker_backoff_ms);
+  setup.first_backoff = std::min(setup.first_backoff, setup.max_backoff);
+  return setup;
+}
+
+// Blocks the stop signals for all threads that start later, and waits for them here.
+class StopSignals {
+ public:
+  StopSignals() {
+    ::sigemptyset(&signals_);
+    ::sigaddset(&signals_, SIGTERM);
+    ::sigaddset(&signals_, SIGINT);
+    ::pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    ::signal(SIGPIPE, SIG_IGN);
+  }
+  void Wait() const {
+    int signal = 0;
+    ::sigwait(&signals_, &signal);
+  }
+  // The second signal ends the process at once; its workers then drain by themselves.
+  void ExitOnNext() const {
+    std::thread([signals = signals_] {
+      int signal = 0;
+      ::sigwait(&signals, &signal);
+      ::_exit(1);
+    }).detach();
+  }
+
+ private:
+  sigset_t signals_;
+};
+
+}  // namespace
+
+void Serve(const ServeOptions& options) {
+  SetUpLog("server", options.log_level, {});
+  CheckOptions(options);
+  const SupervisorOptions worker_setup = WorkerSetup(options);
+  const StopSignals signals;
+  const DataPaths paths(options.data_folder);
+  PrepareDataFolder(paths);
+  const DataFolderLock lock(paths);
+  const Clock clock = SystemClock();
+  StoreOptions store_options;
+  store_options.retry_backoff_ms = options.retry_backoff_ms;
+  store_options.max_attempts = options.max_attempts;
+  // RPCs and background threads do not wait for each other's connection.
+  SqliteJobStore store(paths.Store(), clock, store_options);
+  SqliteJobStore background(paths.Store(), clock, store_options);
+  BlobStoreOptions blob_options;
+  blob_options.reserve_bytes = options.reserve_mib << 20;
+  BlobStore blobs(paths.Blobs(), blob_options);
+  RpcServerOptions rpc;
+  rpc.listen = options.listen;
+  rpc.version = COLOR3D_VERSION;
+  rpc.limits.max_unfinished_jobs = options.max_unfinished_jobs;
+  UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
+  ExpireDeadWorkers(background);
+
+  RpcServer server(rpc, store, blobs, uploads, clock);
+  if (!options.port_file.empty()) WriteFileAtomic(options.port_file, server.address() + "\n");
+  MaintenanceTiming chores;
+  chores.reap = std::clamp(Milliseconds(options.lease_seconds / 10.0),
+                           std::chrono::milliseconds(100),
+                           std::chrono::milliseconds(5'000));
+  Maintenance maintenance(background, blobs, uploads, paths, clock, chores);
+  Supervisor supervisor(worker_setup, background);
+  spdlog::info("listening on {}, data in {}, {} workers",
+               server.address(),
+               paths.root.string(),
+               options.workers);
+
+  signals.Wait();
+  spdlog::info("draining: no new jobs, running ones are saved and released");
+  signals.ExitOnNext();
+  server.StartDraining();
+  supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
+  supervisor.Wait();
+  server.Shutdown(Milliseconds(std::min(2.0, options.drain_seconds * 0.1)));
+  spdlog::info("ended");
+}
+
+}  // namespace color3d

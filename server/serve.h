@@ -1,0 +1,36 @@
+// `color3d-server serve`: wires stores, RPC server, maintenance and workers together, and drains
+// them on SIGTERM.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace color3d {
+
+struct ServeOptions {
+  std::string listen = "127.0.0.1:50551";
+  bool insecure_any_address = false;
+  std::filesystem::path data_folder;
+  std::filesystem::path port_file;  // empty: none
+  int workers = 1;
+  int threads = 0;  // of each worker; 0: the machine's, shared among the workers
+  std::string log_level = "info";
+  double drain_seconds = 20.0;
+  int64_t reserve_mib = 256;
+  int max_unfinished_jobs = 2'000;
+  // For tests.
+  std::filesystem::path worker_program;  // empty: color3d-worker beside this program
+  double lease_seconds = 60.0;
+  double heartbeat_seconds = 10.0;
+  double checkpoint_seconds = 20.0;
+  double stuck_seconds = 900.0;
+  int64_t retry_backoff_ms = 2'000;
+  int max_attempts = 3;
+  double stop_grace_seconds = 60.0;
+  int64_t worker_backoff_ms = 10'000;
+};
+
+// Returns after a drain. Throws Error for what the user can mend (exit status 2).
+void Serve(const ServeOptions& options);
+
+}  // namespace color3d

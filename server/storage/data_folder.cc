@@ -1,0 +1,57 @@
+#include "server/storage/data_folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+
+void PrepareDataFolder(const DataPaths& paths) {
+  std::error_code error;
+  for (const fs::path& folder :
+       {paths.root, paths.Blobs(), paths.Uploads(), paths.Scratch(), paths.Logs()}) {
+    fs::create_directories(folder, error);
+    if (error || !fs::is_directory(folder)) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  "cannot create the data directory " + folder.string() + ": " +
+                      (error ? error.message() : "it is not a folder") +
+                      "; choose another --data-dir or change its permissions");
+    }
+    const fs::path probe = folder / ".write-test";
+    const int fd = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+    if (fd < 0) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  "the data directory " + folder.string() +
+                      " is not writable: " + std::strerror(errno) +
+                      "; choose another --data-dir or change its permissions");
+    }
+    ::close(fd);
+    ::unlink(probe.c_str());
+  }
+}
+
+DataFolderLock::DataFolderLock(const DataPaths& paths) {
+  fd_ = ::open(paths.Lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (fd_ < 0) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot open " + paths.Lock().string() + ": " + std::strerror(errno));
+  }
+  if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+    ::close(fd_);
+    throw Error(ErrorCode::kFailedPrecondition,
+                "another server uses the data directory " + paths.root.string() +
+                    "; stop it or choose another --data-dir");
+  }
+}
+
+DataFolderLock::~DataFolderLock() { ::close(fd_); }
+
+}  // namespace color3d

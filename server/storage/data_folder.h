@@ -1,0 +1,36 @@
+// The layout of the server's data directory, and the lock that keeps a second server out of it.
+#pragma once
+
+#include <filesystem>
+
+namespace color3d {
+
+struct DataPaths {
+  explicit DataPaths(const std::filesystem::path& data_folder) : root(data_folder) {}
+  std::filesystem::path root;
+  std::filesystem::path Store() const { return root / "jobs.db"; }
+  std::filesystem::path Blobs() const { return root / "blobs"; }
+  std::filesystem::path Uploads() const { return root / "uploads"; }
+  std::filesystem::path Scratch() const { return root / "scratch"; }
+  std::filesystem::path Logs() const { return root / "logs"; }
+  std::filesystem::path Lock() const { return root / "lock"; }
+};
+
+// Creates the folders. Throws Error{kFailedPrecondition} in one line when that is not possible or
+// the folder cannot be written.
+void PrepareDataFolder(const DataPaths& paths);
+
+// Held while a server uses the data directory; released when destroyed or when the process dies.
+class DataFolderLock {
+ public:
+  // Throws Error{kFailedPrecondition} when another process holds it.
+  explicit DataFolderLock(const DataPaths& paths);
+  ~DataFolderLock();
+  DataFolderLock(const DataFolderLock&) = delete;
+  DataFolderLock& operator=(const DataFolderLock&) = delete;
+
+ private:
+  int fd_ = -1;
+};
+
+}  // namespace color3d

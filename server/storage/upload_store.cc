@@ -1,0 +1,190 @@
+#include "server/storage/upload_store.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+#include "server/service_error.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+
+struct UploadStore::Writer::Session {
+  std::mutex mutex;
+  uint64_t generation = 0;
+};
+
+namespace {
+
+void CheckName(const UploadName& name, int64_t max_blob_bytes) {
+  constexpr char kAllowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-";
+  if (name.uuid.empty() || name.uuid.size() > 64 ||
+      name.uuid.find_first_not_of(kAllowed) != std::string::npos) {
+    throw InvalidArgument("the upload id '" + name.uuid.substr(0, 80) +
+                          "' must be 1 to 64 letters, digits or '-'");
+  }
+  if (!IsSha256Hex(name.digest.sha256)) {
+    throw InvalidArgument("'" + name.digest.sha256.substr(0, 80) +
+                          "' is not a SHA-256 digest: 64 lower-case hexadecimal digits");
+  }
+  if (name.digest.size_bytes < 0 || name.digest.size_bytes > max_blob_bytes) {
+    throw InvalidArgument("a blob of " + std::to_string(name.digest.size_bytes) + " bytes: 0 to " +
+                          std::to_string(max_blob_bytes) + " are allowed");
+  }
+}
+
+[[noreturn]] void ThrowWriteError(const std::string& what) {
+  const int error = errno;
+  if (error == ENOSPC || error == EDQUOT) {
+    throw ServiceError(ErrorCode::kResourceExhausted,
+                       "STORAGE_FULL",
+                       what + ": the server's disk is full; what was sent is kept, resume later");
+  }
+  throw Error(ErrorCode::kInternal, what + ": " + std::strerror(error));
+}
+
+}  // namespace
+
+UploadStore::UploadStore(const fs::path& folder, BlobStore& blobs, int64_t max_blob_bytes)
+    : folder_(folder), blobs_(blobs), max_blob_bytes_(max_blob_bytes) {
+  std::error_code error;
+  fs::create_directories(folder_, error);
+}
+
+fs::path UploadStore::PartPath(const UploadName& name) const {
+  return folder_ / (name.uuid + "." + name.digest.sha256 + "." +
+                    std::to_string(name.digest.size_bytes) + ".part");
+}
+
+UploadStatus UploadStore::Status(const UploadName& name) {
+  CheckName(name, max_blob_bytes_);
+  if (blobs_.Touch(name.digest)) return {name.digest.size_bytes, true};
+  const int fd = ::open(PartPath(name).c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return {0, false};
+  struct stat status {};
+  const bool known = ::fsync(fd) == 0 && ::fstat(fd, &status) == 0;
+  ::close(fd);
+  return {known ? static_cast<int64_t>(status.st_size) : 0, false};
+}
+
+std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name, int64_t offset) {
+  CheckName(name, max_blob_bytes_);
+  const fs::path path = PartPath(name);
+  std::unique_ptr<Writer> writer(new Writer());
+  writer->store_ = this;
+  writer->name_ = name;
+  {
+    std::lock_guard lock(mutex_);
+    std::weak_ptr<Writer::Session>& entry = sessions_[path.filename().string()];
+    writer->session_ = entry.lock();
+    if (!writer->session_) {
+      writer->session_ = std::make_shared<Writer::Session>();
+      entry = writer->session_;
+    }
+  }
+  std::lock_guard lock(writer->session_->mutex);
+  writer->fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  struct stat status {};
+  if (writer->fd_ < 0 || ::fstat(writer->fd_, &status) != 0)
+    ThrowWriteError("cannot open an upload");
+  writer->size_ = status.st_size;
+  if (offset != writer->size_) {
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "OFFSET_MISMATCH",
+                       "the upload has " + std::to_string(writer->size_) +
+                           " bytes, the write starts at " + std::to_string(offset) +
+                           "; ask QueryWriteStatus and go on from there");
+  }
+  blobs_.RequireSpace(name.digest.size_bytes - writer->size_);
+  writer->generation_ = ++writer->session_->generation;
+  return writer;
+}
+
+UploadStore::Writer::~Writer() {
+  if (fd_ >= 0) {
+    ::fsync(fd_);
+    ::close(fd_);
+  }
+  const std::string key = store_->PartPath(name_).filename().string();
+  session_.reset();
+  std::lock_guard lock(store_->mutex_);
+  const auto entry = store_->sessions_.find(key);
+  if (entry != store_->sessions_.end() && entry->second.expired()) store_->sessions_.erase(entry);
+}
+
+void UploadStore::Writer::RequireOwner() const {
+  if (generation_ != session_->generation) {
+    throw ServiceError(ErrorCode::kAborted,
+                       "UPLOAD_TAKEN_OVER",
+                       "another connection goes on with this upload; ask QueryWriteStatus");
+  }
+}
+
+void UploadStore::Writer::Append(int64_t offset, std::string_view data) {
+  std::lock_guard lock(session_->mutex);
+  RequireOwner();
+  if (offset != size_) {
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "OFFSET_MISMATCH",
+                       "a write at offset " + std::to_string(offset) +
+                           " follows one that ended at " + std::to_string(size_));
+  }
+  if (size_ + static_cast<int64_t>(data.size()) > name_.digest.size_bytes) {
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "SIZE_MISMATCH",
+                       "more bytes than the announced " + std::to_string(name_.digest.size_bytes));
+  }
+  while (!data.empty()) {
+    const ssize_t put = ::write(fd_, data.data(), data.size());
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) ThrowWriteError("cannot write an upload");
+    data.remove_prefix(static_cast<size_t>(put));
+    size_ += put;
+  }
+}
+
+int64_t UploadStore::Writer::Sync() {
+  std::lock_guard lock(session_->mutex);
+  RequireOwner();
+  if (::fsync(fd_) != 0) ThrowWriteError("cannot sync an upload");
+  return size_;
+}
+
+void UploadStore::Writer::Finish() {
+  std::lock_guard lock(session_->mutex);
+  RequireOwner();
+  if (size_ != name_.digest.size_bytes) {
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "SIZE_MISMATCH",
+                       "the upload ends after " + std::to_string(size_) + " of the announced " +
+                           std::to_string(name_.digest.size_bytes) + " bytes");
+  }
+  const fs::path path = store_->PartPath(name_);
+  const FileDigest actual = DigestFile(path);
+  if (actual.sha256 != name_.digest.sha256) {
+    ::unlink(path.c_str());
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "DIGEST_MISMATCH",
+                       "the bytes have the digest " + actual.sha256 + ", announced was " +
+                           name_.digest.sha256 + "; upload the file again");
+  }
+  store_->blobs_.Adopt(path, actual);
+}
+
+int UploadStore::ReapOlderThan(std::chrono::seconds age) {
+  int reaped = 0;
+  std::error_code error;
+  const std::time_t oldest = ::time(nullptr) - age.count();
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
+    struct stat status {};
+    if (::stat(entry.path().c_str(), &status) != 0 || status.st_mtime > oldest) continue;
+    if (::unlink(entry.path().c_str()) == 0) ++reaped;
+  }
+  return reaped;
+}
+
+}  // namespace color3d

@@ -1,0 +1,80 @@
+// Resumable uploads into the blob store: uploads/<uuid>.<sha256>.<size>.part grows until it is
+// whole; the digest is then verified and the file becomes a blob. Thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "core/base/digest.h"
+#include "server/storage/blob_store.h"
+
+namespace color3d {
+
+struct UploadName {
+  std::string uuid;  // chosen by the client: letters, digits, '-', 1 to 64 of them
+  FileDigest digest;
+};
+
+struct UploadStatus {
+  int64_t committed_size = 0;
+  bool complete = false;
+};
+
+class UploadStore {
+ public:
+  UploadStore(const std::filesystem::path& folder, BlobStore& blobs, int64_t max_blob_bytes);
+
+  // Bytes that survive a crash (synced before they are reported); 0 for an unknown upload.
+  UploadStatus Status(const UploadName& name);
+
+  // One open write. A second Open of the same upload takes it over: the client has reconnected, and
+  // the older writer gets Error{kAborted}.
+  class Writer {
+   public:
+    ~Writer();
+    Writer(const Writer&) = delete;
+    Writer& operator=(const Writer&) = delete;
+    // `offset` must be where the last write ended. kInvalidArgument otherwise or beyond the
+    // announced size; kResourceExhausted (STORAGE_FULL) when the disk is full.
+    void Append(int64_t offset, std::string_view data);
+    // Verifies and stores the blob. kInvalidArgument DIGEST_MISMATCH drops the upload.
+    void Finish();
+    // Syncs what has been written; returns its length.
+    int64_t Sync();
+
+   private:
+    friend class UploadStore;
+    struct Session;
+    Writer() = default;
+    void RequireOwner() const;
+    UploadStore* store_ = nullptr;
+    UploadName name_;
+    std::shared_ptr<Session> session_;
+    uint64_t generation_ = 0;
+    int fd_ = -1;
+    int64_t size_ = 0;
+  };
+  // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). Check Status first: a
+  // complete upload cannot be opened again, but needs no writing either.
+  std::unique_ptr<Writer> Open(const UploadName& name, int64_t offset);
+
+  // Removes uploads that have not grown for `age`; returns how many.
+  int ReapOlderThan(std::chrono::seconds age);
+
+ private:
+  std::filesystem::path PartPath(const UploadName& name) const;
+
+  std::filesystem::path folder_;
+  BlobStore& blobs_;
+  int64_t max_blob_bytes_;
+  std::mutex mutex_;
+  std::map<std::string, std::weak_ptr<Writer::Session>> sessions_;
+};
+
+}  // namespace color3d

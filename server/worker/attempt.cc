@@ -1,0 +1,281 @@
+#include "server/worker/attempt.h"
+
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <map>
+#include <new>
+
+#include "core/base/files.h"
+#include "server/jobs/planner.h"
+#include "server/ops/process.h"
+#include "server/service_error.h"
+#include "server/worker/blob_checkpoints.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+// Read-only view of a blob under another name: a hard link, or a copy across filesystems.
+void LinkOrCopy(const fs::path& blob, const fs::path& target) {
+  fs::create_directories(target.parent_path());
+  if (::link(blob.c_str(), target.c_str()) == 0) return;
+  fs::copy_file(blob, target);
+}
+
+std::string MediaType(const std::string& name) {
+  static const std::map<std::string, std::string> types = {{".png", "image/png"},
+                                                           {".jpg", "image/jpeg"},
+                                                           {".jpeg", "image/jpeg"},
+                                                           {".json", "application/json"},
+                                                           {".csv", "text/csv"},
+                                                           {".txt", "text/plain"},
+                                                           {".log", "text/plain"},
+                                                           {".html", "text/html"},
+                                                           {".svg", "image/svg+xml"},
+                                                           {".mp4", "video/mp4"}};
+  const auto type = types.find(fs::path(name).extension().string());
+  return type != types.end() ? type->second : "application/octet-stream";
+}
+
+class StoredBlobs : public BlobSource {
+ public:
+  explicit StoredBlobs(const BlobStore& blobs) : blobs_(blobs) {}
+  fs::path Fetch(const std::string& sha256) override { return blobs_.Fetch(sha256); }
+
+ private:
+  const BlobStore& blobs_;
+};
+
+class Attempt {
+ public:
+  Attempt(const AttemptContext& context, const JobRecord& job)
+      : context_(context),
+        job_(job),
+        tag_(AttemptTag(job)),
+        scratch_(context.paths.Scratch() /
+                 (job.name.substr(job.name.find('/') + 1) + "-" + std::to_string(job.lease_epoch))),
+        keeper_(
+            context.heartbeat_store,
+            job,
+            context.timing,
+            context.draining,
+            [this] { context_.on_heartbeat(job_); },
+            [this](StopReason reason) { GiveUp(reason); }),
+        checkpoints_(context.store, context.blobs, job, context.checkpoint_interval) {
+    ResetPeakMemory();
+  }
+  ~Attempt() {
+    std::error_code error;
+    fs::remove_all(scratch_, error);
+  }
+
+  void Run();
+
+ private:
+  void Prepare();
+  bool ServeFromCache();
+  void Compute();
+  void Publish(const StageOutput& output);
+  void HandleError(const JobError& error);
+  // Writes the end of an attempt that was told to stop; false when there was no such order.
+  void Conclude(JobStore& store, StopReason reason, const JobError& error);
+  [[noreturn]] void GiveUp(StopReason reason);
+  void LogEnd(const char* how);
+
+  const AttemptContext& context_;
+  const JobRecord job_;
+  const std::string tag_;
+  const fs::path scratch_;
+  StageRun run_;
+  std::string stage_key_;
+  std::map<std::string, ArtifactRecord> input_artifacts_;
+  LeaseKeeper keeper_;
+  BlobCheckpoints checkpoints_;
+};
+
+void Attempt::Run() {
+  spdlog::info("{} begins {} of {}", tag_, job_.kind, job_.scene);
+  try {
+    Prepare();
+    if (!ServeFromCache()) Compute();
+  } catch (const Error& e) {
+    HandleError({e.code(), ReasonOf(e), e.what()});
+  } catch (const std::bad_alloc&) {
+    HandleError({ErrorCode::kResourceExhausted,
+                 "OUT_OF_MEMORY",
+                 job_.kind + " ran out of memory; use smaller pictures (max_side_px) or a machine "
+                             "with more"});
+  } catch (const std::exception& e) {
+    HandleError({ErrorCode::kInternal, "INTERNAL", std::string("unexpected: ") + e.what()});
+  }
+}
+
+void Attempt::Prepare() {
+  fs::remove_all(scratch_);
+  run_.job_name = job_.name;
+  run_.spec = job_.spec;
+  run_.threads = context_.threads;
+  run_.scene_folder = scratch_ / "scene";
+  run_.output_folder = scratch_ / "out";
+  run_.scratch_folder = scratch_ / "tmp";
+  for (const fs::path& folder : {run_.scene_folder, run_.output_folder, run_.scratch_folder}) {
+    fs::create_directories(folder);
+  }
+  std::string manifest;
+  for (const SceneFileRecord& file : context_.store.GetScene(job_.scene).files) {
+    LinkOrCopy(context_.blobs.Fetch(file.digest.sha256), run_.scene_folder / file.path);
+    manifest += file.path + '\n' + file.digest.sha256 + '\n';
+    keeper_.token().ThrowIfCancelled();
+  }
+  for (const JobRecord& input : context_.store.GetInputs(job_.id)) {
+    for (const ArtifactRecord& artifact : input.artifacts) {
+      if (!input_artifacts_.emplace(artifact.name, artifact).second) continue;
+      const fs::path path = scratch_ / "inputs" / artifact.name;
+      LinkOrCopy(context_.blobs.Fetch(artifact.digest.sha256), path);
+      run_.inputs[artifact.name] = path;
+    }
+  }
+  for (const JobRecord& child : context_.store.ListChildren(job_.name)) {
+    run_.graph.push_back({child.kind,
+                          JobStateName(child.state),
+                          child.skip_reason,
+                          child.progress.seconds,
+                          child.cached,
+                          child.peak_memory_bytes,
+                          child.warnings});
+  }
+  const StageKeyPart part = KeyPartOf(job_.spec);
+  if (part.bytes.empty()) return;
+  std::string material = context_.code_version + '\n' + Sha256Hex(manifest) + '\n';
+  for (const auto& [name, artifact] : input_artifacts_) {
+    material += name + '\n' + artifact.digest.sha256 + '\n';
+  }
+  stage_key_ = Sha256Hex(material + part.bytes);
+}
+
+bool Attempt::ServeFromCache() {
+  if (KeyPartOf(job_.spec).skip_cache) return false;
+  const std::optional<JobRecord> earlier = context_.store.FindStage(stage_key_);
+  if (!earlier) return false;
+  for (const ArtifactRecord& artifact : earlier->artifacts) {
+    if (!context_.blobs.Touch(artifact.digest)) return false;
+  }
+  keeper_.Stop();
+  if (keeper_.stop_reason() != StopReason::kNone) keeper_.token().ThrowIfCancelled();
+  Publication publication;
+  publication.artifacts = earlier->artifacts;
+  publication.stage_key = stage_key_;
+  publication.cached = true;
+  publication.usage = {earlier->progress.seconds, earlier->peak_memory_bytes, earlier->warnings};
+  context_.store.Publish(keeper_.lease(), publication);
+  spdlog::info("{} served from the stage cache ({})", tag_, earlier->name);
+  return true;
+}
+
+void Attempt::Compute() {
+  StoredBlobs blobs(context_.blobs);
+  const StageOutput output =
+      context_.runner.Run(run_, blobs, checkpoints_, keeper_, keeper_.token());
+  Publish(output);
+}
+
+void Attempt::Publish(const StageOutput& output) {
+  Publication publication;
+  for (const std::string& name : output.passed_on) {
+    const auto artifact = input_artifacts_.find(name);
+    if (artifact == input_artifacts_.end()) {
+      throw Error(ErrorCode::kInternal,
+                  job_.kind + " passes on '" + name + "', which no input has");
+    }
+    publication.artifacts.push_back(artifact->second);
+  }
+  for (const std::string& name : output.files) {
+    const fs::path file = run_.output_folder / name;
+    std::error_code error;
+    if (!IsSafeRelativePath(name) || !fs::is_regular_file(fs::symlink_status(file, error))) {
+      throw Error(
+          ErrorCode::kInternal,
+          job_.kind + " names the result '" + name + "', which is not a file in its output folder");
+    }
+    context_.blobs.RequireSpace(0);
+    publication.artifacts.push_back({name, context_.blobs.PutFile(file), MediaType(name)});
+    if (keeper_.stop_reason() == StopReason::kLeaseLost) keeper_.token().ThrowIfCancelled();
+  }
+  publication.stage_key = stage_key_;
+  publication.usage = keeper_.Usage();
+  keeper_.Stop();  // a heartbeat after the end would look like a lost lease
+  context_.store.Publish(keeper_.lease(), publication);
+  checkpoints_.RemoveNewest();
+  LogEnd("succeeded");
+}
+
+void Attempt::LogEnd(const char* how) {
+  const AttemptUsage usage = keeper_.Usage();
+  spdlog::info("{} {} after {:.1f} s, peak memory {} MiB, now {} MiB",
+               tag_,
+               how,
+               usage.seconds,
+               usage.peak_memory_bytes >> 20,
+               ResidentMemoryBytes() >> 20);
+}
+
+void Attempt::HandleError(const JobError& error) {
+  keeper_.Stop();
+  try {
+    Conclude(context_.store, keeper_.stop_reason(), error);
+  } catch (const Error& e) {
+    spdlog::error("{} cannot report its end ({}); its lease will run out", tag_, e.what());
+  }
+}
+
+void Attempt::Conclude(JobStore& store, StopReason reason, const JobError& error) {
+  const AttemptUsage usage = keeper_.Usage();
+  switch (reason) {
+    case StopReason::kLeaseLost:
+      spdlog::warn("{} lost its lease; nothing is published", tag_);
+      return;
+    case StopReason::kCancelled:
+      store.Fail(keeper_.lease(), {ErrorCode::kCancelled, "CANCELLED", "cancelled"}, usage);
+      return LogEnd("was cancelled");
+    case StopReason::kDraining:
+      store.Release(keeper_.lease(), usage);
+      return LogEnd("was released for another worker");
+    case StopReason::kStuck:
+      store.Fail(keeper_.lease(),
+                 {ErrorCode::kDeadlineExceeded,
+                  "STAGE_STUCK",
+                  job_.kind + " made no progress for " +
+                      std::to_string(context_.timing.stuck.count() / 1000) + " s"},
+                 usage);
+      return LogEnd("was stuck");
+    case StopReason::kNone:
+      break;
+  }
+  spdlog::error("{} failed: {}: {}", tag_, ErrorCodeName(error.code), error.message);
+  store.Fail(keeper_.lease(), error, usage);
+  LogEnd("failed");
+}
+
+// The stage does not react to the token: end the attempt in the store, then the process, because
+// the thread that hangs cannot be ended alone.
+void Attempt::GiveUp(StopReason reason) {
+  try {
+    Conclude(context_.heartbeat_store, reason, {});
+  } catch (const Error& e) {
+    spdlog::error("{} cannot report its end: {}", tag_, e.what());
+  }
+  spdlog::critical("{} does not stop; the worker process ends with it", tag_);
+  spdlog::shutdown();
+  ::_exit(3);
+}
+
+}  // namespace
+
+void RunAttempt(const AttemptContext& context, const JobRecord& job) {
+  Attempt attempt(context, job);
+  attempt.Run();
+}
+
+}  // namespace color3d

@@ -1,0 +1,37 @@
+// Checkpoints of a running job as blobs, named by a fenced update of the job's row. Only the newest
+// is kept. Used by the stage's thread.
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "core/base/progress.h"
+#include "server/jobs/job_store.h"
+#include "server/storage/blob_store.h"
+
+namespace color3d {
+
+class BlobCheckpoints : public CheckpointStore {
+ public:
+  BlobCheckpoints(JobStore& store,
+                  BlobStore& blobs,
+                  const JobRecord& job,
+                  std::chrono::milliseconds interval);
+  std::optional<std::string> Load() override;
+  bool WantsSave() override;
+  void Save(const std::string& state) override;
+  // After the job was published: its checkpoint is of no more use.
+  void RemoveNewest();
+
+ private:
+  JobStore& store_;
+  BlobStore& blobs_;
+  const Lease lease_;
+  const std::string tag_;  // of log lines
+  const std::chrono::milliseconds interval_;
+  std::optional<FileDigest> newest_;
+  std::chrono::steady_clock::time_point last_save_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace color3d

@@ -1,0 +1,165 @@
+#include "server/worker/lease_keeper.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/ops/process.h"
+
+namespace color3d {
+namespace {
+constexpr size_t kMaxWarnings = 100;
+}  // namespace
+
+std::string AttemptTag(const JobRecord& job) {
+  return "[job=" + job.name + " attempt=" + std::to_string(job.attempt) + "]";
+}
+
+LeaseKeeper::LeaseKeeper(JobStore& store,
+                         const JobRecord& job,
+                         const LeaseTiming& timing,
+                         const std::atomic<bool>& draining,
+                         std::function<void()> on_heartbeat,
+                         std::function<void(StopReason)> give_up)
+    : store_(store),
+      lease_{job.id, job.lease_epoch},
+      tag_(AttemptTag(job)),
+      timing_(timing),
+      draining_(draining),
+      on_heartbeat_(std::move(on_heartbeat)),
+      give_up_(std::move(give_up)),
+      earlier_seconds_(job.progress.seconds) {
+  progress_ = job.progress;
+  progress_.eta_seconds = -1.0;
+  thread_ = std::thread([this] { Loop(); });
+}
+
+LeaseKeeper::~LeaseKeeper() { Stop(); }
+
+void LeaseKeeper::Stop() {
+  {
+    std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  wake_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+double LeaseKeeper::SecondsSoFar() const {
+  return earlier_seconds_ + std::chrono::duration<double>(SteadyClock::now() - start_).count();
+}
+
+AttemptUsage LeaseKeeper::Usage() const {
+  std::lock_guard lock(mutex_);
+  return {SecondsSoFar(), PeakMemoryBytes(), warnings_};
+}
+
+void LeaseKeeper::OnProgress(int64_t step, int64_t total_steps, const std::string& message) {
+  std::lock_guard lock(mutex_);
+  const bool fresh = total_steps != progress_.total_steps || step < progress_.step;
+  progress_.step = step;
+  progress_.total_steps = total_steps;
+  progress_.message = message;
+  last_progress_ = SteadyClock::now();
+  if (fresh) {
+    eta_base_step_ = step;
+    eta_base_time_ = last_progress_;
+  }
+  UpdateEta();
+  dirty_ = true;
+}
+
+void LeaseKeeper::UpdateEta() {
+  const double elapsed = std::chrono::duration<double>(last_progress_ - eta_base_time_).count();
+  const int64_t done = progress_.step - eta_base_step_;
+  const bool known = progress_.total_steps > 0 && done > 0 && elapsed > 0.5;
+  progress_.eta_seconds = known ? elapsed / static_cast<double>(done) *
+                                      static_cast<double>(progress_.total_steps - progress_.step)
+                                : -1.0;
+}
+
+void LeaseKeeper::OnError(int64_t, const std::string& error_name, double value) {
+  std::lock_guard lock(mutex_);
+  progress_.error_name = error_name;
+  progress_.error_value = std::isfinite(value) ? value : 0.0;
+  last_progress_ = SteadyClock::now();
+  dirty_ = true;
+}
+
+void LeaseKeeper::OnWarning(const std::string& message) {
+  spdlog::warn("{} {}", tag_, message);
+  std::lock_guard lock(mutex_);
+  const bool known = std::find(warnings_.begin(), warnings_.end(), message) != warnings_.end();
+  if (!known && warnings_.size() < kMaxWarnings) warnings_.push_back(message);
+}
+
+void LeaseKeeper::StopStage(StopReason reason) {
+  StopReason expected = StopReason::kNone;
+  if (!reason_.compare_exchange_strong(expected, reason)) return;
+  stopped_at_ = SteadyClock::now();
+  token_.Cancel();
+}
+
+// Stores progress and extends the lease, or at least looks whether the user wants it cancelled.
+void LeaseKeeper::Beat() {
+  ProgressRecord progress;
+  std::vector<std::string> warnings;
+  bool dirty = false;
+  {
+    std::lock_guard lock(mutex_);
+    progress = progress_;
+    warnings = warnings_;
+    dirty = dirty_;
+    dirty_ = false;
+  }
+  progress.seconds = SecondsSoFar();
+  const auto now = SteadyClock::now();
+  try {
+    bool cancel = false;
+    if (dirty || now - last_attempt_ >= timing_.heartbeat) {
+      last_attempt_ = now;
+      cancel = store_.Heartbeat(lease_, progress, warnings, timing_.lease.count()).cancel_requested;
+      last_success_ = now;
+    } else if (now - last_peek_ >= std::min(timing_.heartbeat, std::chrono::milliseconds(1000))) {
+      cancel = store_.Peek(lease_).cancel_requested;
+      last_peek_ = now;
+    }
+    if (cancel) StopStage(StopReason::kCancelled);
+    if (now - last_report_ >= timing_.heartbeat) {
+      last_report_ = now;
+      on_heartbeat_();
+    }
+  } catch (const Error& e) {
+    if (e.code() == ErrorCode::kAborted) {
+      StopStage(StopReason::kLeaseLost);
+    } else {
+      spdlog::warn("{} heartbeat failed: {}", tag_, e.what());
+    }
+  }
+}
+
+void LeaseKeeper::Loop() {
+  const auto tick = std::min(timing_.progress, timing_.heartbeat / 2);
+  std::unique_lock lock(mutex_);
+  while (!wake_.wait_for(lock, tick, [this] { return ending_; })) {
+    const auto last_progress = last_progress_;
+    lock.unlock();
+    Beat();
+    const auto now = SteadyClock::now();
+    // A worker that cannot reach the store stops before somebody else may take its job over.
+    if (SteadyClock::now() - last_success_ > timing_.lease * 2 / 3) {
+      StopStage(StopReason::kLeaseLost);
+    }
+    if (draining_.load()) StopStage(StopReason::kDraining);
+    if (now - last_progress > timing_.stuck) StopStage(StopReason::kStuck);
+    const StopReason reason = reason_.load();
+    if (reason != StopReason::kNone) {
+      const auto grace = reason == StopReason::kDraining ? timing_.drain_grace : timing_.stop_grace;
+      if (SteadyClock::now() - stopped_at_ > grace) give_up_(reason);
+    }
+    lock.lock();
+  }
+}
+
+}  // namespace color3d

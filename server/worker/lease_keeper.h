@@ -1,0 +1,103 @@
+// Keeps one running job alive: heartbeats from a thread of its own, coalesced progress, and every
+// reason to stop early (cancelled by a user, lease lost, drain, stuck) turned into one token.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/progress.h"
+#include "server/jobs/job_store.h"
+
+namespace color3d {
+
+struct LeaseTiming {
+  std::chrono::milliseconds lease{60'000};
+  std::chrono::milliseconds heartbeat{10'000};
+  // Progress reaches the store at most this often.
+  std::chrono::milliseconds progress{250};
+  // Without any progress for this long the stage counts as stuck.
+  std::chrono::milliseconds stuck{15 * 60'000};
+  // A stage that has not stopped this long after it was told to is given up with its process.
+  std::chrono::milliseconds stop_grace{60'000};
+  std::chrono::milliseconds drain_grace{15'000};
+};
+
+// "[job=jobs/... attempt=1]", the beginning of every log line about the attempt.
+std::string AttemptTag(const JobRecord& job);
+
+enum class StopReason { kNone, kCancelled, kLeaseLost, kDraining, kStuck };
+
+// Thread-safe. The stage reports progress here from its own threads.
+class LeaseKeeper : public ProgressObserver {
+ public:
+  // `store` is used from the heartbeat thread: give it a connection of its own. `draining` turns
+  // true when the worker must stop. `on_heartbeat` is called there after each full heartbeat.
+  // `give_up` is called on the heartbeat thread when the stage does
+  // not stop in time, and must not return (the process ends).
+  LeaseKeeper(JobStore& store,
+              const JobRecord& job,
+              const LeaseTiming& timing,
+              const std::atomic<bool>& draining,
+              std::function<void()> on_heartbeat,
+              std::function<void(StopReason)> give_up);
+  ~LeaseKeeper() override;
+
+  const CancellationToken& token() const { return token_; }
+  StopReason stop_reason() const { return reason_.load(); }
+  // Ends the heartbeats; the caller then publishes or fails the job.
+  void Stop();
+  // Seconds over all attempts, warnings and peak memory so far.
+  AttemptUsage Usage() const;
+  Lease lease() const { return lease_; }
+
+  void OnProgress(int64_t step, int64_t total_steps, const std::string& message) override;
+  void OnError(int64_t iteration, const std::string& error_name, double value) override;
+  void OnWarning(const std::string& message) override;
+
+ private:
+  using SteadyClock = std::chrono::steady_clock;
+  void Loop();
+  void Beat();
+  void StopStage(StopReason reason);
+  double SecondsSoFar() const;
+  void UpdateEta();
+
+  JobStore& store_;
+  const Lease lease_;
+  const std::string tag_;  // of log lines
+  const LeaseTiming timing_;
+  const std::atomic<bool>& draining_;
+  const std::function<void()> on_heartbeat_;
+  const std::function<void(StopReason)> give_up_;
+  const double earlier_seconds_;
+  const SteadyClock::time_point start_ = SteadyClock::now();
+  CancellationToken token_;
+  std::atomic<StopReason> reason_{StopReason::kNone};
+  SteadyClock::time_point stopped_at_;  // heartbeat thread only
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  bool ending_ = false;
+  bool dirty_ = false;
+  ProgressRecord progress_;
+  std::vector<std::string> warnings_;
+  SteadyClock::time_point last_progress_ = start_;
+  // Where the present run of steps began, for the expected time to its end.
+  int64_t eta_base_step_ = 0;
+  SteadyClock::time_point eta_base_time_ = start_;
+
+  SteadyClock::time_point last_attempt_ = start_;  // heartbeat thread only
+  SteadyClock::time_point last_success_ = start_;
+  SteadyClock::time_point last_peek_ = start_;
+  SteadyClock::time_point last_report_ = start_;
+  std::thread thread_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,85 @@
+#include "server/worker/stage_options.h"
+
+namespace color3d {
+
+ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
+  ImportOptions options;
+  options.threads = threads;
+  options.hold_out_every_eighth = spec.hold_out_every_eighth();
+  if (spec.has_sfm_max_image_side_px()) options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
+  if (spec.has_sfm_max_features()) options.sfm_max_features = spec.sfm_max_features();
+  if (spec.has_sfm_timeout_seconds()) {
+    options.sfm_timeout = std::chrono::seconds(spec.sfm_timeout_seconds());
+  }
+  return options;
+}
+
+SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
+  SelectKeyViewOptions options;
+  options.view = spec.view();
+  switch (spec.strategy()) {
+    case v1::SelectKeyViewSpec::STRATEGY_ENTROPY:
+      options.selection.strategy = KeyViewStrategy::kEntropy;
+      break;
+    case v1::SelectKeyViewSpec::STRATEGY_MANUAL:
+      options.selection.strategy = KeyViewStrategy::kManual;
+      break;
+    default:
+      options.selection.strategy = KeyViewStrategy::kCoverage;
+  }
+  if (spec.has_temperature()) options.selection.temperature = spec.temperature();
+  if (spec.has_exclude_self()) options.selection.exclude_self = spec.exclude_self();
+  if (spec.has_outlier_guard()) options.selection.outlier_guard = spec.outlier_guard();
+  return options;
+}
+
+HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec) {
+  HintOptions options;
+  if (spec.has_hint_sigma()) options.sigma = spec.hint_sigma();
+  return options;
+}
+
+ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed) {
+  ColorizerOptions options;
+  options.threads = threads;
+  options.seed = seed;
+  if (spec.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) {
+    options.recipe = ColorizerOptions::Recipe::kPaper;
+  }
+  if (spec.has_iterations()) options.iterations = spec.iterations();
+  if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  if (spec.has_crop_px()) options.crop_px = spec.crop_px();
+  if (spec.has_consistency_weight()) options.consistency_weight = spec.consistency_weight();
+  return options;
+}
+
+GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed) {
+  GeometryOptions options;
+  options.seed = seed;
+  if (spec.has_iterations()) options.iterations = spec.iterations();
+  if (spec.has_max_gaussians()) options.max_gaussians = spec.max_gaussians();
+  if (spec.has_sh_degree()) options.sh_degree = spec.sh_degree();
+  if (spec.has_ssim_weight()) options.ssim_weight = spec.ssim_weight();
+  if (spec.has_edge_weight()) options.edge_weight = spec.edge_weight();
+  return options;
+}
+
+ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) {
+  ChromaOptions options;
+  options.seed = seed;
+  if (spec.has_iterations()) options.iterations = spec.iterations();
+  if (spec.has_chroma_sh_degree()) options.chroma_sh_degree = spec.chroma_sh_degree();
+  if (spec.has_ssim_weight()) options.ssim_weight = spec.ssim_weight();
+  return options;
+}
+
+RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec) {
+  RenderOptions options;
+  options.views.assign(spec.views().begin(), spec.views().end());
+  if (spec.has_max_views()) options.max_views = spec.max_views();
+  options.max_side_px = spec.has_max_side_px() ? spec.max_side_px() : kDefaultMaxSidePx;
+  return options;
+}
+
+}  // namespace color3d

@@ -1,0 +1,22 @@
+// JobSpec messages -> option structs of the method library. Unset fields keep the struct's default;
+// a value out of range is refused later by the struct's own Validate().
+#pragma once
+
+#include "color3d/v1/stage.pb.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+
+ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads);
+SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
+// Source and file are set by the caller, which holds the blobs.
+HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
+ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed);
+GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed);
+ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed);
+RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec);
+
+// Working size when a single-stage job does not say.
+inline constexpr int kDefaultMaxSidePx = 500;
+
+}  // namespace color3d

@@ -1,0 +1,139 @@
+#include "server/worker/stage_runner.h"
+
+#include "color3d/v1/job.pb.h"
+#include "core/report/curves.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
+#include "server/worker/stage_options.h"
+
+namespace color3d {
+namespace {
+
+using v1::JobSpec;
+
+ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, BlobSource& blobs) {
+  ColorizeKeyViewOptions options;
+  options.hints = HintOptionsFrom(spec);
+  const v1::KeyColorSource& source = spec.source();
+  switch (source.source_case()) {
+    case v1::KeyColorSource::kImage:
+      options.source = ColorizeKeyViewOptions::Source::kImage;
+      options.file = blobs.Fetch(source.image().sha256());
+      break;
+    case v1::KeyColorSource::kStrokes:
+      options.source = ColorizeKeyViewOptions::Source::kStrokes;
+      options.file = blobs.Fetch(source.strokes().sha256());
+      break;
+    case v1::KeyColorSource::kPoints:
+      options.source = ColorizeKeyViewOptions::Source::kPoints;
+      options.file = blobs.Fetch(source.points().sha256());
+      break;
+    default:
+      throw Error(ErrorCode::kUnimplemented, "this source of key colour is not built yet");
+  }
+  return options;
+}
+
+void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {
+  std::vector<TruthFile> truth;
+  for (const v1::TruthImage& image : spec.truth()) {
+    truth.push_back({image.view(), blobs.Fetch(image.image().sha256())});
+  }
+  RunEvaluate(truth, context);
+}
+
+void RunRootReport(const std::vector<JobSummary>& graph, StageContext& context) {
+  std::vector<StageSummary> stages;
+  for (const JobSummary& job : graph) {
+    stages.push_back({job.kind,
+                      job.state,
+                      job.skip_reason,
+                      job.seconds,
+                      job.peak_memory_bytes,
+                      job.warnings});
+  }
+  RunReport(stages, context);
+}
+
+class CoreStageRunner : public StageRunner {
+ public:
+  StageOutput Run(const StageRun& run,
+                  BlobSource& blobs,
+                  CheckpointStore& checkpoints,
+                  ProgressObserver& progress,
+                  const CancellationToken& cancel) override {
+    JobSpec spec;
+    if (!spec.ParseFromString(run.spec)) {
+      throw Error(ErrorCode::kDataLoss, "the stored spec of " + run.job_name + " is damaged");
+    }
+    const std::string kind =
+        spec.stage_case() == JobSpec::STAGE_NOT_SET
+            ? std::string()
+            : JobSpec::descriptor()->FindFieldByNumber(spec.stage_case())->name();
+    CurveRecorder recorder(kind, progress, checkpoints);
+    StageContext context({run.scene_folder,
+                          run.inputs,
+                          run.output_folder,
+                          run.scratch_folder,
+                          run.threads,
+                          spec.seed() == 0 ? 1 : spec.seed()},
+                         recorder,
+                         recorder,
+                         cancel);
+    RunStage(spec, kind, run, blobs, context);
+    const auto points = recorder.points();
+    if (!points.empty() && kind != "colorize_scene") {
+      context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(points));
+    }
+    return {context.outputs(), context.passed_on()};
+  }
+
+ private:
+  static void RunStage(const JobSpec& spec,
+                       const std::string& kind,
+                       const StageRun& run,
+                       BlobSource& blobs,
+                       StageContext& context) {
+    switch (spec.stage_case()) {
+      case JobSpec::kImportScene:
+        return RunImportScene(ImportOptionsFrom(spec.import_scene(), run.threads), context);
+      case JobSpec::kSelectKeyView:
+        return RunSelectKeyView(SelectOptionsFrom(spec.select_key_view()), context);
+      case JobSpec::kColorizeKeyView:
+        return RunColorizeKeyView(KeyColorOptions(spec.colorize_key_view(), blobs), context);
+      case JobSpec::kPersonalize:
+        return RunPersonalize(
+            ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()), context);
+      case JobSpec::kColorizeViews:
+        return RunColorizeViews(spec.colorize_views().has_max_side_px()
+                                    ? spec.colorize_views().max_side_px()
+                                    : kDefaultMaxSidePx,
+                                context);
+      case JobSpec::kReconstructGeometry:
+        return RunReconstructGeometry(
+            GeometryOptionsFrom(spec.reconstruct_geometry(), context.seed()),
+            spec.reconstruct_geometry().has_max_side_px()
+                ? spec.reconstruct_geometry().max_side_px()
+                : kDefaultMaxSidePx,
+            context);
+      case JobSpec::kSolveChroma:
+        return RunSolveChroma(ChromaOptionsFrom(spec.solve_chroma(), context.seed()), context);
+      case JobSpec::kExport:
+        return RunExport(context);
+      case JobSpec::kRender:
+        return RunRender(RenderOptionsFrom(spec.render()), context);
+      case JobSpec::kEvaluate:
+        return RunEvaluation(spec.evaluate(), blobs, context);
+      case JobSpec::kColorizeScene:
+        return RunRootReport(run.graph, context);
+      default:
+        throw Error(ErrorCode::kUnimplemented, "jobs of kind \"" + kind + "\" are not built yet");
+    }
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<StageRunner> MakeStageRunner() { return std::make_unique<CoreStageRunner>(); }
+
+}  // namespace color3d

@@ -1,0 +1,150 @@
+#include "server/worker/supervisor.h"
+
+#include <signal.h>
+#include <spawn.h>
+#include <spdlog/spdlog.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+extern char** environ;
+
+namespace color3d {
+namespace {
+constexpr auto kTick = std::chrono::milliseconds(50);
+// A worker that lived this long did not fail to start.
+constexpr auto kHealthyLife = std::chrono::seconds(60);
+}  // namespace
+
+Supervisor::Supervisor(const SupervisorOptions& options, JobStore& store)
+    : options_(options), store_(store) {
+  kill_at_ = SteadyClock::time_point::max();
+  for (int i = 0; i < options_.workers; ++i) {
+    Slot slot;
+    slot.name = "worker-" + std::to_string(i + 1);
+    slots_.push_back(slot);
+  }
+  thread_ = std::thread([this] { Loop(); });
+}
+
+Supervisor::~Supervisor() {
+  Drain(std::chrono::milliseconds(0));
+  Wait();
+}
+
+void Supervisor::Drain(std::chrono::milliseconds grace) {
+  const SteadyClock::time_point kill_at = SteadyClock::now() + grace;
+  if (kill_at < kill_at_.load()) kill_at_ = kill_at;
+  draining_ = true;
+}
+
+void Supervisor::Wait() {
+  if (thread_.joinable()) thread_.join();
+}
+
+void Supervisor::StartWorker(Slot* slot) {
+  std::vector<std::string> arguments = {options_.program.string()};
+  arguments.insert(arguments.end(), options_.arguments.begin(), options_.arguments.end());
+  arguments.insert(arguments.end(),
+                   {"--name", slot->name, "--parent-pid", std::to_string(::getpid())});
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  // Signals as a fresh program expects them (ours are blocked), and a process group of its own so
+  // that Ctrl-C reaches the server alone, which then drains its workers.
+  posix_spawnattr_t attributes;
+  ::posix_spawnattr_init(&attributes);
+  sigset_t none;
+  ::sigemptyset(&none);
+  sigset_t defaults;
+  ::sigemptyset(&defaults);
+  for (const int signal : {SIGTERM, SIGINT, SIGPIPE}) ::sigaddset(&defaults, signal);
+  ::posix_spawnattr_setsigmask(&attributes, &none);
+  ::posix_spawnattr_setsigdefault(&attributes, &defaults);
+  ::posix_spawnattr_setpgroup(&attributes, 0);
+  ::posix_spawnattr_setflags(
+      &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  pid_t pid = 0;
+  const int error =
+      ::posix_spawn(&pid, options_.program.c_str(), nullptr, &attributes, argv.data(), environ);
+  ::posix_spawnattr_destroy(&attributes);
+  slot->started = SteadyClock::now();
+  if (error != 0) {
+    slot->backoff = std::clamp(slot->backoff * 2, options_.first_backoff, options_.max_backoff);
+    slot->next_start = slot->started + slot->backoff;
+    spdlog::error("cannot start {}: {}", options_.program.string(), std::strerror(error));
+    return;
+  }
+  slot->pid = pid;
+  spdlog::info("{} started (pid {})", slot->name, pid);
+}
+
+void Supervisor::OnExit(Slot* slot, int status) {
+  const std::string id = slot->name + "-" + std::to_string(slot->pid);
+  const bool clean = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  std::string jobs;
+  try {
+    for (const std::string& job : store_.ExpireLeasesOf(id)) jobs += " [job=" + job + "]";
+    store_.RemoveWorker(id);
+  } catch (const Error& e) {
+    spdlog::warn("{}: {}", id, e.what());
+  }
+  if (clean) {
+    spdlog::info("{} ended", id);
+  } else if (WIFSIGNALED(status)) {
+    spdlog::error("{} was killed by signal {} ({}){}",
+                  id,
+                  WTERMSIG(status),
+                  ::strsignal(WTERMSIG(status)),
+                  jobs);
+  } else {
+    spdlog::error("{} ended with status {}{}", id, WEXITSTATUS(status), jobs);
+  }
+  const auto now = SteadyClock::now();
+  if (clean || now - slot->started > kHealthyLife) {
+    slot->backoff = std::chrono::milliseconds(0);
+  } else {
+    slot->backoff = std::clamp(slot->backoff * 2, options_.first_backoff, options_.max_backoff);
+  }
+  // Ends without a fault (recycling) are not held back, but never spin either.
+  slot->next_start = now + std::max(slot->backoff, std::chrono::milliseconds(50));
+  slot->pid = 0;
+}
+
+void Supervisor::CheckWorker(Slot* slot) {
+  if (slot->pid == 0) {
+    if (!draining_.load() && SteadyClock::now() >= slot->next_start) StartWorker(slot);
+    return;
+  }
+  int status = 0;
+  const pid_t ended = ::waitpid(slot->pid, &status, WNOHANG);
+  if (ended == slot->pid) OnExit(slot, status);
+}
+
+void Supervisor::Loop() {
+  bool told = false;
+  while (true) {
+    for (Slot& slot : slots_) CheckWorker(&slot);
+    if (draining_.load()) {
+      const bool kill = SteadyClock::now() >= kill_at_.load();
+      bool running = false;
+      for (const Slot& slot : slots_) {
+        if (slot.pid == 0) continue;
+        running = true;
+        if (kill) {
+          ::kill(slot.pid, SIGKILL);
+        } else if (!told) {
+          ::kill(slot.pid, SIGTERM);
+        }
+      }
+      told = true;
+      if (!running) return;
+    }
+    std::this_thread::sleep_for(kTick);
+  }
+}
+
+}  // namespace color3d

@@ -1,0 +1,64 @@
+// Starts worker processes, starts them again when they end, and ends them at a drain. One thread,
+// which also is the one that the kernel ties the workers' lives to.
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/jobs/job_store.h"
+
+namespace color3d {
+
+struct SupervisorOptions {
+  std::filesystem::path program;
+  std::vector<std::string> arguments;  // besides --name and --parent-pid
+  int workers = 1;
+  std::chrono::milliseconds first_backoff{500};
+  std::chrono::milliseconds max_backoff{10'000};
+};
+
+class Supervisor {
+ public:
+  // Starts the workers. The store outlives the supervisor; it learns of dead workers at once, so
+  // that their jobs need not wait for the lease's end.
+  Supervisor(const SupervisorOptions& options, JobStore& store);
+  // Kills what still runs.
+  ~Supervisor();
+  Supervisor(const Supervisor&) = delete;
+  Supervisor& operator=(const Supervisor&) = delete;
+
+  // SIGTERM to all workers, no more restarts; SIGKILL to those that still run after `grace`.
+  void Drain(std::chrono::milliseconds grace);
+  // Waits until all workers have ended after Drain.
+  void Wait();
+
+ private:
+  using SteadyClock = std::chrono::steady_clock;
+  struct Slot {
+    std::string name;
+    pid_t pid = 0;  // 0: not running
+    SteadyClock::time_point started;
+    SteadyClock::time_point next_start;
+    std::chrono::milliseconds backoff{0};
+  };
+  void Loop();
+  void StartWorker(Slot* slot);
+  void CheckWorker(Slot* slot);
+  void OnExit(Slot* slot, int status);
+
+  const SupervisorOptions options_;
+  JobStore& store_;
+  std::vector<Slot> slots_;  // supervisor's thread only
+  std::atomic<bool> draining_{false};
+  std::atomic<SteadyClock::time_point> kill_at_;
+  std::thread thread_;
+};
+
+}  // namespace color3d

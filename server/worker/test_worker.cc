@@ -1,0 +1,136 @@
+// color3d-test-worker: the worker loop with scripted stages instead of the method library. Every
+// kind leaves the artifacts that its successors ask for. A select_key_view job with
+// STRATEGY_MANUAL takes its script from `view`: words separated by commas.
+//   steps=N  ms=N       N steps of so many milliseconds, a checkpoint after each
+//   crash, throw, oom, unavailable_once, hang (deaf to cancellation)
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <new>
+#include <sstream>
+#include <thread>
+
+#include "color3d/v1/job.pb.h"
+#include "core/base/files.h"
+#include "server/jobs/spec_check.h"
+#include "server/worker/worker_loop.h"
+
+namespace color3d {
+namespace {
+
+struct Script {
+  int steps = 3;
+  int step_ms = 1;
+  std::vector<std::string> words;
+  bool Has(const std::string& word) const {
+    for (const std::string& w : words) {
+      if (w == word) return true;
+    }
+    return false;
+  }
+};
+
+Script ParseScript(const std::string& text) {
+  Script script;
+  std::stringstream stream(text);
+  std::string word;
+  while (std::getline(stream, word, ',')) {
+    if (word.rfind("steps=", 0) == 0) {
+      script.steps = std::atoi(word.c_str() + 6);
+    } else if (word.rfind("ms=", 0) == 0) {
+      script.step_ms = std::atoi(word.c_str() + 3);
+    } else {
+      script.words.push_back(word);
+    }
+  }
+  return script;
+}
+
+std::vector<std::string> ArtifactsOf(const std::string& kind) {
+  if (kind == "import_scene") return {"scene.json"};
+  if (kind == "select_key_view") return {"key_view.json"};
+  if (kind == "colorize_key_view") return {"key_color.png"};
+  if (kind == "personalize") return {"colorizer.c3c"};
+  if (kind == "colorize_views") return {"views_ab/a.png", "views_ab/b.png"};
+  if (kind == "reconstruct_geometry") return {"geometry.c3g"};
+  if (kind == "solve_chroma") return {"model.c3g"};
+  if (kind == "export") return {"scene.ply"};
+  if (kind == "render") return {"renders/a.png"};
+  if (kind == "evaluate") return {"metrics.json"};
+  return {"report.html"};
+}
+
+// What an effect without a fence looks like: a line in a shared file, repeated whenever a step is.
+void LogUnfenced(const std::string& job, int step) {
+  const char* path = std::getenv("COLOR3D_TEST_EFFECTS");
+  if (path == nullptr) return;
+  std::ofstream(path, std::ios::app) << job + " " + std::to_string(step) + "\n";
+}
+
+class ScriptedRunner : public StageRunner {
+ public:
+  StageOutput Run(const StageRun& run,
+                  BlobSource& blobs,
+                  CheckpointStore& checkpoints,
+                  ProgressObserver& progress,
+                  const CancellationToken& cancel) override;
+
+ private:
+  static void Misbehave(const Script& script, CheckpointStore& checkpoints);
+};
+
+void ScriptedRunner::Misbehave(const Script& script, CheckpointStore& checkpoints) {
+  if (script.Has("crash")) std::abort();
+  if (script.Has("throw")) throw InvalidArgument("scripted failure");
+  if (script.Has("oom")) throw std::bad_alloc();
+  if (script.Has("unavailable_once") && !checkpoints.Load()) {
+    checkpoints.Save("tried");
+    throw Error(ErrorCode::kUnavailable, "scripted outage");
+  }
+  while (script.Has("hang")) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+StageOutput ScriptedRunner::Run(const StageRun& run,
+                                BlobSource& blobs,
+                                CheckpointStore& checkpoints,
+                                ProgressObserver& progress,
+                                const CancellationToken& cancel) {
+  v1::JobSpec spec;
+  spec.ParseFromString(run.spec);
+  const std::string kind = KindOf(spec);
+  for (const FileDigest& digest : SpecBlobs(spec)) ReadFile(blobs.Fetch(digest.sha256));
+  const Script script = ParseScript(spec.select_key_view().view());
+  Misbehave(script, checkpoints);
+  // The state is one line for each step: which process did it. Each Save is fenced, so whatever is
+  // killed in between, the published trace holds every step once.
+  std::string trace = checkpoints.Load().value_or("");
+  int step = static_cast<int>(std::count(trace.begin(), trace.end(), '\n'));
+  for (; step < script.steps; ++step) {
+    cancel.ThrowIfCancelled();
+    std::this_thread::sleep_for(std::chrono::milliseconds(script.step_ms));
+    LogUnfenced(run.job_name, step);
+    trace += std::to_string(step) + " " + std::to_string(::getpid()) + "\n";
+    if (checkpoints.WantsSave()) checkpoints.Save(trace);
+    progress.OnProgress(step + 1, script.steps, kind);
+    progress.OnError(step, "train_l1", 1.0 / (step + 1));
+  }
+  StageOutput output;
+  output.files = ArtifactsOf(kind);
+  for (const std::string& name : output.files) {
+    std::filesystem::create_directories((run.output_folder / name).parent_path());
+    WriteFileAtomic(run.output_folder / name, kind + " " + name + "\n" + trace);
+  }
+  if (run.inputs.count("scene.ply") > 0) output.passed_on.push_back("scene.ply");
+  return output;
+}
+
+std::unique_ptr<StageRunner> MakeScriptedRunner() { return std::make_unique<ScriptedRunner>(); }
+
+}  // namespace
+}  // namespace color3d
+
+int main(int argc, char** argv) {
+  return color3d::WorkerMain(argc, argv, &color3d::MakeScriptedRunner);
+}

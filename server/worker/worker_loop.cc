@@ -1,0 +1,121 @@
+#include "server/worker/worker_loop.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <thread>
+
+#include "server/jobs/sqlite_job_store.h"
+#include "server/ops/process.h"
+#include "server/worker/attempt.h"
+
+namespace color3d {
+namespace {
+
+class WorkerLoop {
+ public:
+  WorkerLoop(const WorkerOptions& options, StageRunner& runner, const std::atomic<bool>& draining)
+      : options_(options),
+        id_(options.name + "-" + std::to_string(::getpid())),
+        paths_(options.data_folder),
+        store_(paths_.Store(), SystemClock(), Store(options)),
+        heartbeat_store_(paths_.Store(), SystemClock(), Store(options)),
+        blobs_(paths_.Blobs(), {options.reserve_mib << 20}),
+        draining_(draining),
+        context_{store_,
+                 heartbeat_store_,
+                 blobs_,
+                 runner,
+                 paths_,
+                 options.timing,
+                 options.checkpoint_interval,
+                 options.threads,
+                 options.code_version,
+                 draining,
+                 [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); }} {}
+
+  void Run();
+
+ private:
+  static StoreOptions Store(const WorkerOptions& options) {
+    StoreOptions store;
+    store.retry_backoff_ms = options.retry_backoff_ms;
+    return store;
+  }
+  bool Finished() const {
+    return draining_.load() || (options_.parent != 0 && ::getppid() != options_.parent);
+  }
+  void ReportSelf(JobStore& store, const std::string& job) const;
+  bool ShouldRecycle() const;
+  // Claims and runs one job; false when there was none.
+  bool Turn();
+
+  const WorkerOptions options_;
+  const std::string id_;
+  const DataPaths paths_;
+  SqliteJobStore store_;
+  SqliteJobStore heartbeat_store_;
+  BlobStore blobs_;
+  const std::atomic<bool>& draining_;
+  const AttemptContext context_;
+  int jobs_done_ = 0;
+};
+
+void WorkerLoop::ReportSelf(JobStore& store, const std::string& job) const {
+  store.UpdateWorker({id_, ::getpid(), job, ResidentMemoryBytes(), 0});
+}
+
+bool WorkerLoop::ShouldRecycle() const {
+  if (jobs_done_ == 0) return false;
+  const int64_t memory = ResidentMemoryBytes();
+  if (memory <= options_.recycle_memory_bytes && jobs_done_ < options_.recycle_jobs) return false;
+  spdlog::info(
+      "{} ends after {} jobs with {} MiB, to be started afresh", id_, jobs_done_, memory >> 20);
+  return true;
+}
+
+bool WorkerLoop::Turn() {
+  const std::optional<JobRecord> job = store_.Claim(id_, options_.timing.lease.count());
+  if (!job) return false;
+  ReportSelf(store_, job->name);
+  RunAttempt(context_, *job);
+  ++jobs_done_;
+  ReportSelf(store_, "");
+  return true;
+}
+
+void WorkerLoop::Run() {
+  spdlog::info(
+      "{} is ready with {} threads, {} MiB", id_, options_.threads, ResidentMemoryBytes() >> 20);
+  auto next_report = std::chrono::steady_clock::now();
+  while (!Finished() && !ShouldRecycle()) {
+    bool worked = false;
+    try {
+      if (std::chrono::steady_clock::now() >= next_report) {
+        ReportSelf(store_, "");
+        next_report = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+      }
+      worked = Turn();
+    } catch (const Error& e) {
+      // A job that was claimed but not run is taken up again when its lease has run out.
+      spdlog::error("{}: {}", id_, e.what());
+    }
+    if (!worked) std::this_thread::sleep_for(options_.poll);
+  }
+  try {
+    store_.RemoveWorker(id_);
+  } catch (const Error& e) {
+    spdlog::warn("{}: {}", id_, e.what());
+  }
+}
+
+}  // namespace
+
+void RunWorker(const WorkerOptions& options,
+               StageRunner& runner,
+               const std::atomic<bool>& draining) {
+  WorkerLoop loop(options, runner, draining);
+  loop.Run();
+}
+
+}  // namespace color3d

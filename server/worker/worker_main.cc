@@ -1,0 +1,123 @@
+// Command line, log and signals of a worker process.
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <thread>
+
+#include "core/base/digest.h"
+#include "server/ops/process.h"
+#include "server/storage/data_folder.h"
+#include "server/worker/worker_loop.h"
+
+namespace color3d {
+namespace {
+
+struct WorkerArguments {
+  WorkerOptions options;
+  std::string log_level = "info";
+  double lease_seconds = 60.0;
+  double heartbeat_seconds = 10.0;
+  double checkpoint_seconds = 20.0;
+  double stuck_seconds = 900.0;
+  double drain_grace_seconds = 15.0;
+  double stop_grace_seconds = 60.0;
+};
+
+std::chrono::milliseconds Milliseconds(double seconds) {
+  return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
+}
+
+// Flags without a group are hidden: they are set by `serve` and by tests.
+void AddFlags(CLI::App* app, WorkerArguments* arguments) {
+  WorkerOptions& options = arguments->options;
+  app->add_option("--data-dir", options.data_folder, "The server's data directory")->required();
+  app->add_option("--name", options.name, "Name in logs and in GetServerInfo")
+      ->capture_default_str();
+  app->add_option("--threads", options.threads, "Threads of computing")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  app->add_option("--log-level", arguments->log_level, "trace, debug, info, warn, error, off")
+      ->capture_default_str();
+  app->add_option("--parent-pid", options.parent)->group("");
+  app->add_option("--lease-seconds", arguments->lease_seconds)->group("");
+  app->add_option("--heartbeat-seconds", arguments->heartbeat_seconds)->group("");
+  app->add_option("--checkpoint-seconds", arguments->checkpoint_seconds)->group("");
+  app->add_option("--stuck-seconds", arguments->stuck_seconds)->group("");
+  app->add_option("--drain-grace-seconds", arguments->drain_grace_seconds)->group("");
+  app->add_option("--stop-grace-seconds", arguments->stop_grace_seconds)->group("");
+  app->add_option("--retry-backoff-ms", options.retry_backoff_ms)->group("");
+  app->add_option("--reserve-mib", options.reserve_mib)->group("");
+  app->add_option("--recycle-jobs", options.recycle_jobs)->group("");
+  app->add_option("--code-version", options.code_version)->group("");
+}
+
+void Complete(WorkerArguments* arguments) {
+  WorkerOptions& options = arguments->options;
+  options.timing.lease = Milliseconds(arguments->lease_seconds);
+  options.timing.heartbeat = Milliseconds(arguments->heartbeat_seconds);
+  options.timing.stuck = Milliseconds(arguments->stuck_seconds);
+  options.timing.stop_grace = Milliseconds(arguments->stop_grace_seconds);
+  options.timing.drain_grace = Milliseconds(arguments->drain_grace_seconds);
+  options.checkpoint_interval = Milliseconds(arguments->checkpoint_seconds);
+  // Another build may compute something else: its results are not taken for ours.
+  if (options.code_version.empty()) {
+    options.code_version = std::string(COLOR3D_VERSION) + " " + DigestFile("/proc/self/exe").sha256;
+  }
+}
+
+// Waits for SIGTERM or SIGINT on a thread of its own: the first drains, the second ends at once.
+void WatchSignals(const sigset_t& signals, std::atomic<bool>* draining) {
+  std::thread([signals, draining] {
+    int signal = 0;
+    ::sigwait(&signals, &signal);
+    draining->store(true);
+    ::sigwait(&signals, &signal);
+    ::_exit(1);
+  }).detach();
+}
+
+}  // namespace
+
+int WorkerMain(int argc, char** argv, std::unique_ptr<StageRunner> (*make_runner)()) {
+  WorkerArguments arguments;
+  CLI::App app("Runs the jobs of a color3d server; started by 'color3d-server serve'.");
+  AddFlags(&app, &arguments);
+  CLI11_PARSE(app, argc, argv);
+  // Lives until the process ends, like the thread that sets it.
+  static std::atomic<bool> draining{false};
+  sigset_t signals;
+  ::sigemptyset(&signals);
+  ::sigaddset(&signals, SIGTERM);
+  ::sigaddset(&signals, SIGINT);
+  ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  WatchSignals(signals, &draining);
+  ::signal(SIGPIPE, SIG_IGN);
+  if (arguments.options.parent != 0) {
+    // When the server dies, however it dies, this worker drains.
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (::getppid() != arguments.options.parent) return 1;
+  }
+  try {
+    const DataPaths paths(arguments.options.data_folder);
+    SetUpLog(arguments.options.name,
+             arguments.log_level,
+             paths.Logs() / (arguments.options.name + ".log"));
+    Complete(&arguments);
+    const std::unique_ptr<StageRunner> runner = make_runner();
+    RunWorker(arguments.options, *runner, draining);
+    spdlog::shutdown();
+    return 0;
+  } catch (const Error& e) {
+    spdlog::critical("{}", e.what());
+    return 2;
+  } catch (const std::exception& e) {
+    spdlog::critical("unexpected: {}", e.what());
+    return 1;
+  }
+}
+
+}  // namespace color3d

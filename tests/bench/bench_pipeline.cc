@@ -1,0 +1,96 @@
+// color3d-bench pipeline: a colour scene end to end in benchmark mode, without server.
+#include <cstdio>
+
+#include "core/base/files.h"
+#include "core/stage/artifacts.h"
+#include "tests/bench/commands.h"
+#include "tests/bench/local_pipeline.h"
+
+namespace color3d {
+namespace {
+
+struct PipelineArguments {
+  std::string scene_folder;
+  std::string out_folder;
+  int max_side_px = 500;
+  int threads = 2;
+  uint64_t seed = 1;
+  std::string key_view;
+  GeometryOptions geometry;
+  ColorizerOptions colorizer;
+  ChromaOptions chroma;
+  bool paper = false;
+};
+
+void RunPipeline(const PipelineArguments& args) {
+  LocalPipeline pipeline(args.scene_folder,
+                         args.out_folder,
+                         args.threads,
+                         args.seed,
+                         [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  pipeline.Run("import_scene", [&](StageContext& c) {
+    ImportOptions options;
+    options.hold_out_every_eighth = true;
+    options.threads = args.threads;
+    RunImportScene(options, c);
+  });
+  pipeline.Run("select_key_view", [&](StageContext& c) {
+    SelectKeyViewOptions options;
+    options.view = args.key_view;
+    if (!args.key_view.empty()) options.selection.strategy = KeyViewStrategy::kManual;
+    RunSelectKeyView(options, c);
+  });
+  const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
+  pipeline.Run("colorize_key_view", [&](StageContext& c) {
+    ColorizeKeyViewOptions options;
+    options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
+    RunColorizeKeyView(options, c);
+  });
+  ColorizerOptions colorizer = args.colorizer;
+  colorizer.threads = args.threads;
+  if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
+  pipeline.Run("personalize", [&](StageContext& c) { RunPersonalize(colorizer, c); });
+  pipeline.Run("colorize_views", [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
+  pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
+    RunReconstructGeometry(args.geometry, args.max_side_px, c);
+  });
+  pipeline.Run("solve_chroma", [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
+  pipeline.Run("export", [&](StageContext& c) { RunExport(c); });
+  pipeline.Run("render", [&](StageContext& c) {
+    RenderOptions options;
+    options.max_side_px = args.max_side_px;
+    RunRender(options, c);
+  });
+  pipeline.Run("evaluate", [&](StageContext& c) {
+    std::vector<TruthFile> truth;
+    for (int view : scene.HeldOutViews()) {
+      truth.push_back({scene.views[view].name, c.scene_folder() / scene.views[view].image_file});
+    }
+    RunEvaluate(truth, c);
+  });
+  pipeline.Run("colorize_scene", [&](StageContext& c) { RunReport(pipeline.summaries(), c); });
+  std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kMetrics)).c_str());
+}
+
+}  // namespace
+
+void AddPipelineCommand(CLI::App& app) {
+  auto args = std::make_shared<PipelineArguments>();
+  CLI::App* command = app.add_subcommand(
+      "pipeline", "photos in colour -> coloured scene and its score, all stages in this process");
+  command->add_option("--scene", args->scene_folder, "folder of photos, with or without poses")
+      ->required();
+  command->add_option("--out", args->out_folder, "where artifacts and the report go")->required();
+  command->add_option("--max-side", args->max_side_px, "working size, px");
+  command->add_option("--threads", args->threads);
+  command->add_option("--seed", args->seed);
+  command->add_option("--key-view", args->key_view, "instead of the selected one");
+  command->add_option("--geometry-iterations", args->geometry.iterations);
+  command->add_option("--max-gaussians", args->geometry.max_gaussians);
+  command->add_option("--colorizer-iterations", args->colorizer.iterations);
+  command->add_option("--chroma-iterations", args->chroma.iterations);
+  command->add_flag("--paper", args->paper, "the paper's colorizer recipe");
+  command->callback([args] { RunPipeline(*args); });
+}
+
+}  // namespace color3d

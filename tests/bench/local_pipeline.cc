@@ -1,0 +1,72 @@
+#include "tests/bench/local_pipeline.h"
+
+#include "core/base/files.h"
+#include "core/report/curves.h"
+#include "core/stage/artifacts.h"
+
+namespace color3d {
+namespace {
+
+// Says errors and warnings as they come, and keeps the warnings.
+class SayingObserver : public ProgressObserver {
+ public:
+  SayingObserver(std::string kind, const std::function<void(const std::string&)>& say)
+      : kind_(std::move(kind)), say_(say) {}
+
+  void OnProgress(int64_t, int64_t, const std::string&) override {}
+  void OnError(int64_t iteration, const std::string& name, double value) override {
+    Say(kind_ + " " + std::to_string(iteration) + ": " + name + " " + std::to_string(value));
+  }
+  void OnWarning(const std::string& message) override {
+    warnings.push_back(message);
+    Say(kind_ + ": " + message);
+  }
+
+  std::vector<std::string> warnings;
+
+ private:
+  void Say(const std::string& text) {
+    if (say_) say_(text);
+  }
+  std::string kind_;
+  const std::function<void(const std::string&)>& say_;
+};
+
+}  // namespace
+
+LocalPipeline::LocalPipeline(std::filesystem::path scene_folder,
+                             std::filesystem::path out_folder,
+                             int threads,
+                             uint64_t seed,
+                             std::function<void(const std::string&)> say)
+    : scene_folder_(std::move(scene_folder)),
+      out_folder_(std::move(out_folder)),
+      threads_(threads),
+      seed_(seed),
+      say_(std::move(say)) {
+  std::filesystem::create_directories(out_folder_);
+}
+
+void LocalPipeline::Run(const std::string& kind,
+                        const std::function<void(StageContext&)>& stage) {
+  NoCheckpoints none;
+  SayingObserver observer(kind, say_);
+  CurveRecorder recorder(kind, observer, none);
+  CancellationToken cancel;
+  const ScratchFolder scratch;
+  StageContext context(
+      {scene_folder_, artifacts_, out_folder_, scratch.path(), threads_, seed_},
+      recorder,
+      recorder,
+      cancel);
+  stage(context);
+  const double seconds = recorder.Seconds();
+  if (!recorder.points().empty()) {
+    context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(recorder.points()));
+  }
+  for (const std::string& name : context.outputs()) artifacts_[name] = out_folder_ / name;
+  summaries_.push_back({kind, "SUCCEEDED", "", seconds, 0, observer.warnings});
+  if (say_) say_(kind + " took " + std::to_string(seconds) + " s");
+}
+
+}  // namespace color3d

@@ -1,0 +1,40 @@
+// The stages of one scene run in this process, one after the other, with folders in place of blobs:
+// what the server does, without the server. For benchmarks and tests.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/stage/stages.h"
+
+namespace color3d {
+
+class LocalPipeline {
+ public:
+  // Artifacts are left in `out_folder`; messages go to `say` (may be empty).
+  LocalPipeline(std::filesystem::path scene_folder,
+                std::filesystem::path out_folder,
+                int threads,
+                uint64_t seed,
+                std::function<void(const std::string&)> say);
+
+  // Runs `stage` as job kind `kind` with all artifacts made so far as inputs.
+  void Run(const std::string& kind, const std::function<void(StageContext&)>& stage);
+
+  std::filesystem::path ArtifactPath(const std::string& name) const { return artifacts_.at(name); }
+  const std::vector<StageSummary>& summaries() const { return summaries_; }
+
+ private:
+  std::filesystem::path scene_folder_;
+  std::filesystem::path out_folder_;
+  int threads_;
+  uint64_t seed_;
+  std::function<void(const std::string&)> say_;
+  std::map<std::string, std::filesystem::path> artifacts_;
+  std::vector<StageSummary> summaries_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,22 @@
+// color3d-bench: measures the method library, each figure with its error and its seconds.
+#include <cstdio>
+
+#include "core/base/error.h"
+#include "tests/bench/commands.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Benchmarks of Color3D");
+  app.require_subcommand(1);
+  color3d::AddPipelineCommand(app);
+  color3d::AddReconstructCommand(app);
+  color3d::AddColorizerCommand(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e);
+  } catch (const color3d::Error& e) {
+    std::fprintf(stderr, "color3d-bench: %s: %s\n", color3d::ErrorCodeName(e.code()), e.what());
+    return 1;
+  }
+  return 0;
+}

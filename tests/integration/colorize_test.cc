@@ -1,0 +1,206 @@
+// Photos in, coloured scene out: the whole service, end to end.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/image/codec.h"
+#include "tests/integration/service_fixture.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using std::chrono::seconds;
+
+class ColorizeTest : public ServiceTest {
+ protected:
+  void SetUp() override { StartServer(); }
+};
+
+void ExpectResults(const fs::path& out, int min_renders) {
+  for (const char* name :
+       {"scene.ply", "metrics.json", "curves.csv", "plan.json", "report.html", "key_view.png"}) {
+    ASSERT_TRUE(fs::is_regular_file(out / name)) << name;
+    EXPECT_GT(fs::file_size(out / name), 20u) << name;
+  }
+  int renders = 0;
+  for (const std::string& name : ListFiles(out / "renders")) {
+    const Image render = ReadImage(out / "renders" / name);
+    EXPECT_EQ(render.channels, 3);
+    EXPECT_FALSE(IsGray(render)) << name << " has no colour";
+    ++renders;
+  }
+  EXPECT_GE(renders, min_renders);
+  EXPECT_NE(ReadFile(out / "report.html").find("</html>"), std::string::npos);
+  EXPECT_TRUE(json::parse(ReadFile(out / "plan.json")).is_structured());
+}
+
+void ExpectMetrics(const json& metrics) {
+  std::set<std::string> names{"psnr_rgb",
+                              "ssim_rgb",
+                              "psnr_l",
+                              "ab_rmse",
+                              "delta_e00",
+                              "delta_e00_chroma",
+                              "delta_e00_chroma_2d",
+                              "delta_e00_grey",
+                              "colourfulness",
+                              "colourfulness_truth",
+                              "gaussians",
+                              "seconds_total"};
+  for (const char* stage : {"import_scene",
+                            "select_key_view",
+                            "colorize_key_view",
+                            "personalize",
+                            "colorize_views",
+                            "reconstruct_geometry",
+                            "solve_chroma",
+                            "export",
+                            "render",
+                            "evaluate"}) {
+    names.insert(std::string("seconds_") + stage);
+  }
+  for (const std::string& name : names) {
+    ASSERT_TRUE(metrics.contains(name)) << name;
+    ASSERT_TRUE(metrics[name].is_number()) << name;
+    EXPECT_TRUE(std::isfinite(metrics[name].get<double>())) << name;
+  }
+  // Far below what it reaches with time, far above what a fault leaves.
+  EXPECT_GT(metrics["psnr_l"].get<double>(), 17.0);
+  EXPECT_LT(metrics["delta_e00_chroma_2d"].get<double>(), metrics["delta_e00_grey"].get<double>());
+  EXPECT_LT(metrics["delta_e00_chroma"].get<double>(), metrics["delta_e00_grey"].get<double>());
+  EXPECT_GT(metrics["gaussians"].get<double>(), 500.0);
+  EXPECT_GT(metrics["colourfulness"].get<double>(), 5.0);
+}
+
+int CountCached(const std::vector<v1::Job>& jobs) {
+  int cached = 0;
+  for (const v1::Job& job : jobs) cached += job.cached() ? 1 : 0;
+  return cached;
+}
+
+TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecondTime) {
+  WriteProceduralScene(Path("room"), SmallRoom());
+  const auto command = [&](const std::string& out) {
+    return std::vector<std::string>{
+               "colorize", Path("room").string(), "-o", Path(out).string(), "--benchmark"} +
+           QuickOptions();
+  };
+  const ProcessResult first = Client(command("first"));
+  ASSERT_EQ(first.exit_code, 0) << first.out << first.err;
+  ExpectResults(Path("first"), 2);
+  const json metrics = json::parse(ReadFile(Path("first") / "metrics.json"));
+  ExpectMetrics(metrics);
+  const std::string curves = ReadFile(Path("first") / "curves.csv");
+  for (const char* stage : {"personalize", "reconstruct_geometry", "solve_chroma"}) {
+    EXPECT_NE(curves.find(stage), std::string::npos) << stage << " left no curve";
+  }
+  for (const v1::Job& job : server().ListJobs()) {
+    EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.kind();
+    EXPECT_EQ(job.attempt(), 1) << job.kind();
+  }
+  ASSERT_EQ(CountCached(server().ListJobs()), 0);
+
+  const ProcessResult second = Client(command("second"));
+  ASSERT_EQ(second.exit_code, 0) << second.out << second.err;
+  ExpectResults(Path("second"), 2);
+  EXPECT_GE(CountCached(server().ListJobs()), 9);
+  EXPECT_LT(second.seconds, 0.5 * first.seconds + 3.0);
+  EXPECT_EQ(ReadFile(Path("second") / "scene.ply"), ReadFile(Path("first") / "scene.ply"));
+}
+
+TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColourItThenTheScene) {
+  WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));
+  const std::string room = Path("room").string(), out = Path("out").string();
+  const ProcessResult select = Client({"colorize", room, "-o", out});
+  ASSERT_EQ(select.exit_code, 0) << select.err;
+  EXPECT_NE(select.out.find("--key-color"), std::string::npos) << "it does not say how to go on";
+  const Image key = ReadImage(Path("out") / "key_view.png");
+  EXPECT_EQ(key.width, 240);
+  EXPECT_TRUE(IsGray(key));
+  EXPECT_FALSE(fs::exists(Path("out") / "scene.ply"));
+
+  // Which photo it was: the one that is equal to it.
+  fs::path truth;
+  for (const std::string& name : ListFiles(Path("room") / "images")) {
+    if (ReadImage(Path("room") / "images" / name).data == ReadImage(Path("out") / "key_view.png").data) {
+      truth = Path("room") / "truth" / name;
+    }
+  }
+  ASSERT_FALSE(truth.empty()) << "key_view.png is none of the photos";
+  const ProcessResult color =
+      Client(std::vector<std::string>{"colorize", room, "-o", out, "--key-color", truth.string()} +
+             QuickOptions());
+  ASSERT_EQ(color.exit_code, 0) << color.out << color.err;
+  ExpectResults(Path("out"), 2);
+  const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
+  EXPECT_FALSE(metrics.contains("psnr_rgb")) << "there was no truth to score against";
+  EXPECT_GT(metrics.at("gaussians").get<int>(), 500);
+  // Nothing said which view is the key view, so it is the selected one, from the cache.
+  EXPECT_TRUE(NewestJob("select_key_view").cached());
+}
+
+TEST_F(ColorizeTest, HintsAsJsonColourTheKeyView) {
+  WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
+  WriteFileAtomic(Path("hints.json"),
+                  R"([{"x": 60, "y": 30, "radius": 4, "color": "#2f6f7f"},
+                      {"x": 120, "y": 150, "radius": 4, "color": "#203070"},
+                      {"x": 200, "y": 90, "radius": 4, "color": "#903020"}])");
+  Process client(ClientCommand(std::vector<std::string>{"colorize",
+                                                        Path("room").string(),
+                                                        "-o",
+                                                        Path("out").string(),
+                                                        "--key-view",
+                                                        "view003",
+                                                        "--hints",
+                                                        Path("hints.json").string()} +
+                               QuickOptions()),
+                 Path("client"));
+  v1::Job colored;
+  ASSERT_TRUE(WaitUntil(
+      [&] {
+        for (const v1::Job& job : server().ListJobs()) {
+          if (job.kind() == "colorize_key_view") colored = job;
+        }
+        return colored.state() >= v1::Job::STATE_SUCCEEDED || !client.IsRunning();
+      },
+      seconds(120)))
+      << client.Err();
+  EXPECT_EQ(colored.state(), v1::Job::STATE_SUCCEEDED)
+      << colored.error().message() << client.Err();
+  EXPECT_EQ(NewestJob("select_key_view").spec().select_key_view().view(), "view003");
+  client.Kill();  // the job goes on without its client
+  EXPECT_TRUE(server().IsHealthy());
+  const ProcessResult cancel = Client({"job", "cancel", NewestJob("colorize_scene").name()});
+  EXPECT_EQ(cancel.exit_code, 0) << cancel.err;
+  EXPECT_TRUE(WaitUntil(
+      [&] { return NewestJob("colorize_scene").state() == v1::Job::STATE_CANCELLED; },
+      seconds(60)));
+}
+
+TEST_F(ColorizeTest, DetachReturnsAtOnceAndWatchAttachesAgain) {
+  WriteProceduralScene(Path("room"), SmallRoom(6));
+  const ProcessResult detached =
+      Client(std::vector<std::string>{"colorize",
+                                      Path("room").string(),
+                                      "-o",
+                                      Path("out").string(),
+                                      "--benchmark",
+                                      "--detach"} +
+             QuickOptions());
+  ASSERT_EQ(detached.exit_code, 0) << detached.err;
+  const std::string job = NewestJob("colorize_scene").name();
+  EXPECT_NE(detached.out.find(job.substr(job.find('/') + 1)), std::string::npos) << detached.out;
+  const ProcessResult watched = Client({"job", "watch", job});
+  EXPECT_EQ(watched.exit_code, 0) << watched.err;
+  const ProcessResult shown = Client({"job", "show", job, "--json"});
+  ASSERT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_NE(shown.out.find("SUCCEEDED"), std::string::npos);
+  EXPECT_TRUE(json::accept(shown.out)) << shown.out;
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,192 @@
+// Workers and servers that die in the middle: the work goes on where it was.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "tests/integration/service_fixture.h"
+
+namespace color3d {
+namespace {
+
+using std::chrono::seconds;
+
+// Geometry takes long enough to be interrupted after several checkpoints.
+constexpr int kIterations = 1500;
+
+class RecoveryTest : public ServiceTest {
+ protected:
+  void SetUp() override {
+    StartServer(ShortTimes());
+    WriteProceduralScene(Path("room"), SmallRoom(8));
+  }
+
+  static std::vector<std::string> ShortTimes() {
+    return {"--lease-seconds", "4",   "--heartbeat-seconds", "0.3", "--checkpoint-seconds",
+            "0.5",             "--retry-backoff-ms", "200"};
+  }
+
+  std::unique_ptr<Process> StartColorize() {
+    return std::make_unique<Process>(
+        ClientCommand({"colorize",
+                       Path("room").string(),
+                       "-o",
+                       Path("out").string(),
+                       "--benchmark",
+                       "--max-side",
+                       "240",
+                       "--geometry-iterations",
+                       std::to_string(kIterations),
+                       "--colorizer-iterations",
+                       "20",
+                       "--chroma-iterations",
+                       "10"}),
+        Path("client"));
+  }
+
+  v1::Job Geometry() {
+    for (const v1::Job& job : server().ListJobs()) {
+      if (job.kind() == "reconstruct_geometry") return job;
+    }
+    return {};
+  }
+
+  // Until training has gone on for a while after its first checkpoint; the step that it is at.
+  int64_t WaitForTheMiddle(Process& client) {
+    v1::Job job;
+    EXPECT_TRUE(WaitUntil(
+        [&] {
+          job = Geometry();
+          return (job.state() == v1::Job::STATE_RUNNING && job.progress().step() > 300) ||
+                 job.state() >= v1::Job::STATE_SUCCEEDED || !client.IsRunning();
+        },
+        seconds(200)))
+        << client.Err();
+    EXPECT_EQ(job.state(), v1::Job::STATE_RUNNING) << "training was over before it was interrupted";
+    return job.progress().step();
+  }
+
+  // The step of the first sign of life of the next attempt.
+  int64_t FirstStepOfAttempt(int attempt) {
+    v1::Job job;
+    EXPECT_TRUE(WaitUntil(
+        [&] {
+          job = Geometry();
+          return job.attempt() >= attempt && job.state() == v1::Job::STATE_RUNNING &&
+                 job.progress().step() > 0;
+        },
+        seconds(120),
+        std::chrono::milliseconds(10)));
+    return job.progress().step();
+  }
+
+  void ExpectFinished(Process& client) {
+    const std::optional<int> code = client.Wait(seconds(400));
+    ASSERT_EQ(code, 0) << client.Out() << client.Err();
+    EXPECT_TRUE(std::filesystem::is_regular_file(Path("out") / "scene.ply"));
+    const auto metrics = nlohmann::json::parse(ReadFile(Path("out") / "metrics.json"));
+    EXPECT_GT(metrics.at("psnr_l").get<double>(), 17.0);
+    ExpectNoStepTwice();
+  }
+
+  // The curve of an error goes on over attempts: no iteration is there twice.
+  void ExpectNoStepTwice() {
+    std::istringstream csv(ReadFile(Path("out") / "curves.csv"));
+    std::set<std::string> seen;
+    int rows = 0;
+    std::string line;
+    std::getline(csv, line);
+    const std::vector<std::string> columns = Split(line);
+    for (; std::getline(csv, line);) {
+      const std::vector<std::string> cells = Split(line);
+      ASSERT_EQ(cells.size(), columns.size()) << line;
+      std::string key;
+      for (size_t i = 0; i < cells.size(); ++i) {
+        if (columns[i] != "seconds" && columns[i] != "value") key += cells[i] + ",";
+      }
+      if (key.find("reconstruct_geometry") == std::string::npos) continue;
+      ++rows;
+      EXPECT_TRUE(seen.insert(key).second) << key << " is there twice";
+    }
+    EXPECT_GT(rows, 3);
+  }
+
+  static std::vector<std::string> Split(const std::string& line) {
+    std::vector<std::string> cells;
+    std::istringstream stream(line);
+    for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
+    return cells;
+  }
+};
+
+TEST_F(RecoveryTest, JobOfAKilledWorkerGoesOnFromItsCheckpoint) {
+  const std::unique_ptr<Process> client = StartColorize();
+  const int64_t step = WaitForTheMiddle(*client);
+  const std::string name = Geometry().name();
+  pid_t worker = 0;
+  const v1::ServerInfo server_info = server().Info();
+  for (const v1::WorkerInfo& info : server_info.workers()) {
+    if (info.job() == name) worker = static_cast<pid_t>(info.pid());
+  }
+  ASSERT_GT(worker, 1);
+  const std::vector<pid_t> children = Descendants(server().pid());
+  ASSERT_NE(std::find(children.begin(), children.end(), worker), children.end());
+  ASSERT_EQ(kill(worker, SIGKILL), 0);
+
+  const int64_t resumed = FirstStepOfAttempt(2);
+  EXPECT_GT(resumed, step / 4) << "it began again, killed at " << step;
+  ExpectFinished(*client);
+  EXPECT_EQ(Geometry().attempt(), 2);
+  EXPECT_EQ(Geometry().state(), v1::Job::STATE_SUCCEEDED);
+  EXPECT_FALSE(IsAlive(worker));
+}
+
+TEST_F(RecoveryTest, JobOfAKilledServerGoesOnWhenItIsBack) {
+  const std::unique_ptr<Process> client = StartColorize();
+  const int64_t step = WaitForTheMiddle(*client);
+  const std::string address = server().address();
+  const std::vector<pid_t> workers = Descendants(server().pid());
+  ASSERT_FALSE(workers.empty());
+  ASSERT_EQ(kill(server().pid(), SIGKILL), 0);
+  for (pid_t worker : workers) {
+    EXPECT_TRUE(WaitUntil([&] { return !IsAlive(worker); }, seconds(30)))
+        << "worker " << worker << " outlived its server";
+    kill(worker, SIGKILL);
+  }
+  // The same address, so that the client that waits finds it again.
+  StartServer(ShortTimes() + std::vector<std::string>{"--listen", address});
+  EXPECT_GT(FirstStepOfAttempt(1), step / 4);
+  ExpectFinished(*client);
+}
+
+TEST_F(RecoveryTest, DrainedServerReleasesItsJobWithoutCountingAnAttempt) {
+  const std::unique_ptr<Process> client = StartColorize();
+  const int64_t step = WaitForTheMiddle(*client);
+  client->Signal(SIGKILL);
+  EXPECT_EQ(server().Stop(), 0);
+  StartServer(ShortTimes());
+  EXPECT_GT(FirstStepOfAttempt(1), step / 2);
+  EXPECT_EQ(Geometry().attempt(), 1);
+}
+
+TEST_F(RecoveryTest, CancelledJobStopsSoonAndCanBeRetried) {
+  const std::unique_ptr<Process> client = StartColorize();
+  WaitForTheMiddle(*client);
+  const std::string root = NewestJob("colorize_scene").name();
+  EXPECT_EQ(Client({"job", "cancel", root}).exit_code, 0);
+  EXPECT_TRUE(
+      WaitUntil([&] { return Geometry().state() == v1::Job::STATE_CANCELLED; }, seconds(20)));
+  EXPECT_EQ(client->Wait(seconds(30)), 1) << client->Err();
+  EXPECT_TRUE(server().IsHealthy());
+  const ProcessResult retried = Client({"job", "retry", root});
+  EXPECT_EQ(retried.exit_code, 0) << retried.err;
+  const ProcessResult watched = Client({"job", "watch", root});
+  EXPECT_EQ(watched.exit_code, 0) << watched.err;
+  EXPECT_EQ(Geometry().state(), v1::Job::STATE_SUCCEEDED);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,95 @@
+// A server of our own for tests, with its workers and its client: real processes on a free port, in
+// a temporary folder. Everything is gone when the fixture is.
+#pragma once
+
+#include <grpcpp/channel.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "color3d/v1/job.grpc.pb.h"
+#include "color3d/v1/scene.grpc.pb.h"
+#include "color3d/v1/server.grpc.pb.h"
+#include "core/base/files.h"
+#include "tests/support/processes.h"
+#include "tests/support/procedural_scene.h"
+
+namespace color3d {
+
+// Absolute paths of the programs under test.
+std::string ServerProgram();
+std::string ClientProgram();
+
+// `color3d-server serve` with one worker of two threads; the constructor returns when it listens and
+// throws Error{kUnavailable} with the server's last words when it does not.
+class TestServer {
+ public:
+  TestServer(const std::filesystem::path& folder, const std::vector<std::string>& more_flags = {});
+  ~TestServer();
+
+  const std::string& address() const { return address_; }
+  std::shared_ptr<grpc::Channel> channel() const { return channel_; }
+  pid_t pid() const { return process_.pid(); }
+  std::string Log() const { return process_.Err() + process_.Out(); }
+  bool IsRunning() { return process_.IsRunning(); }
+  // Running, and answers within ten seconds.
+  bool IsHealthy();
+  v1::ServerInfo Info() const;
+  std::vector<v1::Job> ListJobs() const;
+  // SIGTERM; the exit code, -1 when it had to be killed.
+  int Stop();
+
+ private:
+  static std::vector<std::string> Arguments(const std::filesystem::path& folder,
+                                            const std::vector<std::string>& more_flags);
+
+  Process process_;
+  std::string address_;
+  std::shared_ptr<grpc::Channel> channel_;
+};
+
+class ServiceTest : public testing::Test {
+ protected:
+  // Prints the server's log when the test has failed.
+  void TearDown() override;
+
+  void StartServer(const std::vector<std::string>& flags = {});
+  // Starts the next one on the same data directory.
+  void StopServer() { server_.reset(); }
+  TestServer& server() { return *server_; }
+  std::filesystem::path Path(const std::string& name) const { return folder_.path() / name; }
+
+  // Runs `color3d ARGUMENTS` against the server.
+  ProcessResult Client(const std::vector<std::string>& arguments,
+                       std::chrono::seconds limit = std::chrono::seconds(400)) const;
+  std::vector<std::string> ClientCommand(const std::vector<std::string>& arguments) const;
+  // The newest job of this kind; fails the test when there is none.
+  v1::Job NewestJob(const std::string& kind) const;
+
+  // What every refusal must be: this exit code, one line of complaint on stderr, the last one, that
+  // holds all `words`, and a server that goes on.
+  void ExpectRefusal(const ProcessResult& result,
+                     int exit_code,
+                     const std::vector<std::string>& words);
+
+  const ScratchFolder folder_;
+
+ private:
+  std::unique_ptr<TestServer> server_;
+};
+
+// A small room in a folder of its own. `gray`: monochrome photos, colour ones in truth/.
+ProceduralSceneOptions SmallRoom(int views = 10, bool gray = false);
+
+// Options that make `color3d colorize` as quick as it can be.
+std::vector<std::string> QuickOptions();
+
+// Appends.
+std::vector<std::string> operator+(std::vector<std::string> left,
+                                   const std::vector<std::string>& right);
+
+}  // namespace color3d

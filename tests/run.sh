@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Builds Color3D and runs its test suite. Installs what is missing (as root or with sudo).
+#   tests/run.sh            everything: layering, API checks, fast and integration tests
+#   tests/run.sh -L fast    only the tests with this CTest label (fast, integration, slow)
+# BUILD_DIR names another build folder (default: build). With CI=true nothing is asked or coloured.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+label_args=()
+while getopts "L:h" option; do
+  case "$option" in
+    L) label_args=(-L "$OPTARG") ;;
+    h) sed -n '2,5p' "$0" | cut -c3-; exit 0 ;;
+    *) exit 2 ;;
+  esac
+done
+build=${BUILD_DIR:-build}
+
+deploy/install-deps.sh
+tests/check_layers.sh
+tests/check_proto.sh "$build"
+cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release
+cmake --build "$build"
+# One test at a time: most of them use every core.
+ctest --test-dir "$build" --output-on-failure --timeout 900 "${label_args[@]}"
