@@ -21,6 +21,16 @@ void HandleInterrupt() {
   ::sigaction(SIGINT, &action, nullptr);
 }
 
+// CLI11 calls a mistyped command a missing one. Empty when the first word is a command or an
+// option.
+std::string UnknownCommand(const CLI::App& app, const Context& context) {
+  if (context.arguments.empty() || context.arguments[0].starts_with('-')) return "";
+  for (const CLI::App* command : app.get_subcommands({})) {
+    if (command->get_name() == context.arguments[0]) return "";
+  }
+  return "there is no command '" + context.arguments[0] + "'";
+}
+
 int Main(int argc, char** argv) {
   Context context;
   context.interrupt = &interrupt;
@@ -45,7 +55,9 @@ int Main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);  // --help
-    std::cerr << "color3d: " << e.what() << "; see `color3d --help`" << std::endl;
+    const std::string unknown = UnknownCommand(app, context);
+    std::cerr << "color3d: " << (unknown.empty() ? e.what() : unknown) << "; see `color3d --help`"
+              << std::endl;
     return static_cast<int>(ExitCode::kBadInput);
   }
   HandleInterrupt();

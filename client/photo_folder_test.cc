@@ -116,6 +116,9 @@ TEST_F(PhotoFolderTest, FindsThePhotoOfAColouredCopy) {
   EXPECT_EQ(PhotoOfSameStem(folder, "/elsewhere/a.png"), "a.jpg");
   EXPECT_EQ(PhotoOfSameStem(folder, "b.png"), "");  // two have this stem
   EXPECT_EQ(PhotoOfSameStem(folder, "key_view.png"), "");
+  EXPECT_NO_THROW(RequirePhoto(folder, "a"));
+  EXPECT_NO_THROW(RequirePhoto(folder, "x/b.jpg"));
+  EXPECT_THROW(RequirePhoto(folder, "c"), Error);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 namespace color3d::client {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -71,6 +72,8 @@ TEST(Text, EndLines) {
   job.set_state(v1::Job::STATE_SKIPPED);
   job.set_skip_reason("no truth");
   EXPECT_THAT(EndLine(job), HasSubstr("left out: no truth"));
+  job.set_skip_reason("input jobs/1 failed: a long story");
+  EXPECT_THAT(EndLine(job), EndsWith("left out: input jobs/1 failed"));
   job.set_state(v1::Job::STATE_FAILED);
   job.mutable_error()->set_message("it broke");
   EXPECT_THAT(EndLine(job), HasSubstr("failed after 12 s: it broke"));

@@ -69,6 +69,8 @@ int ExecWorker(char** argv) {
 }
 
 int Main(int argc, char** argv) {
+  // Workers inherit this. Threads that wait by spinning make a busy machine many times slower.
+  ::setenv("OMP_WAIT_POLICY", "PASSIVE", /*overwrite=*/0);
   if (argc > 1 && std::string(argv[1]) == "worker") return ExecWorker(argv);
   ServeOptions options;
   CLI::App app("Color3D server: colours 3D scenes from monochrome photographs.");

@@ -73,6 +73,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options) {
                      std::to_string(options.retry_backoff_ms),
                      "--reserve-mib",
                      std::to_string(options.reserve_mib)};
+  setup.max_stopped = Milliseconds(3.0 * options.lease_seconds);
   setup.max_backoff = std::chrono::milliseconds(options.worker_backoff_ms);
   setup.first_backoff = std::min(setup.first_backoff, setup.max_backoff);
   return setup;

@@ -27,6 +27,7 @@ class Colorize {
   ExitCode Run() {
     folder_ = CollectPhotos(options_.photos);
     options_.CheckFiles();
+    if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
     RequireOutBesidePhotos(out_, folder_);
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);

@@ -1,5 +1,7 @@
 #include "client/commands/follow.h"
 
+#include <set>
+
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/text.h"
@@ -35,15 +37,20 @@ bool Follow(Connection& connection,
             const std::vector<std::string>& jobs,
             const Context& context,
             ProgressDisplay& display) {
+  // A job that has failed may have stages that go on: their results are kept, but not waited for.
+  std::set<std::string> unfinished(jobs.begin(), jobs.end());
   const auto keep_going = [&] {
     display.OnTick();
-    return !context.interrupt->IsCancelled();
+    return !unfinished.empty() && !context.interrupt->IsCancelled();
   };
-  const auto on_event = [&](const v1::JobEvent& event) { display.OnEvent(event); };
+  const auto on_event = [&](const v1::JobEvent& event) {
+    display.OnEvent(event);
+    if (IsFinished(event.job().state())) unfinished.erase(event.job().name());
+  };
   try {
     const WatchEnd end = WatchJobs(connection, jobs, on_event, keep_going);
     display.Clear();
-    return end == WatchEnd::kFinished;
+    return end == WatchEnd::kFinished || unfinished.empty();
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kUnavailable) throw;
     display.Clear();

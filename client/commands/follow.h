@@ -13,8 +13,9 @@ namespace color3d::client {
 
 v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec);
 
-// True when all have ended; false when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable}
-// that says how to attach again when the server stays away.
+// True when all of them have ended (stages that go on after a failure are not waited for); false
+// when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable} that says how to attach again
+// when the server stays away.
 bool Follow(Connection& connection,
             const std::vector<std::string>& jobs,
             const Context& context,

@@ -40,7 +40,11 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
   const v1::Job& job = event.job();
   if (IsFinished(job.state())) {
     bool& ended = ended_[job.name()];
-    if (!ended) Say(EndLine(job));
+    // The last stage's failure only repeats the one that has been told.
+    const bool failed = job.state() == v1::Job::STATE_FAILED;
+    const bool repeated = failed && failure_told_ && job.kind() == "colorize_scene";
+    if (!ended && !repeated) Say(EndLine(job));
+    failure_told_ = failure_told_ || failed;
     ended = true;
     if (unfinished_.erase(job.name()) > 0) idle_since_ = steady_clock::now();
     return;

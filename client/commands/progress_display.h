@@ -37,6 +37,7 @@ class ProgressDisplay {
   const bool quiet_;
   const bool terminal_;
   bool drawn_ = false;
+  bool failure_told_ = false;
   std::chrono::steady_clock::time_point last_;
   std::map<std::string, bool> ended_;  // by job name
   std::map<std::string, v1::Job::State> unfinished_;

@@ -1,7 +1,9 @@
 #include "client/lib/gray_copies.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <vector>
 
 #include "core/base/files.h"
@@ -14,8 +16,10 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kJpegQuality = 97;
-
-bool HasColor(const Image& image) { return image.channels == 3 && !IsGray(image); }
+constexpr int kChromaSidePx = 160;
+constexpr int kLuminanceBins = 16;
+// Toned film measures 0.7..1.0, scenes in colour 7.6 and more.
+constexpr double kMinFreeChroma = 2.0;
 
 std::string EncodeGray(const Image& srgb, ImageFormat format) {
   Image gray = LuminanceFromSrgb(srgb);
@@ -23,7 +27,38 @@ std::string EncodeGray(const Image& srgb, ImageFormat format) {
   return format == ImageFormat::kJpeg ? EncodeJpeg(gray, kJpegQuality) : EncodePng16(gray);
 }
 
+// First and second moments of the chroma of pixels of like luminance.
+struct ChromaBin {
+  double count = 0.0;
+  double a = 0.0;
+  double b = 0.0;
+  double square = 0.0;
+};
+
 }  // namespace
+
+double FreeChroma(const Image& srgb) {
+  if (srgb.channels != 3 || srgb.Empty()) return 0.0;
+  const Image lab = LabFromSrgb(FitWithin(srgb, kChromaSidePx));
+  std::array<ChromaBin, kLuminanceBins> bins;
+  for (size_t i = 0; i < lab.PlaneSize(); ++i) {
+    const int index = static_cast<int>(lab.Plane(0)[i] / 100.0f * kLuminanceBins);
+    ChromaBin& bin = bins[std::clamp(index, 0, kLuminanceBins - 1)];
+    const double a = lab.Plane(1)[i];
+    const double b = lab.Plane(2)[i];
+    bin.count += 1.0;
+    bin.a += a;
+    bin.b += b;
+    bin.square += a * a + b * b;
+  }
+  double sum = 0.0;
+  for (const ChromaBin& bin : bins) {
+    if (bin.count > 0.0) sum += bin.square - (bin.a * bin.a + bin.b * bin.b) / bin.count;
+  }
+  return std::sqrt(std::max(0.0, sum) / static_cast<double>(lab.PlaneSize()));
+}
+
+bool HasColor(const Image& srgb) { return FreeChroma(srgb) >= kMinFreeChroma; }
 
 ColorCount CountColorPhotos(const PhotoFolder& folder,
                             int max_photos,

@@ -205,4 +205,16 @@ std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
   return found;
 }
 
+void RequirePhoto(const PhotoFolder& folder, const std::string& name) {
+  std::string known;
+  for (size_t i = 0; i < folder.photos.size(); ++i) {
+    const std::string& path = folder.photos[i].path;
+    if (Stem(path) == Stem(name)) return;
+    if (i < 3) known += (i == 0 ? "" : ", ") + fs::path(path).filename().string();
+  }
+  throw Error(ErrorCode::kNotFound,
+              "no photo in " + folder.root.string() + " is called '" + name + "'; there are " +
+                  known + (folder.photos.size() > 3 ? ", ..." : ""));
+}
+
 }  // namespace color3d::client

@@ -33,4 +33,8 @@ PhotoFolder CollectPhotos(const std::filesystem::path& root);
 // as a view's name: relative to images/. Empty when none or several have it.
 std::string PhotoOfSameStem(const PhotoFolder& folder, const std::filesystem::path& file);
 
+// Throws Error{kNotFound} that names some photos when no photo can be the view `name`: neither path
+// nor stem fits.
+void RequirePhoto(const PhotoFolder& folder, const std::string& name);
+
 }  // namespace color3d::client

@@ -44,6 +44,13 @@ std::string Bar(const v1::Progress& progress) {
          std::to_string(progress.step()) + "/" + std::to_string(progress.total_steps());
 }
 
+// The server repeats the whole error in every stage that could not run because of it.
+std::string ShortSkipReason(const std::string& reason) {
+  const size_t failed = reason.find(" failed: ");
+  const bool of_input = reason.starts_with("input jobs/") && failed != std::string::npos;
+  return OneLine(of_input ? reason.substr(0, failed) + " failed" : reason);
+}
+
 double SecondsOf(const v1::Job& job) {
   if (job.progress().seconds() > 0.0 || !job.has_start_time() || !job.has_end_time()) {
     return job.progress().seconds();
@@ -126,11 +133,11 @@ std::string EndLine(const v1::Job& job) {
     case v1::Job::STATE_SUCCEEDED:
       return name + (job.cached() ? "done (cached)" : "done in " + seconds);
     case v1::Job::STATE_SKIPPED:
-      return name + "left out: " + OneLine(job.skip_reason());
+      return name + "left out: " + ShortSkipReason(job.skip_reason());
     case v1::Job::STATE_FAILED:
       return name + "failed after " + seconds + ": " + OneLine(job.error().message());
     case v1::Job::STATE_CANCELLED:
-      return name + "cancelled after " + seconds;
+      return name + (job.has_start_time() ? "cancelled after " + seconds : "cancelled");
     default:
       return name + StateName(job.state());
   }

@@ -149,19 +149,13 @@ torch::Tensor PersonalModel::Normalise(const Norm& norm, const torch::Tensor& x)
   }
   const torch::Tensor scale = norm.weight * norm.inverse_deviation;
   const torch::Tensor shift = norm.bias - norm.mean * scale;
-  return torch::addcmul(Working(shift.view({1, c, 1, 1})), x, Working(scale.view({1, c, 1, 1})));
-}
-
-torch::Tensor PersonalModel::Working(const torch::Tensor& x) const {
-  return bfloat16_ ? x.to(torch::kBFloat16) : x;
+  return torch::addcmul(shift.view({1, c, 1, 1}), x, scale.view({1, c, 1, 1}));
 }
 
 torch::Tensor PersonalModel::RunBlock(const ResidualBlock& block, const torch::Tensor& x) const {
-  torch::Tensor y =
-      torch::conv2d(x, Working(block.conv1), Working(block.bias1), /*stride=*/1, /*padding=*/1);
+  torch::Tensor y = torch::conv2d(x, block.conv1, block.bias1, /*stride=*/1, /*padding=*/1);
   y = LeakyRelu(Normalise(block.norm, y));
-  y = LeakyRelu(
-      torch::conv2d(y, Working(block.conv2), Working(block.bias2), /*stride=*/1, /*padding=*/1));
+  y = LeakyRelu(torch::conv2d(y, block.conv2, block.bias2, /*stride=*/1, /*padding=*/1));
   return x + y;
 }
 
@@ -197,18 +191,17 @@ torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,
   for (int i = static_cast<int>(levels_.size()) - 1; i >= 0; --i) {
     const Level& level = levels_[i];
     std::vector<torch::Tensor> parts;
-    parts.push_back(Working(taps[i]));
+    parts.push_back(taps[i]);
     if (x.defined()) parts.push_back(UpsampleTwice(x));
     if (i == 0) {
       const int stride = encoder_.config().stem_stride;
-      parts.push_back(Working(torch::avg_pool2d(luminance, {stride, stride}) / 50.0 - 1.0));
+      parts.push_back(torch::avg_pool2d(luminance, {stride, stride}) / 50.0 - 1.0);
     }
     x = parts.size() == 1 ? parts[0] : torch::cat(parts, 1);
-    x = LeakyRelu(Normalise(level.norm, torch::conv2d(x, Working(level.fuse), Working(level.fuse_bias))));
+    x = LeakyRelu(Normalise(level.norm, torch::conv2d(x, level.fuse, level.fuse_bias)));
     for (const ResidualBlock& block : level.blocks) x = RunBlock(block, x);
   }
-  // The head stays in float32: its output is compared with ab to a fraction of a Lab unit.
-  return torch::conv2d(x.to(torch::kFloat32), head_, head_bias_, /*stride=*/1, /*padding=*/1);
+  return torch::conv2d(x, head_, head_bias_, /*stride=*/1, /*padding=*/1);
 }
 
 torch::Tensor PersonalModel::Forward(const torch::Tensor& luminance) const {

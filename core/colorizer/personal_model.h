@@ -59,9 +59,6 @@ class PersonalModel {
     return statistics_;
   }
   void RequireGradients(bool on);
-  // Runs the decoder in bfloat16 (parameters, head and loss stay float32). For training only, where
-  // the processor multiplies it natively.
-  void set_bfloat16(bool on) { bfloat16_ = on; }
 
  private:
   struct Norm {
@@ -89,7 +86,6 @@ class PersonalModel {
   Norm NewNorm(const std::string& name, int64_t channels);
   void AddLevel(const std::string& name, int64_t in, int64_t out, Random& random);
   void AddAdapters(Random& random);
-  torch::Tensor Working(const torch::Tensor& x) const;
   torch::Tensor Normalise(const Norm& norm, const torch::Tensor& x) const;
   torch::Tensor RunBlock(const ResidualBlock& block, const torch::Tensor& x) const;
   torch::Tensor Adapt(int stage, int block, const torch::Tensor& x) const;
@@ -100,7 +96,6 @@ class PersonalModel {
   std::vector<std::vector<Adapter>> adapters_;
   torch::Tensor head_, head_bias_;
   bool measuring_statistics_ = false;
-  bool bfloat16_ = false;
   std::vector<std::pair<std::string, torch::Tensor>> parameters_;
   std::vector<std::pair<std::string, torch::Tensor>> statistics_;
 };

@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "server/rpc/error_mapping.h"
+#include "server/rpc/utf8.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -50,8 +51,8 @@ v1::Job ToProgressProto(const JobRecord& job) {
   v1::Progress* progress = proto.mutable_progress();
   progress->set_step(job.progress.step);
   progress->set_total_steps(job.progress.total_steps);
-  progress->set_message(job.progress.message);
-  progress->set_error_name(job.progress.error_name);
+  progress->set_message(CleanUtf8(job.progress.message));
+  progress->set_error_name(CleanUtf8(job.progress.error_name));
   progress->set_error_value(job.progress.error_value);
   progress->set_seconds(job.progress.seconds);
   progress->set_eta_seconds(job.progress.eta_seconds);
@@ -72,9 +73,9 @@ v1::Job ToProto(const JobRecord& job) {
     entry->set_media_type(artifact.media_type);
   }
   if (job.error) *proto.mutable_error() = ToRpcStatus(*job.error);
-  proto.set_skip_reason(job.skip_reason);
+  proto.set_skip_reason(CleanUtf8(job.skip_reason));
   proto.set_cached(job.cached);
-  for (const std::string& warning : job.warnings) proto.add_warnings(warning);
+  for (const std::string& warning : job.warnings) proto.add_warnings(CleanUtf8(warning));
   *proto.mutable_create_time() = ToTimestamp(job.create_ms);
   if (job.start_ms != 0) *proto.mutable_start_time() = ToTimestamp(job.start_ms);
   if (job.end_ms != 0) *proto.mutable_end_time() = ToTimestamp(job.end_ms);

@@ -5,14 +5,15 @@
 #include <algorithm>
 
 #include "google/rpc/error_details.pb.h"
+#include "server/rpc/utf8.h"
 #include "server/service_error.h"
 
 namespace color3d {
 namespace {
 
 // Trailers share gRPC's 8 KiB limit on metadata: details are cut to fit.
-constexpr size_t kMaxViolationBytes = 3000;
-constexpr size_t kMaxMessageBytes = 1200;
+constexpr size_t kMaxViolationBytes = 2500;
+constexpr size_t kMaxMessageBytes = 700;
 
 grpc::StatusCode CodeOf(const std::string& reason, ErrorCode code) {
   if (reason == "REVISION_COMPACTED" || reason == "OFFSET_BEYOND_END") {
@@ -54,7 +55,7 @@ google::rpc::Status Build(ErrorCode code,
   google::rpc::Status status;
   status.set_code(CodeOf(reason, code));
   // Trailers are text: paths of users may hold anything.
-  std::string text = message.substr(0, kMaxMessageBytes);
+  std::string text = CleanUtf8(message, kMaxMessageBytes);
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 32; }, ' ');
   status.set_message(text);
@@ -69,8 +70,8 @@ google::rpc::Status Build(ErrorCode code,
       bytes += violation.field.size() + violation.description.size() + 8;
       if (bytes > kMaxViolationBytes) break;
       auto* entry = bad.add_field_violations();
-      entry->set_field(violation.field);
-      entry->set_description(violation.description);
+      entry->set_field(CleanUtf8(violation.field));
+      entry->set_description(CleanUtf8(violation.description));
     }
     status.add_details()->PackFrom(bad);
   }

@@ -107,6 +107,11 @@ void Attempt::Run() {
                  "OUT_OF_MEMORY",
                  job_.kind + " ran out of memory; use smaller pictures (max_side_px) or a machine "
                              "with more"});
+  } catch (const fs::filesystem_error& e) {
+    const bool full = e.code() == std::errc::no_space_on_device;
+    HandleError({full ? ErrorCode::kResourceExhausted : ErrorCode::kInternal,
+                 full ? "STORAGE_FULL" : "INTERNAL",
+                 std::string(e.what()) + (full ? "; free some disk space" : "")});
   } catch (const std::exception& e) {
     HandleError({ErrorCode::kInternal, "INTERNAL", std::string("unexpected: ") + e.what()});
   }
@@ -223,8 +228,10 @@ void Attempt::LogEnd(const char* how) {
 
 void Attempt::HandleError(const JobError& error) {
   keeper_.Stop();
+  // The stage may learn of a lost lease (saving a checkpoint) before the heartbeat does.
+  const bool lost = error.reason == "LEASE_LOST";
   try {
-    Conclude(context_.store, keeper_.stop_reason(), error);
+    Conclude(context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
   } catch (const Error& e) {
     spdlog::error("{} cannot report its end ({}); its lease will run out", tag_, e.what());
   }

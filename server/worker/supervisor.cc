@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 
 extern char** environ;
 
@@ -17,6 +18,16 @@ namespace {
 constexpr auto kTick = std::chrono::milliseconds(50);
 // A worker that lived this long did not fail to start.
 constexpr auto kHealthyLife = std::chrono::seconds(60);
+
+// State T of /proc/<pid>/stat, which follows the program's name in parentheses.
+bool IsStopped(pid_t pid) {
+  std::ifstream stream("/proc/" + std::to_string(pid) + "/stat");
+  std::string line;
+  std::getline(stream, line);
+  const size_t name_end = line.rfind(')');
+  return name_end != std::string::npos && name_end + 2 < line.size() &&
+         (line[name_end + 2] == 'T' || line[name_end + 2] == 't');
+}
 }  // namespace
 
 Supervisor::Supervisor(const SupervisorOptions& options, JobStore& store)
@@ -79,6 +90,7 @@ void Supervisor::StartWorker(Slot* slot) {
     return;
   }
   slot->pid = pid;
+  slot->last_moving = slot->started;
   spdlog::info("{} started (pid {})", slot->name, pid);
 }
 
@@ -121,7 +133,22 @@ void Supervisor::CheckWorker(Slot* slot) {
   }
   int status = 0;
   const pid_t ended = ::waitpid(slot->pid, &status, WNOHANG);
-  if (ended == slot->pid) OnExit(slot, status);
+  if (ended == slot->pid) {
+    OnExit(slot, status);
+  } else {
+    KillIfFrozen(slot);
+  }
+}
+
+void Supervisor::KillIfFrozen(Slot* slot) {
+  const auto now = SteadyClock::now();
+  if (!IsStopped(slot->pid)) {
+    slot->last_moving = now;
+  } else if (now - slot->last_moving > options_.max_stopped) {
+    spdlog::error("{} (pid {}) has been stopped for too long; killing it", slot->name, slot->pid);
+    ::kill(slot->pid, SIGKILL);
+    slot->last_moving = now;
+  }
 }
 
 void Supervisor::Loop() {

@@ -22,6 +22,9 @@ struct SupervisorOptions {
   int workers = 1;
   std::chrono::milliseconds first_backoff{500};
   std::chrono::milliseconds max_backoff{10'000};
+  // A worker that is stopped (SIGSTOP, a debugger) for this long is killed: it has lost its lease,
+  // and may hold the store's write lock.
+  std::chrono::milliseconds max_stopped{180'000};
 };
 
 class Supervisor {
@@ -47,11 +50,13 @@ class Supervisor {
     SteadyClock::time_point started;
     SteadyClock::time_point next_start;
     std::chrono::milliseconds backoff{0};
+    SteadyClock::time_point last_moving;  // not stopped when last seen
   };
   void Loop();
   void StartWorker(Slot* slot);
   void CheckWorker(Slot* slot);
   void OnExit(Slot* slot, int status);
+  void KillIfFrozen(Slot* slot);
 
   const SupervisorOptions options_;
   JobStore& store_;

@@ -62,11 +62,13 @@ std::vector<std::string> ArtifactsOf(const std::string& kind) {
   return {"report.html"};
 }
 
-// What an effect without a fence looks like: a line in a shared file, repeated whenever a step is.
-void LogUnfenced(const std::string& job, int step) {
-  const char* path = std::getenv("COLOR3D_TEST_EFFECTS");
-  if (path == nullptr) return;
-  std::ofstream(path, std::ios::app) << job + " " + std::to_string(step) + "\n";
+// Tests count effects in shared files: a line in "<prefix>.begun" when a step begins, which repeats
+// whenever an attempt is lost, and one in "<prefix>.saved" after the fenced write, which must not.
+void LogEffect(const char* file, const std::string& job, int step) {
+  const char* prefix = std::getenv("COLOR3D_TEST_EFFECTS");
+  if (prefix == nullptr) return;
+  const std::string line = job + " " + std::to_string(step) + "\n";
+  std::ofstream(std::string(prefix) + file, std::ios::app) << line;
 }
 
 class ScriptedRunner : public StageRunner {
@@ -110,9 +112,12 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   for (; step < script.steps; ++step) {
     cancel.ThrowIfCancelled();
     std::this_thread::sleep_for(std::chrono::milliseconds(script.step_ms));
-    LogUnfenced(run.job_name, step);
+    LogEffect(".begun", run.job_name, step);
     trace += std::to_string(step) + " " + std::to_string(::getpid()) + "\n";
-    if (checkpoints.WantsSave()) checkpoints.Save(trace);
+    if (checkpoints.WantsSave()) {
+      checkpoints.Save(trace);
+      LogEffect(".saved", run.job_name, step);
+    }
     progress.OnProgress(step + 1, script.steps, kind);
     progress.OnError(step, "train_l1", 1.0 / (step + 1));
   }

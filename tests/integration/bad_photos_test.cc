@@ -53,6 +53,19 @@ void ReplaceFirst(const fs::path& path, const std::string& from, const std::stri
   Overwrite(path, text.replace(at, from.size(), to));
 }
 
+// CRC-32 of a chunk's type and data, as PNG stores it.
+std::string PngChecksum(const std::string& bytes) {
+  uint32_t crc = 0xFFFFFFFFu;
+  for (unsigned char byte : bytes) {
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1u) ^ ((crc & 1u) != 0 ? 0xEDB88320u : 0u);
+  }
+  crc = ~crc;
+  std::string big_endian;
+  for (int shift = 24; shift >= 0; shift -= 8) big_endian += static_cast<char>(crc >> shift);
+  return big_endian;
+}
+
 TEST_F(BadPhotosTest, NoSuchFolder) {
   ExpectRefusal(Colorize(Path("nowhere")), 2, {"nowhere"});
 }
@@ -97,6 +110,7 @@ TEST_F(BadPhotosTest, WholePngHeaderThatClaims60000Squared) {
   std::string png = ReadFile(room / "images" / "view000.png");
   const std::string side("\0\0\xea\x60", 4);
   png.replace(16, 8, side + side);
+  png.replace(29, 4, PngChecksum(png.substr(12, 17)));
   Overwrite(room / "images" / "bomb.png", png);
   const ProcessResult result = Colorize(room);
   EXPECT_TRUE(result.exit_code == 2 || result.exit_code == 4) << result.exit_code;

@@ -38,12 +38,14 @@ class RecoveryTest : public ServiceTest {
                        "--benchmark",
                        "--max-side",
                        "240",
+                       "--max-gaussians",
+                       "15000",
                        "--geometry-iterations",
                        std::to_string(kIterations),
                        "--colorizer-iterations",
-                       "20",
+                       "4",
                        "--chroma-iterations",
-                       "10"}),
+                       "4"}),
         Path("client"));
   }
 
@@ -157,7 +159,7 @@ TEST_F(RecoveryTest, JobOfAKilledServerGoesOnWhenItIsBack) {
     kill(worker, SIGKILL);
   }
   // The same address, so that the client that waits finds it again.
-  StartServer(ShortTimes() + std::vector<std::string>{"--listen", address});
+  StartServer(ShortTimes(), address);
   EXPECT_GT(FirstStepOfAttempt(1), step / 4);
   ExpectFinished(*client);
 }
@@ -167,6 +169,8 @@ TEST_F(RecoveryTest, DrainedServerReleasesItsJobWithoutCountingAnAttempt) {
   const int64_t step = WaitForTheMiddle(*client);
   client->Signal(SIGKILL);
   EXPECT_EQ(server().Stop(), 0);
+  EXPECT_EQ(server().Log().find("was killed by signal"), std::string::npos)
+      << "a worker did not drain";
   StartServer(ShortTimes());
   EXPECT_GT(FirstStepOfAttempt(1), step / 2);
   EXPECT_EQ(Geometry().attempt(), 1);

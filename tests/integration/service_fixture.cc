@@ -61,13 +61,14 @@ std::vector<std::string> operator+(std::vector<std::string> left,
 }
 
 std::vector<std::string> TestServer::Arguments(const fs::path& folder,
-                                               const std::vector<std::string>& more_flags) {
+                                               const std::vector<std::string>& more_flags,
+                                               const std::string& listen) {
   fs::create_directories(folder);
   fs::remove(folder / "address");
   return std::vector<std::string>{ServerProgram(),
                                   "serve",
                                   "--listen",
-                                  "127.0.0.1:0",
+                                  listen,
                                   "--port-file",
                                   (folder / "address").string(),
                                   "--data-dir",
@@ -81,8 +82,10 @@ std::vector<std::string> TestServer::Arguments(const fs::path& folder,
          more_flags;
 }
 
-TestServer::TestServer(const fs::path& folder, const std::vector<std::string>& more_flags)
-    : process_(Arguments(folder, more_flags), folder / "logs") {
+TestServer::TestServer(const fs::path& folder,
+                       const std::vector<std::string>& more_flags,
+                       const std::string& listen)
+    : process_(Arguments(folder, more_flags, listen), folder / "logs") {
   const fs::path file = folder / "address";
   WaitUntil([&] { return fs::exists(file) || !process_.IsRunning(); }, kStartLimit);
   if (!fs::exists(file)) {
@@ -95,9 +98,11 @@ TestServer::TestServer(const fs::path& folder, const std::vector<std::string>& m
 TestServer::~TestServer() { Stop(); }
 
 int TestServer::Stop() {
+  const std::vector<pid_t> family = Descendants(process_.pid());
   process_.Signal(SIGTERM);
   const std::optional<int> code = process_.Wait(kStopLimit);
   process_.Kill();
+  for (pid_t pid : family) kill(pid, SIGKILL);  // none is left, unless something is wrong
   return code.value_or(-1);
 }
 
@@ -140,8 +145,9 @@ void ServiceTest::TearDown() {
   server_.reset();
 }
 
-void ServiceTest::StartServer(const std::vector<std::string>& flags) {
-  server_ = std::make_unique<TestServer>(Path("server"), flags);
+void ServiceTest::StartServer(const std::vector<std::string>& flags, const std::string& listen) {
+  server_.reset();
+  server_ = std::make_unique<TestServer>(Path("server"), flags, listen);
 }
 
 std::vector<std::string> ServiceTest::ClientCommand(
@@ -193,12 +199,14 @@ ProceduralSceneOptions SmallRoom(int views, bool gray) {
 std::vector<std::string> QuickOptions() {
   return {"--max-side",
           "240",
+          "--max-gaussians",
+          "15000",
           "--geometry-iterations",
           "300",
           "--colorizer-iterations",
-          "60",
+          "25",
           "--chroma-iterations",
-          "40"};
+          "20"};
 }
 
 }  // namespace color3d

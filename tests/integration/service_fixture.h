@@ -28,7 +28,9 @@ std::string ClientProgram();
 // throws Error{kUnavailable} with the server's last words when it does not.
 class TestServer {
  public:
-  TestServer(const std::filesystem::path& folder, const std::vector<std::string>& more_flags = {});
+  TestServer(const std::filesystem::path& folder,
+             const std::vector<std::string>& more_flags = {},
+             const std::string& listen = "127.0.0.1:0");
   ~TestServer();
 
   const std::string& address() const { return address_; }
@@ -45,7 +47,8 @@ class TestServer {
 
  private:
   static std::vector<std::string> Arguments(const std::filesystem::path& folder,
-                                            const std::vector<std::string>& more_flags);
+                                            const std::vector<std::string>& more_flags,
+                                            const std::string& listen);
 
   Process process_;
   std::string address_;
@@ -57,8 +60,9 @@ class ServiceTest : public testing::Test {
   // Prints the server's log when the test has failed.
   void TearDown() override;
 
-  void StartServer(const std::vector<std::string>& flags = {});
-  // Starts the next one on the same data directory.
+  // The next one takes over the same data directory.
+  void StartServer(const std::vector<std::string>& flags = {},
+                   const std::string& listen = "127.0.0.1:0");
   void StopServer() { server_.reset(); }
   TestServer& server() { return *server_; }
   std::filesystem::path Path(const std::string& name) const { return folder_.path() / name; }
