@@ -51,10 +51,7 @@ Image Product(const Image& one_channel, const Image& image) {
 
 }  // namespace
 
-Image UpsampleGuided(const Image& ab,
-                     const Image& luminance,
-                     int radius,
-                     float variance_floor) {
+Image UpsampleGuided(const Image& ab, const Image& luminance, int radius, float variance_floor) {
   Image guide = Resize(luminance, ab.width, ab.height);
   // Centred on mid-grey: the products below stay small, so float32 suffices.
   for (float& value : guide.data) value -= 50.0f;

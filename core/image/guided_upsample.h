@@ -5,14 +5,11 @@
 
 namespace color3d {
 
-// Fast guided filter (He & Sun 2015): on the coarse grid, ab is fitted as a local linear function of
-// L in windows of (2 radius + 1)^2 cells; the coefficients are interpolated bilinearly and applied
-// to the full-size L. `ab`: any channels on a coarse grid whose cells tile the picture evenly;
-// `luminance`: 1 channel, L 0..100. `variance_floor` (L units squared) decides below which contrast
-// L is no edge. Returns ab's channels at luminance's size.
-Image UpsampleGuided(const Image& ab,
-                     const Image& luminance,
-                     int radius,
-                     float variance_floor);
+// Fast guided filter (He & Sun 2015): on the coarse grid, ab is fitted as a local linear function
+// of L in windows of (2 radius + 1)^2 cells; the coefficients are interpolated bilinearly and
+// applied to the full-size L. `ab`: any channels on a coarse grid whose cells tile the picture
+// evenly; `luminance`: 1 channel, L 0..100. `variance_floor` (L units squared) decides below which
+// contrast L is no edge. Returns ab's channels at luminance's size.
+Image UpsampleGuided(const Image& ab, const Image& luminance, int radius, float variance_floor);
 
 }  // namespace color3d

@@ -20,7 +20,8 @@ TEST(GuidedUpsampleTest, AConstantStaysConstant) {
 }
 
 TEST(GuidedUpsampleTest, FollowsAnEdgeOfLThatTheCoarseGridBlurs) {
-  // The edge lies in the middle of a coarse cell: plain interpolation is off by half the step there.
+  // The edge lies in the middle of a coarse cell: plain interpolation is off by half the step
+  // there.
   Image luminance(64, 64, 1, 20.0f);
   Image truth(64, 64, 1, -30.0f);
   for (int y = 0; y < 64; ++y) {

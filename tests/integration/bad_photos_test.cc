@@ -32,13 +32,11 @@ class BadPhotosTest : public ServiceTest {
   fs::path BareRoom() { return Room(ProceduralSceneOptions::Poses::kNone); }
 
   ProcessResult Colorize(const fs::path& folder) {
-    return Client(std::vector<std::string>{"colorize",
-                                           folder.string(),
-                                           "-o",
-                                           Path("out").string(),
-                                           "--benchmark"} +
-                  QuickOptions(),
-                  kLimit);
+    return Client(
+        std::vector<std::string>{
+            "colorize", folder.string(), "-o", Path("out").string(), "--benchmark"} +
+            QuickOptions(),
+        kLimit);
   }
 };
 
@@ -66,9 +64,7 @@ std::string PngChecksum(const std::string& bytes) {
   return big_endian;
 }
 
-TEST_F(BadPhotosTest, NoSuchFolder) {
-  ExpectRefusal(Colorize(Path("nowhere")), 2, {"nowhere"});
-}
+TEST_F(BadPhotosTest, NoSuchFolder) { ExpectRefusal(Colorize(Path("nowhere")), 2, {"nowhere"}); }
 
 TEST_F(BadPhotosTest, EmptyFolder) {
   fs::create_directories(Path("empty"));

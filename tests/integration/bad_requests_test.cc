@@ -26,18 +26,18 @@ class BadRequestsTest : public ServiceTest {
   }
 
   ProcessResult Colorize(const std::vector<std::string>& more) {
-    return Client(std::vector<std::string>{
-                      "colorize", Path("room").string(), "-o", Path("out").string()} +
-                  QuickOptions() + more,
-                  kLimit);
+    return Client(
+        std::vector<std::string>{"colorize", Path("room").string(), "-o", Path("out").string()} +
+            QuickOptions() + more,
+        kLimit);
   }
 
   // Starts a second server that must refuse to start.
   ProcessResult Serve(const std::vector<std::string>& arguments) {
-    return RunProcess(std::vector<std::string>{ServerProgram(), "serve", "--workers", "0"} +
-                          arguments,
-                      Path("second"),
-                      seconds(60));
+    return RunProcess(
+        std::vector<std::string>{ServerProgram(), "serve", "--workers", "0"} + arguments,
+        Path("second"),
+        seconds(60));
   }
 };
 
@@ -46,21 +46,19 @@ TEST_F(BadRequestsTest, KeyColourOfAnotherSize) {
   GrayRoom();
   const Image truth = ReadImage(Path("room") / "truth" / "view002.png");
   WriteFileAtomic(Path("small.png"), EncodePng8(Resize(truth, 100, 75)));
-  ExpectRefusal(
-      Colorize({"--key-view", "view002", "--key-color", Path("small.png").string()}),
-      2,
-      {"100x75", "160x120"});
+  ExpectRefusal(Colorize({"--key-view", "view002", "--key-color", Path("small.png").string()}),
+                2,
+                {"100x75", "160x120"});
 }
 
 TEST_F(BadRequestsTest, KeyColourWithoutColour) {
   StartServer();
   const fs::path room = GrayRoom();
-  ExpectRefusal(Colorize({"--key-view",
-                          "view002",
-                          "--key-color",
-                          (room / "images" / "view002.png").string()}),
-                2,
-                {"no colour"});
+  ExpectRefusal(
+      Colorize(
+          {"--key-view", "view002", "--key-color", (room / "images" / "view002.png").string()}),
+      2,
+      {"no colour"});
 }
 
 TEST_F(BadRequestsTest, KeyColourThatIsNoImage) {
@@ -74,18 +72,16 @@ TEST_F(BadRequestsTest, HintsOnNoPixel) {
   StartServer();
   GrayRoom();
   WriteFileAtomic(Path("hints.json"), R"([{"x": 5000, "y": 20, "radius": 3, "color": "#ff0000"}])");
-  ExpectRefusal(Colorize({"--key-view", "view001", "--hints", Path("hints.json").string()}),
-                2,
-                {"hint"});
+  ExpectRefusal(
+      Colorize({"--key-view", "view001", "--hints", Path("hints.json").string()}), 2, {"hint"});
 }
 
 TEST_F(BadRequestsTest, EmptyHints) {
   StartServer();
   GrayRoom();
   WriteFileAtomic(Path("hints.json"), "[]");
-  ExpectRefusal(Colorize({"--key-view", "view001", "--hints", Path("hints.json").string()}),
-                2,
-                {"hint"});
+  ExpectRefusal(
+      Colorize({"--key-view", "view001", "--hints", Path("hints.json").string()}), 2, {"hint"});
 }
 
 TEST_F(BadRequestsTest, KeyViewThatIsNotThere) {
@@ -155,28 +151,46 @@ TEST_F(BadRequestsTest, DiskWithoutRoom) {
   ExpectRefusal(Colorize({}), 4, {"space"});
 }
 
-TEST_F(BadRequestsTest, DiskThatFillsUpInTheMiddle) {
-  fs::create_directories(Path("server"));
-  if (::mount("none", Path("server").c_str(), "tmpfs", 0, "size=2m") != 0) {
-    GTEST_SKIP() << "mounting a small file system is not allowed here";
+// A file system that is gone when the test is.
+class SmallDisk {
+ public:
+  explicit SmallDisk(const fs::path& folder) : folder_(folder) {
+    fs::create_directories(folder);
+    mounted_ = ::mount("none", folder.c_str(), "tmpfs", 0, "size=4m") == 0;
   }
-  StartServer({"--reserve-mib", "0"});
-  GrayRoom();
-  const ProcessResult result =
-      Colorize({"--key-view",
-                "view001",
-                "--key-color",
-                (Path("room") / "truth" / "view001.png").string()});
-  std::cerr << result.out << result.err << server().Log();
-  ExpectRefusal(result, 4, {});
+  ~SmallDisk() {
+    if (mounted_) ::umount2(folder_.c_str(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+  bool mounted() const { return mounted_; }
+
+ private:
+  const fs::path folder_;
+  bool mounted_ = false;
+};
+
+TEST_F(BadRequestsTest, DiskThatFillsUpInTheMiddle) {
+  const SmallDisk disk(Path("server") / "data");
+  if (!disk.mounted()) GTEST_SKIP() << "mounting a small file system is not allowed here";
+  StartServer({"--reserve-mib", "2"});
+  const fs::path room = GrayRoom();
+  ExpectRefusal(
+      Colorize({"--key-view", "view001", "--key-color", (room / "truth" / "view001.png").string()}),
+      4,
+      {"disk"});
   StopServer();
-  ::umount(Path("server").c_str());
 }
 
 TEST_F(BadRequestsTest, ManifestPathsThatLeaveTheScene) {
   StartServer();
-  for (const char* path : {"../secret.png", "images/../../secret.png", "/etc/passwd", "a//b.png",
-                           "./a.png", "", "a\\b.png"}) {
+  for (const char* path : {"../secret.png",
+                           "images/../../secret.png",
+                           "/etc/passwd",
+                           "a//b.png",
+                           "./a.png",
+                           "",
+                           "a\\b.png"}) {
     grpc::ClientContext context;
     v1::CreateSceneRequest request;
     v1::SceneFile* file = request.add_files();

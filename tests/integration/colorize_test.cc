@@ -168,10 +168,10 @@ TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColourItThenTheScene) {
 
   // The name of the coloured file says nothing of the view: OUT remembers it.
   fs::copy_file(Path("room") / "truth" / name, Path("painted.png"));
-  const ProcessResult color = Client(
-      std::vector<std::string>{
-          "colorize", room, "-o", out, "--key-color", Path("painted.png").string()} +
-      QuickOptions());
+  const ProcessResult color =
+      Client(std::vector<std::string>{
+                 "colorize", room, "-o", out, "--key-color", Path("painted.png").string()} +
+             QuickOptions());
   ASSERT_EQ(color.exit_code, 0) << color.out << color.err;
   ExpectResults(Path("out"), 2);
   const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
@@ -206,28 +206,26 @@ TEST_F(ColorizeTest, HintsAsJsonColourTheKeyView) {
       },
       seconds(120)))
       << client.Err();
-  EXPECT_EQ(colored.state(), v1::Job::STATE_SUCCEEDED)
-      << colored.error().message() << client.Err();
+  EXPECT_EQ(colored.state(), v1::Job::STATE_SUCCEEDED) << colored.error().message() << client.Err();
   EXPECT_EQ(NewestJob("select_key_view").spec().select_key_view().view(), "view003");
   client.Kill();  // the job goes on without its client
   EXPECT_TRUE(server().IsHealthy());
   const ProcessResult cancel = Client({"job", "cancel", NewestJob("colorize_scene").name()});
   EXPECT_EQ(cancel.exit_code, 0) << cancel.err;
-  EXPECT_TRUE(WaitUntil(
-      [&] { return NewestJob("colorize_scene").state() == v1::Job::STATE_CANCELLED; },
-      seconds(60)));
+  EXPECT_TRUE(
+      WaitUntil([&] { return NewestJob("colorize_scene").state() == v1::Job::STATE_CANCELLED; },
+                seconds(60)));
 }
 
 TEST_F(ColorizeTest, DetachReturnsAtOnceAndWatchAttachesAgain) {
   WriteProceduralScene(Path("room"), SmallRoom(6));
-  const ProcessResult detached =
-      Client(std::vector<std::string>{"colorize",
-                                      Path("room").string(),
-                                      "-o",
-                                      Path("out").string(),
-                                      "--benchmark",
-                                      "--detach"} +
-             QuickOptions());
+  const ProcessResult detached = Client(std::vector<std::string>{"colorize",
+                                                                 Path("room").string(),
+                                                                 "-o",
+                                                                 Path("out").string(),
+                                                                 "--benchmark",
+                                                                 "--detach"} +
+                                        QuickOptions());
   ASSERT_EQ(detached.exit_code, 0) << detached.err;
   const std::string job = NewestJob("colorize_scene").name();
   EXPECT_NE(detached.out.find(job.substr(job.find('/') + 1)), std::string::npos) << detached.out;

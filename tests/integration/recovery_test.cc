@@ -25,28 +25,33 @@ class RecoveryTest : public ServiceTest {
   }
 
   static std::vector<std::string> ShortTimes() {
-    return {"--lease-seconds", "4",   "--heartbeat-seconds", "0.3", "--checkpoint-seconds",
-            "0.5",             "--retry-backoff-ms", "200"};
+    return {"--lease-seconds",
+            "4",
+            "--heartbeat-seconds",
+            "0.3",
+            "--checkpoint-seconds",
+            "0.5",
+            "--retry-backoff-ms",
+            "200"};
   }
 
   std::unique_ptr<Process> StartColorize() {
-    return std::make_unique<Process>(
-        ClientCommand({"colorize",
-                       Path("room").string(),
-                       "-o",
-                       Path("out").string(),
-                       "--benchmark",
-                       "--max-side",
-                       "240",
-                       "--max-gaussians",
-                       "15000",
-                       "--geometry-iterations",
-                       std::to_string(kIterations),
-                       "--colorizer-iterations",
-                       "4",
-                       "--chroma-iterations",
-                       "4"}),
-        Path("client"));
+    return std::make_unique<Process>(ClientCommand({"colorize",
+                                                    Path("room").string(),
+                                                    "-o",
+                                                    Path("out").string(),
+                                                    "--benchmark",
+                                                    "--max-side",
+                                                    "240",
+                                                    "--max-gaussians",
+                                                    "15000",
+                                                    "--geometry-iterations",
+                                                    std::to_string(kIterations),
+                                                    "--colorizer-iterations",
+                                                    "4",
+                                                    "--chroma-iterations",
+                                                    "4"}),
+                                     Path("client"));
   }
 
   v1::Job Geometry() {

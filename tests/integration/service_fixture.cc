@@ -17,9 +17,7 @@ namespace {
 constexpr seconds kStartLimit{60};
 constexpr seconds kStopLimit{60};
 
-std::string Program(const std::string& name) {
-  return (fs::path(COLOR3D_BIN_DIR) / name).string();
-}
+std::string Program(const std::string& name) { return (fs::path(COLOR3D_BIN_DIR) / name).string(); }
 
 std::string Trimmed(std::string text) {
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
@@ -156,8 +154,7 @@ std::vector<std::string> ServiceTest::ClientCommand(
   return std::vector<std::string>{"env", "COLOR3D_SERVER=" + address, ClientProgram()} + arguments;
 }
 
-ProcessResult ServiceTest::Client(const std::vector<std::string>& arguments,
-                                  seconds limit) const {
+ProcessResult ServiceTest::Client(const std::vector<std::string>& arguments, seconds limit) const {
   return RunProcess(ClientCommand(arguments), folder_.path() / "client", limit);
 }
 

@@ -15,8 +15,8 @@
 #include "color3d/v1/scene.grpc.pb.h"
 #include "color3d/v1/server.grpc.pb.h"
 #include "core/base/files.h"
-#include "tests/support/processes.h"
 #include "tests/support/procedural_scene.h"
+#include "tests/support/processes.h"
 
 namespace color3d {
 
@@ -24,8 +24,8 @@ namespace color3d {
 std::string ServerProgram();
 std::string ClientProgram();
 
-// `color3d-server serve` with one worker of two threads; the constructor returns when it listens and
-// throws Error{kUnavailable} with the server's last words when it does not.
+// `color3d-server serve` with one worker of two threads; the constructor returns when it listens
+// and throws Error{kUnavailable} with the server's last words when it does not.
 class TestServer {
  public:
   TestServer(const std::filesystem::path& folder,

@@ -97,12 +97,8 @@ void ProceduralScene::AddViews() {
     std::snprintf(name, sizeof(name), "view%03d.%s", i, options_.jpeg ? "jpg" : "png");
     view.name = name;
     view.image_file = "images/" + view.name;
-    view.captured_camera = {options_.width,
-                            options_.height,
-                            focal,
-                            focal,
-                            0.5 * options_.width,
-                            0.5 * options_.height};
+    view.captured_camera = {
+        options_.width, options_.height, focal, focal, 0.5 * options_.width, 0.5 * options_.height};
     view.camera = view.captured_camera;
     const double t = options_.views > 1 ? 2.0 * i / (options_.views - 1) - 1.0 : 0.0;
     const double angle = kArcHalfAngle * t;
@@ -123,9 +119,8 @@ void ProceduralScene::AddSparsePoints() {
   for (int i = 0; i < tries && static_cast<int>(scene_.points.size()) < options_.sparse_points;
        ++i) {
     const View& from = scene_.views[random.NextBelow(static_cast<uint32_t>(options_.views))];
-    const Vector3d direction = RayDirection(from,
-                                            random.NextUniform(0.0, options_.width),
-                                            random.NextUniform(0.0, options_.height));
+    const Vector3d direction = RayDirection(
+        from, random.NextUniform(0.0, options_.width), random.NextUniform(0.0, options_.height));
     const Vector3d center = from.cam_from_world.Center();
     const Hit hit = impl_->room.Trace(center, direction);
     if (hit.object < 0) continue;

@@ -100,8 +100,8 @@ TEST(ProceduralScene, WrittenSceneIsReadBackWithItsPoses) {
   const ScratchFolder folder;
   NullObserver quiet;
   const CancellationToken cancel;
-  for (const auto poses : {ProceduralSceneOptions::Poses::kColmap,
-                           ProceduralSceneOptions::Poses::kTransforms}) {
+  for (const auto poses :
+       {ProceduralSceneOptions::Poses::kColmap, ProceduralSceneOptions::Poses::kTransforms}) {
     ProceduralSceneOptions options = Small();
     options.poses = poses;
     const auto path = folder.path() / (poses == ProceduralSceneOptions::Poses::kColmap ? "c" : "t");
@@ -113,8 +113,7 @@ TEST(ProceduralScene, WrittenSceneIsReadBackWithItsPoses) {
       const View& expected = room.scene().views[i];
       const View& got = result.scene.views[i];
       EXPECT_EQ(got.name.substr(got.name.rfind('/') + 1), expected.name);
-      const Eigen::Vector3d center =
-          got.cam_from_world.Center() + result.scene.world_offset;
+      const Eigen::Vector3d center = got.cam_from_world.Center() + result.scene.world_offset;
       EXPECT_LT((center - expected.cam_from_world.Center()).norm(), 1e-9);
       EXPECT_NEAR(got.camera.fx, expected.camera.fx, 1e-9);
     }

@@ -66,37 +66,17 @@ Room::Object Room::MakeBox(const Vector3d& center,
 }
 
 void Room::AddShell() {
-  const Material left = Make(Pattern::kStripes,
-                             Srgb(0.86, 0.70, 0.30),
-                             Srgb(0.78, 0.55, 0.18),
-                             0.32,
-                             0.22,
-                             0.30);
-  const Material right = Make(Pattern::kBricks,
-                              Srgb(0.66, 0.27, 0.20),
-                              Srgb(0.75, 0.68, 0.60),
-                              0.42,
-                              0.45,
-                              0.20);
-  const Material ceiling = Make(Pattern::kPlain,
-                                Srgb(0.86, 0.84, 0.80),
-                                Srgb(0.86, 0.84, 0.80),
-                                0.3,
-                                0.12,
-                                0.40);
-  const Material floor = Make(Pattern::kChecker,
-                              Srgb(0.80, 0.72, 0.58),
-                              Srgb(0.42, 0.22, 0.14),
-                              0.45,
-                              0.35,
-                              0.30);
+  const Material left =
+      Make(Pattern::kStripes, Srgb(0.86, 0.70, 0.30), Srgb(0.78, 0.55, 0.18), 0.32, 0.22, 0.30);
+  const Material right =
+      Make(Pattern::kBricks, Srgb(0.66, 0.27, 0.20), Srgb(0.75, 0.68, 0.60), 0.42, 0.45, 0.20);
+  const Material ceiling =
+      Make(Pattern::kPlain, Srgb(0.86, 0.84, 0.80), Srgb(0.86, 0.84, 0.80), 0.3, 0.12, 0.40);
+  const Material floor =
+      Make(Pattern::kChecker, Srgb(0.80, 0.72, 0.58), Srgb(0.42, 0.22, 0.14), 0.45, 0.35, 0.30);
   const Material front = ceiling;
-  const Material back = Make(Pattern::kMarble,
-                             Srgb(0.25, 0.50, 0.55),
-                             Srgb(0.33, 0.60, 0.62),
-                             0.8,
-                             0.40,
-                             0.12);
+  const Material back =
+      Make(Pattern::kMarble, Srgb(0.25, 0.50, 0.55), Srgb(0.33, 0.60, 0.62), 0.8, 0.40, 0.12);
   Object shell = MakeBox(Vector3d::Zero(), {kHalfWidth, kHalfHeight, kHalfDepth}, 0.0, left);
   shell.shape = Object::Shape::kRoom;
   shell.materials = {left, right, ceiling, floor, front, back};
@@ -319,13 +299,14 @@ Vector3d Room::Radiance(const Hit& hit,
   const Vector3d albedo =
       Albedo(object.materials[material], surface, local, footprint_m, noise_seed);
 
-  const Vector3d lamp = kLampCenter + Vector3d((2.0 * lamp_u - 1.0) * kLampHalfSize,
-                                               0.0,
-                                               (2.0 * lamp_v - 1.0) * kLampHalfSize);
+  const Vector3d lamp =
+      kLampCenter +
+      Vector3d((2.0 * lamp_u - 1.0) * kLampHalfSize, 0.0, (2.0 * lamp_v - 1.0) * kLampHalfSize);
   const Vector3d start = position + 1e-4 * hit.normal;
   const Vector3d to_lamp = lamp - start;
   const double squared = to_lamp.squaredNorm();
-  double direct = std::max(0.0, hit.normal.dot(to_lamp)) / std::sqrt(squared) / (1.0 + 0.12 * squared);
+  double direct =
+      std::max(0.0, hit.normal.dot(to_lamp)) / std::sqrt(squared) / (1.0 + 0.12 * squared);
   if (direct > 0.0 && !IsLit(start, lamp)) direct = 0.0;
   const double facing = 0.85 - 0.15 * hit.normal.y();  // a little more from above
   const double ambient = facing * CornerShade(position) * ContactShade(hit, position);

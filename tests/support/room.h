@@ -25,8 +25,8 @@ class Room {
   // Nearest surface in front of `origin`, which lies inside the room.
   Hit Trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
-  // Linear RGB, 0..1, of a surface point, the same from every side (no gloss). `lamp_u`, `lamp_v` in
-  // 0..1 pick the point of the lamp; averaging over them gives soft shadows.
+  // Linear RGB, 0..1, of a surface point, the same from every side (no gloss). `lamp_u`, `lamp_v`
+  // in 0..1 pick the point of the lamp; averaging over them gives soft shadows.
   Eigen::Vector3d Radiance(const Hit& hit,
                            const Eigen::Vector3d& position,
                            double footprint_m,

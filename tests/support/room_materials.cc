@@ -58,9 +58,11 @@ double PatternShare(const Material& m,
   const double v = surface.y() / m.size_m;
   const double footprint = footprint_m / m.size_m;
   switch (m.pattern) {
-    case Pattern::kPlain: return 0.0;
+    case Pattern::kPlain:
+      return 0.0;
     case Pattern::kChecker: {
-      const int64_t cell = static_cast<int64_t>(std::floor(u)) + static_cast<int64_t>(std::floor(v));
+      const int64_t cell =
+          static_cast<int64_t>(std::floor(u)) + static_cast<int64_t>(std::floor(v));
       return (cell & 1) != 0 ? 1.0 : 0.0;
     }
     case Pattern::kBricks: {
@@ -95,11 +97,8 @@ double PatternShare(const Material& m,
 
 }  // namespace
 
-double FractalNoise(const Eigen::Vector3d& p,
-                    double coarsest_m,
-                    double footprint_m,
-                    int octaves,
-                    uint32_t seed) {
+double FractalNoise(
+    const Eigen::Vector3d& p, double coarsest_m, double footprint_m, int octaves, uint32_t seed) {
   double sum = 0.0, weight_sum = 0.0, weight = 1.0, wavelength = coarsest_m;
   for (int i = 0; i < octaves; ++i, wavelength *= 0.5, weight *= 0.7) {
     // An octave fades out between two footprints and one: finer detail would alias.

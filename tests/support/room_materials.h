@@ -14,18 +14,15 @@ struct Material {
   Pattern pattern = Pattern::kPlain;
   Eigen::Vector3d color = Eigen::Vector3d::Zero();         // albedo, linear RGB in 0..1
   Eigen::Vector3d second_color = Eigen::Vector3d::Zero();  // of the pattern
-  double size_m = 1.0;   // period of the pattern
-  double noise = 0.0;    // relative brightness, 0..1
-  double noise_m = 1.0;  // its coarsest wavelength
+  double size_m = 1.0;                                     // period of the pattern
+  double noise = 0.0;                                      // relative brightness, 0..1
+  double noise_m = 1.0;                                    // its coarsest wavelength
 };
 
 // Value noise summed over `octaves` from `coarsest_m` down, 0..1 around one half. Detail finer than
 // `footprint_m`, the size of a sample on the surface, is left out.
-double FractalNoise(const Eigen::Vector3d& p,
-                    double coarsest_m,
-                    double footprint_m,
-                    int octaves,
-                    uint32_t seed);
+double FractalNoise(
+    const Eigen::Vector3d& p, double coarsest_m, double footprint_m, int octaves, uint32_t seed);
 
 // Albedo (linear RGB, 0..1) of a surface point: `surface` in the plane of the surface, m, for the
 // pattern; `solid` in space, m, for the noise.
