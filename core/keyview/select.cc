@@ -139,8 +139,7 @@ void ApplyOutlierGuard(std::vector<RankedView>& views, std::vector<std::string>&
   }
   if (!rejected.empty()) {
     warnings.push_back("key view: " + std::to_string(rejected.size()) +
-                       " views are unlike the others and were set aside (view " + ListOf(rejected) +
-                       ")");
+                       " views are unlike the others and were set aside");
   }
 }
 

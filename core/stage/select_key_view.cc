@@ -58,6 +58,18 @@ KeyViewSelection Select(const SelectKeyViewOptions& options,
   return SelectKeyViewByCoverage(distances, descriptors, options.selection);
 }
 
+// The views that the guard set aside, by the names that the user knows.
+void WarnOfViewsSetAside(const KeyViewSelection& selection,
+                         const Scene& scene,
+                         const std::vector<int>& candidates,
+                         ProgressObserver& progress) {
+  std::string names;
+  for (const RankedView& ranked : selection.ranking) {
+    if (ranked.set_aside) names += " " + scene.views[candidates[ranked.index]].name;
+  }
+  if (!names.empty()) progress.OnWarning("key view: set aside:" + names);
+}
+
 }  // namespace
 
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context) {
@@ -65,6 +77,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   const std::vector<int> candidates = scene.TrainingViews();
   const KeyViewSelection selection = Select(options, scene, candidates, context);
   for (const std::string& warning : selection.warnings) context.progress().OnWarning(warning);
+  WarnOfViewsSetAside(selection, scene, candidates, context.progress());
 
   const View& key = scene.views[candidates[selection.index]];
   nlohmann::ordered_json result{{"view", key.name},

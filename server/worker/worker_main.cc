@@ -6,7 +6,6 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
-#include <thread>
 
 #include "core/base/digest.h"
 #include "server/ops/process.h"
@@ -69,15 +68,23 @@ void Complete(WorkerArguments* arguments) {
   }
 }
 
-// Waits for SIGTERM or SIGINT on a thread of its own: the first drains, the second ends at once.
-void WatchSignals(const sigset_t& signals, std::atomic<bool>* draining) {
-  std::thread([signals, draining] {
-    int signal = 0;
-    ::sigwait(&signals, &signal);
-    draining->store(true);
-    ::sigwait(&signals, &signal);
-    ::_exit(1);
-  }).detach();
+std::atomic<bool> g_draining{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
+
+// The first signal drains, the second ends the process at once.
+void OnStopSignal(int) {
+  if (g_draining.exchange(true)) ::_exit(1);
+}
+
+// A handler, not a blocked mask with sigwait: OpenBLAS starts threads while it is loaded, before
+// main could block anything, and a signal that reaches one of them would kill the process.
+void HandleStopSignals() {
+  struct sigaction action {};
+  action.sa_handler = OnStopSignal;
+  action.sa_flags = SA_RESTART;
+  ::sigaction(SIGTERM, &action, nullptr);
+  ::sigaction(SIGINT, &action, nullptr);
+  ::signal(SIGPIPE, SIG_IGN);
 }
 
 }  // namespace
@@ -87,15 +94,7 @@ int WorkerMain(int argc, char** argv, std::unique_ptr<StageRunner> (*make_runner
   CLI::App app("Runs the jobs of a color3d server; started by 'color3d-server serve'.");
   AddFlags(&app, &arguments);
   CLI11_PARSE(app, argc, argv);
-  // Lives until the process ends, like the thread that sets it.
-  static std::atomic<bool> draining{false};
-  sigset_t signals;
-  ::sigemptyset(&signals);
-  ::sigaddset(&signals, SIGTERM);
-  ::sigaddset(&signals, SIGINT);
-  ::pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  WatchSignals(signals, &draining);
-  ::signal(SIGPIPE, SIG_IGN);
+  HandleStopSignals();
   if (arguments.options.parent != 0) {
     // When the server dies, however it dies, this worker drains.
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -108,7 +107,7 @@ int WorkerMain(int argc, char** argv, std::unique_ptr<StageRunner> (*make_runner
              paths.Logs() / (arguments.options.name + ".log"));
     Complete(&arguments);
     const std::unique_ptr<StageRunner> runner = make_runner();
-    RunWorker(arguments.options, *runner, draining);
+    RunWorker(arguments.options, *runner, g_draining);
     spdlog::shutdown();
     return 0;
   } catch (const Error& e) {
