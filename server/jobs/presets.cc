@@ -7,7 +7,7 @@ PresetValues ValuesOf(v1::Preset preset) {
   switch (preset) {
     case v1::PRESET_BEST:
       values.max_side_px = 800;
-      values.personalize_iterations = 1500;
+      values.personalize_iterations = 1200;
       values.geometry_iterations = 10'000;
       values.max_gaussians = 120'000;
       values.chroma_iterations = 800;
