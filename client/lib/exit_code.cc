@@ -31,10 +31,16 @@ ExitCode ExitCodeOf(const v1::Job& job) {
   if (job.state() == v1::Job::STATE_SUCCEEDED || job.state() == v1::Job::STATE_SKIPPED) {
     return ExitCode::kOk;
   }
-  const auto code = static_cast<grpc::StatusCode>(job.error().code());
-  const bool input_is_wrong =
-      code == grpc::StatusCode::INVALID_ARGUMENT || code == grpc::StatusCode::FAILED_PRECONDITION;
-  return input_is_wrong ? ExitCode::kBadInput : ExitCode::kJobFailed;
+  switch (static_cast<grpc::StatusCode>(job.error().code())) {
+    case grpc::StatusCode::INVALID_ARGUMENT:
+    case grpc::StatusCode::FAILED_PRECONDITION:
+    case grpc::StatusCode::NOT_FOUND:
+      return ExitCode::kBadInput;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return ExitCode::kNoRoom;
+    default:
+      return ExitCode::kJobFailed;
+  }
 }
 
 }  // namespace color3d::client

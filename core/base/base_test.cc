@@ -63,7 +63,10 @@ TEST(ThreadPool, CoversEveryIndexOnceAndRethrows) {
     for (int64_t i = begin; i < end; ++i) ++hits[i];
   });
   for (int h : hits) ASSERT_EQ(h, 2);
-  EXPECT_THROW(pool.ForEach(100, [](int64_t i, int) { if (i == 57) throw InvalidArgument("x"); }),
+  EXPECT_THROW(pool.ForEach(100,
+                            [](int64_t i, int) {
+                              if (i == 57) throw InvalidArgument("x");
+                            }),
                Error);
   int64_t sum = 0;
   ThreadPool single(1);

@@ -11,7 +11,7 @@ namespace color3d {
 // Same meaning as the canonical codes of gRPC, without depending on gRPC.
 enum class ErrorCode {
   kCancelled,
-  kInvalidArgument,     // the input is wrong whatever the state of the system
+  kInvalidArgument,  // the input is wrong whatever the state of the system
   kDeadlineExceeded,
   kNotFound,
   kAlreadyExists,
@@ -19,9 +19,9 @@ enum class ErrorCode {
   kResourceExhausted,   // disk, memory, quota
   kAborted,             // lost a race (a lease, an etag): start again
   kUnimplemented,
-  kInternal,            // our own bug
-  kUnavailable,         // try again later
-  kDataLoss,            // stored bytes are not what was written
+  kInternal,     // our own bug
+  kUnavailable,  // try again later
+  kDataLoss,     // stored bytes are not what was written
 };
 
 // `message` names the offending value and what to do about it, in one line.
@@ -36,18 +36,30 @@ class Error : public std::runtime_error {
 
 inline const char* ErrorCodeName(ErrorCode code) {
   switch (code) {
-    case ErrorCode::kCancelled: return "CANCELLED";
-    case ErrorCode::kInvalidArgument: return "INVALID_ARGUMENT";
-    case ErrorCode::kDeadlineExceeded: return "DEADLINE_EXCEEDED";
-    case ErrorCode::kNotFound: return "NOT_FOUND";
-    case ErrorCode::kAlreadyExists: return "ALREADY_EXISTS";
-    case ErrorCode::kFailedPrecondition: return "FAILED_PRECONDITION";
-    case ErrorCode::kResourceExhausted: return "RESOURCE_EXHAUSTED";
-    case ErrorCode::kAborted: return "ABORTED";
-    case ErrorCode::kUnimplemented: return "UNIMPLEMENTED";
-    case ErrorCode::kInternal: return "INTERNAL";
-    case ErrorCode::kUnavailable: return "UNAVAILABLE";
-    case ErrorCode::kDataLoss: return "DATA_LOSS";
+    case ErrorCode::kCancelled:
+      return "CANCELLED";
+    case ErrorCode::kInvalidArgument:
+      return "INVALID_ARGUMENT";
+    case ErrorCode::kDeadlineExceeded:
+      return "DEADLINE_EXCEEDED";
+    case ErrorCode::kNotFound:
+      return "NOT_FOUND";
+    case ErrorCode::kAlreadyExists:
+      return "ALREADY_EXISTS";
+    case ErrorCode::kFailedPrecondition:
+      return "FAILED_PRECONDITION";
+    case ErrorCode::kResourceExhausted:
+      return "RESOURCE_EXHAUSTED";
+    case ErrorCode::kAborted:
+      return "ABORTED";
+    case ErrorCode::kUnimplemented:
+      return "UNIMPLEMENTED";
+    case ErrorCode::kInternal:
+      return "INTERNAL";
+    case ErrorCode::kUnavailable:
+      return "UNAVAILABLE";
+    case ErrorCode::kDataLoss:
+      return "DATA_LOSS";
   }
   return "INTERNAL";
 }

@@ -94,8 +94,7 @@ void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
                 std::to_string(counter.fetch_add(1)) + ".part");
   try {
     {
-      FileDescriptor fd(
-          ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+      FileDescriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
       if (fd.get() < 0) ThrowErrno("cannot create", temporary);
       size_t done = 0;
       while (done < bytes.size()) {

@@ -99,7 +99,8 @@ std::vector<CurvePoint> CurveRecorder::points() const {
   return points_;
 }
 
-// Layout of a wrapped checkpoint: seconds (float64), length of the CSV (uint64), CSV, trainer state.
+// Layout of a wrapped checkpoint: seconds (float64), length of the CSV (uint64), CSV, trainer
+// state.
 void CurveRecorder::Save(const std::string& state) {
   const double seconds = Seconds();
   const std::string csv = CurvesToCsv(points());

@@ -56,7 +56,9 @@ std::string OnePlot(const std::string& title, const std::vector<const CurvePoint
   }
   const Axis x_axis(0.0, max_x);
   const Axis y_axis(min_y, max_y);
-  const auto x_px = [&](double v) { return kLeft + x_axis.Fraction(v) * (kWidth - kLeft - kRight); };
+  const auto x_px = [&](double v) {
+    return kLeft + x_axis.Fraction(v) * (kWidth - kLeft - kRight);
+  };
   const auto y_px = [&](double v) {
     return kHeight - kBottom - y_axis.Fraction(v) * (kHeight - kTop - kBottom);
   };
@@ -75,7 +77,8 @@ std::string OnePlot(const std::string& title, const std::vector<const CurvePoint
            Format("%.1f", kHeight - kBottom + 14) + "\">" + Format("%.4g", v) + "</text>";
   }
   svg += "<text class=\"n\" text-anchor=\"end\" x=\"" + Format("%.1f", kWidth - kRight) +
-         "\" y=\"" + Format("%.1f", kHeight - 6) + "\">seconds</text><polyline class=\"c\" points=\"";
+         "\" y=\"" + Format("%.1f", kHeight - 6) +
+         "\">seconds</text><polyline class=\"c\" points=\"";
   for (const CurvePoint* p : points) {
     svg += Format("%.1f", x_px(p->seconds)) + "," + Format("%.1f", y_px(p->value)) + " ";
   }
@@ -88,12 +91,23 @@ std::string EscapeHtml(const std::string& text) {
   std::string escaped;
   for (char c : text) {
     switch (c) {
-      case '&': escaped += "&amp;"; break;
-      case '<': escaped += "&lt;"; break;
-      case '>': escaped += "&gt;"; break;
-      case '"': escaped += "&quot;"; break;
-      case '\'': escaped += "&#39;"; break;
-      default: escaped += c;
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
     }
   }
   return escaped;

@@ -73,9 +73,10 @@ std::string PlanHtml(const std::vector<PlanStep>& plan) {
 }  // namespace
 
 std::string RenderReport(const ReportData& data) {
-  std::string html = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
-                     "<meta name=\"viewport\" content=\"width=device-width\"><title>" +
-                     EscapeHtml(data.title) + "</title><style>" + kStyle + "</style></head><body>";
+  std::string html =
+      "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width\"><title>" +
+      EscapeHtml(data.title) + "</title><style>" + kStyle + "</style></head><body>";
   html += "<h1>" + EscapeHtml(data.title) + "</h1><p>" + EscapeHtml(data.summary) + "</p>";
   for (const std::string& warning : data.warnings) {
     html += "<p class=\"warn\">" + EscapeHtml(warning) + "</p>";
@@ -86,7 +87,8 @@ std::string RenderReport(const ReportData& data) {
   if (!data.metrics.empty()) {
     html += "<h2>Figures</h2><table>";
     for (const auto& [name, value] : data.metrics) {
-      html += "<tr><td>" + EscapeHtml(name) + "</td><td class=\"v\">" + Number(value) + "</td></tr>";
+      html +=
+          "<tr><td>" + EscapeHtml(name) + "</td><td class=\"v\">" + Number(value) + "</td></tr>";
     }
     html += "</table>";
   }

@@ -25,28 +25,29 @@ PlanStep Step(std::string name, bool needed, std::string reason, double seconds)
 std::vector<PlanStep> PlanScene(const PlanFacts& f) {
   const double megapixels = f.views * f.megapixels_per_view;
   std::vector<PlanStep> plan;
-  plan.push_back(Step("structure_from_motion",
-                      !f.has_poses,
-                      f.has_poses ? "the scene comes with camera poses"
-                                  : "the photos come without camera poses",
-                      SfmSeconds(f)));
-  plan.push_back(Step("undistortion",
-                      f.has_distortion,
-                      f.has_distortion ? "the cameras have lens distortion"
-                                       : "no camera has lens distortion",
-                      kSecondsPerRemapMegapixel * megapixels));
+  plan.push_back(Step(
+      "structure_from_motion",
+      !f.has_poses,
+      f.has_poses ? "the scene comes with camera poses" : "the photos come without camera poses",
+      SfmSeconds(f)));
+  plan.push_back(
+      Step("undistortion",
+           f.has_distortion,
+           f.has_distortion ? "the cameras have lens distortion" : "no camera has lens distortion",
+           kSecondsPerRemapMegapixel * megapixels));
   plan.push_back(Step("random_points",
                       !f.has_sparse_points,
                       f.has_sparse_points ? "the scene has sparse points to start from"
                                           : "the scene has no sparse points to start from",
                       0.1));
-  plan.push_back(Step("key_view_selection",
-                      !f.key_view_given,
-                      f.key_view_given ? "the key view was given"
-                                       : "the key view is chosen by feature coverage",
-                      kSecondsPerFeatureMegapixel * megapixels));
+  plan.push_back(Step(
+      "key_view_selection",
+      !f.key_view_given,
+      f.key_view_given ? "the key view was given" : "the key view is chosen by feature coverage",
+      kSecondsPerFeatureMegapixel * megapixels));
   plan.push_back(Step("luminance_geometry", true, "every scene needs geometry", 0.0));
-  plan.push_back(Step("personalization", true, "the key view's colours must reach every view", 0.0));
+  plan.push_back(
+      Step("personalization", true, "the key view's colours must reach every view", 0.0));
   plan.push_back(Step("chroma", true, "a and b are fitted on the finished geometry", 0.0));
   plan.push_back(Step("warm_up_in_three_channels",
                       false,
@@ -60,11 +61,11 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
                       f.time_varying,
                       f.time_varying ? "the input is film" : "all photos show one moment",
                       0.0));
-  plan.push_back(Step("evaluation",
-                      f.has_truth,
-                      f.has_truth ? "true colours of held-out views were given"
-                                  : "no true colours were given",
-                      0.0));
+  plan.push_back(
+      Step("evaluation",
+           f.has_truth,
+           f.has_truth ? "true colours of held-out views were given" : "no true colours were given",
+           0.0));
   return plan;
 }
 

@@ -9,10 +9,11 @@
 namespace color3d {
 
 struct PlanStep {
-  std::string step;    // e.g. "structure_from_motion"
+  std::string step;  // e.g. "structure_from_motion"
   bool needed = true;
   std::string reason;  // one sentence
-  double estimated_seconds = 0.0;  // of this machine's threads; what leaving it out saves, if left out
+  double estimated_seconds =
+      0.0;  // of this machine's threads; what leaving it out saves, if left out
   double measured_seconds = -1.0;  // < 0: not run, or not measured on its own
 };
 

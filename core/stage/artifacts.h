@@ -17,19 +17,19 @@ inline constexpr char kScene[] = "scene.json";
 inline constexpr char kImportFacts[] = "import.json";
 inline constexpr char kSfmLog[] = "sfm.log";
 inline constexpr char kKeyView[] = "key_view.json";
-inline constexpr char kKeyViewGray[] = "key_view.png";             // as captured, grey: to colour
-inline constexpr char kKeyColor[] = "key_color.png";               // ab, undistorted, see codec.h
-inline constexpr char kKeyViewColored[] = "key_view_coloured.png"; // for people
+inline constexpr char kKeyViewGray[] = "key_view.png";              // as captured, grey: to colour
+inline constexpr char kKeyColor[] = "key_color.png";                // ab, undistorted, see codec.h
+inline constexpr char kKeyViewColored[] = "key_view_coloured.png";  // for people
 inline constexpr char kColorizer[] = "colorizer.c3c";
-inline constexpr char kViewsAb[] = "views_ab/";                    // + view's stem + ".png"
+inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
 inline constexpr char kGeometry[] = "geometry.c3g";
 inline constexpr char kModel[] = "model.c3g";
 inline constexpr char kPly[] = "scene.ply";
-inline constexpr char kRenders[] = "renders/";                     // + view's stem + ".png"
-inline constexpr char kTruths[] = "truths/";                       // + view's stem + ".jpg"
-inline constexpr char kColored2d[] = "coloured_views/";            // + view's stem + ".jpg"
+inline constexpr char kRenders[] = "renders/";           // + view's stem + ".png"
+inline constexpr char kTruths[] = "truths/";             // + view's stem + ".jpg"
+inline constexpr char kColored2d[] = "coloured_views/";  // + view's stem + ".jpg"
 inline constexpr char kScores[] = "scores.json";
-inline constexpr char kCurves[] = "curves/";                       // + stage + ".csv"
+inline constexpr char kCurves[] = "curves/";  // + stage + ".csv"
 inline constexpr char kMetrics[] = "metrics.json";
 inline constexpr char kAllCurves[] = "curves.csv";
 inline constexpr char kPlan[] = "plan.json";
@@ -39,8 +39,8 @@ inline constexpr char kReport[] = "report.html";
 // Job kind that makes an artifact, for error messages; "another" when the name is unknown.
 std::string StageThatMakes(std::string_view artifact_name);
 
-// "views_ab/0001.png" for the view "0001.jpg", and so on. The import stage sees to it that stems are
-// unique (CheckStemsAreUnique).
+// "views_ab/0001.png" for the view "0001.jpg", and so on. The import stage sees to it that stems
+// are unique (CheckStemsAreUnique).
 std::string ViewArtifact(std::string_view folder, const View& view, std::string_view extension);
 
 // Throws Error{kInvalidArgument} naming two photos that differ only in their file name extension:

@@ -43,8 +43,7 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   // Everything after this works on undistorted pictures.
   const ViewImages images(scene, context.scene_folder(), 0, 0);
   context.WriteOutput(artifact::kKeyColor, EncodeAbPng(images.Undistort(key, ab)));
-  context.WriteOutput(artifact::kKeyViewColored,
-                      EncodePng8(SrgbFromLab(JoinLab(luminance, ab))));
+  context.WriteOutput(artifact::kKeyViewColored, EncodePng8(SrgbFromLab(JoinLab(luminance, ab))));
 }
 
 }  // namespace color3d

@@ -47,8 +47,7 @@ Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image&
   v["delta_e00"] = MeanDeltaE00(rendered, truth);
   v["delta_e00_chroma"] = MeanDeltaE00(UnderTrueL(truth, Plane(rendered, 1, 2)), truth);
   v["delta_e00_chroma_2d"] = MeanDeltaE00(UnderTrueL(truth, direct), truth);
-  v["delta_e00_grey"] =
-      MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
+  v["delta_e00_grey"] = MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
   return v;
 }
 

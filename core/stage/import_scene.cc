@@ -7,9 +7,12 @@ namespace {
 
 const char* LayoutName(SceneLayout layout) {
   switch (layout) {
-    case SceneLayout::kPhotos: return "photos";
-    case SceneLayout::kColmap: return "colmap";
-    case SceneLayout::kTransforms: return "transforms";
+    case SceneLayout::kPhotos:
+      return "photos";
+    case SceneLayout::kColmap:
+      return "colmap";
+    case SceneLayout::kTransforms:
+      return "transforms";
   }
   return "photos";
 }

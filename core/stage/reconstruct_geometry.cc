@@ -37,13 +37,8 @@ void RunReconstructGeometry(const GeometryOptions& options,
   GeometryOptions capped = options;
   capped.max_gaussians = GaussianCap(options.max_gaussians, scene, images);
   ThreadPool pool(context.threads());
-  const GaussianModel model = TrainGeometry(scene,
-                                            images,
-                                            capped,
-                                            pool,
-                                            context.checkpoints(),
-                                            context.progress(),
-                                            context.cancel());
+  const GaussianModel model = TrainGeometry(
+      scene, images, capped, pool, context.checkpoints(), context.progress(), context.cancel());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));
 }
 

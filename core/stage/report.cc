@@ -1,5 +1,3 @@
-#include "core/report/report_page.h"
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -7,6 +5,7 @@
 #include "core/base/parallel.h"
 #include "core/image/codec.h"
 #include "core/report/curves.h"
+#include "core/report/report_page.h"
 #include "core/report/scene_plan.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
@@ -29,9 +28,16 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages, StageContex
   ordered_json metrics = ordered_json::object();
   if (context.HasInput(artifact::kScores)) {
     const auto mean = ordered_json::parse(context.ReadInput(artifact::kScores)).at("mean");
-    for (const char* name : {"psnr_rgb", "ssim_rgb", "psnr_l", "ab_rmse", "delta_e00",
-                             "delta_e00_chroma", "delta_e00_chroma_2d", "delta_e00_grey",
-                             "colourfulness", "colourfulness_truth"}) {
+    for (const char* name : {"psnr_rgb",
+                             "ssim_rgb",
+                             "psnr_l",
+                             "ab_rmse",
+                             "delta_e00",
+                             "delta_e00_chroma",
+                             "delta_e00_chroma_2d",
+                             "delta_e00_grey",
+                             "colourfulness",
+                             "colourfulness_truth"}) {
       metrics[name] = mean.at(name);
     }
   }
@@ -86,9 +92,12 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   plan_facts.megapixels_per_view = 1e-6 * camera.width * camera.height;
   std::vector<PlanStep> plan = PlanScene(plan_facts);
   const std::pair<const char*, const char*> stage_of[] = {
-      {"structure_from_motion", "import_scene"}, {"key_view_selection", "select_key_view"},
-      {"luminance_geometry", "reconstruct_geometry"}, {"personalization", "personalize"},
-      {"chroma", "solve_chroma"}, {"evaluation", "evaluate"}};
+      {"structure_from_motion", "import_scene"},
+      {"key_view_selection", "select_key_view"},
+      {"luminance_geometry", "reconstruct_geometry"},
+      {"personalization", "personalize"},
+      {"chroma", "solve_chroma"},
+      {"evaluation", "evaluate"}};
   for (PlanStep& step : plan) {
     for (const auto& [name, kind] : stage_of) {
       if (step.needed && step.step == name) step.measured_seconds = SecondsOf(stages, kind);
@@ -132,8 +141,8 @@ std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context)
 
 void PassOnResults(StageContext& context) {
   using namespace artifact;
-  for (const char* name : {kPly, kModel, kColorizer, kKeyView, kKeyViewGray, kKeyViewColored,
-                           kSfmLog}) {
+  for (const char* name :
+       {kPly, kModel, kColorizer, kKeyView, kKeyViewGray, kKeyViewColored, kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }
   for (const std::string& name : context.InputsBelow(kRenders)) context.PassOn(name);

@@ -16,9 +16,12 @@ constexpr int kFeatureSidePx = 384;
 
 const char* StrategyName(KeyViewStrategy strategy) {
   switch (strategy) {
-    case KeyViewStrategy::kEntropy: return "entropy";
-    case KeyViewStrategy::kCoverage: return "coverage";
-    case KeyViewStrategy::kManual: return "manual";
+    case KeyViewStrategy::kEntropy:
+      return "entropy";
+    case KeyViewStrategy::kCoverage:
+      return "coverage";
+    case KeyViewStrategy::kManual:
+      return "manual";
   }
   return "coverage";
 }
@@ -90,8 +93,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
                                  {"set_aside", ranked.set_aside}});
   }
   // The photo as captured, in grey: what the user colours.
-  const Image luminance =
-      LuminanceFromSrgb(ReadImage(context.scene_folder() / key.image_file));
+  const Image luminance = LuminanceFromSrgb(ReadImage(context.scene_folder() / key.image_file));
   Image gray = luminance;
   for (float& v : gray.data) v = static_cast<float>(GrayFromLuminance(v));
   context.WriteOutput(artifact::kKeyView, result.dump(1) + "\n");

@@ -24,8 +24,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  const ViewImages images(
-      scene, context.scene_folder(), ColoredSide(context, scene.views[key]));
+  const ViewImages images(scene, context.scene_folder(), ColoredSide(context, scene.views[key]));
   const AbMap key_color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
 
   std::map<int, std::shared_ptr<const ChromaTarget>> cache;

@@ -29,9 +29,7 @@ std::vector<std::string> StageContext::InputsBelow(std::string_view prefix) cons
   return names;
 }
 
-std::string StageContext::ReadInput(const std::string& name) const {
-  return ReadFile(Input(name));
-}
+std::string StageContext::ReadInput(const std::string& name) const { return ReadFile(Input(name)); }
 
 void StageContext::WriteOutput(const std::string& name, std::string_view bytes) {
   if (!IsSafeRelativePath(name)) {

@@ -1,5 +1,5 @@
-// What every stage gets and gives: files in, named files out. One file per job kind beside this one:
-// typed options in, artifacts out, checkpoints, progress and cancellation through the context.
+// What every stage gets and gives: files in, named files out. One file per job kind beside this
+// one: typed options in, artifacts out, checkpoints, progress and cancellation through the context.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace color3d {
 class StageContext {
  public:
   struct Setup {
-    std::filesystem::path scene_folder;    // the scene's files, read-only
+    std::filesystem::path scene_folder;                   // the scene's files, read-only
     std::map<std::string, std::filesystem::path> inputs;  // artifacts of earlier stages by name
     std::filesystem::path output_folder;   // artifacts are left here under their names
     std::filesystem::path scratch_folder;  // free to use, deleted by the caller

@@ -4,8 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <map>
 #include <new>
+#include <thread>
 
 #include "core/base/files.h"
 #include "server/jobs/planner.h"
@@ -16,6 +18,9 @@
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
+
+// Between attempts to tell the store how an attempt ended.
+constexpr auto kReportPause = std::chrono::seconds(1);
 
 // Read-only view of a blob under another name: a hard link, or a copy across filesystems.
 void LinkOrCopy(const fs::path& blob, const fs::path& target) {
@@ -230,10 +235,20 @@ void Attempt::HandleError(const JobError& error) {
   keeper_.Stop();
   // The stage may learn of a lost lease (saving a checkpoint) before the heartbeat does.
   const bool lost = error.reason == "LEASE_LOST";
-  try {
-    Conclude(context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
-  } catch (const Error& e) {
-    spdlog::error("{} cannot report its end ({}); its lease will run out", tag_, e.what());
+  // Room first: on a full disk the store could not even write that the job failed.
+  std::error_code ignored;
+  fs::remove_all(scratch_, ignored);
+  for (int tries_left = 2;; --tries_left) {
+    try {
+      return Conclude(context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
+    } catch (const Error& e) {
+      if (tries_left > 0 && e.code() != ErrorCode::kAborted) {
+        std::this_thread::sleep_for(kReportPause);
+        continue;
+      }
+      spdlog::error("{} cannot report its end ({}); its lease will run out", tag_, e.what());
+      return;
+    }
   }
 }
 

@@ -6,7 +6,8 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
   ImportOptions options;
   options.threads = threads;
   options.hold_out_every_eighth = spec.hold_out_every_eighth();
-  if (spec.has_sfm_max_image_side_px()) options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
+  if (spec.has_sfm_max_image_side_px())
+    options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
   if (spec.has_sfm_max_features()) options.sfm_max_features = spec.sfm_max_features();
   if (spec.has_sfm_timeout_seconds()) {
     options.sfm_timeout = std::chrono::seconds(spec.sfm_timeout_seconds());

@@ -45,12 +45,8 @@ void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext
 void RunRootReport(const std::vector<JobSummary>& graph, StageContext& context) {
   std::vector<StageSummary> stages;
   for (const JobSummary& job : graph) {
-    stages.push_back({job.kind,
-                      job.state,
-                      job.skip_reason,
-                      job.seconds,
-                      job.peak_memory_bytes,
-                      job.warnings});
+    stages.push_back(
+        {job.kind, job.state, job.skip_reason, job.seconds, job.peak_memory_bytes, job.warnings});
   }
   RunReport(stages, context);
 }
@@ -102,8 +98,8 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kColorizeKeyView:
         return RunColorizeKeyView(KeyColorOptions(spec.colorize_key_view(), blobs), context);
       case JobSpec::kPersonalize:
-        return RunPersonalize(
-            ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()), context);
+        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()),
+                              context);
       case JobSpec::kColorizeViews:
         return RunColorizeViews(spec.colorize_views().has_max_side_px()
                                     ? spec.colorize_views().max_side_px()

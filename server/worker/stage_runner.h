@@ -34,8 +34,8 @@ class BlobSource {
 };
 
 struct StageRun {
-  std::string job_name;  // "jobs/..."
-  std::string spec;      // serialised color3d.v1.JobSpec
+  std::string job_name;                // "jobs/..."
+  std::string spec;                    // serialised color3d.v1.JobSpec
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
   // Artifacts of the jobs that this one depends on, by artifact name (read-only files).
   std::map<std::string, std::filesystem::path> inputs;
@@ -46,8 +46,8 @@ struct StageRun {
 };
 
 struct StageOutput {
-  std::vector<std::string> files;        // relative paths below output_folder = artifact names
-  std::vector<std::string> passed_on;    // names of `inputs` to publish again under the same name
+  std::vector<std::string> files;      // relative paths below output_folder = artifact names
+  std::vector<std::string> passed_on;  // names of `inputs` to publish again under the same name
 };
 
 class StageRunner {

@@ -72,8 +72,7 @@ void RunColorizer(const ColorizerArguments& args) {
     const Image luminance = Luminance(truth);
     const auto start = std::chrono::steady_clock::now();
     const Image predicted = JoinLab(luminance, colorizer->Colorize(luminance));
-    seconds +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     error += MeanDeltaE00(predicted, truth);
     grey_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
     ++count;

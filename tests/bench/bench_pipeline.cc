@@ -23,11 +23,10 @@ struct PipelineArguments {
 };
 
 void RunPipeline(const PipelineArguments& args) {
-  LocalPipeline pipeline(args.scene_folder,
-                         args.out_folder,
-                         args.threads,
-                         args.seed,
-                         [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+  LocalPipeline pipeline(
+      args.scene_folder, args.out_folder, args.threads, args.seed, [](const std::string& text) {
+        std::fprintf(stderr, "%s\n", text.c_str());
+      });
   pipeline.Run("import_scene", [&](StageContext& c) {
     ImportOptions options;
     options.hold_out_every_eighth = true;

@@ -47,18 +47,16 @@ LocalPipeline::LocalPipeline(std::filesystem::path scene_folder,
   std::filesystem::create_directories(out_folder_);
 }
 
-void LocalPipeline::Run(const std::string& kind,
-                        const std::function<void(StageContext&)>& stage) {
+void LocalPipeline::Run(const std::string& kind, const std::function<void(StageContext&)>& stage) {
   NoCheckpoints none;
   SayingObserver observer(kind, say_);
   CurveRecorder recorder(kind, observer, none);
   CancellationToken cancel;
   const ScratchFolder scratch;
-  StageContext context(
-      {scene_folder_, artifacts_, out_folder_, scratch.path(), threads_, seed_},
-      recorder,
-      recorder,
-      cancel);
+  StageContext context({scene_folder_, artifacts_, out_folder_, scratch.path(), threads_, seed_},
+                       recorder,
+                       recorder,
+                       cancel);
   stage(context);
   const double seconds = recorder.Seconds();
   if (!recorder.points().empty()) {
