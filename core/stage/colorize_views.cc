@@ -6,10 +6,7 @@
 namespace color3d {
 
 void RunColorizeViews(int max_side_px, StageContext& context) {
-  if (max_side_px < 64 || max_side_px > 4096) {
-    throw InvalidArgument("max_side_px is " + std::to_string(max_side_px) +
-                          "; it must be 64 to 4096");
-  }
+  CheckMaxSide(max_side_px);
   const Scene scene = ReadScene(context);
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), Encoder::Embedded(), context.threads());

@@ -28,10 +28,7 @@ void RunReconstructGeometry(const GeometryOptions& options,
                             int max_side_px,
                             StageContext& context) {
   options.Validate();
-  if (max_side_px < 64 || max_side_px > 4096) {
-    throw InvalidArgument("max_side_px is " + std::to_string(max_side_px) +
-                          "; it must be 64 to 4096");
-  }
+  CheckMaxSide(max_side_px);
   const Scene scene = ReadScene(context);
   const ViewImages images(scene, context.scene_folder(), max_side_px);
   GeometryOptions capped = options;

@@ -31,10 +31,7 @@ void RenderOptions::Validate() const {
   if (max_views < 1 || max_views > 1000) {
     throw InvalidArgument("max_views is " + std::to_string(max_views) + "; it must be 1 to 1000");
   }
-  if (max_side_px < 64 || max_side_px > 4096) {
-    throw InvalidArgument("max_side_px is " + std::to_string(max_side_px) +
-                          "; it must be 64 to 4096");
-  }
+  CheckMaxSide(max_side_px);
 }
 
 void RunRender(const RenderOptions& options, StageContext& context) {

@@ -2,8 +2,16 @@
 
 #include "core/base/files.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
 
 namespace color3d {
+
+void CheckMaxSide(int max_side_px) {
+  if (max_side_px < 64 || max_side_px > 4096) {
+    throw InvalidArgument("max_side_px is " + std::to_string(max_side_px) +
+                          "; it must be 64 to 4096");
+  }
+}
 
 StageContext::StageContext(Setup setup,
                            CheckpointStore& checkpoints,

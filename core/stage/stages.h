@@ -15,6 +15,9 @@
 
 namespace color3d {
 
+// Throws Error{kInvalidArgument} unless a working size is 64..4096 px.
+void CheckMaxSide(int max_side_px);
+
 // The scene's files -> scene.json, import.json (and sfm.log).
 void RunImportScene(const ImportOptions& options, StageContext& context);
 
