@@ -1,5 +1,6 @@
 #include "client/commands/colorize_options.h"
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "client/lib/names.h"
@@ -82,6 +83,11 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
         if (name == "fast" || name == "best" || name == "paper") return "";
         return "'" + name + "' is unknown; known presets are fast, best and paper";
       });
+  app.add_option("--time-budget",
+                 o->time_budget_seconds,
+                 "Shorten the preset's schedules to end in about this time: 90s, 5m, 1h")
+      ->transform(CLI::AsNumberWithUnit(
+          std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}}));
   CLI::Option* benchmark = app.add_flag(
       "--benchmark", o->benchmark, "Photos in colour: drop their colour and score against it");
   color->excludes(hints)->excludes(benchmark);
@@ -130,6 +136,9 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
   colorize->set_preset(PresetOf(options.preset));
+  if (options.time_budget_seconds > 0.0) {
+    colorize->set_time_budget_seconds(options.time_budget_seconds);
+  }
   if (options.max_side_px) colorize->set_max_side_px(*options.max_side_px);
   if (options.hold_out || options.benchmark) {
     colorize->mutable_import_scene()->set_hold_out_every_eighth(true);

@@ -22,7 +22,8 @@ struct ColorizeOptions {
   bool benchmark = false;
   bool detach = false;
   bool hold_out = false;
-  uint64_t seed = 0;  // 0: the server's default
+  uint64_t seed = 0;                 // 0: the server's default
+  double time_budget_seconds = 0.0;  // 0: none
   std::optional<int> max_side_px;
   std::optional<int> geometry_iterations;
   std::optional<int> max_gaussians;

@@ -14,6 +14,7 @@ constexpr double kLeft = 52.0;
 constexpr double kRight = 12.0;
 constexpr double kTop = 28.0;
 constexpr double kBottom = 34.0;
+constexpr int kColors = 6;
 
 std::string Format(const char* format, double value) {
   char buffer[64];
@@ -31,58 +32,111 @@ double TickStep(double span) {
   return 10.0 * power;
 }
 
-struct Axis {
-  double low = 0.0;
-  double high = 1.0;
-  double step = 0.25;
-
-  Axis(double min_value, double max_value) {
-    if (!(max_value > min_value)) max_value = min_value + std::max(1.0, std::abs(min_value));
-    step = TickStep(max_value - min_value);
-    low = std::floor(min_value / step) * step;
-    high = std::ceil(max_value / step) * step;
+// From seconds or values to pixels, with round ticks.
+class Axis {
+ public:
+  Axis(double low, double high, double first_px, double last_px, bool logarithmic)
+      : first_px_(first_px), last_px_(last_px), logarithmic_(logarithmic) {
+    if (logarithmic) {
+      AddDecades(low, high);
+    } else {
+      AddSteps(low, high);
+    }
+    low_ = Scale(ticks_.front());
+    high_ = Scale(ticks_.back());
   }
-  double Fraction(double v) const { return (v - low) / (high - low); }
+  double Px(double v) const {
+    return first_px_ + (Scale(v) - low_) / (high_ - low_) * (last_px_ - first_px_);
+  }
+  const std::vector<double>& ticks() const { return ticks_; }
+
+ private:
+  double Scale(double v) const { return logarithmic_ ? std::log10(v) : v; }
+
+  void AddSteps(double low, double high) {
+    if (!(high > low)) high = low + std::max(1.0, std::abs(low));
+    const double step = TickStep(high - low);
+    const auto first = std::llround(std::floor(low / step));
+    const auto last = std::llround(std::ceil(high / step));
+    for (auto k = first; k <= last; ++k) ticks_.push_back(static_cast<double>(k) * step);
+  }
+
+  // 1, 2, 5, 10, 20, ... around the range.
+  void AddDecades(double low, double high) {
+    const int first = static_cast<int>(std::floor(std::log10(low)));
+    for (int power = first; ticks_.size() < 2 || ticks_.back() < high; ++power) {
+      for (const double m : {1.0, 2.0, 5.0}) {
+        const double tick = m * std::pow(10.0, power);
+        if (!ticks_.empty() && tick <= low) ticks_.clear();
+        if (ticks_.size() < 2 || ticks_.back() < high) ticks_.push_back(tick);
+      }
+    }
+  }
+
+  std::vector<double> ticks_;
+  double first_px_, last_px_;
+  double low_ = 0.0, high_ = 1.0;
+  bool logarithmic_;
 };
 
-std::string OnePlot(const std::string& title, const std::vector<const CurvePoint*>& points) {
-  double min_y = points[0]->value;
-  double max_y = min_y;
-  double max_x = 0.0;
-  for (const CurvePoint* p : points) {
-    min_y = std::min(min_y, p->value);
-    max_y = std::max(max_y, p->value);
-    max_x = std::max(max_x, p->seconds);
-  }
-  const Axis x_axis(0.0, max_x);
-  const Axis y_axis(min_y, max_y);
-  const auto x_px = [&](double v) {
-    return kLeft + x_axis.Fraction(v) * (kWidth - kLeft - kRight);
-  };
-  const auto y_px = [&](double v) {
-    return kHeight - kBottom - y_axis.Fraction(v) * (kHeight - kTop - kBottom);
-  };
-  std::string svg = "<svg class=\"plot\" viewBox=\"0 0 " + Format("%.0f", kWidth) + " " +
-                    Format("%.0f", kHeight) + "\"><text x=\"8\" y=\"16\" class=\"t\">" +
-                    EscapeHtml(title) + "</text>";
-  for (double v = y_axis.low; v <= y_axis.high + 1e-9 * y_axis.step; v += y_axis.step) {
+std::string TextAt(
+    double x, double y, const char* anchor, const char* style, const std::string& t) {
+  return std::string("<text class=\"") + style + "\" text-anchor=\"" + anchor + "\" x=\"" +
+         Format("%.1f", x) + "\" y=\"" + Format("%.1f", y) + "\">" + t + "</text>";
+}
+
+std::string Grid(const Axis& x_axis, const Axis& y_axis) {
+  std::string svg;
+  for (const double v : y_axis.ticks()) {
+    const std::string y = Format("%.1f", y_axis.Px(v));
     svg += "<line class=\"g\" x1=\"" + Format("%.1f", kLeft) + "\" x2=\"" +
-           Format("%.1f", kWidth - kRight) + "\" y1=\"" + Format("%.1f", y_px(v)) + "\" y2=\"" +
-           Format("%.1f", y_px(v)) + "\"/><text class=\"n\" text-anchor=\"end\" x=\"" +
-           Format("%.1f", kLeft - 5) + "\" y=\"" + Format("%.1f", y_px(v) + 3.5) + "\">" +
-           Format("%.4g", v) + "</text>";
+           Format("%.1f", kWidth - kRight) + "\" y1=\"" + y + "\" y2=\"" + y + "\"/>" +
+           TextAt(kLeft - 5, y_axis.Px(v) + 3.5, "end", "n", Format("%.4g", v));
   }
-  for (double v = x_axis.low; v <= x_axis.high + 1e-9 * x_axis.step; v += x_axis.step) {
-    svg += "<text class=\"n\" text-anchor=\"middle\" x=\"" + Format("%.1f", x_px(v)) + "\" y=\"" +
-           Format("%.1f", kHeight - kBottom + 14) + "\">" + Format("%.4g", v) + "</text>";
+  for (const double v : x_axis.ticks()) {
+    svg += TextAt(x_axis.Px(v), kHeight - kBottom + 14, "middle", "n", Format("%.4g", v));
   }
-  svg += "<text class=\"n\" text-anchor=\"end\" x=\"" + Format("%.1f", kWidth - kRight) +
-         "\" y=\"" + Format("%.1f", kHeight - 6) +
-         "\">seconds</text><polyline class=\"c\" points=\"";
-  for (const CurvePoint* p : points) {
-    svg += Format("%.1f", x_px(p->seconds)) + "," + Format("%.1f", y_px(p->value)) + " ";
+  return svg + TextAt(kWidth - kRight, kHeight - 6, "end", "n", "seconds");
+}
+
+// The plot's elements, without the <svg> around them.
+std::string PlotElements(const Plot& plot) {
+  const auto shown = [&](const CurvePoint& p) { return !plot.log_seconds || p.seconds > 0.0; };
+  double min_x = plot.log_seconds ? 1e30 : 0.0, max_x = 0.0, min_y = 1e30, max_y = -1e30;
+  for (const PlotSeries& series : plot.series) {
+    for (const CurvePoint& p : series.points) {
+      if (!shown(p)) continue;
+      min_x = std::min(min_x, p.seconds);
+      max_x = std::max(max_x, p.seconds);
+      min_y = std::min(min_y, p.value);
+      max_y = std::max(max_y, p.value);
+    }
   }
-  return svg + "\"/></svg>";
+  std::string svg = TextAt(8, 16, "start", "t", EscapeHtml(plot.title));
+  if (min_y > max_y) return svg;
+  const Axis x_axis(min_x, max_x, kLeft, kWidth - kRight, plot.log_seconds);
+  const Axis y_axis(min_y, max_y, kHeight - kBottom, kTop, false);
+  svg += Grid(x_axis, y_axis);
+  for (size_t i = 0; i < plot.series.size(); ++i) {
+    const std::string color = std::string("c c") + std::to_string(i % kColors);
+    svg += "<polyline class=\"" + color + "\" points=\"";
+    for (const CurvePoint& p : plot.series[i].points) {
+      if (!shown(p)) continue;
+      svg += Format("%.1f", x_axis.Px(p.seconds)) + "," + Format("%.1f", y_axis.Px(p.value)) + " ";
+    }
+    svg += "\"/>";
+    if (plot.series.size() == 1) continue;
+    const double y = kHeight - kBottom - 8.0 - 14.0 * static_cast<double>(i);
+    svg += "<line class=\"" + color + "\" x1=\"" + Format("%.1f", kWidth - kRight - 18) +
+           "\" x2=\"" + Format("%.1f", kWidth - kRight) + "\" y1=\"" + Format("%.1f", y - 3.5) +
+           "\" y2=\"" + Format("%.1f", y - 3.5) + "\"/>" +
+           TextAt(kWidth - kRight - 22, y, "end", "n", EscapeHtml(plot.series[i].name));
+  }
+  return svg;
+}
+
+std::string ViewBox(double width, double height) {
+  return "viewBox=\"0 0 " + Format("%.0f", width) + " " + Format("%.0f", height) + "\"";
 }
 
 }  // namespace
@@ -115,15 +169,34 @@ std::string EscapeHtml(const std::string& text) {
 
 std::string PlotsSvg(const std::vector<CurvePoint>& points) {
   std::vector<std::string> order;
-  std::map<std::string, std::vector<const CurvePoint*>> groups;
+  std::map<std::string, std::vector<CurvePoint>> groups;
   for (const CurvePoint& p : points) {
     const std::string title = p.stage + ": " + p.error_name;
     if (groups[title].empty()) order.push_back(title);
-    groups[title].push_back(&p);
+    groups[title].push_back(p);
   }
   std::string svg;
-  for (const std::string& title : order) svg += OnePlot(title, groups[title]);
+  for (const std::string& title : order) {
+    svg += "<svg class=\"plot\" " + ViewBox(kWidth, kHeight) + ">" +
+           PlotElements({title, {{"", groups[title]}}}) + "</svg>";
+  }
   return svg;
+}
+
+std::string FigureSvg(const std::vector<Plot>& plots) {
+  const double width = kWidth * static_cast<double>(std::max<size_t>(1, plots.size()));
+  std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" " + ViewBox(width, kHeight) +
+                    " font-family=\"sans-serif\"><style>"
+                    ".t{font-size:13px;font-weight:600}.n{font-size:10px;fill:#555}"
+                    ".g{stroke:#ddd}.c{fill:none;stroke-width:1.6}"
+                    ".c0{stroke:#c0392b}.c1{stroke:#2471a3}.c2{stroke:#1e8449}"
+                    ".c3{stroke:#b9770e}.c4{stroke:#6c3483}.c5{stroke:#333}"
+                    "</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>";
+  for (size_t i = 0; i < plots.size(); ++i) {
+    svg += "<g transform=\"translate(" + Format("%.0f", kWidth * static_cast<double>(i)) + ")\">" +
+           PlotElements(plots[i]) + "</g>";
+  }
+  return svg + "</svg>\n";
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// Small line plots as inline SVG: error against seconds.
+// Small line plots as SVG: error against seconds.
 #pragma once
 
 #include <string>
@@ -8,7 +8,22 @@
 
 namespace color3d {
 
-// One plot for each (stage, error_name) among `points`, in order of first appearance.
+// Lines that share a pair of axes.
+struct PlotSeries {
+  std::string name;
+  std::vector<CurvePoint> points;  // their stage and error_name are not looked at
+};
+struct Plot {
+  std::string title;
+  std::vector<PlotSeries> series;  // at most 6 colours; a legend when there are several
+  bool log_seconds = false;        // points at 0 s are left out then
+};
+
+// A file of its own: the plots side by side, with their styles.
+std::string FigureSvg(const std::vector<Plot>& plots);
+
+// For a page that brings the styles: one plot for each (stage, error_name) among `points`, in order
+// of first appearance.
 std::string PlotsSvg(const std::vector<CurvePoint>& points);
 
 // The five characters that HTML gives a meaning, replaced by entities.

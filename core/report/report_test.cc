@@ -62,6 +62,21 @@ TEST(CurveRecorder, RefusesADamagedCheckpoint) {
   EXPECT_THROW(recorder.Load(), Error);
 }
 
+TEST(Plot, FigureDrawsEverySeriesOnItsAxes) {
+  Plot plot{"fox & friends", {{"fast", {}}, {"best", {}}}, /*log_seconds=*/true};
+  plot.series[0].points = {{"", 0.0, 0, "", 9.0}, {"", 2.0, 10, "", 22.0}, {"", 9.0, 50, "", 26.0}};
+  plot.series[1].points = {{"", 40.0, 100, "", 27.0}};
+  const std::string svg = FigureSvg({plot, Plot{"empty", {}}});
+  EXPECT_NE(svg.find("fox &amp; friends"), std::string::npos);
+  EXPECT_NE(svg.find(">best<"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+  // 0 s has no place on a logarithmic axis: two points are left of the first line.
+  const size_t begin = svg.find("points=\"") + 8;
+  const std::string first = svg.substr(begin, svg.find('/', begin) - begin);
+  EXPECT_EQ(std::count(first.begin(), first.end(), ','), 2);
+}
+
 TEST(ScenePlan, LeavesOutWhatTheSceneDoesNotNeed) {
   PlanFacts facts;
   facts.has_poses = true;

@@ -4,6 +4,7 @@
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "server/jobs/presets.h"
@@ -57,6 +58,20 @@ bool CreatesPrerequisites(const std::string& kind) {
   return kind == "select_key_view" || kind == "reconstruct_geometry" || kind == "colorize_key_view";
 }
 
+// Writes a stage's share of the time budget into its options, unless they say otherwise.
+void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec) {
+  const auto limit = [](auto* options, double seconds) {
+    if (!options->has_time_limit_seconds()) options->set_time_limit_seconds(seconds);
+  };
+  if (spec->has_personalize()) {
+    limit(spec->mutable_personalize(), budget.personalize_seconds);
+  } else if (spec->has_reconstruct_geometry()) {
+    limit(spec->mutable_reconstruct_geometry(), budget.geometry_seconds);
+  } else if (spec->has_solve_chroma()) {
+    limit(spec->mutable_solve_chroma(), budget.chroma_seconds);
+  }
+}
+
 // Writes the preset's values into the unset fields of a stage's options.
 void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec) {
   if (spec->has_select_key_view()) {
@@ -76,9 +91,15 @@ void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec)
     if (!s->has_iterations()) s->set_iterations(preset.geometry_iterations);
     if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
     if (!s->has_max_gaussians()) s->set_max_gaussians(preset.max_gaussians);
+    if (s->recipe() == v1::ReconstructGeometrySpec::RECIPE_UNSPECIFIED) {
+      s->set_recipe(preset.geometry_recipe);
+    }
   } else if (spec->has_solve_chroma()) {
     auto* s = spec->mutable_solve_chroma();
     if (!s->has_iterations()) s->set_iterations(preset.chroma_iterations);
+    if (s->solver() == v1::SolveChromaSpec::SOLVER_UNSPECIFIED) {
+      s->set_solver(preset.chroma_solver);
+    }
   } else if (spec->has_render()) {
     auto* s = spec->mutable_render();
     if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
@@ -87,7 +108,9 @@ void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec)
 
 class GraphBuilder {
  public:
-  GraphBuilder(const v1::JobSpec& submitted, const std::vector<JobRecord>& inputs);
+  GraphBuilder(const v1::JobSpec& submitted,
+               const std::vector<JobRecord>& inputs,
+               const SceneFacts& facts);
   NewGraph BuildStage();
   NewGraph BuildColorizeScene();
 
@@ -105,17 +128,23 @@ class GraphBuilder {
   std::string submitted_kind_;
   PresetValues preset_;
   int max_side_px_ = 0;
+  std::optional<TimeBudget> time_budget_;
   std::map<std::string, JobRecord> given_;  // by kind
   std::map<std::string, int> planned_;      // by kind
   NewGraph graph_;
 };
 
-GraphBuilder::GraphBuilder(const v1::JobSpec& submitted, const std::vector<JobRecord>& inputs)
+GraphBuilder::GraphBuilder(const v1::JobSpec& submitted,
+                           const std::vector<JobRecord>& inputs,
+                           const SceneFacts& facts)
     : submitted_(submitted), submitted_kind_(KindOf(submitted)) {
   preset_ = ValuesOf(submitted.colorize_scene().preset());
   max_side_px_ = submitted.colorize_scene().has_max_side_px()
                      ? submitted.colorize_scene().max_side_px()
                      : preset_.max_side_px;
+  if (submitted.colorize_scene().time_budget_seconds() > 0.0) {
+    time_budget_ = DivideTimeBudget(submitted.colorize_scene().time_budget_seconds(), facts);
+  }
   graph_.scene = submitted.scene();
   for (const JobRecord& input : inputs) {
     if (input.scene != submitted.scene()) {
@@ -179,6 +208,7 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   job.skip_reason = skip_reason;
   for (const Need& need : NeedsOf(job.kind)) Provide(need, job.kind, &job);
   ApplyPreset(preset_, max_side_px_, &spec);
+  if (time_budget_) ApplyTimeBudget(*time_budget_, &spec);
   job.spec = Serialize(spec);
   for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
   planned_[job.kind] = static_cast<int>(graph_.jobs.size());
@@ -263,9 +293,11 @@ NewGraph GraphBuilder::BuildColorizeScene() {
 
 }  // namespace
 
-NewGraph PlanJob(const v1::JobSpec& spec, const std::vector<JobRecord>& inputs) {
+NewGraph PlanJob(const v1::JobSpec& spec,
+                 const std::vector<JobRecord>& inputs,
+                 const SceneFacts& facts) {
   CheckSpec(spec);
-  GraphBuilder builder(spec, inputs);
+  GraphBuilder builder(spec, inputs, facts);
   return spec.has_colorize_scene() ? builder.BuildColorizeScene() : builder.BuildStage();
 }
 

@@ -6,14 +6,17 @@
 
 #include "color3d/v1/job.pb.h"
 #include "server/jobs/job_store.h"
+#include "server/jobs/time_budget.h"
 
 namespace color3d {
 
 // `inputs`: the jobs that spec.inputs names, with their children. The last job of the graph is the
 // one that was asked for. Throws what CheckSpec throws; kFailedPrecondition (INPUT_MISSING) naming
 // an artifact that nothing provides; kInvalidArgument for inputs of another scene or two jobs that
-// give the same artifact.
-NewGraph PlanJob(const v1::JobSpec& spec, const std::vector<JobRecord>& inputs);
+// give the same artifact; what DivideTimeBudget throws for a budget that this scene cannot meet.
+NewGraph PlanJob(const v1::JobSpec& spec,
+                 const std::vector<JobRecord>& inputs,
+                 const SceneFacts& facts);
 
 // What the options, the seed and the kind contribute to the stage cache's key: equal bytes, equal
 // work. Empty when the job must not be served from the cache or found in it (the report of a

@@ -21,6 +21,8 @@ v1::Digest SomeDigest(const std::string& text) {
   return digest;
 }
 
+constexpr SceneFacts kTwentyPhotos = {.photos = 20, .has_poses = true};
+
 v1::JobSpec SceneSpec() {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
@@ -57,15 +59,49 @@ struct Thrown {
 };
 Thrown PlanError(const v1::JobSpec& spec, const std::vector<JobRecord>& inputs = {}) {
   try {
-    PlanJob(spec, inputs);
+    PlanJob(spec, inputs, kTwentyPhotos);
   } catch (const Error& e) {
     return {ReasonOf(e), e.what(), e.code()};
   }
   return {};
 }
 
+TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  const double geometry =
+      SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().time_limit_seconds();
+  const double personalize = SpecOf(graph, "personalize").personalize().time_limit_seconds();
+  const double chroma = SpecOf(graph, "solve_chroma").solve_chroma().time_limit_seconds();
+  EXPECT_GT(geometry, 5.0);
+  EXPECT_GT(personalize, geometry);
+  EXPECT_GT(chroma, 1.0);
+  EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
+}
+
+TEST(Planner, AStagesOwnTimeLimitWinsOverTheBudget) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  spec.mutable_colorize_scene()->mutable_reconstruct_geometry()->set_time_limit_seconds(3);
+  EXPECT_EQ(SpecOf(PlanJob(spec, {}, kTwentyPhotos), "reconstruct_geometry")
+                .reconstruct_geometry()
+                .time_limit_seconds(),
+            3.0);
+}
+
+TEST(Planner, RefusesABudgetThatTheSceneCannotMeetAndNamesTheLeast) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(20);
+  const Thrown thrown = PlanError(spec);
+  EXPECT_EQ(thrown.code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(thrown.reason, "BAD_OPTION");
+  EXPECT_THAT(thrown.message, HasSubstr("20 photos"));
+  EXPECT_THAT(thrown.message, HasSubstr("at least"));
+}
+
 TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
-  const NewGraph graph = PlanJob(SceneSpec(), {});
+  const NewGraph graph = PlanJob(SceneSpec(), {}, kTwentyPhotos);
   ASSERT_EQ(graph.jobs.size(), 11u);
   EXPECT_EQ(graph.jobs.back().kind, "colorize_scene");
   EXPECT_EQ(graph.jobs.back().inputs.size(), 10u);
@@ -96,7 +132,7 @@ TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
   spec.mutable_colorize_scene()->mutable_personalize()->set_iterations(7);
-  NewGraph graph = PlanJob(spec, {});
+  NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
   const PresetValues paper = ValuesOf(v1::PRESET_PAPER);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().iterations(), 7);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().recipe(), v1::PersonalizeSpec::RECIPE_PAPER);
@@ -106,7 +142,7 @@ TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
             paper.max_gaussians);
   EXPECT_EQ(SpecOf(graph, "render").render().max_side_px(), paper.max_side_px);
   spec.mutable_colorize_scene()->set_max_side_px(333);
-  graph = PlanJob(spec, {});
+  graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_side_px(), 333);
   EXPECT_EQ(SpecOf(graph, "colorize_views").colorize_views().max_side_px(), 333);
   EXPECT_EQ(SpecOf(graph, "colorize_views").seed(), 1u);
@@ -115,7 +151,7 @@ TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
 TEST(Planner, KeyViewMakesTheSelectionManual) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_key_view("a.jpg");
-  const v1::JobSpec select = SpecOf(PlanJob(spec, {}), "select_key_view");
+  const v1::JobSpec select = SpecOf(PlanJob(spec, {}, kTwentyPhotos), "select_key_view");
   EXPECT_EQ(select.select_key_view().strategy(), v1::SelectKeyViewSpec::STRATEGY_MANUAL);
   EXPECT_EQ(select.select_key_view().view(), "a.jpg");
 }
@@ -125,7 +161,7 @@ TEST(Planner, TruthBringsEvaluation) {
   v1::TruthImage* truth = spec.mutable_colorize_scene()->add_truth();
   truth->set_view("b.jpg");
   *truth->mutable_image() = SomeDigest("truth");
-  const NewGraph graph = PlanJob(spec, {});
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_EQ(graph.jobs[IndexOf(graph, "evaluate")].skip_reason, "");
   EXPECT_EQ(graph.jobs.back().blobs.size(), 2u);
 }
@@ -134,7 +170,7 @@ TEST(Planner, SingleStagesBringSimplePrerequisites) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   *spec.mutable_colorize_key_view()->mutable_source()->mutable_image() = SomeDigest("key");
-  NewGraph graph = PlanJob(spec, {});
+  NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
   ASSERT_EQ(graph.jobs.size(), 3u);
   EXPECT_EQ(graph.jobs.back().kind, "colorize_key_view");
   EXPECT_EQ(graph.jobs.back().inputs.size(), 2u);
@@ -143,7 +179,7 @@ TEST(Planner, SingleStagesBringSimplePrerequisites) {
   import.kind = "import_scene";
   import.scene = "scenes/test";
   import.state = JobState::kRunning;
-  graph = PlanJob(spec, {import});
+  graph = PlanJob(spec, {import}, kTwentyPhotos);
   ASSERT_EQ(graph.jobs.size(), 2u);
   EXPECT_THAT(graph.jobs[0].input_jobs, ElementsAre("jobs/i"));
   EXPECT_THAT(graph.jobs[1].input_jobs, ElementsAre("jobs/i"));
@@ -170,7 +206,7 @@ TEST(Planner, OtherStagesNameTheMissingInput) {
   inputs.push_back(inputs[0]);
   inputs.back().kind = "reconstruct_geometry";
   inputs.back().name = "jobs/g";
-  const NewGraph graph = PlanJob(spec, inputs);
+  const NewGraph graph = PlanJob(spec, inputs, kTwentyPhotos);
   ASSERT_EQ(graph.jobs.size(), 1u);
   EXPECT_EQ(graph.jobs[0].input_jobs.size(), 5u);
   inputs.back().state = JobState::kFailed;
@@ -254,7 +290,8 @@ TEST(Planner, ExportOfNothingIsSkipped) {
   JobRecord model = import;
   model.name = "jobs/m";
   model.kind = "solve_chroma";
-  EXPECT_THAT(PlanJob(spec, {import, model}).jobs.back().skip_reason, HasSubstr("ply"));
+  EXPECT_THAT(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason,
+              HasSubstr("ply"));
 }
 
 TEST(StageKey, DependsOnOptionsAndSeedOnly) {

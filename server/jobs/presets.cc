@@ -17,8 +17,10 @@ PresetValues ValuesOf(v1::Preset preset) {
       values.strategy = v1::SelectKeyViewSpec::STRATEGY_ENTROPY;
       values.recipe = v1::PersonalizeSpec::RECIPE_PAPER;
       values.personalize_iterations = 4000;
+      values.geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_PAPER;
       values.geometry_iterations = 15'000;
       values.max_gaussians = 2'000'000;
+      values.chroma_solver = v1::SolveChromaSpec::SOLVER_ADAM;
       values.chroma_iterations = 15'000;
       break;
     default:

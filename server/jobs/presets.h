@@ -10,9 +10,11 @@ struct PresetValues {
   v1::SelectKeyViewSpec::Strategy strategy = v1::SelectKeyViewSpec::STRATEGY_COVERAGE;
   v1::PersonalizeSpec::Recipe recipe = v1::PersonalizeSpec::RECIPE_COLOR3D;
   int personalize_iterations = 0;
+  v1::ReconstructGeometrySpec::Recipe geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_COLOR3D;
   int geometry_iterations = 0;
   int max_gaussians = 0;
-  int chroma_iterations = 0;
+  v1::SolveChromaSpec::Solver chroma_solver = v1::SolveChromaSpec::SOLVER_CONJUGATE_GRADIENTS;
+  int chroma_iterations = 0;  // of Adam
 };
 
 // PRESET_UNSPECIFIED is PRESET_FAST.

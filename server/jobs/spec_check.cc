@@ -42,9 +42,11 @@ const std::map<std::string, Range>& Ranges() {
       {"ReconstructGeometrySpec.sh_degree", {0, 3}},
       {"ReconstructGeometrySpec.ssim_weight", {0, 1}},
       {"ReconstructGeometrySpec.edge_weight", {0, 10}},
+      {"ReconstructGeometrySpec.time_limit_seconds", {0, 86400}},
       {"SolveChromaSpec.iterations", {0, 100'000}},
       {"SolveChromaSpec.chroma_sh_degree", {0, 1}},
       {"SolveChromaSpec.ssim_weight", {0, 1}},
+      {"SolveChromaSpec.time_limit_seconds", {0, 86400}},
       {"ReconstructDynamicSpec.frames_per_second", {0.1, 1000}},
       {"ReconstructDynamicSpec.coarse_iterations", {0, 100'000}},
       {"ReconstructDynamicSpec.fine_iterations", {0, 100'000}},
@@ -52,6 +54,7 @@ const std::map<std::string, Range>& Ranges() {
       {"RenderSpec.max_views", {1, 1000}},
       {"RenderSpec.max_side_px", {64, 4096}},
       {"ColorizeSceneSpec.max_side_px", {64, 4096}},
+      {"ColorizeSceneSpec.time_budget_seconds", {0, 604'800}},
   };
   return ranges;
 }

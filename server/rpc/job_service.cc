@@ -52,6 +52,12 @@ std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec
   return inputs;
 }
 
+SceneFacts FactsOf(const SceneRecord& scene) {
+  return {.photos = scene.photo_count,
+          .has_poses =
+              scene.layout == StoredLayout::kColmap || scene.layout == StoredLayout::kTransforms};
+}
+
 JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& request) {
   const RequestKey key = KeyOf("CreateJob", request);
   if (const auto existing = parts.store.FindRequest(key)) return parts.store.GetJob(*existing);
@@ -64,7 +70,9 @@ JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& req
   }
   CheckSpec(request.spec());
   CheckBlobs(parts, request.spec());
-  NewGraph graph = PlanJob(request.spec(), LoadInputs(parts, request.spec()));
+  NewGraph graph = PlanJob(request.spec(),
+                           LoadInputs(parts, request.spec()),
+                           FactsOf(parts.store.GetScene(request.spec().scene())));
   graph.priority = priority;
   JobRecord job = parts.store.CreateGraph(graph, key, parts.limits.max_unfinished_jobs);
   spdlog::info(

@@ -102,6 +102,29 @@ TEST_F(BadRequestsTest, OptionOutOfRange) {
   ExpectRefusal(Colorize({"--max-side", "3"}), 2, {"64"});
 }
 
+TEST_F(BadRequestsTest, TimeBudgetBelowWhatTheSceneNeeds) {
+  StartServer();
+  ExpectRefusal(Client({"colorize",
+                        GrayRoom().string(),
+                        "-o",
+                        Path("out").string(),
+                        "--key-view",
+                        "view002",
+                        "--key-color",
+                        (Path("room") / "truth" / "view002.png").string(),
+                        "--time-budget",
+                        "12s"},
+                       kLimit),
+                2,
+                {"time_budget_seconds is 12", "4 photos", "give at least"});
+}
+
+TEST_F(BadRequestsTest, TimeBudgetThatIsNoTime) {
+  StartServer();
+  GrayRoom();
+  ExpectRefusal(Colorize({"--time-budget", "soon"}), 2, {"soon"});
+}
+
 TEST_F(BadRequestsTest, ServerThatIsNotThere) {
   GrayRoom();
   // Port 1 is never ours.

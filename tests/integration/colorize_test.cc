@@ -217,6 +217,32 @@ TEST_F(ColorizeTest, HintsAsJsonColourTheKeyView) {
                 seconds(60)));
 }
 
+// Schedules of hours, cut to seconds: the result must still be whole.
+TEST_F(ColorizeTest, TimeBudgetShortensTheSchedules) {
+  WriteProceduralScene(Path("room"), SmallRoom(6));
+  const ProcessResult result = Client({"colorize",
+                                       Path("room").string(),
+                                       "-o",
+                                       Path("out").string(),
+                                       "--benchmark",
+                                       "--max-side",
+                                       "240",
+                                       "--geometry-iterations",
+                                       "100000",
+                                       "--colorizer-iterations",
+                                       "100000",
+                                       "--time-budget",
+                                       "28s"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  ExpectResults(Path("out"), 1);
+  const double limit =
+      NewestJob("reconstruct_geometry").spec().reconstruct_geometry().time_limit_seconds();
+  EXPECT_GT(limit, 1.0);
+  EXPECT_LT(limit, 28.0);
+  const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
+  EXPECT_GT(metrics["psnr_l"].get<double>(), 17.0);
+}
+
 TEST_F(ColorizeTest, DetachReturnsAtOnceAndWatchAttachesAgain) {
   WriteProceduralScene(Path("room"), SmallRoom(6));
   const ProcessResult detached = Client(std::vector<std::string>{"colorize",
