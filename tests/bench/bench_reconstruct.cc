@@ -9,6 +9,7 @@
 #include "core/image/codec.h"
 #include "core/report/curves.h"
 #include "core/splat/geometry_trainer.h"
+#include "core/splat/instruction_set.h"
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
 
@@ -103,6 +104,7 @@ nlohmann::ordered_json ToJson(const ReconstructArguments& args, const TrainingTr
       {"max_side_px", args.max_side_px},
       {"colours", args.colours == TrainingColours::kSrgb ? "truth" : "luminance"},
       {"threads", args.threads},
+      {"instruction_set", std::string(ActiveInstructionSet())},
       {"seconds", trace.seconds},
       {"iterations", trace.iterations},
       {"gaussians", trace.gaussians},
