@@ -70,9 +70,8 @@ class GeometryTrainer {
                  channels_,
                  problem.colours ? 1.0f : 0.01f,
                  kTargetBudgetBytes) {
-    state_.parameters =
-        AtMost(options.max_gaussians,
-               WithColours(initial, channels_, ShCoefficients(options.sh_degree)));
+    state_.parameters = AtMost(options.max_gaussians,
+                               WithColours(initial, channels_, ShCoefficients(options.sh_degree)));
     const int rows = state_.parameters.rows();
     initial_count_ = state_.parameters.count();
     state_.moments = {ParameterBlock(rows, initial_count_), ParameterBlock(rows, initial_count_)};
@@ -290,8 +289,7 @@ class GeometryTrainer {
     const double each = 1.0 / static_cast<double>(problem_.held_out.size());
     for (const PosedCamera& view : problem_.held_out) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
-      pipeline_.Forward(
-          state_.parameters, Colours(), CameraAt(view, 0), kBackground, false, pool_);
+      pipeline_.Forward(state_.parameters, Colours(), CameraAt(view, 0), kBackground, false, pool_);
       PlaneBuffer drawn = pipeline_.color();
       const PictureQuality quality = CompareClamped(*target, loss_, pool_, drawn);
       point.psnr_db += each * quality.psnr_db;

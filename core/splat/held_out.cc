@@ -34,9 +34,8 @@ Image ImageFromPlanes(const PlaneBuffer& planes) {
   Image image(planes.width, planes.height, planes.channels);
   for (int c = 0; c < planes.channels; ++c) {
     for (int y = 0; y < planes.height; ++y) {
-      std::copy_n(planes.Row(c, y),
-                  planes.width,
-                  image.Plane(c) + static_cast<size_t>(y) * planes.width);
+      std::copy_n(
+          planes.Row(c, y), planes.width, image.Plane(c) + static_cast<size_t>(y) * planes.width);
     }
   }
   return image;

@@ -141,8 +141,8 @@ GaussianModel TrainGeometryTuned(const Scene& scene,
   problem.luminance = [&images](int view) { return images.Luminance(view); };
   if (colours == TrainingColours::kSrgb) {
     // Decoded once; every level of the pyramid asks again.
-    problem.colours = [&images, kept = std::map<int, std::shared_ptr<const Image>>()](
-                          int view) mutable {
+    problem.colours = [&images,
+                       kept = std::map<int, std::shared_ptr<const Image>>()](int view) mutable {
       std::shared_ptr<const Image>& picture = kept[view];
       if (picture == nullptr) picture = std::make_shared<const Image>(images.Srgb(view));
       return picture;

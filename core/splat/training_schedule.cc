@@ -51,7 +51,9 @@ double TrainingSchedule::Fraction(int64_t iteration, double elapsed_seconds) con
 }
 
 int TrainingSchedule::Level(double fraction, const Camera& camera) const {
-  int level = fraction < tuning_.quarter_size_until ? 2 : fraction < tuning_.half_size_until ? 1 : 0;
+  int level = fraction < tuning_.quarter_size_until ? 2
+              : fraction < tuning_.half_size_until  ? 1
+                                                    : 0;
   const int side = std::min(camera.width, camera.height);
   while (level > 0 && side >> level < kMinTrainingSidePx) --level;
   return level;

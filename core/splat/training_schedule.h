@@ -1,6 +1,6 @@
 // What training does when: levels of the picture pyramid, spherical harmonics, learning rates,
-// densification. All as functions of the fraction 0..1 of the schedule that is done. Internal to the
-// splat module. Stateless.
+// densification. All as functions of the fraction 0..1 of the schedule that is done. Internal to
+// the splat module. Stateless.
 #pragma once
 
 #include <cstdint>

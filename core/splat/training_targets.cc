@@ -30,12 +30,11 @@ std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view,
   const std::shared_ptr<const Image> image = source_(view.view);
   if (image->channels != channels_ || image->width != view.camera.width ||
       image->height != view.camera.height) {
-    throw InvalidArgument("view " + std::to_string(view.view) + ": the picture is " +
-                          std::to_string(image->width) + "x" + std::to_string(image->height) +
-                          "x" + std::to_string(image->channels) + ", its camera " +
-                          std::to_string(view.camera.width) + "x" +
-                          std::to_string(view.camera.height) + " px of " +
-                          std::to_string(channels_) + " channels");
+    throw InvalidArgument(
+        "view " + std::to_string(view.view) + ": the picture is " + std::to_string(image->width) +
+        "x" + std::to_string(image->height) + "x" + std::to_string(image->channels) +
+        ", its camera " + std::to_string(view.camera.width) + "x" +
+        std::to_string(view.camera.height) + " px of " + std::to_string(channels_) + " channels");
   }
   auto planes = std::make_shared<const PlaneBuffer>(PlanesFromImage(
       level == 0

@@ -30,27 +30,26 @@ struct ReconstructArguments {
 
 // "name=value", for measuring other schedules than the defaults.
 void Apply(const std::string& setting, GeometryTuning& t) {
-  const std::map<std::string, double*> fields{
-      {"quarter_size_until", &t.quarter_size_until},
-      {"half_size_until", &t.half_size_until},
-      {"densify_from", &t.densify_from},
-      {"densify_until", &t.densify_until},
-      {"gradient_preference", &t.gradient_preference},
-      {"growth_until", &t.growth_until},
-      {"opacity_reset_every", &t.opacity_reset_every},
-      {"opacity_penalty", &t.opacity_penalty},
-      {"scale_penalty", &t.scale_penalty},
-      {"noise", &t.noise},
-      {"sh_from", &t.sh_from},
-      {"sh_step", &t.sh_step},
-      {"position_rate_first", &t.position_rate_first},
-      {"position_rate_last", &t.position_rate_last},
-      {"dc_rate", &t.dc_rate},
-      {"rest_divisor", &t.rest_divisor},
-      {"opacity_rate", &t.opacity_rate},
-      {"scale_rate", &t.scale_rate},
-      {"rotation_rate", &t.rotation_rate},
-      {"last_rate", &t.last_rate}};
+  const std::map<std::string, double*> fields{{"quarter_size_until", &t.quarter_size_until},
+                                              {"half_size_until", &t.half_size_until},
+                                              {"densify_from", &t.densify_from},
+                                              {"densify_until", &t.densify_until},
+                                              {"gradient_preference", &t.gradient_preference},
+                                              {"growth_until", &t.growth_until},
+                                              {"opacity_reset_every", &t.opacity_reset_every},
+                                              {"opacity_penalty", &t.opacity_penalty},
+                                              {"scale_penalty", &t.scale_penalty},
+                                              {"noise", &t.noise},
+                                              {"sh_from", &t.sh_from},
+                                              {"sh_step", &t.sh_step},
+                                              {"position_rate_first", &t.position_rate_first},
+                                              {"position_rate_last", &t.position_rate_last},
+                                              {"dc_rate", &t.dc_rate},
+                                              {"rest_divisor", &t.rest_divisor},
+                                              {"opacity_rate", &t.opacity_rate},
+                                              {"scale_rate", &t.scale_rate},
+                                              {"rotation_rate", &t.rotation_rate},
+                                              {"last_rate", &t.last_rate}};
   const size_t equals = setting.find('=');
   const std::string name = setting.substr(0, equals);
   char* end = nullptr;
@@ -140,9 +139,9 @@ void RunReconstruct(ReconstructArguments args) {
   if (!args.pictures_folder.empty()) {
     std::filesystem::create_directories(args.pictures_folder);
     trace.on_held_out_picture = [&](int view, const Image& drawn) {
-      WriteFileAtomic(std::filesystem::path(args.pictures_folder) /
-                          (imported.scene.views[view].name + ".png"),
-                      EncodePng8(SideBySide(Truth(images, view, args.colours), drawn)));
+      WriteFileAtomic(
+          std::filesystem::path(args.pictures_folder) / (imported.scene.views[view].name + ".png"),
+          EncodePng8(SideBySide(Truth(images, view, args.colours), drawn)));
     };
   }
   TrainGeometryTuned(imported.scene,
@@ -176,8 +175,7 @@ void AddReconstructCommand(CLI::App& app) {
   command->add_option("--scene", args->scene_folder)->required();
   command->add_option("--max-side", args->max_side_px, "px");
   command->add_option("--threads", args->threads);
-  command
-      ->add_option("--colours", args->colours, "truth (RGB, the default) or luminance")
+  command->add_option("--colours", args->colours, "truth (RGB, the default) or luminance")
       ->transform(CLI::Transformer(std::map<std::string, TrainingColours>{
           {"truth", TrainingColours::kSrgb}, {"luminance", TrainingColours::kLuminance}}));
   CLI::Option* iterations = command->add_option("--iterations", args->geometry.iterations);
