@@ -29,6 +29,8 @@ LocalFeatures DetectLocalFeatures(const Image& gray, int max_count) {
   }
   constexpr int kDimensions = LocalFeatures::kDimensions;
   LocalFeatures features;
+  constexpr int kSmallestPx = 16;  // a descriptor's window; OpenCV's octaves need some pixels, too
+  if (std::min(gray.width, gray.height) < kSmallestPx) return features;
   try {
     const auto sift = cv::SIFT::create();
     const cv::Mat picture = Bytes(gray);

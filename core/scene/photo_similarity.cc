@@ -27,10 +27,11 @@ struct Nearest {
       second = cosine;
     }
   }
-  // Squared distance of unit vectors is 2 - 2 cos.
+  // Squared distance of unit vectors is 2 - 2 cos, up to rounding.
   bool Clear() const {
     constexpr float kRatio = 0.8f;
-    return 1.0f - best < kRatio * kRatio * (1.0f - second);
+    constexpr float kRounding = 1e-5f;
+    return 1.0f - best + kRounding < kRatio * kRatio * (1.0f - second);
   }
 };
 
