@@ -53,6 +53,10 @@ ColmapProcess::ColmapProcess(fs::path log,
       cancel_(cancel),
       deadline_(Clock::now() + options.sfm_timeout) {}
 
+void ColmapProcess::Note(const std::string& line) const {
+  std::ofstream(log_, std::ios::app) << "color3d: " << line << "\n";
+}
+
 std::string ColmapProcess::Threads() const {
   return std::to_string(options_.threads > 0 ? options_.threads : -1);
 }

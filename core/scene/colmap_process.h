@@ -30,6 +30,8 @@ class ColmapProcess {
                 const CancellationToken& cancel);
 
   const std::filesystem::path& log() const { return log_; }
+  // Adds a line of our own to the log.
+  void Note(const std::string& line) const;
   // The value of COLMAP's thread options.
   std::string Threads() const;
 

@@ -123,6 +123,7 @@ void ImportPhotos(const fs::path& scene_folder,
   SfmResult sfm =
       RunStructureFromMotion(photos, scene_folder, scratch_folder, options, progress, cancel);
   result->scene = std::move(sfm.scene);
+  result->sfm = std::move(sfm.report);
   result->ran_structure_from_motion = true;
   if (sfm.unplaced.empty()) return;
   const bool few = 2 * result->scene.views.size() < photos.size();
@@ -153,6 +154,7 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
 void ImportOptions::Validate() const {
   CheckRange("sfm_max_image_side_px", sfm_max_image_side_px, 256, 4096);
   CheckRange("sfm_max_features", sfm_max_features, 512, 16384);
+  CheckRange("sfm_neighbors", sfm_neighbors, 2, 100);
   CheckRange("sfm_timeout", sfm_timeout.count(), 1, 7 * 24 * 3600);
   CheckRange("threads", threads, 0, 1024);
 }

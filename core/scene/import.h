@@ -15,21 +15,39 @@ namespace color3d {
 
 enum class SceneLayout { kPhotos, kColmap, kTransforms };
 
+// Which pairs of photos structure-from-motion matches: a planned few, with all as the way out when
+// those do not hang together, or all from the start.
+enum class SfmPairs { kPlanned, kExhaustive };
+
 struct ImportOptions {
   // Hold out every eighth view (sorted by name; the first, ninth, ...) for evaluation.
   bool hold_out_every_eighth = false;
   // Structure-from-motion (only when the input has no poses).
   int sfm_max_image_side_px = 1600;  // 256..4096
   int sfm_max_features = 4096;       // 512..16384, per photo
+  SfmPairs sfm_pairs = SfmPairs::kPlanned;
+  int sfm_neighbors = 8;  // 2..100, similar photos that each photo is matched with
   std::chrono::seconds sfm_timeout{3600};
   int threads = 0;        // 0: all
   void Validate() const;  // throws Error{kInvalidArgument}
+};
+
+// What structure-from-motion did.
+struct SfmReport {
+  std::string plan;  // which pairs were matched and why, one line
+  int64_t pairs_tried = 0;
+  bool exhaustive = false;  // all pairs were matched
+  double photos_seconds = 0.0;
+  double features_seconds = 0.0;
+  double matching_seconds = 0.0;
+  double mapping_seconds = 0.0;
 };
 
 struct ImportResult {
   Scene scene;
   SceneLayout layout = SceneLayout::kPhotos;
   bool ran_structure_from_motion = false;
+  SfmReport sfm;             // when it ran
   bool undistorted = false;  // some camera had lens distortion
   int photos_found = 0;
   int photos_registered = 0;

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/image/focal_length.h"
 #include "core/image/orientation.h"
 #include "core/image/probe.h"
 #include "core/scene/lens.h"
@@ -87,6 +88,7 @@ void ProbePhoto(const fs::path& scene_folder, Photo* photo) {
   photo->orientation = ReadOrientation(bytes);
   photo->stored_width = info.width;
   photo->stored_height = info.height;
+  photo->focal_px = ReadFocalLengthPx(bytes, info.width, info.height);
   const PictureSize size = OrientedSize(info, photo->orientation);
   photo->width = size.width;
   photo->height = size.height;

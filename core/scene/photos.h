@@ -20,14 +20,15 @@ struct Photo {
   int orientation = 1;  // EXIF, 1..8
   int width = 0;        // px, as looked at: after orientation
   int height = 0;
+  double focal_px = 0.0;  // from EXIF; 0: unknown
 };
 
 // Photos in images/ (any depth) when there are some, else those directly in the folder, else those
 // in subfolders other than augment, masks and hidden ones. Sorted by name; sizes are not read yet.
 std::vector<Photo> ListPhotos(const std::filesystem::path& scene_folder);
 
-// Fills sizes and orientation; refuses files that are no images, cut short or too large
-// (Error{kInvalidArgument} that names the file).
+// Fills sizes, orientation and focal length; refuses files that are no images, cut short or too
+// large (Error{kInvalidArgument} that names the file).
 void ProbePhoto(const std::filesystem::path& scene_folder, Photo* photo);
 
 // Finds the file for a name in a model: images/, input/, the folder itself, then by file name alone

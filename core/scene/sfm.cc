@@ -1,205 +1,173 @@
 #include "core/scene/sfm.h"
 
 #include <algorithm>
-#include <cmath>
+#include <chrono>
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/scene/colmap_model.h"
 #include "core/scene/colmap_process.h"
 #include "core/scene/lens.h"
+#include "core/scene/pair_planner.h"
+#include "core/scene/sfm_mapper.h"
+#include "core/scene/sfm_matching.h"
 #include "core/scene/sfm_photos.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Few photos match each with each; long sequences match neighbours first.
+// Up to here matching all pairs is the answer to every doubt; beyond it takes hours.
 constexpr size_t kExhaustiveLimit = 60;
-constexpr int kSequentialOverlap = 15;
-constexpr int kMatchingBlock = 10;
-constexpr size_t kMinPlaced = 3;
+// Enough to tell photos apart; fewer where the number of pairs makes up for it.
+constexpr int kMaxLocalFeatures = 300;
+constexpr int kMinLocalFeatures = 100;
 
-// Where one run keeps its files.
-struct Workspace {
-  fs::path folder;
-  fs::path images() const { return folder / "photos"; }
-  fs::path database() const { return folder / "database.db"; }
+int LocalFeatureCount(const ImportOptions& options, size_t photos) {
+  if (options.sfm_pairs == SfmPairs::kExhaustive) return 0;
+  return std::clamp(
+      static_cast<int>(100 * kMaxLocalFeatures / photos), kMinLocalFeatures, kMaxLocalFeatures);
+}
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(double* seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    *seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double* seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-void ExtractFeatures(ColmapProcess& colmap,
-                     const Workspace& work,
-                     const ImportOptions& options,
-                     size_t count) {
-  colmap.RunOrThrow({"feature_extractor",
-                     "--database_path",
-                     work.database().string(),
-                     "--image_path",
-                     work.images().string(),
-                     "--ImageReader.camera_model",
-                     "SIMPLE_RADIAL",
-                     "--ImageReader.single_camera_per_folder",
-                     "1",
-                     "--SiftExtraction.use_gpu",
-                     "0",
-                     "--SiftExtraction.num_threads",
-                     colmap.Threads(),
-                     "--SiftExtraction.max_image_size",
-                     std::to_string(options.sfm_max_image_side_px),
-                     "--SiftExtraction.max_num_features",
-                     std::to_string(options.sfm_max_features)},
-                    {"finding features in photos", "Processed file", static_cast<int64_t>(count)});
-}
+// The stages of one run, the best model so far, and what was done for it.
+class Solver {
+ public:
+  Solver(ColmapProcess& colmap,
+         const SfmWorkspace& work,
+         const FeatureImages& copies,
+         const ImportOptions& options,
+         ProgressObserver& progress,
+         SfmReport* report)
+      : colmap_(colmap),
+        work_(work),
+        copies_(copies),
+        options_(options),
+        progress_(progress),
+        report_(report) {}
 
-void Match(ColmapProcess& colmap, const Workspace& work, size_t count, bool exhaustive) {
-  std::vector<std::string> arguments = {exhaustive ? "exhaustive_matcher" : "sequential_matcher",
-                                        "--database_path",
-                                        work.database().string(),
-                                        "--SiftMatching.use_gpu",
-                                        "0",
-                                        "--SiftMatching.num_threads",
-                                        colmap.Threads()};
-  ColmapPhase phase{"matching photos", "Matching image", static_cast<int64_t>(count)};
-  if (exhaustive) {
-    const int64_t blocks = static_cast<int64_t>(count + kMatchingBlock - 1) / kMatchingBlock;
-    arguments.insert(arguments.end(),
-                     {"--ExhaustiveMatching.block_size", std::to_string(kMatchingBlock)});
-    phase = {"matching blocks of photos", "Matching block", blocks * blocks};
-  } else {
-    arguments.insert(arguments.end(),
-                     {"--SequentialMatching.overlap", std::to_string(kSequentialOverlap)});
-  }
-  colmap.RunOrThrow(std::move(arguments), phase);
-}
-
-// How much the mapper insists on. Straight: a smaller angle between the first two photos, and no
-// lens distortion until all cameras stand, because on walks straight ahead distortion and motion
-// explain each other and the mapper gives up with an absurd lens. Loose: fewer common points, too,
-// which may join what does not belong together.
-enum class Strictness { kDefault, kStraight, kLoose };
-
-std::vector<std::string> MapperThresholds(Strictness strictness) {
-  if (strictness == Strictness::kDefault) return {};
-  std::vector<std::string> arguments = {
-      "--Mapper.init_min_tri_angle", "4", "--Mapper.ba_refine_extra_params", "0"};
-  if (strictness == Strictness::kLoose) {
-    arguments.insert(arguments.end(),
-                     {"--Mapper.init_min_num_inliers",
-                      "50",
-                      "--Mapper.min_num_matches",
-                      "10",
-                      "--Mapper.abs_pose_min_num_inliers",
-                      "15",
-                      "--Mapper.abs_pose_min_inlier_ratio",
-                      "0.15"});
-  }
-  return arguments;
-}
-
-// False for models that only look like one: a handful of points, or a lens that no one builds.
-bool IsPlausible(const ColmapModel& model) {
-  constexpr size_t kPointsPerPhoto = 10;
-  if (model.points.size() < kPointsPerPhoto * model.images.size()) return false;
-  for (const auto& [id, image] : model.images) {
-    const ColmapCamera& camera = model.cameras.at(image.camera_id);
-    const double focal = camera.camera.fx / std::max(camera.camera.width, camera.camera.height);
-    if (!(focal > 0.2 && focal < 8.0 && std::abs(camera.distortion.k[0]) < 1.0)) return false;
-    try {
-      UndistortedCamera(camera.camera, camera.distortion);
-    } catch (const Error&) {
-      return false;
+  // An empty model when nothing was placed.
+  ColmapModel Solve(const PairPlan& plan) {
+    if (plan.pairs.size() < AllPairs(Count()).size()) {
+      SolvePlanned(plan);
+      if (PlannedIsEnough()) return std::move(*best_);
+      Say(std::to_string(Placed()) + " of " + std::to_string(Count()) +
+          " photos hang together by the planned pairs; comparing all pairs, which takes longer");
     }
+    SolveExhaustively();
+    return best_ ? std::move(*best_) : ColmapModel{};
   }
-  return true;
-}
 
-// The plausible model with the most photos below `folder`; nullopt when there is none.
-std::optional<ColmapModel> BestModel(const fs::path& folder, fs::path* where) {
-  std::optional<ColmapModel> best;
-  std::set<fs::path> candidates;
-  for (const auto& entry : fs::directory_iterator(folder)) candidates.insert(entry.path());
-  for (const fs::path& candidate : candidates) {
-    if (!IsColmapFolder(candidate)) continue;
-    ColmapModel model = LoadColmapModel(candidate);
-    if (!IsPlausible(model) || (best && model.images.size() <= best->images.size())) continue;
-    best = std::move(model);
-    *where = candidate;
+ private:
+  int Count() const { return static_cast<int>(copies_.names.size()); }
+  size_t Placed() const { return best_ ? best_->images.size() : 0; }
+  bool IsHalfPlaced() const {
+    return 2 * Placed() >= copies_.names.size() && Placed() >= kMinPlaced;
   }
-  return best;
-}
+  bool PlannedIsEnough() const {
+    const bool nearly_all = 10 * Placed() >= 9 * copies_.names.size();
+    return IsHalfPlaced() && (nearly_all || copies_.names.size() > kExhaustiveLimit);
+  }
 
-std::optional<ColmapModel> Map(ColmapProcess& colmap,
-                               const Workspace& work,
-                               size_t count,
-                               const std::string& attempt,
-                               Strictness strictness) {
-  const fs::path output = work.folder / ("models_" + attempt);
-  fs::create_directories(output);
-  std::vector<std::string> arguments = {"mapper",
-                                        "--database_path",
-                                        work.database().string(),
-                                        "--image_path",
-                                        work.images().string(),
-                                        "--output_path",
-                                        output.string(),
-                                        "--Mapper.num_threads",
-                                        colmap.Threads(),
-                                        "--Mapper.min_model_size",
-                                        std::to_string(kMinPlaced),
-                                        "--Mapper.ba_global_function_tolerance",
-                                        "1e-6",
-                                        "--Mapper.extract_colors",
-                                        "0"};
-  const std::vector<std::string> thresholds = MapperThresholds(strictness);
-  arguments.insert(arguments.end(), thresholds.begin(), thresholds.end());
-  const ColmapPhase phase{"placing cameras (" + attempt + " attempt)",
-                          "Registering image",
-                          static_cast<int64_t>(count)};
-  colmap.Run(std::move(arguments), phase);  // another exit code than 0 says: no model
-  fs::path where;
-  std::optional<ColmapModel> best = BestModel(output, &where);
-  if (!best || strictness == Strictness::kDefault) return best;
-  // Now that the cameras stand, the lens may bend.
-  const fs::path refined = work.folder / ("models_" + attempt + "_refined") / "0";
-  fs::create_directories(refined);
-  const int code = colmap.Run(
-      {"bundle_adjuster", "--input_path", where.string(), "--output_path", refined.string()},
-      {"refining cameras", "Bundle adjustment report", 1});
-  std::optional<ColmapModel> better;
-  if (code == 0) better = BestModel(refined.parent_path(), &where);
-  return better ? std::move(better) : std::move(best);
-}
+  void Say(const std::string& warning) {
+    colmap_.Note(warning);
+    progress_.OnWarning(warning);
+  }
 
-ColmapModel Solve(ColmapProcess& colmap,
-                  const Workspace& work,
-                  size_t count,
-                  ProgressObserver& progress) {
-  std::optional<ColmapModel> best;
-  const auto enough = [&] {
-    return best && 2 * best->images.size() >= count && best->images.size() >= kMinPlaced;
-  };
-  const auto attempt = [&](const char* name, Strictness strictness) {
-    std::optional<ColmapModel> model = Map(colmap, work, count, name, strictness);
-    if (!model || (best && model->images.size() <= best->images.size())) return;
-    best = std::move(model);
-    if (strictness == Strictness::kLoose) {
-      progress.OnWarning("camera positions were found with loose thresholds only; check them");
+  void Extract(FeatureDetail detail) {
+    const Stopwatch watch(&report_->features_seconds);
+    ExtractFeatures(colmap_, work_, copies_, options_, detail);
+  }
+
+  void Match(const std::vector<PhotoPair>& pairs) {
+    const Stopwatch watch(&report_->matching_seconds);
+    MatchPairs(colmap_, work_, copies_, pairs);
+    report_->pairs_tried += static_cast<int64_t>(pairs.size());
+  }
+
+  void Attempt(const char* name, Strictness strictness) {
+    const Stopwatch watch(&report_->mapping_seconds);
+    std::optional<ColmapModel> model =
+        MapPhotos(colmap_, work_, copies_.names.size(), name, strictness);
+    if (!model || model->images.size() <= Placed()) return;
+    best_ = std::move(model);
+    is_loose_ = strictness == Strictness::kLoose;
+  }
+
+  void SolvePlanned(const PairPlan& plan) {
+    Extract(FeatureDetail::kCoarse);
+    Match(plan.pairs);
+    Attempt("planned", Strictness::kDefault);
+    if (!IsHalfPlaced() || Placed() == copies_.names.size()) return;
+    const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
+    colmap_.Note(std::to_string(Placed()) +
+                 " photos found a place; matching the others with all: " +
+                 std::to_string(more.size()) + " more pairs");
+    Match(more);
+    Attempt("widened", Strictness::kDefault);
+  }
+
+  void SolveExhaustively() {
+    Extract(FeatureDetail::kFine);
+    report_->exhaustive = true;
+    report_->pairs_tried = static_cast<int64_t>(AllPairs(Count()).size());
+    {
+      const Stopwatch watch(&report_->matching_seconds);
+      MatchAllPairs(colmap_, work_, copies_.names.size());
     }
-  };
-  const bool exhaustive_first = count <= kExhaustiveLimit;
-  Match(colmap, work, count, exhaustive_first);
-  attempt("first", Strictness::kDefault);
-  if (!enough() && !exhaustive_first) {
-    progress.OnWarning("neighbouring photos alone do not hang together; comparing all pairs");
-    Match(colmap, work, count, true);
-    attempt("exhaustive", Strictness::kDefault);
+    Attempt("exhaustive", Strictness::kDefault);
+    if (!IsHalfPlaced()) Attempt("straight", Strictness::kStraight);
+    if (!IsHalfPlaced()) Attempt("loose", Strictness::kLoose);
+    if (is_loose_) Say("camera positions were found with loose thresholds only; check them");
   }
-  if (!enough()) attempt("straight", Strictness::kStraight);
-  if (!enough()) attempt("loose", Strictness::kLoose);
-  return best ? std::move(*best) : ColmapModel{};
+
+  std::vector<bool> PlacedPhotos() const {
+    std::set<std::string> names;
+    for (const auto& [id, image] : best_->images) names.insert(image.name);
+    std::vector<bool> placed;
+    for (const std::string& name : copies_.names) placed.push_back(names.count(name) > 0);
+    return placed;
+  }
+
+  ColmapProcess& colmap_;
+  const SfmWorkspace& work_;
+  const FeatureImages& copies_;
+  const ImportOptions& options_;
+  ProgressObserver& progress_;
+  SfmReport* report_;
+  std::optional<ColmapModel> best_;
+  bool is_loose_ = false;
+};
+
+PairPlan Plan(const std::vector<Photo>& photos,
+              const FeatureImages& copies,
+              const ImportOptions& options,
+              ThreadPool& pool,
+              const CancellationToken& cancel) {
+  const int count = static_cast<int>(photos.size());
+  if (copies.features.empty()) return {AllPairs(count), "all pairs, as asked for"};
+  std::vector<std::string> names;
+  for (const Photo& photo : photos) names.push_back(photo.name);
+  return PlanPairs(CompareAll(copies.features, pool, cancel),
+                   SequenceOrder(names).value_or(std::vector<int>()),
+                   options.sfm_neighbors);
 }
 
 void RequirePlaced(size_t placed, size_t count, const fs::path& log) {
@@ -253,6 +221,19 @@ SfmResult SceneOfModel(const ColmapModel& model,
   return result;
 }
 
+// What an earlier, interrupted run left would be mixed with ours.
+void RemoveEarlierRun(const fs::path& scratch_folder) {
+  std::error_code error;
+  fs::create_directories(scratch_folder, error);
+  fs::remove_all(scratch_folder / "photos", error);
+  fs::remove_all(scratch_folder / "database.db", error);
+  std::vector<fs::path> models;
+  for (const auto& entry : fs::directory_iterator(scratch_folder)) {
+    if (entry.path().filename().string().rfind("models_", 0) == 0) models.push_back(entry.path());
+  }
+  for (const fs::path& folder : models) fs::remove_all(folder, error);
+}
+
 }  // namespace
 
 SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
@@ -261,23 +242,32 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const ImportOptions& options,
                                  ProgressObserver& progress,
                                  const CancellationToken& cancel) {
-  std::error_code error;
-  fs::create_directories(scratch_folder, error);
-  // What an earlier, interrupted run left would be mixed with ours.
-  fs::remove_all(scratch_folder / "photos", error);
-  fs::remove_all(scratch_folder / "database.db", error);
-  for (const std::string attempt : {"first", "exhaustive", "straight", "loose"}) {
-    fs::remove_all(scratch_folder / ("models_" + attempt), error);
-    fs::remove_all(scratch_folder / ("models_" + attempt + "_refined"), error);
-  }
-  const Workspace work{scratch_folder};
+  RemoveEarlierRun(scratch_folder);
+  const SfmWorkspace work{scratch_folder};
   ColmapProcess colmap(scratch_folder / "sfm.log", options, progress, cancel);
-  const std::vector<std::string> copies = WriteFeatureImages(
-      photos, scene_folder, work.images(), options.sfm_max_image_side_px, progress, cancel);
-  ExtractFeatures(colmap, work, options, photos.size());
-  const ColmapModel model = Solve(colmap, work, photos.size(), progress);
+  ThreadPool pool(options.threads);
+  SfmReport report;
+  FeatureImages copies;
+  PairPlan plan;
+  {
+    const Stopwatch watch(&report.photos_seconds);
+    copies = WriteFeatureImages(photos,
+                                scene_folder,
+                                work.images(),
+                                options.sfm_max_image_side_px,
+                                LocalFeatureCount(options, photos.size()),
+                                pool,
+                                progress,
+                                cancel);
+    plan = Plan(photos, copies, options, pool, cancel);
+  }
+  report.plan = plan.reason;
+  colmap.Note("planned " + plan.reason);
+  const ColmapModel model = Solver(colmap, work, copies, options, progress, &report).Solve(plan);
   RequirePlaced(model.images.size(), photos.size(), colmap.log());
-  return SceneOfModel(model, photos, copies);
+  SfmResult result = SceneOfModel(model, photos, copies.names);
+  result.report = std::move(report);
+  return result;
 }
 
 }  // namespace color3d

@@ -16,14 +16,16 @@ namespace color3d {
 struct SfmResult {
   Scene scene;  // the views that were placed, with their points; cameras at the photos' full size
   std::vector<std::string> unplaced;  // names of the other photos
+  SfmReport report;
 };
 
 // `photos` have been probed and are at least 2. Reduced 8-bit grey copies, COLMAP's database and
-// sfm.log are left in `scratch_folder`. Tries again with exhaustive matching, then with a straight
-// lens and a small first angle, then with loose thresholds, while fewer than half of the photos
-// find a place; models with too few points or an absurd lens do not count. Throws Error: fewer than
-// 3 placed (kInvalidArgument), COLMAP not installed (kFailedPrecondition), too slow
-// (kDeadlineExceeded), cancelled.
+// sfm.log are left in `scratch_folder`. Matches planned pairs, then those of the photos that found
+// no place; when too many stay without, all pairs of finer features; then a straight lens and a
+// small first angle, then loose thresholds, while fewer than half of the photos find a place;
+// models with too few points or an absurd lens do not count. Throws Error: fewer than 3 placed
+// (kInvalidArgument), COLMAP not installed (kFailedPrecondition), too slow (kDeadlineExceeded),
+// cancelled.
 SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& scratch_folder,

@@ -1,7 +1,9 @@
 #include "core/scene/sfm_photos.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "core/base/files.h"
 #include "core/image/codec.h"
@@ -9,6 +11,10 @@
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
+
+// Small enough to be cheap, large enough that photos of the same things have features in common.
+constexpr int kSimilaritySidePx = 384;
+constexpr int kMaxPhotosInMemory = 4;
 
 // Range between the 0.5 % and the 99.5 % quantile, from a histogram of 4096 steps.
 std::pair<float, float> UsedRange(const Image& image) {
@@ -23,6 +29,13 @@ std::pair<float, float> UsedRange(const Image& image) {
   for (size_t sum = histogram[high]; sum <= tail && high > low; sum += histogram[--high]) {
   }
   return {static_cast<float>(low) / kBins, static_cast<float>(high + 1) / kBins};
+}
+
+// Equal for photos of one camera and zoom.
+std::string GroupFolder(const FeatureImages::Group& group) {
+  std::string name = std::to_string(group.width) + "x" + std::to_string(group.height);
+  if (group.focal_px > 0.0) name += "_f" + std::to_string(std::lround(group.focal_px));
+  return name;
 }
 
 }  // namespace
@@ -48,28 +61,51 @@ Image FeatureImage(const Image& photo, int max_side_px) {
   return gray;
 }
 
-std::vector<std::string> WriteFeatureImages(const std::vector<Photo>& photos,
-                                            const fs::path& scene_folder,
-                                            const fs::path& folder,
-                                            int max_side_px,
-                                            ProgressObserver& progress,
-                                            const CancellationToken& cancel) {
-  std::vector<std::string> names;
-  for (size_t i = 0; i < photos.size(); ++i) {
+FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
+                                 const fs::path& scene_folder,
+                                 const fs::path& folder,
+                                 int max_side_px,
+                                 int local_features,
+                                 ThreadPool& pool,
+                                 ProgressObserver& progress,
+                                 const CancellationToken& cancel) {
+  FeatureImages written;
+  const int64_t count = static_cast<int64_t>(photos.size());
+  written.names.resize(photos.size());
+  if (local_features > 0) written.features.resize(photos.size());
+  std::vector<std::string> folders(photos.size());
+  std::vector<FeatureImages::Group> seen(photos.size());
+  const auto write = [&](int64_t i) {
     cancel.ThrowIfCancelled();
-    progress.OnProgress(
-        static_cast<int64_t>(i),
-        static_cast<int64_t>(photos.size()),
-        "reading photos " + std::to_string(i + 1) + "/" + std::to_string(photos.size()));
-    const Image image = FeatureImage(ReadImage(scene_folder / photos[i].file), max_side_px);
+    const Photo& photo = photos[i];
+    const Image image = FeatureImage(ReadImage(scene_folder / photo.file), max_side_px);
+    const double focal_px = photo.focal_px * image.width / photo.width;
+    seen[i] = {image.width, image.height, focal_px, {}};
+    folders[i] = GroupFolder(seen[i]);
     char number[32];
-    std::snprintf(number, sizeof(number), "%06zu.png", i + 1);
-    const std::string size = std::to_string(image.width) + "x" + std::to_string(image.height);
-    names.push_back(size + "/" + number);
-    fs::create_directories(folder / size);
-    WriteFileAtomic(folder / names.back(), EncodePng8(image));
+    std::snprintf(number, sizeof(number), "%06d.png", static_cast<int>(i + 1));
+    written.names[i] = folders[i] + "/" + number;
+    fs::create_directories(folder / folders[i]);
+    WriteFileAtomic(folder / written.names[i], EncodePng8(image));
+    if (local_features > 0) {
+      written.features[i] =
+          DetectLocalFeatures(FitWithin(image, kSimilaritySidePx), local_features);
+    }
+  };
+  // Observers are called from one thread; large photos take memory, hence not too many at a time.
+  const int64_t batch = std::min(pool.thread_count(), kMaxPhotosInMemory);
+  for (int64_t begin = 0; begin < count; begin += batch) {
+    progress.OnProgress(
+        begin, count, "reading photos " + std::to_string(begin + 1) + "/" + std::to_string(count));
+    pool.ForEach(std::min(batch, count - begin), [&](int64_t i, int) { write(begin + i); });
   }
-  return names;
+  std::map<std::string, size_t> group_of_folder;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const auto [it, is_new] = group_of_folder.emplace(folders[i], written.groups.size());
+    if (is_new) written.groups.push_back(seen[i]);
+    written.groups[it->second].names.push_back(written.names[i]);
+  }
+  return written;
 }
 
 }  // namespace color3d

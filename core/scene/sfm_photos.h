@@ -7,7 +7,9 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/image.h"
+#include "core/base/parallel.h"
 #include "core/base/progress.h"
+#include "core/image/local_features.h"
 #include "core/scene/photos.h"
 
 namespace color3d {
@@ -16,14 +18,29 @@ namespace color3d {
 // photo uses less than half of the range (16-bit scans often do; SIFT's threshold is absolute).
 Image FeatureImage(const Image& photo, int max_side_px);
 
-// Writes photo i as <width>x<height>/<i + 1 as 6 digits>.png below `folder`, EXIF orientation
-// applied, so that photos of one size share a folder and with it a camera. Returns the relative
-// names.
-std::vector<std::string> WriteFeatureImages(const std::vector<Photo>& photos,
-                                            const std::filesystem::path& scene_folder,
-                                            const std::filesystem::path& folder,
-                                            int max_side_px,
-                                            ProgressObserver& progress,
-                                            const CancellationToken& cancel);
+// The copies on disk and what was seen on the way.
+struct FeatureImages {
+  // Photos that share a folder and with it a camera: the same size and the same focal length.
+  struct Group {
+    int width = 0;  // of the copies, px
+    int height = 0;
+    double focal_px = 0.0;  // of the copies; 0: unknown
+    std::vector<std::string> names;
+  };
+  std::vector<std::string> names;       // of all copies, relative to the folder, in photos' order
+  std::vector<Group> groups;            // together all names
+  std::vector<LocalFeatures> features;  // per photo, for CompareAll; empty unless asked for
+};
+
+// Writes photo i as <width>x<height>[_f<focal>]/<i + 1 as 6 digits>.png below `folder`, EXIF
+// orientation applied. `local_features` > 0: also finds so many features in each photo.
+FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
+                                 const std::filesystem::path& scene_folder,
+                                 const std::filesystem::path& folder,
+                                 int max_side_px,
+                                 int local_features,
+                                 ThreadPool& pool,
+                                 ProgressObserver& progress,
+                                 const CancellationToken& cancel);
 
 }  // namespace color3d

@@ -1,0 +1,172 @@
+// color3d-bench poses: structure-from-motion of a folder of photos, seconds per phase, and how far
+// its cameras are from a given model.
+#include <sqlite3.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/scene/import.h"
+#include "tests/bench/commands.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PosesArguments {
+  std::string scene_folder;
+  std::string pairs = "planned";
+  std::string json_file;
+  std::string keep_folder;
+  ImportOptions options;
+};
+
+class WarningList : public NullObserver {
+ public:
+  void OnWarning(const std::string& message) override { warnings.push_back(message); }
+  std::vector<std::string> warnings;
+};
+
+// Pairs in COLMAP's database with at least as many verified matches as its mapper asks for; -1 when
+// it cannot be read.
+int CountVerifiedPairs(const fs::path& database) {
+  sqlite3* db = nullptr;
+  sqlite3_stmt* query = nullptr;
+  int count = -1;
+  if (sqlite3_open_v2(database.c_str(), &db, SQLITE_OPEN_READONLY, nullptr) == SQLITE_OK &&
+      sqlite3_prepare_v2(
+          db, "SELECT COUNT(*) FROM two_view_geometries WHERE rows >= 15", -1, &query, nullptr) ==
+          SQLITE_OK &&
+      sqlite3_step(query) == SQLITE_ROW) {
+    count = sqlite3_column_int(query, 0);
+  }
+  sqlite3_finalize(query);
+  sqlite3_close(db);
+  return count;
+}
+
+// Camera centres and viewing directions against a model's, after the similarity that fits the
+// centres best (Umeyama 1991).
+nlohmann::ordered_json CompareWithModel(const Scene& found, const Scene& model) {
+  std::map<std::string, const View*> view_of_name;
+  for (const View& view : model.views) view_of_name[view.name] = &view;
+  std::vector<std::pair<const View*, const View*>> both;
+  for (const View& view : found.views) {
+    const auto it = view_of_name.find(view.name);
+    if (it != view_of_name.end()) both.emplace_back(&view, it->second);
+  }
+  nlohmann::ordered_json result{{"model_views", model.views.size()}, {"common", both.size()}};
+  if (both.size() < 4) return result;
+  const auto n = static_cast<Eigen::Index>(both.size());
+  Eigen::Matrix3Xd from(3, n), to(3, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    from.col(i) = both[i].first->cam_from_world.Center();
+    to.col(i) = both[i].second->cam_from_world.Center();
+  }
+  const Eigen::Matrix4d align = Eigen::umeyama(from, to, true);
+  const double scale = std::cbrt(align.topLeftCorner<3, 3>().determinant());
+  const Eigen::Matrix3d rotation = align.topLeftCorner<3, 3>() / scale;
+  const Eigen::Matrix3Xd moved = (align * from.colwise().homogeneous()).topRows<3>();
+  const double extent = (to.rowwise().maxCoeff() - to.rowwise().minCoeff()).norm();
+  const Eigen::VectorXd off = (moved - to).colwise().norm();
+  double sum_deg = 0.0, worst_deg = 0.0;
+  for (const auto& [mine, theirs] : both) {
+    const Eigen::Matrix3d turn = mine->cam_from_world.rotation.toRotationMatrix() *
+                                 rotation.transpose() *
+                                 theirs->cam_from_world.rotation.toRotationMatrix().transpose();
+    const double deg = Eigen::AngleAxisd(turn).angle() * 180.0 / M_PI;
+    sum_deg += deg;
+    worst_deg = std::max(worst_deg, deg);
+  }
+  result["centre_rms_over_extent"] = std::sqrt(off.squaredNorm() / n) / extent;
+  result["centre_worst_over_extent"] = off.maxCoeff() / extent;
+  result["rotation_mean_deg"] = sum_deg / n;
+  result["rotation_worst_deg"] = worst_deg;
+  return result;
+}
+
+// A folder without poses next to the scene's photos, so that the import has to find them.
+void LinkPhotos(const fs::path& scene_folder, const fs::path& folder) {
+  const fs::path images = scene_folder / "images";
+  fs::create_directory_symlink(fs::absolute(fs::exists(images) ? images : scene_folder),
+                               folder / "images");
+}
+
+nlohmann::ordered_json PointFacts(const Scene& scene) {
+  double track = 0.0, error_px = 0.0;
+  for (const SparsePoint& point : scene.points) {
+    track += static_cast<double>(point.views.size());
+    error_px += point.reprojection_error_px;
+  }
+  const double n = std::max<double>(1.0, static_cast<double>(scene.points.size()));
+  return {{"points", scene.points.size()},
+          {"mean_track_length", track / n},
+          {"mean_reprojection_error_px", error_px / n}};
+}
+
+void RunPoses(PosesArguments& args) {
+  if (args.pairs == "exhaustive") args.options.sfm_pairs = SfmPairs::kExhaustive;
+  const ScratchFolder photos, scratch;
+  LinkPhotos(args.scene_folder, photos.path());
+  const fs::path work = args.keep_folder.empty() ? scratch.path() : fs::path(args.keep_folder);
+  WarningList observer;
+  const CancellationToken cancel;
+  const auto start = std::chrono::steady_clock::now();
+  const ImportResult imported = ImportScene(photos.path(), work, args.options, observer, cancel);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const SfmReport& sfm = imported.sfm;
+  nlohmann::ordered_json result{
+      {"scene", args.scene_folder},
+      {"pairs", args.pairs},
+      {"threads", args.options.threads},
+      {"seconds", seconds},
+      {"seconds_photos", sfm.photos_seconds},
+      {"seconds_features", sfm.features_seconds},
+      {"seconds_matching", sfm.matching_seconds},
+      {"seconds_mapping", sfm.mapping_seconds},
+      {"photos", imported.photos_found},
+      {"registered", imported.photos_registered},
+      {"plan", sfm.plan},
+      {"pairs_tried", sfm.pairs_tried},
+      {"pairs_verified", CountVerifiedPairs(work / "database.db")},
+      {"fell_back_to_exhaustive", sfm.exhaustive && args.pairs == "planned"}};
+  result.update(PointFacts(imported.scene));
+  const fs::path model = fs::path(args.scene_folder) / "sparse/0";
+  if (fs::exists(model)) {
+    result["against_model"] =
+        CompareWithModel(imported.scene, ReadColmapModel(model, args.scene_folder));
+  }
+  result["warnings"] = observer.warnings;
+  const std::string text = result.dump(1) + "\n";
+  if (args.json_file.empty()) {
+    std::printf("%s", text.c_str());
+  } else {
+    WriteFileAtomic(args.json_file, text);
+  }
+}
+
+}  // namespace
+
+void AddPosesCommand(CLI::App& app) {
+  auto args = std::make_shared<PosesArguments>();
+  CLI::App* command =
+      app.add_subcommand("poses", "structure-from-motion of photos: seconds and registered views");
+  command->add_option("--scene", args->scene_folder, "folder with images/")->required();
+  command->add_option("--pairs", args->pairs)->check(CLI::IsMember({"planned", "exhaustive"}));
+  command->add_option("--neighbors", args->options.sfm_neighbors, "similar photos per photo");
+  command->add_option("--max-features", args->options.sfm_max_features, "per photo");
+  command->add_option("--threads", args->options.threads, "0: all");
+  command->add_option("--keep", args->keep_folder, "keeps COLMAP's files and sfm.log here");
+  command->add_option("--json", args->json_file, "default: standard output");
+  command->callback([args] { RunPoses(*args); });
+}
+
+}  // namespace color3d
