@@ -7,6 +7,7 @@
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/base/subprocess.h"
@@ -20,6 +21,26 @@ TEST(Sha256, MatchesPublishedVectors) {
   EXPECT_EQ(Sha256Hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   EXPECT_TRUE(IsSha256Hex(Sha256Hex("x")));
   EXPECT_FALSE(IsSha256Hex("ABC"));
+}
+
+TEST(AvailableMemory, IsTheLeastOfWhatTheSystemAndTheGroupsLeave) {
+  const ScratchFolder root;
+  const auto put = [&](const std::string& file, const std::string& text) {
+    fs::create_directories((root.path() / file).parent_path());
+    WriteFileAtomic(root.path() / file, text);
+  };
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), INT64_MAX);
+  put("proc/meminfo", "MemTotal:  9000 kB\nMemAvailable:   5000 kB\n");
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), 5000 * 1024);
+  put("proc/self/cgroup", "4:memory:/a/b\n0::/c/d\n");
+  put("sys/fs/cgroup/c/memory.max", "4000000\n");
+  put("sys/fs/cgroup/c/memory.current", "1000000\n");
+  put("sys/fs/cgroup/c/d/memory.max", "max\n");
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), 3000000);
+  put("sys/fs/cgroup/memory/a/b/memory.limit_in_bytes", "2500000\n");
+  put("sys/fs/cgroup/memory/a/b/memory.usage_in_bytes", "2600000\n");
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), 0);  // over its limit: never negative
+  EXPECT_GT(AvailableMemoryBytes(), 1 << 20);
 }
 
 TEST(Files, WriteIsAtomicAndReadable) {

@@ -6,6 +6,7 @@
 #include "core/scene/colmap_model.h"
 #include "core/scene/import.h"
 #include "core/scene/photos.h"
+#include "core/scene/reprojection.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -24,8 +25,15 @@ void ThrowMissing(const std::vector<std::string>& missing, size_t total, const f
 
 }  // namespace
 
-Scene ReadColmapModel(const fs::path& model_folder, const fs::path& scene_folder) {
+Scene ReadColmapModel(const fs::path& model_folder,
+                      const fs::path& scene_folder,
+                      std::vector<std::string>* warnings) {
   const ColmapModel model = LoadColmapModel(model_folder);
+  const std::vector<CameraReprojection> reprojection = MeasureReprojection(model);
+  if (warnings != nullptr) {
+    const std::vector<std::string> said = ReprojectionWarnings(reprojection);
+    warnings->insert(warnings->end(), said.begin(), said.end());
+  }
   if (model.images.empty()) {
     throw InvalidArgument("the COLMAP model in " + model_folder.string() + " has no images");
   }

@@ -1,10 +1,12 @@
 #include "core/scene/import.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/error.h"
 #include "core/scene/colmap_model.h"
 #include "core/scene/lens.h"
+#include "core/scene/normalise.h"
 #include "core/scene/photos.h"
 #include "core/scene/sfm.h"
 #include "core/scene/sparse_cloud.h"
@@ -14,7 +16,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kFarFromOrigin = 1e3;
+constexpr double kSuspiciousShareBehind = 0.2;
 constexpr int kRandomPoints = 20'000;
 constexpr uint64_t kRandomPointSeed = 1;
 constexpr int kHoldOutEvery = 8;
@@ -44,30 +46,6 @@ std::string FirstNames(const std::vector<std::string>& names, size_t count) {
   return text + (names.size() > count ? ", ..." : "");
 }
 
-// Float32 carries 7 digits: a scene in geographic coordinates would lose all detail.
-void Recentre(ImportResult* result) {
-  Scene& scene = result->scene;
-  double largest = 0.0;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const View& view : scene.views) {
-    const Eigen::Vector3d center = view.cam_from_world.Center();
-    largest = std::max(largest, center.cwiseAbs().maxCoeff());
-    mean += center / static_cast<double>(scene.views.size());
-  }
-  for (const SparsePoint& point : scene.points) {
-    largest = std::max(largest, point.position.cwiseAbs().maxCoeff());
-  }
-  if (largest <= kFarFromOrigin || mean.cwiseAbs().maxCoeff() <= kFarFromOrigin) return;
-  for (View& view : scene.views) {
-    view.cam_from_world.translation += view.cam_from_world.rotation * mean;
-  }
-  for (SparsePoint& point : scene.points) point.position -= mean;
-  scene.world_offset += mean;
-  result->warnings.push_back(
-      "the scene lies far from the origin; its coordinates are kept relative "
-      "to the cameras' mean and put back on export");
-}
-
 void DropWeakPoints(Scene* scene) {
   auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
   scene->points.erase(std::remove_if(scene->points.begin(), scene->points.end(), weak),
@@ -83,9 +61,22 @@ void AddRandomPointsWhenEmpty(ImportResult* result) {
         "the scene has no sparse points, and its cameras look at nothing in "
         "common; check the poses");
   }
+  result->random_points = true;
   result->warnings.push_back(
       "the scene has poses but no sparse points; reconstruction starts from " +
       std::to_string(scene.points.size()) + " random ones");
+}
+
+void Normalise(ImportResult* result) {
+  for (std::string& note : NormaliseScene(&result->scene)) {
+    result->warnings.push_back(std::move(note));
+  }
+  const double behind = ShareBehindCameras(result->scene);
+  if (behind > kSuspiciousShareBehind) {
+    result->warnings.push_back(std::to_string(std::lround(100.0 * behind)) +
+                               " % of the observations of sparse points lie behind their camera; "
+                               "check the poses");
+  }
 }
 
 void HoldOut(ImportResult* result) {
@@ -174,7 +165,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   const fs::path colmap_folder = FindColmapFolder(scene_folder);
   if (!colmap_folder.empty()) {
     result.layout = SceneLayout::kColmap;
-    result.scene = ReadColmapModel(colmap_folder, scene_folder);
+    result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings);
     WarnOfUnposedPhotos(scene_folder, &result);
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;
@@ -194,7 +185,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
     return !IsUndistorted(v.distortion);
   });
   DropWeakPoints(&scene);
-  Recentre(&result);
+  Normalise(&result);
   AddRandomPointsWhenEmpty(&result);
   if (options.hold_out_every_eighth) HoldOut(&result);
   return result;

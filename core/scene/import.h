@@ -47,8 +47,9 @@ struct ImportResult {
   Scene scene;
   SceneLayout layout = SceneLayout::kPhotos;
   bool ran_structure_from_motion = false;
-  SfmReport sfm;             // when it ran
-  bool undistorted = false;  // some camera had lens distortion
+  SfmReport sfm;               // when it ran
+  bool undistorted = false;    // some camera had lens distortion
+  bool random_points = false;  // the input had none
   int photos_found = 0;
   int photos_registered = 0;
   std::vector<std::string> warnings;  // for the report; not sent to the observer
@@ -59,17 +60,21 @@ struct ImportResult {
 // With poses of several kinds, COLMAP's wins. `scratch_folder` receives structure-from-motion's
 // files and sfm.log. Throws Error: an empty folder, one photo, unreadable photos, a model whose
 // images are missing, non-finite numbers, photos that do not overlap (how many registered and why
-// it may have failed). Scenes far from the origin (cameras' mean beyond 1e3) are recentred; points
-// with fewer than 2 observations are dropped; poses without points get 20 000 seeded random ones.
+// it may have failed), points that all lie behind their cameras or absurdly far away. Scenes far
+// from the origin are recentred, very small and very large ones rescaled (normalise.h); points with
+// fewer than 2 observations are dropped; poses without points get 20 000 seeded random ones. Warns
+// of cameras whose intrinsics do not fit their observations.
 ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const std::filesystem::path& scratch_folder,
                          const ImportOptions& options,
                          ProgressObserver& progress,
                          const CancellationToken& cancel);
 
-// Readers on their own. The returned views have `image_file` relative to `scene_folder`.
+// Readers on their own. The returned views have `image_file` relative to `scene_folder`. `warnings`
+// (may be null) receives what is wrong with cameras whose intrinsics do not fit their observations.
 Scene ReadColmapModel(const std::filesystem::path& model_folder,
-                      const std::filesystem::path& scene_folder);
+                      const std::filesystem::path& scene_folder,
+                      std::vector<std::string>* warnings = nullptr);
 Scene ReadTransformsJson(const std::filesystem::path& json_file,
                          const std::filesystem::path& scene_folder);
 // Writers for round trips and for users who want to look at the poses elsewhere.

@@ -33,7 +33,9 @@ struct SparsePoint {
 struct Scene {
   std::vector<View> views;  // sorted by name
   std::vector<SparsePoint> points;
-  // Subtracted from all world coordinates on import (geo-referenced scenes); add on export.
+  // What import did to coordinates that float32 or the near plane could not bear (normalise.h), and
+  // every writer and export undoes: world = world_from_scene_scale * scene + world_offset.
+  double world_from_scene_scale = 1.0;  // > 0
   Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
 
   std::vector<int> TrainingViews() const;
@@ -43,6 +45,10 @@ struct Scene {
   int FindView(std::string_view name) const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
   double Extent() const;
+  // In the world's units and frame.
+  Eigen::Vector3d WorldFromScene(const Eigen::Vector3d& scene) const {
+    return world_from_scene_scale * scene + world_offset;
+  }
 };
 
 std::string SceneToJson(const Scene& scene);

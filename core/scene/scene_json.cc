@@ -198,6 +198,7 @@ std::string SceneToJson(const Scene& scene) {
   }
   const json root = {{"format", kFormat},
                      {"version", kVersion},
+                     {"world_from_scene_scale", scene.world_from_scene_scale},
                      {"world_offset", Vector3ToJson(scene.world_offset)},
                      {"views", std::move(views)},
                      {"points", std::move(points)}};
@@ -222,6 +223,9 @@ Scene SceneFromJson(std::string_view text) {
     throw field["version"].Wrong(std::to_string(kVersion) + "; update color3d to read it");
   }
   Scene scene;
+  if (root.contains("world_from_scene_scale")) {  // absent from older files
+    scene.world_from_scene_scale = field["world_from_scene_scale"].PositiveNumber();
+  }
   scene.world_offset = field["world_offset"].Vector3();
   const Field views = field["views"];
   const size_t view_count = views.ArraySize();

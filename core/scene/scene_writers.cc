@@ -75,7 +75,7 @@ void WriteColmapText(const Scene& scene, const fs::path& model_folder) {
   std::vector<int> observation_count(scene.views.size(), 0);
   for (size_t i = 0; i < scene.points.size(); ++i) {
     const SparsePoint& point = scene.points[i];
-    const Eigen::Vector3d p = point.position + scene.world_offset;
+    const Eigen::Vector3d p = scene.WorldFromScene(point.position);
     std::string line = std::to_string(i + 1);
     for (int k = 0; k < 3; ++k) AppendWord(&line, Text(p[k]));
     line += " 128 128 128 " + Text(point.reprojection_error_px);
@@ -93,8 +93,9 @@ void WriteColmapText(const Scene& scene, const fs::path& model_folder) {
   for (size_t i = 0; i < scene.views.size(); ++i) {
     const Pose& pose = scene.views[i].cam_from_world;
     const Eigen::Quaterniond& q = pose.rotation;
-    // x_cam = R (x + offset) + t' with x + offset the coordinates that we write.
-    const Eigen::Vector3d t = pose.translation - q * scene.world_offset;
+    // s x_cam = R (s x + offset) + t with s x + offset the coordinates that we write.
+    const Eigen::Vector3d t =
+        scene.world_from_scene_scale * pose.translation - q * scene.world_offset;
     std::string line = std::to_string(i + 1);
     for (double v : {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) AppendWord(&line, Text(v));
     line += " " + std::to_string(camera_of_view[i]) + " " + scene.views[i].name;
@@ -133,7 +134,7 @@ void WriteTransformsJson(const Scene& scene, const fs::path& json_file) {
     Eigen::Matrix4d gl = Eigen::Matrix4d::Identity();
     gl.topLeftCorner<3, 3>() = view.cam_from_world.rotation.conjugate().toRotationMatrix() *
                                Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
-    gl.topRightCorner<3, 1>() = view.cam_from_world.Center() + scene.world_offset;
+    gl.topRightCorner<3, 1>() = scene.WorldFromScene(view.cam_from_world.Center());
     json rows = json::array();
     for (int r = 0; r < 4; ++r) rows.push_back({gl(r, 0), gl(r, 1), gl(r, 2), gl(r, 3)});
     frame["transform_matrix"] = std::move(rows);

@@ -13,9 +13,9 @@ namespace color3d {
 // it is pulled to where they would meet if the scene were three baselines away.
 Eigen::Vector3d FocusPoint(const Scene& scene);
 
-// Up to `count` points, uniform in the part of a box around the focus that at least two (or a
-// quarter, whichever is more) of the views see. Deterministic for a seed. Each lists the views
-// whose picture it falls into; the reprojection error is -1 (unknown).
+// Up to `count` points in the views' frusta that at least two (or a quarter, whichever is more) of
+// the views see: on random pixels, uniform in inverse depth around the focus. Deterministic for a
+// seed. Each lists the views whose picture it falls into; the reprojection error is -1 (unknown).
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed);
 
 }  // namespace color3d

@@ -30,17 +30,27 @@ static_assert(sizeof(Header) == 32);
 template <class Model, class Visit>
 void ForEachBuffer(Model& m, Visit&& visit) {
   const int chroma = m.channels == 3 ? ShCoefficients(m.chroma_sh_degree) : 0;
-  visit(m.position, 3);
-  visit(m.log_scale, 3);
-  visit(m.rotation, 4);
-  visit(m.opacity_logit, 1);
-  visit(m.sh_l, ShCoefficients(m.sh_degree));
-  visit(m.sh_a, chroma);
-  visit(m.sh_b, chroma);
+  visit("position", m.position, 3);
+  visit("log_scale", m.log_scale, 3);
+  visit("rotation", m.rotation, 4);
+  visit("opacity_logit", m.opacity_logit, 1);
+  visit("sh_l", m.sh_l, ShCoefficients(m.sh_degree));
+  visit("sh_a", m.sh_a, chroma);
+  visit("sh_b", m.sh_b, chroma);
 }
 
 Error Refuse(const std::string& why) {
   return InvalidArgument("not a usable Gaussian file: " + why);
+}
+
+// "position of Gaussian 7" for the first value that is not finite, or "".
+std::string FirstNotFinite(const char* name, const std::vector<float>& buffer, int width) {
+  for (size_t i = 0; i < buffer.size(); ++i) {
+    if (!std::isfinite(buffer[i])) {
+      return std::string(name) + " of Gaussian " + std::to_string(i / static_cast<size_t>(width));
+    }
+  }
+  return "";
 }
 
 Header ReadHeader(std::string_view bytes) {
@@ -74,12 +84,11 @@ std::string SerializeGaussians(const GaussianModel& model) {
   h.chroma_sh_degree = static_cast<uint32_t>(model.chroma_sh_degree);
   h.count = model.size();
   std::string bytes(reinterpret_cast<const char*>(&h), sizeof(h));
-  ForEachBuffer(model, [&](const std::vector<float>& buffer, int) {
-    for (const float value : buffer) {
-      if (!std::isfinite(value)) {
-        throw Error(ErrorCode::kInternal,
-                    "a Gaussian model with non-finite values was to be saved");
-      }
+  ForEachBuffer(model, [&](const char* name, const std::vector<float>& buffer, int width) {
+    const std::string place = FirstNotFinite(name, buffer, width);
+    if (!place.empty()) {
+      throw Error(ErrorCode::kInternal,
+                  "a Gaussian model was to be saved whose " + place + " is not finite");
     }
     bytes.append(reinterpret_cast<const char*>(buffer.data()), buffer.size() * sizeof(float));
   });
@@ -93,7 +102,7 @@ GaussianModel ParseGaussians(std::string_view bytes) {
   model.sh_degree = static_cast<int>(h.sh_degree);
   model.chroma_sh_degree = static_cast<int>(h.chroma_sh_degree);
   size_t floats_each = 0;
-  ForEachBuffer(model, [&](std::vector<float>&, int width) { floats_each += width; });
+  ForEachBuffer(model, [&](const char*, std::vector<float>&, int width) { floats_each += width; });
   const size_t body = bytes.size() - sizeof(Header) - kDigestBytes;
   const size_t bytes_each = floats_each * sizeof(float);
   if (body % bytes_each != 0 || body / bytes_each != h.count) {
@@ -103,13 +112,12 @@ GaussianModel ParseGaussians(std::string_view bytes) {
   const std::string_view content = bytes.substr(0, bytes.size() - kDigestBytes);
   if (Sha256Hex(content) != bytes.substr(content.size())) throw Refuse("the checksum is wrong");
   const char* next = bytes.data() + sizeof(Header);
-  ForEachBuffer(model, [&](std::vector<float>& buffer, int width) {
+  ForEachBuffer(model, [&](const char* name, std::vector<float>& buffer, int width) {
     buffer.resize(static_cast<size_t>(h.count) * width);
     std::memcpy(buffer.data(), next, buffer.size() * sizeof(float));
     next += buffer.size() * sizeof(float);
-    for (const float value : buffer) {
-      if (!std::isfinite(value)) throw Refuse("it holds a value that is not finite");
-    }
+    const std::string place = FirstNotFinite(name, buffer, width);
+    if (!place.empty()) throw Refuse("the " + place + " is not finite");
   });
   return model;
 }

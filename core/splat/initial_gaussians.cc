@@ -12,6 +12,7 @@ namespace {
 constexpr int kNeighbors = 3;
 constexpr double kInitialOpacity = 0.1;
 constexpr double kMinSquaredDistance = 1e-7;  // as 3DGS: equal points still get a size
+constexpr double kMaxCoordinate = 1e15;       // squares of distances stay in float32
 constexpr double kLoneScale = 0.1;            // of a scene with one point
 
 }  // namespace
@@ -19,9 +20,9 @@ constexpr double kLoneScale = 0.1;            // of a scene with one point
 GaussianModel InitialGaussians(const Scene& scene) {
   std::vector<NeighborTree::Point> points;
   for (const SparsePoint& point : scene.points) {
-    if (!point.position.allFinite()) {
+    if (!(point.position.cwiseAbs().maxCoeff() <= kMaxCoordinate)) {
       throw InvalidArgument("sparse point " + std::to_string(&point - scene.points.data()) +
-                            " is not finite; rerun structure-from-motion");
+                            " is not finite or absurdly far away; rerun structure-from-motion");
     }
     points.push_back({static_cast<float>(point.position.x()),
                       static_cast<float>(point.position.y()),

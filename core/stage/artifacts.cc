@@ -21,7 +21,10 @@ std::string StageThatMakes(std::string_view name) {
                                                              {kViewsAb, "colorize_views"},
                                                              {kGeometry, "reconstruct_geometry"},
                                                              {kModel, "solve_chroma"},
+                                                             {kMemoryPlan, "reconstruct_geometry"},
                                                              {kPly, "export"},
+                                                             {kSplat, "export"},
+                                                             {kExportScores, "export"},
                                                              {kRenders, "render"},
                                                              {kScores, "evaluate"}};
   for (const auto& [prefix, kind] : makers) {

@@ -1,15 +1,81 @@
 #include "core/splat/export.h"
 
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/splat/rgb_refine.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
+namespace {
 
-void RunExport(StageContext& context) {
+constexpr int kSidePx = 500;       // of the pictures that colours are refined on
+constexpr size_t kMostViews = 32;  // of them, spread evenly
+
+std::vector<RgbView> ViewsToCompare(const Scene& scene, std::vector<std::string>* names) {
+  std::vector<RgbView> views;
+  const size_t count = scene.views.size();
+  const size_t wanted = std::min(count, kMostViews);
+  for (size_t i = 0; i < wanted; ++i) {
+    const View& view = scene.views[i * count / wanted];
+    views.push_back({view.camera.FitWithin(kSidePx), view.cam_from_world, !view.held_out});
+    names->push_back(view.name);
+  }
+  return views;
+}
+
+nlohmann::ordered_json ScoresOf(const RgbRefinement& refinement,
+                                const std::vector<std::string>& names) {
+  return {{"psnr_db_vs_lab", refinement.after.mean_psnr_db},
+          {"worst_psnr_db_vs_lab", refinement.after.worst_psnr_db},
+          {"worst_view", names.at(refinement.after.worst_view)},
+          {"unrefined_psnr_db_vs_lab", refinement.before.mean_psnr_db},
+          {"unrefined_worst_psnr_db_vs_lab", refinement.before.worst_psnr_db}};
+}
+
+}  // namespace
+
+void ExportOptions::Validate() const {
+  if (!ply && !splat) {
+    throw InvalidArgument("the export has nothing to write; ask for ply or splat");
+  }
+}
+
+void RunExport(const ExportOptions& options, StageContext& context) {
+  options.Validate();
   const Scene scene = ReadScene(context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   ThreadPool pool(context.threads());
-  context.WriteOutput(artifact::kPly, EncodeGaussianPly(model, scene.world_offset, pool));
+  const ExportFrame frame = ExportFrameOf(scene);
+  if (!frame.left_out.isZero(0.0)) {
+    context.progress().OnWarning(
+        "the scene lies so far from the origin that the 32-bit numbers of its files cannot say "
+        "where: positions are relative to the offset in the header of scene.ply");
+  }
+  std::vector<std::string> names;
+  const std::vector<RgbView> views = ViewsToCompare(scene, &names);
+  RgbRefineOptions refine;
+  refine.seed = context.seed();
+  const auto refined = [&](RgbHarmonics start) {
+    return RefineRgbHarmonics(
+        model, std::move(start), views, refine, pool, context.progress(), context.cancel());
+  };
+  const RgbHarmonics fitted = FitRgbHarmonics(model, pool);
+  nlohmann::ordered_json scores;
+  if (options.ply) {
+    const RgbRefinement rgb = refined(fitted);
+    context.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
+    context.progress().OnError(refine.epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
+    scores["ply"] = ScoresOf(rgb, names);
+    context.WriteOutput(artifact::kPly, EncodeGaussianPly(model, rgb.harmonics, frame, pool));
+  }
+  if (options.splat) {
+    const RgbRefinement rgb = refined(DegreeZero(fitted));
+    scores["splat"] = ScoresOf(rgb, names);
+    context.WriteOutput(artifact::kSplat, EncodeSplat(model, rgb.harmonics, frame));
+  }
+  context.WriteOutput(artifact::kExportScores, scores.dump(1) + "\n");
 }
 
 }  // namespace color3d

@@ -32,7 +32,7 @@ void RunImportScene(const ImportOptions& options, StageContext& context) {
   facts.layout = LayoutName(result.layout);
   facts.ran_structure_from_motion = result.ran_structure_from_motion;
   facts.undistorted = result.undistorted;
-  facts.random_points = !result.scene.points.empty() && result.scene.points[0].views.empty();
+  facts.random_points = result.random_points;
   facts.photos_found = result.photos_found;
   facts.photos_registered = result.photos_registered;
   context.progress().OnError(

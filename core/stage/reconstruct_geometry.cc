@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "core/scene/view_images.h"
+#include "core/splat/memory_plan.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -12,14 +14,36 @@ namespace {
 constexpr double kMaxGaussiansPerPixel = 0.02;
 constexpr int kFewestGaussians = 5000;
 
-int GaussianCap(int wanted, const Scene& scene, const ViewImages& images) {
+int GaussianCap(int wanted, int max_side_px, const Scene& scene) {
   double pixels = 0.0;
   for (int view : scene.TrainingViews()) {
-    const Camera camera = images.WorkingCamera(view);
+    const Camera camera = scene.views[view].camera.FitWithin(max_side_px);
     pixels += static_cast<double>(camera.width) * camera.height;
   }
   const double cap = std::max<double>(kFewestGaussians, kMaxGaussiansPerPixel * pixels);
   return static_cast<int>(std::min<double>(wanted, cap));
+}
+
+MemoryPlan PlanMemory(const GeometryOptions& options,
+                      int max_side_px,
+                      const Scene& scene,
+                      int64_t budget_bytes) {
+  MemoryDemand demand;
+  for (const View& view : scene.views) demand.views.push_back({view.captured_camera, view.camera});
+  demand.max_side_px = max_side_px;
+  demand.max_gaussians = options.max_gaussians;
+  demand.sh_degree = options.sh_degree;
+  return PlanGeometryMemory(demand, budget_bytes);
+}
+
+std::string MemoryPlanToJson(const MemoryPlan& plan) {
+  return nlohmann::ordered_json{{"max_side_px", plan.max_side_px},
+                                {"max_gaussians", plan.max_gaussians},
+                                {"estimated_bytes", plan.estimated_bytes},
+                                {"budget_bytes", plan.budget_bytes},
+                                {"note", plan.note}}
+             .dump(1) +
+         "\n";
 }
 
 }  // namespace
@@ -30,13 +54,18 @@ void RunReconstructGeometry(const GeometryOptions& options,
   options.Validate();
   CheckMaxSide(max_side_px);
   const Scene scene = ReadScene(context);
-  const ViewImages images(scene, context.scene_folder(), max_side_px);
-  GeometryOptions capped = options;
-  capped.max_gaussians = GaussianCap(options.max_gaussians, scene, images);
+  GeometryOptions planned = options;
+  planned.max_gaussians = GaussianCap(options.max_gaussians, max_side_px, scene);
+  const MemoryPlan memory = PlanMemory(planned, max_side_px, scene, context.MemoryBytes());
+  planned.max_gaussians = memory.max_gaussians;
+  if (!memory.note.empty()) context.progress().OnWarning(memory.note);
+  const ViewImages images(
+      scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
   ThreadPool pool(context.threads());
   const GaussianModel model = TrainGeometry(
-      scene, images, capped, pool, context.checkpoints(), context.progress(), context.cancel());
+      scene, images, planned, pool, context.checkpoints(), context.progress(), context.cancel());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));
+  context.WriteOutput(artifact::kMemoryPlan, MemoryPlanToJson(memory));
 }
 
 }  // namespace color3d

@@ -41,6 +41,13 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages, StageContex
       metrics[name] = mean.at(name);
     }
   }
+  if (context.HasInput(artifact::kExportScores)) {
+    const auto scores = ordered_json::parse(context.ReadInput(artifact::kExportScores));
+    for (const auto& [format, values] : scores.items()) {
+      metrics[format + "_psnr_db_vs_lab"] = values.at("psnr_db_vs_lab");
+      metrics[format + "_worst_psnr_db_vs_lab"] = values.at("worst_psnr_db_vs_lab");
+    }
+  }
   if (context.HasInput(artifact::kModel)) {
     metrics["gaussians"] = ParseGaussians(context.ReadInput(artifact::kModel)).size();
   }
@@ -103,6 +110,13 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
       if (step.needed && step.step == name) step.measured_seconds = SecondsOf(stages, kind);
     }
   }
+  if (context.HasInput(artifact::kMemoryPlan)) {
+    const auto memory = ordered_json::parse(context.ReadInput(artifact::kMemoryPlan));
+    const std::string note = memory.at("note");
+    for (PlanStep& step : plan) {
+      if (step.step == "luminance_geometry" && !note.empty()) step.reason += "; " + note;
+    }
+  }
   for (const StageSummary& s : stages) {
     if (s.state == "SKIPPED" && s.kind != "evaluate") {
       plan.push_back({s.kind, false, s.skip_reason, 0.0, -1.0});
@@ -142,7 +156,7 @@ std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context)
 void PassOnResults(StageContext& context) {
   using namespace artifact;
   for (const char* name :
-       {kPly, kModel, kColorizer, kKeyView, kKeyViewGray, kKeyViewColored, kSfmLog}) {
+       {kPly, kSplat, kModel, kColorizer, kKeyView, kKeyViewGray, kKeyViewColored, kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }
   for (const std::string& name : context.InputsBelow(kRenders)) context.PassOn(name);

@@ -1,6 +1,7 @@
 #include "core/stage/stage.h"
 
 #include "core/base/files.h"
+#include "core/base/memory.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -18,6 +19,13 @@ StageContext::StageContext(Setup setup,
                            ProgressObserver& progress,
                            const CancellationToken& cancel)
     : setup_(std::move(setup)), checkpoints_(checkpoints), progress_(progress), cancel_(cancel) {}
+
+int64_t StageContext::MemoryBytes() const {
+  // Other processes of this machine must be able to grow, too.
+  constexpr double kShare = 0.6;
+  if (setup_.memory_bytes > 0) return setup_.memory_bytes;
+  return static_cast<int64_t>(kShare * static_cast<double>(AvailableMemoryBytes()));
+}
 
 std::filesystem::path StageContext::Input(const std::string& name) const {
   const auto found = setup_.inputs.find(name);

@@ -24,6 +24,7 @@ class StageContext {
     std::filesystem::path scratch_folder;  // free to use, deleted by the caller
     int threads = 1;
     uint64_t seed = 1;
+    int64_t memory_bytes = 0;  // that the stage may take; 0: 60 % of what is available
   };
 
   // The references must outlive the context.
@@ -36,6 +37,7 @@ class StageContext {
   const std::filesystem::path& scratch_folder() const { return setup_.scratch_folder; }
   int threads() const { return setup_.threads; }
   uint64_t seed() const { return setup_.seed; }
+  int64_t MemoryBytes() const;
   CheckpointStore& checkpoints() { return checkpoints_; }
   ProgressObserver& progress() { return progress_; }
   const CancellationToken& cancel() const { return cancel_; }

@@ -13,14 +13,21 @@
 namespace color3d {
 namespace {
 
+class Warnings : public NullObserver {
+ public:
+  void OnWarning(const std::string& message) override { text += message + "\n"; }
+  std::string text;
+};
+
 class StageTest : public ::testing::Test {
  protected:
   StageContext MakeContext() {
     std::filesystem::create_directories(scratch_.path() / "out");
-    return StageContext({scratch_.path(), inputs_, scratch_.path() / "out", scratch_.path(), 1, 1},
-                        none_,
-                        silent_,
-                        cancel_);
+    return StageContext(
+        {scratch_.path(), inputs_, scratch_.path() / "out", scratch_.path(), 1, 1, memory_bytes_},
+        none_,
+        observer_,
+        cancel_);
   }
   void AddInput(const std::string& name, const std::string& bytes) {
     const auto path = scratch_.path() / ("in" + std::to_string(inputs_.size()));
@@ -31,8 +38,9 @@ class StageTest : public ::testing::Test {
   ScratchFolder scratch_;
   std::map<std::string, std::filesystem::path> inputs_;
   NoCheckpoints none_;
-  NullObserver silent_;
+  Warnings observer_;
   CancellationToken cancel_;
+  int64_t memory_bytes_ = 0;
 };
 
 // Three photos of a ramp, with made-up poses, as an imported scene.
@@ -137,6 +145,73 @@ TEST_F(StageTest, EvaluationRefusesTruthOfTrainingViews) {
   StageContext context = MakeContext();
   EXPECT_THROW(RunEvaluate({{"p1.png", scratch_.path() / "p1.png"}}, context), Error);
   EXPECT_THROW(RunEvaluate({}, context), Error);
+}
+
+// A few Gaussians in front of RampScene's cameras.
+GaussianModel SmallModel() {
+  GaussianModel model;
+  model.channels = 3;
+  for (int i = 0; i < 9; ++i) {
+    model.position.insert(model.position.end(), {0.3f * (i % 3) - 0.3f, 0.2f * (i / 3), 2.0f});
+    model.log_scale.insert(model.log_scale.end(), {-1.5f, -1.5f, -1.5f});
+    model.rotation.insert(model.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
+    model.opacity_logit.push_back(1.0f);
+    model.sh_l.push_back(0.1f * i);
+    model.sh_a.push_back(0.1f * (i % 2));
+    model.sh_b.push_back(-0.1f * (i % 3));
+  }
+  return model;
+}
+
+TEST_F(StageTest, ExportWritesBothFormatsInTheWorldsFrameAndSaysWhatTheyLose) {
+  Scene scene = RampScene(scratch_.path(), 48, 32);
+  scene.world_from_scene_scale = 0.001;
+  scene.world_offset = {1e6, 0.0, 0.0};
+  AddInput(artifact::kScene, SceneToJson(scene));
+  AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
+  StageContext context = MakeContext();
+  RunExport({}, context);
+  EXPECT_EQ(context.outputs(),
+            (std::vector<std::string>{"scene.ply", "scene.splat", "export.json"}));
+  EXPECT_NE(observer_.text.find("relative to the offset"), std::string::npos) << observer_.text;
+  const std::string ply = ReadFile(scratch_.path() / "out/scene.ply");
+  EXPECT_NE(ply.find("comment offset 1e+06 0 0\n"), std::string::npos);
+  EXPECT_EQ(ReadFile(scratch_.path() / "out/scene.splat").size(), 9u * 32);
+  const auto scores = nlohmann::json::parse(ReadFile(scratch_.path() / "out/export.json"));
+  const double before = scores.at("ply").at("unrefined_psnr_db_vs_lab");
+  const double after = scores.at("ply").at("psnr_db_vs_lab");
+  EXPECT_GT(before, 20.0);
+  EXPECT_GE(after, before);
+  EXPECT_EQ(scores.at("ply").at("worst_view").get<std::string>().substr(0, 1), "p");
+  StageContext again = MakeContext();
+  EXPECT_THROW(RunExport({.ply = false, .splat = false}, again), Error);
+}
+
+TEST_F(StageTest, PosesWithoutPointsReconstructAndLittleMemoryIsPlannedFor) {
+  WriteTransformsJson(RampScene(scratch_.path(), 48, 32), scratch_.path() / "transforms.json");
+  StageContext import = MakeContext();
+  RunImportScene({}, import);
+  EXPECT_TRUE(ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json")).random_points);
+  inputs_[artifact::kScene] = scratch_.path() / "out/scene.json";
+  GeometryOptions options;
+  options.iterations = 2;
+  StageContext plenty = MakeContext();
+  RunReconstructGeometry(options, 64, plenty);
+  auto plan = nlohmann::json::parse(ReadFile(scratch_.path() / "out/memory_plan.json"));
+  EXPECT_EQ(plan.at("note"), "");
+  EXPECT_EQ(plan.at("max_gaussians"), 5000);
+  observer_.text.clear();
+  memory_bytes_ = int64_t{101} << 20;
+  StageContext little = MakeContext();
+  RunReconstructGeometry(options, 64, little);
+  plan = nlohmann::json::parse(ReadFile(scratch_.path() / "out/memory_plan.json"));
+  EXPECT_LT(plan.at("max_gaussians"), 5000);
+  EXPECT_NE(observer_.text.find("memory: 101 MiB may be used"), std::string::npos);
+  EXPECT_LE(ParseGaussians(ReadFile(scratch_.path() / "out/geometry.c3g")).size(),
+            plan.at("max_gaussians").get<size_t>());
+  memory_bytes_ = 1 << 20;
+  StageContext none = MakeContext();
+  EXPECT_THROW(RunReconstructGeometry(options, 64, none), Error);
 }
 
 TEST(ViewArtifact, DropsThePhotosExtensionAndNoticesCollisions) {

@@ -43,14 +43,21 @@ void RunPersonalize(const ColorizerOptions& options, StageContext& context);
 // scene.json, colorizer.c3c -> views_ab/*.png for every view at max_side_px (64..4096).
 void RunColorizeViews(int max_side_px, StageContext& context);
 
-// scene.json -> geometry.c3g, trained at max_side_px (64..4096).
+// scene.json -> geometry.c3g, trained at max_side_px (64..4096), and memory_plan.json: with little
+// memory the size and the number of Gaussians are smaller, and a warning says so.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
 
 // scene.json, key_view.json, key_color.png, views_ab/*, geometry.c3g -> model.c3g.
 void RunSolveChroma(const ChromaOptions& options, StageContext& context);
 
-// scene.json, model.c3g -> scene.ply.
-void RunExport(StageContext& context);
+struct ExportOptions {
+  bool ply = true;    // 3DGS with RGB spherical harmonics
+  bool splat = true;  // 32 bytes a Gaussian, no view dependence
+  void Validate() const;
+};
+// scene.json, model.c3g -> scene.ply, scene.splat, export.json (what RGB loses against our
+// renders).
+void RunExport(const ExportOptions& options, StageContext& context);
 
 struct RenderOptions {
   std::vector<std::string> views;  // by name; empty: held-out views, or evenly spread ones

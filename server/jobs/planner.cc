@@ -218,9 +218,11 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
 NewGraph GraphBuilder::BuildStage() {
   v1::JobSpec spec = submitted_;
   if (spec.seed() == 0) spec.set_seed(1);
-  const bool nothing_to_do =
-      spec.has_export_() && spec.export_().has_ply() && !spec.export_().ply();
-  Add(std::move(spec), nothing_to_do ? "export.ply is false: there is nothing to export" : "");
+  const bool nothing_to_do = spec.has_export_() && spec.export_().has_ply() &&
+                             !spec.export_().ply() && !spec.export_().splat();
+  Add(std::move(spec),
+      nothing_to_do ? "export.ply is false and no splat is asked for: there is nothing to export"
+                    : "");
   return std::move(graph_);
 }
 

@@ -292,6 +292,8 @@ TEST(Planner, ExportOfNothingIsSkipped) {
   model.kind = "solve_chroma";
   EXPECT_THAT(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason,
               HasSubstr("ply"));
+  spec.mutable_export_()->set_splat(true);
+  EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
 }
 
 TEST(StageKey, DependsOnOptionsAndSeedOnly) {

@@ -75,6 +75,13 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
   return options;
 }
 
+ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
+  ExportOptions options;
+  if (spec.has_ply()) options.ply = spec.ply();
+  options.splat = spec.has_splat() ? spec.splat() : options.ply;
+  return options;
+}
+
 RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec) {
   RenderOptions options;
   options.views.assign(spec.views().begin(), spec.views().end());

@@ -14,6 +14,7 @@ HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed);
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed);
 ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed);
+ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec);
 RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec);
 
 // Working size when a single-stage job does not say.

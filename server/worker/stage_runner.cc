@@ -115,7 +115,7 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kSolveChroma:
         return RunSolveChroma(ChromaOptionsFrom(spec.solve_chroma(), context.seed()), context);
       case JobSpec::kExport:
-        return RunExport(context);
+        return RunExport(ExportOptionsFrom(spec.export_()), context);
       case JobSpec::kRender:
         return RunRender(RenderOptionsFrom(spec.render()), context);
       case JobSpec::kEvaluate:

@@ -54,7 +54,7 @@ void RunPipeline(const PipelineArguments& args) {
     RunReconstructGeometry(args.geometry, args.max_side_px, c);
   });
   pipeline.Run("solve_chroma", [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
-  pipeline.Run("export", [&](StageContext& c) { RunExport(c); });
+  pipeline.Run("export", [&](StageContext& c) { RunExport({}, c); });
   pipeline.Run("render", [&](StageContext& c) {
     RenderOptions options;
     options.max_side_px = args.max_side_px;

@@ -1,0 +1,13 @@
+// How much memory this process may still take. Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+namespace color3d {
+
+// The least of MemAvailable and of what the process's control groups (version 1 or 2) leave below
+// their limits, bytes; INT64_MAX when the system tells neither. `root` stands for "/" in tests.
+int64_t AvailableMemoryBytes(const std::filesystem::path& root = "/");
+
+}  // namespace color3d

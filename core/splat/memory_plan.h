@@ -1,0 +1,49 @@
+// What training geometry takes in memory, and how to stay within what there is. Pure functions.
+//
+// Per Gaussian, in floats, with R = 11 + (degree + 1)^2 parameters: parameters and two Adam moments
+// (3R), the last good state (3R), the gradient (R), one copy while densifying (R), a checkpoint
+// being written (3R), and 32 for splats, sorting keys and statistics; that is 1008 bytes at degree
+// 2 and 1316 at degree 3. Each of its (Gaussian, tile) pairs takes 42 bytes more: about 8 pairs a
+// Gaussian, and not less than 400 pairs a tile.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/scene/camera.h"
+
+namespace color3d {
+
+struct MemoryDemand {
+  struct View {
+    Camera captured;  // at full size: what decoding takes
+    Camera camera;    // undistorted, at full size: what the working size is derived from
+  };
+  std::vector<View> views;  // that are trained on or measured
+  int max_side_px = 0;      // wanted working size
+  int max_gaussians = 0;    // wanted cap
+  int sh_degree = 0;        // of luminance, 0..3
+};
+
+struct MemoryPlan {
+  int max_side_px = 0;
+  int max_gaussians = 0;
+  int64_t image_cache_bytes = 0;  // for ViewImages
+  int64_t estimated_bytes = 0;    // peak, of all of it
+  int64_t budget_bytes = 0;
+  std::string note;  // what was reduced and why; empty when nothing was
+};
+
+int64_t BytesPerGaussian(int sh_degree);
+
+// Peak of geometry training at this size with this many Gaussians and the smallest caches, bytes.
+int64_t GeometryBytes(const MemoryDemand& demand, int max_side_px, int max_gaussians);
+
+// Keeps what was asked for when it fits; gives up caches first, then Gaussians down to a quarter,
+// then working size (not below 64 px) with them. Throws Error{kResourceExhausted} saying how much
+// memory is needed when even that does not fit, naming the photo's size when one alone is too
+// large.
+MemoryPlan PlanGeometryMemory(const MemoryDemand& demand, int64_t budget_bytes);
+
+}  // namespace color3d
