@@ -8,6 +8,9 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
   options.hold_out_every_eighth = spec.hold_out_every_eighth();
   if (spec.has_sfm_max_image_side_px())
     options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
+  if (spec.sfm_pairs() == v1::ImportSceneSpec::SFM_PAIRS_EXHAUSTIVE) {
+    options.sfm_pairs = SfmPairs::kExhaustive;
+  }
   if (spec.has_sfm_max_features()) options.sfm_max_features = spec.sfm_max_features();
   if (spec.has_sfm_timeout_seconds()) {
     options.sfm_timeout = std::chrono::seconds(spec.sfm_timeout_seconds());
@@ -63,6 +66,10 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
   if (spec.has_sh_degree()) options.sh_degree = spec.sh_degree();
   if (spec.has_ssim_weight()) options.ssim_weight = spec.ssim_weight();
   if (spec.has_edge_weight()) options.edge_weight = spec.edge_weight();
+  if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
+  if (spec.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
+    options.recipe = GeometryOptions::Recipe::kPaper;
+  }
   return options;
 }
 
