@@ -22,7 +22,9 @@ F32 UpdateRow(const float* g,
               float* v) {
   F32 poison = {};
   for (int64_t i = begin; i < end; i += simd::kLanes) {
-    const F32 gradient = simd::Load(g + i);
+    // Clamped so that its square does not overflow; Adam does not depend on the gradient's size.
+    const F32 raw = simd::Load(g + i);
+    const F32 gradient = simd::Clamp(raw, simd::Broadcast(-1e18f), simd::Broadcast(1e18f));
     const F32 first = simd::Load(m + i) + (1.0f - kAdamBeta1) * (gradient - simd::Load(m + i));
     const F32 second =
         simd::Load(v + i) + (1.0f - kAdamBeta2) * (gradient * gradient - simd::Load(v + i));
@@ -31,7 +33,7 @@ F32 UpdateRow(const float* g,
     simd::Store(m + i, first);
     simd::Store(v + i, second);
     simd::Store(p + i, updated);
-    poison = poison + updated * 0.0f + gradient * 0.0f;
+    poison = poison + updated * 0.0f + raw * 0.0f;
   }
   return poison;
 }

@@ -259,6 +259,8 @@ void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
   LoadShape(ctx.p, i, g);
   LoadOpacity(ctx.p, i, g);
   ComputeConic(ctx.camera, g);
+  // The moments' gradients have 1 / variance as factor: that of the Gaussian as it is, not shrunk.
+  for (int k = kSumWE; k <= kSumWDyDy; ++k) sums[k] = sums[k] * (g.shrink * g.shrink);
   ShapeGradient shape = ShapeBackward(ctx.camera, g, sums);
   ColorBackward(ctx, i, sums, shape.position);
   // Lanes that are not visible hold arbitrary geometry; their sums are zero, but 0 * inf is not.

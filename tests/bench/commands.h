@@ -7,6 +7,7 @@ namespace color3d {
 
 void AddPipelineCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
+void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
 
 }  // namespace color3d

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   color3d::AddPipelineCommand(app);
   color3d::AddReconstructCommand(app);
+  color3d::AddStabilityCommand(app);
   color3d::AddColorizerCommand(app);
   try {
     app.parse(argc, argv);
