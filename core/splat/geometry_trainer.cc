@@ -1,12 +1,12 @@
 #include "core/splat/geometry_trainer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 
 #include "core/base/error.h"
 #include "core/splat/densify.h"
+#include "core/splat/held_out.h"
 #include "core/splat/loss.h"
 #include "core/splat/model_parameters.h"
 #include "core/splat/pipeline.h"
@@ -20,9 +20,10 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kTargetBudgetBytes = int64_t{512} << 20;
-constexpr int kMinTrainingSidePx = 64;  // coarser levels are not used below this
-constexpr int kErrorReports = 100;
+constexpr double kErrorReports = 100.0;
+constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
+constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
 // An evenly spaced part when there are more than the cap allows.
 ParameterBlock AtMost(int64_t count, ParameterBlock p) {
@@ -30,6 +31,23 @@ ParameterBlock AtMost(int64_t count, ParameterBlock p) {
   std::vector<uint32_t> kept(count);
   for (int64_t i = 0; i < count; ++i) kept[i] = static_cast<uint32_t>(i * p.count() / count);
   p.Gather(kept);
+  return p;
+}
+
+// Spherical harmonics of `from`, channel by channel, cut or extended to `coefficients` each. A
+// single channel serves for all.
+ParameterBlock WithColours(const GaussianModel& from, int channels, int coefficients) {
+  const ParameterBlock given = ParametersFromModel(from);
+  const int first = ShCoefficients(from.sh_degree), other = ShCoefficients(from.chroma_sh_degree);
+  ParameterBlock p(kColorRow + channels * coefficients, given.count());
+  for (int r = 0; r < kColorRow; ++r) std::copy_n(given.Row(r), given.count(), p.Row(r));
+  for (int c = 0; c < channels; ++c) {
+    const int source = std::min(c, from.channels - 1);
+    const int row = kColorRow + (source == 0 ? 0 : first + (source - 1) * other);
+    for (int k = 0; k < std::min(coefficients, source == 0 ? first : other); ++k) {
+      std::copy_n(given.Row(row + k), given.count(), p.Row(kColorRow + c * coefficients + k));
+    }
+  }
   return p;
 }
 
@@ -44,50 +62,61 @@ class GeometryTrainer {
       : problem_(problem),
         options_(options),
         tuning_(tuning),
+        schedule_(options, tuning, problem.extent),
+        channels_(problem.colours ? 3 : 1),
         pool_(pool),
         progress_(progress),
-        targets_(problem.luminance, kTargetBudgetBytes) {
-    const ParameterBlock from = AtMost(options.max_gaussians, ParametersFromModel(initial));
-    const int rows = kColorRow + ShCoefficients(options.sh_degree);
-    state_.parameters = ParameterBlock(rows, from.count());
-    for (int r = 0; r < std::min(rows, from.rows()); ++r) {
-      std::copy_n(from.Row(r), from.count(), state_.parameters.Row(r));
-    }
-    state_.moments = {ParameterBlock(rows, from.count()), ParameterBlock(rows, from.count())};
-    state_.statistics.Reset(from.count());
+        targets_(problem.colours ? problem.colours : problem.luminance,
+                 channels_,
+                 problem.colours ? 1.0f : 0.01f,
+                 kTargetBudgetBytes) {
+    state_.parameters = AtMost(options.max_gaussians,
+                               WithColours(initial, channels_, ShCoefficients(options.sh_degree)));
+    const int rows = state_.parameters.rows();
+    initial_count_ = state_.parameters.count();
+    state_.moments = {ParameterBlock(rows, initial_count_), ParameterBlock(rows, initial_count_)};
+    state_.statistics.Reset(initial_count_);
     state_.random = Random(options.seed);
-    initial_count_ = from.count();
+    pipeline_.set_clock(&clock_);
   }
 
-  GaussianModel Train(CheckpointStore& checkpoints, const CancellationToken& cancel) {
+  GaussianModel Train(CheckpointStore& checkpoints,
+                      const CancellationToken& cancel,
+                      TrainingTrace* trace) {
+    trace_ = trace;
     TrainingGuard guard(progress_);
     Resume(checkpoints);
     guard.Keep(state_);
-    const double resumed_seconds = state_.elapsed_seconds;
-    const auto start = std::chrono::steady_clock::now();
-    while (state_.iteration < options_.iterations) {
+    earlier_seconds_ = state_.elapsed_seconds;
+    fraction_ = FractionNow();
+    while (fraction_ < 1.0) {
       cancel.ThrowIfCancelled();
       if (!Step()) {
-        guard.Restore("luminance geometry", state_);
+        guard.Restore("geometry", state_);
+        fraction_ = FractionNow();
         continue;
       }
       ++state_.iteration;
-      Densify();
+      const double before = fraction_;
+      fraction_ = FractionNow();
+      clock_.Enter(Phase::kDensify);
+      Densify(before);
+      clock_.Enter(Phase::kOther);
       if (guard.IsDue(state_.iteration)) guard.Keep(state_);
-      Report();
+      Report(before);
       if (checkpoints.WantsSave()) {
-        state_.elapsed_seconds =
-            resumed_seconds +
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        state_.elapsed_seconds = earlier_seconds_ + clock_.TrainingSeconds();
         checkpoints.Save(SerializeTrainingState(state_, Fingerprint()));
       }
     }
-    return ModelFromParameters(state_.parameters, 1, options_.sh_degree, 0);
+    FinishTrace();
+    const int chroma_degree = channels_ == 3 ? options_.sh_degree : 0;
+    return ModelFromParameters(state_.parameters, channels_, options_.sh_degree, chroma_degree);
   }
 
  private:
-  double Fraction() const {
-    return static_cast<double>(state_.iteration) / std::max(1, options_.iterations);
+  double FractionNow() {
+    return schedule_.Fraction(state_.iteration, earlier_seconds_ + clock_.TrainingSeconds());
   }
 
   // Everything that the course of training depends on.
@@ -95,10 +124,13 @@ class GeometryTrainer {
     char text[256];
     std::snprintf(text,
                   sizeof(text),
-                  "geometry %d %d %d %g %g %g %g %llu %zu %zu %lld",
+                  "geometry %d %d %d %d %d %g %g %g %g %g %llu %zu %zu %lld",
+                  channels_,
+                  static_cast<int>(options_.recipe),
                   options_.iterations,
                   options_.max_gaussians,
                   options_.sh_degree,
+                  options_.time_limit_seconds,
                   options_.ssim_weight,
                   options_.edge_weight,
                   options_.densify_gradient,
@@ -114,44 +146,9 @@ class GeometryTrainer {
     const std::optional<std::string> saved = checkpoints.Load();
     if (saved && !ParseTrainingState(*saved, Fingerprint(), state_)) {
       progress_.OnWarning(
-          "luminance geometry: the checkpoint belongs to other options or is damaged; training "
-          "starts afresh");
+          "geometry: the checkpoint belongs to other options or is damaged; training starts "
+          "afresh");
     }
-  }
-
-  int Level(const Camera& camera) const {
-    const double f = Fraction();
-    int level = f < tuning_.quarter_size_until ? 2 : f < tuning_.half_size_until ? 1 : 0;
-    const int side = std::min(camera.width, camera.height);
-    while (level > 0 && side >> level < kMinTrainingSidePx) --level;
-    return level;
-  }
-
-  int ActiveDegree() const {
-    const double since = Fraction() - tuning_.sh_from;
-    if (since < 0.0) return 0;
-    return std::min(options_.sh_degree, 1 + static_cast<int>(since / tuning_.sh_step));
-  }
-
-  double PositionRate() const {
-    const double f = Fraction();
-    return problem_.extent * std::exp((1.0 - f) * std::log(tuning_.position_rate_first) +
-                                      f * std::log(tuning_.position_rate_last));
-  }
-
-  std::vector<float> LearningRates() const {
-    const double scale = options_.learning_rate_scale * state_.rate_scale;
-    std::vector<float> rates(state_.parameters.rows(), 0.0f);
-    const auto set = [&](int row, int count, double rate) {
-      std::fill_n(rates.begin() + row, count, static_cast<float>(scale * rate));
-    };
-    set(kPositionRow, 3, PositionRate());
-    set(kLogScaleRow, 3, tuning_.scale_rate);
-    set(kRotationRow, 4, tuning_.rotation_rate);
-    set(kOpacityRow, 1, tuning_.opacity_rate);
-    set(kColorRow, 1, tuning_.dc_rate);
-    set(kColorRow + 1, ShCoefficients(ActiveDegree()) - 1, tuning_.dc_rate / tuning_.rest_divisor);
-    return rates;
   }
 
   RasterCamera CameraAt(const PosedCamera& view, int level) const {
@@ -160,20 +157,32 @@ class GeometryTrainer {
                             view.cam_from_world);
   }
 
+  ColorSpec Colours() const {
+    ColorSpec spec;
+    spec.channels = channels_;
+    for (int c = 0; c < channels_; ++c) {
+      spec.channel[c] = {kColorRow + c * ShCoefficients(options_.sh_degree),
+                         ShCoefficients(schedule_.ActiveDegree(fraction_)),
+                         0.5f,
+                         true};
+    }
+    return spec;
+  }
+
   // One iteration. False when something was not finite.
   bool Step() {
     const PosedCamera& view =
         problem_.training[state_.NextView(static_cast<int>(problem_.training.size()))];
-    const int level = Level(view.camera);
+    const int level = schedule_.Level(fraction_, view.camera);
     const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, level);
     const RasterCamera camera = CameraAt(view, level);
-    ColorSpec color = ColorSpecOf(1, ActiveDegree(), 0);
-    const float background = 0.0f;
-    pipeline_.Forward(state_.parameters, color, camera, &background, false, pool_);
+    const ColorSpec color = Colours();
+    pipeline_.Forward(state_.parameters, color, camera, kBackground, false, pool_);
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
     weights.edge = static_cast<float>(options_.edge_weight);
+    clock_.Enter(Phase::kLoss);
     const LossValue loss =
         loss_.Evaluate(pipeline_.color(), *target, nullptr, weights, pool_, d_color_);
     if (!std::isfinite(loss.total)) return false;
@@ -185,134 +194,143 @@ class GeometryTrainer {
                        pool_,
                        gradient_,
                        &state_.statistics);
+    if (!Update()) return false;
+    state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
+    return true;
+  }
+
+  // Parameters from the gradient. False when something was not finite.
+  bool Update() {
+    clock_.Enter(Phase::kAdam);
     AddPenaltyGradients(state_.parameters,
                         static_cast<float>(tuning_.opacity_penalty),
                         static_cast<float>(tuning_.scale_penalty / problem_.extent),
                         pool_,
                         gradient_);
-    if (!AdamStep(gradient_,
-                  LearningRates(),
-                  state_.iteration + 1,
-                  pool_,
-                  state_.parameters,
-                  state_.moments)) {
+    std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
+    for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
+    if (!AdamStep(
+            gradient_, rates, state_.iteration + 1, pool_, state_.parameters, state_.moments)) {
       return false;
     }
     if (tuning_.strategy == GeometryTuning::Strategy::kRelocate && tuning_.noise > 0.0 &&
-        Fraction() < tuning_.densify_until) {
-      AddPositionNoise(static_cast<float>(tuning_.noise * PositionRate() *
-                                          options_.learning_rate_scale * state_.rate_scale),
+        fraction_ < tuning_.densify_until) {
+      AddPositionNoise(static_cast<float>(tuning_.noise * rates[kPositionRow]),
                        state_.random.NextUint32(),
                        pool_,
                        state_.parameters);
     }
-    state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
+    clock_.Enter(Phase::kOther);
     return true;
   }
 
-  void Densify() {
-    const double n = options_.iterations;
-    const double from = tuning_.densify_from * n, until = tuning_.densify_until * n;
-    const int64_t interval = std::max<int64_t>(
-        10, static_cast<int64_t>((until - from) / std::max(1, tuning_.densify_rounds)));
-    const double at = static_cast<double>(state_.iteration);
-    if (at < from || at > until || state_.iteration % interval != 0) return;
+  void Densify(double before) {
     DensifyTarget target{state_.parameters, state_.moments, state_.statistics, state_.random};
-    if (tuning_.strategy == GeometryTuning::Strategy::kRelocate) {
-      RelocationOptions relocation;
-      relocation.gradient_preference = tuning_.gradient_preference;
-      relocation.target_count = std::max(state_.parameters.count(), TargetCount());
-      Relocate(relocation, target);
-      return;
+    if (schedule_.DensifyDue(before, fraction_) &&
+        state_.iteration - state_.densified_at >= kMinDensifyInterval) {
+      state_.densified_at = state_.iteration;
+      const int64_t target_count = schedule_.TargetCount(fraction_, initial_count_);
+      if (tuning_.strategy == GeometryTuning::Strategy::kRelocate) {
+        RelocationOptions relocation;
+        relocation.gradient_preference = tuning_.gradient_preference;
+        relocation.target_count = std::max(state_.parameters.count(), target_count);
+        Relocate(relocation, target);
+      } else {
+        GradientDensifyOptions densify;
+        densify.gradient_threshold = options_.densify_gradient;
+        densify.clone_below_scale = 0.01 * problem_.extent;
+        densify.max_gaussians = tuning_.scheduled_cap ? target_count : options_.max_gaussians;
+        if (tuning_.prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
+          densify.prune_scale = tuning_.prune_scale * problem_.extent;
+        }
+        DensifyByGradient(densify, target);
+      }
     }
-    GradientDensifyOptions densify;
-    densify.gradient_threshold = options_.densify_gradient;
-    densify.clone_below_scale = 0.01 * problem_.extent;
-    densify.max_gaussians = options_.max_gaussians;
-    DensifyByGradient(densify, target);
-    const int64_t round = static_cast<int64_t>((at - from) / static_cast<double>(interval));
-    if (tuning_.opacity_resets > 0 && round > 0 &&
-        round % std::max(1, tuning_.densify_rounds / (tuning_.opacity_resets + 1)) == 0) {
-      ResetOpacity(0.01, target);
-    }
+    if (schedule_.OpacityResetDue(before, fraction_)) ResetOpacity(0.01, target);
   }
 
-  // Geometric growth from the initial count to the cap.
-  int64_t TargetCount() const {
-    const double progress =
-        std::clamp((Fraction() - tuning_.densify_from) /
-                       std::max(1e-9, tuning_.growth_until - tuning_.densify_from),
-                   0.0,
-                   1.0);
-    const double first = static_cast<double>(initial_count_);
-    const double last = std::max<double>(first, options_.max_gaussians);
-    return std::min<int64_t>(static_cast<int64_t>(first * std::pow(last / first, progress)),
-                             std::max<int64_t>(options_.max_gaussians, initial_count_));
+  std::string Named(const char* what, const char* unit = "") const {
+    return std::string(what) + (channels_ == 3 ? "_rgb" : "_l") + unit;
   }
 
-  void Report() {
-    const int64_t n = options_.iterations;
+  void Report(double before) {
     const auto now = std::chrono::steady_clock::now();
-    if (now - last_progress_ > std::chrono::milliseconds(250) || state_.iteration == n) {
+    if (now - last_progress_ > std::chrono::milliseconds(250) || fraction_ >= 1.0) {
       last_progress_ = now;
       const Camera& camera = problem_.training.front().camera;
-      const int level = Level(camera);
-      progress_.OnProgress(state_.iteration,
-                           n,
-                           "luminance geometry, " + std::to_string(state_.parameters.count()) +
-                               " Gaussians at " + std::to_string(SizeAtLevel(camera.width, level)) +
-                               "x" + std::to_string(SizeAtLevel(camera.height, level)) + " px");
+      const int level = schedule_.Level(fraction_, camera);
+      progress_.OnProgress(
+          state_.iteration,
+          std::llround(static_cast<double>(state_.iteration) / std::max(fraction_, 1e-9)),
+          "geometry, " + std::to_string(state_.parameters.count()) + " Gaussians at " +
+              std::to_string(SizeAtLevel(camera.width, level)) + "x" +
+              std::to_string(SizeAtLevel(camera.height, level)) + " px");
     }
-    if (state_.iteration % std::max<int64_t>(1, n / kErrorReports) == 0 || state_.iteration == n) {
-      progress_.OnError(state_.iteration, "train_l1_l", state_.mean_error);
+    if (std::floor(fraction_ * kErrorReports) > std::floor(before * kErrorReports)) {
+      progress_.OnError(state_.iteration, Named("train_l1"), state_.mean_error);
     }
     for (const double moment : kHeldOutMoments) {
-      if (state_.iteration == std::max<int64_t>(1, std::llround(moment * static_cast<double>(n)))) {
+      if (before < moment && fraction_ >= moment) {
         ReportHeldOut();
         break;
       }
     }
   }
 
-  // Mean over the held-out views of the PSNR of L (peak 100).
+  // Means over the held-out views; no part of training's time.
   void ReportHeldOut() {
     if (problem_.held_out.empty()) return;
-    double sum = 0.0;
+    HeldOutPoint point;
+    point.seconds = earlier_seconds_ + clock_.TrainingSeconds();
+    point.iteration = state_.iteration;
+    point.gaussians = state_.parameters.count();
+    pipeline_.set_clock(nullptr);
+    clock_.Enter(Phase::kEvaluation);
+    const double each = 1.0 / static_cast<double>(problem_.held_out.size());
     for (const PosedCamera& view : problem_.held_out) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
-      const float background = 0.0f;
-      pipeline_.Forward(state_.parameters,
-                        ColorSpecOf(1, ActiveDegree(), 0),
-                        CameraAt(view, 0),
-                        &background,
-                        false,
-                        pool_);
-      double squares = 0.0;
-      for (int y = 0; y < target->height; ++y) {
-        const float *a = pipeline_.color().Row(0, y), *b = target->Row(0, y);
-        for (int x = 0; x < target->width; ++x) {
-          squares += static_cast<double>(a[x] - b[x]) * (a[x] - b[x]);
-        }
+      pipeline_.Forward(state_.parameters, Colours(), CameraAt(view, 0), kBackground, false, pool_);
+      PlaneBuffer drawn = pipeline_.color();
+      const PictureQuality quality = CompareClamped(*target, loss_, pool_, drawn);
+      point.psnr_db += each * quality.psnr_db;
+      point.ssim += each * quality.ssim;
+      point.l1 += each * quality.l1;
+      if (fraction_ >= 1.0 && trace_ != nullptr && trace_->on_held_out_picture) {
+        trace_->on_held_out_picture(view.view, ImageFromPlanes(drawn));
       }
-      const double mse = squares / (static_cast<double>(target->width) * target->height);
-      sum += std::min(99.0, -10.0 * std::log10(std::max(mse, 1e-12)));
     }
-    progress_.OnError(
-        state_.iteration, "heldout_psnr_l_db", sum / static_cast<double>(problem_.held_out.size()));
+    progress_.OnError(state_.iteration, Named("heldout_psnr", "_db"), point.psnr_db);
+    if (trace_ != nullptr) trace_->held_out.push_back(point);
+    clock_.Enter(Phase::kOther);
+    pipeline_.set_clock(&clock_);
+  }
+
+  void FinishTrace() {
+    if (trace_ == nullptr) return;
+    trace_->seconds = clock_.TrainingSeconds();
+    trace_->phases = clock_.seconds();
+    trace_->iterations = state_.iteration;
+    trace_->gaussians = state_.parameters.count();
   }
 
   const GeometryProblem& problem_;
   const GeometryOptions& options_;
   const GeometryTuning& tuning_;
+  TrainingSchedule schedule_;
+  int channels_;
   ThreadPool& pool_;
   ProgressObserver& progress_;
   TrainingTargets targets_;
   TrainingState state_;
   int64_t initial_count_ = 0;
+  double fraction_ = 0.0;  // of the schedule that is done
+  double earlier_seconds_ = 0.0;
+  PhaseClock clock_;
   SplatPipeline pipeline_;
   ImageLoss loss_;
   PlaneBuffer d_color_;
   ParameterBlock gradient_;
+  TrainingTrace* trace_ = nullptr;
   std::chrono::steady_clock::time_point last_progress_;
 };
 
@@ -325,13 +343,14 @@ GaussianModel TrainGeometryOn(const GeometryProblem& problem,
                               ThreadPool& pool,
                               CheckpointStore& checkpoints,
                               ProgressObserver& progress,
-                              const CancellationToken& cancel) {
+                              const CancellationToken& cancel,
+                              TrainingTrace* trace) {
   options.Validate();
   if (problem.training.empty()) {
     throw InvalidArgument("the scene has no training views; give at least one posed photo");
   }
   GeometryTrainer trainer(problem, initial, options, tuning, pool, progress);
-  return trainer.Train(checkpoints, cancel);
+  return trainer.Train(checkpoints, cancel, trace);
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// Luminance geometry training on plain inputs (no files): the engine behind TrainGeometry. Internal
+// Geometry training on plain inputs (no files): the engine behind TrainGeometry. Internal
 // to the splat module.
 #pragma once
 
@@ -11,7 +11,9 @@
 #include "core/base/parallel.h"
 #include "core/base/progress.h"
 #include "core/splat/gaussian_model.h"
+#include "core/splat/phase_clock.h"
 #include "core/splat/trainer.h"
+#include "core/splat/training_schedule.h"
 
 namespace color3d {
 
@@ -21,45 +23,42 @@ struct PosedCamera {
   Pose cam_from_world;
 };
 
-// 1 channel, L in 0..100, the size of the view's camera.
-using LuminanceSource = std::function<std::shared_ptr<const Image>(int view)>;
+// A picture of the size of the view's camera.
+using PictureSource = std::function<std::shared_ptr<const Image>(int view)>;
 
 struct GeometryProblem {
   std::vector<PosedCamera> training;
   std::vector<PosedCamera> held_out;
-  LuminanceSource luminance;
+  PictureSource luminance;  // 1 channel, L in 0..100
+  PictureSource colours;    // 3 channels, sRGB 0..1; when set, trained on in place of luminance
   double extent = 1.0;
 };
 
-// How the schedule is spent. Fractions are of options.iterations. The defaults are measured.
-struct GeometryTuning {
-  enum class Strategy { kAdaptive, kRelocate };
-  Strategy strategy = Strategy::kAdaptive;
-  double quarter_size_until = 0.0;  // train at 1/4, then 1/2 of the working size
-  double half_size_until = 0.35;
-  double densify_from = 0.05;
-  double densify_until = 0.6;
-  int densify_rounds = 30;
-  double gradient_preference = 1.0;  // RelocationOptions
-  double growth_until = 0.5;         // the number of Gaussians reaches its cap here
-  int opacity_resets = 0;
-  double opacity_penalty = 0.005;  // times the mean opacity
-  double scale_penalty = 0.005;    // times the mean scale / extent
-  double noise = 5e5;              // of 3DGS-MCMC, times the position's learning rate
-  double sh_from = 0.3;            // degree 1 begins here
-  double sh_step = 0.15;           // and each further degree this much later
-  double position_rate_first = 1.6e-4;
-  double position_rate_last = 1.6e-6;
-  double dc_rate = 2.5e-3;
-  double rest_divisor = 20.0;
-  double opacity_rate = 0.05;
-  double scale_rate = 5e-3;
-  double rotation_rate = 1e-3;
-  double ssim_scale = 1.0;
+// Quality over the held-out views, at a moment of training. Pictures are compared after clamping to
+// 0..1; each view counts the same.
+struct HeldOutPoint {
+  double seconds = 0.0;  // of training
+  int64_t iteration = 0;
+  int64_t gaussians = 0;
+  double psnr_db = 0.0;  // from the squared error over all channels
+  double ssim = 0.0;
+  double l1 = 0.0;  // of values 0..1
 };
 
-// As TrainGeometry. `initial` has 1 channel; its spherical harmonics are extended to the options'
-// degree.
+// What training leaves for whoever measures it.
+struct TrainingTrace {
+  // Called at the end for each held-out view, in order: the model's picture, clamped to 0..1.
+  std::function<void(int view, const Image& drawn)> on_held_out_picture;
+  double seconds = 0.0;  // of training in this attempt, held-out evaluation not counted
+  int64_t iterations = 0;
+  int64_t gaussians = 0;
+  PhaseSeconds phases{};
+  std::vector<HeldOutPoint> held_out;
+};
+
+// As TrainGeometry. `initial` has 1 or 3 channels of any degree; its spherical harmonics are cut or
+// extended to the options' degree. On colours the result has 3 channels, and sh_l, sh_a, sh_b are
+// those of R, G, B, all around 0.5. `trace` may be null.
 GaussianModel TrainGeometryOn(const GeometryProblem& problem,
                               const GaussianModel& initial,
                               const GeometryOptions& options,
@@ -67,16 +66,20 @@ GaussianModel TrainGeometryOn(const GeometryProblem& problem,
                               ThreadPool& pool,
                               CheckpointStore& checkpoints,
                               ProgressObserver& progress,
-                              const CancellationToken& cancel);
+                              const CancellationToken& cancel,
+                              TrainingTrace* trace = nullptr);
 
-// TrainGeometry with another schedule, for measurements.
+// TrainGeometry with another schedule and on true colours if wanted, for measurements.
+enum class TrainingColours { kLuminance, kSrgb };
 GaussianModel TrainGeometryTuned(const Scene& scene,
                                  const ViewImages& images,
                                  const GeometryOptions& options,
                                  const GeometryTuning& tuning,
+                                 TrainingColours colours,
                                  ThreadPool& pool,
                                  CheckpointStore& checkpoints,
                                  ProgressObserver& progress,
-                                 const CancellationToken& cancel);
+                                 const CancellationToken& cancel,
+                                 TrainingTrace* trace);
 
 }  // namespace color3d

@@ -8,13 +8,17 @@ void SplatPipeline::Forward(const ParameterBlock& parameters,
                             const float* background,
                             bool depth_channel,
                             ThreadPool& pool) {
+  Enter(Phase::kProjection);
   ProjectSplats(parameters, color, depth_channel, camera, pool, splats_);
+  Enter(Phase::kBinning);
   binner_.Bin(splats_, camera.width, camera.height, pool, lists_);
+  Enter(Phase::kForward);
   color_.Reset(camera.width, camera.height, splats_.channels);
   transmittance_.Reset(camera.width, camera.height, 1);
   float behind[4] = {0.0f, 0.0f, 0.0f, 0.0f};
   for (int c = 0; c < color.channels; ++c) behind[c] = background[c];
   RasterizeForward(splats_, lists_, behind, pool, color_, &transmittance_, block_masks_);
+  Enter(Phase::kOther);
 }
 
 void SplatPipeline::Backward(const ParameterBlock& parameters,
@@ -25,7 +29,9 @@ void SplatPipeline::Backward(const ParameterBlock& parameters,
                              ThreadPool& pool,
                              ParameterBlock& gradient,
                              DensifyStatistics* statistics) {
+  Enter(Phase::kBackward);
   RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, pool, pair_gradient_);
+  Enter(Phase::kProjectionBackward);
   ProjectSplatsBackward(parameters,
                         color,
                         camera,
@@ -36,6 +42,7 @@ void SplatPipeline::Backward(const ParameterBlock& parameters,
                         pool,
                         gradient,
                         statistics);
+  Enter(Phase::kOther);
 }
 
 }  // namespace color3d

@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/splat/binning.h"
 #include "core/splat/parameter_block.h"
+#include "core/splat/phase_clock.h"
 #include "core/splat/projection.h"
 #include "core/splat/rasterizer.h"
 
@@ -14,6 +15,10 @@ namespace color3d {
 
 class SplatPipeline {
  public:
+  // Passes book their time on `clock` (may be null), which must outlive the pipeline's use; they
+  // leave it in Phase::kOther.
+  void set_clock(PhaseClock* clock) { clock_ = clock; }
+
   // Draws `parameters`; `background` has one number per channel. With `depth_channel` a last
   // channel holds sum(alpha T depth).
   void Forward(const ParameterBlock& parameters,
@@ -37,6 +42,11 @@ class SplatPipeline {
                 DensifyStatistics* statistics = nullptr);
 
  private:
+  void Enter(Phase phase) {
+    if (clock_ != nullptr) clock_->Enter(phase);
+  }
+
+  PhaseClock* clock_ = nullptr;
   SplatBuffer splats_;
   TileBinner binner_;
   TileLists lists_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 
 #include "core/base/error.h"
@@ -44,17 +45,20 @@ bool PixelOf(const PosedCamera& view, const Eigen::Vector3d& world, int* x, int*
   return true;
 }
 
-// Luminance of each sparse point where training views observe it, as a better start than grey. View
-// by view, so that each picture is read once. Returns how many points some training view has before
+// Colour of each sparse point where training views observe it, as a better start than grey. View by
+// view, so that each picture is read once. Returns how many points some training view has before
 // it.
-size_t SampleInitialLuminance(const Scene& scene,
-                              const GeometryProblem& problem,
-                              GaussianModel& model) {
-  std::vector<double> sum(scene.points.size(), 0.0);
+size_t SampleInitialColours(const Scene& scene,
+                            const GeometryProblem& problem,
+                            GaussianModel& model) {
+  const bool srgb = static_cast<bool>(problem.colours);
+  const int channels = srgb ? 3 : 1;
+  std::vector<double> sum(scene.points.size() * channels, 0.0);
   std::vector<int> count(scene.points.size(), 0);
   std::vector<char> in_front(scene.points.size(), 0);
   for (const PosedCamera& view : problem.training) {
-    const std::shared_ptr<const Image> luminance = problem.luminance(view.view);
+    const std::shared_ptr<const Image> picture =
+        srgb ? problem.colours(view.view) : problem.luminance(view.view);
     for (size_t i = 0; i < scene.points.size(); ++i) {
       const SparsePoint& point = scene.points[i];
       int x = 0, y = 0;
@@ -64,14 +68,20 @@ size_t SampleInitialLuminance(const Scene& scene,
           !std::binary_search(point.views.begin(), point.views.end(), view.view)) {
         continue;
       }
-      sum[i] += luminance->At(0, y, x);
+      for (int c = 0; c < channels; ++c) sum[i * channels + c] += picture->At(c, y, x);
       ++count[i];
     }
   }
+  model.channels = channels;
+  if (srgb) model.sh_a = model.sh_b = model.sh_l;
+  std::vector<float>* const sh[3] = {&model.sh_l, &model.sh_a, &model.sh_b};
   for (size_t i = 0; i < scene.points.size(); ++i) {
     if (count[i] == 0) continue;
-    const float value = static_cast<float>(0.01 * sum[i] / count[i]);
-    if (std::isfinite(value)) model.sh_l[i] = (value - 0.5f) / kShDc;
+    for (int c = 0; c < channels; ++c) {
+      const float value =
+          static_cast<float>((srgb ? 1.0 : 0.01) * sum[i * channels + c] / count[i]);
+      if (std::isfinite(value)) (*sh[c])[i] = (value - 0.5f) / kShDc;
+    }
   }
   return static_cast<size_t>(std::count(in_front.begin(), in_front.end(), 1));
 }
@@ -80,6 +90,7 @@ size_t SampleInitialLuminance(const Scene& scene,
 
 void GeometryOptions::Validate() const {
   CheckRange("iterations", iterations, 0, 100'000);
+  CheckRange("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
   CheckRange("max_gaussians", max_gaussians, 1, 10'000'000);
   CheckRange("sh_degree", sh_degree, 0, 3);
   CheckRange("ssim_weight", ssim_weight, 0.0, 1.0);
@@ -101,32 +112,52 @@ GaussianModel TrainGeometry(const Scene& scene,
                             CheckpointStore& checkpoints,
                             ProgressObserver& progress,
                             const CancellationToken& cancel) {
-  return TrainGeometryTuned(
-      scene, images, options, GeometryTuning(), pool, checkpoints, progress, cancel);
+  return TrainGeometryTuned(scene,
+                            images,
+                            options,
+                            TuningOf(options),
+                            TrainingColours::kLuminance,
+                            pool,
+                            checkpoints,
+                            progress,
+                            cancel,
+                            nullptr);
 }
 
 GaussianModel TrainGeometryTuned(const Scene& scene,
                                  const ViewImages& images,
                                  const GeometryOptions& options,
                                  const GeometryTuning& tuning,
+                                 TrainingColours colours,
                                  ThreadPool& pool,
                                  CheckpointStore& checkpoints,
                                  ProgressObserver& progress,
-                                 const CancellationToken& cancel) {
+                                 const CancellationToken& cancel,
+                                 TrainingTrace* trace) {
   options.Validate();
   GeometryProblem problem;
   problem.training = Posed(scene, images, scene.TrainingViews());
   problem.held_out = Posed(scene, images, scene.HeldOutViews());
   problem.luminance = [&images](int view) { return images.Luminance(view); };
+  if (colours == TrainingColours::kSrgb) {
+    // Decoded once; every level of the pyramid asks again.
+    problem.colours = [&images,
+                       kept = std::map<int, std::shared_ptr<const Image>>()](int view) mutable {
+      std::shared_ptr<const Image>& picture = kept[view];
+      if (picture == nullptr) picture = std::make_shared<const Image>(images.Srgb(view));
+      return picture;
+    };
+  }
   problem.extent = scene.Extent();
   GaussianModel initial = InitialGaussians(scene);
-  if (SampleInitialLuminance(scene, problem, initial) == 0) {
+  if (SampleInitialColours(scene, problem, initial) == 0) {
     throw InvalidArgument("none of the " + std::to_string(scene.points.size()) +
                           " sparse points lies in front of a training camera (nearer than " +
                           std::to_string(kNearPlane) +
                           " world units does not count); check the poses and the scene's scale");
   }
-  return TrainGeometryOn(problem, initial, options, tuning, pool, checkpoints, progress, cancel);
+  return TrainGeometryOn(
+      problem, initial, options, tuning, pool, checkpoints, progress, cancel, trace);
 }
 
 GaussianModel FitChroma(const GaussianModel& geometry,

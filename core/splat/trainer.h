@@ -18,7 +18,13 @@
 namespace color3d {
 
 struct GeometryOptions {
-  int iterations = 3000;             // 0..100000
+  // kOurs: coarse to fine, measured on CPUs. kPaper: the schedule of Kerbl et al. 2023.
+  enum class Recipe { kOurs, kPaper };
+  Recipe recipe = Recipe::kOurs;
+  int iterations = 3000;  // 0..100000
+  // Of training, 0: none, at most 86400. The whole schedule then fits into this time or the
+  // iterations, whichever is used up first; the same input gives similar results, not the same.
+  double time_limit_seconds = 0.0;
   int max_gaussians = 150'000;       // hard cap, 1..10,000,000
   int sh_degree = 2;                 // of luminance at the end, 0..3
   double ssim_weight = 0.2;          // lambda of (1 - SSIM), 0..1

@@ -17,7 +17,8 @@ class TrainingGuard {
   bool IsDue(int64_t iteration) const { return iteration % kInterval == 0; }
   void Keep(const TrainingState& state) { good_ = state; }
 
-  // Throws Error{kInternal} after kMaxRestores.
+  // Reports curve point "restored_non_finite": the iteration that training went back to. Throws
+  // Error{kInternal} after kMaxRestores.
   void Restore(const std::string& what, TrainingState& state) {
     const int64_t iteration = state.iteration;
     const int32_t restores = state.restores + 1;
@@ -31,6 +32,7 @@ class TrainingGuard {
     state = good_;
     state.restores = restores;
     state.rate_scale = rate_scale;
+    progress_.OnError(iteration, "restored_non_finite", static_cast<double>(state.iteration));
     progress_.OnWarning(what + ": a value was not finite at iteration " +
                         std::to_string(iteration) + "; went back to iteration " +
                         std::to_string(state.iteration) + " with " + std::to_string(rate_scale) +

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-constexpr std::string_view kMagic = "C3DTRAIN1";
+constexpr std::string_view kMagic = "C3DTRAIN2";
 constexpr size_t kDigestBytes = 64;
 
 class Writer {
@@ -129,6 +129,7 @@ std::string SerializeTrainingState(const TrainingState& state, std::string_view 
   w.Value(state.restores);
   w.Value(state.mean_error);
   w.Value(state.elapsed_seconds);
+  w.Value(state.densified_at);
   std::string bytes = w.Take();
   return bytes + Sha256Hex(bytes);
 }
@@ -159,6 +160,7 @@ bool ParseTrainingState(std::string_view bytes,
   read.restores = r.Value<int32_t>();
   read.mean_error = r.Value<double>();
   read.elapsed_seconds = r.Value<double>();
+  read.densified_at = r.Value<int64_t>();
   if (!r.ok()) return false;
   state = std::move(read);
   return true;

@@ -24,8 +24,9 @@ struct TrainingState {
   int64_t next_in_order = 0;
   double rate_scale = 1.0;  // halved by every restore
   int32_t restores = 0;
-  double mean_error = 0.0;  // running mean of the L1 error, 0 before the first iteration
-  double elapsed_seconds = 0.0;
+  double mean_error = 0.0;       // running mean of the L1 error, 0 before the first iteration
+  double elapsed_seconds = 0.0;  // of training, over all attempts; set when saved
+  int64_t densified_at = 0;      // iteration
 
   // Next view to train on: random order without replacement.
   int NextView(int view_count);

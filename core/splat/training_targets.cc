@@ -27,20 +27,21 @@ int SizeAtLevel(int size_px, int level) {
 std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view, int level) {
   const auto found = kept_.find({view.view, level});
   if (found != kept_.end()) return found->second;
-  const std::shared_ptr<const Image> image = luminance_(view.view);
-  if (image->channels != 1 || image->width != view.camera.width ||
+  const std::shared_ptr<const Image> image = source_(view.view);
+  if (image->channels != channels_ || image->width != view.camera.width ||
       image->height != view.camera.height) {
-    throw InvalidArgument("view " + std::to_string(view.view) + ": luminance is " +
-                          std::to_string(image->width) + "x" + std::to_string(image->height) +
-                          " px, its camera " + std::to_string(view.camera.width) + "x" +
-                          std::to_string(view.camera.height));
+    throw InvalidArgument(
+        "view " + std::to_string(view.view) + ": the picture is " + std::to_string(image->width) +
+        "x" + std::to_string(image->height) + "x" + std::to_string(image->channels) +
+        ", its camera " + std::to_string(view.camera.width) + "x" +
+        std::to_string(view.camera.height) + " px of " + std::to_string(channels_) + " channels");
   }
   auto planes = std::make_shared<const PlaneBuffer>(PlanesFromImage(
       level == 0
           ? *image
           : Resize(*image, SizeAtLevel(image->width, level), SizeAtLevel(image->height, level)),
       0.0f,
-      0.01f));
+      scale_));
   const int64_t bytes = static_cast<int64_t>(planes->data.size() * sizeof(float));
   if (used_bytes_ + bytes <= budget_bytes_) {
     used_bytes_ += bytes;

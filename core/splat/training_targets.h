@@ -20,16 +20,18 @@ int SizeAtLevel(int size_px, int level);
 
 class TrainingTargets {
  public:
-  // `luminance` must outlive this object.
-  TrainingTargets(const LuminanceSource& luminance, int64_t budget_bytes)
-      : luminance_(luminance), budget_bytes_(budget_bytes) {}
+  // `source` gives `channels` channels, must outlive this object, and is multiplied by `scale`.
+  TrainingTargets(const PictureSource& source, int channels, float scale, int64_t budget_bytes)
+      : source_(source), channels_(channels), scale_(scale), budget_bytes_(budget_bytes) {}
 
-  // L' of a view at a level. Throws Error{kInvalidArgument} when the picture does not have the
+  // Picture of a view at a level. Throws Error{kInvalidArgument} when the picture does not have the
   // camera's size.
   std::shared_ptr<const PlaneBuffer> Get(const PosedCamera& view, int level);
 
  private:
-  const LuminanceSource& luminance_;
+  const PictureSource& source_;
+  int channels_;
+  float scale_;
   int64_t budget_bytes_;
   int64_t used_bytes_ = 0;
   std::map<std::pair<int, int>, std::shared_ptr<const PlaneBuffer>> kept_;

@@ -198,6 +198,7 @@ TEST(TrainGeometryTest, RestoresTheLastGoodStateAndGivesUpAfterSeveralTries) {
     EXPECT_EQ(e.code(), ErrorCode::kInternal);
   }
   EXPECT_THAT(recorder.warnings, testing::Contains(testing::HasSubstr("not finite")));
+  EXPECT_THAT(recorder.errors["restored_non_finite"], testing::SizeIs(testing::Ge(1u)));
 }
 
 TEST(TrainGeometryTest, HugeLearningRatesNeverLeaveNonFiniteValues) {

@@ -60,6 +60,7 @@ nlohmann::ordered_json ToJson(const StabilityCase& c, const StabilityResult& r) 
           {"non_finite", r.non_finite},
           {"compared", r.compared},
           {"left_out", r.left_out},
+          {"restores", r.restores},
           {"outcome", r.outcome},
           {"seconds", r.seconds},
           {"passed", r.Passed()}};

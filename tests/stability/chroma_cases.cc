@@ -104,7 +104,7 @@ StabilityResult Run(const Fit& f, ThreadPool& pool) {
   result.compared = static_cast<int64_t>(model.size());
   // Garbage is chroma far beyond the targets': the gamut of Lab ends near 130.
   const double largest = LargestChroma(model);
-  result.warnings = static_cast<int64_t>(witness.warnings.size());
+  result.restores = witness.restores;
   result.held = model.channels == 3 && largest < 260.0;
   char text[120];
   std::snprintf(text,

@@ -56,14 +56,15 @@ StabilityResult RunTraining(const Training& t, ThreadPool& pool) {
   char text[160];
   std::snprintf(text,
                 sizeof(text),
-                "%zu Gaussians, error %.3g -> %.3g, %zu warnings",
+                "%zu Gaussians, error %.3g -> %.3g, %lld restores, %zu warnings",
                 model.size(),
                 witness.first,
                 witness.last,
+                static_cast<long long>(witness.restores),
                 witness.warnings.size());
   result.outcome = text;
   if (!witness.warnings.empty()) result.outcome += ", first: " + witness.warnings.front();
-  result.warnings = static_cast<int64_t>(witness.warnings.size());
+  result.restores = witness.restores;
   return result;
 }
 
@@ -224,7 +225,7 @@ void AddGeometryCases(std::vector<StabilityCase>& cases) {
                      Training t = OfRate(1000.0);
                      t.extent = 6e38;
                      StabilityResult result = RunTraining(t, pool);
-                     result.held = result.held && result.warnings > 0;
+                     result.held = result.held && result.restores > 0;
                      return result;
                    }});
 }

@@ -37,7 +37,7 @@ struct StabilityResult {
   int64_t non_finite = 0;
   int64_t compared = 0;  // pixels or numbers
   int64_t left_out = 0;  // near a threshold
-  int64_t warnings = 0;  // that training reported: restores among them
+  int64_t restores = 0;  // of the last good state, as the curves report them
   bool held = true;      // what else the case demands
   std::string outcome;   // in words, for cases that are more than a comparison
   double seconds = 0.0;

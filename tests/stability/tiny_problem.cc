@@ -9,6 +9,7 @@ namespace color3d {
 
 void TrainingWitness::OnError(int64_t, const std::string& name, double value) {
   non_finite += std::isfinite(value) ? 0 : 1;
+  if (name == "restored_non_finite") ++restores;
   if (name.rfind("train_", 0) != 0) return;
   if (!seen_) first = value;
   seen_ = true;

@@ -21,6 +21,7 @@ class TrainingWitness : public ProgressObserver {
   void OnWarning(const std::string& message) override { warnings.push_back(message); }
   int64_t non_finite = 0;          // points of curves
   double first = 0.0, last = 0.0;  // training error
+  int64_t restores = 0;            // points of the curve "restored_non_finite"
   std::vector<std::string> warnings;
 
  private:
