@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds Color3D and runs its test suite. Installs what is missing (as root or with sudo).
 #   tests/run.sh            everything: layering, API checks, fast and integration tests
-#   tests/run.sh -L fast    only the tests with this CTest label (fast, integration, slow)
+#   tests/run.sh -L fast    only the tests with this CTest label (fast, stability, integration, slow)
 # BUILD_DIR names another build folder (default: build). With CI=true nothing is asked or coloured.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -42,7 +42,9 @@ using simd::F32;
 float UpdateRow(const RowStep& s, int64_t begin, int64_t end) {
   F32 poison = simd::Zero();
   for (int64_t i = begin; i < end; i += simd::kLanes) {
-    const F32 gradient = simd::Load(s.g + i), m = simd::Load(s.m + i), v = simd::Load(s.v + i);
+    // Clamped so that its square does not overflow; Adam does not depend on the gradient's size.
+    const F32 raw = simd::Load(s.g + i), m = simd::Load(s.m + i), v = simd::Load(s.v + i);
+    const F32 gradient = simd::Clamp(raw, simd::Broadcast(-1e18f), simd::Broadcast(1e18f));
     const F32 first = m + (1.0f - kAdamBeta1) * (gradient - m);
     const F32 second = v + (1.0f - kAdamBeta2) * (gradient * gradient - v);
     const F32 scale = simd::Sqrt(second) * s.root_correction + kAdamEpsilon;
@@ -50,7 +52,7 @@ float UpdateRow(const RowStep& s, int64_t begin, int64_t end) {
     simd::Store(s.m + i, first);
     simd::Store(s.v + i, second);
     simd::Store(s.p + i, updated);
-    poison = poison + updated * 0.0f + gradient * 0.0f;
+    poison = poison + updated * 0.0f + raw * 0.0f;
   }
   return simd::HorizontalSum(poison);
 }

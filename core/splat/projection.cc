@@ -221,10 +221,22 @@ bool GatherSums(const BackwardContext& ctx, int64_t i, int lanes, F32* sums) {
   return true;
 }
 
+// Lanes that are not visible hold arbitrary geometry; their sums are zero, but 0 * inf is not.
+Mask Drawn(const BackwardContext& ctx, int64_t i) {
+  const int lanes = static_cast<int>(std::min<int64_t>(ctx.p.count() - i, simd::kLanes));
+  float seen[simd::kLanes] = {};
+  for (int lane = 0; lane < lanes; ++lane) {
+    seen[lane] = ctx.splats.depth_key[i + lane] != 0 ? 1.0f : 0.0f;
+  }
+  return simd::Less(Broadcast(0.5f), simd::Load(seen));
+}
+
 // Colour gradients, and the part of dL/d(position) that comes through the view direction.
-void ColorBackward(const BackwardContext& ctx, int64_t i, const F32* sums, F32* d_position) {
+void ColorBackward(
+    const BackwardContext& ctx, int64_t i, Mask drawn, const F32* sums, F32* d_position) {
   F32 direction[3], inv_distance, basis[kMaxShCoefficients], weight[kMaxShCoefficients];
   ViewDirection(ctx.p, ctx.camera, i, direction, &inv_distance);
+  for (F32& d : direction) d = simd::SelectOrZero(drawn, d);
   const int most = MaxCoefficients(ctx.color);
   EvaluateSh(most, direction[0], direction[1], direction[2], basis);
   for (int k = 0; k < most; ++k) weight[k] = Broadcast(0.0f);
@@ -275,8 +287,9 @@ void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
     for (int r = 0; r < ctx.p.rows(); ++r) simd::Store(ctx.gradient.Row(r) + i, Broadcast(0.0f));
     return;
   }
+  const Mask drawn = Drawn(ctx, i);
   if (ctx.scope == GradientScope::kColorOnly) {
-    ColorBackward(ctx, i, sums, nullptr);
+    ColorBackward(ctx, i, drawn, sums, nullptr);
     return;
   }
   Projected g;
@@ -284,16 +297,12 @@ void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
   LoadShape(ctx.p, i, g);
   LoadOpacity(ctx.p, i, g);
   ComputeConic(ctx.camera, g);
+  // The moments' gradients have 1 / variance as factor: that of the Gaussian as it is, not shrunk.
+  for (int k = kSumWE; k <= kSumWDyDy; ++k) sums[k] = sums[k] * (g.shrink * g.shrink);
   ShapeGradient shape = ShapeBackward(ctx.camera, g, sums);
-  ColorBackward(ctx, i, sums, shape.position);
-  // Lanes that are not visible hold arbitrary geometry; their sums are zero, but 0 * inf is not.
-  float seen[simd::kLanes] = {};
-  for (int lane = 0; lane < lanes; ++lane) {
-    seen[lane] = ctx.splats.depth_key[i + lane] != 0 ? 1.0f : 0.0f;
-  }
-  const Mask visible = simd::Less(Broadcast(0.5f), simd::Load(seen));
+  ColorBackward(ctx, i, drawn, sums, shape.position);
   const auto store = [&](int row, F32 value) HWY_ATTR {
-    simd::Store(ctx.gradient.Row(row) + i, simd::SelectOrZero(visible, value));
+    simd::Store(ctx.gradient.Row(row) + i, simd::SelectOrZero(drawn, value));
   };
   for (int k = 0; k < 3; ++k) store(kPositionRow + k, shape.position[k]);
   for (int k = 0; k < 3; ++k) store(kLogScaleRow + k, shape.log_scale[k]);

@@ -58,13 +58,21 @@ HWY_INLINE void RotationFromQuaternion(const F32* q, F32* r) {
 }
 
 HWY_INLINE void LoadShape(const ParameterBlock& p, int64_t i, Projected& g) {
-  F32 norm2 = Broadcast(1e-24f);
+  F32 norm2 = Broadcast(1e-24f), sum = Broadcast(0.0f);
   for (int k = 0; k < 4; ++k) {
     g.q[k] = simd::Load(p.Row(kRotationRow + k) + i);
+    sum = sum + simd::Max(g.q[k], -g.q[k]);
+  }
+  // The square of a huge quaternion would overflow.
+  const F32 reduce =
+      simd::Select(simd::Less(Broadcast(1e15f), sum), Broadcast(1e-20f), Broadcast(1.0f));
+  for (int k = 0; k < 4; ++k) {
+    g.q[k] = g.q[k] * reduce;
     norm2 = norm2 + g.q[k] * g.q[k];
   }
   g.inv_norm = 1.0f / simd::Sqrt(norm2);
   for (int k = 0; k < 4; ++k) g.q[k] = g.q[k] * g.inv_norm;
+  g.inv_norm = g.inv_norm * reduce;
   RotationFromQuaternion(g.q, g.r);
   const F32 low = Broadcast(kMinLogScale), high = Broadcast(kMaxLogScale);
   for (int k = 0; k < 3; ++k) {

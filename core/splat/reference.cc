@@ -4,116 +4,266 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/splat/jet.h"
 #include "core/splat/spherical_harmonics.h"
 
 namespace color3d {
 namespace {
 
+constexpr int kShapeRows = kColorRow;  // position, log scale, rotation, opacity
+using ShapeJet = Jet<kShapeRows>;
+
+// A Gaussian on the screen; T is double, or a jet by the Gaussian's shape rows.
+template <class T>
 struct Splat {
-  double depth = 0.0;
-  double u = 0.0, v = 0.0;
-  double conic_xx = 0.0, conic_xy = 0.0, conic_yy = 0.0;
-  double opacity = 0.0;
-  double color[3] = {};
+  int index = 0;
+  T depth, u, v;
+  T xx, xy, yy;  // 2D covariance with dilation
+  T conic_xx, conic_xy, conic_yy;
+  T opacity;
+  T color[3];
 };
 
-void Rotation(const ReferenceParameters& p, int i, double r[3][3]) {
-  double q[4], norm = 1e-24;
-  for (int k = 0; k < 4; ++k) {
-    q[k] = p.At(kRotationRow + k, i);
-    norm += q[k] * q[k];
-  }
-  for (double& v : q) v /= std::sqrt(norm);
-  const double w = q[0], x = q[1], y = q[2], z = q[3];
-  const double values[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-                               {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-                               {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
+double Variable(double value, int, double) { return value; }
+ShapeJet Variable(double value, int row, const ShapeJet&) { return ShapeJet::Variable(value, row); }
+
+template <class T>
+void Rotation(const T* parameters, T r[3][3]) {
+  T q[4], norm = 1e-24;
+  for (int k = 0; k < 4; ++k)
+    norm = norm + parameters[kRotationRow + k] * parameters[kRotationRow + k];
+  norm = SquareRoot(norm);
+  for (int k = 0; k < 4; ++k) q[k] = parameters[kRotationRow + k] / norm;
+  const T w = q[0], x = q[1], y = q[2], z = q[3];
+  const T values[3][3] = {
+      {1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+      {2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)},
+      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)}};
   std::copy(&values[0][0], &values[0][0] + 9, &r[0][0]);
 }
 
 // M = J W R S.
-void ScreenAxes(const ReferenceParameters& p,
-                const RasterCamera& c,
-                int i,
-                const double cam[3],
-                double m[2][3]) {
-  double r[3][3];
-  Rotation(p, i, r);
-  const double margin_x = kFrustumMargin * 0.5 * c.width / c.fx;
-  const double margin_y = kFrustumMargin * 0.5 * c.height / c.fy;
-  const double tx =
-      std::clamp(cam[0] / cam[2], -c.cx / c.fx - margin_x, (c.width - c.cx) / c.fx + margin_x);
-  const double ty =
-      std::clamp(cam[1] / cam[2], -c.cy / c.fy - margin_y, (c.height - c.cy) / c.fy + margin_y);
-  const double jacobian[2][3] = {{c.fx / cam[2], 0.0, -c.fx * tx / cam[2]},
-                                 {0.0, c.fy / cam[2], -c.fy * ty / cam[2]}};
+template <class T>
+void ScreenAxes(const T* parameters, const RasterCamera& c, const T cam[3], T m[2][3]) {
+  T r[3][3];
+  Rotation(parameters, r);
+  const double fx = c.fx, fy = c.fy, cx = c.cx, cy = c.cy;
+  const double margin_x = kFrustumMargin * 0.5 * c.width / fx;
+  const double margin_y = kFrustumMargin * 0.5 * c.height / fy;
+  const T tx = Limited(cam[0] / cam[2], -cx / fx - margin_x, (c.width - cx) / fx + margin_x);
+  const T ty = Limited(cam[1] / cam[2], -cy / fy - margin_y, (c.height - cy) / fy + margin_y);
+  const T jacobian[2][3] = {{fx / cam[2], 0.0, -fx * tx / cam[2]},
+                            {0.0, fy / cam[2], -fy * ty / cam[2]}};
   for (int row = 0; row < 2; ++row) {
     for (int k = 0; k < 3; ++k) {
-      double sum = 0.0;
+      T sum = 0.0;
       for (int a = 0; a < 3; ++a) {
         for (int b = 0; b < 3; ++b) {
-          sum += jacobian[row][a] * c.rotation[3 * a + b] * r[b][k];
+          sum = sum + jacobian[row][a] * double{c.rotation[3 * a + b]} * r[b][k];
         }
       }
-      const double log_scale =
-          std::clamp<double>(p.At(kLogScaleRow + k, i), kMinLogScale, kMaxLogScale);
-      m[row][k] = sum * std::exp(log_scale);
+      m[row][k] = sum * Exp(Limited(parameters[kLogScaleRow + k], kMinLogScale, kMaxLogScale));
     }
   }
 }
 
+// The determinant is the sum of the squared 2x2 minors of M and of the dilation's terms (Cauchy and
+// Binet); as xx yy - xy^2 even float64 would lose a needle of 1e8 px.
+template <class T>
+void Conic(const T m[2][3], Splat<T>& s) {
+  const double dilation = kCovarianceDilation;
+  T n0 = 0.0, n1 = 0.0, xy = 0.0, minors = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    const int next = (k + 1) % 3;
+    const T minor = m[0][k] * m[1][next] - m[0][next] * m[1][k];
+    n0 = n0 + m[0][k] * m[0][k];
+    n1 = n1 + m[1][k] * m[1][k];
+    xy = xy + m[0][k] * m[1][k];
+    minors = minors + minor * minor;
+  }
+  const T det = minors + dilation * (n0 + n1) + dilation * dilation;
+  s.xx = n0 + dilation;
+  s.xy = xy;
+  s.yy = n1 + dilation;
+  s.conic_xx = s.yy / det;
+  s.conic_xy = -xy / det;
+  s.conic_yy = s.xx / det;
+}
+
+template <class T>
 void Color(const ReferenceParameters& p,
+           const T* parameters,
            const ColorSpec& color,
            const RasterCamera& c,
-           int i,
-           Splat& splat) {
-  double d[3], norm = 1e-24;
+           Splat<T>& splat) {
+  T d[3], norm = 1e-24;
   for (int k = 0; k < 3; ++k) {
-    d[k] = p.At(kPositionRow + k, i) - c.center[k];
-    norm += d[k] * d[k];
+    d[k] = parameters[kPositionRow + k] - double{c.center[k]};
+    norm = norm + d[k] * d[k];
   }
-  norm = std::sqrt(norm);
-  double basis[kMaxShCoefficients];
-  EvaluateSh(kMaxShCoefficients, d[0] / norm, d[1] / norm, d[2] / norm, basis);
+  norm = SquareRoot(norm);
+  T basis[kMaxShCoefficients];
+  EvaluateSh<T>(kMaxShCoefficients, d[0] / norm, d[1] / norm, d[2] / norm, basis);
   for (int ch = 0; ch < color.channels; ++ch) {
-    double value = color.channel[ch].base;
+    T value = double{color.channel[ch].base};
     for (int k = 0; k < color.channel[ch].coefficients; ++k) {
-      value += basis[k] * p.At(color.channel[ch].row + k, i);
+      value = value + basis[k] * p.At(color.channel[ch].row + k, splat.index);
     }
-    splat.color[ch] = color.channel[ch].clamp_at_zero ? std::max(value, 0.0) : value;
+    splat.color[ch] = color.channel[ch].clamp_at_zero && ValueOf(value) < 0.0 ? T(0.0) : value;
   }
 }
 
 // False when the Gaussian is behind the near plane.
+template <class T>
 bool Project(const ReferenceParameters& p,
              const ColorSpec& color,
              const RasterCamera& c,
              int i,
-             Splat& splat) {
-  double cam[3];
+             Splat<T>& splat) {
+  T parameters[kShapeRows];
+  for (int row = 0; row < kShapeRows; ++row) parameters[row] = Variable(p.At(row, i), row, T());
+  T cam[3];
   for (int a = 0; a < 3; ++a) {
-    cam[a] = c.translation[a];
-    for (int b = 0; b < 3; ++b) cam[a] += c.rotation[3 * a + b] * p.At(kPositionRow + b, i);
+    cam[a] = double{c.translation[a]};
+    for (int b = 0; b < 3; ++b) {
+      cam[a] = cam[a] + double{c.rotation[3 * a + b]} * parameters[kPositionRow + b];
+    }
   }
-  if (!(cam[2] > kNearPlane)) return false;
+  if (!(ValueOf(cam[2]) > kNearPlane)) return false;
+  splat.index = i;
   splat.depth = cam[2];
-  splat.u = c.fx * cam[0] / cam[2] + c.cx;
-  splat.v = c.fy * cam[1] / cam[2] + c.cy;
-  double m[2][3];
-  ScreenAxes(p, c, i, cam, m);
-  double xx = kCovarianceDilation, xy = 0.0, yy = kCovarianceDilation;
-  for (int k = 0; k < 3; ++k) {
-    xx += m[0][k] * m[0][k];
-    xy += m[0][k] * m[1][k];
-    yy += m[1][k] * m[1][k];
-  }
-  const double det = xx * yy - xy * xy;
-  splat.conic_xx = yy / det;
-  splat.conic_xy = -xy / det;
-  splat.conic_yy = xx / det;
-  splat.opacity = 1.0 / (1.0 + std::exp(-p.At(kOpacityRow, i)));
-  Color(p, color, c, i, splat);
+  splat.u = double{c.fx} * cam[0] / cam[2] + double{c.cx};
+  splat.v = double{c.fy} * cam[1] / cam[2] + double{c.cy};
+  T m[2][3];
+  ScreenAxes(parameters, c, cam, m);
+  Conic(m, splat);
+  splat.opacity = Sigmoid(parameters[kOpacityRow]);
+  Color(p, parameters, color, c, splat);
   return true;
+}
+
+std::vector<Splat<double>> ProjectSorted(const ReferenceParameters& p,
+                                         const ColorSpec& color,
+                                         const RasterCamera& camera) {
+  std::vector<Splat<double>> splats;
+  for (int i = 0; i < p.count; ++i) {
+    Splat<double> splat;
+    if (Project(p, color, camera, i, splat)) splats.push_back(splat);
+  }
+  std::stable_sort(
+      splats.begin(), splats.end(), [](const auto& a, const auto& b) { return a.depth < b.depth; });
+  return splats;
+}
+
+// What one splat puts into one pixel.
+struct Contribution {
+  size_t splat = 0;
+  double dx = 0.0, dy = 0.0;
+  double alpha = 0.0;
+  double transmittance = 1.0;  // before it
+  bool capped = false;
+};
+
+// Front to back; returns the transmittance that is left.
+double Blend(const std::vector<Splat<double>>& splats,
+             int x,
+             int y,
+             double margin,
+             std::vector<Contribution>& contributions,
+             bool* near_threshold) {
+  contributions.clear();
+  *near_threshold = false;
+  const auto check = [&](double value, double threshold) {
+    *near_threshold = *near_threshold || std::abs(std::log(value / threshold)) < margin;
+  };
+  double t = 1.0;
+  for (size_t i = 0; i < splats.size(); ++i) {
+    if (t < kMinTransmittance) break;
+    const Splat<double>& s = splats[i];
+    const double dx = x + 0.5 - s.u, dy = y + 0.5 - s.v;
+    const double power =
+        -0.5 * (s.conic_xx * dx * dx + s.conic_yy * dy * dy) - s.conic_xy * dx * dy;
+    if (power < -50.0) continue;
+    const double raw = s.opacity * std::exp(power);
+    check(raw, kMinAlpha);
+    if (raw < kMinAlpha) continue;
+    check(raw, kMaxAlpha);
+    const double alpha = std::min<double>(kMaxAlpha, raw);
+    contributions.push_back({i, dx, dy, alpha, t, raw > kMaxAlpha});
+    t *= 1.0 - alpha;
+    check(t, kMinTransmittance);
+  }
+  return t;
+}
+
+// dL/d(u, v, conic, opacity, colour) of one Gaussian.
+struct ScreenGradient {
+  double u = 0.0, v = 0.0, conic_xx = 0.0, conic_xy = 0.0, conic_yy = 0.0, opacity = 0.0;
+  double color[3] = {};
+};
+
+// Adjoint of one pixel's blending sum, back to front with S = the colour behind:
+// dC/d(alpha) = c T - S / (1 - alpha).
+void BlendBackward(const std::vector<Splat<double>>& splats,
+                   const std::vector<Contribution>& contributions,
+                   int channels,
+                   const std::vector<double>& background,
+                   double last_transmittance,
+                   const std::array<double, 3>& d_color,
+                   std::vector<ScreenGradient>& gradient) {
+  double behind = 0.0;
+  for (int c = 0; c < channels; ++c) behind += d_color[c] * background[c] * last_transmittance;
+  for (size_t k = contributions.size(); k-- > 0;) {
+    const Contribution& at = contributions[k];
+    const Splat<double>& s = splats[at.splat];
+    ScreenGradient& g = gradient[s.index];
+    double own = 0.0;
+    for (int c = 0; c < channels; ++c) {
+      own += d_color[c] * s.color[c];
+      g.color[c] += d_color[c] * at.alpha * at.transmittance;
+    }
+    const double d_alpha = own * at.transmittance - behind / (1.0 - at.alpha);
+    behind += own * at.alpha * at.transmittance;
+    if (at.capped) continue;
+    const double d_power = d_alpha * at.alpha;
+    g.opacity += d_power / s.opacity;
+    g.conic_xx -= 0.5 * d_power * at.dx * at.dx;
+    g.conic_xy -= d_power * at.dx * at.dy;
+    g.conic_yy -= 0.5 * d_power * at.dy * at.dy;
+    g.u += d_power * (s.conic_xx * at.dx + s.conic_xy * at.dy);
+    g.v += d_power * (s.conic_yy * at.dy + s.conic_xy * at.dx);
+  }
+}
+
+// From the screen to the parameters of Gaussian i.
+void ProjectBackward(const ReferenceParameters& p,
+                     const ColorSpec& color,
+                     const RasterCamera& camera,
+                     int i,
+                     const ScreenGradient& g,
+                     ReferenceParameters& gradient) {
+  Splat<ShapeJet> s;
+  if (!Project(p, color, camera, i, s)) return;
+  for (int row = 0; row < kShapeRows; ++row) {
+    double sum = g.u * s.u.d[row] + g.v * s.v.d[row] + g.conic_xx * s.conic_xx.d[row] +
+                 g.conic_xy * s.conic_xy.d[row] + g.conic_yy * s.conic_yy.d[row] +
+                 g.opacity * s.opacity.d[row];
+    for (int c = 0; c < color.channels; ++c) sum += g.color[c] * s.color[c].d[row];
+    gradient.At(row, i) = sum;
+  }
+  double d[3], norm = 1e-24, basis[kMaxShCoefficients];
+  for (int k = 0; k < 3; ++k) {
+    d[k] = p.At(kPositionRow + k, i) - camera.center[k];
+    norm += d[k] * d[k];
+  }
+  norm = std::sqrt(norm);
+  EvaluateSh<double>(kMaxShCoefficients, d[0] / norm, d[1] / norm, d[2] / norm, basis);
+  for (int c = 0; c < color.channels; ++c) {
+    if (color.channel[c].clamp_at_zero && !(s.color[c].value > 0.0)) continue;
+    for (int k = 0; k < color.channel[c].coefficients; ++k) {
+      gradient.At(color.channel[c].row + k, i) += g.color[c] * basis[k];
+    }
+  }
 }
 
 }  // namespace
@@ -128,132 +278,89 @@ ReferenceParameters ReferenceParameters::From(const ParameterBlock& parameters) 
   return p;
 }
 
+void ReferenceRenderAt(const ReferenceParameters& parameters,
+                       const ColorSpec& color,
+                       const RasterCamera& camera,
+                       const std::vector<double>& background,
+                       double margin,
+                       std::vector<ReferencePixel>& pixels) {
+  const std::vector<Splat<double>> splats = ProjectSorted(parameters, color, camera);
+  std::vector<Contribution> contributions;
+  for (ReferencePixel& pixel : pixels) {
+    const double t = Blend(splats, pixel.x, pixel.y, margin, contributions, &pixel.near_threshold);
+    pixel.color = {};
+    pixel.depth = 0.0;
+    for (const Contribution& at : contributions) {
+      const double weight = at.alpha * at.transmittance;
+      for (int c = 0; c < color.channels; ++c) {
+        pixel.color[c] += splats[at.splat].color[c] * weight;
+      }
+      pixel.depth += splats[at.splat].depth * weight;
+    }
+    for (int c = 0; c < color.channels; ++c) pixel.color[c] += background[c] * t;
+    pixel.opacity = 1.0 - t;
+  }
+}
+
 ReferenceImage ReferenceRender(const ReferenceParameters& parameters,
                                const ColorSpec& color,
                                const RasterCamera& camera,
                                const std::vector<double>& background) {
-  std::vector<Splat> splats;
-  for (int i = 0; i < parameters.count; ++i) {
-    Splat splat;
-    if (Project(parameters, color, camera, i, splat)) splats.push_back(splat);
+  std::vector<ReferencePixel> pixels(static_cast<size_t>(camera.width) * camera.height);
+  for (size_t i = 0; i < pixels.size(); ++i) {
+    pixels[i].x = static_cast<int>(i % camera.width);
+    pixels[i].y = static_cast<int>(i / camera.width);
   }
-  std::stable_sort(splats.begin(), splats.end(), [](const Splat& a, const Splat& b) {
-    return a.depth < b.depth;
-  });
+  ReferenceRenderAt(parameters, color, camera, background, 0.0, pixels);
   ReferenceImage image;
   image.width = camera.width;
   image.height = camera.height;
-  const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
-  image.color.assign(color.channels, std::vector<double>(pixels, 0.0));
-  image.opacity.assign(pixels, 0.0);
-  image.depth.assign(pixels, 0.0);
-  for (size_t pixel = 0; pixel < pixels; ++pixel) {
-    const double px = static_cast<double>(pixel % camera.width) + 0.5;
-    const double py = static_cast<double>(pixel / camera.width) + 0.5;
-    double t = 1.0;
-    for (const Splat& s : splats) {
-      if (t < kMinTransmittance) break;
-      const double dx = px - s.u, dy = py - s.v;
-      const double power =
-          -0.5 * (s.conic_xx * dx * dx + s.conic_yy * dy * dy) - s.conic_xy * dx * dy;
-      const double alpha = std::min<double>(kMaxAlpha, s.opacity * std::exp(power));
-      if (alpha < kMinAlpha) continue;
-      for (int c = 0; c < color.channels; ++c) image.color[c][pixel] += s.color[c] * alpha * t;
-      image.depth[pixel] += s.depth * alpha * t;
-      t *= 1.0 - alpha;
-    }
-    for (int c = 0; c < color.channels; ++c) image.color[c][pixel] += background[c] * t;
-    image.opacity[pixel] = 1.0 - t;
+  image.color.resize(color.channels);
+  for (const ReferencePixel& pixel : pixels) {
+    for (int c = 0; c < color.channels; ++c) image.color[c].push_back(pixel.color[c]);
+    image.opacity.push_back(pixel.opacity);
+    image.depth.push_back(pixel.depth);
   }
   return image;
 }
 
-namespace {
-
-// 11x11 Gaussian window, sigma 1.5, zeros outside.
-double Blurred(const std::vector<double>& p, int width, int height, int x, int y) {
-  double sum = 0.0, norm = 0.0;
-  for (int dy = -5; dy <= 5; ++dy) {
-    for (int dx = -5; dx <= 5; ++dx) {
-      const double w = std::exp(-(dx * dx + dy * dy) / (2.0 * 1.5 * 1.5));
-      norm += w;
-      const int xx = x + dx, yy = y + dy;
-      if (xx < 0 || yy < 0 || xx >= width || yy >= height) continue;
-      sum += w * p[static_cast<size_t>(yy) * width + xx];
-    }
+ReferenceParameters ReferenceGradient(const ReferenceParameters& parameters,
+                                      const ColorSpec& color,
+                                      const RasterCamera& camera,
+                                      const std::vector<double>& background,
+                                      const std::vector<ReferencePixel>& pixels,
+                                      const std::vector<std::array<double, 3>>& d_color) {
+  const std::vector<Splat<double>> splats = ProjectSorted(parameters, color, camera);
+  std::vector<ScreenGradient> screen(parameters.count);
+  std::vector<Contribution> contributions;
+  for (size_t k = 0; k < pixels.size(); ++k) {
+    bool near_threshold = false;
+    const double t = Blend(splats, pixels[k].x, pixels[k].y, 0.0, contributions, &near_threshold);
+    BlendBackward(splats, contributions, color.channels, background, t, d_color[k], screen);
   }
-  return sum / norm;
+  ReferenceParameters gradient = parameters;
+  std::fill(gradient.values.begin(), gradient.values.end(), 0.0);
+  for (int i = 0; i < parameters.count; ++i) {
+    ProjectBackward(parameters, color, camera, i, screen[i], gradient);
+  }
+  return gradient;
 }
 
-std::vector<double> Product(const std::vector<double>& a, const std::vector<double>& b) {
-  std::vector<double> p(a.size());
-  for (size_t i = 0; i < a.size(); ++i) p[i] = a[i] * b[i];
-  return p;
-}
-
-double DissimilaritySum(const std::vector<double>& x,
-                        const std::vector<double>& y,
-                        const std::vector<double>& weight,
-                        int width,
-                        int height) {
-  const std::vector<double> xx = Product(x, x), xy = Product(x, y), yy = Product(y, y);
-  double sum = 0.0;
-  for (int r = 0; r < height; ++r) {
-    for (int c = 0; c < width; ++c) {
-      const double mx = Blurred(x, width, height, c, r), my = Blurred(y, width, height, c, r);
-      const double sx = Blurred(xx, width, height, c, r) - mx * mx;
-      const double sy = Blurred(yy, width, height, c, r) - my * my;
-      const double sxy = Blurred(xy, width, height, c, r) - mx * my;
-      const double ssim = (2 * mx * my + kSsimC1) * (2 * sxy + kSsimC2) /
-                          ((mx * mx + my * my + kSsimC1) * (sx + sy + kSsimC2));
-      const size_t i = static_cast<size_t>(r) * width + c;
-      sum += (weight.empty() ? 1.0 : weight[i]) * (1.0 - ssim);
-    }
+double ReferenceCovarianceCondition(const ReferenceParameters& parameters,
+                                    const RasterCamera& camera) {
+  double worst = 1.0;
+  ColorSpec none;
+  none.channels = 0;
+  for (int i = 0; i < parameters.count; ++i) {
+    Splat<double> s;
+    if (!Project(parameters, none, camera, i, s)) continue;
+    // Eigenvalues: mean +- radius, and their product is the determinant 1 / det(conic).
+    const double mean = 0.5 * (s.xx + s.yy);
+    const double largest = mean + std::hypot(0.5 * (s.xx - s.yy), s.xy);
+    const double det = s.yy / s.conic_xx;
+    worst = std::max(worst, largest * largest / det);
   }
-  return sum;
-}
-
-double EdgeMean(const std::vector<double>& x,
-                const std::vector<double>& y,
-                const std::vector<double>& weight,
-                int width,
-                int height) {
-  if (width < 3 || height < 3) return 0.0;
-  double sum = 0.0;
-  for (int r = 1; r < height - 1; ++r) {
-    for (int c = 1; c < width - 1; ++c) {
-      const size_t i = static_cast<size_t>(r) * width + c;
-      const auto laplacian = [&](const std::vector<double>& p) {
-        return p[i - 1] + p[i + 1] + p[i - width] + p[i + width] - 4.0 * p[i];
-      };
-      const double d = laplacian(x) - laplacian(y);
-      sum += (weight.empty() ? 1.0 : weight[i]) *
-             std::sqrt(d * d + double{kCharbonnierEpsilon} * kCharbonnierEpsilon);
-    }
-  }
-  return sum / (static_cast<double>(width - 2) * (height - 2));
-}
-
-}  // namespace
-
-double ReferenceLoss(const std::vector<std::vector<double>>& x,
-                     const std::vector<std::vector<double>>& y,
-                     const std::vector<double>& weight,
-                     int width,
-                     int height,
-                     const LossWeights& weights) {
-  const double pixels = static_cast<double>(width) * height;
-  double loss = 0.0;
-  for (size_t c = 0; c < x.size(); ++c) {
-    double l1 = 0.0;
-    for (size_t i = 0; i < x[c].size(); ++i) {
-      l1 += (weight.empty() ? 1.0 : weight[i]) * std::abs(x[c][i] - y[c][i]);
-    }
-    loss += weights.l1 * l1 / pixels;
-    loss += weights.ssim * DissimilaritySum(x[c], y[c], weight, width, height) / pixels;
-    loss += weights.edge * EdgeMean(x[c], y[c], weight, width, height);
-  }
-  return loss / static_cast<double>(x.size());
+  return worst;
 }
 
 }  // namespace color3d

@@ -1,8 +1,10 @@
 // The rasterizer's slow, readable twin in float64: every pixel visits every Gaussian in depth
 // order. Formulas as in the publications (conic by matrix inverse, libm exponentials), not as in
-// the fast kernels; the tests compare the two. Also a plain form of the training loss.
+// the fast kernels; gradients by automatic differentiation of the projection and the plain adjoint
+// of the blending sum. The tests compare the two. Also a plain form of the training loss.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "core/splat/loss.h"
@@ -34,6 +36,38 @@ ReferenceImage ReferenceRender(const ReferenceParameters& parameters,
                                const ColorSpec& color,
                                const RasterCamera& camera,
                                const std::vector<double>& background);
+
+struct ReferencePixel {
+  int x = 0, y = 0;
+  std::array<double, 3> color{};
+  double opacity = 0.0;
+  double depth = 0.0;
+  // A Gaussian's alpha lies within the margin of 1/255 or 0.99, or the transmittance of 1e-4:
+  // rounding may decide there, so that two right answers differ.
+  bool near_threshold = false;
+};
+
+// Fills the pixels at the given (x, y). `margin` is relative (of the natural logarithm).
+void ReferenceRenderAt(const ReferenceParameters& parameters,
+                       const ColorSpec& color,
+                       const RasterCamera& camera,
+                       const std::vector<double>& background,
+                       double margin,
+                       std::vector<ReferencePixel>& pixels);
+
+// Gradient by all parameters of the sum over pixels k and channels c of d_color[k][c] * colour;
+// only x and y of the pixels are read.
+ReferenceParameters ReferenceGradient(const ReferenceParameters& parameters,
+                                      const ColorSpec& color,
+                                      const RasterCamera& camera,
+                                      const std::vector<double>& background,
+                                      const std::vector<ReferencePixel>& pixels,
+                                      const std::vector<std::array<double, 3>>& d_color);
+
+// Largest ratio of the eigenvalues of a 2D covariance (dilation included) among the Gaussians in
+// front of the near plane; 1 when there is none.
+double ReferenceCovarianceCondition(const ReferenceParameters& parameters,
+                                    const RasterCamera& camera);
 
 // Value of the training loss for planes x, y [channel][y * width + x] (see ImageLoss); `weight` may
 // be empty.

@@ -8,6 +8,7 @@ namespace color3d {
 void AddPipelineCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
+void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);
 

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   color3d::AddPipelineCommand(app);
   color3d::AddReconstructCommand(app);
   color3d::AddPosesCommand(app);
+  color3d::AddStabilityCommand(app);
   color3d::AddColorizerCommand(app);
   color3d::AddPlotCommand(app);
   try {

@@ -1,0 +1,70 @@
+// The stiff and extreme cases of the splat engine (METHOD.md "Stability"), each run through the
+// real kernels and compared with float64. Used by stability_test and by color3d-bench stability.
+//
+// Errors are relative, per buffer: max |fast - reference| / max |reference|. Buffers of values are
+// the colour channels, opacity and depth; buffers of gradients are the rows of parameters, where
+//  - rotation gradients are multiplied by the quaternion's norm (they scale with its inverse),
+//  - the denominator is at least 1e-3 of the largest gradient in the row's group, because a row may
+//    vanish by symmetry (turning a sphere changes nothing); rotation and log scale are one group.
+// Pixels where rounding decides on which side of a threshold a number falls (alpha 1/255 and 0.99,
+// transmittance 1e-4) have two right answers: they are left out of both sides, values and
+// gradients, and counted.
+//
+// A bound is what the case is held to. Where the condition number leaves float32 no chance it is
+// about eps * condition, and says so by being large.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/base/parallel.h"
+
+namespace color3d {
+
+inline constexpr double kNotCompared = std::numeric_limits<double>::quiet_NaN();
+inline constexpr double kFloatEpsilon = std::numeric_limits<float>::epsilon();
+
+struct StabilityResult {
+  double condition = 1.0;
+  std::string condition_of;  // what the condition number belongs to
+  double value_error = kNotCompared;
+  double value_bound = 0.0;
+  double gradient_error = kNotCompared;
+  double gradient_bound = 0.0;
+  int64_t non_finite = 0;
+  int64_t compared = 0;  // pixels or numbers
+  int64_t left_out = 0;  // near a threshold
+  int64_t restores = 0;  // of the last good state, as the curves report them
+  bool held = true;      // what else the case demands
+  std::string outcome;   // in words, for cases that are more than a comparison
+  double seconds = 0.0;
+
+  bool Passed() const;
+};
+
+struct StabilityCase {
+  std::string group;  // raster, loss, adam, geometry, chroma
+  std::string name;   // unique in the group
+  bool slow = false;  // for the benchmark only
+  std::function<StabilityResult(ThreadPool&)> run;
+};
+
+// In the table's order.
+std::vector<StabilityCase> StabilityCases();
+
+// Runs with the clock; an exception that the case did not expect becomes a failed result.
+StabilityResult RunStabilityCase(const StabilityCase& stability_case, ThreadPool& pool);
+
+int64_t CountNonFinite(const float* values, size_t count);
+
+// The groups, for StabilityCases.
+void AddRasterCases(std::vector<StabilityCase>& cases);
+void AddLossCases(std::vector<StabilityCase>& cases);
+void AddAdamCases(std::vector<StabilityCase>& cases);
+void AddGeometryCases(std::vector<StabilityCase>& cases);
+void AddChromaCases(std::vector<StabilityCase>& cases);
+
+}  // namespace color3d
