@@ -1,6 +1,7 @@
 #include "core/splat/training_targets.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "core/base/error.h"
@@ -20,6 +21,22 @@ PlaneBuffer PlanesFromImage(const Image& image, float offset, float scale) {
   return planes;
 }
 
+namespace {
+
+// Throws Error{kInvalidArgument} naming the first value that is not finite.
+void CheckFinite(const Image& image, int view) {
+  for (size_t i = 0; i < image.data.size(); ++i) {
+    if (std::isfinite(image.data[i])) continue;
+    const size_t pixel = i % (static_cast<size_t>(image.width) * image.height);
+    throw InvalidArgument("view " + std::to_string(view) + ": the pixel at " +
+                          std::to_string(pixel % image.width) + ", " +
+                          std::to_string(pixel / image.width) +
+                          " is not a finite number; mend or leave out the photo");
+  }
+}
+
+}  // namespace
+
 int SizeAtLevel(int size_px, int level) {
   return std::max(1, (size_px + (1 << level) / 2) >> level);
 }
@@ -36,6 +53,7 @@ std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view,
         ", its camera " + std::to_string(view.camera.width) + "x" +
         std::to_string(view.camera.height) + " px of " + std::to_string(channels_) + " channels");
   }
+  CheckFinite(*image, view.view);
   auto planes = std::make_shared<const PlaneBuffer>(PlanesFromImage(
       level == 0
           ? *image
