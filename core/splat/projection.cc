@@ -17,6 +17,8 @@
 namespace color3d {
 namespace {
 
+constexpr int64_t kPrefetchBlocks = 2;  // ahead
+
 struct ForwardContext {
   const ParameterBlock& p;
   const ColorSpec& color;
@@ -203,18 +205,27 @@ ShapeGradient ShapeBackward(const RasterCamera& c, const Projected& g, const F32
 
 // Adds up the pairs of sixteen Gaussians into planar sums. False when none is visible.
 bool GatherSums(const BackwardContext& ctx, int64_t i, int lanes, F32* sums) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::FixedTag<float, 4> d;
   const int row_floats = ctx.splats.row_floats;
   const int used = kGradientColor + ctx.color.channels;
-  const uint32_t begin = ctx.first_pair[i];
-  if (ctx.first_pair[i + lanes] == begin) return false;
+  if (ctx.first_pair[i + lanes] == ctx.first_pair[i]) return false;
   alignas(64) float planar[12][simd::kLanes] = {};
   for (int lane = 0; lane < lanes; ++lane) {
-    float sum[12] = {};
-    const uint32_t end = ctx.first_pair[i + lane + 1];
-    for (uint32_t pair = ctx.first_pair[i + lane]; pair < end; ++pair) {
-      const float* row = ctx.pair_gradient + static_cast<size_t>(pair) * row_floats;
-      for (int k = 0; k < used; ++k) sum[k] += row[k];
+    auto sum0 = hn::Zero(d), sum1 = sum0, sum2 = sum0;
+    const float* row =
+        ctx.pair_gradient + static_cast<size_t>(ctx.first_pair[i + lane]) * row_floats;
+    const float* end =
+        ctx.pair_gradient + static_cast<size_t>(ctx.first_pair[i + lane + 1]) * row_floats;
+    for (; row != end; row += row_floats) {
+      sum0 = hn::Add(sum0, hn::Load(d, row));
+      sum1 = hn::Add(sum1, hn::Load(d, row + 4));
+      if (row_floats > 8) sum2 = hn::Add(sum2, hn::Load(d, row + 8));
     }
+    alignas(16) float sum[12];
+    hn::Store(sum0, d, sum);
+    hn::Store(sum1, d, sum + 4);
+    hn::Store(sum2, d, sum + 8);
     for (int k = 0; k < used; ++k) planar[k][lane] = sum[k];
   }
   for (int k = 0; k < used; ++k) sums[k] = simd::Load(planar[k]);
@@ -268,6 +279,12 @@ void UpdateStatistics(const BackwardContext& ctx, int64_t i, const Projected& g,
   }
 }
 
+// There are more rows than the processor's prefetchers can follow.
+void PrefetchRows(const ParameterBlock& p, int64_t i) {
+  i = std::min(i, p.stride() - simd::kLanes);
+  for (int r = 0; r < p.rows(); ++r) __builtin_prefetch(p.Row(r) + i);
+}
+
 void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
   const int lanes = static_cast<int>(std::min<int64_t>(ctx.p.count() - i, simd::kLanes));
   F32 sums[12];
@@ -303,11 +320,18 @@ void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
 }
 
 void ProjectRange(const ForwardContext& ctx, int64_t begin, int64_t end) {
-  for (int64_t block = begin; block < end; ++block) ProjectSixteen(ctx, block * simd::kLanes);
+  for (int64_t block = begin; block < end; ++block) {
+    PrefetchRows(ctx.p, (block + kPrefetchBlocks) * simd::kLanes);
+    ProjectSixteen(ctx, block * simd::kLanes);
+  }
 }
 
 void BackwardRange(const BackwardContext& ctx, int64_t begin, int64_t end) {
-  for (int64_t block = begin; block < end; ++block) BackwardSixteen(ctx, block * simd::kLanes);
+  for (int64_t block = begin; block < end; ++block) {
+    PrefetchRows(ctx.p, (block + kPrefetchBlocks) * simd::kLanes);
+    PrefetchRows(ctx.gradient, (block + kPrefetchBlocks) * simd::kLanes);
+    BackwardSixteen(ctx, block * simd::kLanes);
+  }
 }
 
 }  // namespace
