@@ -28,6 +28,8 @@ struct ForwardContext {
 };
 
 struct BackwardContext {
+  int row_floats;  // of a pair's gradient
+  int columns;     // of them used
   const ParameterBlock& p;
   const ColorSpec& color;
   const RasterCamera& camera;
@@ -207,8 +209,7 @@ ShapeGradient ShapeBackward(const RasterCamera& c, const Projected& g, const F32
 bool GatherSums(const BackwardContext& ctx, int64_t i, int lanes, F32* sums) {
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::FixedTag<float, 4> d;
-  const int row_floats = ctx.splats.row_floats;
-  const int used = kGradientColor + ctx.color.channels;
+  const int row_floats = ctx.row_floats, used = ctx.columns;
   if (ctx.first_pair[i + lanes] == ctx.first_pair[i]) return false;
   alignas(64) float planar[12][simd::kLanes] = {};
   for (int lane = 0; lane < lanes; ++lane) {
@@ -262,8 +263,12 @@ void ColorBackward(const BackwardContext& ctx, int64_t i, const F32* sums, F32* 
 
 void UpdateStatistics(const BackwardContext& ctx, int64_t i, const Projected& g, const F32* sums) {
   DensifyStatistics& s = *ctx.statistics;
-  const F32 du = g.inv_var_x * sums[kSumWE];
-  const F32 dv = g.inv_var_y * sums[kSumWDy] - g.slope * du;
+  F32 du = g.inv_var_x * sums[kSumWE];
+  F32 dv = g.inv_var_y * sums[kSumWDy] - g.slope * du;
+  if (s.absolute) {
+    du = sums[AbsoluteColumn(ctx.color.channels)] * (1.0f / kHalfLog2E);
+    dv = sums[AbsoluteColumn(ctx.color.channels) + 1] * (1.0f / kHalfLog2E);
+  }
   const F32 nx = du * (0.5f * static_cast<float>(ctx.camera.width));
   const F32 ny = dv * (0.5f * static_cast<float>(ctx.camera.height));
   alignas(64) float norm[simd::kLanes], radius[simd::kLanes];
@@ -381,7 +386,10 @@ void ProjectSplatsBackward(const ParameterBlock& parameters,
   if (gradient.rows() != parameters.rows() || gradient.count() != parameters.count()) {
     gradient = ParameterBlock(parameters.rows(), parameters.count());
   }
-  const BackwardContext ctx{parameters,
+  const bool absolute = statistics != nullptr && statistics->absolute;
+  const BackwardContext ctx{GradientRowFloats(color.channels, absolute),
+                            kGradientColor + color.channels + (absolute ? 2 : 0),
+                            parameters,
                             color,
                             camera,
                             splats,
