@@ -273,10 +273,6 @@ HWY_INLINE void BackwardEntry(const Chunk& chunk,
                               BackwardPixels<kChannels>& pixels,
                               float* out) {
   constexpr int kColumns = kGradientColor + kChannels + (kAbsolute ? 2 : 0);
-  if (work.begin[j] == work.begin[j + 1]) {
-    std::fill_n(out, GradientRowFloats(kChannels, kAbsolute), 0.0f);
-    return;
-  }
   F32 absolute_u = simd::Zero(), absolute_v = simd::Zero();
   F32 w0 = simd::Zero(), we1 = w0, wy1 = w0, wee = w0, wey = w0, wyy = w0, wc[kChannels];
   for (int c = 0; c < kChannels; ++c) wc[c] = simd::Zero();
