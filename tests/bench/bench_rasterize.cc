@@ -86,19 +86,33 @@ Json Measure(const SyntheticLoad& load, int threads, int repeats) {
   return result;
 }
 
-// Slope of log(ms) over log(covered pixels): 1 is linear.
-double FittedExponent(const std::vector<Json>& results) {
-  double n = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
+// ms ~ Gaussians^p * covered^q, where covered is the pixels that one Gaussian covers on average: p
+// and q by least squares of the logarithms. Linear in the product: both 1 or less.
+struct Exponents {
+  double gaussians = 0.0;
+  double covered = 0.0;
+};
+Exponents FitExponents(const std::vector<Json>& results) {
+  std::vector<std::array<double, 3>> logs;
+  std::array<double, 3> mean{};
   for (const Json& r : results) {
-    const double x = std::log(r["covered_pixels"].get<double>());
-    const double y = std::log(r["iteration_ms"].get<double>());
-    n += 1.0;
-    sx += x;
-    sy += y;
-    sxx += x * x;
-    sxy += x * y;
+    const double gaussians = r["gaussians"].get<double>();
+    logs.push_back({std::log(gaussians),
+                    std::log(r["covered_pixels"].get<double>() / gaussians),
+                    std::log(r["iteration_ms"].get<double>())});
+    for (int k = 0; k < 3; ++k) mean[k] += logs.back()[k] / static_cast<double>(results.size());
   }
-  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+  double aa = 0.0, ab = 0.0, bb = 0.0, at = 0.0, bt = 0.0;
+  for (const auto& log : logs) {
+    const double a = log[0] - mean[0], b = log[1] - mean[1], t = log[2] - mean[2];
+    aa += a * a;
+    ab += a * b;
+    bb += b * b;
+    at += a * t;
+    bt += b * t;
+  }
+  const double det = aa * bb - ab * ab;
+  return {(at * bb - bt * ab) / det, (bt * aa - at * ab) / det};
 }
 
 // Bytes that training holds per Gaussian, and per (Gaussian, tile) pair of the picture in work.
@@ -158,10 +172,11 @@ void PrintTable(const Json& report) {
     std::printf("\n");
   }
   for (const Json& e : report["exponents"]) {
-    std::printf("%d channels, %d threads: iteration ~ covered pixels^%.2f\n",
+    std::printf("%d channels, %d threads: ms ~ Gaussians^%.2f * (pixels covered by one)^%.2f\n",
                 e["channels"].get<int>(),
                 e["threads"].get<int>(),
-                e["exponent"].get<double>());
+                e["gaussians"].get<double>(),
+                e["covered_pixels_of_one"].get<double>());
   }
   for (const Json& m : report["bytes_per_gaussian"]) {
     std::printf("%d channels: %d bytes per Gaussian and %d per (Gaussian, tile) pair\n",
@@ -202,8 +217,11 @@ void RunRasterize(const RasterizeArguments& args) {
     report["bytes_per_gaussian"].push_back(MemoryPerGaussian(channels));
   }
   for (const auto& [key, results] : groups) {
-    report["exponents"].push_back(
-        {{"channels", key.first}, {"threads", key.second}, {"exponent", FittedExponent(results)}});
+    const Exponents e = FitExponents(results);
+    report["exponents"].push_back({{"channels", key.first},
+                                   {"threads", key.second},
+                                   {"gaussians", e.gaussians},
+                                   {"covered_pixels_of_one", e.covered}});
   }
   const std::string text = report.dump(1) + "\n";
   if (args.json_file.empty()) {
