@@ -30,7 +30,8 @@ void SplatPipeline::Backward(const ParameterBlock& parameters,
                              ParameterBlock& gradient,
                              DensifyStatistics* statistics) {
   Enter(Phase::kBackward);
-  RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, pool, pair_gradient_);
+  const bool absolute = statistics != nullptr && statistics->absolute;
+  RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, absolute, pool, pair_gradient_);
   Enter(Phase::kProjectionBackward);
   ProjectSplatsBackward(parameters,
                         color,
