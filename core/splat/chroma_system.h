@@ -1,0 +1,111 @@
+// The linear system of chroma on fixed geometry. A picture's chroma, measured from neutral, is
+// W c: blending weights times spherical harmonics (the background is neutral, so it drops out).
+// Weighted least squares asks for W^T D W c = W^T D t with the target t and pixel weights D. The
+// products are matrix-free over the views; blending weights are kept (chroma_weights.h) as far as a
+// byte budget reaches and made again from the splats for the other views.
+// Internal to the splat module. Not thread-safe; uses the pool's threads. Deterministic for a
+// thread count.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/parallel.h"
+#include "core/splat/binning.h"
+#include "core/splat/chroma_weights.h"
+#include "core/splat/parameter_block.h"
+#include "core/splat/projection.h"
+
+namespace color3d {
+
+// Coefficient k of channel c (0: a', 1: b') of Gaussian i at [(i * coefficients + k) * 2 + c].
+using ChromaVector = std::vector<double>;
+
+// Cells of the equations: single pixels, or means over 4x4 pixels (1/16 of the cost).
+enum class ChromaLevel { kCoarse = 0, kFine = 1 };
+
+// D = weight / max(|residual| / scale, floor) for least absolute residuals by reweighting (Holland
+// & Welsch 1977), or the plain weight.
+struct RobustWeights {
+  bool on = true;
+  double scale = 1.0;   // of residuals, a' units
+  double floor = 0.05;  // of |residual| / scale, > 0
+};
+
+class ChromaSystem {
+ public:
+  // `parameters` holds the geometry and has the rows of `color` (two channels of 1 or 4
+  // coefficients); both must outlive this object.
+  ChromaSystem(const ParameterBlock& parameters,
+               const ColorSpec& color,
+               int64_t budget_bytes,
+               ThreadPool& pool);
+  ~ChromaSystem();
+
+  // `ab`: 2 channels, target chroma from neutral; `weight`: 1 channel, 0..1. With `keep` false only
+  // the sums below are taken.
+  void AddView(const RasterCamera& camera,
+               const PlaneBuffer& ab,
+               const PlaneBuffer& weight,
+               bool keep);
+
+  int64_t count() const { return parameters_.count(); }
+  int coefficients() const { return coefficients_; }
+  int64_t kept_bytes() const { return kept_bytes_; }
+  int views() const { return static_cast<int>(views_.size()); }
+  int kept_views(ChromaLevel level) const;
+  // Over all views and pixels: sum of weight w, [i], and of weight w t, [2 i + c].
+  const std::vector<double>& seen_weight() const { return seen_weight_; }
+  const std::vector<double>& target_sum() const { return target_sum_; }
+
+  struct Residuals {
+    double mean_l1 = 0.0;    // weighted mean of |t - W x| over cells and channels, a' units
+    ChromaVector gradient;   // W^T D (t - W x)
+    ChromaVector right;      // W^T D t
+    // Diagonal blocks of W^T D W, [((i * 2 + c) * K + k) * K + l].
+    std::vector<double> blocks;
+  };
+  // Sets D from the residuals at x.
+  void Reweight(ChromaLevel level,
+                const ChromaVector& x,
+                const RobustWeights& robust,
+                const CancellationToken& cancel,
+                Residuals& out);
+  // y = W^T D W x.
+  void Multiply(ChromaLevel level,
+                const ChromaVector& x,
+                const CancellationToken& cancel,
+                ChromaVector& y);
+
+ private:
+  struct View;
+  using TileVisitor = void (ChromaSystem::*)(View&, int, int, const TileWeights&, int);
+  template <class Visitor>
+  void ForTiles(View& view, ChromaLevel level, const Visitor& visit);
+  void BinView(const RasterCamera& camera);
+  void Basis(const RasterCamera& camera, int64_t i, float* basis) const;
+  void SetValues(const RasterCamera& camera, const ChromaVector& x);
+  void AddSums(const RasterCamera& camera, std::vector<AlignedFloats>& sums, ChromaVector& y);
+  void AddBlocks(const RasterCamera& camera, std::vector<double>& blocks);
+  void ResetSums(std::vector<AlignedFloats>& sums) const;
+
+  const ParameterBlock& parameters_;
+  ColorSpec color_;
+  int coefficients_;
+  int64_t budget_bytes_;
+  int64_t kept_bytes_ = 0;
+  ThreadPool& pool_;
+  std::vector<std::unique_ptr<View>> views_;
+  std::vector<double> seen_weight_, target_sum_;
+  // Work space.
+  SplatBuffer splats_;
+  TileBinner binner_;
+  TileLists lists_;
+  AlignedFloats value_;                         // two per Gaussian, of the view at hand
+  std::vector<AlignedFloats> sums_, squares_, right_;  // per thread, two per Gaussian
+};
+
+}  // namespace color3d
