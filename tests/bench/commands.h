@@ -8,5 +8,6 @@ namespace color3d {
 void AddPipelineCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
+void AddChromaCommand(CLI::App& app);
 
 }  // namespace color3d

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   color3d::AddPipelineCommand(app);
   color3d::AddReconstructCommand(app);
   color3d::AddColorizerCommand(app);
+  color3d::AddChromaCommand(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
