@@ -89,7 +89,8 @@ class ChromaTrainer {
   std::vector<float> LearningRates() const {
     std::vector<float> rates(state_.parameters.rows(), 0.0f);
     const double rate = kDcRate * std::pow(kLastRate, Done()) * state_.rate_scale;
-    for (const ColorChannel& channel : {parameters_.color.channel[0], parameters_.color.channel[1]}) {
+    for (const ColorChannel& channel :
+         {parameters_.color.channel[0], parameters_.color.channel[1]}) {
       for (int k = 0; k < channel.coefficients; ++k) {
         rates[channel.row + k] = static_cast<float>(k == 0 ? rate : rate / kRestDivisor);
       }
@@ -115,13 +116,8 @@ class ChromaTrainer {
     const LossValue loss =
         loss_.Evaluate(pipeline_.color(), target.ab, &target.weight, weights, pool, d_color_);
     if (!std::isfinite(loss.total)) return false;
-    pipeline_.Backward(state_.parameters,
-                       color,
-                       camera,
-                       d_color_,
-                       GradientScope::kColorOnly,
-                       pool,
-                       gradient_);
+    pipeline_.Backward(
+        state_.parameters, color, camera, d_color_, GradientScope::kColorOnly, pool, gradient_);
     if (!AdamStep(gradient_,
                   LearningRates(),
                   state_.iteration + 1,

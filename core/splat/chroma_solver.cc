@@ -30,6 +30,22 @@ class ChromaSolver {
 
   void Solve() {
     Resume();
+    std::fprintf(stderr,
+                 "DBG kept %lld bytes, %s\n",
+                 (long long)system_.kept_bytes(),
+                 system_.Debug().c_str());
+    const char* e = getenv("SWEEP"); 
+    const double relax0 = e ? atof(e) : 1.0; const double decay = getenv("DECAY") ? atof(getenv("DECAY")) : 0.7;
+    double relax = relax0;
+    for (int s = 0; s < run_.options.sweeps; ++s) {
+      RobustWeights robust;
+      robust.scale = 4.0 / 255.0; if (getenv("SCALE")) robust.scale = atof(getenv("SCALE")) / 255.0;
+      robust.floor = kFloorLab / 255.0 / robust.scale; if (getenv("FLOOR")) robust.floor=atof(getenv("FLOOR"));
+      system_.Sweep(x_, robust, relax, 1.0 / run_.options.tikhonov_rest, seen_, run_.cancel);
+      relax *= decay;
+      ToParameters();
+      run_.Snapshot(s + 1, parameters_);
+    }
     if (position_.level == ChromaLevel::kCoarse) SolveLevel(run_.options.coarse_rounds);
     if (position_.level == ChromaLevel::kFine) SolveLevel(run_.options.rounds);
   }
@@ -39,17 +55,15 @@ class ChromaSolver {
     ChromaLevel level = ChromaLevel::kCoarse;
     int round = 0;
     int64_t iteration = 0;
-    double scale = 0.0;     // of residuals, 0: not known yet
-    double last_l1 = 0.0;   // of this level's round before
+    double scale = 0.0;    // of residuals, 0: not known yet
+    double last_l1 = 0.0;  // of this level's round before
     double earlier_seconds = 0.0;
   };
   using Pair = std::array<double, 2>;  // of a', b'
 
   double Seconds() const { return position_.earlier_seconds + run_.clock.Seconds(); }
   bool OutOfTime() const { return run_.OutOfTime(Seconds()); }
-  bool Ended() const {
-    return position_.iteration >= run_.options.iterations || OutOfTime();
-  }
+  bool Ended() const { return position_.iteration >= run_.options.iterations || OutOfTime(); }
 
   ChromaVector FromParameters() const {
     const int n = parameters_.coefficients();

@@ -1,6 +1,6 @@
 // Conjugate gradients on the normal equations of chroma (chroma_system.h), with reweighting for
-// least absolute residuals and a pull to the first chroma, which keeps Gaussians that few pixels see
-// well-posed. Internal to the splat module.
+// least absolute residuals and a pull to the first chroma, which keeps Gaussians that few pixels
+// see well-posed. Internal to the splat module.
 #pragma once
 
 #include <vector>

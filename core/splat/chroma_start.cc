@@ -23,7 +23,8 @@ std::vector<char> SetClosedForm(const ChromaSystem& system,
   std::vector<char> seen(system.count(), 0);
   for (int64_t i = 0; i < system.count(); ++i) {
     const double weight = system.seen_weight()[i];
-    const double a = system.target_sum()[2 * i] / weight, b = system.target_sum()[2 * i + 1] / weight;
+    const double a = system.target_sum()[2 * i] / weight,
+                 b = system.target_sum()[2 * i + 1] / weight;
     if (!(weight >= kMinSeenWeight) || !std::isfinite(a) || !std::isfinite(b)) continue;
     seen[i] = 1;
     parameters.Row(0, 0)[i] = static_cast<float>(a / kShDc);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/splat/spherical_harmonics.h"
 
@@ -85,6 +86,18 @@ ChromaSystem::ChromaSystem(const ParameterBlock& parameters,
 }
 
 ChromaSystem::~ChromaSystem() = default;
+std::string ChromaSystem::Debug() const {
+  size_t e[2] = {}, it[2] = {};
+  for (auto& v : views_)
+    for (int l = 0; l < 2; ++l)
+      for (auto& w : v->level[l].weights) {
+        e[l] += w.gaussian.size();
+        it[l] += w.items.size();
+      }
+  return std::to_string(views_.size()) + " views, coarse entries " +
+         std::to_string(e[0] / views_.size()) + " fine " + std::to_string(e[1] / views_.size()) +
+         " items " + std::to_string(it[1] / views_.size());
+}
 
 int ChromaSystem::kept_views(ChromaLevel level) const {
   int kept = 0;
@@ -154,12 +167,7 @@ void ChromaSystem::AddView(const RasterCamera& camera,
     cells.kept = kept_bytes_ + bytes <= budget_bytes_;
     if (cells.kept) {
       kept_bytes_ += bytes;
-      for (TileWeights& w : cells.weights) {
-        w.weight.shrink_to_fit();
-        w.block.shrink_to_fit();
-        w.gaussian.shrink_to_fit();
-        w.first_item.shrink_to_fit();
-      }
+      for (TileWeights& w : cells.weights) w.ShrinkToFit();
     } else {
       cells.weights = {};
     }
@@ -320,6 +328,80 @@ void ChromaSystem::Reweight(ChromaLevel level,
     area += total[t];
   }
   out.mean_l1 = area > 0.0 ? sum / area : 0.0;
+}
+
+void ChromaSystem::Sweep(ChromaVector& x,
+                         const RobustWeights& robust,
+                         double relaxation,
+                         double rest_weight,
+                         const std::vector<char>& seen,
+                         const CancellationToken& cancel) {
+  ResetSums(sums_);
+  ResetSums(right_);
+  const float inverse_scale = static_cast<float>(1.0 / robust.scale);
+  const float floor = static_cast<float>(robust.floor);
+  // The views one after another would drag the colours along the camera's path: a stride that is
+  // coprime to their number visits all of them in mixed order.
+  const size_t n = views_.size();
+  size_t stride = std::max<size_t>(1, static_cast<size_t>(0.618 * static_cast<double>(n)));
+  while (std::gcd(stride, n) != 1) ++stride;
+  for (size_t k = 0; k < n; ++k) {
+    cancel.ThrowIfCancelled();
+    View& view = *views_[k * stride % n];
+    SetValues(view.camera, x);
+    View::Cells& c = view.At(ChromaLevel::kFine);
+    ForTiles(view, ChromaLevel::kFine, [&](int tile, int thread, const TileWeights& weights) {
+      alignas(64) float picture[2 * kTilePixels], d[2 * kTilePixels];
+      TileForward(weights, kFineBlocks, value_.data(), picture);
+      const float* mask = c.mask.data() + static_cast<size_t>(tile) * kTilePixels;
+      const float* target = c.target.data() + static_cast<size_t>(tile) * 2 * kTilePixels;
+      for (int i = 0; i < 2 * kTilePixels; ++i) {
+        const float m = mask[i / (2 * kBlockCells) * kBlockCells + i % kBlockCells];
+        const float r = target[i] - picture[i];
+        d[i] = robust.on ? m / std::max(std::abs(r) * inverse_scale, floor) : m;
+        picture[i] = d[i] * r;
+      }
+      TileAdjoint(weights, picture, sums_[thread].data());
+      TileAdjoint(weights, d, right_[thread].data());
+    });
+    Step(view.camera, relaxation, rest_weight, seen, x);
+  }
+}
+
+// x += relaxation * sums / B, and the sums are zero again.
+void ChromaSystem::Step(const RasterCamera& camera,
+                        double relaxation,
+                        double rest_weight,
+                        const std::vector<char>& seen,
+                        ChromaVector& x) {
+  const int n = coefficients_;
+  const double per_view = 1.0 / static_cast<double>(views_.size());
+  pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
+    float basis[kMaxShCoefficients];
+    EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
+    for (int64_t i = begin; i < end; ++i) {
+      double sum[2] = {0.0, 0.0}, row[2] = {0.0, 0.0};
+      for (size_t t = 0; t < sums_.size(); ++t) {
+        for (int c = 0; c < 2; ++c) {
+          sum[c] += sums_[t][2 * i + c];
+          row[c] += right_[t][2 * i + c];
+          sums_[t][2 * i + c] = right_[t][2 * i + c] = 0.0f;
+        }
+      }
+      if (seen[i] == 0 || (row[0] == 0.0 && row[1] == 0.0)) continue;
+      if (n > 1) Basis(camera, i, basis);
+      double norm = basis[0] * basis[0];
+      for (int k = 1; k < n; ++k) norm += rest_weight * basis[k] * basis[k];
+      for (int c = 0; c < 2; ++c) {
+        const double b = norm * std::max(row[c], per_view * seen_weight_[i]);
+        if (!(b > 0.0)) continue;
+        for (int k = 0; k < n; ++k) {
+          x[(i * n + k) * 2 + c] +=
+              relaxation * (k == 0 ? 1.0 : rest_weight) * basis[k] * sum[c] / b;
+        }
+      }
+    }
+  });
 }
 
 void ChromaSystem::Multiply(ChromaLevel level,

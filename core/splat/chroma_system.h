@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "core/base/cancellation.h"
@@ -54,6 +55,7 @@ class ChromaSystem {
 
   int64_t count() const { return parameters_.count(); }
   int coefficients() const { return coefficients_; }
+  std::string Debug() const;
   int64_t kept_bytes() const { return kept_bytes_; }
   int views() const { return static_cast<int>(views_.size()); }
   int kept_views(ChromaLevel level) const;
@@ -62,9 +64,9 @@ class ChromaSystem {
   const std::vector<double>& target_sum() const { return target_sum_; }
 
   struct Residuals {
-    double mean_l1 = 0.0;    // weighted mean of |t - W x| over cells and channels, a' units
-    ChromaVector gradient;   // W^T D (t - W x)
-    ChromaVector right;      // W^T D t
+    double mean_l1 = 0.0;   // weighted mean of |t - W x| over cells and channels, a' units
+    ChromaVector gradient;  // W^T D (t - W x)
+    ChromaVector right;     // W^T D t
     // Diagonal blocks of W^T D W, [((i * 2 + c) * K + k) * K + l].
     std::vector<double> blocks;
   };
@@ -74,6 +76,16 @@ class ChromaSystem {
                 const RobustWeights& robust,
                 const CancellationToken& cancel,
                 Residuals& out);
+  // One ordered-subsets sweep on pixels, D and the step from each view alone (Andersen & Kak 1984;
+  // Hudson & Larkin 1994): x += relaxation * B^-1 W_v^T D (t - W_v x) with B the larger of the row
+  // sums of W_v^T D W_v and their mean over the views. Quick at first, never exact. `rest_weight`:
+  // share of coefficients above degree 0.
+  void Sweep(ChromaVector& x,
+             const RobustWeights& robust,
+             double relaxation,
+             double rest_weight,
+             const std::vector<char>& seen,
+             const CancellationToken& cancel);
   // y = W^T D W x.
   void Multiply(ChromaLevel level,
                 const ChromaVector& x,
@@ -90,6 +102,11 @@ class ChromaSystem {
   void SetValues(const RasterCamera& camera, const ChromaVector& x);
   void AddSums(const RasterCamera& camera, std::vector<AlignedFloats>& sums, ChromaVector& y);
   void AddBlocks(const RasterCamera& camera, std::vector<double>& blocks);
+  void Step(const RasterCamera& camera,
+            double relaxation,
+            double rest_weight,
+            const std::vector<char>& seen,
+            ChromaVector& x);
   void ResetSums(std::vector<AlignedFloats>& sums) const;
 
   const ParameterBlock& parameters_;
@@ -104,7 +121,7 @@ class ChromaSystem {
   SplatBuffer splats_;
   TileBinner binner_;
   TileLists lists_;
-  AlignedFloats value_;                         // two per Gaussian, of the view at hand
+  AlignedFloats value_;                                // two per Gaussian, of the view at hand
   std::vector<AlignedFloats> sums_, squares_, right_;  // per thread, two per Gaussian
 };
 

@@ -23,11 +23,10 @@ void CheckSizes(const ChromaTarget& target, const PosedCamera& view) {
            image.height == view.camera.height;
   };
   if (fits(target.ab, 2) && (target.weight.Empty() || fits(target.weight, 1))) return;
-  throw InvalidArgument("chroma target of view " + std::to_string(view.view) + " is " +
-                        SizeOf(target.ab) + ", its weight " + SizeOf(target.weight) + "; " +
-                        std::to_string(view.camera.width) + "x" +
-                        std::to_string(view.camera.height) +
-                        "x2 and the same size with one channel are needed");
+  throw InvalidArgument(
+      "chroma target of view " + std::to_string(view.view) + " is " + SizeOf(target.ab) +
+      ", its weight " + SizeOf(target.weight) + "; " + std::to_string(view.camera.width) + "x" +
+      std::to_string(view.camera.height) + "x2 and the same size with one channel are needed");
 }
 
 // Comparisons that NaN fails.

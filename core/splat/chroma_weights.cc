@@ -10,12 +10,12 @@ namespace {
 // Sixteen lanes; the compiler splits them where registers are narrower.
 using F32 = float __attribute__((vector_size(64)));
 using I32 = int32_t __attribute__((vector_size(64)));
-using U16 = uint16_t __attribute__((vector_size(32)));
+using U8 = uint8_t __attribute__((vector_size(16)));
 
-constexpr float kUnit = 1.0f / 65535.0f;
-// Blocks whose weights all stay below this (2e-4) are left out: they hold a fifth of the items and
-// a thousandth of the light.
-constexpr uint16_t kMinStored = 13;
+constexpr float kUnit = 1.0f / 65535.0f / 255.0f;
+// Entries whose weights sum to less than this many pixels are left out: a fifth of the entries of
+// real scenes, a thousandth of their light.
+constexpr float kMinStoredPixels = 0.01f;
 constexpr float kLog2MinAlpha = -7.9943534f;
 constexpr float kSlackPx = 0.02f;  // the pixel test itself decides
 
@@ -25,8 +25,8 @@ inline V LoadAs(const T* p) {
   std::memcpy(&v, p, sizeof(v));
   return v;
 }
-inline F32 LoadWeights(const uint16_t* p) {
-  return __builtin_convertvector(__builtin_convertvector(LoadAs<U16>(p), I32), F32);
+inline F32 LoadWeights(const WeightItem& item) {
+  return __builtin_convertvector(__builtin_convertvector(LoadAs<U8>(item.weight), I32), F32);
 }
 inline void Store(float* p, F32 v) { std::memcpy(p, &v, sizeof(v)); }
 
@@ -40,6 +40,18 @@ inline float Sum(F32 v) {
   std::memcpy(q, &a, sizeof(a));
   const Quarter b = q[0] + q[1];
   return (b[0] + b[2]) + (b[1] + b[3]);
+}
+
+inline float Largest(F32 v) {
+  using Half = float __attribute__((vector_size(32)));
+  using Quarter = float __attribute__((vector_size(16)));
+  Half h[2];
+  std::memcpy(h, &v, sizeof(v));
+  const Half a = h[0] > h[1] ? h[0] : h[1];
+  Quarter q[2];
+  std::memcpy(q, &a, sizeof(a));
+  const Quarter b = q[0] > q[1] ? q[0] : q[1];
+  return std::max(std::max(b[0], b[1]), std::max(b[2], b[3]));
 }
 
 // 2^x for x in [-126, 1]: as simd::Exp2.
@@ -63,6 +75,9 @@ inline void BlockRange(float center, float reach, float origin, int* first, int*
   *last = static_cast<int>(std::floor(std::clamp(high, -1.0f, 3.0f)));
 }
 
+// Gaussians of a tile lie anywhere in memory: fetched this many entries ahead.
+constexpr size_t kAhead = 12;
+
 // Ranges of blocks of a splat's bounding box.
 struct Box {
   int x0, x1, y0, y1;
@@ -80,6 +95,19 @@ Box BoundingBlocks(const float* row, float tile_x, float tile_y) {
   return box;
 }
 
+// Nothing when all weights are zero.
+inline void AddItem(F32 w, int block, std::vector<WeightItem>& items) {
+  const float most = Largest(w);
+  if (!(most > 0.0f)) return;
+  WeightItem item;
+  item.scale = static_cast<uint16_t>(std::min(std::ceil(most * 65535.0f), 65535.0f));
+  const F32 rounded = w * (65535.0f * 255.0f / static_cast<float>(item.scale)) + 0.5f;
+  const U8 q = __builtin_convertvector(__builtin_convertvector(rounded, I32), U8);
+  std::memcpy(item.weight, &q, sizeof(q));
+  item.block = static_cast<uint16_t>(block);
+  items.push_back(item);
+}
+
 bool AnyAlive(const F32* t) {
   F32 most = t[0];
   for (int b = 1; b < kFineBlocks; ++b) most = most > t[b] ? most : t[b];
@@ -94,13 +122,18 @@ bool AnyAlive(const F32* t) {
 void TileWeights::Clear() {
   gaussian.clear();
   first_item.assign(1, 0);
-  block.clear();
-  weight.clear();
+  items.clear();
+}
+
+void TileWeights::ShrinkToFit() {
+  gaussian.shrink_to_fit();
+  first_item.shrink_to_fit();
+  items.shrink_to_fit();
 }
 
 int64_t TileWeights::Bytes() const {
-  return static_cast<int64_t>(4 * (gaussian.size() + first_item.size()) + block.size() +
-                              2 * weight.size());
+  return static_cast<int64_t>(sizeof(uint32_t) * (gaussian.size() + first_item.size()) +
+                              sizeof(WeightItem) * items.size());
 }
 
 void BuildTileWeights(const SplatBuffer& splats,
@@ -119,8 +152,7 @@ void BuildTileWeights(const SplatBuffer& splats,
   for (int b = 0; b < kFineBlocks; ++b) {
     const F32 x = lane_x + (x0 + static_cast<float>(b % 4 * 4));
     const F32 y = lane_y + (y0 + static_cast<float>(b / 4 * 4));
-    const I32 inside =
-        (x < static_cast<float>(width_px)) & (y < static_cast<float>(height_px));
+    const I32 inside = (x < static_cast<float>(width_px)) & (y < static_cast<float>(height_px));
     t[b] = inside ? one : zero;
   }
   const uint32_t begin = lists.tile_begin[tile], end = lists.tile_begin[tile + 1];
@@ -130,6 +162,7 @@ void BuildTileWeights(const SplatBuffer& splats,
     const float* row = splats.rows.data() + static_cast<size_t>(gaussian) * splats.row_floats;
     const Box box = BoundingBlocks(row, x0, y0);
     const float inv_x = row[kInvX], slope = row[kSlope], inv_y = row[kInvY];
+    float total = 0.0f;
     for (int b = 4 * box.y0; b <= 4 * box.y1; b += 4) {
       for (int i = b + box.x0; i <= b + box.x1; ++i) {
         const F32 dx = lane_x + ((x0 + static_cast<float>(i % 4 * 4) + 0.5f) - row[kU]);
@@ -140,21 +173,16 @@ void BuildTileWeights(const SplatBuffer& splats,
         const F32 alpha = Exp2(live ? exponent : zero - 20.0f);
         const F32 w = live ? (alpha < kMaxAlpha ? alpha : zero + kMaxAlpha) * t[i] : zero;
         t[i] = t[i] - w;
-        const I32 rounded = __builtin_convertvector(w * 65535.0f + 0.5f, I32);
-        const U16 q = __builtin_convertvector(rounded, U16);
-        const U16 large = q >= kMinStored;
-        uint64_t any[4];
-        std::memcpy(any, &large, sizeof(any));
-        if ((any[0] | any[1] | any[2] | any[3]) == 0) continue;
-        uint16_t values[16];
-        std::memcpy(values, &q, sizeof(values));
-        weights.block.push_back(static_cast<uint8_t>(i));
-        weights.weight.insert(weights.weight.end(), values, values + 16);
+        total += Sum(w);
+        AddItem(w, i, weights.items);
       }
     }
-    if (weights.block.size() == weights.first_item.back()) continue;
+    if (!(total >= kMinStoredPixels)) {
+      weights.items.resize(weights.first_item.back());
+      continue;
+    }
     weights.gaussian.push_back(gaussian);
-    weights.first_item.push_back(static_cast<uint32_t>(weights.block.size()));
+    weights.first_item.push_back(static_cast<uint32_t>(weights.items.size()));
   }
 }
 
@@ -167,65 +195,69 @@ void CoarsenTileWeights(const TileWeights& fine, const float* pixel_weight, Tile
     share[b] = w * (total > 0.0f ? 1.0f / total : 0.0f);
   }
   for (size_t j = 0; j < fine.gaussian.size(); ++j) {
-    uint16_t cells[kBlockCells] = {};
-    bool any = false;
-    for (uint32_t item = fine.first_item[j]; item < fine.first_item[j + 1]; ++item) {
-      const int b = fine.block[item];
-      const F32 w = LoadWeights(fine.weight.data() + kBlockCells * static_cast<size_t>(item));
-      cells[b] = static_cast<uint16_t>(std::min(Sum(w * share[b]) + 0.5f, 65535.0f));
-      any = any || cells[b] != 0;
+    alignas(64) float cells[kBlockCells] = {};
+    for (uint32_t k = fine.first_item[j]; k < fine.first_item[j + 1]; ++k) {
+      const WeightItem& item = fine.items[k];
+      cells[item.block] = Sum(LoadWeights(item) * share[item.block]) * item.scale * kUnit;
     }
-    if (!any) continue;
+    AddItem(LoadAs<F32>(cells), 0, coarse.items);
+    if (coarse.items.size() == coarse.first_item.back()) continue;
     coarse.gaussian.push_back(fine.gaussian[j]);
-    coarse.block.push_back(0);
-    coarse.weight.insert(coarse.weight.end(), cells, cells + kBlockCells);
-    coarse.first_item.push_back(static_cast<uint32_t>(coarse.block.size()));
+    coarse.first_item.push_back(static_cast<uint32_t>(coarse.items.size()));
   }
 }
 
 void TileForward(const TileWeights& weights, int blocks, const float* value, float* picture) {
   std::fill_n(picture, 2 * kBlockCells * blocks, 0.0f);
-  for (size_t j = 0; j < weights.gaussian.size(); ++j) {
-    const float* v = value + 2 * static_cast<size_t>(weights.gaussian[j]);
+  const uint32_t* gaussian = weights.gaussian.data();
+  const size_t count = weights.gaussian.size();
+  const WeightItem* item = weights.items.data();
+  for (size_t j = 0; j < count; ++j) {
+    if (j + kAhead < count)
+      __builtin_prefetch(value + 2 * static_cast<size_t>(gaussian[j + kAhead]));
+    const float* v = value + 2 * static_cast<size_t>(gaussian[j]);
     const float a = v[0] * kUnit, b = v[1] * kUnit;
-    for (uint32_t item = weights.first_item[j]; item < weights.first_item[j + 1]; ++item) {
-      const F32 w = LoadWeights(weights.weight.data() + kBlockCells * static_cast<size_t>(item));
-      float* p = picture + 2 * kBlockCells * weights.block[item];
+    for (const WeightItem* end = weights.items.data() + weights.first_item[j + 1]; item < end;
+         ++item) {
+      const F32 w = LoadWeights(*item) * static_cast<float>(item->scale);
+      float* p = picture + 2 * kBlockCells * item->block;
       Store(p, LoadAs<F32>(p) + w * a);
       Store(p + kBlockCells, LoadAs<F32>(p + kBlockCells) + w * b);
     }
   }
 }
 
-void TileAdjoint(const TileWeights& weights, const float* picture, float* sum) {
-  for (size_t j = 0; j < weights.gaussian.size(); ++j) {
+// sum += V^T picture with V the weights or, squared, their squares.
+template <bool kSquared>
+static void Adjoint(const TileWeights& weights, const float* picture, float* sum) {
+  const uint32_t* gaussian = weights.gaussian.data();
+  const size_t count = weights.gaussian.size();
+  const WeightItem* item = weights.items.data();
+  for (size_t j = 0; j < count; ++j) {
+    if (j + kAhead < count) {
+      __builtin_prefetch(sum + 2 * static_cast<size_t>(gaussian[j + kAhead]), 1);
+    }
     F32 a = {}, b = {};
-    for (uint32_t item = weights.first_item[j]; item < weights.first_item[j + 1]; ++item) {
-      const F32 w = LoadWeights(weights.weight.data() + kBlockCells * static_cast<size_t>(item));
-      const float* p = picture + 2 * kBlockCells * weights.block[item];
+    for (const WeightItem* end = weights.items.data() + weights.first_item[j + 1]; item < end;
+         ++item) {
+      F32 w = LoadWeights(*item) * (static_cast<float>(item->scale) * kUnit);
+      if (kSquared) w = w * w;
+      const float* p = picture + 2 * kBlockCells * item->block;
       a += w * LoadAs<F32>(p);
       b += w * LoadAs<F32>(p + kBlockCells);
     }
-    float* s = sum + 2 * static_cast<size_t>(weights.gaussian[j]);
-    s[0] += kUnit * Sum(a);
-    s[1] += kUnit * Sum(b);
+    float* s = sum + 2 * static_cast<size_t>(gaussian[j]);
+    s[0] += Sum(a);
+    s[1] += Sum(b);
   }
 }
 
+void TileAdjoint(const TileWeights& weights, const float* picture, float* sum) {
+  Adjoint<false>(weights, picture, sum);
+}
+
 void TileSquares(const TileWeights& weights, const float* picture, float* sum) {
-  for (size_t j = 0; j < weights.gaussian.size(); ++j) {
-    F32 a = {}, b = {};
-    for (uint32_t item = weights.first_item[j]; item < weights.first_item[j + 1]; ++item) {
-      const F32 q = LoadWeights(weights.weight.data() + kBlockCells * static_cast<size_t>(item));
-      const F32 w = q * q;
-      const float* p = picture + 2 * kBlockCells * weights.block[item];
-      a += w * LoadAs<F32>(p);
-      b += w * LoadAs<F32>(p + kBlockCells);
-    }
-    float* s = sum + 2 * static_cast<size_t>(weights.gaussian[j]);
-    s[0] += kUnit * kUnit * Sum(a);
-    s[1] += kUnit * kUnit * Sum(b);
-  }
+  Adjoint<true>(weights, picture, sum);
 }
 
 }  // namespace color3d

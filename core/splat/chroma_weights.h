@@ -1,8 +1,9 @@
 // Blending weights of one 16x16 tile kept as numbers, so that the chroma solver multiplies with
 // them again and again without projecting, sorting or exponentials: the rows of W in
-// picture = W c. A weight is a 16-bit fixed-point number (step 1.5e-5). Both products use the same
-// rounded weights, so W^T D W stays symmetric and positive semidefinite. Internal to the splat
-// module; no Eigen here, because the source is compiled for the machine's instruction set.
+// picture = W c. The products are bound by memory, so a weight has 8 bits relative to the largest
+// of its block (errors average out to 1e-3 of a pixel's sum). Both products use the same rounded
+// weights, so W^T D W stays symmetric and positive semidefinite. Internal to the splat module; no
+// Eigen here, because the source is compiled for the machine's instruction set.
 //
 // A tile's picture is [block][channel][16]: blocks of 4x4 cells, row by row in the tile, and two
 // channels. Cells are pixels (16 blocks) or, after CoarsenTileWeights, 4x4 pixels (1 block).
@@ -20,13 +21,20 @@ inline constexpr int kFineBlocks = 16;
 inline constexpr int kBlockCells = 16;
 inline constexpr int kTilePixels = kFineBlocks * kBlockCells;
 
+// One block that an entry touches: weight[lane] * scale / (255 * 65535).
+struct WeightItem {
+  uint8_t weight[kBlockCells];
+  uint16_t scale;
+  uint16_t block;
+};
+
 struct TileWeights {
   std::vector<uint32_t> gaussian;    // of each entry, front to back
-  std::vector<uint32_t> first_item;  // entries + 1; an item is a block that the entry touches
-  std::vector<uint8_t> block;        // of each item
-  std::vector<uint16_t> weight;      // 16 of each item
+  std::vector<uint32_t> first_item;  // entries + 1
+  std::vector<WeightItem> items;
 
   void Clear();
+  void ShrinkToFit();
   int64_t Bytes() const;
 };
 

@@ -93,6 +93,7 @@ void ChromaOptions::Validate() const {
   CheckRange("chroma_sh_degree", chroma_sh_degree, 0, 1);
   CheckRange("ssim_weight", ssim_weight, 0.0, 1.0);
   CheckRange("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
+  CheckRange("sweeps", sweeps, 0, 1000);
   CheckRange("coarse_rounds", coarse_rounds, 0, 1000);
   CheckRange("rounds", rounds, 0, 1000);
   CheckRange("steps_per_round", steps_per_round, 1, 1000);

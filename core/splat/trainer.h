@@ -41,7 +41,8 @@ struct ChromaOptions {
   uint64_t seed = 1;                // of Adam
 
   // Conjugate gradients: rounds of reweighting, first on means over 4x4 pixels, then on pixels.
-  int coarse_rounds = 6;              // at most, 0..1000
+  int sweeps = 4;                     // ordered-subsets sweeps before, 0..1000
+  int coarse_rounds = 0;              // at most, 0..1000
   int rounds = 6;                     // at most, 0..1000
   int steps_per_round = 10;           // at most, 1..1000
   double residual_tolerance = 0.05;   // a round ends when its residual has shrunk to this, 0..1
