@@ -3,39 +3,67 @@
 #include <atomic>
 #include <cmath>
 
-#include "core/splat/simd.h"
+#include "core/splat/flush_to_zero.h"
+#include "core/splat/instruction_set.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/splat/adam.cc"
+#include <hwy/foreach_target.h>
+
+#include "core/splat/simd-inl.h"
+
+#ifndef COLOR3D_SPLAT_ADAM_ONCE
+#define COLOR3D_SPLAT_ADAM_ONCE
 namespace color3d {
+namespace {
+
+// One row's step: gradient g, parameter p, moments m and v.
+struct RowStep {
+  const float* g;
+  float* p;
+  float* m;
+  float* v;
+  float rate;             // divided by the first moment's bias correction
+  float root_correction;  // 1 / sqrt of the second moment's
+};
+
+}  // namespace
+}  // namespace color3d
+#endif  // COLOR3D_SPLAT_ADAM_ONCE
+
+HWY_BEFORE_NAMESPACE();
+namespace color3d {
+namespace HWY_NAMESPACE {
+namespace {
 
 using simd::F32;
 
-namespace {
-
-// Returns a vector of zeros when all is finite (x * 0 is NaN for infinities and NaN).
-F32 UpdateRow(const float* g,
-              float rate,
-              float root_correction,
-              int64_t begin,
-              int64_t end,
-              float* p,
-              float* m,
-              float* v) {
-  F32 poison = {};
+// Lanes [begin, end). Returns zero when all is finite (x * 0 is NaN for infinities and NaN).
+float UpdateRow(const RowStep& s, int64_t begin, int64_t end) {
+  F32 poison = simd::Zero();
   for (int64_t i = begin; i < end; i += simd::kLanes) {
-    const F32 gradient = simd::Load(g + i);
-    const F32 first = simd::Load(m + i) + (1.0f - kAdamBeta1) * (gradient - simd::Load(m + i));
-    const F32 second =
-        simd::Load(v + i) + (1.0f - kAdamBeta2) * (gradient * gradient - simd::Load(v + i));
-    const F32 scale = simd::Sqrt(second) * root_correction + kAdamEpsilon;
-    const F32 updated = simd::Load(p + i) - rate * first / scale;
-    simd::Store(m + i, first);
-    simd::Store(v + i, second);
-    simd::Store(p + i, updated);
+    const F32 gradient = simd::Load(s.g + i), m = simd::Load(s.m + i), v = simd::Load(s.v + i);
+    const F32 first = m + (1.0f - kAdamBeta1) * (gradient - m);
+    const F32 second = v + (1.0f - kAdamBeta2) * (gradient * gradient - v);
+    const F32 scale = simd::Sqrt(second) * s.root_correction + kAdamEpsilon;
+    const F32 updated = simd::Load(s.p + i) - s.rate * first / scale;
+    simd::Store(s.m + i, first);
+    simd::Store(s.v + i, second);
+    simd::Store(s.p + i, updated);
     poison = poison + updated * 0.0f + gradient * 0.0f;
   }
-  return poison;
+  return simd::HorizontalSum(poison);
 }
 
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace color3d {
+namespace {
+HWY_EXPORT(UpdateRow);
 }  // namespace
 
 bool AdamStep(const ParameterBlock& gradient,
@@ -47,25 +75,23 @@ bool AdamStep(const ParameterBlock& gradient,
   const double bias1 = 1.0 - std::pow(static_cast<double>(kAdamBeta1), static_cast<double>(step));
   const double bias2 = 1.0 - std::pow(static_cast<double>(kAdamBeta2), static_cast<double>(step));
   const float root_correction = static_cast<float>(1.0 / std::sqrt(bias2));
+  const auto update_row = &COLOR3D_KERNEL(UpdateRow);
   std::atomic<bool> finite{true};
-  pool.ForRanges((parameters.count() + simd::kLanes - 1) / simd::kLanes,
-                 [&](int64_t begin, int64_t end, int) {
-                   const simd::ScopedFlushToZero flush;
-                   F32 poison = {};
-                   for (int row = 0; row < parameters.rows(); ++row) {
-                     if (learning_rates[row] == 0.0f) continue;
-                     poison = poison + UpdateRow(gradient.Row(row),
-                                                 static_cast<float>(learning_rates[row] / bias1),
-                                                 root_correction,
-                                                 begin * simd::kLanes,
-                                                 end * simd::kLanes,
-                                                 parameters.Row(row),
-                                                 moments.first.Row(row),
-                                                 moments.second.Row(row));
-                   }
-                   if (!(simd::HorizontalSum(poison) == 0.0f)) finite = false;
-                 });
+  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
+    const ScopedFlushToZero flush;
+    for (int row = 0; row < parameters.rows(); ++row) {
+      if (learning_rates[row] == 0.0f) continue;
+      const RowStep s{gradient.Row(row),
+                      parameters.Row(row),
+                      moments.first.Row(row),
+                      moments.second.Row(row),
+                      static_cast<float>(learning_rates[row] / bias1),
+                      root_correction};
+      if (!(update_row(s, begin * 16, end * 16) == 0.0f)) finite = false;
+    }
+  });
   return finite;
 }
 
 }  // namespace color3d
+#endif  // HWY_ONCE

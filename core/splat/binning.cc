@@ -5,80 +5,94 @@
 #include <limits>
 
 #include "core/base/error.h"
-#include "core/splat/ellipse.h"
+#include "core/splat/instruction_set.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/splat/binning.cc"
+#include <hwy/foreach_target.h>
+
+#include "core/splat/ellipse-inl.h"
+
+#ifndef COLOR3D_SPLAT_BINNING_ONCE
+#define COLOR3D_SPLAT_BINNING_ONCE
 namespace color3d {
+namespace {
 
-using namespace splat_internal;  // NOLINT: the kernels' own vocabulary
-
-// The spans of sixteen Gaussians at once, row by row of tiles.
-void TileBinner::SpansOfSixteen(const SplatBuffer& splats,
-                                int width,
-                                int64_t first,
-                                int lanes,
-                                int thread,
-                                std::vector<Span>& scratch,
-                                TileLists& lists) {
+struct SpanRequest {
   alignas(64) float column[kSplatColor][16];
-  alignas(64) float visible[16] = {};
-  for (int lane = 0; lane < 16; ++lane) {
-    const bool drawn = lane < lanes && splats.depth_key[first + lane] != 0;
-    visible[lane] = drawn ? 1.0f : 0.0f;
-    const float* s = splats.rows.data() + (first + lane) * splats.row_floats;
-    for (int k = 0; k < kSplatColor; ++k) column[k][lane] = drawn ? s[k] : 1.0f;
-  }
-  using simd::F32;
-  using simd::I32;
-  const F32 u = simd::Load(column[kU]), v = simd::Load(column[kV]);
-  const Ellipse<F32> e = MakeEllipse(simd::Load(column[kInvX]),
-                                     simd::Load(column[kSlope]),
-                                     simd::Load(column[kInvY]),
-                                     simd::Load(column[kLog2Opacity]));
+  alignas(64) float visible[16];  // 1 or 0
+  int width, tiles_x, tiles_y;
+};
+struct SpanResult {
+  alignas(64) int32_t first_row[16];
+  alignas(64) int32_t row_count[16];
+  int32_t* begin;  // [row of tiles][lane]
+  int32_t* end;
+};
+
+}  // namespace
+}  // namespace color3d
+#endif  // COLOR3D_SPLAT_BINNING_ONCE
+
+HWY_BEFORE_NAMESPACE();
+namespace color3d {
+namespace HWY_NAMESPACE {
+namespace {
+
+using simd::Broadcast;
+using simd::I32;
+using simd::Mask;
+
+// The tile rows and, row by row, the tile columns that sixteen Gaussians reach. Returns the most
+// rows that one of them has.
+int SpansOfSixteen(const SpanRequest& request, SpanResult& result) {
+  const F32 u = simd::Load(request.column[kU]), v = simd::Load(request.column[kV]);
+  const Ellipse e = MakeEllipse(simd::Load(request.column[kInvX]),
+                                simd::Load(request.column[kSlope]),
+                                simd::Load(request.column[kInvY]),
+                                simd::Load(request.column[kLog2Opacity]));
   constexpr float kPerTile = 1.0f / kTileSide;
-  const F32 zero = simd::Broadcast(0.0f);
-  const F32 tiles_x = simd::Broadcast(static_cast<float>(lists.tiles_x));
-  const F32 tiles_y = simd::Broadcast(static_cast<float>(lists.tiles_y));
+  const F32 zero = simd::Zero();
+  const F32 tiles_x = Broadcast(static_cast<float>(request.tiles_x));
+  const F32 tiles_y = Broadcast(static_cast<float>(request.tiles_y));
   // Pixel centres are at +0.5: pixels i with low <= i <= high lie inside; ceil(low) as trunc of
   // low + (1 - tiny) after clamping.
   const F32 top = v - e.y_reach - (0.5f + kBoundSlackPx) + 0.999f;
   const F32 bottom = v + e.y_reach - (0.5f - kBoundSlackPx);
-  const I32 first_row = __builtin_convertvector(simd::Clamp(top * kPerTile, zero, tiles_y), I32);
-  const I32 end_row =
-      __builtin_convertvector(simd::Clamp(bottom * kPerTile + 1.0f, zero, tiles_y), I32);
-  const I32 shown = simd::Load(visible) > 0.5f;
-  const I32 row_count = (end_row - first_row) & (end_row > first_row) & shown;
+  const I32 first_row = simd::Truncate(simd::Clamp(top * kPerTile, zero, tiles_y));
+  const I32 end_row = simd::Truncate(simd::Clamp(bottom * kPerTile + 1.0f, zero, tiles_y));
+  const Mask shown = simd::Less(Broadcast(0.5f), simd::Load(request.visible));
+  simd::Store(result.first_row, first_row);
+  simd::Store(result.row_count,
+              simd::SelectOrZero(shown, simd::Max(end_row, first_row) - first_row));
   int most = 0;
-  for (int lane = 0; lane < lanes; ++lane) most = std::max(most, row_count[lane]);
-  const F32 last_pixel = simd::Broadcast(static_cast<float>(width - 1));
+  for (int lane = 0; lane < simd::kLanes; ++lane) most = std::max(most, result.row_count[lane]);
+  const F32 last_pixel = Broadcast(static_cast<float>(request.width - 1));
+  const F32 first_y = simd::ToFloat(first_row) * static_cast<float>(kTileSide) + 0.5f - v;
   for (int k = 0; k < most; ++k) {
-    const F32 y0 = __builtin_convertvector((first_row + k) * kTileSide, F32) + 0.5f - v;
+    const F32 y0 = first_y + static_cast<float>(k * kTileSide);
     F32 left, right;
     BandExtent(e, y0, y0 + static_cast<float>(kTileSide - 1), &left, &right);
     left = u + left - 0.5f + 0.999f;
     right = simd::Min(u + right - 0.5f, last_pixel);
-    const I32 begin = __builtin_convertvector(simd::Clamp(left * kPerTile, zero, tiles_x), I32);
-    const I32 end =
-        __builtin_convertvector(simd::Clamp(right * kPerTile + 1.0f, zero, tiles_x), I32);
-    for (int lane = 0; lane < lanes; ++lane) {
-      scratch[k * 16 + lane] = {static_cast<uint16_t>(begin[lane]),
-                                static_cast<uint16_t>(std::max(begin[lane], end[lane]))};
-    }
+    const I32 begin = simd::Truncate(simd::Clamp(left * kPerTile, zero, tiles_x));
+    const I32 end = simd::Truncate(simd::Clamp(right * kPerTile + 1.0f, zero, tiles_x));
+    simd::Store(result.begin + k * simd::kLanes, begin);
+    simd::Store(result.end + k * simd::kLanes, simd::Max(begin, end));
   }
-  std::vector<Span>& spans = spans_[thread];
-  for (int lane = 0; lane < lanes; ++lane) {
-    uint32_t pairs = 0;
-    rows_[first + lane] = {static_cast<uint32_t>(spans.size()),
-                           static_cast<uint16_t>(first_row[lane]),
-                           static_cast<uint16_t>(row_count[lane]),
-                           static_cast<uint16_t>(thread)};
-    for (int k = 0; k < row_count[lane]; ++k) {
-      const Span span = scratch[k * 16 + lane];
-      pairs += span.end - span.begin;
-      spans.push_back(span);
-    }
-    lists.first_pair[first + lane + 1] = pairs;
-  }
+  return most;
 }
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace color3d {
+namespace {
+HWY_EXPORT(SpansOfSixteen);
+}  // namespace
 
 void TileBinner::FindSpans(const SplatBuffer& splats,
                            int width,
@@ -86,11 +100,39 @@ void TileBinner::FindSpans(const SplatBuffer& splats,
                            int64_t end,
                            int thread,
                            TileLists& lists) {
-  spans_[thread].clear();
-  std::vector<Span> scratch(static_cast<size_t>(lists.tiles_y) * 16);
-  for (int64_t i = begin; i < end; i += 16) {
-    const int lanes = static_cast<int>(std::min<int64_t>(16, end - i));
-    SpansOfSixteen(splats, width, i, lanes, thread, scratch, lists);
+  const auto spans_of_sixteen = &COLOR3D_KERNEL(SpansOfSixteen);
+  std::vector<Span>& spans = spans_[thread];
+  spans.clear();
+  std::vector<int32_t> columns(static_cast<size_t>(lists.tiles_y) * 32);
+  SpanRequest request;
+  request.width = width;
+  request.tiles_x = lists.tiles_x;
+  request.tiles_y = lists.tiles_y;
+  SpanResult result;
+  result.begin = columns.data();
+  result.end = columns.data() + static_cast<size_t>(lists.tiles_y) * 16;
+  for (int64_t first = begin; first < end; first += 16) {
+    const int lanes = static_cast<int>(std::min<int64_t>(16, end - first));
+    for (int lane = 0; lane < 16; ++lane) {
+      const bool drawn = lane < lanes && splats.depth_key[first + lane] != 0;
+      request.visible[lane] = drawn ? 1.0f : 0.0f;
+      const float* s = splats.rows.data() + (first + lane) * splats.row_floats;
+      for (int k = 0; k < kSplatColor; ++k) request.column[k][lane] = drawn ? s[k] : 1.0f;
+    }
+    spans_of_sixteen(request, result);
+    for (int lane = 0; lane < lanes; ++lane) {
+      uint32_t pairs = 0;
+      rows_[first + lane] = {static_cast<uint32_t>(spans.size()),
+                             static_cast<uint16_t>(result.first_row[lane]),
+                             static_cast<uint16_t>(result.row_count[lane]),
+                             static_cast<uint16_t>(thread)};
+      for (int k = 0; k < result.row_count[lane]; ++k) {
+        const int32_t from = result.begin[k * 16 + lane], to = result.end[k * 16 + lane];
+        pairs += static_cast<uint32_t>(to - from);
+        spans.push_back({static_cast<uint16_t>(from), static_cast<uint16_t>(to)});
+      }
+      lists.first_pair[first + lane + 1] = pairs;
+    }
   }
 }
 
@@ -207,3 +249,4 @@ void TileBinner::Bin(
 }
 
 }  // namespace color3d
+#endif  // HWY_ONCE

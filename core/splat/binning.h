@@ -55,13 +55,6 @@ class TileBinner {
                  int64_t end,
                  int thread,
                  TileLists& lists);
-  void SpansOfSixteen(const SplatBuffer& splats,
-                      int width,
-                      int64_t first,
-                      int lanes,
-                      int thread,
-                      std::vector<Span>& scratch,
-                      TileLists& lists);
   void SortByDepth(const SplatBuffer& splats);
   void FillLists(ThreadPool& pool, TileLists& lists);
 

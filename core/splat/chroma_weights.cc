@@ -4,10 +4,20 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/splat/instruction_set.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/splat/chroma_weights.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
 namespace color3d {
+namespace HWY_NAMESPACE {
 namespace {
 
-// Sixteen lanes; the compiler splits them where registers are narrower.
+// Sixteen lanes of the compiler's own vectors, split where registers are narrower: simd-inl.h has
+// no 8-bit numbers.
 using F32 = float __attribute__((vector_size(64)));
 using I32 = int32_t __attribute__((vector_size(64)));
 using U8 = uint8_t __attribute__((vector_size(16)));
@@ -117,31 +127,12 @@ bool AnyAlive(const F32* t) {
   return false;
 }
 
-}  // namespace
-
-void TileWeights::Clear() {
-  gaussian.clear();
-  first_item.assign(1, 0);
-  items.clear();
-}
-
-void TileWeights::ShrinkToFit() {
-  gaussian.shrink_to_fit();
-  first_item.shrink_to_fit();
-  items.shrink_to_fit();
-}
-
-int64_t TileWeights::Bytes() const {
-  return static_cast<int64_t>(sizeof(uint32_t) * (gaussian.size() + first_item.size()) +
-                              sizeof(WeightItem) * items.size());
-}
-
-void BuildTileWeights(const SplatBuffer& splats,
-                      const TileLists& lists,
-                      int tile,
-                      int width_px,
-                      int height_px,
-                      TileWeights& weights) {
+void Build(const SplatBuffer& splats,
+           const TileLists& lists,
+           int tile,
+           int width_px,
+           int height_px,
+           TileWeights& weights) {
   const F32 lane_x = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
   const F32 lane_y = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
   const F32 zero = {}, one = zero + 1.0f;
@@ -186,7 +177,7 @@ void BuildTileWeights(const SplatBuffer& splats,
   }
 }
 
-void CoarsenTileWeights(const TileWeights& fine, const float* pixel_weight, TileWeights& coarse) {
+void Coarsen(const TileWeights& fine, const float* pixel_weight, TileWeights& coarse) {
   coarse.Clear();
   F32 share[kFineBlocks];  // of each pixel in its cell
   for (int b = 0; b < kFineBlocks; ++b) {
@@ -207,7 +198,7 @@ void CoarsenTileWeights(const TileWeights& fine, const float* pixel_weight, Tile
   }
 }
 
-void TileForward(const TileWeights& weights, int blocks, const float* value, float* picture) {
+void Forward(const TileWeights& weights, int blocks, const float* value, float* picture) {
   std::fill_n(picture, 2 * kBlockCells * blocks, 0.0f);
   const uint32_t* gaussian = weights.gaussian.data();
   const size_t count = weights.gaussian.size();
@@ -229,7 +220,7 @@ void TileForward(const TileWeights& weights, int blocks, const float* value, flo
 
 // sum += V^T picture with V the weights or, squared, their squares.
 template <bool kSquared>
-static void Adjoint(const TileWeights& weights, const float* picture, float* sum) {
+void Adjoint(const TileWeights& weights, const float* picture, float* sum) {
   const uint32_t* gaussian = weights.gaussian.data();
   const size_t count = weights.gaussian.size();
   const WeightItem* item = weights.items.data();
@@ -252,12 +243,70 @@ static void Adjoint(const TileWeights& weights, const float* picture, float* sum
   }
 }
 
-void TileAdjoint(const TileWeights& weights, const float* picture, float* sum) {
+void AdjointOfWeights(const TileWeights& weights, const float* picture, float* sum) {
   Adjoint<false>(weights, picture, sum);
 }
 
-void TileSquares(const TileWeights& weights, const float* picture, float* sum) {
+void AdjointOfSquares(const TileWeights& weights, const float* picture, float* sum) {
   Adjoint<true>(weights, picture, sum);
 }
 
+}  // namespace
+}  // namespace HWY_NAMESPACE
 }  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace color3d {
+namespace {
+HWY_EXPORT(Build);
+HWY_EXPORT(Coarsen);
+HWY_EXPORT(Forward);
+HWY_EXPORT(AdjointOfWeights);
+HWY_EXPORT(AdjointOfSquares);
+}  // namespace
+
+void TileWeights::Clear() {
+  gaussian.clear();
+  first_item.assign(1, 0);
+  items.clear();
+}
+
+void TileWeights::ShrinkToFit() {
+  gaussian.shrink_to_fit();
+  first_item.shrink_to_fit();
+  items.shrink_to_fit();
+}
+
+int64_t TileWeights::Bytes() const {
+  return static_cast<int64_t>(sizeof(uint32_t) * (gaussian.size() + first_item.size()) +
+                              sizeof(WeightItem) * items.size());
+}
+
+void BuildTileWeights(const SplatBuffer& splats,
+                      const TileLists& lists,
+                      int tile,
+                      int width_px,
+                      int height_px,
+                      TileWeights& weights) {
+  COLOR3D_KERNEL(Build)(splats, lists, tile, width_px, height_px, weights);
+}
+
+void CoarsenTileWeights(const TileWeights& fine, const float* pixel_weight, TileWeights& coarse) {
+  COLOR3D_KERNEL(Coarsen)(fine, pixel_weight, coarse);
+}
+
+void TileForward(const TileWeights& weights, int blocks, const float* value, float* picture) {
+  COLOR3D_KERNEL(Forward)(weights, blocks, value, picture);
+}
+
+void TileAdjoint(const TileWeights& weights, const float* picture, float* sum) {
+  COLOR3D_KERNEL(AdjointOfWeights)(weights, picture, sum);
+}
+
+void TileSquares(const TileWeights& weights, const float* picture, float* sum) {
+  COLOR3D_KERNEL(AdjointOfSquares)(weights, picture, sum);
+}
+
+}  // namespace color3d
+#endif  // HWY_ONCE

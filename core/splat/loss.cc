@@ -2,14 +2,18 @@
 
 #include <algorithm>
 
-#include "core/splat/simd.h"
+#include "core/splat/flush_to_zero.h"
+#include "core/splat/instruction_set.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/splat/loss.cc"
+#include <hwy/foreach_target.h>
+
+#include "core/splat/simd-inl.h"
+
+#ifndef COLOR3D_SPLAT_LOSS_ONCE
+#define COLOR3D_SPLAT_LOSS_ONCE
 namespace color3d {
-
-using simd::Broadcast;
-using simd::F32;
-using simd::Mask;
-
 namespace {
 
 constexpr int kReach = 5;  // of the 11-tap window
@@ -30,6 +34,19 @@ struct Terms {
   PlaneBuffer& d_laplacian;
   PlaneBuffer& gradient;
 };
+
+}  // namespace
+}  // namespace color3d
+#endif  // COLOR3D_SPLAT_LOSS_ONCE
+
+HWY_BEFORE_NAMESPACE();
+namespace color3d {
+namespace HWY_NAMESPACE {
+namespace {
+
+using simd::Broadcast;
+using simd::F32;
+using simd::Mask;
 
 const float* RowOrZeros(const PlaneBuffer& p, int c, int y, const float* zeros) {
   return y >= 0 && y < p.height ? p.Row(c, y) : zeros;
@@ -88,12 +105,12 @@ void StructureRow(const Terms& t, int c, int r, float* scratch, double* sums) {
     std::fill_n(rows[k] + t.x.stride, kPad, 0.0f);
   }
   BlurColumns(t, c, r, rows);
-  F32 l1 = {}, dissimilarity = {};
+  F32 l1 = simd::Zero(), dissimilarity = simd::Zero();
   const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
   for (int j = 0; j < t.x.stride; j += simd::kLanes) {
     const F32 w = PixelWeights(t, r, j);
     const F32 d = simd::Load(x + j) - simd::Load(y + j);
-    l1 = l1 + w * simd::Max(d, -d);
+    l1 = l1 + w * simd::Abs(d);
     const F32 mx = BlurAlongRow(rows[0] + j), my = BlurAlongRow(rows[1] + j);
     const F32 sx = BlurAlongRow(rows[2] + j) - mx * mx;
     const F32 sy = BlurAlongRow(rows[3] + j) - my * my;
@@ -118,9 +135,9 @@ void EdgeRow(const Terms& t, int c, int r, double* sum) {
   const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
   const int stride = t.x.stride;
   float* out = t.d_laplacian.Row(c, r);
-  F32 total = {};
+  F32 total = simd::Zero();
   for (int j = 0; j < stride; j += simd::kLanes) {
-    const auto difference = [&](int offset) {
+    const auto difference = [&](int offset) HWY_ATTR {
       return simd::Load(x + j + offset) - simd::Load(y + j + offset);
     };
     const F32 laplacian = difference(-1) + difference(1) + difference(-stride) +
@@ -182,6 +199,17 @@ void GradientRow(const Terms& t, int c, int r, float* scratch) {
 }
 
 }  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace color3d {
+namespace {
+HWY_EXPORT(StructureRow);
+HWY_EXPORT(EdgeRow);
+HWY_EXPORT(GradientRow);
+}  // namespace
 
 LossValue ImageLoss::Evaluate(const PlaneBuffer& x,
                               const PlaneBuffer& y,
@@ -215,14 +243,17 @@ LossValue ImageLoss::Evaluate(const PlaneBuffer& x,
                 d_laplacian_,
                 gradient};
   if (!edge) std::fill(d_laplacian_.data.begin(), d_laplacian_.data.end(), 0.0f);
+  const auto structure_row = &COLOR3D_KERNEL(StructureRow);
+  const auto edge_row = &COLOR3D_KERNEL(EdgeRow);
+  const auto gradient_row = &COLOR3D_KERNEL(GradientRow);
   pool.ForEach(rows, [&](int64_t i, int thread) {
     const int c = static_cast<int>(i / x.height), r = static_cast<int>(i % x.height);
-    StructureRow(t, c, r, scratch_[thread].data(), &row_sums_[3 * i]);
-    if (edge && r > 0 && r + 1 < x.height) EdgeRow(t, c, r, &row_sums_[3 * i + 2]);
+    structure_row(t, c, r, scratch_[thread].data(), &row_sums_[3 * i]);
+    if (edge && r > 0 && r + 1 < x.height) edge_row(t, c, r, &row_sums_[3 * i + 2]);
   });
   pool.ForEach(rows, [&](int64_t i, int thread) {
-    const simd::ScopedFlushToZero flush;
-    GradientRow(
+    const ScopedFlushToZero flush;
+    gradient_row(
         t, static_cast<int>(i / x.height), static_cast<int>(i % x.height), scratch_[thread].data());
   });
   LossValue value;
@@ -236,3 +267,4 @@ LossValue ImageLoss::Evaluate(const PlaneBuffer& x,
 }
 
 }  // namespace color3d
+#endif  // HWY_ONCE

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/random.h"
+#include "core/splat/instruction_set_testing.h"
 #include "core/splat/reference.h"
 
 namespace color3d {
@@ -44,10 +45,10 @@ struct Case {
   bool weighted;
 };
 
-class LossTest : public testing::TestWithParam<Case> {};
+using LossTest = InstructionSetTest<Case>;
 
 TEST_P(LossTest, AgreesWithFloat64FormulaAndItsFiniteDifferences) {
-  const Case& c = GetParam();
+  const Case& c = TestCase();
   ThreadPool pool(2);
   const PlaneBuffer x = RandomPicture(c.width, c.height, c.channels, 1);
   const PlaneBuffer y = RandomPicture(c.width, c.height, c.channels, 2);
@@ -86,15 +87,17 @@ TEST_P(LossTest, AgreesWithFloat64FormulaAndItsFiniteDifferences) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases,
-                         LossTest,
-                         testing::Values(Case{23, 19, 1, {0.8f, 0.2f, 1.0f}, false},
-                                         Case{32, 16, 2, {0.8f, 0.2f, 0.0f}, true},
-                                         Case{17, 21, 3, {0.0f, 1.0f, 0.5f}, true},
-                                         Case{2, 2, 1, {0.8f, 0.2f, 1.0f}, false},
-                                         Case{1, 1, 1, {0.8f, 0.2f, 1.0f}, false}));
+INSTANTIATE_TEST_SUITE_P(
+    Cases,
+    LossTest,
+    testing::Combine(testing::Values(Case{23, 19, 1, {0.8f, 0.2f, 1.0f}, false},
+                                     Case{32, 16, 2, {0.8f, 0.2f, 0.0f}, true},
+                                     Case{17, 21, 3, {0.0f, 1.0f, 0.5f}, true},
+                                     Case{2, 2, 1, {0.8f, 0.2f, 1.0f}, false},
+                                     Case{1, 1, 1, {0.8f, 0.2f, 1.0f}, false}),
+                     EachInstructionSet()));
 
-TEST(LossTest, EqualPicturesHaveNoLossButTheCharbonnierFloor) {
+TEST(ImageLossTest, EqualPicturesHaveNoLossButTheCharbonnierFloor) {
   ThreadPool pool(1);
   const PlaneBuffer x = RandomPicture(40, 30, 1, 1);
   ImageLoss loss;

@@ -2,14 +2,51 @@
 
 #include <algorithm>
 
-#include "core/splat/projection_math.h"
+#include "core/splat/flush_to_zero.h"
+#include "core/splat/instruction_set.h"
 #include "core/splat/spherical_harmonics.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/splat/projection.cc"
+#include <hwy/foreach_target.h>
+
+#include "core/splat/projection_math-inl.h"
+
+#ifndef COLOR3D_SPLAT_PROJECTION_ONCE
+#define COLOR3D_SPLAT_PROJECTION_ONCE
 namespace color3d {
-
-using namespace splat_internal;  // NOLINT: the kernels' own vocabulary
-
 namespace {
+
+struct ForwardContext {
+  const ParameterBlock& p;
+  const ColorSpec& color;
+  bool depth_channel;
+  const RasterCamera& camera;
+  SplatBuffer& splats;
+};
+
+struct BackwardContext {
+  const ParameterBlock& p;
+  const ColorSpec& color;
+  const RasterCamera& camera;
+  const SplatBuffer& splats;
+  const float* pair_gradient;
+  const uint32_t* first_pair;
+  GradientScope scope;
+  ParameterBlock& gradient;
+  DensifyStatistics* statistics;
+};
+
+}  // namespace
+}  // namespace color3d
+#endif  // COLOR3D_SPLAT_PROJECTION_ONCE
+
+HWY_BEFORE_NAMESPACE();
+namespace color3d {
+namespace HWY_NAMESPACE {
+namespace {
+
+#include "core/splat/spherical_harmonics-inl.h"
 
 // Lanes of [i, i + 16) that exist and contribute to the picture.
 Mask VisibleLanes(const RasterCamera& c, const Projected& g, int64_t i, int64_t count) {
@@ -46,12 +83,9 @@ F32 ShSum(const ParameterBlock& p, const ColorChannel& channel, const F32* basis
   return sum;
 }
 
-void ProjectSixteen(const ParameterBlock& p,
-                    const ColorSpec& color,
-                    bool depth_channel,
-                    const RasterCamera& camera,
-                    int64_t i,
-                    SplatBuffer& splats) {
+void ProjectSixteen(const ForwardContext& ctx, int64_t i) {
+  const ParameterBlock& p = ctx.p;
+  const RasterCamera& camera = ctx.camera;
   Projected g;
   LoadCenter(p, camera, i, g);
   LoadShape(p, i, g);
@@ -59,36 +93,38 @@ void ProjectSixteen(const ParameterBlock& p,
   ComputeConic(camera, g);
   const uint32_t bits = simd::MaskBits(VisibleLanes(camera, g, i, p.count()));
   const int lanes = static_cast<int>(std::min<int64_t>(p.count() - i, simd::kLanes));
-  uint32_t* keys = splats.depth_key.data() + i;
+  uint32_t* keys = ctx.splats.depth_key.data() + i;
   if (bits == 0) {
     std::fill_n(keys, lanes, 0u);
     return;
   }
-  alignas(64) F32 columns[12];
-  columns[kU] = g.px;
-  columns[kV] = g.py;
-  columns[kInvX] = g.inv_var_x * kHalfLog2E;
-  columns[kSlope] = g.slope;
-  columns[kInvY] = g.inv_var_y * kHalfLog2E;
-  columns[kLog2Opacity] = g.log2_opacity;
+  alignas(64) float columns[12][simd::kLanes];
+  simd::Store(columns[kU], g.px);
+  simd::Store(columns[kV], g.py);
+  simd::Store(columns[kInvX], g.inv_var_x * kHalfLog2E);
+  simd::Store(columns[kSlope], g.slope);
+  simd::Store(columns[kInvY], g.inv_var_y * kHalfLog2E);
+  simd::Store(columns[kLog2Opacity], g.log2_opacity);
   F32 direction[3], inv_distance, basis[kMaxShCoefficients];
   ViewDirection(p, camera, i, direction, &inv_distance);
-  EvaluateSh(MaxCoefficients(color), direction[0], direction[1], direction[2], basis);
-  for (int c = 0; c < color.channels; ++c) {
-    const F32 value = ShSum(p, color.channel[c], basis, i);
-    columns[kSplatColor + c] =
-        color.channel[c].clamp_at_zero ? simd::Max(value, Broadcast(0.0f)) : value;
+  EvaluateSh(MaxCoefficients(ctx.color), direction[0], direction[1], direction[2], basis);
+  const int channels = ctx.color.channels;
+  for (int c = 0; c < channels; ++c) {
+    const ColorChannel& channel = ctx.color.channel[c];
+    const F32 value = ShSum(p, channel, basis, i);
+    simd::Store(columns[kSplatColor + c],
+                channel.clamp_at_zero ? simd::Max(value, simd::Zero()) : value);
   }
-  if (depth_channel) columns[kSplatColor + color.channels] = g.z;
-  const int used = kSplatColor + splats.channels;
-  const simd::I32 depth_bits = simd::BitsOf(g.z);
+  if (ctx.depth_channel) simd::Store(columns[kSplatColor + channels], g.z);
+  const int used = kSplatColor + ctx.splats.channels, row_floats = ctx.splats.row_floats;
+  alignas(64) int32_t depth_bits[simd::kLanes];
+  simd::Store(depth_bits, simd::BitsOf(g.z));
   for (int lane = 0; lane < lanes; ++lane) {
     const bool visible = (bits >> lane & 1u) != 0;
     keys[lane] = visible ? static_cast<uint32_t>(depth_bits[lane]) : 0u;
     if (!visible) continue;
-    float* row = splats.rows.data() + (i + lane) * splats.row_floats;
-    const float* from = reinterpret_cast<const float*>(columns) + lane;
-    for (int k = 0; k < used; ++k) row[k] = from[k * simd::kLanes];
+    float* row = ctx.splats.rows.data() + (i + lane) * row_floats;
+    for (int k = 0; k < used; ++k) row[k] = columns[k][lane];
   }
 }
 
@@ -165,26 +201,13 @@ ShapeGradient ShapeBackward(const RasterCamera& c, const Projected& g, const F32
   return out;
 }
 
-struct BackwardContext {
-  const ParameterBlock& p;
-  const ColorSpec& color;
-  const RasterCamera& camera;
-  const SplatBuffer& splats;
-  const float* pair_gradient;
-  const uint32_t* first_pair;
-  GradientScope scope;
-  ParameterBlock& gradient;
-  DensifyStatistics* statistics;
-};
-
 // Adds up the pairs of sixteen Gaussians into planar sums. False when none is visible.
 bool GatherSums(const BackwardContext& ctx, int64_t i, int lanes, F32* sums) {
   const int row_floats = ctx.splats.row_floats;
   const int used = kGradientColor + ctx.color.channels;
   const uint32_t begin = ctx.first_pair[i];
   if (ctx.first_pair[i + lanes] == begin) return false;
-  for (int k = 0; k < used; ++k) sums[k] = Broadcast(0.0f);
-  float* out = reinterpret_cast<float*>(sums);
+  alignas(64) float planar[12][simd::kLanes] = {};
   for (int lane = 0; lane < lanes; ++lane) {
     float sum[12] = {};
     const uint32_t end = ctx.first_pair[i + lane + 1];
@@ -192,8 +215,9 @@ bool GatherSums(const BackwardContext& ctx, int64_t i, int lanes, F32* sums) {
       const float* row = ctx.pair_gradient + static_cast<size_t>(pair) * row_floats;
       for (int k = 0; k < used; ++k) sum[k] += row[k];
     }
-    for (int k = 0; k < used; ++k) out[k * simd::kLanes + lane] = sum[k];
+    for (int k = 0; k < used; ++k) planar[k][lane] = sum[k];
   }
+  for (int k = 0; k < used; ++k) sums[k] = simd::Load(planar[k]);
   return true;
 }
 
@@ -231,9 +255,10 @@ void UpdateStatistics(const BackwardContext& ctx, int64_t i, const Projected& g,
   const F32 dv = g.inv_var_y * sums[kSumWDy] - g.slope * du;
   const F32 nx = du * (0.5f * static_cast<float>(ctx.camera.width));
   const F32 ny = dv * (0.5f * static_cast<float>(ctx.camera.height));
-  const F32 norm = simd::Sqrt(nx * nx + ny * ny);
-  const F32 radius =
-      simd::Sqrt(simd::Max(g.xx, g.yy)) * (1.0f / static_cast<float>(ctx.camera.width));
+  alignas(64) float norm[simd::kLanes], radius[simd::kLanes];
+  simd::Store(norm, simd::Sqrt(nx * nx + ny * ny));
+  simd::Store(radius,
+              simd::Sqrt(simd::Max(g.xx, g.yy)) * (1.0f / static_cast<float>(ctx.camera.width)));
   const int lanes = static_cast<int>(std::min<int64_t>(ctx.p.count() - i, simd::kLanes));
   for (int lane = 0; lane < lanes; ++lane) {
     if (ctx.splats.depth_key[i + lane] == 0) continue;
@@ -267,7 +292,7 @@ void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
     seen[lane] = ctx.splats.depth_key[i + lane] != 0 ? 1.0f : 0.0f;
   }
   const Mask visible = simd::Less(Broadcast(0.5f), simd::Load(seen));
-  const auto store = [&](int row, F32 value) {
+  const auto store = [&](int row, F32 value) HWY_ATTR {
     simd::Store(ctx.gradient.Row(row) + i, simd::SelectOrZero(visible, value));
   };
   for (int k = 0; k < 3; ++k) store(kPositionRow + k, shape.position[k]);
@@ -277,6 +302,24 @@ void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
   if (ctx.statistics != nullptr) UpdateStatistics(ctx, i, g, sums);
 }
 
+void ProjectRange(const ForwardContext& ctx, int64_t begin, int64_t end) {
+  for (int64_t block = begin; block < end; ++block) ProjectSixteen(ctx, block * simd::kLanes);
+}
+
+void BackwardRange(const BackwardContext& ctx, int64_t begin, int64_t end) {
+  for (int64_t block = begin; block < end; ++block) BackwardSixteen(ctx, block * simd::kLanes);
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace color3d {
+namespace {
+HWY_EXPORT(ProjectRange);
+HWY_EXPORT(BackwardRange);
 }  // namespace
 
 void DensifyStatistics::Reset(int64_t gaussians) {
@@ -295,11 +338,10 @@ void ProjectSplats(const ParameterBlock& parameters,
   splats.row_floats = SplatRowFloats(splats.channels);
   splats.rows.resize(static_cast<size_t>(parameters.count()) * splats.row_floats);
   splats.depth_key.resize(static_cast<size_t>(parameters.count()));
-  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
-    for (int64_t block = begin; block < end; ++block) {
-      ProjectSixteen(parameters, color, depth_channel, camera, block * 16, splats);
-    }
-  });
+  const ForwardContext ctx{parameters, color, depth_channel, camera, splats};
+  const auto project_range = &COLOR3D_KERNEL(ProjectRange);
+  pool.ForRanges((parameters.count() + 15) / 16,
+                 [&](int64_t begin, int64_t end, int) { project_range(ctx, begin, end); });
 }
 
 void ProjectSplatsBackward(const ParameterBlock& parameters,
@@ -324,10 +366,12 @@ void ProjectSplatsBackward(const ParameterBlock& parameters,
                             scope,
                             gradient,
                             statistics};
+  const auto backward_range = &COLOR3D_KERNEL(BackwardRange);
   pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
-    const simd::ScopedFlushToZero flush;
-    for (int64_t block = begin; block < end; ++block) BackwardSixteen(ctx, block * 16);
+    const ScopedFlushToZero flush;
+    backward_range(ctx, begin, end);
   });
 }
 
 }  // namespace color3d
+#endif  // HWY_ONCE

@@ -1,5 +1,5 @@
 // From 3D Gaussians to 2D splats and back (EWA splatting: Zwicker et al. 2001; Kerbl et al. 2023).
-// Internal to the splat module; no Eigen here, because the sources are compiled for the machine's
+// Internal to the splat module; no Eigen here, because the sources are compiled
 // instruction set. All functions are deterministic whatever the thread count.
 #pragma once
 

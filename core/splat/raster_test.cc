@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/base/random.h"
+#include "core/splat/instruction_set_testing.h"
 #include "core/splat/pipeline.h"
 #include "core/splat/reference.h"
 #include "core/splat/spherical_harmonics.h"
@@ -97,14 +98,15 @@ double WeightedSum(const ReferenceImage& image, const PlaneBuffer& weights) {
 const float kBackground[4] = {0.2f, 0.5f, 0.6f, 0.0f};
 const std::vector<double> kBackground64 = {0.2f, 0.5f, 0.6f};
 
-class RasterTest : public testing::TestWithParam<int> {};
+using RasterTest = InstructionSetTest<int>;  // of channel counts
 
 TEST_P(RasterTest, PictureAgreesWithFloat64Reference) {
   ThreadPool pool(2);
+  const int channels = TestCase();
   const int width = 61, height = 45;
   const RasterCamera camera = TestCamera(width, height);
   const ParameterBlock p = RandomGaussians(200, 3);
-  const ColorSpec color = TestColor(GetParam());
+  const ColorSpec color = TestColor(channels);
   SplatPipeline pipeline;
   pipeline.Forward(p, color, camera, kBackground, true, pool);
   const ReferenceImage image =
@@ -113,14 +115,14 @@ TEST_P(RasterTest, PictureAgreesWithFloat64Reference) {
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const size_t i = static_cast<size_t>(y) * width + x;
-      for (int c = 0; c < GetParam(); ++c) {
+      for (int c = 0; c < channels; ++c) {
         worst = std::max(worst, std::abs(pipeline.color().Row(c, y)[x] - image.color[c][i]));
         spread = std::max(spread, std::abs(image.color[c][i] - kBackground64[c]));
       }
       worst =
           std::max(worst, std::abs(1.0 - pipeline.transmittance().Row(0, y)[x] - image.opacity[i]));
       worst_depth =
-          std::max(worst_depth, std::abs(pipeline.color().Row(GetParam(), y)[x] - image.depth[i]));
+          std::max(worst_depth, std::abs(pipeline.color().Row(channels, y)[x] - image.depth[i]));
     }
   }
   EXPECT_GT(spread, 0.2);  // something is drawn
@@ -130,11 +132,12 @@ TEST_P(RasterTest, PictureAgreesWithFloat64Reference) {
 
 TEST_P(RasterTest, GradientsAgreeWithFiniteDifferencesOfTheReference) {
   ThreadPool pool(2);
+  const int channels = TestCase();
   const int width = 37, height = 29;
   const RasterCamera camera = TestCamera(width, height);
   const ParameterBlock p = RandomGaussians(24, 11);
-  const ColorSpec color = TestColor(GetParam());
-  const PlaneBuffer weights = RandomWeights(width, height, GetParam(), 5);
+  const ColorSpec color = TestColor(channels);
+  const PlaneBuffer weights = RandomWeights(width, height, channels, 5);
   SplatPipeline pipeline;
   pipeline.Forward(p, color, camera, kBackground, false, pool);
   ParameterBlock gradient;
@@ -165,9 +168,11 @@ TEST_P(RasterTest, GradientsAgreeWithFiniteDifferencesOfTheReference) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Channels, RasterTest, testing::Values(1, 2, 3));
+INSTANTIATE_TEST_SUITE_P(Channels,
+                         RasterTest,
+                         testing::Combine(testing::Values(1, 2, 3), EachInstructionSet()));
 
-TEST(RasterTest, TileSidesAndThreadCountsDoNotChangeTheResult) {
+TEST(RasterizerTest, TileSidesAndThreadCountsDoNotChangeTheResult) {
   const RasterCamera camera = TestCamera(131, 77);
   const ParameterBlock p = RandomGaussians(500, 8);
   const ColorSpec color = TestColor(3);
@@ -185,7 +190,7 @@ TEST(RasterTest, TileSidesAndThreadCountsDoNotChangeTheResult) {
   EXPECT_EQ(gradients[0].values(), gradients[1].values());
 }
 
-TEST(RasterTest, ColorOnlyGradientEqualsTheFullOne) {
+TEST(RasterizerTest, ColorOnlyGradientEqualsTheFullOne) {
   ThreadPool pool(2);
   const RasterCamera camera = TestCamera(64, 48);
   const ParameterBlock p = RandomGaussians(60, 9);

@@ -2,24 +2,26 @@
 
 #include <algorithm>
 
-#include "core/splat/ellipse.h"
+#include "core/splat/flush_to_zero.h"
+#include "core/splat/instruction_set.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/splat/rasterizer.cc"
+#include <hwy/foreach_target.h>
+
+#include "core/splat/ellipse-inl.h"
+
+#ifndef COLOR3D_SPLAT_RASTERIZER_ONCE
+#define COLOR3D_SPLAT_RASTERIZER_ONCE
 namespace color3d {
-
-using namespace splat_internal;  // NOLINT: the kernels' own vocabulary
-using simd::Broadcast;
-using simd::F32;
-using simd::I32;
-using simd::Mask;
-
 namespace {
 
 constexpr int kBlocks = 16;  // of 4x4 pixels in a tile: block b is at column b % 4, row b / 4
 constexpr float kLog2MinAlpha = -7.9943534f;
 constexpr float kLog2MaxAlpha = -0.014499569f;  // log2(0.99)
 
-inline F32 LaneX() { return F32{0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3}; }
-inline F32 LaneY() { return F32{0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3}; }
+alignas(64) constexpr float kLaneX[16] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+alignas(64) constexpr float kLaneY[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
 struct Tile {
   int index;
@@ -36,6 +38,40 @@ Tile TileAt(const TileLists& lists, int64_t index) {
   t.end = lists.tile_begin[index + 1];
   return t;
 }
+
+struct ForwardJob {
+  const SplatBuffer& splats;
+  const TileLists& lists;
+  const float* background;
+  PlaneBuffer& color;
+  PlaneBuffer* transmittance;
+  uint16_t* block_masks;
+};
+
+struct BackwardJob {
+  const SplatBuffer& splats;
+  const TileLists& lists;
+  const uint16_t* block_masks;
+  const PlaneBuffer& color;
+  const PlaneBuffer& d_color;
+  float* pair_gradient;
+};
+
+}  // namespace
+}  // namespace color3d
+#endif  // COLOR3D_SPLAT_RASTERIZER_ONCE
+
+HWY_BEFORE_NAMESPACE();
+namespace color3d {
+namespace HWY_NAMESPACE {
+namespace {
+
+using simd::Broadcast;
+using simd::I32;
+using simd::Mask;
+
+HWY_INLINE F32 LaneX() { return simd::Load(kLaneX); }
+HWY_INLINE F32 LaneY() { return simd::Load(kLaneY); }
 
 F32 LoadBlock(const PlaneBuffer& image, int channel, const Tile& tile, int block) {
   alignas(64) float values[16];
@@ -82,13 +118,14 @@ void LoadChunk(const SplatBuffer& splats, const uint32_t* gaussian, int count, C
 // Bit b of masks[j]: the ellipse of entry j touches pixel centres of block b.
 void BlockMasks(const Chunk& chunk, const Tile& tile, uint16_t* masks) {
   const F32 u = simd::Load(chunk.column[kU]), v = simd::Load(chunk.column[kV]);
-  const Ellipse<F32> e = MakeEllipse(simd::Load(chunk.column[kInvX]),
-                                     simd::Load(chunk.column[kSlope]),
-                                     simd::Load(chunk.column[kInvY]),
-                                     simd::Load(chunk.column[kLog2Opacity]));
-  const F32 reach = e.y_reach + kBoundSlackPx, zero = Broadcast(0.0f), four = Broadcast(4.0f);
-  I32 bits = {};
-  for (int row = 0; row < 4; ++row) {
+  const Ellipse e = MakeEllipse(simd::Load(chunk.column[kInvX]),
+                                simd::Load(chunk.column[kSlope]),
+                                simd::Load(chunk.column[kInvY]),
+                                simd::Load(chunk.column[kLog2Opacity]));
+  const F32 reach = e.y_reach + kBoundSlackPx, zero = simd::Zero(), four = Broadcast(4.0f);
+  const I32 one = Broadcast(int32_t{1});
+  I32 bits = Broadcast(int32_t{0});
+  for (int row = 3; row >= 0; --row) {
     const F32 low = (static_cast<float>(tile.y0 + 4 * row) + 0.5f) - v;
     const F32 high = low + 3.0f;
     F32 left, right;
@@ -96,14 +133,15 @@ void BlockMasks(const Chunk& chunk, const Tile& tile, uint16_t* masks) {
     const F32 origin = u - (static_cast<float>(tile.x0) + 0.5f);
     const F32 begin = simd::Clamp((origin + left + 0.999f) * 0.25f, zero, four);
     const F32 end = simd::Clamp((origin + right + 4.0f) * 0.25f, zero, four);
-    const I32 first = __builtin_convertvector(begin, I32);
-    const I32 last = __builtin_convertvector(end, I32);  // one past
-    const I32 one = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
-    const I32 span = ((one << last) - (one << first)) << (4 * row);
-    const I32 meets = (low < reach) & (high > -reach) & (last > first);
-    bits |= span & meets;
+    const I32 first = simd::Truncate(begin);
+    const I32 last = simd::Max(simd::Truncate(end), first);  // one past
+    const I32 span = simd::ShiftLeft(one, last) - simd::ShiftLeft(one, first);
+    const Mask meets = simd::And(simd::Less(low, reach), simd::Less(-reach, high));
+    bits = simd::ShiftLeft<4>(bits) | simd::SelectOrZero(meets, span);
   }
-  for (int j = 0; j < chunk.count; ++j) masks[j] = static_cast<uint16_t>(bits[j]);
+  alignas(64) int32_t lanes[16];
+  simd::Store(lanes, bits);
+  for (int j = 0; j < chunk.count; ++j) masks[j] = static_cast<uint16_t>(lanes[j]);
 }
 
 uint32_t AliveBlocks(const F32* transmittance) {
@@ -127,7 +165,7 @@ void BuildWorkList(const Chunk& chunk, const uint16_t* masks, uint32_t alive, Wo
   for (int j = 0; j < chunk.count; ++j) {
     work.begin[j] = count;
     const uint32_t mask = masks[j] & alive;
-#if COLOR3D_AVX512
+#if HWY_TARGET == HWY_AVX3
     const __m512i first = _mm512_set1_epi32(16 * j);
     const __m512i blocks = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     _mm512_storeu_si512(
@@ -152,8 +190,7 @@ struct Offsets {
 };
 
 void ComputeOffsets(const Chunk& chunk, const Tile& tile, Offsets& o) {
-  const F32 block_x = {0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12, 0, 4, 8, 12};
-  const F32 block_y = {0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12};
+  const F32 block_x = LaneX() * 4.0f, block_y = LaneY() * 4.0f;
   for (int j = 0; j < chunk.count; ++j) {
     const F32 slope = Broadcast(chunk.column[kSlope][j]);
     const F32 dy = block_y + ((static_cast<float>(tile.y0) + 0.5f) - chunk.column[kV][j]);
@@ -165,16 +202,10 @@ void ComputeOffsets(const Chunk& chunk, const Tile& tile, Offsets& o) {
 }
 
 template <int kChannels>
-void ForwardTile(const SplatBuffer& splats,
-                 const TileLists& lists,
-                 const float* background,
-                 const Tile& tile,
-                 PlaneBuffer& color,
-                 PlaneBuffer* transmittance,
-                 uint16_t* block_masks) {
+void ForwardTile(const ForwardJob& job, const Tile& tile) {
   F32 t[kBlocks], sum[kChannels][kBlocks];
   for (int b = 0; b < kBlocks; ++b) {
-    t[b] = InitialTransmittance(color.width, color.height, tile, b);
+    t[b] = InitialTransmittance(job.color.width, job.color.height, tile, b);
     for (int c = 0; c < kChannels; ++c) sum[c][b] = Broadcast(0.0f);
   }
   Chunk chunk;
@@ -184,9 +215,9 @@ void ForwardTile(const SplatBuffer& splats,
     const int count = static_cast<int>(std::min<uint32_t>(16, tile.end - begin));
     const uint32_t alive = AliveBlocks(t);
     if (alive == 0) break;
-    LoadChunk<kChannels>(splats, lists.gaussian.data() + begin, count, chunk);
-    BlockMasks(chunk, tile, block_masks + begin);
-    BuildWorkList(chunk, block_masks + begin, alive, work);
+    LoadChunk<kChannels>(job.splats, job.lists.gaussian.data() + begin, count, chunk);
+    BlockMasks(chunk, tile, job.block_masks + begin);
+    BuildWorkList(chunk, job.block_masks + begin, alive, work);
     ComputeOffsets(chunk, tile, offsets);
     for (int k = 0; k < work.begin[count]; ++k) {
       const int j = work.item[k] >> 4, b = work.item[k] & 15;
@@ -207,9 +238,9 @@ void ForwardTile(const SplatBuffer& splats,
   }
   for (int b = 0; b < kBlocks; ++b) {
     for (int c = 0; c < kChannels; ++c) {
-      StoreBlock(color, c, tile, b, sum[c][b] + t[b] * background[c]);
+      StoreBlock(job.color, c, tile, b, sum[c][b] + t[b] * job.background[c]);
     }
-    if (transmittance != nullptr) StoreBlock(*transmittance, 0, tile, b, t[b]);
+    if (job.transmittance != nullptr) StoreBlock(*job.transmittance, 0, tile, b, t[b]);
   }
 }
 
@@ -241,7 +272,8 @@ inline void BackwardEntry(const Chunk& chunk,
                           BackwardPixels<kChannels>& pixels,
                           float* out) {
   constexpr int kRow = SplatRowFloats(kChannels);
-  F32 w0 = {}, we1 = {}, wy1 = {}, wee = {}, wey = {}, wyy = {}, wc[kChannels] = {};
+  F32 w0 = simd::Zero(), we1 = w0, wy1 = w0, wee = w0, wey = w0, wyy = w0, wc[kChannels];
+  for (int c = 0; c < kChannels; ++c) wc[c] = simd::Zero();
   const F32 inv_x = Broadcast(chunk.column[kInvX][j]), inv_y = Broadcast(chunk.column[kInvY][j]);
   for (int k = work.begin[j]; k < work.begin[j + 1]; ++k) {
     const int b = work.item[k] & 15;
@@ -284,15 +316,9 @@ inline void BackwardEntry(const Chunk& chunk,
 }
 
 template <int kChannels>
-void BackwardTile(const SplatBuffer& splats,
-                  const TileLists& lists,
-                  const uint16_t* block_masks,
-                  const PlaneBuffer& color,
-                  const PlaneBuffer& d_color,
-                  const Tile& tile,
-                  float* pair_gradient) {
+void BackwardTile(const BackwardJob& job, const Tile& tile) {
   constexpr int kRow = SplatRowFloats(kChannels);
-  BackwardPixels<kChannels> pixels(color, d_color, tile);
+  BackwardPixels<kChannels> pixels(job.color, job.d_color, tile);
   Chunk chunk;
   WorkList work;
   Offsets offsets;
@@ -301,8 +327,8 @@ void BackwardTile(const SplatBuffer& splats,
     const int count = static_cast<int>(std::min<uint32_t>(16, tile.end - begin));
     const uint32_t alive = AliveBlocks(pixels.t);
     if (alive == 0) break;
-    LoadChunk<kChannels>(splats, lists.gaussian.data() + begin, count, chunk);
-    BuildWorkList(chunk, block_masks + begin, alive, work);
+    LoadChunk<kChannels>(job.splats, job.lists.gaussian.data() + begin, count, chunk);
+    BuildWorkList(chunk, job.block_masks + begin, alive, work);
     ComputeOffsets(chunk, tile, offsets);
     for (int j = 0; j < count; ++j) {
       BackwardEntry(chunk,
@@ -310,44 +336,51 @@ void BackwardTile(const SplatBuffer& splats,
                     work,
                     j,
                     pixels,
-                    pair_gradient + static_cast<size_t>(lists.pair[begin + j]) * kRow);
+                    job.pair_gradient + static_cast<size_t>(job.lists.pair[begin + j]) * kRow);
     }
   }
   // Entries behind the last visible surface.
   for (; begin < tile.end; ++begin) {
-    std::fill_n(pair_gradient + static_cast<size_t>(lists.pair[begin]) * kRow, kRow, 0.0f);
+    std::fill_n(job.pair_gradient + static_cast<size_t>(job.lists.pair[begin]) * kRow, kRow, 0.0f);
   }
 }
 
-template <int kChannels>
-void ForwardTiles(const SplatBuffer& splats,
-                  const TileLists& lists,
-                  const float* background,
-                  ThreadPool& pool,
-                  PlaneBuffer& color,
-                  PlaneBuffer* transmittance,
-                  uint16_t* block_masks) {
-  pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
-    ForwardTile<kChannels>(
-        splats, lists, background, TileAt(lists, index), color, transmittance, block_masks);
-  });
+void ForwardTileAt(const ForwardJob& job, int64_t index) {
+  const Tile tile = TileAt(job.lists, index);
+  switch (job.splats.channels) {
+    case 1:
+      return ForwardTile<1>(job, tile);
+    case 2:
+      return ForwardTile<2>(job, tile);
+    case 3:
+      return ForwardTile<3>(job, tile);
+    default:
+      return ForwardTile<4>(job, tile);
+  }
 }
 
-template <int kChannels>
-void BackwardTiles(const SplatBuffer& splats,
-                   const TileLists& lists,
-                   const uint16_t* block_masks,
-                   const PlaneBuffer& color,
-                   const PlaneBuffer& d_color,
-                   ThreadPool& pool,
-                   float* pair_gradient) {
-  pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
-    const simd::ScopedFlushToZero flush;
-    BackwardTile<kChannels>(
-        splats, lists, block_masks, color, d_color, TileAt(lists, index), pair_gradient);
-  });
+void BackwardTileAt(const BackwardJob& job, int64_t index) {
+  const Tile tile = TileAt(job.lists, index);
+  switch (job.splats.channels) {
+    case 1:
+      return BackwardTile<1>(job, tile);
+    case 2:
+      return BackwardTile<2>(job, tile);
+    default:
+      return BackwardTile<3>(job, tile);
+  }
 }
 
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace color3d {
+namespace {
+HWY_EXPORT(ForwardTileAt);
+HWY_EXPORT(BackwardTileAt);
 }  // namespace
 
 void RasterizeForward(const SplatBuffer& splats,
@@ -358,17 +391,9 @@ void RasterizeForward(const SplatBuffer& splats,
                       PlaneBuffer* transmittance,
                       std::vector<uint16_t>& block_masks) {
   block_masks.resize(lists.pair_count() + 16);
-  uint16_t* masks = block_masks.data();
-  switch (splats.channels) {
-    case 1:
-      return ForwardTiles<1>(splats, lists, background, pool, color, transmittance, masks);
-    case 2:
-      return ForwardTiles<2>(splats, lists, background, pool, color, transmittance, masks);
-    case 3:
-      return ForwardTiles<3>(splats, lists, background, pool, color, transmittance, masks);
-    default:
-      return ForwardTiles<4>(splats, lists, background, pool, color, transmittance, masks);
-  }
+  const ForwardJob job{splats, lists, background, color, transmittance, block_masks.data()};
+  const auto forward_tile = &COLOR3D_KERNEL(ForwardTileAt);
+  pool.ForEach(lists.tile_count(), [&](int64_t index, int) { forward_tile(job, index); });
 }
 
 void RasterizeBackward(const SplatBuffer& splats,
@@ -379,16 +404,13 @@ void RasterizeBackward(const SplatBuffer& splats,
                        ThreadPool& pool,
                        AlignedFloats& pair_gradient) {
   pair_gradient.resize(lists.pair_count() * splats.row_floats);
-  const uint16_t* masks = block_masks.data();
-  float* out = pair_gradient.data();
-  switch (splats.channels) {
-    case 1:
-      return BackwardTiles<1>(splats, lists, masks, color, d_color, pool, out);
-    case 2:
-      return BackwardTiles<2>(splats, lists, masks, color, d_color, pool, out);
-    default:
-      return BackwardTiles<3>(splats, lists, masks, color, d_color, pool, out);
-  }
+  const BackwardJob job{splats, lists, block_masks.data(), color, d_color, pair_gradient.data()};
+  const auto backward_tile = &COLOR3D_KERNEL(BackwardTileAt);
+  pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
+    const ScopedFlushToZero flush;
+    backward_tile(job, index);
+  });
 }
 
 }  // namespace color3d
+#endif  // HWY_ONCE

@@ -1,11 +1,19 @@
 // The chain from a Gaussian's parameters to its 2D conic for sixteen Gaussians, shared by the
-// forward and the backward pass (which recomputes it: cheaper than memory). Internal.
-#pragma once
+// forward and the backward pass (which recomputes it: cheaper than memory). Internal to the
+// kernels; compiled once per instruction set.
+#if defined(COLOR3D_SPLAT_PROJECTION_MATH_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef COLOR3D_SPLAT_PROJECTION_MATH_INL
+#undef COLOR3D_SPLAT_PROJECTION_MATH_INL
+#else
+#define COLOR3D_SPLAT_PROJECTION_MATH_INL
+#endif
 
 #include "core/splat/projection.h"
-#include "core/splat/simd.h"
+#include "core/splat/simd-inl.h"
 
-namespace color3d::splat_internal {
+HWY_BEFORE_NAMESPACE();
+namespace color3d {
+namespace HWY_NAMESPACE {
 
 using simd::Broadcast;
 using simd::F32;
@@ -36,7 +44,7 @@ struct Projected {
 };
 
 // R from a unit quaternion (w, x, y, z), row-major.
-inline void RotationFromQuaternion(const F32* q, F32* r) {
+HWY_INLINE void RotationFromQuaternion(const F32* q, F32* r) {
   const F32 w = q[0], x = q[1], y = q[2], z = q[3];
   r[0] = 1.0f - 2.0f * (y * y + z * z);
   r[1] = 2.0f * (x * y - w * z);
@@ -49,7 +57,7 @@ inline void RotationFromQuaternion(const F32* q, F32* r) {
   r[8] = 1.0f - 2.0f * (x * x + y * y);
 }
 
-inline void LoadShape(const ParameterBlock& p, int64_t i, Projected& g) {
+HWY_INLINE void LoadShape(const ParameterBlock& p, int64_t i, Projected& g) {
   F32 norm2 = Broadcast(1e-24f);
   for (int k = 0; k < 4; ++k) {
     g.q[k] = simd::Load(p.Row(kRotationRow + k) + i);
@@ -67,14 +75,17 @@ inline void LoadShape(const ParameterBlock& p, int64_t i, Projected& g) {
 }
 
 // log2 sigmoid(x) = -log2(1 + exp(-x)); exact enough where alpha >= 1/255 can happen.
-inline void LoadOpacity(const ParameterBlock& p, int64_t i, Projected& g) {
+HWY_INLINE void LoadOpacity(const ParameterBlock& p, int64_t i, Projected& g) {
   const F32 logit = simd::Load(p.Row(kOpacityRow) + i);
   const F32 e = simd::Exp2(simd::Clamp(logit * -kLog2E, Broadcast(-100.0f), Broadcast(100.0f)));
   g.log2_opacity = -simd::Log2(1.0f + e);
   g.one_minus_opacity = e / (1.0f + e);
 }
 
-inline void LoadCenter(const ParameterBlock& p, const RasterCamera& c, int64_t i, Projected& g) {
+HWY_INLINE void LoadCenter(const ParameterBlock& p,
+                           const RasterCamera& c,
+                           int64_t i,
+                           Projected& g) {
   const F32 wx = simd::Load(p.Row(kPositionRow) + i);
   const F32 wy = simd::Load(p.Row(kPositionRow + 1) + i);
   const F32 wz = simd::Load(p.Row(kPositionRow + 2) + i);
@@ -101,7 +112,7 @@ inline void LoadCenter(const ParameterBlock& p, const RasterCamera& c, int64_t i
 }
 
 // cov = M M' + 0.3 I with M = J W R S (2x3); det from the Lagrange identity, all terms positive.
-inline void ComputeConic(const RasterCamera& c, Projected& g) {
+HWY_INLINE void ComputeConic(const RasterCamera& c, Projected& g) {
   const float* w = c.rotation;
   const F32 jx = c.fx * g.inv_z, jy = c.fy * g.inv_z;
   for (int k = 0; k < 3; ++k) {
@@ -137,7 +148,7 @@ inline void ComputeConic(const RasterCamera& c, Projected& g) {
 }
 
 // Unit direction from the camera to the Gaussian, and 1 / distance.
-inline void ViewDirection(
+HWY_INLINE void ViewDirection(
     const ParameterBlock& p, const RasterCamera& c, int64_t i, F32* direction, F32* inv_distance) {
   F32 n2 = Broadcast(1e-24f);
   for (int k = 0; k < 3; ++k) {
@@ -148,4 +159,8 @@ inline void ViewDirection(
   for (int k = 0; k < 3; ++k) direction[k] = direction[k] * *inv_distance;
 }
 
-}  // namespace color3d::splat_internal
+}  // namespace HWY_NAMESPACE
+}  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#endif  // COLOR3D_SPLAT_PROJECTION_MATH_INL

@@ -1,0 +1,1 @@
+int placeholder_for_chroma_test = 0;
