@@ -13,9 +13,9 @@
 namespace color3d {
 namespace {
 
-constexpr double kFirstFloor = 1e-9;
-// Scale of residuals below which |r| becomes quadratic: half a step of 8-bit chroma.
-constexpr double kFloorLab = 0.25;
+// Of the ordered-subsets sweeps: the first step, and the factor from sweep to sweep. Measured.
+constexpr double kFirstRelaxation = 1.0;
+constexpr double kRelaxationDecay = 0.9;
 
 class ChromaSolver {
  public:
@@ -30,33 +30,38 @@ class ChromaSolver {
 
   void Solve() {
     Resume();
-    std::fprintf(stderr,
-                 "DBG kept %lld bytes, %s\n",
-                 (long long)system_.kept_bytes(),
-                 system_.Debug().c_str());
-    const char* e = getenv("SWEEP"); 
-    const double relax0 = e ? atof(e) : 1.0; const double decay = getenv("DECAY") ? atof(getenv("DECAY")) : 0.7;
-    double relax = relax0;
-    for (int s = 0; s < run_.options.sweeps; ++s) {
-      RobustWeights robust;
-      robust.scale = 4.0 / 255.0; if (getenv("SCALE")) robust.scale = atof(getenv("SCALE")) / 255.0;
-      robust.floor = kFloorLab / 255.0 / robust.scale; if (getenv("FLOOR")) robust.floor=atof(getenv("FLOOR"));
-      system_.Sweep(x_, robust, relax, 1.0 / run_.options.tikhonov_rest, seen_, run_.cancel);
-      relax *= decay;
-      ToParameters();
-      run_.Snapshot(s + 1, parameters_);
+    while (position_.sweep < run_.options.sweeps && !Ended()) {
+      const double relaxation =
+          kFirstRelaxation * std::pow(kRelaxationDecay, static_cast<double>(position_.sweep));
+      const double l1 = system_.Sweep(
+          Robust(), relaxation, 1.0 / run_.options.tikhonov_rest, seen_, run_.cancel, x_);
+      ReportL1(l1);
+      ++position_.sweep;
+      ++position_.iteration;
+      EndRound();
     }
-    if (position_.level == ChromaLevel::kCoarse) SolveLevel(run_.options.coarse_rounds);
-    if (position_.level == ChromaLevel::kFine) SolveLevel(run_.options.rounds);
+    while (position_.round < run_.options.rounds && !Ended()) {
+      system_.Reweight(x_, Robust(), run_.cancel, residuals_);
+      ReportL1(residuals_.mean_l1);
+      const double before = position_.last_l1;
+      position_.last_l1 = residuals_.mean_l1;
+      if (position_.round > 0 &&
+          before - residuals_.mean_l1 < run_.options.objective_tolerance * before) {
+        break;
+      }
+      InvertBlocks();
+      Iterate();
+      ++position_.round;
+      EndRound();
+    }
   }
 
  private:
   struct Position {
-    ChromaLevel level = ChromaLevel::kCoarse;
+    int sweep = 0;
     int round = 0;
-    int64_t iteration = 0;
-    double scale = 0.0;    // of residuals, 0: not known yet
-    double last_l1 = 0.0;  // of this level's round before
+    int64_t iteration = 0;  // passes over all views
+    double last_l1 = 0.0;   // of the round before
     double earlier_seconds = 0.0;
   };
   using Pair = std::array<double, 2>;  // of a', b'
@@ -90,34 +95,23 @@ class ChromaSolver {
     }
   }
 
-  // One reweighting and a few steps of conjugate gradients a round.
-  void SolveLevel(int rounds) {
-    const bool fine = position_.level == ChromaLevel::kFine;
-    while (position_.round < rounds && !Ended()) {
-      RobustWeights robust;
-      robust.on = position_.scale > 0.0;
-      robust.scale = robust.on ? position_.scale : 1.0;
-      robust.floor = kFloorLab / 255.0 / robust.scale;
-      system_.Reweight(position_.level, x_, robust, run_.cancel, residuals_);
-      if (position_.scale == 0.0) position_.scale = std::max(residuals_.mean_l1, kFirstFloor);
-      if (fine) Report();
-      const double before = position_.last_l1;
-      position_.last_l1 = residuals_.mean_l1;
-      if (position_.round > 1 &&
-          before - residuals_.mean_l1 < run_.options.objective_tolerance * before) {
-        break;
-      }
-      InvertBlocks();
-      Iterate();
-      ToParameters();
-      ++position_.round;
-      run_.Snapshot(position_.iteration, parameters_);
-      Save();
-    }
-    if (fine || Ended()) return;
-    position_.level = ChromaLevel::kFine;
-    position_.round = 0;
-    position_.last_l1 = 0.0;
+  RobustWeights Robust() const {
+    RobustWeights robust;
+    robust.on = run_.options.robust;
+    return robust;
+  }
+
+  void ReportL1(double mean_l1) {
+    run_.progress.OnError(position_.iteration, "train_l1_ab", 255.0 * mean_l1);
+    run_.progress.OnProgress(position_.iteration,
+                             run_.options.iterations,
+                             "chroma on " + std::to_string(system_.count()) + " Gaussians");
+  }
+
+  void EndRound() {
+    ToParameters();
+    run_.Snapshot(position_.iteration, parameters_);
+    Save();
   }
 
   double Pull(int k) const {
@@ -183,7 +177,7 @@ class ChromaSolver {
     const double stop = run_.options.residual_tolerance * run_.options.residual_tolerance;
     for (int step = 0; step < run_.options.steps_per_round && !Ended(); ++step) {
       if (!(rho[0] > stop * start[0]) && !(rho[1] > stop * start[1])) break;
-      system_.Multiply(position_.level, p, run_.cancel, q);
+      system_.Multiply(p, run_.cancel, q);
       Pair curvature = {0.0, 0.0}, alpha, beta;
       for (size_t j = 0; j < size; ++j) {
         q[j] += Pull(static_cast<int>(j / 2 % n)) * p[j];
@@ -201,14 +195,7 @@ class ChromaSolver {
       for (size_t j = 0; j < size; ++j) p[j] = z[j] + beta[j % 2] * p[j];
       rho = next;
       ++position_.iteration;
-      run_.progress.OnProgress(position_.iteration,
-                               run_.options.iterations,
-                               "chroma on " + std::to_string(system_.count()) + " Gaussians");
     }
-  }
-
-  void Report() {
-    run_.progress.OnError(position_.iteration, "train_l1_ab", 255.0 * residuals_.mean_l1);
   }
 
   std::string Fingerprint() const {
@@ -216,14 +203,15 @@ class ChromaSolver {
     char text[256];
     std::snprintf(text,
                   sizeof(text),
-                  "chroma cg %d %d %g %g %g %g %d %d %d %zu %lld",
+                  "chroma cg %d %d %g %g %g %g %d %d %d %d %zu %lld",
                   o.iterations,
                   o.chroma_sh_degree,
                   o.residual_tolerance,
                   o.objective_tolerance,
                   o.tikhonov,
                   o.tikhonov_rest,
-                  o.coarse_rounds,
+                  o.robust ? 1 : 0,
+                  o.sweeps,
                   o.rounds,
                   o.steps_per_round,
                   run_.problem.training.size(),
@@ -231,14 +219,13 @@ class ChromaSolver {
     return text;
   }
 
-  // Between rounds only. `order` carries the level and the round; the errors the rest.
+  // Between rounds only. `order` carries the sweeps and rounds that are done.
   void Save() {
     if (!run_.checkpoints.WantsSave()) return;
     TrainingState state;
     state.parameters = parameters_.block;
     state.iteration = position_.iteration;
-    state.order = {static_cast<int32_t>(position_.level), position_.round};
-    state.rate_scale = position_.scale;
+    state.order = {position_.sweep, position_.round};
     state.mean_error = position_.last_l1;
     state.elapsed_seconds = Seconds();
     run_.checkpoints.Save(SerializeTrainingState(state, Fingerprint()));
@@ -257,10 +244,9 @@ class ChromaSolver {
     }
     parameters_.block = state.parameters;
     x_ = FromParameters();
-    position_.level = static_cast<ChromaLevel>(state.order[0]);
+    position_.sweep = state.order[0];
     position_.round = state.order[1];
     position_.iteration = state.iteration;
-    position_.scale = state.rate_scale;
     position_.last_l1 = state.mean_error;
     position_.earlier_seconds = state.elapsed_seconds;
   }

@@ -9,7 +9,43 @@
 namespace color3d {
 namespace {
 
-constexpr int BlocksOf(ChromaLevel level) { return level == ChromaLevel::kFine ? kFineBlocks : 1; }
+constexpr int kTileFloats = 2 * kTilePixels;  // of a tile's picture
+
+// Copies a tile's targets and weights; pixels outside, and those of weight 0, get zeros.
+void LoadTile(
+    const PlaneBuffer& ab, const PlaneBuffer& weight, int x0, int y0, float* target, float* mask) {
+  for (int b = 0; b < kTileBlocks; ++b) {
+    for (int lane = 0; lane < kBlockPixels; ++lane) {
+      const int x = x0 + PixelX(b, lane), y = y0 + PixelY(b, lane);
+      const bool inside = x < ab.width && y < ab.height;
+      const float w = inside ? weight.Row(0, y)[x] : 0.0f;
+      float* t = target + 2 * kBlockPixels * b + lane;
+      t[0] = w > 0.0f ? ab.Row(0, y)[x] : 0.0f;
+      t[kBlockPixels] = w > 0.0f ? ab.Row(1, y)[x] : 0.0f;
+      mask[kBlockPixels * b + lane] = w > 0.0f ? w : 0.0f;
+    }
+  }
+}
+
+// D of a tile from the residuals target - picture, which become `picture`. Returns the sums of
+// weight * |residual| and of the weights.
+std::array<float, 2> WeighTile(
+    const RobustWeights& robust, const float* target, const float* mask, float* picture, float* d) {
+  const float scale = static_cast<float>(robust.scale), floor = static_cast<float>(robust.floor);
+  float l1 = 0.0f, area = 0.0f;
+  for (int b = 0; b < 2 * kTileBlocks; ++b) {
+    const float* m = mask + b / 2 * kBlockPixels;
+    for (int lane = 0; lane < kBlockPixels; ++lane) {
+      const int i = b * kBlockPixels + lane;
+      const float r = target[i] - picture[i];
+      l1 += m[lane] * std::abs(r);
+      area += m[lane];
+      d[i] = robust.on ? m[lane] * scale / std::max(std::abs(r), floor) : m[lane];
+      picture[i] = r;
+    }
+  }
+  return {l1, area};
+}
 
 }  // namespace
 
@@ -17,60 +53,14 @@ constexpr int BlocksOf(ChromaLevel level) { return level == ChromaLevel::kFine ?
 struct ChromaSystem::View {
   RasterCamera camera;
   int tiles = 0;
-  struct Cells {
-    bool kept = false;
-    std::vector<TileWeights> weights;  // per tile, when kept
-    AlignedFloats target, mask, d;
-  };
-  Cells level[2];
-  Cells& At(ChromaLevel l) { return level[static_cast<int>(l)]; }
+  bool kept = false;
+  std::vector<TileWeights> weights;  // per tile, when kept
+  AlignedFloats target, mask, d;
 
-  void LoadPixels(const PlaneBuffer& ab, const PlaneBuffer& weight, int tiles_x);
-  void Coarsen();
+  float* Target(int tile) { return target.data() + static_cast<size_t>(tile) * kTileFloats; }
+  float* Mask(int tile) { return mask.data() + static_cast<size_t>(tile) * kTilePixels; }
+  float* D(int tile) { return d.data() + static_cast<size_t>(tile) * kTileFloats; }
 };
-
-void ChromaSystem::View::LoadPixels(const PlaneBuffer& ab, const PlaneBuffer& weight, int tiles_x) {
-  Cells& fine = At(ChromaLevel::kFine);
-  fine.target.assign(static_cast<size_t>(tiles) * 2 * kTilePixels, 0.0f);
-  fine.mask.assign(static_cast<size_t>(tiles) * kTilePixels, 0.0f);
-  for (int tile = 0; tile < tiles; ++tile) {
-    const int x0 = tile % tiles_x * kTileSide, y0 = tile / tiles_x * kTileSide;
-    for (int i = 0; i < kTilePixels; ++i) {
-      const int b = i / kBlockCells, lane = i % kBlockCells;
-      const int x = x0 + FineX(b, lane), y = y0 + FineY(b, lane);
-      if (x >= ab.width || y >= ab.height) continue;
-      const float w = weight.Row(0, y)[x];
-      if (w == 0.0f) continue;
-      float* t = fine.target.data() + 2 * (static_cast<size_t>(tile) * kTilePixels) +
-                 2 * kBlockCells * b + lane;
-      t[0] = ab.Row(0, y)[x];
-      t[kBlockCells] = ab.Row(1, y)[x];
-      fine.mask[static_cast<size_t>(tile) * kTilePixels + i] = w;
-    }
-  }
-}
-
-void ChromaSystem::View::Coarsen() {
-  const Cells& fine = At(ChromaLevel::kFine);
-  Cells& coarse = At(ChromaLevel::kCoarse);
-  coarse.target.assign(static_cast<size_t>(tiles) * 2 * kBlockCells, 0.0f);
-  coarse.mask.assign(static_cast<size_t>(tiles) * kBlockCells, 0.0f);
-  for (size_t block = 0; block < static_cast<size_t>(tiles) * kFineBlocks; ++block) {
-    const float* mask = fine.mask.data() + kBlockCells * block;
-    const float* target = fine.target.data() + 2 * kBlockCells * block;
-    float total = 0.0f, a = 0.0f, b = 0.0f;
-    for (int lane = 0; lane < kBlockCells; ++lane) {
-      total += mask[lane];
-      a += mask[lane] * target[lane];
-      b += mask[lane] * target[kBlockCells + lane];
-    }
-    if (!(total > 0.0f)) continue;
-    const size_t tile = block / kFineBlocks, cell = block % kFineBlocks;
-    coarse.mask[kBlockCells * tile + cell] = total;
-    coarse.target[2 * kBlockCells * tile + cell] = a / total;
-    coarse.target[2 * kBlockCells * tile + kBlockCells + cell] = b / total;
-  }
-}
 
 ChromaSystem::ChromaSystem(const ParameterBlock& parameters,
                            const ColorSpec& color,
@@ -83,29 +73,12 @@ ChromaSystem::ChromaSystem(const ParameterBlock& parameters,
       pool_(pool) {
   seen_weight_.assign(count(), 0.0);
   target_sum_.assign(2 * count(), 0.0);
+  pixel_sums_.resize(pool.thread_count());
 }
 
 ChromaSystem::~ChromaSystem() = default;
-std::string ChromaSystem::Debug() const {
-  size_t e[2] = {}, it[2] = {};
-  for (auto& v : views_)
-    for (int l = 0; l < 2; ++l)
-      for (auto& w : v->level[l].weights) {
-        e[l] += w.gaussian.size();
-        it[l] += w.items.size();
-      }
-  return std::to_string(views_.size()) + " views, coarse entries " +
-         std::to_string(e[0] / views_.size()) + " fine " + std::to_string(e[1] / views_.size()) +
-         " items " + std::to_string(it[1] / views_.size());
-}
 
-int ChromaSystem::kept_views(ChromaLevel level) const {
-  int kept = 0;
-  for (const auto& view : views_) kept += view->At(level).kept ? 1 : 0;
-  return kept;
-}
-
-void ChromaSystem::ResetSums(std::vector<AlignedFloats>& sums) const {
+void ChromaSystem::ResetSums(Sums& sums) const {
   sums.resize(pool_.thread_count());
   for (AlignedFloats& s : sums) s.assign(2 * static_cast<size_t>(count()), 0.0f);
 }
@@ -123,79 +96,60 @@ void ChromaSystem::AddView(const RasterCamera& camera,
   view->camera = camera;
   BinView(camera);
   view->tiles = lists_.tile_count();
-  view->LoadPixels(ab, weight, lists_.tiles_x);
-  view->Coarsen();
-  View::Cells& fine = view->At(ChromaLevel::kFine);
-  View::Cells& coarse = view->At(ChromaLevel::kCoarse);
-  fine.weights.resize(keep ? view->tiles : 0);
-  coarse.weights.resize(keep ? view->tiles : 0);
+  view->target.resize(static_cast<size_t>(view->tiles) * kTileFloats);
+  view->mask.resize(static_cast<size_t>(view->tiles) * kTilePixels);
+  view->kept = keep && kept_bytes_ < budget_bytes_;
+  if (view->kept) view->weights.resize(view->tiles);
   ResetSums(sums_);
   ResetSums(right_);
-  const int64_t threads = pool_.thread_count();
+  const int threads = pool_.thread_count();
   pool_.ForRanges(threads, [&](int64_t thread, int64_t, int) {
-    TileWeights scratch;
-    float picture[2 * kTilePixels], ones[2 * kTilePixels];
-    for (int tile = static_cast<int>(thread); tile < view->tiles;
-         tile += static_cast<int>(threads)) {
-      TileWeights& w = keep ? fine.weights[tile] : scratch;
+    TileWeights w;
+    alignas(64) float picture[kTileFloats], ones[kTileFloats];
+    for (int tile = static_cast<int>(thread); tile < view->tiles; tile += threads) {
+      const float* target = view->Target(tile);
+      const float* mask = view->Mask(tile);
+      LoadTile(ab,
+               weight,
+               tile % lists_.tiles_x * kTileSide,
+               tile / lists_.tiles_x * kTileSide,
+               view->Target(tile),
+               view->Mask(tile));
       BuildTileWeights(splats_, lists_, tile, camera.width, camera.height, w);
-      const float* mask = fine.mask.data() + static_cast<size_t>(tile) * kTilePixels;
-      const float* target = fine.target.data() + static_cast<size_t>(tile) * 2 * kTilePixels;
-      for (int i = 0; i < 2 * kTilePixels; ++i) {
-        const float m = mask[i / (2 * kBlockCells) * kBlockCells + i % kBlockCells];
-        picture[i] = m * target[i];
-        ones[i] = m;
+      for (int i = 0; i < kTileFloats; ++i) {
+        ones[i] = mask[i / (2 * kBlockPixels) * kBlockPixels + i % kBlockPixels];
+        picture[i] = ones[i] * target[i];
       }
       TileAdjoint(w, picture, sums_[thread].data());
       TileAdjoint(w, ones, right_[thread].data());
-      if (keep) CoarsenTileWeights(w, mask, coarse.weights[tile]);
+      if (view->kept) view->weights[tile] = w;
     }
   });
   for (int64_t i = 0; i < count(); ++i) {
-    for (int64_t t = 0; t < threads; ++t) {
+    for (int t = 0; t < threads; ++t) {
       seen_weight_[i] += right_[t][2 * i];
       target_sum_[2 * i] += sums_[t][2 * i];
       target_sum_[2 * i + 1] += sums_[t][2 * i + 1];
     }
   }
   if (!keep) return;
-  // The coarse level is small and used most: it comes first.
-  for (const ChromaLevel l : {ChromaLevel::kCoarse, ChromaLevel::kFine}) {
-    View::Cells& cells = view->At(l);
-    int64_t bytes = 0;
-    for (const TileWeights& w : cells.weights) bytes += w.Bytes();
-    cells.kept = kept_bytes_ + bytes <= budget_bytes_;
-    if (cells.kept) {
-      kept_bytes_ += bytes;
-      for (TileWeights& w : cells.weights) w.ShrinkToFit();
-    } else {
-      cells.weights = {};
-    }
-    cells.d.assign(cells.target.size(), 0.0f);
-  }
+  for (const TileWeights& w : view->weights) kept_bytes_ += w.Bytes();
+  view->d.assign(view->target.size(), 0.0f);
   views_.push_back(std::move(view));
 }
 
 // visit(tile, thread, weights) for every tile; a thread's tiles are always the same.
 template <class Visitor>
-void ChromaSystem::ForTiles(View& view, ChromaLevel level, const Visitor& visit) {
-  const View::Cells& cells = view.At(level);
-  if (!cells.kept) BinView(view.camera);
-  const int64_t threads = pool_.thread_count();
+void ChromaSystem::ForTiles(View& view, const Visitor& visit) {
+  if (!view.kept) BinView(view.camera);
+  const int threads = pool_.thread_count();
   pool_.ForRanges(threads, [&](int64_t thread, int64_t, int) {
-    TileWeights fine, coarse;
-    for (int tile = static_cast<int>(thread); tile < view.tiles;
-         tile += static_cast<int>(threads)) {
-      if (cells.kept) {
-        visit(tile, static_cast<int>(thread), cells.weights[tile]);
-        continue;
+    TileWeights made;
+    for (int tile = static_cast<int>(thread); tile < view.tiles; tile += threads) {
+      if (!view.kept) {
+        BuildTileWeights(splats_, lists_, tile, view.camera.width, view.camera.height, made);
       }
-      BuildTileWeights(splats_, lists_, tile, view.camera.width, view.camera.height, fine);
-      if (level == ChromaLevel::kCoarse) {
-        const float* mask = view.At(ChromaLevel::kFine).mask.data();
-        CoarsenTileWeights(fine, mask + static_cast<size_t>(tile) * kTilePixels, coarse);
-      }
-      visit(tile, static_cast<int>(thread), level == ChromaLevel::kCoarse ? coarse : fine);
+      visit(tile, static_cast<int>(thread), view.kept ? view.weights[tile] : made);
     }
   });
 }
@@ -228,10 +182,18 @@ void ChromaSystem::SetValues(const RasterCamera& camera, const ChromaVector& x) 
   });
 }
 
+ChromaSystem::PixelSums ChromaSystem::SumOfThreads() {
+  PixelSums sum;
+  for (PixelSums& s : pixel_sums_) {
+    sum.l1 += s.l1;
+    sum.weight += s.weight;
+    s = {};
+  }
+  return sum;
+}
+
 // y += Y^T (sums over the threads), and the sums are zero again.
-void ChromaSystem::AddSums(const RasterCamera& camera,
-                           std::vector<AlignedFloats>& sums,
-                           ChromaVector& y) {
+void ChromaSystem::AddSums(const RasterCamera& camera, Sums& sums, ChromaVector& y) {
   pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
     float basis[kMaxShCoefficients];
     if (coefficients_ == 1) EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
@@ -277,97 +239,6 @@ void ChromaSystem::AddBlocks(const RasterCamera& camera, std::vector<double>& bl
   });
 }
 
-void ChromaSystem::Reweight(ChromaLevel level,
-                            const ChromaVector& x,
-                            const RobustWeights& robust,
-                            const CancellationToken& cancel,
-                            Residuals& out) {
-  const int blocks = BlocksOf(level), cells = blocks * kBlockCells;
-  out.gradient.assign(x.size(), 0.0);
-  out.right.assign(x.size(), 0.0);
-  out.blocks.assign(static_cast<size_t>(count()) * 2 * coefficients_ * coefficients_, 0.0);
-  ResetSums(sums_);
-  ResetSums(squares_);
-  ResetSums(right_);
-  std::vector<double> l1(pool_.thread_count(), 0.0), total(pool_.thread_count(), 0.0);
-  const float inverse_scale = static_cast<float>(1.0 / robust.scale);
-  const float floor = static_cast<float>(robust.floor);
-  for (const auto& view : views_) {
-    cancel.ThrowIfCancelled();
-    SetValues(view->camera, x);
-    View::Cells& c = view->At(level);
-    ForTiles(*view, level, [&](int tile, int thread, const TileWeights& weights) {
-      alignas(64) float picture[2 * kTilePixels], right[2 * kTilePixels];
-      TileForward(weights, blocks, value_.data(), picture);
-      const float* mask = c.mask.data() + static_cast<size_t>(tile) * cells;
-      const float* target = c.target.data() + static_cast<size_t>(tile) * 2 * cells;
-      float* d = c.d.data() + static_cast<size_t>(tile) * 2 * cells;
-      float sum = 0.0f, area = 0.0f;
-      for (int i = 0; i < 2 * cells; ++i) {
-        const float m = mask[i / (2 * kBlockCells) * kBlockCells + i % kBlockCells];
-        const float r = target[i] - picture[i];
-        sum += m * std::abs(r);
-        area += m;
-        d[i] = robust.on ? m / std::max(std::abs(r) * inverse_scale, floor) : m;
-        picture[i] = d[i] * r;
-        right[i] = d[i] * target[i];
-      }
-      l1[thread] += sum;
-      total[thread] += area;
-      TileAdjoint(weights, picture, sums_[thread].data());
-      TileAdjoint(weights, right, right_[thread].data());
-      TileSquares(weights, d, squares_[thread].data());
-    });
-    AddSums(view->camera, sums_, out.gradient);
-    AddSums(view->camera, right_, out.right);
-    AddBlocks(view->camera, out.blocks);
-  }
-  double sum = 0.0, area = 0.0;
-  for (size_t t = 0; t < l1.size(); ++t) {
-    sum += l1[t];
-    area += total[t];
-  }
-  out.mean_l1 = area > 0.0 ? sum / area : 0.0;
-}
-
-void ChromaSystem::Sweep(ChromaVector& x,
-                         const RobustWeights& robust,
-                         double relaxation,
-                         double rest_weight,
-                         const std::vector<char>& seen,
-                         const CancellationToken& cancel) {
-  ResetSums(sums_);
-  ResetSums(right_);
-  const float inverse_scale = static_cast<float>(1.0 / robust.scale);
-  const float floor = static_cast<float>(robust.floor);
-  // The views one after another would drag the colours along the camera's path: a stride that is
-  // coprime to their number visits all of them in mixed order.
-  const size_t n = views_.size();
-  size_t stride = std::max<size_t>(1, static_cast<size_t>(0.618 * static_cast<double>(n)));
-  while (std::gcd(stride, n) != 1) ++stride;
-  for (size_t k = 0; k < n; ++k) {
-    cancel.ThrowIfCancelled();
-    View& view = *views_[k * stride % n];
-    SetValues(view.camera, x);
-    View::Cells& c = view.At(ChromaLevel::kFine);
-    ForTiles(view, ChromaLevel::kFine, [&](int tile, int thread, const TileWeights& weights) {
-      alignas(64) float picture[2 * kTilePixels], d[2 * kTilePixels];
-      TileForward(weights, kFineBlocks, value_.data(), picture);
-      const float* mask = c.mask.data() + static_cast<size_t>(tile) * kTilePixels;
-      const float* target = c.target.data() + static_cast<size_t>(tile) * 2 * kTilePixels;
-      for (int i = 0; i < 2 * kTilePixels; ++i) {
-        const float m = mask[i / (2 * kBlockCells) * kBlockCells + i % kBlockCells];
-        const float r = target[i] - picture[i];
-        d[i] = robust.on ? m / std::max(std::abs(r) * inverse_scale, floor) : m;
-        picture[i] = d[i] * r;
-      }
-      TileAdjoint(weights, picture, sums_[thread].data());
-      TileAdjoint(weights, d, right_[thread].data());
-    });
-    Step(view.camera, relaxation, rest_weight, seen, x);
-  }
-}
-
 // x += relaxation * sums / B, and the sums are zero again.
 void ChromaSystem::Step(const RasterCamera& camera,
                         double relaxation,
@@ -404,28 +275,93 @@ void ChromaSystem::Step(const RasterCamera& camera,
   });
 }
 
-void ChromaSystem::Multiply(ChromaLevel level,
-                            const ChromaVector& x,
-                            const CancellationToken& cancel,
-                            ChromaVector& y) {
-  const int blocks = BlocksOf(level), cells = blocks * kBlockCells;
-  y.assign(x.size(), 0.0);
+double ChromaSystem::Sweep(const RobustWeights& robust,
+                           double relaxation,
+                           double rest_weight,
+                           const std::vector<char>& seen,
+                           const CancellationToken& cancel,
+                           ChromaVector& x) {
   ResetSums(sums_);
-  bool first = true;
+  ResetSums(right_);
+  // Views in the order of a path would drag the colours along it: a stride that is coprime to their
+  // number mixes them.
+  const size_t n = views_.size();
+  size_t stride = std::max<size_t>(1, static_cast<size_t>(0.618 * static_cast<double>(n)));
+  while (std::gcd(stride, n) > 1) ++stride;
+  for (size_t k = 0; k < n; ++k) {
+    cancel.ThrowIfCancelled();
+    View& view = *views_[k * stride % n];
+    SetValues(view.camera, x);
+    ForTiles(view, [&](int tile, int thread, const TileWeights& weights) {
+      alignas(64) float picture[kTileFloats];
+      float* d = view.D(tile);
+      TileForward(weights, value_.data(), picture);
+      const auto [l1, area] = WeighTile(robust, view.Target(tile), view.Mask(tile), picture, d);
+      for (int i = 0; i < kTileFloats; ++i) picture[i] *= d[i];
+      pixel_sums_[thread].l1 += l1;
+      pixel_sums_[thread].weight += area;
+      TileAdjoint(weights, picture, sums_[thread].data());
+      TileAdjoint(weights, d, right_[thread].data());
+    });
+    Step(view.camera, relaxation, rest_weight, seen, x);
+  }
+  return SumOfThreads().Mean();
+}
+
+void ChromaSystem::Reweight(const ChromaVector& x,
+                            const RobustWeights& robust,
+                            const CancellationToken& cancel,
+                            Residuals& out) {
+  out.gradient.assign(x.size(), 0.0);
+  out.right.assign(x.size(), 0.0);
+  out.blocks.assign(static_cast<size_t>(count()) * 2 * coefficients_ * coefficients_, 0.0);
+  ResetSums(sums_);
+  ResetSums(squares_);
+  ResetSums(right_);
   for (const auto& view : views_) {
     cancel.ThrowIfCancelled();
+    SetValues(view->camera, x);
+    ForTiles(*view, [&](int tile, int thread, const TileWeights& weights) {
+      alignas(64) float picture[kTileFloats], right[kTileFloats];
+      const float* target = view->Target(tile);
+      float* d = view->D(tile);
+      TileForward(weights, value_.data(), picture);
+      const auto [l1, area] = WeighTile(robust, target, view->Mask(tile), picture, d);
+      for (int i = 0; i < kTileFloats; ++i) {
+        picture[i] *= d[i];
+        right[i] = d[i] * target[i];
+      }
+      pixel_sums_[thread].l1 += l1;
+      pixel_sums_[thread].weight += area;
+      TileAdjoint(weights, picture, sums_[thread].data());
+      TileAdjoint(weights, right, right_[thread].data());
+      TileSquares(weights, d, squares_[thread].data());
+    });
+    AddSums(view->camera, sums_, out.gradient);
+    AddSums(view->camera, right_, out.right);
+    AddBlocks(view->camera, out.blocks);
+  }
+  out.mean_l1 = SumOfThreads().Mean();
+}
+
+void ChromaSystem::Multiply(const ChromaVector& x,
+                            const CancellationToken& cancel,
+                            ChromaVector& y) {
+  y.assign(x.size(), 0.0);
+  ResetSums(sums_);
+  for (size_t k = 0; k < views_.size(); ++k) {
+    View& view = *views_[k];
+    cancel.ThrowIfCancelled();
     // Values of degree 0 are the same for all views.
-    if (first || coefficients_ > 1) SetValues(view->camera, x);
-    first = false;
-    View::Cells& c = view->At(level);
-    ForTiles(*view, level, [&](int tile, int thread, const TileWeights& weights) {
-      alignas(64) float picture[2 * kTilePixels];
-      TileForward(weights, blocks, value_.data(), picture);
-      const float* d = c.d.data() + static_cast<size_t>(tile) * 2 * cells;
-      for (int i = 0; i < 2 * cells; ++i) picture[i] *= d[i];
+    if (k == 0 || coefficients_ > 1) SetValues(view.camera, x);
+    ForTiles(view, [&](int tile, int thread, const TileWeights& weights) {
+      alignas(64) float picture[kTileFloats];
+      const float* d = view.D(tile);
+      TileForward(weights, value_.data(), picture);
+      for (int i = 0; i < kTileFloats; ++i) picture[i] *= d[i];
       TileAdjoint(weights, picture, sums_[thread].data());
     });
-    AddSums(view->camera, sums_, y);
+    AddSums(view.camera, sums_, y);
   }
 }
 

@@ -10,7 +10,6 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "core/base/cancellation.h"
@@ -25,15 +24,13 @@ namespace color3d {
 // Coefficient k of channel c (0: a', 1: b') of Gaussian i at [(i * coefficients + k) * 2 + c].
 using ChromaVector = std::vector<double>;
 
-// Cells of the equations: single pixels, or means over 4x4 pixels (1/16 of the cost).
-enum class ChromaLevel { kCoarse = 0, kFine = 1 };
-
-// D = weight / max(|residual| / scale, floor) for least absolute residuals by reweighting (Holland
-// & Welsch 1977), or the plain weight.
+// D = weight / max(|residual|, floor) * scale for least absolute residuals by reweighting (Holland
+// & Welsch 1977), or the plain weight. All in units of a' and b'.
 struct RobustWeights {
   bool on = true;
-  double scale = 1.0;   // of residuals, a' units
-  double floor = 0.05;  // of |residual| / scale, > 0
+  double scale = 4.0 / 255.0;
+  double floor =
+      0.25 / 255.0;  // below it |residual| becomes quadratic: half a step of 8-bit chroma
 };
 
 class ChromaSystem {
@@ -55,59 +52,61 @@ class ChromaSystem {
 
   int64_t count() const { return parameters_.count(); }
   int coefficients() const { return coefficients_; }
-  std::string Debug() const;
   int64_t kept_bytes() const { return kept_bytes_; }
-  int views() const { return static_cast<int>(views_.size()); }
-  int kept_views(ChromaLevel level) const;
   // Over all views and pixels: sum of weight w, [i], and of weight w t, [2 i + c].
   const std::vector<double>& seen_weight() const { return seen_weight_; }
   const std::vector<double>& target_sum() const { return target_sum_; }
 
+  // One ordered-subsets sweep: D and a step from each view alone (Andersen & Kak 1984; Hudson &
+  // Larkin 1994). x += relaxation * B^-1 W_v^T D (t - W_v x), with B the larger of the row sums of
+  // W_v^T D W_v and their mean over the views. Quick at first, never exact. Gaussians that are not
+  // `seen` stay; `rest_weight` is the share of coefficients above degree 0. Returns the weighted
+  // mean of |t - W x|, each view before its step.
+  double Sweep(const RobustWeights& robust,
+               double relaxation,
+               double rest_weight,
+               const std::vector<char>& seen,
+               const CancellationToken& cancel,
+               ChromaVector& x);
+
   struct Residuals {
-    double mean_l1 = 0.0;   // weighted mean of |t - W x| over cells and channels, a' units
+    double mean_l1 = 0.0;   // weighted mean of |t - W x| over pixels and channels
     ChromaVector gradient;  // W^T D (t - W x)
     ChromaVector right;     // W^T D t
     // Diagonal blocks of W^T D W, [((i * 2 + c) * K + k) * K + l].
     std::vector<double> blocks;
   };
   // Sets D from the residuals at x.
-  void Reweight(ChromaLevel level,
-                const ChromaVector& x,
+  void Reweight(const ChromaVector& x,
                 const RobustWeights& robust,
                 const CancellationToken& cancel,
                 Residuals& out);
-  // One ordered-subsets sweep on pixels, D and the step from each view alone (Andersen & Kak 1984;
-  // Hudson & Larkin 1994): x += relaxation * B^-1 W_v^T D (t - W_v x) with B the larger of the row
-  // sums of W_v^T D W_v and their mean over the views. Quick at first, never exact. `rest_weight`:
-  // share of coefficients above degree 0.
-  void Sweep(ChromaVector& x,
-             const RobustWeights& robust,
-             double relaxation,
-             double rest_weight,
-             const std::vector<char>& seen,
-             const CancellationToken& cancel);
   // y = W^T D W x.
-  void Multiply(ChromaLevel level,
-                const ChromaVector& x,
-                const CancellationToken& cancel,
-                ChromaVector& y);
+  void Multiply(const ChromaVector& x, const CancellationToken& cancel, ChromaVector& y);
 
  private:
   struct View;
-  using TileVisitor = void (ChromaSystem::*)(View&, int, int, const TileWeights&, int);
+  using Sums = std::vector<AlignedFloats>;  // per thread, two numbers per Gaussian
+  struct PixelSums {
+    double l1 = 0.0;
+    double weight = 0.0;
+    double Mean() const { return weight > 0.0 ? l1 / weight : 0.0; }
+  };
+
   template <class Visitor>
-  void ForTiles(View& view, ChromaLevel level, const Visitor& visit);
+  void ForTiles(View& view, const Visitor& visit);
   void BinView(const RasterCamera& camera);
   void Basis(const RasterCamera& camera, int64_t i, float* basis) const;
   void SetValues(const RasterCamera& camera, const ChromaVector& x);
-  void AddSums(const RasterCamera& camera, std::vector<AlignedFloats>& sums, ChromaVector& y);
+  PixelSums SumOfThreads();
+  void AddSums(const RasterCamera& camera, Sums& sums, ChromaVector& y);
   void AddBlocks(const RasterCamera& camera, std::vector<double>& blocks);
   void Step(const RasterCamera& camera,
             double relaxation,
             double rest_weight,
             const std::vector<char>& seen,
             ChromaVector& x);
-  void ResetSums(std::vector<AlignedFloats>& sums) const;
+  void ResetSums(Sums& sums) const;
 
   const ParameterBlock& parameters_;
   ColorSpec color_;
@@ -121,8 +120,9 @@ class ChromaSystem {
   SplatBuffer splats_;
   TileBinner binner_;
   TileLists lists_;
-  AlignedFloats value_;                                // two per Gaussian, of the view at hand
-  std::vector<AlignedFloats> sums_, squares_, right_;  // per thread, two per Gaussian
+  AlignedFloats value_;  // two per Gaussian, of the view at hand
+  Sums sums_, squares_, right_;
+  std::vector<PixelSums> pixel_sums_;  // per thread
 };
 
 }  // namespace color3d

@@ -17,15 +17,15 @@ namespace HWY_NAMESPACE {
 namespace {
 
 // Sixteen lanes of the compiler's own vectors, split where registers are narrower: simd-inl.h has
-// no 8-bit numbers.
+// no 16-bit numbers.
 using F32 = float __attribute__((vector_size(64)));
 using I32 = int32_t __attribute__((vector_size(64)));
-using U8 = uint8_t __attribute__((vector_size(16)));
+using U16 = uint16_t __attribute__((vector_size(32)));
 
-constexpr float kUnit = 1.0f / 65535.0f / 255.0f;
-// Entries whose weights sum to less than this many pixels are left out: a fifth of the entries of
-// real scenes, a thousandth of their light.
-constexpr float kMinStoredPixels = 0.01f;
+constexpr float kUnit = 1.0f / 65535.0f;
+// Entries whose weights sum to less than this many pixels are left out: a twentieth of the entries
+// of real scenes, 1e-4 of their light.
+constexpr float kMinStoredPixels = 1e-3f;
 constexpr float kLog2MinAlpha = -7.9943534f;
 constexpr float kSlackPx = 0.02f;  // the pixel test itself decides
 
@@ -36,7 +36,7 @@ inline V LoadAs(const T* p) {
   return v;
 }
 inline F32 LoadWeights(const WeightItem& item) {
-  return __builtin_convertvector(__builtin_convertvector(LoadAs<U8>(item.weight), I32), F32);
+  return __builtin_convertvector(__builtin_convertvector(LoadAs<U16>(item.weight), I32), F32);
 }
 inline void Store(float* p, F32 v) { std::memcpy(p, &v, sizeof(v)); }
 
@@ -50,18 +50,6 @@ inline float Sum(F32 v) {
   std::memcpy(q, &a, sizeof(a));
   const Quarter b = q[0] + q[1];
   return (b[0] + b[2]) + (b[1] + b[3]);
-}
-
-inline float Largest(F32 v) {
-  using Half = float __attribute__((vector_size(32)));
-  using Quarter = float __attribute__((vector_size(16)));
-  Half h[2];
-  std::memcpy(h, &v, sizeof(v));
-  const Half a = h[0] > h[1] ? h[0] : h[1];
-  Quarter q[2];
-  std::memcpy(q, &a, sizeof(a));
-  const Quarter b = q[0] > q[1] ? q[0] : q[1];
-  return std::max(std::max(b[0], b[1]), std::max(b[2], b[3]));
 }
 
 // 2^x for x in [-126, 1]: as simd::Exp2.
@@ -107,21 +95,18 @@ Box BoundingBlocks(const float* row, float tile_x, float tile_y) {
 
 // Nothing when all weights are zero.
 inline void AddItem(F32 w, int block, std::vector<WeightItem>& items) {
-  const float most = Largest(w);
-  if (!(most > 0.0f)) return;
+  if (!(Sum(w) > 1.0f / 65535.0f)) return;
   WeightItem item;
-  item.scale = static_cast<uint16_t>(std::min(std::ceil(most * 65535.0f), 65535.0f));
-  const F32 rounded = w * (65535.0f * 255.0f / static_cast<float>(item.scale)) + 0.5f;
-  const U8 q = __builtin_convertvector(__builtin_convertvector(rounded, I32), U8);
+  const U16 q = __builtin_convertvector(__builtin_convertvector(w * 65535.0f + 0.5f, I32), U16);
   std::memcpy(item.weight, &q, sizeof(q));
-  item.block = static_cast<uint16_t>(block);
+  item.block = static_cast<uint32_t>(block);
   items.push_back(item);
 }
 
 bool AnyAlive(const F32* t) {
   F32 most = t[0];
-  for (int b = 1; b < kFineBlocks; ++b) most = most > t[b] ? most : t[b];
-  for (int lane = 0; lane < kBlockCells; ++lane) {
+  for (int b = 1; b < kTileBlocks; ++b) most = most > t[b] ? most : t[b];
+  for (int lane = 0; lane < kBlockPixels; ++lane) {
     if (most[lane] >= kMinTransmittance) return true;
   }
   return false;
@@ -139,8 +124,8 @@ void Build(const SplatBuffer& splats,
   weights.Clear();
   const float x0 = static_cast<float>(tile % lists.tiles_x * kTileSide);
   const float y0 = static_cast<float>(tile / lists.tiles_x * kTileSide);
-  F32 t[kFineBlocks];
-  for (int b = 0; b < kFineBlocks; ++b) {
+  F32 t[kTileBlocks];
+  for (int b = 0; b < kTileBlocks; ++b) {
     const F32 x = lane_x + (x0 + static_cast<float>(b % 4 * 4));
     const F32 y = lane_y + (y0 + static_cast<float>(b / 4 * 4));
     const I32 inside = (x < static_cast<float>(width_px)) & (y < static_cast<float>(height_px));
@@ -153,7 +138,7 @@ void Build(const SplatBuffer& splats,
     const float* row = splats.rows.data() + static_cast<size_t>(gaussian) * splats.row_floats;
     const Box box = BoundingBlocks(row, x0, y0);
     const float inv_x = row[kInvX], slope = row[kSlope], inv_y = row[kInvY];
-    float total = 0.0f;
+    F32 total = zero;
     for (int b = 4 * box.y0; b <= 4 * box.y1; b += 4) {
       for (int i = b + box.x0; i <= b + box.x1; ++i) {
         const F32 dx = lane_x + ((x0 + static_cast<float>(i % 4 * 4) + 0.5f) - row[kU]);
@@ -164,11 +149,11 @@ void Build(const SplatBuffer& splats,
         const F32 alpha = Exp2(live ? exponent : zero - 20.0f);
         const F32 w = live ? (alpha < kMaxAlpha ? alpha : zero + kMaxAlpha) * t[i] : zero;
         t[i] = t[i] - w;
-        total += Sum(w);
+        total += w;
         AddItem(w, i, weights.items);
       }
     }
-    if (!(total >= kMinStoredPixels)) {
+    if (!(Sum(total) >= kMinStoredPixels)) {
       weights.items.resize(weights.first_item.back());
       continue;
     }
@@ -177,29 +162,8 @@ void Build(const SplatBuffer& splats,
   }
 }
 
-void Coarsen(const TileWeights& fine, const float* pixel_weight, TileWeights& coarse) {
-  coarse.Clear();
-  F32 share[kFineBlocks];  // of each pixel in its cell
-  for (int b = 0; b < kFineBlocks; ++b) {
-    const F32 w = LoadAs<F32>(pixel_weight + kBlockCells * b);
-    const float total = Sum(w);
-    share[b] = w * (total > 0.0f ? 1.0f / total : 0.0f);
-  }
-  for (size_t j = 0; j < fine.gaussian.size(); ++j) {
-    alignas(64) float cells[kBlockCells] = {};
-    for (uint32_t k = fine.first_item[j]; k < fine.first_item[j + 1]; ++k) {
-      const WeightItem& item = fine.items[k];
-      cells[item.block] = Sum(LoadWeights(item) * share[item.block]) * item.scale * kUnit;
-    }
-    AddItem(LoadAs<F32>(cells), 0, coarse.items);
-    if (coarse.items.size() == coarse.first_item.back()) continue;
-    coarse.gaussian.push_back(fine.gaussian[j]);
-    coarse.first_item.push_back(static_cast<uint32_t>(coarse.items.size()));
-  }
-}
-
-void Forward(const TileWeights& weights, int blocks, const float* value, float* picture) {
-  std::fill_n(picture, 2 * kBlockCells * blocks, 0.0f);
+void Forward(const TileWeights& weights, const float* value, float* picture) {
+  std::fill_n(picture, 2 * kTilePixels, 0.0f);
   const uint32_t* gaussian = weights.gaussian.data();
   const size_t count = weights.gaussian.size();
   const WeightItem* item = weights.items.data();
@@ -210,10 +174,10 @@ void Forward(const TileWeights& weights, int blocks, const float* value, float* 
     const float a = v[0] * kUnit, b = v[1] * kUnit;
     for (const WeightItem* end = weights.items.data() + weights.first_item[j + 1]; item < end;
          ++item) {
-      const F32 w = LoadWeights(*item) * static_cast<float>(item->scale);
-      float* p = picture + 2 * kBlockCells * item->block;
+      const F32 w = LoadWeights(*item);
+      float* p = picture + 2 * kBlockPixels * item->block;
       Store(p, LoadAs<F32>(p) + w * a);
-      Store(p + kBlockCells, LoadAs<F32>(p + kBlockCells) + w * b);
+      Store(p + kBlockPixels, LoadAs<F32>(p + kBlockPixels) + w * b);
     }
   }
 }
@@ -231,11 +195,11 @@ void Adjoint(const TileWeights& weights, const float* picture, float* sum) {
     F32 a = {}, b = {};
     for (const WeightItem* end = weights.items.data() + weights.first_item[j + 1]; item < end;
          ++item) {
-      F32 w = LoadWeights(*item) * (static_cast<float>(item->scale) * kUnit);
+      F32 w = LoadWeights(*item) * kUnit;
       if (kSquared) w = w * w;
-      const float* p = picture + 2 * kBlockCells * item->block;
+      const float* p = picture + 2 * kBlockPixels * item->block;
       a += w * LoadAs<F32>(p);
-      b += w * LoadAs<F32>(p + kBlockCells);
+      b += w * LoadAs<F32>(p + kBlockPixels);
     }
     float* s = sum + 2 * static_cast<size_t>(gaussian[j]);
     s[0] += Sum(a);
@@ -260,7 +224,6 @@ HWY_AFTER_NAMESPACE();
 namespace color3d {
 namespace {
 HWY_EXPORT(Build);
-HWY_EXPORT(Coarsen);
 HWY_EXPORT(Forward);
 HWY_EXPORT(AdjointOfWeights);
 HWY_EXPORT(AdjointOfSquares);
@@ -270,12 +233,6 @@ void TileWeights::Clear() {
   gaussian.clear();
   first_item.assign(1, 0);
   items.clear();
-}
-
-void TileWeights::ShrinkToFit() {
-  gaussian.shrink_to_fit();
-  first_item.shrink_to_fit();
-  items.shrink_to_fit();
 }
 
 int64_t TileWeights::Bytes() const {
@@ -292,12 +249,8 @@ void BuildTileWeights(const SplatBuffer& splats,
   COLOR3D_KERNEL(Build)(splats, lists, tile, width_px, height_px, weights);
 }
 
-void CoarsenTileWeights(const TileWeights& fine, const float* pixel_weight, TileWeights& coarse) {
-  COLOR3D_KERNEL(Coarsen)(fine, pixel_weight, coarse);
-}
-
-void TileForward(const TileWeights& weights, int blocks, const float* value, float* picture) {
-  COLOR3D_KERNEL(Forward)(weights, blocks, value, picture);
+void TileForward(const TileWeights& weights, const float* value, float* picture) {
+  COLOR3D_KERNEL(Forward)(weights, value, picture);
 }
 
 void TileAdjoint(const TileWeights& weights, const float* picture, float* sum) {

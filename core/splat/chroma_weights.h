@@ -1,12 +1,11 @@
 // Blending weights of one 16x16 tile kept as numbers, so that the chroma solver multiplies with
 // them again and again without projecting, sorting or exponentials: the rows of W in
-// picture = W c. The products are bound by memory, so a weight has 8 bits relative to the largest
-// of its block (errors average out to 1e-3 of a pixel's sum). Both products use the same rounded
-// weights, so W^T D W stays symmetric and positive semidefinite. Internal to the splat module; no
-// Eigen here, because the source is compiled for the machine's instruction set.
+// picture = W c. A weight is a 16-bit fixed-point number (step 1.5e-5). Both products use the same
+// rounded weights, so W^T D W stays symmetric and positive semidefinite. Internal to the splat
+// module; no Eigen here, because the source is compiled once per instruction set.
 //
-// A tile's picture is [block][channel][16]: blocks of 4x4 cells, row by row in the tile, and two
-// channels. Cells are pixels (16 blocks) or, after CoarsenTileWeights, 4x4 pixels (1 block).
+// A tile's picture is [block][channel][16]: blocks of 4x4 pixels, row by row in the tile, and two
+// channels.
 #pragma once
 
 #include <cstdint>
@@ -17,15 +16,14 @@
 
 namespace color3d {
 
-inline constexpr int kFineBlocks = 16;
-inline constexpr int kBlockCells = 16;
-inline constexpr int kTilePixels = kFineBlocks * kBlockCells;
+inline constexpr int kTileBlocks = 16;
+inline constexpr int kBlockPixels = 16;
+inline constexpr int kTilePixels = kTileBlocks * kBlockPixels;
 
-// One block that an entry touches: weight[lane] * scale / (255 * 65535).
+// One block that an entry touches: weight / 65535.
 struct WeightItem {
-  uint8_t weight[kBlockCells];
-  uint16_t scale;
-  uint16_t block;
+  uint16_t weight[kBlockPixels];
+  uint32_t block;
 };
 
 struct TileWeights {
@@ -34,13 +32,12 @@ struct TileWeights {
   std::vector<WeightItem> items;
 
   void Clear();
-  void ShrinkToFit();
   int64_t Bytes() const;
 };
 
-// Position in the tile of cell `lane` of block `block`, in px (fine blocks).
-constexpr int FineX(int block, int lane) { return block % 4 * 4 + lane % 4; }
-constexpr int FineY(int block, int lane) { return block / 4 * 4 + lane / 4; }
+// Position in the tile of pixel `lane` of block `block`, px.
+constexpr int PixelX(int block, int lane) { return block % 4 * 4 + lane % 4; }
+constexpr int PixelY(int block, int lane) { return block / 4 * 4 + lane / 4; }
 
 // alpha T of every splat in the list of tile `tile`, as RasterizeForward blends it.
 void BuildTileWeights(const SplatBuffer& splats,
@@ -50,11 +47,8 @@ void BuildTileWeights(const SplatBuffer& splats,
                       int height_px,
                       TileWeights& weights);
 
-// Averages over 4x4 pixels with `pixel_weight` ([block][16]).
-void CoarsenTileWeights(const TileWeights& fine, const float* pixel_weight, TileWeights& coarse);
-
 // picture = W value; two values per Gaussian.
-void TileForward(const TileWeights& weights, int blocks, const float* value, float* picture);
+void TileForward(const TileWeights& weights, const float* value, float* picture);
 
 // sum += W^T picture; two sums per Gaussian.
 void TileAdjoint(const TileWeights& weights, const float* picture, float* sum);

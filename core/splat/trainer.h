@@ -40,18 +40,18 @@ struct ChromaOptions {
   double time_limit_seconds = 0.0;  // 0: none; 0..86400. Ends on time with the best so far
   uint64_t seed = 1;                // of Adam
 
-  // Conjugate gradients: rounds of reweighting, first on means over 4x4 pixels, then on pixels.
-  int sweeps = 4;                     // ordered-subsets sweeps before, 0..1000
-  int coarse_rounds = 0;              // at most, 0..1000
-  int rounds = 6;                     // at most, 0..1000
-  int steps_per_round = 10;           // at most, 1..1000
+  // Conjugate gradients. Least absolute residuals, by reweighting; false: least squares.
+  bool robust = true;
+  int sweeps = 6;                     // ordered-subsets sweeps before, 0..1000
+  int rounds = 6;                     // of reweighting, at most, 0..1000
+  int steps_per_round = 10;           // of conjugate gradients, at most, 1..1000
   double residual_tolerance = 0.05;   // a round ends when its residual has shrunk to this, 0..1
-  double objective_tolerance = 5e-3;  // ... and a level when a round improves L1 by less, 0..1
+  double objective_tolerance = 5e-3;  // ... and all when a round improves L1 by less, 0..1
   // Pull to the closed form, as strong as this many pixels of the Gaussian alone, 1e-6..1e6; for
-  // coefficients above degree 0, times tikhonov_rest, 1e-6..1e6.
-  double tikhonov = 1.0;
+  // coefficients above degree 0, times tikhonov_rest, 1..1e6.
+  double tikhonov = 0.1;
   double tikhonov_rest = 10.0;
-  int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..2^50
+  int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..1e15
   void Validate() const;
 };
 

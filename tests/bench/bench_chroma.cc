@@ -251,7 +251,6 @@ void AddChromaCommand(CLI::App& app) {
   command->add_option("--adam-iterations", args->adam_iterations, "of run adam");
   command->add_option("--preset-iterations", args->preset_iterations, "of run adam-preset");
   command->add_option("--iterations", args->chroma.iterations, "of run cg, at most");
-  command->add_option("--coarse-rounds", args->chroma.coarse_rounds);
   command->add_option("--sweeps", args->chroma.sweeps);
   command->add_option("--rounds", args->chroma.rounds);
   command->add_option("--steps", args->chroma.steps_per_round);
