@@ -25,7 +25,8 @@ void SplatPipeline::Backward(const ParameterBlock& parameters,
                              ThreadPool& pool,
                              ParameterBlock& gradient,
                              DensifyStatistics* statistics) {
-  RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, pool, pair_gradient_);
+  const bool absolute = statistics != nullptr && statistics->absolute;
+  RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, absolute, pool, pair_gradient_);
   ProjectSplatsBackward(parameters,
                         color,
                         camera,
