@@ -77,7 +77,7 @@ class ChromaTrainer {
     }
   }
 
-  // From 0.8 of the time limit on as if the iterations were about to end.
+  // Share of the schedule that is over, by iterations or by time.
   double Done() const {
     const double by_count =
         static_cast<double>(state_.iteration) / std::max(1, run_.options.iterations);

@@ -1,6 +1,7 @@
-// Conjugate gradients on the normal equations of chroma (chroma_system.h), with reweighting for
-// least absolute residuals and a pull to the first chroma, which keeps Gaussians that few pixels
-// see well-posed. Internal to the splat module.
+// Least absolute residuals of chroma (chroma_system.h): a few ordered-subsets sweeps, which take a
+// step per view and so are quick at first, then rounds of reweighting with block-Jacobi
+// preconditioned conjugate gradients on the normal equations of all views. A pull to the closed form
+// keeps Gaussians that few pixels see well-posed. Internal to the splat module.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,7 @@
 #include "core/splat/chroma_system.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 

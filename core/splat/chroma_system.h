@@ -7,7 +7,6 @@
 // thread count.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>

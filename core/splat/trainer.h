@@ -77,8 +77,8 @@ struct ChromaTarget {
 using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
 
 // Expands a 1-channel model to L', a', b' and fits chroma with geometry fixed: closed form first
-// (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by reweighted
-// conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM). Gaussians that no training view sees get
+// (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by ordered-subsets
+// sweeps and reweighted conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM). Gaussians that no training view sees get
 // their nearest seen neighbours' chroma. Curves: "train_l1_ab" (Lab units) and, of conjugate
 // gradients, "chroma_residual" (relative). Throws Error{kInvalidArgument} for targets of another
 // size than the view's camera or with values that are not finite, Error{kCancelled}.
