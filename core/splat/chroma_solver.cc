@@ -17,6 +17,8 @@ namespace {
 constexpr double kFirstRelaxation = 1.0;
 constexpr double kRelaxationDecay = 0.9;
 
+constexpr double kMaxChroma = 128.0 / 255.0;
+
 class ChromaSolver {
  public:
   ChromaSolver(const ChromaRun& run,
@@ -81,13 +83,15 @@ class ChromaSolver {
     return x;
   }
 
-  // Rounded to float, so that going on from a checkpoint gives the same bytes.
+  // Rounded to float, so that going on from a checkpoint gives the same bytes. Splats that hide
+  // each other can cancel with chroma that no colour has: kept within what Lab needs.
   void ToParameters() {
     const int n = parameters_.coefficients();
     for (int64_t i = 0; i < system_.count(); ++i) {
       for (int k = 0; k < n; ++k) {
         for (int c = 0; c < 2; ++c) {
           double& value = x_[(i * n + k) * 2 + c];
+          if (k == 0) value = std::clamp(value, -kMaxChroma / kShDc, kMaxChroma / kShDc);
           parameters_.Row(c, k)[i] = static_cast<float>(value);
           value = parameters_.Row(c, k)[i];
         }

@@ -293,7 +293,7 @@ TEST(FitChromaTest, NoViewHasColours) {
 TEST(FitChromaTest, OnePixelColoursAllGaussiansAlike) {
   const GaussianModel model =
       Fit(RandomGaussians(30, 4), ConstantProblem(1, 40.0f, -20.0f, 1, 1), {});
-  ExpectFiniteAndBelow(model, 60.0);  // the pixel is not opaque
+  ExpectFiniteAndBelow(model, 100.0);  // the pixel is half transparent
 }
 
 TEST(FitChromaTest, AConstantTargetGivesItsColourWhereTheSceneIsSolid) {
@@ -322,7 +322,7 @@ TEST(FitChromaTest, CopiesOfOneGaussianShareItsColour) {
     copies.opacity_logit.push_back(0.0f);
     copies.sh_l.push_back(0.0f);
   }
-  ExpectFiniteAndBelow(Fit(copies, ConstantProblem(2, 40.0f, -20.0f, kWidth, kHeight), {}), 200.0);
+  ExpectFiniteAndBelow(Fit(copies, ConstantProblem(2, 40.0f, -20.0f, kWidth, kHeight), {}), 128.1);
 }
 
 TEST(FitChromaTest, ValuesThatAreNotFiniteAreRefusedWithTheirPlace) {
@@ -371,6 +371,8 @@ TEST(FitChromaTest, GoesOnFromACheckpointWithTheSameBytes) {
     ChromaOptions options;
     options.solver = solver;
     options.iterations = 40;
+    options.sweeps = 6;
+    options.objective_tolerance = 0.0;
     const GaussianModel whole = Fit(geometry, problem, options);
     for (const int stop_after : {1, 5, 7}) {
       ThreadPool pool(2);
@@ -395,7 +397,7 @@ TEST(FitChromaTest, ATimeLimitEndsBothSolversEarlyWithSoundChroma) {
     options.residual_tolerance = 0.0;
     options.time_limit_seconds = 0.05;
     const auto start = std::chrono::steady_clock::now();
-    ExpectFiniteAndBelow(Fit(RandomGaussians(60, 4), RandomProblem(3, 6), options), 2000.0);
+    ExpectFiniteAndBelow(Fit(RandomGaussians(60, 4), RandomProblem(3, 6), options), 300.0);
     EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
   }
 }

@@ -42,14 +42,14 @@ struct ChromaOptions {
 
   // Conjugate gradients. Least absolute residuals, by reweighting; false: least squares.
   bool robust = true;
-  int sweeps = 6;                     // ordered-subsets sweeps before, 0..1000
+  int sweeps = 3;                     // ordered-subsets sweeps before, 0..1000
   int rounds = 6;                     // of reweighting, at most, 0..1000
   int steps_per_round = 10;           // of conjugate gradients, at most, 1..1000
   double residual_tolerance = 0.05;   // a round ends when its residual has shrunk to this, 0..1
-  double objective_tolerance = 5e-3;  // ... and all when a round improves L1 by less, 0..1
+  double objective_tolerance = 8e-3;  // ... and all when a round improves L1 by less, 0..1
   // Pull to the closed form, as strong as this many pixels of the Gaussian alone, 1e-6..1e6; for
   // coefficients above degree 0, times tikhonov_rest, 1..1e6.
-  double tikhonov = 0.1;
+  double tikhonov = 0.01;
   double tikhonov_rest = 10.0;
   int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..1e15
   void Validate() const;
@@ -77,11 +77,12 @@ struct ChromaTarget {
 using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
 
 // Expands a 1-channel model to L', a', b' and fits chroma with geometry fixed: closed form first
-// (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by ordered-subsets
-// sweeps and reweighted conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM). Gaussians that no training view sees get
-// their nearest seen neighbours' chroma. Curves: "train_l1_ab" (Lab units) and, of conjugate
-// gradients, "chroma_residual" (relative). Throws Error{kInvalidArgument} for targets of another
-// size than the view's camera or with values that are not finite, Error{kCancelled}.
+// (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by
+// ordered-subsets sweeps and reweighted conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM).
+// Gaussians that no training view sees get their nearest seen neighbours' chroma. Curves:
+// "train_l1_ab" (Lab units) and, of conjugate gradients, "chroma_residual" (relative). Throws
+// Error{kInvalidArgument} for targets of another size than the view's camera or with values that
+// are not finite, Error{kCancelled}.
 GaussianModel FitChroma(const GaussianModel& geometry,
                         const Scene& scene,
                         const ViewImages& images,
