@@ -2,6 +2,7 @@
 // module.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "core/splat/geometry_trainer.h"
@@ -12,6 +13,9 @@ namespace color3d {
 struct ChromaProblem {
   std::vector<PosedCamera> training;
   ChromaTargetSource targets;  // may return null for a view that has no colours
+  // For measurements, may be empty: called after the closed form, after every round of conjugate
+  // gradients and at growing intervals of Adam, with a way to get the model of that moment.
+  std::function<void(int64_t iteration, const std::function<GaussianModel()>& model)> snapshot;
 };
 
 // As FitChroma.

@@ -103,6 +103,15 @@ void ChromaOptions::Validate() const {
   CheckRange("iterations", iterations, 0, 100'000);
   CheckRange("chroma_sh_degree", chroma_sh_degree, 0, 1);
   CheckRange("ssim_weight", ssim_weight, 0.0, 1.0);
+  CheckRange("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
+  CheckRange("sweeps", sweeps, 0, 1000);
+  CheckRange("rounds", rounds, 0, 1000);
+  CheckRange("steps_per_round", steps_per_round, 1, 1000);
+  CheckRange("residual_tolerance", residual_tolerance, 0.0, 1.0);
+  CheckRange("objective_tolerance", objective_tolerance, 0.0, 1.0);
+  CheckRange("tikhonov", tikhonov, 1e-6, 1e6);
+  CheckRange("tikhonov_rest", tikhonov_rest, 1.0, 1e6);
+  CheckRange("memory_budget_bytes", static_cast<double>(memory_budget_bytes), 0.0, 1e15);
 }
 
 GaussianModel TrainGeometry(const Scene& scene,

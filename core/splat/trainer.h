@@ -36,10 +36,28 @@ struct GeometryOptions {
 };
 
 struct ChromaOptions {
-  int iterations = 600;  // of Adam on a', b' coefficients after the closed-form start, 0..100000
-  int chroma_sh_degree = 0;  // 0..1
-  double ssim_weight = 0.2;
-  uint64_t seed = 1;
+  enum class Solver { kConjugateGradients, kAdam };
+  Solver solver = Solver::kConjugateGradients;
+  // 0..100000. Of Adam; of conjugate gradients at most (they stop by themselves, see below). 0: the
+  // closed form alone.
+  int iterations = 600;
+  int chroma_sh_degree = 0;         // 0..1
+  double ssim_weight = 0.2;         // of Adam's loss, 0..1
+  double time_limit_seconds = 0.0;  // 0: none; 0..86400. Ends on time with the best so far
+  uint64_t seed = 1;                // of Adam
+
+  // Conjugate gradients. Least absolute residuals, by reweighting; false: least squares.
+  bool robust = true;
+  int sweeps = 3;                     // ordered-subsets sweeps before, 0..1000
+  int rounds = 6;                     // of reweighting, at most, 0..1000
+  int steps_per_round = 10;           // of conjugate gradients, at most, 1..1000
+  double residual_tolerance = 0.05;   // a round ends when its residual has shrunk to this, 0..1
+  double objective_tolerance = 8e-3;  // ... and all when a round improves L1 by less, 0..1
+  // Pull to the closed form, as strong as this many pixels of the Gaussian alone, 1e-6..1e6; for
+  // coefficients above degree 0, times tikhonov_rest, 1..1e6.
+  double tikhonov = 0.01;
+  double tikhonov_rest = 10.0;
+  int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..1e15
   void Validate() const;
 };
 
@@ -65,9 +83,12 @@ struct ChromaTarget {
 using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
 
 // Expands a 1-channel model to L', a', b' and fits chroma with geometry fixed: closed form first
-// (visibility-weighted mean per Gaussian), then Adam on 0.8 L1 + 0.2 (1 - SSIM) of a', b'.
-// Gaussians that no training view sees get their nearest seen neighbours' chroma. Curve:
-// "train_l1_ab" (Lab units).
+// (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by
+// ordered-subsets sweeps and reweighted conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM).
+// Gaussians that no training view sees get their nearest seen neighbours' chroma. Curves:
+// "train_l1_ab" (Lab units) and, of conjugate gradients, "chroma_residual" (relative). Throws
+// Error{kInvalidArgument} for targets of another size than the view's camera or with values that
+// are not finite, Error{kCancelled}.
 GaussianModel FitChroma(const GaussianModel& geometry,
                         const Scene& scene,
                         const ViewImages& images,

@@ -12,5 +12,6 @@ void AddPosesCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);
+void AddChromaCommand(CLI::App& app);
 
 }  // namespace color3d

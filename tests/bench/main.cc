@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   color3d::AddStabilityCommand(app);
   color3d::AddColorizerCommand(app);
   color3d::AddPlotCommand(app);
+  color3d::AddChromaCommand(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
