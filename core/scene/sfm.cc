@@ -226,7 +226,6 @@ void RemoveEarlierRun(const fs::path& scratch_folder) {
   std::error_code error;
   fs::create_directories(scratch_folder, error);
   fs::remove_all(scratch_folder / "photos", error);
-  fs::remove_all(scratch_folder / "database.db", error);
   std::vector<fs::path> models;
   for (const auto& entry : fs::directory_iterator(scratch_folder)) {
     if (entry.path().filename().string().rfind("models_", 0) == 0) models.push_back(entry.path());

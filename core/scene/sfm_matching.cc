@@ -34,6 +34,14 @@ void WriteLines(const fs::path& file, const std::vector<std::string>& lines) {
   WriteFileAtomic(file, text);
 }
 
+// With the log of a program that was stopped: SQLite would play it into the next database.
+void RemoveDatabase(const SfmWorkspace& work) {
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+    std::error_code error;
+    fs::remove(work.database().string() + suffix, error);
+  }
+}
+
 std::vector<std::string> MatchingArguments(const ColmapProcess& colmap,
                                            const SfmWorkspace& work,
                                            const char* program) {
@@ -53,8 +61,7 @@ void ExtractFeatures(ColmapProcess& colmap,
                      const FeatureImages& photos,
                      const ImportOptions& options,
                      FeatureDetail detail) {
-  std::error_code error;
-  fs::remove(work.database(), error);
+  RemoveDatabase(work);
   for (const FeatureImages::Group& group : photos.groups) {
     const bool coarse = detail == FeatureDetail::kCoarse &&
                         std::max(group.width, group.height) >= kCoarseFromSidePx;
