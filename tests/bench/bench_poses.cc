@@ -137,22 +137,21 @@ void RunPoses(PosesArguments& args) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const SfmReport& sfm = imported.sfm;
-  nlohmann::ordered_json result{
-      {"scene", args.scene_folder},
-      {"pairs", args.pairs},
-      {"threads", args.options.threads},
-      {"seconds", seconds},
-      {"cpu_seconds", CpuSeconds()},
-      {"seconds_photos", sfm.photos_seconds},
-      {"seconds_features", sfm.features_seconds},
-      {"seconds_matching", sfm.matching_seconds},
-      {"seconds_mapping", sfm.mapping_seconds},
-      {"photos", imported.photos_found},
-      {"registered", imported.photos_registered},
-      {"plan", sfm.plan},
-      {"pairs_tried", sfm.pairs_tried},
-      {"pairs_verified", CountVerifiedPairs(work / "database.db")},
-      {"fell_back_to_exhaustive", sfm.exhaustive && args.pairs == "planned"}};
+  nlohmann::ordered_json result{{"scene", args.scene_folder},
+                                {"pairs", args.pairs},
+                                {"threads", args.options.threads},
+                                {"seconds", seconds},
+                                {"cpu_seconds", CpuSeconds()},
+                                {"seconds_photos", sfm.photos_seconds},
+                                {"seconds_features", sfm.features_seconds},
+                                {"seconds_matching", sfm.matching_seconds},
+                                {"seconds_mapping", sfm.mapping_seconds},
+                                {"photos", imported.photos_found},
+                                {"registered", imported.photos_registered},
+                                {"plan", sfm.plan},
+                                {"pairs_tried", sfm.pairs_tried},
+                                {"pairs_verified", CountVerifiedPairs(work / "database.db")},
+                                {"all_pairs_matched", sfm.exhaustive}};
   result.update(PointFacts(imported.scene));
   const fs::path model = fs::path(args.scene_folder) / "sparse/0";
   if (fs::exists(model)) {
