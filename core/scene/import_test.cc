@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/image/test_exif.h"
 #include "core/scene/sfm_photos.h"
 #include "core/scene/sparse_cloud.h"
 #include "core/scene/test_scenes.h"
@@ -56,6 +57,9 @@ TEST_F(Import, OptionsAreChecked) {
   options_ = {};
   options_.sfm_timeout = std::chrono::seconds(0);
   EXPECT_THAT(Said(), HasSubstr("sfm_timeout"));
+  options_ = {};
+  options_.sfm_neighbors = 1;
+  EXPECT_THAT(Said(), HasSubstr("sfm_neighbors is 1; it must be 2..100"));
   options_ = {};
   options_.threads = -1;
   EXPECT_THAT(Said(), HasSubstr("threads"));
@@ -192,6 +196,38 @@ TEST(FeatureImage, DullPhotosAreStretchedOthersNot) {
   EXPECT_EQ(FeatureImage(bright, 1000).data, bright.data);
   EXPECT_EQ(FeatureImage(GradientPhoto(64, 48, 3), 32).width, 32);
   for (float v : FeatureImage(Image(8, 8, 1, 0.5f), 100).data) EXPECT_LE(v, 1.0f);
+}
+
+// Photos of one camera share its focal length; those of another zoom or size do not.
+TEST_F(Import, FeatureImagesAreGroupedByCamera) {
+  std::vector<Photo> photos;
+  const auto add = [&](const std::string& name, int width, uint32_t film_mm) {
+    const std::string jpeg = EncodeJpeg(GradientPhoto(width, 60, 1));
+    WriteFileAtomic(folder_.path() / name,
+                    film_mm > 0 ? WithExif(jpeg, {{41989, 3, film_mm}}) : jpeg);
+    photos.push_back({name, name});
+    ProbePhoto(folder_.path(), &photos.back());
+  };
+  add("a.jpg", 80, 28);
+  add("b.jpg", 80, 28);
+  add("c.jpg", 80, 50);
+  add("d.jpg", 80, 0);
+  add("e.jpg", 100, 28);
+  EXPECT_NEAR(photos[0].focal_px, 28.0 * 100.0 / 43.2666, 0.1);
+  ThreadPool pool(2);
+  const FeatureImages written = WriteFeatureImages(
+      photos, folder_.path(), scratch_.path() / "copies", 40, 50, pool, progress_, {});
+  ASSERT_EQ(written.groups.size(), 4u);
+  EXPECT_EQ(written.groups[0].names,
+            (std::vector<std::string>{written.names[0], written.names[1]}));
+  EXPECT_NEAR(written.groups[0].focal_px, 14.0 * 100.0 / 43.2666, 0.1);
+  EXPECT_EQ(written.groups[2].focal_px, 0.0);
+  EXPECT_EQ(written.features.size(), 5u);
+  for (const std::string& name : written.names) {
+    const Image copy = ReadImage(scratch_.path() / "copies" / name);
+    EXPECT_EQ(copy.width, 40);
+    EXPECT_EQ(copy.channels, 1);
+  }
 }
 
 }  // namespace

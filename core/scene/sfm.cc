@@ -65,13 +65,14 @@ class Solver {
 
   // An empty model when nothing was placed.
   ColmapModel Solve(const PairPlan& plan) {
-    if (plan.pairs.size() < AllPairs(Count()).size()) {
+    const bool planned = plan.pairs.size() < AllPairs(Count()).size();
+    if (planned) {
       SolvePlanned(plan);
       if (PlannedIsEnough()) return std::move(*best_);
       Say(std::to_string(Placed()) + " of " + std::to_string(Count()) +
           " photos hang together by the planned pairs; comparing all pairs, which takes longer");
     }
-    SolveExhaustively();
+    SolveExhaustively(planned);
     return best_ ? std::move(*best_) : ColmapModel{};
   }
 
@@ -81,9 +82,13 @@ class Solver {
   bool IsHalfPlaced() const {
     return 2 * Placed() >= copies_.names.size() && Placed() >= kMinPlaced;
   }
+  bool AreNearlyAllPlaced() const {
+    return IsHalfPlaced() && 10 * Placed() >= 9 * copies_.names.size();
+  }
+  // What is left are pairs between placed photos, and finer features if there are any.
   bool PlannedIsEnough() const {
-    const bool nearly_all = 10 * Placed() >= 9 * copies_.names.size();
-    return IsHalfPlaced() && (nearly_all || copies_.names.size() > kExhaustiveLimit);
+    return AreNearlyAllPlaced() ||
+           (IsHalfPlaced() && (!has_coarse_features_ || copies_.names.size() > kExhaustiveLimit));
   }
 
   void Say(const std::string& warning) {
@@ -93,7 +98,7 @@ class Solver {
 
   void Extract(FeatureDetail detail) {
     const Stopwatch watch(&report_->features_seconds);
-    ExtractFeatures(colmap_, work_, copies_, options_, detail);
+    has_coarse_features_ = ExtractFeatures(colmap_, work_, copies_, options_, detail);
   }
 
   void Match(const std::vector<PhotoPair>& pairs) {
@@ -115,17 +120,24 @@ class Solver {
     Extract(FeatureDetail::kCoarse);
     Match(plan.pairs);
     Attempt("planned", Strictness::kDefault);
-    if (!IsHalfPlaced() || Placed() == copies_.names.size()) return;
+    if (Placed() == copies_.names.size()) return;
     const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
-    colmap_.Note(std::to_string(Placed()) +
-                 " photos found a place; matching the others with all: " +
-                 std::to_string(more.size()) + " more pairs");
-    Match(more);
-    Attempt("widened", Strictness::kDefault);
+    if (AreWorthMatching(more)) {
+      colmap_.Note(std::to_string(Placed()) + " photos found a place; matching the others with " +
+                   "all: " + std::to_string(more.size()) + " more pairs");
+      Match(more);
+      Attempt("widened", Strictness::kDefault);
+    }
+    if (!AreNearlyAllPlaced()) Attempt("straight", Strictness::kStraight);
   }
 
-  void SolveExhaustively() {
-    Extract(FeatureDetail::kFine);
+  // Not when finer features of all photos come next anyway.
+  bool AreWorthMatching(const std::vector<PhotoPair>& pairs) const {
+    return !pairs.empty() && (IsHalfPlaced() || !has_coarse_features_);
+  }
+
+  void SolveExhaustively(bool has_features) {
+    if (!has_features || has_coarse_features_) Extract(FeatureDetail::kFine);
     report_->exhaustive = true;
     report_->pairs_tried = static_cast<int64_t>(AllPairs(Count()).size());
     {
@@ -133,14 +145,16 @@ class Solver {
       MatchAllPairs(colmap_, work_, copies_.names.size());
     }
     Attempt("exhaustive", Strictness::kDefault);
-    if (!IsHalfPlaced()) Attempt("straight", Strictness::kStraight);
-    if (!IsHalfPlaced()) Attempt("loose", Strictness::kLoose);
+    if (!AreNearlyAllPlaced()) Attempt("exhaustive_straight", Strictness::kStraight);
+    if (!IsHalfPlaced()) Attempt("exhaustive_loose", Strictness::kLoose);
     if (is_loose_) Say("camera positions were found with loose thresholds only; check them");
   }
 
   std::vector<bool> PlacedPhotos() const {
     std::set<std::string> names;
-    for (const auto& [id, image] : best_->images) names.insert(image.name);
+    if (best_) {
+      for (const auto& [id, image] : best_->images) names.insert(image.name);
+    }
     std::vector<bool> placed;
     for (const std::string& name : copies_.names) placed.push_back(names.count(name) > 0);
     return placed;
@@ -153,6 +167,7 @@ class Solver {
   ProgressObserver& progress_;
   SfmReport* report_;
   std::optional<ColmapModel> best_;
+  bool has_coarse_features_ = false;
   bool is_loose_ = false;
 };
 
@@ -226,7 +241,6 @@ void RemoveEarlierRun(const fs::path& scratch_folder) {
   std::error_code error;
   fs::create_directories(scratch_folder, error);
   fs::remove_all(scratch_folder / "photos", error);
-  fs::remove_all(scratch_folder / "database.db", error);
   std::vector<fs::path> models;
   for (const auto& entry : fs::directory_iterator(scratch_folder)) {
     if (entry.path().filename().string().rfind("models_", 0) == 0) models.push_back(entry.path());

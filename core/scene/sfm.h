@@ -20,10 +20,11 @@ struct SfmResult {
 };
 
 // `photos` have been probed and are at least 2. Reduced 8-bit grey copies, COLMAP's database and
-// sfm.log are left in `scratch_folder`. Matches planned pairs, then those of the photos that found
-// no place; when too many stay without, all pairs of finer features; then a straight lens and a
-// small first angle, then loose thresholds, while fewer than half of the photos find a place;
-// models with too few points or an absurd lens do not count. Throws Error: fewer than 3 placed
+// sfm.log are left in `scratch_folder`. Matches planned pairs, then the photos that found no place
+// with all. While fewer than nine tenths of the photos find a place, tries a straight lens and a
+// small first angle; then, with coarse features and not very many photos, all pairs of fine ones.
+// While fewer than half find a place: all pairs in any case, and loose thresholds last. Models with
+// too few points or an absurd lens do not count. Throws Error: fewer than 3 placed
 // (kInvalidArgument), COLMAP not installed (kFailedPrecondition), too slow (kDeadlineExceeded),
 // cancelled.
 SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,

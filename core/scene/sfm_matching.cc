@@ -34,6 +34,14 @@ void WriteLines(const fs::path& file, const std::vector<std::string>& lines) {
   WriteFileAtomic(file, text);
 }
 
+// With the log of a program that was stopped: SQLite would play it into the next database.
+void RemoveDatabase(const SfmWorkspace& work) {
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+    std::error_code error;
+    fs::remove(work.database().string() + suffix, error);
+  }
+}
+
 std::vector<std::string> MatchingArguments(const ColmapProcess& colmap,
                                            const SfmWorkspace& work,
                                            const char* program) {
@@ -48,16 +56,17 @@ std::vector<std::string> MatchingArguments(const ColmapProcess& colmap,
 
 }  // namespace
 
-void ExtractFeatures(ColmapProcess& colmap,
+bool ExtractFeatures(ColmapProcess& colmap,
                      const SfmWorkspace& work,
                      const FeatureImages& photos,
                      const ImportOptions& options,
                      FeatureDetail detail) {
-  std::error_code error;
-  fs::remove(work.database(), error);
+  RemoveDatabase(work);
+  bool any_coarse = false;
   for (const FeatureImages::Group& group : photos.groups) {
     const bool coarse = detail == FeatureDetail::kCoarse &&
                         std::max(group.width, group.height) >= kCoarseFromSidePx;
+    any_coarse = any_coarse || coarse;
     const fs::path list = work.folder / "photos.txt";
     WriteLines(list, group.names);
     std::vector<std::string> arguments = {"feature_extractor",
@@ -88,6 +97,7 @@ void ExtractFeatures(ColmapProcess& colmap,
         arguments,
         {"finding features in photos", "Processed file", static_cast<int64_t>(group.names.size())});
   }
+  return any_coarse;
 }
 
 void MatchPairs(ColmapProcess& colmap,

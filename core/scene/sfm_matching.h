@@ -23,8 +23,9 @@ struct SfmWorkspace {
 // features repeat less well. Small photos need it, so they are always fine.
 enum class FeatureDetail { kCoarse, kFine };
 
-// SIFT of all photos into a new database. Photos of one folder share a camera.
-void ExtractFeatures(ColmapProcess& colmap,
+// SIFT of all photos into a new database. Photos of one folder share a camera. True when some got
+// coarse features.
+bool ExtractFeatures(ColmapProcess& colmap,
                      const SfmWorkspace& work,
                      const FeatureImages& photos,
                      const ImportOptions& options,

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "core/image/test_exif.h"
 #include "core/scene/import.h"
 #include "core/scene/test_scenes.h"
 
@@ -152,6 +153,29 @@ TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
     const Eigen::Vector3d should = truth[i].rotation.conjugate() * Eigen::Vector3d::UnitZ();
     EXPECT_LT(std::acos(std::min(1.0, looks.dot(should))) * 180.0 / M_PI, 2.0) << i;
   }
+}
+
+// Enough photos that most pairs are left out, from a camera that says its focal length.
+TEST_F(Sfm, PlannedPairsOfPhotosWithAFocalLength) {
+  constexpr int kCount = 14;
+  const Camera camera = kRoomCamera.Scaled(320, 240);
+  const std::vector<Pose> poses = RoomPoses(kCount);
+  const auto film_mm =
+      static_cast<uint32_t>(std::lround(camera.fx * 43.2666 / std::hypot(320, 240)));
+  for (int i = 0; i < kCount; ++i) {
+    const std::string jpeg = EncodeJpeg(RenderRoom(camera, poses[i]));
+    WriteFileAtomic(folder_.path() / ("p" + std::to_string(i) + ".jpg"),
+                    WithExif(jpeg, {{41989, 3, film_mm}}));
+  }
+  options_.sfm_neighbors = 3;
+  const ImportResult result = Run();
+  EXPECT_EQ(result.photos_registered, kCount);
+  EXPECT_FALSE(result.sfm.exhaustive);
+  EXPECT_LT(result.sfm.pairs_tried, kCount * (kCount - 1) / 2);
+  EXPECT_NEAR(result.scene.views[0].captured_camera.fx, camera.fx, 0.03 * camera.fx);
+  const std::string log = ReadFile(scratch_.path() / "sfm.log");
+  EXPECT_THAT(log, HasSubstr("color3d: planned " + result.sfm.plan));
+  EXPECT_THAT(log, HasSubstr("(Prior)"));
 }
 
 TEST_F(Sfm, PhotosThatShareNothingAreRefusedInOneLine) {

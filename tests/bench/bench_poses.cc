@@ -1,6 +1,7 @@
 // color3d-bench poses: structure-from-motion of a folder of photos, seconds per phase, and how far
 // its cameras are from a given model.
 #include <sqlite3.h>
+#include <sys/resource.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -92,11 +93,24 @@ nlohmann::ordered_json CompareWithModel(const Scene& found, const Scene& model) 
   return result;
 }
 
-// A folder without poses next to the scene's photos, so that the import has to find them.
-void LinkPhotos(const fs::path& scene_folder, const fs::path& folder) {
+// Of this process and its finished children: what the wall time would be on one quiet core.
+double CpuSeconds() {
+  double seconds = 0.0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    for (const timeval& t : {usage.ru_utime, usage.ru_stime}) {
+      seconds += static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    }
+  }
+  return seconds;
+}
+
+// The scene's photos without its poses, so that the import has to find them.
+void CopyPhotos(const fs::path& scene_folder, const fs::path& folder) {
   const fs::path images = scene_folder / "images";
-  fs::create_directory_symlink(fs::absolute(fs::exists(images) ? images : scene_folder),
-                               folder / "images");
+  fs::copy(
+      fs::exists(images) ? images : scene_folder, folder / "images", fs::copy_options::recursive);
 }
 
 nlohmann::ordered_json PointFacts(const Scene& scene) {
@@ -114,7 +128,7 @@ nlohmann::ordered_json PointFacts(const Scene& scene) {
 void RunPoses(PosesArguments& args) {
   if (args.pairs == "exhaustive") args.options.sfm_pairs = SfmPairs::kExhaustive;
   const ScratchFolder photos, scratch;
-  LinkPhotos(args.scene_folder, photos.path());
+  CopyPhotos(args.scene_folder, photos.path());
   const fs::path work = args.keep_folder.empty() ? scratch.path() : fs::path(args.keep_folder);
   WarningList observer;
   const CancellationToken cancel;
@@ -123,21 +137,21 @@ void RunPoses(PosesArguments& args) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const SfmReport& sfm = imported.sfm;
-  nlohmann::ordered_json result{
-      {"scene", args.scene_folder},
-      {"pairs", args.pairs},
-      {"threads", args.options.threads},
-      {"seconds", seconds},
-      {"seconds_photos", sfm.photos_seconds},
-      {"seconds_features", sfm.features_seconds},
-      {"seconds_matching", sfm.matching_seconds},
-      {"seconds_mapping", sfm.mapping_seconds},
-      {"photos", imported.photos_found},
-      {"registered", imported.photos_registered},
-      {"plan", sfm.plan},
-      {"pairs_tried", sfm.pairs_tried},
-      {"pairs_verified", CountVerifiedPairs(work / "database.db")},
-      {"fell_back_to_exhaustive", sfm.exhaustive && args.pairs == "planned"}};
+  nlohmann::ordered_json result{{"scene", args.scene_folder},
+                                {"pairs", args.pairs},
+                                {"threads", args.options.threads},
+                                {"seconds", seconds},
+                                {"cpu_seconds", CpuSeconds()},
+                                {"seconds_photos", sfm.photos_seconds},
+                                {"seconds_features", sfm.features_seconds},
+                                {"seconds_matching", sfm.matching_seconds},
+                                {"seconds_mapping", sfm.mapping_seconds},
+                                {"photos", imported.photos_found},
+                                {"registered", imported.photos_registered},
+                                {"plan", sfm.plan},
+                                {"pairs_tried", sfm.pairs_tried},
+                                {"pairs_verified", CountVerifiedPairs(work / "database.db")},
+                                {"all_pairs_matched", sfm.exhaustive}};
   result.update(PointFacts(imported.scene));
   const fs::path model = fs::path(args.scene_folder) / "sparse/0";
   if (fs::exists(model)) {
