@@ -1,8 +1,9 @@
 #include "core/splat/binning.h"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <limits>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/splat/instruction_set.h"
@@ -136,34 +137,72 @@ void TileBinner::FindSpans(const SplatBuffer& splats,
   }
 }
 
-// Least significant digit radix sort, 11 bits a pass: stable, so ties keep the index order.
-void TileBinner::SortByDepth(const SplatBuffer& splats) {
-  constexpr int kDigits = 2048;
-  order_.clear();
-  keys_.clear();
-  for (size_t i = 0; i < splats.depth_key.size(); ++i) {
-    if (splats.depth_key[i] == 0) continue;
-    order_.push_back(static_cast<uint32_t>(i));
-    keys_.push_back(splats.depth_key[i]);
+// The visible Gaussians in index order, each as (key << 32 | index), and the keys' range.
+void TileBinner::ListVisible(const SplatBuffer& splats, ThreadPool& pool) {
+  const int64_t count = static_cast<int64_t>(splats.depth_key.size());
+  pieces_.assign(pool.thread_count(), {});
+  pool.ForRanges(count, [&](int64_t begin, int64_t end, int thread) {
+    Piece piece;
+    for (int64_t i = begin; i < end; ++i) {
+      const uint32_t key = splats.depth_key[i];
+      if (key == 0) continue;
+      ++piece.count;
+      piece.low = std::min(piece.low, key);
+      piece.high = std::max(piece.high, key);
+    }
+    pieces_[thread] = piece;
+  });
+  size_t visible = 0;
+  low_key_ = std::numeric_limits<uint32_t>::max();
+  high_key_ = 0;
+  for (Piece& piece : pieces_) {
+    piece.first = visible;
+    visible += piece.count;
+    low_key_ = std::min(low_key_, piece.low);
+    high_key_ = std::max(high_key_, piece.high);
   }
-  order_scratch_.resize(order_.size());
-  keys_scratch_.resize(order_.size());
-  for (int shift = 0; shift < 32; shift += 11) {
-    std::array<uint32_t, kDigits> start{};
-    for (const uint32_t key : keys_) ++start[key >> shift & (kDigits - 1)];
+  order_.resize(visible);
+  order_scratch_.resize(visible);
+  pool.ForRanges(count, [&](int64_t begin, int64_t end, int thread) {
+    size_t to = pieces_[thread].first;
+    for (int64_t i = begin; i < end; ++i) {
+      const uint32_t key = splats.depth_key[i];
+      if (key != 0) order_[to++] = uint64_t{key} << 32 | static_cast<uint64_t>(i);
+    }
+  });
+}
+
+// Radix sort, least significant digit first, of the bits that differ. Each thread takes a
+// contiguous piece and a digit's pieces keep their order: stable, so ties keep the index order,
+// whatever the thread count.
+void TileBinner::SortByDepth(ThreadPool& pool) {
+  constexpr int kMostDigitBits = 14;
+  if (order_.size() < 2) return;
+  const int bits = std::bit_width(high_key_ - low_key_);
+  const int passes = (bits + kMostDigitBits - 1) / kMostDigitBits;
+  const int digit_bits = passes == 0 ? 0 : (bits + passes - 1) / passes;
+  const size_t digits = size_t{1} << digit_bits;
+  const int64_t visible = static_cast<int64_t>(order_.size());
+  const int threads = pool.thread_count();
+  for (int pass = 0; pass < passes; ++pass) {
+    const auto digit_of = [&](uint64_t entry) {
+      return (static_cast<uint32_t>(entry >> 32) - low_key_) >> (pass * digit_bits) & (digits - 1);
+    };
+    chunk_counts_.assign(digits * threads, 0);
+    pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
+      uint32_t* counts = chunk_counts_.data() + digits * thread;
+      for (int64_t i = begin; i < end; ++i) ++counts[digit_of(order_[i])];
+    });
     uint32_t sum = 0;
-    bool one_digit = false;
-    for (uint32_t& s : start) {
-      one_digit = one_digit || s == keys_.size();
-      sum += std::exchange(s, sum);
+    for (size_t digit = 0; digit < digits; ++digit) {
+      for (int t = 0; t < threads; ++t) {
+        sum += std::exchange(chunk_counts_[digits * t + digit], sum);
+      }
     }
-    if (one_digit) continue;
-    for (size_t i = 0; i < keys_.size(); ++i) {
-      const uint32_t to = start[keys_[i] >> shift & (kDigits - 1)]++;
-      keys_scratch_[to] = keys_[i];
-      order_scratch_[to] = order_[i];
-    }
-    keys_.swap(keys_scratch_);
+    pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
+      uint32_t* next = chunk_counts_.data() + digits * thread;
+      for (int64_t i = begin; i < end; ++i) order_scratch_[next[digit_of(order_[i])]++] = order_[i];
+    });
     order_.swap(order_scratch_);
   }
 }
@@ -174,34 +213,33 @@ void TileBinner::FillLists(ThreadPool& pool, TileLists& lists) {
   const int threads = pool.thread_count();
   chunk_counts_.assign(tiles * threads, 0);
   footprints_.resize(order_.size());
-  pool.ForRanges(static_cast<int64_t>(order_.size()), [&](int64_t begin, int64_t end, int) {
-    for (int64_t k = begin; k < end; ++k) {
-      const uint32_t gaussian = order_[k];
-      const RowRange& rows = rows_[gaussian];
-      footprints_[k] = {spans_[rows.owner].data() + rows.first_span,
-                        gaussian,
-                        lists.first_pair[gaussian],
-                        rows.first_row,
-                        rows.rows};
-    }
-  });
-  const auto for_each_tile = [&](int64_t begin, int64_t end, auto&& visit) {
-    for (int64_t k = begin; k < end; ++k) {
-      const Footprint& f = footprints_[k];
-      if (k + 8 < end) __builtin_prefetch(footprints_[k + 8].spans);
-      uint32_t pair = f.first_pair;
-      for (int r = 0; r < f.rows; ++r) {
-        const uint32_t base = static_cast<uint32_t>((f.first_row + r) * lists.tiles_x);
-        for (uint32_t x = f.spans[r].begin; x < f.spans[r].end; ++x) {
-          visit(base + x, f.gaussian, pair++);
-        }
+  const auto for_each_tile = [&](const Footprint& f, auto&& visit) {
+    uint32_t pair = f.first_pair;
+    for (int r = 0; r < f.rows; ++r) {
+      const uint32_t base = static_cast<uint32_t>((f.first_row + r) * lists.tiles_x);
+      for (uint32_t x = f.spans[r].begin; x < f.spans[r].end; ++x) {
+        visit(base + x, f.gaussian, pair++);
       }
     }
   };
   const int64_t visible = static_cast<int64_t>(order_.size());
   pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
     uint32_t* counts = chunk_counts_.data() + tiles * thread;
-    for_each_tile(begin, end, [&](uint32_t tile, uint32_t, uint32_t) { ++counts[tile]; });
+    for (int64_t k = begin; k < end; ++k) {
+      if (k + 16 < end) __builtin_prefetch(&rows_[static_cast<uint32_t>(order_[k + 16])]);
+      if (k + 8 < end) {
+        const RowRange& soon = rows_[static_cast<uint32_t>(order_[k + 8])];
+        __builtin_prefetch(spans_[soon.owner].data() + soon.first_span);
+      }
+      const uint32_t gaussian = static_cast<uint32_t>(order_[k]);
+      const RowRange& rows = rows_[gaussian];
+      footprints_[k] = {spans_[rows.owner].data() + rows.first_span,
+                        gaussian,
+                        lists.first_pair[gaussian],
+                        rows.first_row,
+                        rows.rows};
+      for_each_tile(footprints_[k], [&](uint32_t tile, uint32_t, uint32_t) { ++counts[tile]; });
+    }
   });
   uint32_t sum = 0;
   for (size_t tile = 0; tile < tiles; ++tile) {
@@ -211,11 +249,14 @@ void TileBinner::FillLists(ThreadPool& pool, TileLists& lists) {
   lists.tile_begin[tiles] = sum;
   pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
     uint32_t* next = chunk_counts_.data() + tiles * thread;
-    for_each_tile(begin, end, [&](uint32_t tile, uint32_t gaussian, uint32_t pair) {
-      const uint32_t to = next[tile]++;
-      lists.gaussian[to] = gaussian;
-      lists.pair[to] = pair;
-    });
+    for (int64_t k = begin; k < end; ++k) {
+      if (k + 8 < end) __builtin_prefetch(footprints_[k + 8].spans);
+      for_each_tile(footprints_[k], [&](uint32_t tile, uint32_t gaussian, uint32_t pair) {
+        const uint32_t to = next[tile]++;
+        lists.gaussian[to] = gaussian;
+        lists.pair[to] = pair;
+      });
+    }
   });
 }
 
@@ -244,7 +285,8 @@ void TileBinner::Bin(
   }
   lists.gaussian.resize(total);
   lists.pair.resize(total);
-  SortByDepth(splats);
+  ListVisible(splats, pool);
+  SortByDepth(pool);
   FillLists(pool, lists);
 }
 

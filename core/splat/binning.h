@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "core/base/parallel.h"
@@ -49,20 +50,27 @@ class TileBinner {
     uint16_t first_row = 0;
     uint16_t rows = 0;
   };
+  struct Piece {  // a thread's visible Gaussians
+    size_t first = 0, count = 0;
+    uint32_t low = std::numeric_limits<uint32_t>::max(), high = 0;
+  };
   void FindSpans(const SplatBuffer& splats,
                  int width,
                  int64_t begin,
                  int64_t end,
                  int thread,
                  TileLists& lists);
-  void SortByDepth(const SplatBuffer& splats);
+  void ListVisible(const SplatBuffer& splats, ThreadPool& pool);
+  void SortByDepth(ThreadPool& pool);
   void FillLists(ThreadPool& pool, TileLists& lists);
 
   std::vector<std::vector<Span>> spans_;  // per thread
   std::vector<RowRange> rows_;            // per Gaussian
-  std::vector<uint32_t> order_, order_scratch_, keys_, keys_scratch_;
+  std::vector<Piece> pieces_;             // per thread
+  uint32_t low_key_ = 0, high_key_ = 0;
+  std::vector<uint64_t> order_, order_scratch_;  // visible Gaussians: depth key << 32 | index
   std::vector<Footprint> footprints_;
-  std::vector<uint32_t> chunk_counts_;  // [thread][tile]
+  std::vector<uint32_t> chunk_counts_;  // [thread][tile], or [thread][digit]
 };
 
 }  // namespace color3d

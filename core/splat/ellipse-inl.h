@@ -30,12 +30,12 @@ HWY_INLINE Ellipse MakeEllipse(F32 inv_x, F32 slope, F32 inv_y, F32 log2_opacity
   Ellipse e;
   e.slope = slope;
   e.inv_y = inv_y;
-  e.width2 = 1.0f / inv_x;
+  e.width2 = simd::Reciprocal(inv_x);
   e.tau = simd::Max(log2_opacity + (kLog2Of255 + 1e-4f), simd::Zero());
-  const F32 var_y = 1.0f / inv_y;
+  const F32 var_y = simd::Reciprocal(inv_y);
   const F32 var_x = e.width2 + slope * slope * var_y;
-  e.y_reach = simd::Sqrt(e.tau * var_y);
-  e.dy_right = slope * var_y * simd::Sqrt(e.tau / var_x);
+  e.y_reach = simd::FastSqrt(e.tau * var_y);
+  e.dy_right = slope * var_y * simd::FastSqrt(e.tau * simd::Reciprocal(var_x));
   return e;
 }
 
@@ -47,9 +47,9 @@ HWY_INLINE void BandExtent(const Ellipse& e, F32 low, F32 high, F32* left, F32* 
   high = simd::Min(high, e.y_reach);
   const F32 dr = simd::Clamp(e.dy_right, low, high);
   const F32 dl = simd::Clamp(-e.dy_right, low, high);
-  *right = e.slope * dr + simd::Sqrt(simd::Max(e.tau - e.inv_y * dr * dr, zero) * e.width2) +
+  *right = e.slope * dr + simd::FastSqrt(simd::Max(e.tau - e.inv_y * dr * dr, zero) * e.width2) +
            kBoundSlackPx;
-  *left = e.slope * dl - simd::Sqrt(simd::Max(e.tau - e.inv_y * dl * dl, zero) * e.width2) -
+  *left = e.slope * dl - simd::FastSqrt(simd::Max(e.tau - e.inv_y * dl * dl, zero) * e.width2) -
           kBoundSlackPx;
 }
 

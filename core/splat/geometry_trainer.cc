@@ -187,6 +187,7 @@ class GeometryTrainer {
     const LossValue loss =
         loss_.Evaluate(pipeline_.color(), *target, nullptr, weights, pool_, d_color_);
     if (!std::isfinite(loss.total)) return false;
+    state_.statistics.absolute = tuning_.absolute_gradient;
     pipeline_.Backward(state_.parameters,
                        color,
                        camera,
@@ -210,8 +211,13 @@ class GeometryTrainer {
                         gradient_);
     std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
-    if (!AdamStep(
-            gradient_, rates, state_.iteration + 1, pool_, state_.parameters, state_.moments)) {
+    if (!AdamStep(gradient_,
+                  rates,
+                  state_.iteration + 1,
+                  pool_,
+                  state_.parameters,
+                  state_.moments,
+                  tuning_.sparse_adam ? &pipeline_.depth_keys() : nullptr)) {
       return false;
     }
     if (tuning_.strategy == GeometryTuning::Strategy::kRelocate && tuning_.noise > 0.0 &&

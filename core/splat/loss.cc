@@ -27,12 +27,27 @@ struct Terms {
   const PlaneBuffer& y;
   const PlaneBuffer* weight;
   const float* zeros;    // a row of zeros with kPad more on either side
-  float l1, ssim, edge;  // weights divided by the number of terms of the mean
-  PlaneBuffer& d_mean;
-  PlaneBuffer& d_square;
-  PlaneBuffer& d_product;
-  PlaneBuffer& d_laplacian;
+  float l1, ssim, edge;  // weights divided by the number of terms of the mean; edge 0: no edge term
   PlaneBuffer& gradient;
+};
+
+// What a band of rows keeps while it moves down: the last rows of the derivatives by the blurred
+// moments and by the Laplacian, and row buffers.
+enum BandMap { kDMean, kDSquare, kDProduct, kDLaplacian, kBandMaps };
+constexpr int kBandRows = 2 * kReach + 1;
+constexpr int kRowBuffers = 5;
+struct Band {
+  float* data;  // zero where padded
+  int stride;   // of the picture
+
+  static size_t FloatsFor(int stride) {
+    return static_cast<size_t>(kBandMaps * kBandRows + kRowBuffers) * (stride + 2 * kPad);
+  }
+  float* Slot(int slot) const {
+    return data + static_cast<size_t>(slot) * (stride + 2 * kPad) + kPad;
+  }
+  float* Row(BandMap map, int y) const { return Slot(map * kBandRows + y % kBandRows); }
+  float* Buffer(int k) const { return Slot(kBandMaps * kBandRows + k); }
 };
 
 }  // namespace
@@ -50,6 +65,10 @@ using simd::Mask;
 
 const float* RowOrZeros(const PlaneBuffer& p, int c, int y, const float* zeros) {
   return y >= 0 && y < p.height ? p.Row(c, y) : zeros;
+}
+
+const float* RowOrZeros(const Terms& t, const Band& band, BandMap map, int y) {
+  return y >= 0 && y < t.x.height ? band.Row(map, y) : t.zeros;
 }
 
 F32 BlurAlongRow(const float* p) {
@@ -97,16 +116,14 @@ void BlurColumns(const Terms& t, int c, int r, float* const out[5]) {
 }
 
 // 1 - SSIM of row r, its derivatives by the blurred moments, and L1's value.
-void StructureRow(const Terms& t, int c, int r, float* scratch, double* sums) {
+void StructureRow(const Terms& t, int c, int r, const Band& band, double* sums) {
   float* rows[5];
-  for (int k = 0; k < 5; ++k) {
-    rows[k] = scratch + k * (t.x.stride + 2 * kPad) + kPad;
-    std::fill_n(rows[k] - kPad, kPad, 0.0f);
-    std::fill_n(rows[k] + t.x.stride, kPad, 0.0f);
-  }
+  for (int k = 0; k < 5; ++k) rows[k] = band.Buffer(k);
   BlurColumns(t, c, r, rows);
   F32 l1 = simd::Zero(), dissimilarity = simd::Zero();
   const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
+  float *d_mean = band.Row(kDMean, r), *d_square = band.Row(kDSquare, r);
+  float* d_product = band.Row(kDProduct, r);
   for (int j = 0; j < t.x.stride; j += simd::kLanes) {
     const F32 w = PixelWeights(t, r, j);
     const F32 d = simd::Load(x + j) - simd::Load(y + j);
@@ -121,20 +138,19 @@ void StructureRow(const Terms& t, int c, int r, float* scratch, double* sums) {
     const F32 ssim = a1 * a2 * b1 * b2;
     dissimilarity = dissimilarity + w * (1.0f - ssim);
     const F32 scale = -t.ssim * w;
-    simd::Store(t.d_square.Row(c, r) + j, -scale * ssim * b2);
-    simd::Store(t.d_product.Row(c, r) + j, scale * 2.0f * a1 * b1 * b2);
-    simd::Store(t.d_mean.Row(c, r) + j,
-                scale * 2.0f * (my * (a2 - a1) * b1 * b2 - mx * ssim * (b1 - b2)));
+    simd::Store(d_square + j, -scale * ssim * b2);
+    simd::Store(d_product + j, scale * 2.0f * a1 * b1 * b2);
+    simd::Store(d_mean + j, scale * 2.0f * (my * (a2 - a1) * b1 * b2 - mx * ssim * (b1 - b2)));
   }
   sums[0] = simd::HorizontalSum(l1);
   sums[1] = simd::HorizontalSum(dissimilarity);
 }
 
 // Charbonnier of the Laplacian of x - y on row r's inner pixels, and its derivative.
-void EdgeRow(const Terms& t, int c, int r, double* sum) {
+void EdgeRow(const Terms& t, int c, int r, const Band& band, double* sum) {
   const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
   const int stride = t.x.stride;
-  float* out = t.d_laplacian.Row(c, r);
+  float* out = band.Row(kDLaplacian, r);
   F32 total = simd::Zero();
   for (int j = 0; j < stride; j += simd::kLanes) {
     const auto difference = [&](int offset) HWY_ATTR {
@@ -155,17 +171,14 @@ void EdgeRow(const Terms& t, int c, int r, double* sum) {
 }
 
 // dL/dx of row r: the adjoint of the blur, L1's sign, the adjoint of the Laplacian.
-void GradientRow(const Terms& t, int c, int r, float* scratch) {
-  const PlaneBuffer* maps[3] = {&t.d_mean, &t.d_square, &t.d_product};
+void GradientRow(const Terms& t, int c, int r, const Band& band) {
   const int stride = t.x.stride;
   float* rows[3];
   for (int m = 0; m < 3; ++m) {
-    rows[m] = scratch + m * (stride + 2 * kPad) + kPad;
-    std::fill_n(rows[m] - kPad, kPad, 0.0f);
-    std::fill_n(rows[m] + stride, kPad, 0.0f);
+    rows[m] = band.Buffer(m);
     const float* taps[2 * kReach + 1];
     for (int k = -kReach; k <= kReach; ++k) {
-      taps[k + kReach] = RowOrZeros(*maps[m], c, r + k, t.zeros);
+      taps[k + kReach] = RowOrZeros(t, band, static_cast<BandMap>(m), r + k);
     }
     for (int j = 0; j < stride; j += simd::kLanes) {
       F32 sum = kTaps[0] * simd::Load(taps[kReach] + j);
@@ -176,10 +189,12 @@ void GradientRow(const Terms& t, int c, int r, float* scratch) {
       simd::Store(rows[m] + j, sum);
     }
   }
-  const bool inner = r > 0 && r + 1 < t.x.height;  // the border rows' own term is zero
-  const float* here = inner ? t.d_laplacian.Row(c, r) : t.zeros;
-  const float* up = RowOrZeros(t.d_laplacian, c, r - 1, t.zeros);
-  const float* down = RowOrZeros(t.d_laplacian, c, r + 1, t.zeros);
+  // The border rows have no Laplacian of their own.
+  const auto laplacian = [&](int row) {
+    const bool inner = t.edge > 0.0f && row > 0 && row + 1 < t.x.height;
+    return inner ? band.Row(kDLaplacian, row) : t.zeros;
+  };
+  const float *up = laplacian(r - 1), *here = laplacian(r), *down = laplacian(r + 1);
   const float *x = t.x.Row(c, r), *y = t.y.Row(c, r);
   for (int j = 0; j < stride; j += simd::kLanes) {
     const F32 xv = simd::Load(x + j), yv = simd::Load(y + j);
@@ -198,6 +213,21 @@ void GradientRow(const Terms& t, int c, int r, float* scratch) {
   }
 }
 
+// Rows [first, end) of channel c, streaming: the gradient follows kReach rows behind the terms, so
+// that what lies between stays in the cache. Rows beyond the band's ends are computed twice.
+void LossRows(const Terms& t, int c, int first, int end, float* scratch, double* row_sums) {
+  const Band band{scratch, t.x.stride};
+  for (int r = first - kReach; r < end + kReach; ++r) {
+    if (r >= 0 && r < t.x.height) {
+      double beyond[3];
+      double* sums = r >= first && r < end ? row_sums + 3 * r : beyond;
+      StructureRow(t, c, r, band, sums);
+      if (t.edge > 0.0f && r > 0 && r + 1 < t.x.height) EdgeRow(t, c, r, band, sums + 2);
+    }
+    if (r - kReach >= first) GradientRow(t, c, r - kReach, band);
+  }
+}
+
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace color3d
@@ -206,9 +236,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace color3d {
 namespace {
-HWY_EXPORT(StructureRow);
-HWY_EXPORT(EdgeRow);
-HWY_EXPORT(GradientRow);
+HWY_EXPORT(LossRows);
 }  // namespace
 
 LossValue ImageLoss::Evaluate(const PlaneBuffer& x,
@@ -217,12 +245,10 @@ LossValue ImageLoss::Evaluate(const PlaneBuffer& x,
                               const LossWeights& weights,
                               ThreadPool& pool,
                               PlaneBuffer& gradient) {
-  for (PlaneBuffer* p : {&d_mean_, &d_square_, &d_product_, &d_laplacian_, &gradient}) {
-    p->Reset(x.width, x.height, x.channels);
-  }
+  gradient.Reset(x.width, x.height, x.channels);
   zeros_.assign(x.stride + 2 * kPad, 0.0f);
   scratch_.resize(pool.thread_count());
-  for (AlignedFloats& s : scratch_) s.resize(5 * (static_cast<size_t>(x.stride) + 2 * kPad));
+  for (AlignedFloats& s : scratch_) s.assign(Band::FloatsFor(x.stride), 0.0f);
   const int64_t rows = static_cast<int64_t>(x.channels) * x.height;
   row_sums_.assign(rows * 3, 0.0);
   const double pixels = static_cast<double>(x.width) * x.height * x.channels;
@@ -236,25 +262,22 @@ LossValue ImageLoss::Evaluate(const PlaneBuffer& x,
                 zeros_.data() + kPad,
                 static_cast<float>(weights.l1 / pixels),
                 static_cast<float>(weights.ssim / pixels),
-                static_cast<float>(weights.edge / inner),
-                d_mean_,
-                d_square_,
-                d_product_,
-                d_laplacian_,
+                edge ? static_cast<float>(weights.edge / inner) : 0.0f,
                 gradient};
-  if (!edge) std::fill(d_laplacian_.data.begin(), d_laplacian_.data.end(), 0.0f);
-  const auto structure_row = &COLOR3D_KERNEL(StructureRow);
-  const auto edge_row = &COLOR3D_KERNEL(EdgeRow);
-  const auto gradient_row = &COLOR3D_KERNEL(GradientRow);
-  pool.ForEach(rows, [&](int64_t i, int thread) {
-    const int c = static_cast<int>(i / x.height), r = static_cast<int>(i % x.height);
-    structure_row(t, c, r, scratch_[thread].data(), &row_sums_[3 * i]);
-    if (edge && r > 0 && r + 1 < x.height) edge_row(t, c, r, &row_sums_[3 * i + 2]);
-  });
-  pool.ForEach(rows, [&](int64_t i, int thread) {
+  const auto loss_rows = &COLOR3D_KERNEL(LossRows);
+  pool.ForRanges(rows, [&](int64_t begin, int64_t end, int thread) {
     const ScopedFlushToZero flush;
-    gradient_row(
-        t, static_cast<int>(i / x.height), static_cast<int>(i % x.height), scratch_[thread].data());
+    while (begin < end) {
+      const int64_t c = begin / x.height, first = c * x.height;
+      const int64_t stop = std::min(end, first + x.height);
+      loss_rows(t,
+                static_cast<int>(c),
+                static_cast<int>(begin - first),
+                static_cast<int>(stop - first),
+                scratch_[thread].data(),
+                row_sums_.data() + 3 * first);
+      begin = stop;
+    }
   });
   LossValue value;
   for (int64_t i = 0; i < rows; ++i) {

@@ -42,8 +42,6 @@ class ImageLoss {
                      PlaneBuffer& gradient);
 
  private:
-  PlaneBuffer d_mean_, d_square_, d_product_;  // dL/d(blurred x, x^2, xy)
-  PlaneBuffer d_laplacian_;
   std::vector<AlignedFloats> scratch_;  // per thread
   AlignedFloats zeros_;
   std::vector<double> row_sums_;

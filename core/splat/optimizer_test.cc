@@ -54,6 +54,28 @@ TEST_P(OptimizerTest, AdamAgreesWithItsFormula) {
   }
 }
 
+TEST_P(OptimizerTest, SparseAdamLeavesUnseenGaussiansAlone) {
+  ThreadPool pool(TestCase());
+  const ParameterBlock before = RandomBlock(1, 1.0), g = RandomBlock(2, 1.0);
+  std::vector<uint32_t> depth_keys(kCount, 0);
+  for (int i = 0; i < kCount; ++i) depth_keys[i] = i < 16 || i % 3 == 1 ? 7 : 0;
+  std::fill(depth_keys.begin() + 16, depth_keys.begin() + 32, 0);
+  ParameterBlock dense = before, sparse = before;
+  AdamMoments dense_moments{ParameterBlock(kRows, kCount), ParameterBlock(kRows, kCount)};
+  AdamMoments sparse_moments = dense_moments;
+  const std::vector<float> rates(kRows, 0.01f);
+  ASSERT_TRUE(AdamStep(g, rates, 1, pool, dense, dense_moments));
+  ASSERT_TRUE(AdamStep(g, rates, 1, pool, sparse, sparse_moments, &depth_keys));
+  for (int r = 0; r < kRows; ++r) {
+    for (int i = 0; i < kCount; ++i) {
+      const bool seen = depth_keys[i] != 0;
+      EXPECT_EQ(sparse.Row(r)[i], seen ? dense.Row(r)[i] : before.Row(r)[i]);
+      EXPECT_EQ(sparse_moments.first.Row(r)[i], seen ? dense_moments.first.Row(r)[i] : 0.0f);
+      EXPECT_EQ(sparse_moments.second.Row(r)[i], seen ? dense_moments.second.Row(r)[i] : 0.0f);
+    }
+  }
+}
+
 TEST_P(OptimizerTest, AdamReportsWhatIsNotFinite) {
   ThreadPool pool(TestCase());
   for (const float bad :

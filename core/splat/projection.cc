@@ -17,6 +17,8 @@
 namespace color3d {
 namespace {
 
+constexpr int64_t kPrefetchBlocks = 2;  // ahead
+
 struct ForwardContext {
   const ParameterBlock& p;
   const ColorSpec& color;
@@ -26,6 +28,8 @@ struct ForwardContext {
 };
 
 struct BackwardContext {
+  int row_floats;  // of a pair's gradient
+  int columns;     // of them used
   const ParameterBlock& p;
   const ColorSpec& color;
   const RasterCamera& camera;
@@ -203,18 +207,26 @@ ShapeGradient ShapeBackward(const RasterCamera& c, const Projected& g, const F32
 
 // Adds up the pairs of sixteen Gaussians into planar sums. False when none is visible.
 bool GatherSums(const BackwardContext& ctx, int64_t i, int lanes, F32* sums) {
-  const int row_floats = ctx.splats.row_floats;
-  const int used = kGradientColor + ctx.color.channels;
-  const uint32_t begin = ctx.first_pair[i];
-  if (ctx.first_pair[i + lanes] == begin) return false;
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::FixedTag<float, 4> d;
+  const int row_floats = ctx.row_floats, used = ctx.columns;
+  if (ctx.first_pair[i + lanes] == ctx.first_pair[i]) return false;
   alignas(64) float planar[12][simd::kLanes] = {};
   for (int lane = 0; lane < lanes; ++lane) {
-    float sum[12] = {};
-    const uint32_t end = ctx.first_pair[i + lane + 1];
-    for (uint32_t pair = ctx.first_pair[i + lane]; pair < end; ++pair) {
-      const float* row = ctx.pair_gradient + static_cast<size_t>(pair) * row_floats;
-      for (int k = 0; k < used; ++k) sum[k] += row[k];
+    auto sum0 = hn::Zero(d), sum1 = sum0, sum2 = sum0;
+    const float* row =
+        ctx.pair_gradient + static_cast<size_t>(ctx.first_pair[i + lane]) * row_floats;
+    const float* end =
+        ctx.pair_gradient + static_cast<size_t>(ctx.first_pair[i + lane + 1]) * row_floats;
+    for (; row != end; row += row_floats) {
+      sum0 = hn::Add(sum0, hn::Load(d, row));
+      sum1 = hn::Add(sum1, hn::Load(d, row + 4));
+      if (row_floats > 8) sum2 = hn::Add(sum2, hn::Load(d, row + 8));
     }
+    alignas(16) float sum[12];
+    hn::Store(sum0, d, sum);
+    hn::Store(sum1, d, sum + 4);
+    hn::Store(sum2, d, sum + 8);
     for (int k = 0; k < used; ++k) planar[k][lane] = sum[k];
   }
   for (int k = 0; k < used; ++k) sums[k] = simd::Load(planar[k]);
@@ -251,8 +263,12 @@ void ColorBackward(const BackwardContext& ctx, int64_t i, const F32* sums, F32* 
 
 void UpdateStatistics(const BackwardContext& ctx, int64_t i, const Projected& g, const F32* sums) {
   DensifyStatistics& s = *ctx.statistics;
-  const F32 du = g.inv_var_x * sums[kSumWE];
-  const F32 dv = g.inv_var_y * sums[kSumWDy] - g.slope * du;
+  F32 du = g.inv_var_x * sums[kSumWE];
+  F32 dv = g.inv_var_y * sums[kSumWDy] - g.slope * du;
+  if (s.absolute) {
+    du = sums[AbsoluteColumn(ctx.color.channels)] * (1.0f / kHalfLog2E);
+    dv = sums[AbsoluteColumn(ctx.color.channels) + 1] * (1.0f / kHalfLog2E);
+  }
   const F32 nx = du * (0.5f * static_cast<float>(ctx.camera.width));
   const F32 ny = dv * (0.5f * static_cast<float>(ctx.camera.height));
   alignas(64) float norm[simd::kLanes], radius[simd::kLanes];
@@ -266,6 +282,12 @@ void UpdateStatistics(const BackwardContext& ctx, int64_t i, const Projected& g,
     s.count[i + lane] += 1.0f;
     s.radius[i + lane] = std::max(s.radius[i + lane], radius[lane]);
   }
+}
+
+// There are more rows than the processor's prefetchers can follow.
+void PrefetchRows(const ParameterBlock& p, int64_t i) {
+  i = std::min(i, p.stride() - simd::kLanes);
+  for (int r = 0; r < p.rows(); ++r) __builtin_prefetch(p.Row(r) + i);
 }
 
 void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
@@ -303,11 +325,18 @@ void BackwardSixteen(const BackwardContext& ctx, int64_t i) {
 }
 
 void ProjectRange(const ForwardContext& ctx, int64_t begin, int64_t end) {
-  for (int64_t block = begin; block < end; ++block) ProjectSixteen(ctx, block * simd::kLanes);
+  for (int64_t block = begin; block < end; ++block) {
+    PrefetchRows(ctx.p, (block + kPrefetchBlocks) * simd::kLanes);
+    ProjectSixteen(ctx, block * simd::kLanes);
+  }
 }
 
 void BackwardRange(const BackwardContext& ctx, int64_t begin, int64_t end) {
-  for (int64_t block = begin; block < end; ++block) BackwardSixteen(ctx, block * simd::kLanes);
+  for (int64_t block = begin; block < end; ++block) {
+    PrefetchRows(ctx.p, (block + kPrefetchBlocks) * simd::kLanes);
+    PrefetchRows(ctx.gradient, (block + kPrefetchBlocks) * simd::kLanes);
+    BackwardSixteen(ctx, block * simd::kLanes);
+  }
 }
 
 }  // namespace
@@ -357,7 +386,10 @@ void ProjectSplatsBackward(const ParameterBlock& parameters,
   if (gradient.rows() != parameters.rows() || gradient.count() != parameters.count()) {
     gradient = ParameterBlock(parameters.rows(), parameters.count());
   }
-  const BackwardContext ctx{parameters,
+  const bool absolute = statistics != nullptr && statistics->absolute;
+  const BackwardContext ctx{GradientRowFloats(color.channels, absolute),
+                            kGradientColor + color.channels + (absolute ? 2 : 0),
+                            parameters,
                             color,
                             camera,
                             splats,

@@ -1,5 +1,5 @@
 // From 3D Gaussians to 2D splats and back (EWA splatting: Zwicker et al. 2001; Kerbl et al. 2023).
-// Internal to the splat module; no Eigen here, because the sources are compiled
+// Internal to the splat module; no Eigen here, because the kernels are compiled once per
 // instruction set. All functions are deterministic whatever the thread count.
 #pragma once
 
@@ -56,11 +56,18 @@ enum SplatGradientColumn {
   kSumWEE,
   kSumWEDy,
   kSumWDyDy,
-  kGradientColor,
+  kGradientColor,  // the colour channels follow, and the two below when asked for
 };
+// With absolute gradients, behind the channels: sums over pixels of |w inv_x e| and of
+// |w (inv_y dy - slope inv_x e)|, which are |dL/du| and |dL/dv| of a pixel up to a factor.
+constexpr int AbsoluteColumn(int channels) { return kGradientColor + channels; }
 
 // 6 geometry columns and the channels, padded.
 constexpr int SplatRowFloats(int channels) { return channels <= 2 ? 8 : 12; }
+// A gradient row's columns, padded.
+constexpr int GradientRowFloats(int channels, bool absolute) {
+  return kGradientColor + channels + (absolute ? 2 : 0) <= 8 ? 8 : 12;
+}
 
 struct SplatBuffer {
   int channels = 0;  // colour channels, and one for depth when asked for
@@ -78,7 +85,10 @@ void ProjectSplats(const ParameterBlock& parameters,
 
 // Sums over the views since densification, per Gaussian.
 struct DensifyStatistics {
-  AlignedFloats gradient;  // |dL/d(u, v)| in NDC units, summed
+  // What `gradient` sums up: |dL/d(u, v)|, or with `absolute` the length of (sum over pixels of
+  // |dL/du|, sum of |dL/dv|), which pulls of opposite sign do not cancel (AbsGS: Ye et al. 2024).
+  bool absolute = false;
+  AlignedFloats gradient;  // in NDC units
   AlignedFloats count;     // views that saw it
   AlignedFloats radius;    // largest standard deviation on the screen, fraction of the image width
   void Reset(int64_t gaussians);
@@ -87,10 +97,10 @@ struct DensifyStatistics {
 // Which parameters' gradients are wanted.
 enum class GradientScope { kAll, kColorOnly };
 
-// `pair_gradient` holds one gradient row of SplatRowFloats(channels) for each (Gaussian, tile)
-// pair; those of Gaussian i are [first_pair[i], first_pair[i + 1]). `gradient` gets the shape of
-// `parameters`; rows out of scope and Gaussians that are not visible get zeros. `statistics` may be
-// null.
+// `pair_gradient` holds one gradient row of GradientRowFloats(channels, statistics->absolute) for
+// each (Gaussian, tile) pair; those of Gaussian i are [first_pair[i], first_pair[i + 1]).
+// `gradient` gets the shape of `parameters`; rows out of scope and Gaussians that are not visible
+// get zeros. `statistics` may be null.
 void ProjectSplatsBackward(const ParameterBlock& parameters,
                            const ColorSpec& color,
                            const RasterCamera& camera,

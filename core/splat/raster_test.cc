@@ -168,6 +168,60 @@ TEST_P(RasterTest, GradientsAgreeWithFiniteDifferencesOfTheReference) {
   }
 }
 
+// Moving the principal point moves all centres alike, so a picture of one Gaussian gives each
+// pixel's dL/d(u, v) by finite differences of the reference.
+TEST_P(RasterTest, AbsoluteScreenGradientsAgreeWithTheReference) {
+  ThreadPool pool(2);
+  const int channels = TestCase(), width = 41, height = 35;
+  const RasterCamera camera = TestCamera(width, height);
+  const ColorSpec color = TestColor(channels);
+  const PlaneBuffer weights = RandomWeights(width, height, channels, 5);
+  for (const uint64_t seed : {21, 22, 23}) {
+    const ParameterBlock p = RandomGaussians(1, seed);
+    double sums[2] = {0.0, 0.0}, plain[2] = {0.0, 0.0};
+    for (int axis = 0; axis < 2; ++axis) {
+      const float h = 1e-3f;
+      RasterCamera moved[2] = {camera, camera};
+      (axis == 0 ? moved[0].cx : moved[0].cy) -= h;
+      (axis == 0 ? moved[1].cx : moved[1].cy) += h;
+      const double step =
+          axis == 0 ? double{moved[1].cx} - moved[0].cx : double{moved[1].cy} - moved[0].cy;
+      const ReferenceParameters r = ReferenceParameters::From(p);
+      const ReferenceImage below = ReferenceRender(r, color, moved[0], kBackground64);
+      const ReferenceImage above = ReferenceRender(r, color, moved[1], kBackground64);
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+          const size_t i = static_cast<size_t>(y) * width + x;
+          double d = 0.0;
+          for (int c = 0; c < channels; ++c) {
+            d += weights.Row(c, y)[x] * (above.color[c][i] - below.color[c][i]) / step;
+          }
+          // A pixel that crosses alpha = 1/255 between the two jumps.
+          if ((above.opacity[i] == 0.0) != (below.opacity[i] == 0.0)) continue;
+          sums[axis] += std::abs(d);
+          plain[axis] += d;
+        }
+      }
+      sums[axis] *= 0.5 * (axis == 0 ? width : height);
+      plain[axis] *= 0.5 * (axis == 0 ? width : height);
+    }
+    for (const bool absolute : {false, true}) {
+      SplatPipeline pipeline;
+      pipeline.Forward(p, color, camera, kBackground, false, pool);
+      DensifyStatistics statistics;
+      statistics.absolute = absolute;
+      statistics.Reset(1);
+      ParameterBlock gradient;
+      pipeline.Backward(
+          p, color, camera, weights, GradientScope::kAll, pool, gradient, &statistics);
+      const double* expected = absolute ? sums : plain;
+      const double norm = std::hypot(expected[0], expected[1]);
+      EXPECT_GT(norm, 0.1);
+      EXPECT_NEAR(statistics.gradient[0], norm, 3e-3 * std::hypot(sums[0], sums[1])) << absolute;
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Channels,
                          RasterTest,
                          testing::Combine(testing::Values(1, 2, 3), EachInstructionSet()));

@@ -54,6 +54,7 @@ struct BackwardJob {
   const uint16_t* block_masks;
   const PlaneBuffer& color;
   const PlaneBuffer& d_color;
+  bool absolute;
   float* pair_gradient;
 };
 
@@ -264,14 +265,15 @@ struct BackwardPixels {
 };
 
 // One entry: its gradient row to `out`, and the pixels moved behind it.
-template <int kChannels>
-inline void BackwardEntry(const Chunk& chunk,
-                          const Offsets& offsets,
-                          const WorkList& work,
-                          int j,
-                          BackwardPixels<kChannels>& pixels,
-                          float* out) {
-  constexpr int kRow = SplatRowFloats(kChannels);
+template <int kChannels, bool kAbsolute>
+HWY_INLINE void BackwardEntry(const Chunk& chunk,
+                              const Offsets& offsets,
+                              const WorkList& work,
+                              int j,
+                              BackwardPixels<kChannels>& pixels,
+                              float* out) {
+  constexpr int kColumns = kGradientColor + kChannels + (kAbsolute ? 2 : 0);
+  F32 absolute_u = simd::Zero(), absolute_v = simd::Zero();
   F32 w0 = simd::Zero(), we1 = w0, wy1 = w0, wee = w0, wey = w0, wyy = w0, wc[kChannels];
   for (int c = 0; c < kChannels; ++c) wc[c] = simd::Zero();
   const F32 inv_x = Broadcast(chunk.column[kInvX][j]), inv_y = Broadcast(chunk.column[kInvY][j]);
@@ -306,18 +308,24 @@ inline void BackwardEntry(const Chunk& chunk,
     wee = wee + we * e;
     wey = wey + we * dy;
     wyy = wyy + wy * dy;
+    if constexpr (kAbsolute) {
+      const F32 du = inv_x * we;
+      absolute_u = absolute_u + simd::Abs(du);
+      absolute_v = absolute_v + simd::Abs(inv_y * wy - chunk.column[kSlope][j] * du);
+    }
   }
-  F32 sums[kGradientColor + 4] = {w0, we1, wy1, wee, wey, wyy};
+  F32 sums[kColumns] = {w0, we1, wy1, wee, wey, wyy};
   for (int c = 0; c < kChannels; ++c) sums[kGradientColor + c] = wc[c];
-  simd::HorizontalSums8(sums, out);
-  for (int k = 8; k < kRow; ++k) {
-    out[k] = k < kGradientColor + kChannels ? simd::HorizontalSum(sums[k]) : 0.0f;
+  if constexpr (kAbsolute) {
+    sums[AbsoluteColumn(kChannels)] = absolute_u;
+    sums[AbsoluteColumn(kChannels) + 1] = absolute_v;
   }
+  simd::HorizontalSums<kColumns>(sums, out);
 }
 
-template <int kChannels>
+template <int kChannels, bool kAbsolute>
 void BackwardTile(const BackwardJob& job, const Tile& tile) {
-  constexpr int kRow = SplatRowFloats(kChannels);
+  constexpr int kRow = GradientRowFloats(kChannels, kAbsolute);
   BackwardPixels<kChannels> pixels(job.color, job.d_color, tile);
   Chunk chunk;
   WorkList work;
@@ -331,12 +339,13 @@ void BackwardTile(const BackwardJob& job, const Tile& tile) {
     BuildWorkList(chunk, job.block_masks + begin, alive, work);
     ComputeOffsets(chunk, tile, offsets);
     for (int j = 0; j < count; ++j) {
-      BackwardEntry(chunk,
-                    offsets,
-                    work,
-                    j,
-                    pixels,
-                    job.pair_gradient + static_cast<size_t>(job.lists.pair[begin + j]) * kRow);
+      BackwardEntry<kChannels, kAbsolute>(
+          chunk,
+          offsets,
+          work,
+          j,
+          pixels,
+          job.pair_gradient + static_cast<size_t>(job.lists.pair[begin + j]) * kRow);
     }
   }
   // Entries behind the last visible surface.
@@ -359,16 +368,21 @@ void ForwardTileAt(const ForwardJob& job, int64_t index) {
   }
 }
 
-void BackwardTileAt(const BackwardJob& job, int64_t index) {
-  const Tile tile = TileAt(job.lists, index);
+template <bool kAbsolute>
+void BackwardTileOf(const BackwardJob& job, const Tile& tile) {
   switch (job.splats.channels) {
     case 1:
-      return BackwardTile<1>(job, tile);
+      return BackwardTile<1, kAbsolute>(job, tile);
     case 2:
-      return BackwardTile<2>(job, tile);
+      return BackwardTile<2, kAbsolute>(job, tile);
     default:
-      return BackwardTile<3>(job, tile);
+      return BackwardTile<3, kAbsolute>(job, tile);
   }
+}
+
+void BackwardTileAt(const BackwardJob& job, int64_t index) {
+  const Tile tile = TileAt(job.lists, index);
+  return job.absolute ? BackwardTileOf<true>(job, tile) : BackwardTileOf<false>(job, tile);
 }
 
 }  // namespace
@@ -401,10 +415,12 @@ void RasterizeBackward(const SplatBuffer& splats,
                        const std::vector<uint16_t>& block_masks,
                        const PlaneBuffer& color,
                        const PlaneBuffer& d_color,
+                       bool absolute,
                        ThreadPool& pool,
                        AlignedFloats& pair_gradient) {
-  pair_gradient.resize(lists.pair_count() * splats.row_floats);
-  const BackwardJob job{splats, lists, block_masks.data(), color, d_color, pair_gradient.data()};
+  pair_gradient.resize(lists.pair_count() * GradientRowFloats(splats.channels, absolute));
+  const BackwardJob job{
+      splats, lists, block_masks.data(), color, d_color, absolute, pair_gradient.data()};
   const auto backward_tile = &COLOR3D_KERNEL(BackwardTileAt);
   pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
     const ScopedFlushToZero flush;

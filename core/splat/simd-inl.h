@@ -181,6 +181,16 @@ HWY_INLINE uint32_t MaskBits(Mask m) {
   return bits;
 }
 
+HWY_INLINE Mask MaskFromBits(uint32_t bits) {
+  Mask r;
+  for (int k = 0; k < kParts; ++k) {
+    const uint32_t part = bits >> (k * kRegisterLanes);
+    const uint8_t bytes[8] = {static_cast<uint8_t>(part), static_cast<uint8_t>(part >> 8)};
+    r.part[k] = hn::LoadMaskBits(FloatTag(), bytes);
+  }
+  return r;
+}
+
 HWY_INLINE I32 BitsOf(F32 v) {
   I32 r;
   COLOR3D_PARTS(hn::BitCast(IntTag(), v.part[k]))
@@ -252,25 +262,71 @@ HWY_INLINE float HorizontalSum(F32 v) {
   return hn::GetLane(hn::SumOfLanes(FloatTag(), sum));
 }
 
-// The sums over the lanes of 8 vectors, to 8 consecutive floats.
-HWY_INLINE void HorizontalSums8(const F32* v, float* sums) {
-#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX2
-  __m256 half[8];
-  for (int i = 0; i < 8; ++i) {
-#if HWY_TARGET == HWY_AVX3
-    const __m512 x = v[i].part[0].raw;
-    half[i] = _mm256_add_ps(_mm512_castps512_ps256(x), _mm512_extractf32x8_ps(x, 1));
-#else
-    half[i] = _mm256_add_ps(v[i].part[0].raw, v[i].part[1].raw);
+// Square root of x >= 0 without the slow instruction: an estimate and a Newton step, relative error
+// below 4e-7 for x >= 1e-30, and next to nothing below.
+HWY_INLINE F32 FastSqrt(F32 x) {
+  x = Max(x, Broadcast(1e-30f));
+  F32 r;
+  COLOR3D_PARTS(hn::ApproximateReciprocalSqrt(x.part[k]))
+#if HWY_ARCH_ARM
+  r = r * (1.5f - 0.5f * x * r * r);
 #endif
+  return x * (r * (1.5f - 0.5f * x * r * r));
+}
+
+#if HWY_TARGET == HWY_AVX3
+namespace detail {
+// [a, b] as halves of the register, each folded from four 128-bit lanes to two.
+HWY_INLINE __m512 FoldHalves(__m512 a, __m512 b) {
+  return _mm512_add_ps(_mm512_mask_blend_ps(0xFF00, a, b), _mm512_shuffle_f32x4(a, b, 0x4E));
+}
+// From [a, b] and [c, d] to one lane of four partial sums each: [a, c, b, d].
+HWY_INLINE __m512 FoldLanes(__m512 ab, __m512 cd) {
+  const __m512 rest = _mm512_mask_blend_ps(0x0F0F, ab, cd);
+  return _mm512_add_ps(_mm512_mask_blend_ps(0xF0F0, ab, cd),
+                       _mm512_shuffle_f32x4(rest, rest, 0xB1));
+}
+// Two partial sums of p and two of q in each lane.
+HWY_INLINE __m512 FoldPairs(__m512 p, __m512 q) {
+  return _mm512_add_ps(_mm512_mask_blend_ps(0xCCCC, p, q), _mm512_shuffle_ps(p, q, 0x4E));
+}
+}  // namespace detail
+#endif
+
+// The sums over the lanes of kCount <= 12 vectors to consecutive floats, padded with zeros to a
+// multiple of four, at least 8.
+template <int kCount>
+HWY_INLINE void HorizontalSums(const F32* v, float* sums) {
+  static_assert(kCount > 4 && kCount <= 12);
+#if HWY_TARGET == HWY_AVX3
+  const auto raw = [v](int i)
+                       HWY_ATTR { return i < kCount ? v[i].part[0].raw : _mm512_setzero_ps(); };
+  const auto four = [&](int i) HWY_ATTR {
+    return detail::FoldLanes(detail::FoldHalves(raw(i), raw(i + 1)),
+                             detail::FoldHalves(raw(i + 2), raw(i + 3)));
+  };
+  const __m512 p = detail::FoldPairs(four(0), four(4));
+  __m512 q = _mm512_setzero_ps();
+  if constexpr (kCount > 8) q = detail::FoldPairs(four(8), q);
+  const __m512 total = _mm512_add_ps(_mm512_shuffle_ps(p, q, 0x88), _mm512_shuffle_ps(p, q, 0xDD));
+  const __m512 ordered = _mm512_permutexvar_ps(
+      _mm512_setr_epi32(0, 8, 4, 12, 1, 9, 5, 13, 2, 10, 6, 14, 3, 11, 7, 15), total);
+  _mm256_storeu_ps(sums, _mm512_castps512_ps256(ordered));
+  if constexpr (kCount > 8) _mm_storeu_ps(sums + 8, _mm512_extractf32x4_ps(ordered, 2));
+#elif HWY_TARGET == HWY_AVX2
+  const auto pair = [v](int i) HWY_ATTR {
+    const auto half = [v](int j) HWY_ATTR {
+      return j < kCount ? _mm256_add_ps(v[j].part[0].raw, v[j].part[1].raw) : _mm256_setzero_ps();
+    };
+    return _mm256_hadd_ps(half(i), half(i + 1));
+  };
+  for (int i = 0; i < kCount || i < 8; i += 4) {
+    const __m256 four = _mm256_hadd_ps(pair(i), pair(i + 2));
+    _mm_storeu_ps(sums + i,
+                  _mm_add_ps(_mm256_castps256_ps128(four), _mm256_extractf128_ps(four, 1)));
   }
-  const __m256 a = _mm256_hadd_ps(half[0], half[1]), b = _mm256_hadd_ps(half[2], half[3]);
-  const __m256 c = _mm256_hadd_ps(half[4], half[5]), d = _mm256_hadd_ps(half[6], half[7]);
-  const __m256 ab = _mm256_hadd_ps(a, b), cd = _mm256_hadd_ps(c, d);
-  _mm_storeu_ps(sums, _mm_add_ps(_mm256_castps256_ps128(ab), _mm256_extractf128_ps(ab, 1)));
-  _mm_storeu_ps(sums + 4, _mm_add_ps(_mm256_castps256_ps128(cd), _mm256_extractf128_ps(cd, 1)));
 #else
-  for (int i = 0; i < 8; ++i) sums[i] = HorizontalSum(v[i]);
+  for (int i = 0; i < (kCount > 8 ? 12 : 8); ++i) sums[i] = i < kCount ? HorizontalSum(v[i]) : 0.0f;
 #endif
 }
 

@@ -22,7 +22,10 @@ struct GeometryTuning {
   int densify_rounds = 30;
   double gradient_preference = 1.0;  // RelocationOptions
   double growth_until = 0.5;         // the number of Gaussians reaches its cap here
-  bool scheduled_cap = false;        // kAdaptive too may grow no faster than that
+  bool absolute_gradient = false;  // DensifyStatistics::absolute; thresholds are then about 4 times
+                                   // those of the usual criterion
+  bool sparse_adam = false;        // only the Gaussians in the picture take part in a step
+  bool scheduled_cap = false;      // kAdaptive too may grow no faster than that
   double opacity_reset_every = 0.0;  // 0: never; while densifying
   double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
   double opacity_penalty = 0.005;    // times the mean opacity

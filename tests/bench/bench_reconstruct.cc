@@ -23,6 +23,8 @@ struct ReconstructArguments {
   std::string pictures_folder;
   std::string strategy;
   std::vector<std::string> settings;  // name=value of GeometryTuning
+  bool absolute_gradient = false;
+  bool sparse_adam = false;
   int max_side_px = 500;
   int threads = 2;
   TrainingColours colours = TrainingColours::kSrgb;
@@ -85,6 +87,8 @@ void Apply(const std::string& setting, GeometryTuning& t) {
 GeometryTuning TuningFrom(const ReconstructArguments& args) {
   GeometryTuning tuning = TuningOf(args.geometry);
   if (args.strategy == "adaptive") tuning.strategy = GeometryTuning::Strategy::kAdaptive;
+  tuning.absolute_gradient = args.absolute_gradient;
+  tuning.sparse_adam = args.sparse_adam;
   if (args.strategy == "relocate") tuning.strategy = GeometryTuning::Strategy::kRelocate;
   for (const std::string& setting : args.settings) Apply(setting, tuning);
   return tuning;
@@ -219,6 +223,8 @@ void AddReconstructCommand(CLI::App& app) {
   command->add_option("--seed", args->geometry.seed);
   command->add_option("--strategy", args->strategy, "adaptive or relocate (3DGS-MCMC)")
       ->check(CLI::IsMember({"adaptive", "relocate"}));
+  command->add_flag("--absolute-gradient", args->absolute_gradient, "densify as AbsGS");
+  command->add_flag("--sparse-adam", args->sparse_adam, "step only what the picture shows");
   command->add_option("--set", args->settings, "name=value of the schedule (GeometryTuning)");
   command->add_option("--pictures", args->pictures_folder, "held-out views: truth, drawn");
   command->add_option("--json", args->json_file, "default: standard output");
