@@ -34,6 +34,7 @@ GeometryTuning PaperTuning(int iterations) {
   tuning.position_rate_first = 1.6e-4;
   tuning.position_rate_last = 1.6e-6;
   tuning.dc_rate = 2.5e-3;
+  tuning.rest_divisor = 20.0;
   tuning.scale_rate = 5e-3;
   tuning.rotation_rate = 1e-3;
   tuning.sh_from = 1000.0 / n;

@@ -31,17 +31,17 @@ struct GeometryTuning {
   double opacity_penalty = 0.005;    // times the mean opacity
   double scale_penalty = 0.005;      // times the mean scale / extent
   double noise = 5e5;                // of 3DGS-MCMC, times the position's learning rate
-  double sh_from = 0.3;              // degree 1 begins here
+  double sh_from = 0.15;             // degree 1 begins here
   double sh_step = 0.15;             // and each further degree this much later
   double position_rate_first = 6e-4;
   double position_rate_last = 4e-5;
   double dc_rate = 5e-3;
-  double rest_divisor = 20.0;
+  double rest_divisor = 10.0;
   double opacity_rate = 0.05;
   double scale_rate = 2e-2;
   double rotation_rate = 4e-3;
   // Under a time limit the number of Gaussians grows only while so many can be hoped for.
-  double wanted_iterations = 1500;
+  double wanted_iterations = 800;
   double last_rate = 1.0;  // all rates but the position's end at this multiple
 };
 
