@@ -204,11 +204,13 @@ class GeometryTrainer {
   // Parameters from the gradient. False when something was not finite.
   bool Update() {
     clock_.Enter(Phase::kAdam);
-    AddPenaltyGradients(state_.parameters,
-                        static_cast<float>(tuning_.opacity_penalty),
-                        static_cast<float>(tuning_.scale_penalty / problem_.extent),
-                        pool_,
-                        gradient_);
+    if (tuning_.opacity_penalty > 0.0 || tuning_.scale_penalty > 0.0) {
+      AddPenaltyGradients(state_.parameters,
+                          static_cast<float>(tuning_.opacity_penalty),
+                          static_cast<float>(tuning_.scale_penalty / problem_.extent),
+                          pool_,
+                          gradient_);
+    }
     std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
     if (!AdamStep(gradient_,

@@ -29,12 +29,11 @@ GeometryTuning PaperTuning(int iterations) {
   tuning.densify_rounds = std::max(1, static_cast<int>((0.5 * n - 500.0) / 100.0));
   tuning.opacity_reset_every = 3000.0 / n;
   tuning.prune_scale = 0.1;
-  tuning.opacity_penalty = 0.0;
-  tuning.scale_penalty = 0.0;
   tuning.position_rate_first = 1.6e-4;
   tuning.position_rate_last = 1.6e-6;
   tuning.dc_rate = 2.5e-3;
   tuning.rest_divisor = 20.0;
+  tuning.opacity_rate = 0.05;
   tuning.scale_rate = 5e-3;
   tuning.rotation_rate = 1e-3;
   tuning.sh_from = 1000.0 / n;

@@ -28,16 +28,16 @@ struct GeometryTuning {
   bool scheduled_cap = false;      // kAdaptive too may grow no faster than that
   double opacity_reset_every = 0.0;  // 0: never; while densifying
   double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
-  double opacity_penalty = 0.005;    // times the mean opacity
-  double scale_penalty = 0.005;      // times the mean scale / extent
+  double opacity_penalty = 0.0;      // times the mean opacity
+  double scale_penalty = 0.0;        // times the mean scale / extent
   double noise = 5e5;                // of 3DGS-MCMC, times the position's learning rate
   double sh_from = 0.15;             // degree 1 begins here
   double sh_step = 0.15;             // and each further degree this much later
   double position_rate_first = 6e-4;
   double position_rate_last = 4e-5;
-  double dc_rate = 5e-3;
+  double dc_rate = 1e-2;
   double rest_divisor = 10.0;
-  double opacity_rate = 0.05;
+  double opacity_rate = 0.1;
   double scale_rate = 2e-2;
   double rotation_rate = 4e-3;
   // Under a time limit the number of Gaussians grows only while so many can be hoped for.
