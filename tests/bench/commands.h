@@ -6,6 +6,7 @@
 namespace color3d {
 
 void AddPipelineCommand(CLI::App& app);
+void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
 
