@@ -88,6 +88,7 @@ class GeometryTrainer {
     Resume(checkpoints);
     guard.Keep(state_);
     earlier_seconds_ = state_.elapsed_seconds;
+    timed_from_ = state_.iteration;
     fraction_ = FractionNow();
     while (fraction_ < 1.0) {
       cancel.ThrowIfCancelled();
@@ -186,6 +187,7 @@ class GeometryTrainer {
     const LossValue loss =
         loss_.Evaluate(pipeline_.color(), *target, nullptr, weights, pool_, d_color_);
     if (!std::isfinite(loss.total)) return false;
+    state_.statistics.absolute = tuning_.absolute_gradient;
     pipeline_.Backward(state_.parameters,
                        color,
                        camera,
@@ -202,15 +204,22 @@ class GeometryTrainer {
   // Parameters from the gradient. False when something was not finite.
   bool Update() {
     clock_.Enter(Phase::kAdam);
-    AddPenaltyGradients(state_.parameters,
-                        static_cast<float>(tuning_.opacity_penalty),
-                        static_cast<float>(tuning_.scale_penalty / problem_.extent),
-                        pool_,
-                        gradient_);
+    if (tuning_.opacity_penalty > 0.0 || tuning_.scale_penalty > 0.0) {
+      AddPenaltyGradients(state_.parameters,
+                          static_cast<float>(tuning_.opacity_penalty),
+                          static_cast<float>(tuning_.scale_penalty / problem_.extent),
+                          pool_,
+                          gradient_);
+    }
     std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
-    if (!AdamStep(
-            gradient_, rates, state_.iteration + 1, pool_, state_.parameters, state_.moments)) {
+    if (!AdamStep(gradient_,
+                  rates,
+                  state_.iteration + 1,
+                  pool_,
+                  state_.parameters,
+                  state_.moments,
+                  tuning_.sparse_adam ? &pipeline_.depth_keys() : nullptr)) {
       return false;
     }
     if (tuning_.strategy == GeometryTuning::Strategy::kRelocate && tuning_.noise > 0.0 &&
@@ -224,22 +233,38 @@ class GeometryTrainer {
     return true;
   }
 
+  // How many Gaussians there may be after this round.
+  int64_t CountAllowed() {
+    const double now = clock_.TrainingSeconds();
+    const double each = (now - densified_seconds_) /
+                        static_cast<double>(std::max<int64_t>(1, state_.iteration - timed_from_));
+    densified_seconds_ = now;
+    timed_from_ = state_.iteration;
+    const int level = schedule_.Level(fraction_, problem_.training.front().camera);
+    const int64_t affordable = schedule_.AffordableCount(
+        fraction_, state_.iteration, each, level, state_.parameters.count());
+    const bool scheduled =
+        tuning_.scheduled_cap || tuning_.strategy == GeometryTuning::Strategy::kRelocate;
+    return scheduled ? std::min(affordable, schedule_.TargetCount(fraction_, initial_count_))
+                     : affordable;
+  }
+
   void Densify(double before) {
     DensifyTarget target{state_.parameters, state_.moments, state_.statistics, state_.random};
     if (schedule_.DensifyDue(before, fraction_) &&
         state_.iteration - state_.densified_at >= kMinDensifyInterval) {
       state_.densified_at = state_.iteration;
-      const int64_t target_count = schedule_.TargetCount(fraction_, initial_count_);
+      const int64_t allowed = CountAllowed();
       if (tuning_.strategy == GeometryTuning::Strategy::kRelocate) {
         RelocationOptions relocation;
         relocation.gradient_preference = tuning_.gradient_preference;
-        relocation.target_count = std::max(state_.parameters.count(), target_count);
+        relocation.target_count = std::max(state_.parameters.count(), allowed);
         Relocate(relocation, target);
       } else {
         GradientDensifyOptions densify;
         densify.gradient_threshold = options_.densify_gradient;
         densify.clone_below_scale = 0.01 * problem_.extent;
-        densify.max_gaussians = tuning_.scheduled_cap ? target_count : options_.max_gaussians;
+        densify.max_gaussians = allowed;
         if (tuning_.prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
           densify.prune_scale = tuning_.prune_scale * problem_.extent;
         }
@@ -326,6 +351,8 @@ class GeometryTrainer {
   double fraction_ = 0.0;  // of the schedule that is done
   double earlier_seconds_ = 0.0;
   PhaseClock clock_;
+  double densified_seconds_ = 0.0;  // on the clock, and the iteration, of the last round
+  int64_t timed_from_ = 0;
   SplatPipeline pipeline_;
   ImageLoss loss_;
   PlaneBuffer d_color_;

@@ -131,7 +131,7 @@ TEST(TimeLimitTest, EndsTheWholeScheduleLongBeforeTheIterationsRunOut) {
   EXPECT_EQ(last.step_, last.total_);
   EXPECT_EQ(last.step_, trace.iterations);
   EXPECT_THAT(last.message_, testing::HasSubstr("160x130 px"));
-  EXPECT_GT(model.size(), 400u);
+  EXPECT_GT(model.size(), 200u);
 }
 
 // Saves and cancels after some time.
@@ -246,6 +246,24 @@ TEST(TrainingScheduleTest, ThePapersTimesAreIterations) {
   Camera camera;
   camera.width = camera.height = 1000;
   EXPECT_EQ(schedule.Level(0.0, camera), 0);
+}
+
+TEST(TrainingScheduleTest, AShortTimeLimitHoldsBackTheNumberOfGaussians) {
+  GeometryOptions options;
+  options.iterations = 100'000;
+  options.max_gaussians = 50'000;
+  GeometryTuning tuning;
+  tuning.wanted_iterations = 1000;
+  const TrainingSchedule untimed(options, tuning, 1.0);
+  EXPECT_EQ(untimed.AffordableCount(0.5, 10, 1.0, 0, 1000), 50'000);
+  GeometryOptions timed_options = options;
+  timed_options.time_limit_seconds = 10.0;
+  const TrainingSchedule timed(timed_options, tuning, 1.0);
+  // 9 s are left for 900 iterations.
+  EXPECT_NEAR(timed.AffordableCount(0.1, 100, 0.005, 0, 1000), 2000, 1);
+  EXPECT_LT(timed.AffordableCount(0.1, 100, 0.005, 1, 1000), 2000);
+  EXPECT_EQ(timed.AffordableCount(0.1, 100, 0.5, 0, 1000), 1000);
+  EXPECT_EQ(timed.AffordableCount(0.1, 100, 1e-9, 0, 1000), 50'000);
 }
 
 TEST(CompareClampedTest, ClampsBeforeItCompares) {

@@ -9,6 +9,9 @@
 namespace color3d {
 namespace {
 
+// An iteration's time at one level against the next coarser one: 4 times the pixels, the same
+// number of Gaussians.
+constexpr double kCostPerLevel = 2.5;
 constexpr int kMinTrainingSidePx = 64;  // coarser levels are not used below this
 
 // How many whole steps of `step`, counted from `from`, lie before `fraction`.
@@ -26,8 +29,13 @@ GeometryTuning PaperTuning(int iterations) {
   tuning.densify_rounds = std::max(1, static_cast<int>((0.5 * n - 500.0) / 100.0));
   tuning.opacity_reset_every = 3000.0 / n;
   tuning.prune_scale = 0.1;
-  tuning.opacity_penalty = 0.0;
-  tuning.scale_penalty = 0.0;
+  tuning.position_rate_first = 1.6e-4;
+  tuning.position_rate_last = 1.6e-6;
+  tuning.dc_rate = 2.5e-3;
+  tuning.rest_divisor = 20.0;
+  tuning.opacity_rate = 0.05;
+  tuning.scale_rate = 5e-3;
+  tuning.rotation_rate = 1e-3;
   tuning.sh_from = 1000.0 / n;
   tuning.sh_step = 1000.0 / n;
   return tuning;
@@ -107,6 +115,24 @@ bool TrainingSchedule::OpacityResetDue(double before, double now) const {
 
 bool TrainingSchedule::HasReset(double fraction) const {
   return tuning_.opacity_reset_every > 0.0 && fraction > tuning_.opacity_reset_every;
+}
+
+int64_t TrainingSchedule::AffordableCount(double fraction,
+                                          int64_t iteration,
+                                          double seconds_per_iteration,
+                                          int level,
+                                          int64_t count) const {
+  if (!(options_.time_limit_seconds > 0.0) || !(seconds_per_iteration > 0.0)) {
+    return options_.max_gaussians;
+  }
+  const double cost = seconds_per_iteration * std::pow(kCostPerLevel, level);
+  const double possible = (1.0 - fraction) * options_.time_limit_seconds / cost;
+  const double wanted = std::max(1.0,
+                                 std::min<double>(tuning_.wanted_iterations, options_.iterations) -
+                                     static_cast<double>(iteration));
+  const double affordable = static_cast<double>(count) * possible / wanted;
+  return std::max(count,
+                  static_cast<int64_t>(std::min<double>(affordable, options_.max_gaussians)));
 }
 
 int64_t TrainingSchedule::TargetCount(double fraction, int64_t initial_count) const {

@@ -16,27 +16,32 @@ struct GeometryTuning {
   enum class Strategy { kAdaptive, kRelocate };
   Strategy strategy = Strategy::kAdaptive;
   double quarter_size_until = 0.0;  // train at 1/4, then 1/2 of the working size
-  double half_size_until = 0.35;
+  double half_size_until = 0.15;
   double densify_from = 0.05;
   double densify_until = 0.6;
   int densify_rounds = 30;
   double gradient_preference = 1.0;  // RelocationOptions
   double growth_until = 0.5;         // the number of Gaussians reaches its cap here
-  bool scheduled_cap = false;        // kAdaptive too may grow no faster than that
+  bool absolute_gradient = false;  // DensifyStatistics::absolute; thresholds are then about 4 times
+                                   // those of the usual criterion
+  bool sparse_adam = false;        // only the Gaussians in the picture take part in a step
+  bool scheduled_cap = false;      // kAdaptive too may grow no faster than that
   double opacity_reset_every = 0.0;  // 0: never; while densifying
   double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
-  double opacity_penalty = 0.005;    // times the mean opacity
-  double scale_penalty = 0.005;      // times the mean scale / extent
+  double opacity_penalty = 0.0;      // times the mean opacity
+  double scale_penalty = 0.0;        // times the mean scale / extent
   double noise = 5e5;                // of 3DGS-MCMC, times the position's learning rate
-  double sh_from = 0.3;              // degree 1 begins here
+  double sh_from = 0.15;             // degree 1 begins here
   double sh_step = 0.15;             // and each further degree this much later
-  double position_rate_first = 1.6e-4;
-  double position_rate_last = 1.6e-6;
-  double dc_rate = 2.5e-3;
-  double rest_divisor = 20.0;
-  double opacity_rate = 0.05;
-  double scale_rate = 5e-3;
-  double rotation_rate = 1e-3;
+  double position_rate_first = 6e-4;
+  double position_rate_last = 4e-5;
+  double dc_rate = 1e-2;
+  double rest_divisor = 10.0;
+  double opacity_rate = 0.1;
+  double scale_rate = 2e-2;
+  double rotation_rate = 4e-3;
+  // Under a time limit the number of Gaussians grows only while so many can be hoped for.
+  double wanted_iterations = 800;
   double last_rate = 1.0;  // all rates but the position's end at this multiple
 };
 
@@ -61,6 +66,13 @@ class TrainingSchedule {
   bool DensifyDue(double before, double now) const;
   bool OpacityResetDue(double before, double now) const;
   bool HasReset(double fraction) const;
+  // How many Gaussians let the rest of the time limit hold enough iterations, given what one costs
+  // now with `count` of them at `level`; at least `count`. No bound without a time limit.
+  int64_t AffordableCount(double fraction,
+                          int64_t iteration,
+                          double seconds_per_iteration,
+                          int level,
+                          int64_t count) const;
   // Geometric growth from `initial_count` to the cap.
   int64_t TargetCount(double fraction, int64_t initial_count) const;
 

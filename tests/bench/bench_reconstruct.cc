@@ -11,6 +11,7 @@
 #include "core/splat/geometry_trainer.h"
 #include "core/splat/instruction_set.h"
 #include "core/stage/stages.h"
+#include "server/jobs/presets.h"
 #include "tests/bench/commands.h"
 
 namespace color3d {
@@ -22,11 +23,26 @@ struct ReconstructArguments {
   std::string pictures_folder;
   std::string strategy;
   std::vector<std::string> settings;  // name=value of GeometryTuning
+  bool absolute_gradient = false;
+  bool sparse_adam = false;
   int max_side_px = 500;
   int threads = 2;
   TrainingColours colours = TrainingColours::kSrgb;
   GeometryOptions geometry;
 };
+
+// The geometry values of a preset of the service.
+void UsePreset(v1::Preset preset, ReconstructArguments& args) {
+  const PresetValues values = ValuesOf(preset);
+  args.max_side_px = values.max_side_px;
+  args.geometry.iterations = values.geometry_iterations;
+  args.geometry.max_gaussians = values.max_gaussians;
+  if (preset == v1::PRESET_PAPER) {
+    args.geometry.recipe = GeometryOptions::Recipe::kPaper;
+    args.geometry.densify_gradient = 2e-4;
+    args.geometry.sh_degree = 3;
+  }
+}
 
 // "name=value", for measuring other schedules than the defaults.
 void Apply(const std::string& setting, GeometryTuning& t) {
@@ -49,6 +65,7 @@ void Apply(const std::string& setting, GeometryTuning& t) {
                                               {"opacity_rate", &t.opacity_rate},
                                               {"scale_rate", &t.scale_rate},
                                               {"rotation_rate", &t.rotation_rate},
+                                              {"wanted_iterations", &t.wanted_iterations},
                                               {"last_rate", &t.last_rate}};
   const size_t equals = setting.find('=');
   const std::string name = setting.substr(0, equals);
@@ -70,7 +87,12 @@ void Apply(const std::string& setting, GeometryTuning& t) {
 GeometryTuning TuningFrom(const ReconstructArguments& args) {
   GeometryTuning tuning = TuningOf(args.geometry);
   if (args.strategy == "adaptive") tuning.strategy = GeometryTuning::Strategy::kAdaptive;
-  if (args.strategy == "relocate") tuning.strategy = GeometryTuning::Strategy::kRelocate;
+  tuning.absolute_gradient = args.absolute_gradient;
+  tuning.sparse_adam = args.sparse_adam;
+  if (args.strategy == "relocate") {
+    tuning.strategy = GeometryTuning::Strategy::kRelocate;
+    tuning.opacity_penalty = tuning.scale_penalty = 0.005;  // what frees Gaussians to be relocated
+  }
   for (const std::string& setting : args.settings) Apply(setting, tuning);
   return tuning;
 }
@@ -174,6 +196,18 @@ void AddReconstructCommand(CLI::App& app) {
       "reconstruct", "geometry of a posed scene: quality of every eighth view against seconds");
   command->add_option("--scene", args->scene_folder)->required();
   command->add_option("--max-side", args->max_side_px, "px");
+  command
+      ->add_option_function<std::string>(
+          "--preset",
+          [args](const std::string& name) {
+            UsePreset(name == "best"    ? v1::PRESET_BEST
+                      : name == "paper" ? v1::PRESET_PAPER
+                                        : v1::PRESET_FAST,
+                      *args);
+          },
+          "fast, best or paper; options that follow it override its values")
+      ->check(CLI::IsMember({"fast", "best", "paper"}))
+      ->trigger_on_parse();
   command->add_option("--threads", args->threads);
   command->add_option("--colours", args->colours, "truth (RGB, the default) or luminance")
       ->transform(CLI::Transformer(std::map<std::string, TrainingColours>{
@@ -192,6 +226,8 @@ void AddReconstructCommand(CLI::App& app) {
   command->add_option("--seed", args->geometry.seed);
   command->add_option("--strategy", args->strategy, "adaptive or relocate (3DGS-MCMC)")
       ->check(CLI::IsMember({"adaptive", "relocate"}));
+  command->add_flag("--absolute-gradient", args->absolute_gradient, "densify as AbsGS");
+  command->add_flag("--sparse-adam", args->sparse_adam, "step only what the picture shows");
   command->add_option("--set", args->settings, "name=value of the schedule (GeometryTuning)");
   command->add_option("--pictures", args->pictures_folder, "held-out views: truth, drawn");
   command->add_option("--json", args->json_file, "default: standard output");
