@@ -79,6 +79,10 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
   if (spec.has_iterations()) options.iterations = spec.iterations();
   if (spec.has_chroma_sh_degree()) options.chroma_sh_degree = spec.chroma_sh_degree();
   if (spec.has_ssim_weight()) options.ssim_weight = spec.ssim_weight();
+  if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
+  if (spec.solver() == v1::SolveChromaSpec::SOLVER_ADAM) {
+    options.solver = ChromaOptions::Solver::kAdam;
+  }
   return options;
 }
 
