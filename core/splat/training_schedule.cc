@@ -34,6 +34,7 @@ GeometryTuning PaperTuning(int iterations) {
   tuning.dc_rate = 2.5e-3;
   tuning.rest_divisor = 20.0;
   tuning.opacity_rate = 0.05;
+  tuning.last_rate = 1.0;
   tuning.scale_rate = 5e-3;
   tuning.rotation_rate = 1e-3;
   tuning.sh_from = 1000.0 / n;
@@ -83,7 +84,10 @@ std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels
   const int active = ShCoefficients(ActiveDegree(fraction));
   std::vector<float> rates(kColorRow + channels * coefficients, 0.0f);
   const double scale = options_.learning_rate_scale;
-  const double fade = scale * std::pow(tuning_.last_rate, fraction);
+  // Settles once nothing is added any more.
+  const double settling =
+      std::max(0.0, fraction - tuning_.densify_until) / std::max(1e-9, 1.0 - tuning_.densify_until);
+  const double fade = scale * std::pow(tuning_.last_rate, settling);
   const auto set = [&](int row, int count, double rate) {
     std::fill_n(rates.begin() + row, count, static_cast<float>(rate));
   };

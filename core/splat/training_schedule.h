@@ -42,7 +42,7 @@ struct GeometryTuning {
   double rotation_rate = 4e-3;
   // Under a time limit the number of Gaussians grows only while so many can be hoped for.
   double wanted_iterations = 800;
-  double last_rate = 1.0;  // all rates but the position's end at this multiple
+  double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
 };
 
 // The tuning of options.recipe.

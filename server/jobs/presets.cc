@@ -8,7 +8,7 @@ PresetValues ValuesOf(v1::Preset preset) {
     case v1::PRESET_BEST:
       values.max_side_px = 800;
       values.personalize_iterations = 1200;
-      values.geometry_iterations = 10'000;
+      values.geometry_iterations = 5000;
       values.max_gaussians = 120'000;
       values.chroma_iterations = 800;
       break;
@@ -26,8 +26,8 @@ PresetValues ValuesOf(v1::Preset preset) {
     default:
       values.max_side_px = 500;
       values.personalize_iterations = 500;
-      values.geometry_iterations = 3000;
-      values.max_gaussians = 60'000;
+      values.geometry_iterations = 1500;
+      values.max_gaussians = 40'000;
       values.chroma_iterations = 300;
       break;
   }
