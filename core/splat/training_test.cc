@@ -173,13 +173,13 @@ TEST(TrainGeometryTest, ADamagedCheckpointStartsAfreshWithAWarning) {
   EXPECT_EQ(recorder.last_step, 5);
 }
 
-TEST(TrainGeometryTest, RestoresTheLastGoodStateAndGivesUpAfterSeveralTries) {
+TEST(TrainGeometryTest, RefusesAPictureWithANaNAndNamesItsPlace) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   GeometryProblem problem = ProblemOf(s, -1);
   problem.luminance = [&s](int view) {
-    auto bad = std::make_shared<Image>(*s.Luminance(view));
-    bad->At(0, 5, 5) = std::numeric_limits<float>::quiet_NaN();
-    return bad;
+    auto picture = std::make_shared<Image>(*s.Luminance(view));
+    if (view == 1) picture->At(0, 5, 7) = std::numeric_limits<float>::quiet_NaN();
+    return picture;
   };
   ThreadPool pool(2);
   NoCheckpoints none;
@@ -194,6 +194,30 @@ TEST(TrainGeometryTest, RestoresTheLastGoodStateAndGivesUpAfterSeveralTries) {
                     recorder,
                     CancellationToken());
     FAIL() << "a picture with NaN was accepted";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(e.what(), testing::HasSubstr("view 1: the pixel at 7, 5"));
+  }
+}
+
+// An extent that makes every step overflow, however often the rate is halved.
+TEST(TrainGeometryTest, RestoresTheLastGoodStateAndGivesUpAfterSeveralTries) {
+  const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
+  GeometryProblem problem = ProblemOf(s, -1);
+  problem.extent = 1e60;
+  ThreadPool pool(2);
+  NoCheckpoints none;
+  Recorder recorder;
+  try {
+    TrainGeometryOn(problem,
+                    InitialGaussians(s.scene),
+                    SmallOptions(50),
+                    GeometryTuning(),
+                    pool,
+                    none,
+                    recorder,
+                    CancellationToken());
+    FAIL() << "steps that overflow were accepted";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kInternal);
   }

@@ -91,6 +91,8 @@ void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec)
     if (!s->has_iterations()) s->set_iterations(preset.geometry_iterations);
     if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
     if (!s->has_max_gaussians()) s->set_max_gaussians(preset.max_gaussians);
+    if (!s->has_sh_degree()) s->set_sh_degree(preset.sh_degree);
+    if (!s->has_densify_gradient()) s->set_densify_gradient(preset.densify_gradient);
     if (s->recipe() == v1::ReconstructGeometrySpec::RECIPE_UNSPECIFIED) {
       s->set_recipe(preset.geometry_recipe);
     }

@@ -20,6 +20,8 @@ PresetValues ValuesOf(v1::Preset preset) {
       values.geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_PAPER;
       values.geometry_iterations = 15'000;
       values.max_gaussians = 2'000'000;
+      values.sh_degree = 3;
+      values.densify_gradient = 2e-4;
       values.chroma_solver = v1::SolveChromaSpec::SOLVER_ADAM;
       values.chroma_iterations = 15'000;
       break;

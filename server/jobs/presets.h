@@ -13,6 +13,8 @@ struct PresetValues {
   v1::ReconstructGeometrySpec::Recipe geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_COLOR3D;
   int geometry_iterations = 0;
   int max_gaussians = 0;
+  int sh_degree = 2;  // of luminance
+  double densify_gradient = 5e-5;
   v1::SolveChromaSpec::Solver chroma_solver = v1::SolveChromaSpec::SOLVER_CONJUGATE_GRADIENTS;
   int chroma_iterations = 0;  // of Adam
 };

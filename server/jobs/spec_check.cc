@@ -43,6 +43,7 @@ const std::map<std::string, Range>& Ranges() {
       {"ReconstructGeometrySpec.ssim_weight", {0, 1}},
       {"ReconstructGeometrySpec.edge_weight", {0, 10}},
       {"ReconstructGeometrySpec.time_limit_seconds", {0, 86400}},
+      {"ReconstructGeometrySpec.densify_gradient", {1e-9, 1}},
       {"SolveChromaSpec.iterations", {0, 100'000}},
       {"SolveChromaSpec.chroma_sh_degree", {0, 1}},
       {"SolveChromaSpec.ssim_weight", {0, 1}},

@@ -66,6 +66,7 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
   if (spec.has_sh_degree()) options.sh_degree = spec.sh_degree();
   if (spec.has_ssim_weight()) options.ssim_weight = spec.ssim_weight();
   if (spec.has_edge_weight()) options.edge_weight = spec.edge_weight();
+  if (spec.has_densify_gradient()) options.densify_gradient = spec.densify_gradient();
   if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
   if (spec.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     options.recipe = GeometryOptions::Recipe::kPaper;

@@ -13,7 +13,7 @@ namespace {
 struct PlotArguments {
   std::vector<std::string> json_files;
   std::string svg_file;
-  std::string curve = "heldout_psnr_l_db";
+  std::string quality = "psnr_db";
   std::string label = "preset";
 };
 
@@ -30,14 +30,13 @@ void AddResult(const std::string& file, const PlotArguments& args, std::vector<P
   const std::filesystem::path scene = json.at("scene").get<std::string>();
   PlotSeries series;
   series.name = json.value(args.label, file);
-  for (const auto& point : json.at("curve")) {
-    if (point.at("error_name") != args.curve) continue;
-    series.points.push_back({"", point.at("seconds"), 0, args.curve, point.at("value")});
+  for (const auto& point : json.at("held_out")) {
+    series.points.push_back({"", point.at("seconds"), 0, args.quality, point.at(args.quality)});
   }
-  if (series.points.empty()) throw InvalidArgument(file + " has no curve '" + args.curve + "'");
+  if (series.points.empty()) throw InvalidArgument(file + " has no held-out views");
   const std::string name =
       scene.has_filename() ? scene.filename().string() : scene.parent_path().filename().string();
-  PlotOfScene(name + ": " + args.curve, plots).series.push_back(std::move(series));
+  PlotOfScene(name + ": " + args.quality, plots).series.push_back(std::move(series));
 }
 
 void RunPlot(const PlotArguments& args) {
@@ -60,7 +59,7 @@ void AddPlotCommand(CLI::App& app) {
       app.add_subcommand("plot", "error against seconds of several results, as SVG");
   command->add_option("files", args->json_files, "JSON of `reconstruct`")->required();
   command->add_option("--svg", args->svg_file)->required();
-  command->add_option("--curve", args->curve, "error_name to draw")->capture_default_str();
+  command->add_option("--quality", args->quality, "psnr_db, ssim or l1")->capture_default_str();
   command->add_option("--label", args->label, "field that names a line")->capture_default_str();
   command->callback([args] { RunPlot(*args); });
 }

@@ -25,6 +25,7 @@ struct ReconstructArguments {
   std::vector<std::string> settings;  // name=value of GeometryTuning
   bool absolute_gradient = false;
   bool sparse_adam = false;
+  std::string preset = "none";
   int max_side_px = 500;
   int threads = 2;
   TrainingColours colours = TrainingColours::kSrgb;
@@ -32,15 +33,18 @@ struct ReconstructArguments {
 };
 
 // The geometry values of a preset of the service.
-void UsePreset(v1::Preset preset, ReconstructArguments& args) {
-  const PresetValues values = ValuesOf(preset);
+void UsePreset(const std::string& name, ReconstructArguments& args) {
+  const PresetValues values = ValuesOf(name == "best"    ? v1::PRESET_BEST
+                                       : name == "paper" ? v1::PRESET_PAPER
+                                                         : v1::PRESET_FAST);
+  args.preset = name;
   args.max_side_px = values.max_side_px;
   args.geometry.iterations = values.geometry_iterations;
   args.geometry.max_gaussians = values.max_gaussians;
-  if (preset == v1::PRESET_PAPER) {
+  args.geometry.sh_degree = values.sh_degree;
+  args.geometry.densify_gradient = values.densify_gradient;
+  if (values.geometry_recipe == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     args.geometry.recipe = GeometryOptions::Recipe::kPaper;
-    args.geometry.densify_gradient = 2e-4;
-    args.geometry.sh_degree = 3;
   }
 }
 
@@ -122,6 +126,7 @@ nlohmann::ordered_json ToJson(const ReconstructArguments& args, const TrainingTr
   const double n = static_cast<double>(std::max<int64_t>(1, trace.iterations));
   nlohmann::ordered_json result{
       {"scene", args.scene_folder},
+      {"preset", args.preset},
       {"max_side_px", args.max_side_px},
       {"colours", args.colours == TrainingColours::kSrgb ? "truth" : "luminance"},
       {"threads", args.threads},
@@ -199,12 +204,7 @@ void AddReconstructCommand(CLI::App& app) {
   command
       ->add_option_function<std::string>(
           "--preset",
-          [args](const std::string& name) {
-            UsePreset(name == "best"    ? v1::PRESET_BEST
-                      : name == "paper" ? v1::PRESET_PAPER
-                                        : v1::PRESET_FAST,
-                      *args);
-          },
+          [args](const std::string& name) { UsePreset(name, *args); },
           "fast, best or paper; options that follow it override its values")
       ->check(CLI::IsMember({"fast", "best", "paper"}))
       ->trigger_on_parse();
