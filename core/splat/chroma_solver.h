@@ -1,7 +1,7 @@
 // Least absolute residuals of chroma (chroma_system.h): a few ordered-subsets sweeps, which take a
 // step per view and so are quick at first, then rounds of reweighting with block-Jacobi
-// preconditioned conjugate gradients on the normal equations of all views. A pull to the closed form
-// keeps Gaussians that few pixels see well-posed. Internal to the splat module.
+// preconditioned conjugate gradients on the normal equations of all views. A pull to the closed
+// form keeps Gaussians that few pixels see well-posed. Internal to the splat module.
 #pragma once
 
 #include <vector>

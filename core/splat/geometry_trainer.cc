@@ -222,6 +222,10 @@ class GeometryTrainer {
                   tuning_.sparse_adam ? &pipeline_.depth_keys() : nullptr)) {
       return false;
     }
+    if (tuning_.max_needle_ratio > 0.0) {
+      LimitNeedles(
+          static_cast<float>(std::log(tuning_.max_needle_ratio)), pool_, state_.parameters);
+    }
     if (tuning_.strategy == GeometryTuning::Strategy::kRelocate && tuning_.noise > 0.0 &&
         fraction_ < tuning_.densify_until) {
       AddPositionNoise(static_cast<float>(tuning_.noise * rates[kPositionRow]),

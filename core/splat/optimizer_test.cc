@@ -103,6 +103,23 @@ TEST_P(OptimizerTest, PenaltyGradientsAgreeWithTheirFormula) {
   }
 }
 
+TEST_P(OptimizerTest, NeedlesAreShortenedAndFlatGaussiansAreNot) {
+  ThreadPool pool(TestCase());
+  ParameterBlock p(kRows, kCount);
+  for (int i = 0; i < kCount; ++i) {
+    const bool needle = i % 2 == 0;
+    p.Row(kLogScaleRow + i % 3)[i] = needle ? 5.0f : -7.0f;  // the two other axes: 0
+  }
+  const ParameterBlock before = p;
+  LimitNeedles(2.0f, pool, p);
+  for (int i = 0; i < kCount; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const bool long_axis = i % 2 == 0 && k == i % 3;
+      EXPECT_EQ(p.Row(kLogScaleRow + k)[i], long_axis ? 2.0f : before.Row(kLogScaleRow + k)[i]);
+    }
+  }
+}
+
 // The noise has the covariance's axes: along a needle, and for faint Gaussians only.
 TEST_P(OptimizerTest, NoiseMovesFaintGaussiansAlongTheirAxes) {
   ThreadPool pool(TestCase());

@@ -58,6 +58,18 @@ void PenaltyRange(const ParameterBlock& parameters,
   }
 }
 
+void NeedleRange(float max_log_ratio, int64_t begin, int64_t end, ParameterBlock& parameters) {
+  for (int64_t i = begin; i < end; i += simd::kLanes) {
+    F32 s[3];
+    for (int k = 0; k < 3; ++k) s[k] = simd::Load(parameters.Row(kLogScaleRow + k) + i);
+    const F32 low = simd::Min(s[0], s[1]), high = simd::Max(s[0], s[1]);
+    const F32 middle = simd::Max(low, simd::Min(high, s[2]));
+    for (int k = 0; k < 3; ++k) {
+      simd::Store(parameters.Row(kLogScaleRow + k) + i, simd::Min(s[k], middle + max_log_ratio));
+    }
+  }
+}
+
 void NoiseRange(
     float strength, uint32_t seed, int64_t begin, int64_t end, ParameterBlock& parameters) {
   for (int64_t i = begin; i < end; i += simd::kLanes) {
@@ -93,6 +105,7 @@ HWY_AFTER_NAMESPACE();
 namespace color3d {
 namespace {
 HWY_EXPORT(PenaltyRange);
+HWY_EXPORT(NeedleRange);
 HWY_EXPORT(NoiseRange);
 }  // namespace
 
@@ -106,6 +119,13 @@ void AddPenaltyGradients(const ParameterBlock& parameters,
   const auto penalty_range = &COLOR3D_KERNEL(PenaltyRange);
   pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
     penalty_range(parameters, opacity_each, scale_each, begin * 16, end * 16, gradient);
+  });
+}
+
+void LimitNeedles(float max_log_ratio, ThreadPool& pool, ParameterBlock& parameters) {
+  const auto needle_range = &COLOR3D_KERNEL(NeedleRange);
+  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
+    needle_range(max_log_ratio, begin * 16, end * 16, parameters);
   });
 }
 

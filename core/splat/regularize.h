@@ -1,6 +1,6 @@
-// What 3DGS-MCMC (Kheradmand et al. 2024) adds to the picture's loss: penalties on opacity and
-// scale, and noise on positions that lets faint Gaussians explore. Internal to the splat module;
-// deterministic whatever the thread count.
+// What keeps Gaussians in shape beside the picture's loss: the penalties on opacity and scale and
+// the noise on positions of 3DGS-MCMC (Kheradmand et al. 2024), and a limit on needles. Internal to
+// the splat module; deterministic whatever the thread count.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,10 @@ void AddPenaltyGradients(const ParameterBlock& parameters,
                          float scale_penalty,
                          ThreadPool& pool,
                          ParameterBlock& gradient);
+
+// Shortens the longest axis to exp(max_log_ratio) times the middle one. Needles fit the pixels of
+// one view and are streaks in all others; flat Gaussians are surfaces and stay as they are.
+void LimitNeedles(float max_log_ratio, ThreadPool& pool, ParameterBlock& parameters);
 
 // position += strength * sigmoid(100 (0.005 - opacity)) * covariance * normal noise. The noise is a
 // hash of (seed, Gaussian), so the same seed repeats it.

@@ -69,6 +69,7 @@ void Apply(const std::string& setting, GeometryTuning& t) {
                                               {"opacity_rate", &t.opacity_rate},
                                               {"scale_rate", &t.scale_rate},
                                               {"rotation_rate", &t.rotation_rate},
+                                              {"max_needle_ratio", &t.max_needle_ratio},
                                               {"wanted_iterations", &t.wanted_iterations},
                                               {"last_rate", &t.last_rate}};
   const size_t equals = setting.find('=');
