@@ -1,5 +1,6 @@
 #include "core/report/scene_plan.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
@@ -8,12 +9,14 @@ namespace color3d {
 namespace {
 
 // Rough costs measured on two cores (seconds); the report sets measured ones beside them.
-constexpr double kSecondsPerSfmPair = 0.2;
+constexpr double kSecondsPerSfmPair = 0.1;
 constexpr double kSecondsPerRemapMegapixel = 0.01;
 constexpr double kSecondsPerFeatureMegapixel = 0.5;
 
 double SfmSeconds(const PlanFacts& f) {
-  return 1.0 * f.views + kSecondsPerSfmPair * f.views * (f.views - 1) / 2.0;
+  // Planned pairs: about six a photo, or all of a small set.
+  const double pairs = std::min(f.views * (f.views - 1) / 2.0, 6.0 * f.views);
+  return 0.3 * f.views + kSecondsPerSfmPair * pairs;
 }
 
 PlanStep Step(std::string name, bool needed, std::string reason, double seconds) {

@@ -46,17 +46,7 @@ const char* NameOf(int64_t target) {
   }
 }
 
-}  // namespace
-
-std::string_view ActiveInstructionSet() { return NameOf(COLOR3D_KERNEL(CompiledTarget)()); }
-
-std::vector<std::string> SupportedInstructionSets() {
-  std::vector<std::string> names;
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(NameOf(target));
-  return names;
-}
-
-void LimitInstructionSet(std::string_view name) {
+void Choose(std::string_view name) {
   std::string known;
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     if (name.empty() || name == NameOf(target)) {
@@ -69,13 +59,28 @@ void LimitInstructionSet(std::string_view name) {
                         "' (COLOR3D_ISA) is not available on this machine; use one of " + known);
 }
 
+}  // namespace
+
+std::string_view ActiveInstructionSet() { return NameOf(COLOR3D_KERNEL(CompiledTarget)()); }
+
+std::vector<std::string> SupportedInstructionSets() {
+  std::vector<std::string> names;
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(NameOf(target));
+  return names;
+}
+
 void ApplyInstructionSetLimit() {
   static const bool applied = [] {
     const char* name = std::getenv("COLOR3D_ISA");
-    LimitInstructionSet(name == nullptr ? "" : name);
+    Choose(name == nullptr ? "" : name);
     return true;
   }();
   static_cast<void>(applied);
+}
+
+void LimitInstructionSet(std::string_view name) {
+  ApplyInstructionSetLimit();  // so that the environment cannot overrule this at the first kernel
+  Choose(name);
 }
 
 }  // namespace color3d

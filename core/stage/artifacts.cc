@@ -52,6 +52,7 @@ void CheckStemsAreUnique(const Scene& scene) {
 std::string ImportFactsToJson(const ImportFacts& f) {
   return nlohmann::ordered_json{{"layout", f.layout},
                                 {"ran_structure_from_motion", f.ran_structure_from_motion},
+                                {"sfm_plan", f.sfm_plan},
                                 {"undistorted", f.undistorted},
                                 {"random_points", f.random_points},
                                 {"photos_found", f.photos_found},
@@ -66,6 +67,7 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
     ImportFacts f;
     f.layout = value.at("layout");
     f.ran_structure_from_motion = value.at("ran_structure_from_motion");
+    f.sfm_plan = value.at("sfm_plan");
     f.undistorted = value.at("undistorted");
     f.random_points = value.at("random_points");
     f.photos_found = value.at("photos_found");

@@ -54,6 +54,7 @@ void CheckStemsAreUnique(const Scene& scene);
 struct ImportFacts {
   std::string layout;  // "photos", "colmap", "transforms"
   bool ran_structure_from_motion = false;
+  std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
   bool undistorted = false;
   bool random_points = false;
   int photos_found = 0;

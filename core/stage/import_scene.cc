@@ -31,6 +31,7 @@ void RunImportScene(const ImportOptions& options, StageContext& context) {
   ImportFacts facts;
   facts.layout = LayoutName(result.layout);
   facts.ran_structure_from_motion = result.ran_structure_from_motion;
+  facts.sfm_plan = result.sfm.plan;
   facts.undistorted = result.undistorted;
   facts.random_points = result.random_points;
   facts.photos_found = result.photos_found;

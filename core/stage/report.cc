@@ -110,12 +110,15 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
       if (step.needed && step.step == name) step.measured_seconds = SecondsOf(stages, kind);
     }
   }
+  const auto add_reason = [&plan](const char* name, const std::string& note) {
+    for (PlanStep& step : plan) {
+      if (step.step == name && !note.empty()) step.reason += "; " + note;
+    }
+  };
+  add_reason("structure_from_motion", facts.sfm_plan);
   if (context.HasInput(artifact::kMemoryPlan)) {
     const auto memory = ordered_json::parse(context.ReadInput(artifact::kMemoryPlan));
-    const std::string note = memory.at("note");
-    for (PlanStep& step : plan) {
-      if (step.step == "luminance_geometry" && !note.empty()) step.reason += "; " + note;
-    }
+    add_reason("luminance_geometry", memory.at("note"));
   }
   for (const StageSummary& s : stages) {
     if (s.state == "SKIPPED" && s.kind != "evaluate") {
