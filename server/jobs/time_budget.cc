@@ -11,13 +11,13 @@ namespace {
 // Measured at 500 px on two cores (README, "Performance").
 constexpr double kBaseSeconds = 6.0;
 constexpr double kSecondsPerPhoto = 0.85;        // colours one view, renders, evaluates
-constexpr double kPosesSecondsPerPhoto = 1.2;    // structure-from-motion
+constexpr double kPosesSecondsPerPhoto = 0.6;    // structure-from-motion
 constexpr double kLeastScheduledSeconds = 15.0;  // below this the pictures are not worth having
 
 // Of what is left: where the error falls fastest per second.
-constexpr double kGeometryShare = 0.33;
-constexpr double kPersonalizeShare = 0.60;
-constexpr double kChromaShare = 0.07;
+constexpr double kGeometryShare = 0.25;
+constexpr double kPersonalizeShare = 0.70;
+constexpr double kChromaShare = 0.05;
 
 }  // namespace
 

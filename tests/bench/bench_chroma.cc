@@ -243,6 +243,7 @@ void AddChromaCommand(CLI::App& app) {
   command->add_option("--scene", args->scene_folder)->required();
   command->add_option("--max-side", args->max_side_px, "px");
   command->add_option("--threads", args->threads);
+  command->add_option("--max-gaussians", args->geometry.max_gaussians);
   command->add_option("--geometry-iterations", args->geometry.iterations);
   command->add_option(
       "--geometry", args->geometry_file, "native file: read when it exists, else written");
