@@ -1,9 +1,22 @@
 #include "core/base/parallel.h"
 
 #include <algorithm>
-#include <atomic>
+#include <chrono>
 
 namespace color3d {
+namespace {
+
+// Loops follow one another within microseconds, and waking a sleeping thread takes up to 100 us: it
+// is worth looking for this long before going to sleep. Others get the core meanwhile.
+constexpr std::chrono::microseconds kWatchFor(50);
+
+template <class Condition>
+void WatchFor(const Condition& condition) {
+  const auto end = std::chrono::steady_clock::now() + kWatchFor;
+  while (!condition() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+}
+
+}  // namespace
 
 ThreadPool::ThreadPool(int threads) {
   if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
@@ -23,6 +36,7 @@ void ThreadPool::WorkerLoop(int thread) {
   uint64_t seen = 0;
   while (true) {
     const std::function<void(int)>* task = nullptr;
+    WatchFor([&] { return generation_ != seen; });
     {
       std::unique_lock lock(mutex_);
       start_.wait(lock, [&] { return stopping_ || generation_ != seen; });
@@ -57,6 +71,7 @@ void ThreadPool::Run(const std::function<void(int)>& task) {
   } catch (...) {
     failure = std::current_exception();
   }
+  WatchFor([&] { return running_ == 0; });
   std::unique_lock lock(mutex_);
   done_.wait(lock, [&] { return running_ == 0; });
   task_ = nullptr;

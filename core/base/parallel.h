@@ -2,6 +2,7 @@
 // thread takes part. Same work split for the same thread count, so results can be reproducible.
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <exception>
@@ -40,8 +41,8 @@ class ThreadPool {
   std::condition_variable start_;
   std::condition_variable done_;
   const std::function<void(int)>* task_ = nullptr;
-  uint64_t generation_ = 0;
-  int running_ = 0;
+  std::atomic<uint64_t> generation_ = 0;  // changed under the mutex, watched without it
+  std::atomic<int> running_ = 0;
   bool stopping_ = false;
   std::exception_ptr failure_;
 };

@@ -30,6 +30,8 @@ GeometryTuning PaperTuning(int iterations) {
   tuning.opacity_reset_every = 3000.0 / n;
   tuning.prune_scale = 0.1;
   tuning.max_needle_ratio = 0.0;
+  tuning.opacity_penalty = 0.0;
+  tuning.scale_penalty = 0.0;
   tuning.position_rate_first = 1.6e-4;
   tuning.position_rate_last = 1.6e-6;
   tuning.dc_rate = 2.5e-3;

@@ -28,8 +28,8 @@ struct GeometryTuning {
   bool scheduled_cap = false;      // kAdaptive too may grow no faster than that
   double opacity_reset_every = 0.0;  // 0: never; while densifying
   double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
-  double opacity_penalty = 0.0;      // times the mean opacity
-  double scale_penalty = 0.0;        // times the mean scale / extent
+  double opacity_penalty = 0.005;    // times the mean opacity
+  double scale_penalty = 0.005;      // times the mean scale / extent
   double max_needle_ratio = 10.0;    // longest to middle axis; 0: no limit
   double noise = 5e5;                // of 3DGS-MCMC, times the position's learning rate
   double sh_from = 0.15;             // degree 1 begins here

@@ -94,10 +94,7 @@ GeometryTuning TuningFrom(const ReconstructArguments& args) {
   if (args.strategy == "adaptive") tuning.strategy = GeometryTuning::Strategy::kAdaptive;
   tuning.absolute_gradient = args.absolute_gradient;
   tuning.sparse_adam = args.sparse_adam;
-  if (args.strategy == "relocate") {
-    tuning.strategy = GeometryTuning::Strategy::kRelocate;
-    tuning.opacity_penalty = tuning.scale_penalty = 0.005;  // what frees Gaussians to be relocated
-  }
+  if (args.strategy == "relocate") tuning.strategy = GeometryTuning::Strategy::kRelocate;
   for (const std::string& setting : args.settings) Apply(setting, tuning);
   return tuning;
 }
