@@ -102,7 +102,8 @@ void TileBinner::FindSpans(const SplatBuffer& splats,
                            int thread,
                            TileLists& lists) {
   const auto spans_of_sixteen = &COLOR3D_KERNEL(SpansOfSixteen);
-  std::vector<Span>& spans = spans_[thread];
+  // Taken out while it grows: the threads' vectors share a cache line.
+  std::vector<Span> spans = std::move(spans_[thread]);
   spans.clear();
   std::vector<int32_t> columns(static_cast<size_t>(lists.tiles_y) * 32);
   SpanRequest request;
@@ -135,6 +136,7 @@ void TileBinner::FindSpans(const SplatBuffer& splats,
       lists.first_pair[first + lane + 1] = pairs;
     }
   }
+  spans_[thread] = std::move(spans);
 }
 
 // The visible Gaussians in index order, each as (key << 32 | index), and the keys' range.
@@ -177,19 +179,24 @@ void TileBinner::ListVisible(const SplatBuffer& splats, ThreadPool& pool) {
 // whatever the thread count.
 void TileBinner::SortByDepth(ThreadPool& pool) {
   constexpr int kMostDigitBits = 14;
+  constexpr int64_t kWorthSharing = 250'000;  // fewer would share every cache line they write
   if (order_.size() < 2) return;
   const int bits = std::bit_width(high_key_ - low_key_);
   const int passes = (bits + kMostDigitBits - 1) / kMostDigitBits;
   const int digit_bits = passes == 0 ? 0 : (bits + passes - 1) / passes;
   const size_t digits = size_t{1} << digit_bits;
   const int64_t visible = static_cast<int64_t>(order_.size());
-  const int threads = pool.thread_count();
+  const bool alone = visible < kWorthSharing;
+  const int threads = alone ? 1 : pool.thread_count();
+  const auto for_pieces = [&](auto&& body) {
+    alone ? body(0, visible, 0) : pool.ForRanges(visible, body);
+  };
   for (int pass = 0; pass < passes; ++pass) {
     const auto digit_of = [&](uint64_t entry) {
       return (static_cast<uint32_t>(entry >> 32) - low_key_) >> (pass * digit_bits) & (digits - 1);
     };
     chunk_counts_.assign(digits * threads, 0);
-    pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
+    for_pieces([&](int64_t begin, int64_t end, int thread) {
       uint32_t* counts = chunk_counts_.data() + digits * thread;
       for (int64_t i = begin; i < end; ++i) ++counts[digit_of(order_[i])];
     });
@@ -199,7 +206,7 @@ void TileBinner::SortByDepth(ThreadPool& pool) {
         sum += std::exchange(chunk_counts_[digits * t + digit], sum);
       }
     }
-    pool.ForRanges(visible, [&](int64_t begin, int64_t end, int thread) {
+    for_pieces([&](int64_t begin, int64_t end, int thread) {
       uint32_t* next = chunk_counts_.data() + digits * thread;
       for (int64_t i = begin; i < end; ++i) order_scratch_[next[digit_of(order_[i])]++] = order_[i];
     });
