@@ -2,25 +2,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "core/splat/instruction_set.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/splat/chroma_weights.cc"
 #include <hwy/foreach_target.h>
-#include <hwy/highway.h>
+
+#include "core/splat/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace color3d {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Sixteen lanes of the compiler's own vectors, split where registers are narrower: simd-inl.h has
-// no 16-bit numbers.
-using F32 = float __attribute__((vector_size(64)));
-using I32 = int32_t __attribute__((vector_size(64)));
-using U16 = uint16_t __attribute__((vector_size(32)));
+using simd::Broadcast;
+using simd::F32;
+using simd::Mask;
 
 constexpr float kUnit = 1.0f / 65535.0f;
 // Entries whose weights sum to less than this many pixels are left out: a twentieth of the entries
@@ -28,42 +26,6 @@ constexpr float kUnit = 1.0f / 65535.0f;
 constexpr float kMinStoredPixels = 1e-3f;
 constexpr float kLog2MinAlpha = -7.9943534f;
 constexpr float kSlackPx = 0.02f;  // the pixel test itself decides
-
-template <class V, class T>
-inline V LoadAs(const T* p) {
-  V v;
-  std::memcpy(&v, p, sizeof(v));
-  return v;
-}
-inline F32 LoadWeights(const WeightItem& item) {
-  return __builtin_convertvector(__builtin_convertvector(LoadAs<U16>(item.weight), I32), F32);
-}
-inline void Store(float* p, F32 v) { std::memcpy(p, &v, sizeof(v)); }
-
-inline float Sum(F32 v) {
-  using Half = float __attribute__((vector_size(32)));
-  using Quarter = float __attribute__((vector_size(16)));
-  Half h[2];
-  std::memcpy(h, &v, sizeof(v));
-  const Half a = h[0] + h[1];
-  Quarter q[2];
-  std::memcpy(q, &a, sizeof(a));
-  const Quarter b = q[0] + q[1];
-  return (b[0] + b[2]) + (b[1] + b[3]);
-}
-
-// 2^x for x in [-126, 1]: as simd::Exp2.
-inline F32 Exp2(F32 x) {
-  const F32 shifted = x + 12582912.0f;
-  const F32 f = x - (shifted - 12582912.0f);
-  F32 p = f * 1.3390863e-3f + 9.6760319e-3f;
-  p = p * f + 5.5503571e-2f;
-  p = p * f + 2.4022107e-1f;
-  p = p * f + 6.9314719e-1f;
-  p = p * f + 1.0000001f;
-  I32 bits = LoadAs<I32>(&p) + (LoadAs<I32>(&shifted) << 23);
-  return LoadAs<F32>(&bits);
-}
 
 // Blocks of four cells from `first` to `last` that [center - reach, center + reach] meets.
 inline void BlockRange(float center, float reach, float origin, int* first, int* last) {
@@ -94,22 +56,18 @@ Box BoundingBlocks(const float* row, float tile_x, float tile_y) {
 }
 
 // Nothing when all weights are zero.
-inline void AddItem(F32 w, int block, std::vector<WeightItem>& items) {
-  if (!(Sum(w) > 1.0f / 65535.0f)) return;
+HWY_INLINE void AddItem(F32 w, int block, std::vector<WeightItem>& items) {
+  if (!(simd::HorizontalSum(w) > kUnit)) return;
   WeightItem item;
-  const U16 q = __builtin_convertvector(__builtin_convertvector(w * 65535.0f + 0.5f, I32), U16);
-  std::memcpy(item.weight, &q, sizeof(q));
+  simd::StoreU16(item.weight, w * 65535.0f + 0.5f);
   item.block = static_cast<uint32_t>(block);
   items.push_back(item);
 }
 
-bool AnyAlive(const F32* t) {
+HWY_INLINE bool AnyAlive(const F32* t) {
   F32 most = t[0];
-  for (int b = 1; b < kTileBlocks; ++b) most = most > t[b] ? most : t[b];
-  for (int lane = 0; lane < kBlockPixels; ++lane) {
-    if (most[lane] >= kMinTransmittance) return true;
-  }
-  return false;
+  for (int b = 1; b < kTileBlocks; ++b) most = simd::Max(most, t[b]);
+  return simd::Any(simd::GreaterEqual(most, Broadcast(kMinTransmittance)));
 }
 
 void Build(const SplatBuffer& splats,
@@ -118,9 +76,9 @@ void Build(const SplatBuffer& splats,
            int width_px,
            int height_px,
            TileWeights& weights) {
-  const F32 lane_x = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
-  const F32 lane_y = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
-  const F32 zero = {}, one = zero + 1.0f;
+  alignas(64) static constexpr float kLaneX[16] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+  alignas(64) static constexpr float kLaneY[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+  const F32 lane_x = simd::Load(kLaneX), lane_y = simd::Load(kLaneY);
   weights.Clear();
   const float x0 = static_cast<float>(tile % lists.tiles_x * kTileSide);
   const float y0 = static_cast<float>(tile / lists.tiles_x * kTileSide);
@@ -128,8 +86,9 @@ void Build(const SplatBuffer& splats,
   for (int b = 0; b < kTileBlocks; ++b) {
     const F32 x = lane_x + (x0 + static_cast<float>(b % 4 * 4));
     const F32 y = lane_y + (y0 + static_cast<float>(b / 4 * 4));
-    const I32 inside = (x < static_cast<float>(width_px)) & (y < static_cast<float>(height_px));
-    t[b] = inside ? one : zero;
+    const Mask inside = simd::And(simd::Less(x, Broadcast(static_cast<float>(width_px))),
+                                  simd::Less(y, Broadcast(static_cast<float>(height_px))));
+    t[b] = simd::SelectOrZero(inside, Broadcast(1.0f));
   }
   const uint32_t begin = lists.tile_begin[tile], end = lists.tile_begin[tile + 1];
   for (uint32_t k = begin; k < end; ++k) {
@@ -138,22 +97,24 @@ void Build(const SplatBuffer& splats,
     const float* row = splats.rows.data() + static_cast<size_t>(gaussian) * splats.row_floats;
     const Box box = BoundingBlocks(row, x0, y0);
     const float inv_x = row[kInvX], slope = row[kSlope], inv_y = row[kInvY];
-    F32 total = zero;
+    F32 total = simd::Zero();
     for (int b = 4 * box.y0; b <= 4 * box.y1; b += 4) {
       for (int i = b + box.x0; i <= b + box.x1; ++i) {
         const F32 dx = lane_x + ((x0 + static_cast<float>(i % 4 * 4) + 0.5f) - row[kU]);
         const F32 dy = lane_y + ((y0 + static_cast<float>(b) + 0.5f) - row[kV]);
         const F32 e = dx - slope * dy;
         const F32 exponent = row[kLog2Opacity] - inv_y * (dy * dy) - inv_x * (e * e);
-        const I32 live = (exponent >= kLog2MinAlpha) & (t[i] >= kMinTransmittance);
-        const F32 alpha = Exp2(live ? exponent : zero - 20.0f);
-        const F32 w = live ? (alpha < kMaxAlpha ? alpha : zero + kMaxAlpha) * t[i] : zero;
+        const Mask live = simd::And(simd::GreaterEqual(exponent, Broadcast(kLog2MinAlpha)),
+                                    simd::GreaterEqual(t[i], Broadcast(kMinTransmittance)));
+        const F32 alpha =
+            simd::SelectOrZero(live, simd::Min(simd::Exp2(exponent), Broadcast(kMaxAlpha)));
+        const F32 w = alpha * t[i];
         t[i] = t[i] - w;
-        total += w;
+        total = total + w;
         AddItem(w, i, weights.items);
       }
     }
-    if (!(Sum(total) >= kMinStoredPixels)) {
+    if (!(simd::HorizontalSum(total) >= kMinStoredPixels)) {
       weights.items.resize(weights.first_item.back());
       continue;
     }
@@ -174,10 +135,10 @@ void Forward(const TileWeights& weights, const float* value, float* picture) {
     const float a = v[0] * kUnit, b = v[1] * kUnit;
     for (const WeightItem* end = weights.items.data() + weights.first_item[j + 1]; item < end;
          ++item) {
-      const F32 w = LoadWeights(*item);
+      const F32 w = simd::LoadU16(item->weight);
       float* p = picture + 2 * kBlockPixels * item->block;
-      Store(p, LoadAs<F32>(p) + w * a);
-      Store(p + kBlockPixels, LoadAs<F32>(p + kBlockPixels) + w * b);
+      simd::Store(p, simd::Load(p) + w * a);
+      simd::Store(p + kBlockPixels, simd::Load(p + kBlockPixels) + w * b);
     }
   }
 }
@@ -192,18 +153,18 @@ void Adjoint(const TileWeights& weights, const float* picture, float* sum) {
     if (j + kAhead < count) {
       __builtin_prefetch(sum + 2 * static_cast<size_t>(gaussian[j + kAhead]), 1);
     }
-    F32 a = {}, b = {};
+    F32 a = simd::Zero(), b = simd::Zero();
     for (const WeightItem* end = weights.items.data() + weights.first_item[j + 1]; item < end;
          ++item) {
-      F32 w = LoadWeights(*item) * kUnit;
+      F32 w = simd::LoadU16(item->weight) * kUnit;
       if (kSquared) w = w * w;
       const float* p = picture + 2 * kBlockPixels * item->block;
-      a += w * LoadAs<F32>(p);
-      b += w * LoadAs<F32>(p + kBlockPixels);
+      a = a + w * simd::Load(p);
+      b = b + w * simd::Load(p + kBlockPixels);
     }
     float* s = sum + 2 * static_cast<size_t>(gaussian[j]);
-    s[0] += Sum(a);
-    s[1] += Sum(b);
+    s[0] += simd::HorizontalSum(a);
+    s[1] += simd::HorizontalSum(b);
   }
 }
 

@@ -83,6 +83,20 @@ HWY_INLINE void Store(float* p, F32 v) {
 HWY_INLINE void Store(int32_t* p, I32 v) {
   for (int k = 0; k < kParts; ++k) hn::StoreU(v.part[k], IntTag(), p + k * kRegisterLanes);
 }
+// Sixteen 16-bit whole numbers; stored ones must be in 0..65535 and are cut off, not rounded.
+using U16Tag = hn::Rebind<uint16_t, FloatTag>;
+HWY_INLINE F32 LoadU16(const uint16_t* p) {
+  F32 r;
+  COLOR3D_PARTS(hn::ConvertTo(FloatTag(),
+                              hn::PromoteTo(IntTag(), hn::LoadU(U16Tag(), p + k * kRegisterLanes))))
+  return r;
+}
+HWY_INLINE void StoreU16(uint16_t* p, F32 v) {
+  for (int k = 0; k < kParts; ++k) {
+    const auto whole = hn::ConvertTo(IntTag(), v.part[k]);
+    hn::StoreU(hn::DemoteTo(U16Tag(), whole), U16Tag(), p + k * kRegisterLanes);
+  }
+}
 HWY_INLINE F32 LaneIndex() {
   alignas(64) static constexpr float kIndex[kLanes] = {
       0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
