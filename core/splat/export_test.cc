@@ -11,6 +11,7 @@
 #include "core/base/random.h"
 #include "core/color/lab.h"
 #include "core/splat/procedural_scene.h"
+#include "core/splat/random_model.h"
 #include "core/splat/render.h"
 #include "core/splat/rgb_refine.h"
 #include "core/splat/spherical_harmonics.h"
@@ -20,30 +21,13 @@ namespace {
 
 constexpr double kShDc = 0.28209479177387814;
 
-GaussianModel RandomModel(size_t count, int degree, int chroma_degree) {
-  Random random(3);
-  GaussianModel m;
-  m.channels = 3;
-  m.sh_degree = degree;
-  m.chroma_sh_degree = chroma_degree;
-  const auto fill = [&](std::vector<float>& buffer, int width, double size) {
-    for (size_t i = 0; i < count * width; ++i) {
-      buffer.push_back(static_cast<float>(size * random.NextNormal()));
-    }
-  };
-  fill(m.position, 3, 1.0);
-  fill(m.log_scale, 3, 1.0);
-  fill(m.rotation, 4, 1.0);
-  fill(m.opacity_logit, 1, 1.0);
-  fill(m.sh_l, ShCoefficients(degree), 0.2);
-  fill(m.sh_a, ShCoefficients(chroma_degree), 0.03);
-  fill(m.sh_b, ShCoefficients(chroma_degree), 0.03);
-  return m;
+GaussianModel DullModel(size_t count, int degree, int chroma_degree) {
+  return RandomModel({count, 3, degree, chroma_degree, /*chroma_size=*/0.03});
 }
 
 TEST(RgbHarmonicsTest, ReproduceTheColours) {
   ThreadPool pool(2);
-  const GaussianModel m = RandomModel(40, 2, 1);
+  const GaussianModel m = DullModel(40, 2, 1);
   const RgbHarmonicsFitter fitter(m.sh_degree);
   const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
   ASSERT_EQ(rgb.sh.size(), 40u * 9 * 3);
@@ -66,7 +50,7 @@ TEST(RgbHarmonicsTest, ReproduceTheColours) {
 
 TEST(RgbHarmonicsTest, ADiffuseColourIsExact) {
   ThreadPool pool(1);
-  GaussianModel m = RandomModel(1, 0, 0);
+  GaussianModel m = DullModel(1, 0, 0);
   m.sh_l = {0.3f};
   m.sh_a = {0.1f};
   m.sh_b = {-0.05f};
@@ -81,7 +65,7 @@ TEST(RgbHarmonicsTest, ADiffuseColourIsExact) {
 // A wall of overlapping, half-transparent Gaussians of different chroma: where Lab and RGB blend
 // differently.
 GaussianModel MixedWall() {
-  GaussianModel m = RandomModel(400, 1, 0);
+  GaussianModel m = DullModel(400, 1, 0);
   Random random(9);
   for (size_t i = 0; i < m.size(); ++i) {
     m.position[3 * i] = static_cast<float>(random.NextUniform(-1.0, 1.0));
@@ -153,7 +137,7 @@ TEST(RefineRgbHarmonicsTest, RefusesNonsenseAndCanBeCancelled) {
 
 TEST(ExportTest, PlyHasTheStandardLayout) {
   ThreadPool pool(2);
-  GaussianModel m = RandomModel(5, 1, 0);
+  GaussianModel m = DullModel(5, 1, 0);
   for (int k = 0; k < 4; ++k) m.rotation[k] = 0.0f;
   const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
   const std::string bytes =
@@ -185,8 +169,7 @@ TEST(ExportTest, PlyHasTheStandardLayout) {
   EXPECT_EQ(row[22], 1.0f);  // a zero quaternion becomes the identity
   EXPECT_EQ(row[23], 0.0f);
   EXPECT_THROW(
-      EncodeGaussianPly(m, DegreeZero(FitRgbHarmonics(RandomModel(4, 1, 0), pool)), {}, pool),
-      Error);
+      EncodeGaussianPly(m, DegreeZero(FitRgbHarmonics(DullModel(4, 1, 0), pool)), {}, pool), Error);
 }
 
 struct SplatRow {
@@ -199,7 +182,7 @@ static_assert(sizeof(SplatRow) == 32);
 
 TEST(ExportTest, SplatReadsBackSortedByImportance) {
   ThreadPool pool(1);
-  const GaussianModel m = RandomModel(50, 1, 0);
+  const GaussianModel m = DullModel(50, 1, 0);
   const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
   const std::string bytes = EncodeSplat(m, rgb, {3.0, {10.0, 0.0, -5.0}, {0.0, 0.0, 0.0}});
   ASSERT_EQ(bytes.size(), 50u * 32);
@@ -245,7 +228,7 @@ TEST(ExportTest, AnOffsetThatFloatsCannotCarryStaysInTheHeader) {
   frame = ExportFrameOf(scene);
   EXPECT_TRUE(frame.offset.isZero(0.0));
   EXPECT_EQ(frame.left_out, scene.world_offset);
-  const GaussianModel m = RandomModel(2, 0, 0);
+  const GaussianModel m = DullModel(2, 0, 0);
   EXPECT_THAT(EncodeGaussianPly(m, FitRgbHarmonics(m, pool), frame, pool),
               testing::HasSubstr("1.0\ncomment offset 1e+06 -2 0.1\nelement"));
 }

@@ -9,37 +9,15 @@
 #include "core/base/random.h"
 #include "core/color/lab.h"
 #include "core/splat/neighbors.h"
+#include "core/splat/random_model.h"
 #include "core/splat/render.h"
 
 namespace color3d {
 namespace {
 
-GaussianModel RandomModel(size_t count, int channels, int degree, int chroma_degree) {
-  Random random(3);
-  GaussianModel m;
-  m.channels = channels;
-  m.sh_degree = degree;
-  m.chroma_sh_degree = chroma_degree;
-  const auto fill = [&](std::vector<float>& buffer, int width, double size) {
-    for (size_t i = 0; i < count * width; ++i) {
-      buffer.push_back(static_cast<float>(size * random.NextNormal()));
-    }
-  };
-  fill(m.position, 3, 1.0);
-  fill(m.log_scale, 3, 1.0);
-  fill(m.rotation, 4, 1.0);
-  fill(m.opacity_logit, 1, 1.0);
-  fill(m.sh_l, (degree + 1) * (degree + 1), 0.2);
-  if (channels == 3) {
-    fill(m.sh_a, (chroma_degree + 1) * (chroma_degree + 1), 0.15);
-    fill(m.sh_b, (chroma_degree + 1) * (chroma_degree + 1), 0.15);
-  }
-  return m;
-}
-
 TEST(GaussianFileTest, RoundTripsBitForBit) {
   for (const auto& m :
-       {RandomModel(13, 1, 2, 0), RandomModel(7, 3, 3, 1), RandomModel(0, 1, 0, 0)}) {
+       {RandomModel({13, 1, 2, 0}), RandomModel({7, 3, 3, 1}), RandomModel({0, 1, 0, 0})}) {
     const GaussianModel back = ParseGaussians(SerializeGaussians(m));
     EXPECT_EQ(back.channels, m.channels);
     EXPECT_EQ(back.position, m.position);
@@ -65,7 +43,7 @@ void ExpectRefused(const std::string& bytes, const std::string& why) {
 std::string Signed(std::string content) { return content + Sha256Hex(content); }
 
 TEST(GaussianFileTest, HostileBytesAreRefused) {
-  const std::string good = SerializeGaussians(RandomModel(13, 3, 1, 0));
+  const std::string good = SerializeGaussians(RandomModel({13, 3, 1, 0}));
   const std::string content = good.substr(0, good.size() - 64);
   ExpectRefused("", "only 0 bytes");
   for (size_t n = 0; n < good.size(); n += 11) {

@@ -19,6 +19,7 @@
 #include "core/splat/trainer.h"
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
+#include "tests/bench/result_file.h"
 
 namespace color3d {
 namespace {
@@ -226,12 +227,7 @@ class ChromaBench {
 };
 
 void RunChromaBench(const ChromaArguments& args) {
-  const std::string text = ChromaBench(args).Run().dump(1) + "\n";
-  if (args.json_file.empty()) {
-    std::printf("%s", text.c_str());
-  } else {
-    WriteFileAtomic(args.json_file, text);
-  }
+  WriteResult(ChromaBench(args).Run(), args.json_file);
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -15,6 +14,7 @@
 #include "core/base/files.h"
 #include "core/scene/import.h"
 #include "tests/bench/commands.h"
+#include "tests/bench/result_file.h"
 
 namespace color3d {
 namespace {
@@ -159,12 +159,7 @@ void RunPoses(PosesArguments& args) {
         CompareWithModel(imported.scene, ReadColmapModel(model, args.scene_folder));
   }
   result["warnings"] = observer.warnings;
-  const std::string text = result.dump(1) + "\n";
-  if (args.json_file.empty()) {
-    std::printf("%s", text.c_str());
-  } else {
-    WriteFileAtomic(args.json_file, text);
-  }
+  WriteResult(result, args.json_file);
 }
 
 }  // namespace

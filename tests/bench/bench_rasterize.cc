@@ -8,9 +8,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "core/base/files.h"
 #include "core/splat/instruction_set.h"
 #include "tests/bench/commands.h"
+#include "tests/bench/result_file.h"
 #include "tests/bench/synthetic_splats.h"
 
 namespace color3d {
@@ -223,13 +223,8 @@ void RunRasterize(const RasterizeArguments& args) {
                                    {"gaussians", e.gaussians},
                                    {"covered_pixels_of_one", e.covered}});
   }
-  const std::string text = report.dump(1) + "\n";
-  if (args.json_file.empty()) {
-    std::printf("%s", text.c_str());
-  } else {
-    PrintTable(report);
-    WriteFileAtomic(args.json_file, text);
-  }
+  if (!args.json_file.empty()) PrintTable(report);
+  WriteResult(report, args.json_file);
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // color3d-bench reconstruct: geometry alone, on true colours or on luminance; quality of held-out
 // views against seconds of training, and where the seconds go.
-#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -13,6 +12,7 @@
 #include "core/stage/stages.h"
 #include "server/jobs/presets.h"
 #include "tests/bench/commands.h"
+#include "tests/bench/result_file.h"
 
 namespace color3d {
 namespace {
@@ -183,12 +183,7 @@ void RunReconstruct(ReconstructArguments args) {
   for (const CurvePoint& p : recorder.points()) {
     if (p.error_name == "restored_non_finite") result["restored_at"].push_back(p.iteration);
   }
-  const std::string text = result.dump(1) + "\n";
-  if (args.json_file.empty()) {
-    std::printf("%s", text.c_str());
-  } else {
-    WriteFileAtomic(args.json_file, text);
-  }
+  WriteResult(result, args.json_file);
 }
 
 }  // namespace
