@@ -159,8 +159,9 @@ TEST(FeatureDistancesTest, TwoThousandViewsTakeSecondsAndTheSameNumbersTwice) {
 }
 
 TEST(ViewFeaturesTest, RoundTripAndRefusalOfTornBytes) {
-  const ViewFeatures view =
+  ViewFeatures view =
       PackViewFeatures({0.5, -2.0}, {10.0, 3.0, 0.8, 0.9}, RandomGrid(30, 20, 5, 3), 11);
+  view.thumbnail = "picture";
   EXPECT_EQ(view.Cells(), ViewFeatures::kMaxCells);
   const std::string bytes = SerializeViewFeatures(view);
   const auto back = ParseViewFeatures(bytes);
@@ -168,6 +169,7 @@ TEST(ViewFeaturesTest, RoundTripAndRefusalOfTornBytes) {
   EXPECT_EQ(back->descriptor, view.descriptor);
   EXPECT_EQ(back->content.structure, 0.8);
   EXPECT_EQ(back->deep, view.deep);
+  EXPECT_EQ(back->thumbnail, "picture");
   for (size_t size : {size_t{0}, size_t{3}, size_t{40}, bytes.size() - 1}) {
     EXPECT_FALSE(ParseViewFeatures(std::string_view(bytes).substr(0, size)));
   }

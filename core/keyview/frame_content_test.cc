@@ -16,15 +16,15 @@ namespace {
 Image Scenery(uint64_t seed, int width = 384, int height = 288) {
   Random random(seed);
   Image image(width, height, 1, 50.0f);
-  for (int wave = 0; wave < 60; ++wave) {
-    const double length = 6.0 * std::pow(1.06, wave);
+  for (int wave = 0; wave < 30; ++wave) {
+    const double length = 6.0 * std::pow(1.12, wave);
     const double angle = random.NextUniform(0, 6.28);
     const double phase = random.NextUniform(0, 6.28);
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const double along = x * std::cos(angle) + y * std::sin(angle);
         image.At(0, y, x) +=
-            static_cast<float>(0.12 * std::sqrt(length) * std::sin(6.28 * along / length + phase));
+            static_cast<float>(0.17 * std::sqrt(length) * std::sin(6.28 * along / length + phase));
       }
     }
   }
@@ -59,9 +59,12 @@ Image Noise(float mean, float deviation, uint64_t seed) {
 }
 
 std::vector<FrameContent> SceneryFrames(int count) {
-  std::vector<FrameContent> frames;
-  for (int i = 0; i < count; ++i) frames.push_back(MeasureFrameContent(Scenery(10 + i)));
-  return frames;
+  static const std::vector<FrameContent> all = [] {
+    std::vector<FrameContent> frames;
+    for (int i = 0; i < 7; ++i) frames.push_back(MeasureFrameContent(Scenery(10 + i)));
+    return frames;
+  }();
+  return {all.begin(), all.begin() + count};
 }
 
 std::string ReasonFor(const Image& image, int others) {

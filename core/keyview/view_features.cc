@@ -70,7 +70,7 @@ ViewFeatures PackViewFeatures(std::vector<double> descriptor,
                               const Image& deep,
                               uint64_t seed) {
   if (deep.Empty()) throw InvalidArgument("a view has no deep features: the grid is empty");
-  ViewFeatures features{std::move(descriptor), content, deep.channels, {}};
+  ViewFeatures features{std::move(descriptor), content, deep.channels, {}, {}};
   const int wanted =
       std::min<int>(static_cast<int>(deep.PlaneSize()), static_cast<int>(ViewFeatures::kMaxCells));
   features.deep.reserve(static_cast<size_t>(wanted) * deep.channels);
@@ -86,24 +86,25 @@ std::string SerializeViewFeatures(const ViewFeatures& features) {
   const uint32_t header[] = {kMagic,
                              static_cast<uint32_t>(features.descriptor.size()),
                              static_cast<uint32_t>(features.channels),
-                             static_cast<uint32_t>(features.deep.size())};
+                             static_cast<uint32_t>(features.deep.size()),
+                             static_cast<uint32_t>(features.thumbnail.size())};
   std::string bytes;
   Append(header, std::size(header), &bytes);
   Append(&features.content, 1, &bytes);
   Append(features.descriptor.data(), features.descriptor.size(), &bytes);
   Append(features.deep.data(), features.deep.size(), &bytes);
-  return bytes;
+  return bytes + features.thumbnail;
 }
 
 std::optional<ViewFeatures> ParseViewFeatures(std::string_view bytes) {
-  uint32_t header[4];
+  uint32_t header[5];
   ViewFeatures features;
-  if (!Take(&bytes, 4, header) || header[0] != kMagic || !Take(&bytes, 1, &features.content)) {
+  if (!Take(&bytes, 5, header) || header[0] != kMagic || !Take(&bytes, 1, &features.content)) {
     return std::nullopt;
   }
-  if (header[1] > kMaxLength || header[3] > kMaxLength || header[2] == 0 ||
-      header[3] % header[2] != 0 ||
-      bytes.size() != header[1] * sizeof(double) + header[3] * sizeof(uint16_t)) {
+  if (header[1] > kMaxLength || header[3] > kMaxLength || header[4] > kMaxLength ||
+      header[2] == 0 || header[3] % header[2] != 0 ||
+      bytes.size() != header[1] * sizeof(double) + header[3] * sizeof(uint16_t) + header[4]) {
     return std::nullopt;
   }
   features.descriptor.resize(header[1]);
@@ -111,6 +112,7 @@ std::optional<ViewFeatures> ParseViewFeatures(std::string_view bytes) {
   features.deep.resize(header[3]);
   Take(&bytes, features.descriptor.size(), features.descriptor.data());
   Take(&bytes, features.deep.size(), features.deep.data());
+  features.thumbnail = bytes;
   return features;
 }
 

@@ -23,6 +23,7 @@ struct ViewFeatures {
   // Deep features of up to kMaxCells cells as IEEE half precision, cell after cell. The cells come
   // in an order in which every beginning is spread evenly over the picture.
   std::vector<uint16_t> deep;
+  std::string thumbnail;  // JPEG, for people
 
   int Cells() const { return channels > 0 ? static_cast<int>(deep.size()) / channels : 0; }
   // Drops all cells but the first `count`.

@@ -25,6 +25,8 @@ class StageContext {
     int threads = 1;
     uint64_t seed = 1;
     int64_t memory_bytes = 0;  // that the stage may take; 0: 60 % of what is available
+    // Kept between jobs (FileCache); empty: none.
+    std::filesystem::path cache_folder = {};
   };
 
   // The references must outlive the context.
@@ -38,6 +40,7 @@ class StageContext {
   int threads() const { return setup_.threads; }
   uint64_t seed() const { return setup_.seed; }
   int64_t MemoryBytes() const;
+  const std::filesystem::path& cache_folder() const { return setup_.cache_folder; }
   CheckpointStore& checkpoints() { return checkpoints_; }
   ProgressObserver& progress() { return progress_; }
   const CancellationToken& cancel() const { return cancel_; }

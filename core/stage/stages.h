@@ -25,7 +25,8 @@ struct SelectKeyViewOptions {
   KeyViewOptions selection;
   std::string view;  // for KeyViewStrategy::kManual: name or unique file stem
 };
-// scene.json -> key_view.json, key_view.png. Only training views can win.
+// scene.json (import.json) -> key_view.json, key_view.png, key_view_ranking.jpg. Only training
+// views can win. Features of photos that were seen before come from the context's cache folder.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
 struct ColorizeKeyViewOptions {

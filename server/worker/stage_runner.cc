@@ -72,7 +72,9 @@ class CoreStageRunner : public StageRunner {
                           run.output_folder,
                           run.scratch_folder,
                           run.threads,
-                          spec.seed() == 0 ? 1 : spec.seed()},
+                          spec.seed() == 0 ? 1 : spec.seed(),
+                          /*memory_bytes=*/0,
+                          run.cache_folder},
                          recorder,
                          recorder,
                          cancel);

@@ -11,6 +11,7 @@ void AddReconstructCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
+void AddKeyViewCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);
 void AddChromaCommand(CLI::App& app);
 

@@ -1,0 +1,240 @@
+// color3d-bench keyview: what each strategy chooses, how long it takes, and the colour error that
+// the other views get from the chosen one by feature neighbours, beside all other choices.
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "core/base/files.h"
+#include "core/color/difference.h"
+#include "core/color/lab.h"
+#include "core/colorizer/colorizer.h"
+#include "core/image/codec.h"
+#include "core/scene/import.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/stages.h"
+#include "tests/bench/commands.h"
+#include "tests/bench/result_file.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+struct KeyViewArguments {
+  std::vector<std::string> folders;
+  bool as_one = false;
+  int side_px = 256;
+  int tests = 10;
+  int keys = 1000;
+  int threads = 2;
+  std::string sheets;
+  std::string json_file;
+};
+
+double Since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// The photos below a folder as views without poses.
+void AddPhotos(const fs::path& folder, Scene* scene) {
+  for (const std::string& name : ListFiles(folder)) {
+    if (!HasImageExtension(name)) continue;
+    View view;
+    view.name = folder.filename().string() + "/" + name;
+    view.image_file = fs::absolute(folder / name).string();
+    scene->views.push_back(view);
+  }
+}
+
+Scene LoadScene(const fs::path& folder) {
+  if (fs::exists(folder / "sparse")) {
+    const ScratchFolder scratch;
+    NullObserver silent;
+    Scene scene = ImportScene(folder, scratch.path(), {}, silent, {}).scene;
+    for (View& view : scene.views)
+      view.image_file = fs::absolute(folder / view.image_file).string();
+    return scene;
+  }
+  Scene scene;
+  AddPhotos(fs::exists(folder / "images") ? folder / "images" : folder, &scene);
+  return scene;
+}
+
+// Every count-th of `all`, the middle of each step.
+std::vector<int> Spread(int all, int count) {
+  std::vector<int> chosen;
+  const int taken = std::min(all, count);
+  for (int i = 0; i < taken; ++i) chosen.push_back((2 * i + 1) * all / (2 * taken));
+  return chosen;
+}
+
+class ErrorOfKeys {
+ public:
+  ErrorOfKeys(const Scene& scene, const KeyViewArguments& args)
+      : args_(args), encoder_(Encoder::Embedded()) {
+    for (const View& view : scene.views) {
+      truth_.push_back(LabFromSrgb(ReadImageWithin(view.image_file, args.side_px)));
+    }
+    tests_ = Spread(static_cast<int>(truth_.size()), args.tests);
+  }
+
+  // Mean CIEDE2000 over the test views, coloured from view `key` by feature neighbours.
+  double Of(int key) {
+    const auto known = errors_.find(key);
+    if (known != errors_.end()) return known->second;
+    ColorizerOptions options;
+    options.iterations = 0;
+    options.max_side_px = args_.side_px;
+    options.threads = args_.threads;
+    NullObserver silent;
+    NoCheckpoints none;
+    const auto colorizer = TrainColorizer(
+        encoder_, Luminance(truth_[key]), Chroma(truth_[key]), options, none, silent, {});
+    double sum = 0.0;
+    int count = 0;
+    for (int test : tests_) {
+      if (test == key) continue;
+      const Image l = Luminance(truth_[test]);
+      sum += MeanDeltaE00(JoinLab(l, colorizer->Colorize(l)), truth_[test]);
+      ++count;
+    }
+    return errors_[key] = count > 0 ? sum / count : 0.0;
+  }
+
+ private:
+  static Image Luminance(const Image& lab) {
+    Image l(lab.width, lab.height, 1);
+    std::copy_n(lab.Plane(0), l.data.size(), l.data.begin());
+    return l;
+  }
+  static Image Chroma(const Image& lab) {
+    Image ab(lab.width, lab.height, 2);
+    std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
+    return ab;
+  }
+
+  const KeyViewArguments& args_;
+  std::shared_ptr<const Encoder> encoder_;
+  std::vector<Image> truth_;
+  std::vector<int> tests_;
+  std::map<int, double> errors_;
+};
+
+// Runs the stage as a job would. `work` keeps inputs, outputs and the cache.
+ordered_json Select(const Scene& scene,
+                    KeyViewStrategy strategy,
+                    const fs::path& work,
+                    const KeyViewArguments& args,
+                    double* seconds) {
+  WriteFileAtomic(work / artifact::kScene, SceneToJson(scene));
+  fs::create_directories(work / "out");
+  NullObserver silent;
+  NoCheckpoints none;
+  CancellationToken cancel;
+  StageContext context({fs::path(),
+                        {{artifact::kScene, work / artifact::kScene}},
+                        work / "out",
+                        work,
+                        args.threads,
+                        1,
+                        0,
+                        work / "cache"},
+                       none,
+                       silent,
+                       cancel);
+  SelectKeyViewOptions options;
+  options.selection.strategy = strategy;
+  const auto start = std::chrono::steady_clock::now();
+  RunSelectKeyView(options, context);
+  *seconds = Since(start);
+  return ordered_json::parse(ReadFile(work / "out" / artifact::kKeyView));
+}
+
+ordered_json MeasureScene(const std::string& name,
+                          const Scene& scene,
+                          const KeyViewArguments& args) {
+  const ScratchFolder scratch;
+  std::optional<ErrorOfKeys> errors;
+  if (args.tests > 0) errors.emplace(scene, args);
+  ordered_json result{{"scene", name}, {"views", scene.views.size()}};
+  const std::pair<const char*, KeyViewStrategy> runs[] = {
+      {"coverage, nothing cached", KeyViewStrategy::kCoverage},
+      {"coverage", KeyViewStrategy::kCoverage},
+      {"entropy", KeyViewStrategy::kEntropy},
+      {"tracks", KeyViewStrategy::kTracks}};
+  for (const auto& [label, strategy] : runs) {
+    double seconds = 0.0;
+    const ordered_json key = Select(scene, strategy, scratch.path(), args, &seconds);
+    const std::string view = key.at("view");
+    int set_aside = 0;
+    for (const auto& ranked : key.at("ranking")) set_aside += ranked.at("set_aside") ? 1 : 0;
+    ordered_json run{{"strategy", label},
+                     {"used", key.at("strategy")},
+                     {"view", view},
+                     {"decisiveness", key.at("decisiveness")},
+                     {"set_aside", set_aside},
+                     {"seconds", seconds}};
+    if (errors) run["delta_e00"] = errors->Of(scene.FindView(view));
+    result["runs"].push_back(run);
+    if (!args.sheets.empty()) {
+      fs::create_directories(args.sheets);
+      WriteFileAtomic(
+          fs::path(args.sheets) / (name + "-" + std::string(key.at("strategy")) + ".jpg"),
+          ReadFile(scratch.path() / "out" / artifact::kKeyViewRanking));
+    }
+  }
+  if (errors) {
+    double sum = 0.0, best = 1e9, worst = 0.0;
+    const std::vector<int> keys = Spread(static_cast<int>(scene.views.size()), args.keys);
+    for (int key : keys) {
+      const double error = errors->Of(key);
+      sum += error;
+      best = std::min(best, error);
+      worst = std::max(worst, error);
+    }
+    result["all_choices"] = {{"keys", keys.size()},
+                             {"best", best},
+                             {"mean", sum / static_cast<double>(keys.size())},
+                             {"worst", worst},
+                             {"middle", errors->Of(static_cast<int>(scene.views.size()) / 2)}};
+  }
+  return result;
+}
+
+void RunKeyView(const KeyViewArguments& args) {
+  ordered_json results = ordered_json::array();
+  if (args.as_one) {
+    Scene all;
+    for (const std::string& folder : args.folders) {
+      AddPhotos(fs::exists(fs::path(folder) / "images") ? fs::path(folder) / "images" : folder,
+                &all);
+    }
+    for (size_t i = 0; i < all.views.size(); ++i) all.views[i].name += "#" + std::to_string(i);
+    results.push_back(MeasureScene("all", all, args));
+  } else {
+    for (const std::string& folder : args.folders) {
+      results.push_back(MeasureScene(fs::path(folder).filename(), LoadScene(folder), args));
+    }
+  }
+  WriteResult(results, args.json_file);
+}
+
+}  // namespace
+
+void AddKeyViewCommand(CLI::App& app) {
+  auto args = std::make_shared<KeyViewArguments>();
+  CLI::App* command = app.add_subcommand(
+      "keyview", "choice of the key view: strategies, seconds, colour error of every choice");
+  command->add_option("--scene", args->folders, "scene or folder of colour photos")->required();
+  command->add_flag("--as-one", args->as_one, "all folders' photos are one scene without poses");
+  command->add_option("--side", args->side_px, "of the pictures that are coloured, px");
+  command->add_option("--tests", args->tests, "views that are coloured and scored; 0: none");
+  command->add_option("--keys", args->keys, "choices to compare with, spread over the views");
+  command->add_option("--threads", args->threads);
+  command->add_option("--sheets", args->sheets, "folder for the contact sheets");
+  command->add_option("--json", args->json_file);
+  command->callback([args] { RunKeyView(*args); });
+}
+
+}  // namespace color3d
