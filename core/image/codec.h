@@ -16,9 +16,6 @@ namespace color3d {
 // Throws Error{kInvalidArgument} naming `file_name` (see ProbeImage) or when decoding fails.
 Image DecodeImage(std::string_view bytes, const std::string& file_name, bool keep_alpha = false);
 Image ReadImage(const std::filesystem::path& path, bool keep_alpha = false);
-// The same picture reduced so that the longer side is at most `max_side_px` (> 0; never enlarged).
-// Large JPEG files are decoded at a fraction of their size, many times quicker than ReadImage.
-Image ReadImageWithin(const std::filesystem::path& path, int max_side_px);
 
 // True when a 3-channel sRGB image has no colour: every |R-G|, |G-B| <= `tolerance` (0..1) for at
 // least 99.5 % of the pixels. 1-channel images are grey.

@@ -13,6 +13,7 @@
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "core/image/orientation.h"
+#include "core/image/reduced.h"
 
 namespace color3d {
 namespace {

@@ -10,6 +10,7 @@
 #include "core/color/lab.h"
 #include "core/encoder/threads.h"
 #include "core/image/codec.h"
+#include "core/image/reduced.h"
 #include "core/keyview/coverage.h"
 
 namespace color3d {

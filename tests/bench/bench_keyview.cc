@@ -9,6 +9,7 @@
 #include "core/color/lab.h"
 #include "core/colorizer/colorizer.h"
 #include "core/image/codec.h"
+#include "core/image/reduced.h"
 #include "core/scene/import.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
