@@ -28,8 +28,8 @@ std::vector<std::string> DownloadArtifacts(Connection& connection,
                                            const std::filesystem::path& out,
                                            ProgressDisplay& display);
 
-// All of a job's artifacts. After Ctrl-C throws CommandFailure{kDetached} that says how to fetch the
-// rest.
+// All of a job's artifacts. After Ctrl-C throws CommandFailure{kDetached} that says how to fetch
+// the rest.
 std::vector<std::string> DownloadResults(Connection& connection,
                                          const Context& context,
                                          const v1::Job& job,

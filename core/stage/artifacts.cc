@@ -18,6 +18,7 @@ std::string StageThatMakes(std::string_view name) {
                                                              {kKeyViewGray, "select_key_view"},
                                                              {kKeyViewRanking, "select_key_view"},
                                                              {kKeyColor, "colorize_key_view"},
+                                                             {kKeyColorFacts, "colorize_key_view"},
                                                              {kColorizer, "personalize"},
                                                              {kViewsAb, "colorize_views"},
                                                              {kGeometry, "reconstruct_geometry"},

@@ -167,6 +167,7 @@ void PassOnResults(StageContext& context) {
                            kKeyViewGray,
                            kKeyViewRanking,
                            kKeyViewColored,
+                           kKeyColorFacts,
                            kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }

@@ -72,7 +72,7 @@ void ChooseManually(const std::string& name,
   ranking->selection.ranking = {{ranking->selection.index, 0.0, 0.0, ""}};
 }
 
-void ChooseByScore(const KeyViewOptions& options,
+void ChooseByScore(const SelectKeyViewOptions& stage_options,
                    const Scene& scene,
                    const std::vector<int>& candidates,
                    StageContext& context,
@@ -81,9 +81,13 @@ void ChooseByScore(const KeyViewOptions& options,
   for (int view : candidates) {
     photos.push_back(context.scene_folder() / scene.views[view].image_file);
   }
-  const auto encoder = Encoder::Embedded();
+  const KeyViewOptions& options = stage_options.selection;
+  const auto encoder = context.LoadEncoder(stage_options.encoder);
+  const auto describer =
+      stage_options.features.empty() ? encoder : context.LoadEncoder(stage_options.features);
   ranking->encoder = encoder->description();
-  ranking->features = CollectViewFeatures(*encoder, photos, context);
+  if (describer != encoder) ranking->encoder += "; " + describer->description();
+  ranking->features = CollectViewFeatures(*describer, *encoder, photos, context);
   std::vector<std::vector<double>> descriptors;
   std::vector<FrameContent> contents;
   for (const ViewFeatures& view : ranking->features) {
@@ -141,7 +145,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   if (options.selection.strategy == KeyViewStrategy::kManual) {
     ChooseManually(options.view, scene, candidates, &ranking);
   } else {
-    ChooseByScore(options.selection, scene, candidates, context, &ranking);
+    ChooseByScore(options, scene, candidates, context, &ranking);
   }
   for (const std::string& warning : ranking.selection.warnings) {
     context.progress().OnWarning(warning);

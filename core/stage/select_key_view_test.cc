@@ -65,17 +65,13 @@ class SelectTest : public ::testing::Test {
     CancellationToken never;
     NullObserver silent;
     NoCheckpoints none;
-    StageContext context({scene_folder_,
-                          {{artifact::kScene, scratch_.path() / "scene.json"}},
-                          scratch_.path() / "out",
-                          scratch_.path(),
-                          2,
-                          1,
-                          0,
-                          scratch_.path() / "cache"},
-                         none,
-                         silent,
-                         cancel != nullptr ? *cancel : never);
+    StageContext::Setup setup;
+    setup.scene_folder = scene_folder_;
+    setup.inputs = {{artifact::kScene, scratch_.path() / "scene.json"}};
+    setup.output_folder = scratch_.path() / "out";
+    setup.threads = 2;
+    setup.cache_folder = scratch_.path() / "cache";
+    StageContext context(setup, none, silent, cancel != nullptr ? *cancel : never);
     SelectKeyViewOptions options;
     options.selection.strategy = strategy;
     RunSelectKeyView(options, context);

@@ -31,9 +31,12 @@ std::string Thumbnail(const Image& luminance) {
   return EncodeJpeg(gray, kThumbnailQuality);
 }
 
-ViewFeatures Compute(const Encoder& encoder, const fs::path& photo, const std::string& sha256) {
+ViewFeatures Compute(const Encoder& describer,
+                     const Encoder& encoder,
+                     const fs::path& photo,
+                     const std::string& sha256) {
   const Image luminance = LuminanceFromSrgb(ReadImageWithin(photo, kFeatureSidePx));
-  ViewFeatures features = PackViewFeatures(encoder.Describe(luminance),
+  ViewFeatures features = PackViewFeatures(describer.Describe(luminance),
                                            MeasureFrameContent(luminance),
                                            encoder.DeepFeatures(luminance),
                                            std::stoull(sha256.substr(0, 15), nullptr, 16));
@@ -41,21 +44,26 @@ ViewFeatures Compute(const Encoder& encoder, const fs::path& photo, const std::s
   return features;
 }
 
-ViewFeatures Provide(const Encoder& encoder, const fs::path& photo, const FileCache& cache) {
+ViewFeatures Provide(const Encoder& describer,
+                     const Encoder& encoder,
+                     const fs::path& photo,
+                     const FileCache& cache) {
   const std::string sha256 = DigestFile(photo).sha256;
-  const std::string key = Sha256Hex(std::string(kRecipe) + "\n" + encoder.digest() + "\n" +
-                                    std::to_string(kFeatureSidePx) + "\n" + sha256);
+  const std::string key =
+      Sha256Hex(std::string(kRecipe) + "\n" + describer.digest() + "\n" + encoder.digest() + "\n" +
+                std::to_string(kFeatureSidePx) + "\n" + sha256);
   if (const auto bytes = cache.Get(key)) {
     if (auto features = ParseViewFeatures(*bytes)) return *std::move(features);
   }
-  ViewFeatures features = Compute(encoder, photo, sha256);
+  ViewFeatures features = Compute(describer, encoder, photo, sha256);
   cache.Put(key, SerializeViewFeatures(features));
   return features;
 }
 
 }  // namespace
 
-std::vector<ViewFeatures> CollectViewFeatures(const Encoder& encoder,
+std::vector<ViewFeatures> CollectViewFeatures(const Encoder& describer,
+                                              const Encoder& encoder,
                                               const std::vector<fs::path>& photos,
                                               StageContext& context) {
   const FileCache cache(
@@ -72,7 +80,7 @@ std::vector<ViewFeatures> CollectViewFeatures(const Encoder& encoder,
       if (context.cancel().IsCancelled()) return;
       UseOneTorchThread();
       ViewFeatures& view = features[begin + k];
-      view = Provide(encoder, photos[begin + k], cache);
+      view = Provide(describer, encoder, photos[begin + k], cache);
       view.KeepCells(CellsForCoverage(photos.size(), view.channels));
     });
     context.cancel().ThrowIfCancelled();

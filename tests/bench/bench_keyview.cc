@@ -133,17 +133,12 @@ ordered_json Select(const Scene& scene,
   NullObserver silent;
   NoCheckpoints none;
   CancellationToken cancel;
-  StageContext context({fs::path(),
-                        {{artifact::kScene, work / artifact::kScene}},
-                        work / "out",
-                        work,
-                        args.threads,
-                        1,
-                        0,
-                        work / "cache"},
-                       none,
-                       silent,
-                       cancel);
+  StageContext::Setup setup;
+  setup.inputs = {{artifact::kScene, work / artifact::kScene}};
+  setup.output_folder = work / "out";
+  setup.threads = args.threads;
+  setup.cache_folder = work / "cache";
+  StageContext context(setup, none, silent, cancel);
   SelectKeyViewOptions options;
   options.selection.strategy = strategy;
   const auto start = std::chrono::steady_clock::now();
