@@ -23,6 +23,8 @@ struct KeyOptions {
   std::string out = "key_view";
   std::string view;
   std::string strategy;
+  std::string encoder;   // weights by name in the server's configuration
+  std::string features;  // CLIP weights, likewise
   std::string job;
   bool hold_out = false;
   KeyColorFlags color;
@@ -80,6 +82,8 @@ v1::Job Key::SubmitSelection(const std::string& scene) {
   } else if (options_.strategy == "coverage") {
     select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_COVERAGE);
   }
+  select->set_encoder(options_.encoder);
+  select->set_features(options_.features);
   if (options_.hold_out) {
     v1::JobSpec import = Spec(scene);
     import.mutable_import_scene()->set_hold_out_every_eighth(true);
@@ -255,6 +259,9 @@ void AddKeyCommands(CLI::App& app, Context& context) {
   AddView(select, options.get());
   select->add_option("--strategy", options->strategy, "coverage (default), tracks or entropy")
       ->check(CLI::IsMember({"coverage", "tracks", "entropy"}));
+  select->add_option(
+      "--encoder", options->encoder, "Weights that this server knows, to compare by");
+  select->add_option("--features", options->features, "CLIP weights that this server knows");
   run(select, &Key::Select);
 
   CLI::App* colour = key->add_subcommand("colour", "Colour it, and fetch it to look at");

@@ -2,7 +2,9 @@
 // the other views get from the chosen one by feature neighbours, beside all other choices.
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/base/files.h"
 #include "core/color/difference.h"
@@ -37,30 +39,48 @@ double Since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// The photos below a folder as views without poses.
-void AddPhotos(const fs::path& folder, Scene* scene) {
-  for (const std::string& name : ListFiles(folder)) {
-    if (!HasImageExtension(name)) continue;
-    View view;
-    view.name = folder.filename().string() + "/" + name;
-    view.image_file = fs::absolute(folder / name).string();
-    scene->views.push_back(view);
-  }
-}
+// Scenes with their photos in one folder of links.
+class SceneFolder {
+ public:
+  const fs::path& path() const { return scratch_.path(); }
 
-Scene LoadScene(const fs::path& folder) {
-  if (fs::exists(folder / "sparse")) {
+  // The photos below a folder as views without poses.
+  void AddPhotos(const fs::path& folder, Scene* scene) {
+    const fs::path photos = fs::exists(folder / "images") ? folder / "images" : folder;
+    const std::string link = Link(photos);
+    for (const std::string& name : ListFiles(photos)) {
+      if (!HasImageExtension(name)) continue;
+      View view;
+      view.name = link + "/" + name;
+      view.image_file = view.name;
+      view.camera = view.captured_camera = {64, 48, 50.0, 50.0, 32.0, 24.0};
+      scene->views.push_back(view);
+    }
+  }
+
+  Scene Load(const fs::path& folder) {
+    Scene scene;
+    if (!fs::exists(folder / "sparse")) {
+      AddPhotos(folder, &scene);
+      return scene;
+    }
     const ScratchFolder scratch;
     NullObserver silent;
-    Scene scene = ImportScene(folder, scratch.path(), {}, silent, {}).scene;
-    for (View& view : scene.views)
-      view.image_file = fs::absolute(folder / view.image_file).string();
+    scene = ImportScene(folder, scratch.path(), {}, silent, {}).scene;
+    const std::string link = Link(folder);
+    for (View& view : scene.views) view.image_file = link + "/" + view.image_file;
     return scene;
   }
-  Scene scene;
-  AddPhotos(fs::exists(folder / "images") ? folder / "images" : folder, &scene);
-  return scene;
-}
+
+ private:
+  std::string Link(const fs::path& folder) {
+    const std::string name = std::to_string(links_++);
+    fs::create_directory_symlink(fs::canonical(folder), scratch_.path() / name);
+    return name;
+  }
+  const ScratchFolder scratch_;
+  int links_ = 0;
+};
 
 // Every count-th of `all`, the middle of each step.
 std::vector<int> Spread(int all, int count) {
@@ -72,10 +92,10 @@ std::vector<int> Spread(int all, int count) {
 
 class ErrorOfKeys {
  public:
-  ErrorOfKeys(const Scene& scene, const KeyViewArguments& args)
+  ErrorOfKeys(const Scene& scene, const fs::path& folder, const KeyViewArguments& args)
       : args_(args), encoder_(Encoder::Embedded()) {
     for (const View& view : scene.views) {
-      truth_.push_back(LabFromSrgb(ReadImageWithin(view.image_file, args.side_px)));
+      truth_.push_back(LabFromSrgb(ReadImageWithin(folder / view.image_file, args.side_px)));
     }
     tests_ = Spread(static_cast<int>(truth_.size()), args.tests);
   }
@@ -124,6 +144,7 @@ class ErrorOfKeys {
 
 // Runs the stage as a job would. `work` keeps inputs, outputs and the cache.
 ordered_json Select(const Scene& scene,
+                    const fs::path& folder,
                     KeyViewStrategy strategy,
                     const fs::path& work,
                     const KeyViewArguments& args,
@@ -134,6 +155,7 @@ ordered_json Select(const Scene& scene,
   NoCheckpoints none;
   CancellationToken cancel;
   StageContext::Setup setup;
+  setup.scene_folder = folder;
   setup.inputs = {{artifact::kScene, work / artifact::kScene}};
   setup.output_folder = work / "out";
   setup.threads = args.threads;
@@ -149,10 +171,11 @@ ordered_json Select(const Scene& scene,
 
 ordered_json MeasureScene(const std::string& name,
                           const Scene& scene,
+                          const fs::path& folder,
                           const KeyViewArguments& args) {
   const ScratchFolder scratch;
   std::optional<ErrorOfKeys> errors;
-  if (args.tests > 0) errors.emplace(scene, args);
+  if (args.tests > 0) errors.emplace(scene, folder, args);
   ordered_json result{{"scene", name}, {"views", scene.views.size()}};
   const std::pair<const char*, KeyViewStrategy> runs[] = {
       {"coverage, nothing cached", KeyViewStrategy::kCoverage},
@@ -161,7 +184,7 @@ ordered_json MeasureScene(const std::string& name,
       {"tracks", KeyViewStrategy::kTracks}};
   for (const auto& [label, strategy] : runs) {
     double seconds = 0.0;
-    const ordered_json key = Select(scene, strategy, scratch.path(), args, &seconds);
+    const ordered_json key = Select(scene, folder, strategy, scratch.path(), args, &seconds);
     const std::string view = key.at("view");
     int set_aside = 0;
     for (const auto& ranked : key.at("ranking")) set_aside += ranked.at("set_aside") ? 1 : 0;
@@ -200,19 +223,17 @@ ordered_json MeasureScene(const std::string& name,
 
 void RunKeyView(const KeyViewArguments& args) {
   ordered_json results = ordered_json::array();
-  if (args.as_one) {
-    Scene all;
-    for (const std::string& folder : args.folders) {
-      AddPhotos(fs::exists(fs::path(folder) / "images") ? fs::path(folder) / "images" : folder,
-                &all);
-    }
-    for (size_t i = 0; i < all.views.size(); ++i) all.views[i].name += "#" + std::to_string(i);
-    results.push_back(MeasureScene("all", all, args));
-  } else {
-    for (const std::string& folder : args.folders) {
-      results.push_back(MeasureScene(fs::path(folder).filename(), LoadScene(folder), args));
+  SceneFolder folder;
+  Scene all;
+  for (const std::string& name : args.folders) {
+    if (args.as_one) {
+      folder.AddPhotos(name, &all);
+    } else {
+      const Scene scene = folder.Load(name);
+      results.push_back(MeasureScene(fs::path(name).filename(), scene, folder.path(), args));
     }
   }
+  if (args.as_one) results.push_back(MeasureScene("all", all, folder.path(), args));
   WriteResult(results, args.json_file);
 }
 
