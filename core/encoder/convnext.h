@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/encoder/convnext_config.h"
@@ -30,6 +31,10 @@ class ConvNext : public Encoder {
   ConvNext(const ConvNextConfig& config, const WeightMap& weights, std::string description);
 
   const ConvNextConfig& config() const { return config_; }
+  // Every weight by its published name, in a fixed order; storage is shared. For pre-training only:
+  // whoever switches gradients on or changes a value owns the object alone, and its digest is that
+  // of the weights it was made from.
+  std::vector<std::pair<std::string, torch::Tensor>> Parameters() const;
   const std::string& digest() const override { return digest_; }
   const std::string& description() const override { return description_; }
   std::vector<double> Describe(const Image& luminance) const override;
