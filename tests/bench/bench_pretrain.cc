@@ -11,7 +11,6 @@
 #include "core/image/codec.h"
 #include "core/image/probe.h"
 #include "core/keycolor/automatic.h"
-#include "core/metrics/colorfulness.h"
 #include "core/weights/safetensors.h"
 #include "core/colorizer/threads.h"
 #include "tests/bench/commands.h"
@@ -46,12 +45,6 @@ PhotoFolder ParseFolder(const std::string& text) {
   return {text.substr(0, equals), std::stod(text.substr(equals + 1))};
 }
 
-Image AbOf(const Image& lab) {
-  Image ab(lab.width, lab.height, 2);
-  std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-  return ab;
-}
-
 Image LuminanceOf(const Image& lab) {
   Image l(lab.width, lab.height, 1);
   std::copy_n(lab.Plane(0), l.data.size(), l.data.begin());
@@ -81,8 +74,8 @@ nlohmann::ordered_json Validate(const PretrainArguments& args, const WeightMap& 
     const Image predicted = JoinLab(luminance, colorizer->Colorize(luminance).ab);
     error += MeanDeltaE00(predicted, truth);
     grey_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
-    colorfulness += Colorfulness(SrgbFromLab(predicted));
-    true_colorfulness += Colorfulness(SrgbFromLab(truth));
+    colorfulness += Colourfulness(SrgbFromLab(predicted));
+    true_colorfulness += Colourfulness(SrgbFromLab(truth));
   }
   const double n = static_cast<double>(count);
   return {{"photos", count},

@@ -9,6 +9,7 @@ void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
+void AddPretrainCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);

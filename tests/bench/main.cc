@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   color3d::AddRasterizeCommand(app);
   color3d::AddReconstructCommand(app);
   color3d::AddPosesCommand(app);
+  color3d::AddPretrainCommand(app);
   color3d::AddStabilityCommand(app);
   color3d::AddColorizerCommand(app);
   color3d::AddPlotCommand(app);
