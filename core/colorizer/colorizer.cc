@@ -48,11 +48,11 @@ void CheckKeyView(const Image& luminance, const Image& ab) {
   }
 }
 
-std::shared_ptr<const ConvNext> RequireConvNext(const std::shared_ptr<const Encoder>& encoder) {
-  auto network = std::dynamic_pointer_cast<const ConvNext>(encoder);
+std::shared_ptr<const TapEncoder> RequireTaps(const std::shared_ptr<const Encoder>& encoder) {
+  auto network = std::dynamic_pointer_cast<const TapEncoder>(encoder);
   if (!network) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "the colorizer works on a ConvNeXt encoder; this one is " +
+                "the colorizer needs an encoder that shows its feature maps (a ConvNeXt); this one is " +
                     (encoder ? encoder->description() : std::string("null")));
   }
   return network;
@@ -109,7 +109,7 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
   options.Validate();
   CheckKeyView(luminance, ab);
   PersonalColorizer::Parts parts;
-  parts.encoder = RequireConvNext(encoder);
+  parts.encoder = RequireTaps(encoder);
   parts.options = options;
   const TrainingRecipe recipe = RecipeFor(options);
   return WithTorchErrors("personalization", [&]() -> std::shared_ptr<const Colorizer> {
@@ -140,7 +140,7 @@ std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
                                                int threads) {
   return WithTorchErrors("colorizer file", [&] {
-    return PersonalColorizer::Deserialize(bytes, RequireConvNext(encoder), threads);
+    return PersonalColorizer::Deserialize(bytes, RequireTaps(encoder), threads);
   });
 }
 

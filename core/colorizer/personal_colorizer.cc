@@ -160,7 +160,7 @@ std::string PersonalColorizer::Serialize() const {
 }
 
 std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
-    std::string_view bytes, std::shared_ptr<const ConvNext> encoder, int threads) {
+    std::string_view bytes, std::shared_ptr<const TapEncoder> encoder, int threads) {
   Archive archive = ReadArchive(bytes, kMagic, kVersion, kWhat);
   Parts parts;
   bool has_neighbours = false;

@@ -8,7 +8,7 @@
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
-#include "core/encoder/random_features.h"
+#include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_tensors.h"
 #include "core/image/codec.h"
@@ -233,14 +233,11 @@ Image ConvNext::DeepFeatures(const Image& luminance) const {
 }
 
 std::shared_ptr<const Encoder> Encoder::Embedded() {
-  const ConvNextConfig config;
-  constexpr uint64_t kSeed = 2026;
-  // Built anew for each caller that asks: 0.7 M weights take some milliseconds, and nothing global
+  // Built anew for each caller: unpacking 4 M weights takes some milliseconds, and nothing global
   // outlives the caller.
+  const ConvNextConfig config;
   return std::make_shared<const ConvNext>(
-      config,
-      RandomFeatureWeights(config, kSeed),
-      "embedded ConvNeXt, " + config.ToString() + ", seeded random features");
+      config, EmbeddedWeights("encoder."), "embedded ConvNeXt, " + config.ToString());
 }
 
 }  // namespace color3d

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/encoder/convnext.h"
+#include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/torch_errors.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
@@ -126,6 +127,10 @@ class EmbeddedColorizer : public AutomaticColorizer {
 };
 
 }  // namespace
+
+std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::Embedded() {
+  return FromPretrained(EmbeddedWeights(""));
+}
 
 std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromPretrained(
     const WeightMap& weights) {

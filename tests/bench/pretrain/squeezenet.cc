@@ -120,18 +120,38 @@ torch::Tensor SqueezeNet::Fire(int index, const torch::Tensor& x) const {
       {Convolve(name + "expand1x1", squeezed, 0), Convolve(name + "expand3x3", squeezed, 1)}, 1);
 }
 
+torch::Tensor SqueezeNet::Input(const torch::Tensor& srgb) {
+  const torch::Tensor mean = torch::tensor({103.94f, 116.78f, 123.68f}).view({1, 3, 1, 1});
+  return (255.0 * srgb.flip(1) - mean).contiguous(at::MemoryFormat::ChannelsLast);
+}
+
 SqueezeNet::Features SqueezeNet::Run(const torch::Tensor& srgb) const {
   torch::NoGradGuard no_grad;
-  const torch::Tensor mean = torch::tensor({103.94f, 116.78f, 123.68f}).view({1, 3, 1, 1});
-  const torch::Tensor input = (255.0 * srgb.flip(1) - mean).contiguous(at::MemoryFormat::ChannelsLast);
   Features features;
-  features.conv1 = Convolve("conv1", input, 0);
+  features.conv1 = Convolve("conv1", Input(srgb), 0);
   features.fire3 = Fire(3, Fire(2, torch::max_pool2d(features.conv1, 3, 2)));
   features.fire5 = Fire(5, Fire(4, torch::max_pool2d(features.fire3, 3, 2)));
   const torch::Tensor x = torch::max_pool2d(features.fire5, 3, 2);
   features.fire9 = Fire(9, Fire(8, Fire(7, Fire(6, x))));
   features.logits = Convolve("conv10", features.fire9, 0).mean({2, 3});
   return features;
+}
+
+std::vector<torch::Tensor> SqueezeNet::AlignedTaps(const torch::Tensor& srgb) const {
+  torch::NoGradGuard no_grad;
+  const auto pad_after = [](const torch::Tensor& x) {
+    return torch::replication_pad2d(x, {0, 1, 0, 1});
+  };
+  const auto pad_before = [](const torch::Tensor& x) {
+    return torch::replication_pad2d(x, {1, 0, 1, 0});
+  };
+  std::vector<torch::Tensor> taps;
+  taps.push_back(Convolve("conv1", pad_after(Input(srgb)), 0));
+  taps.push_back(Fire(3, Fire(2, torch::max_pool2d(pad_before(taps.back()), 3, 2))));
+  taps.push_back(Fire(5, Fire(4, torch::max_pool2d(pad_after(taps.back()), 3, 2))));
+  const torch::Tensor x = torch::max_pool2d(pad_before(taps.back()), 3, 2);
+  taps.push_back(Fire(9, Fire(8, Fire(7, Fire(6, x)))));
+  return taps;
 }
 
 }  // namespace color3d

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 namespace color3d {
 
@@ -25,8 +26,12 @@ class SqueezeNet {
   };
   // `srgb` [B,3,H,W] in 0..1, at least 32 px.
   Features Run(const torch::Tensor& srgb) const;
+  // Feature maps at strides 2, 4, 8, 16 with H / stride cells (H, W multiples of 16): borders are
+  // padded on alternating sides, so that no cell is off its place by more than 2.5 px.
+  std::vector<torch::Tensor> AlignedTaps(const torch::Tensor& srgb) const;
 
  private:
+  static torch::Tensor Input(const torch::Tensor& srgb);
   torch::Tensor Convolve(const std::string& name, const torch::Tensor& x, int padding) const;
   torch::Tensor Fire(int index, const torch::Tensor& x) const;
 
