@@ -6,13 +6,10 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/color/difference.h"
-#include "core/color/lab.h"
-#include "core/image/codec.h"
-#include "core/image/probe.h"
 #include "core/keycolor/automatic.h"
 #include "core/weights/safetensors.h"
 #include "core/colorizer/threads.h"
+#include "tests/bench/automatic_scores.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/pretrain/pretrainer.h"
 
@@ -45,44 +42,19 @@ PhotoFolder ParseFolder(const std::string& text) {
   return {text.substr(0, equals), std::stod(text.substr(equals + 1))};
 }
 
-Image LuminanceOf(const Image& lab) {
-  Image l(lab.width, lab.height, 1);
-  std::copy_n(lab.Plane(0), l.data.size(), l.data.begin());
-  return l;
-}
-
-// Mean colour error and colourfulness over the photographs of a folder, evenly thinned out.
+// Mean colour error and colourfulness over photographs that are never trained on.
 nlohmann::ordered_json Validate(const PretrainArguments& args, const WeightMap& weights) {
   const auto colorizer = AutomaticColorizer::FromPretrained(weights);
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry :
-       std::filesystem::recursive_directory_iterator(args.validate_folder)) {
-    if (entry.is_regular_file() && HasImageExtension(entry.path().string())) {
-      files.push_back(entry.path());
-    }
+  std::vector<AutomaticScore> scores;
+  for (const auto& photo : PhotosBelow(args.validate_folder, args.validate_photos)) {
+    scores.push_back(ScoreAutomatic(*colorizer, photo, args.max_side_px));
   }
-  std::sort(files.begin(), files.end());
-  const size_t count = std::min<size_t>(files.size(), args.validate_photos);
-  double error = 0.0;
-  double grey_error = 0.0;
-  double colorfulness = 0.0;
-  double true_colorfulness = 0.0;
-  for (size_t i = 0; i < count; ++i) {
-    const Image truth =
-        LabFromSrgb(FitWithin(ReadImage(files[i * files.size() / count]), args.max_side_px));
-    const Image luminance = LuminanceOf(truth);
-    const Image predicted = JoinLab(luminance, colorizer->Colorize(luminance).ab);
-    error += MeanDeltaE00(predicted, truth);
-    grey_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
-    colorfulness += Colourfulness(SrgbFromLab(predicted));
-    true_colorfulness += Colourfulness(SrgbFromLab(truth));
-  }
-  const double n = static_cast<double>(count);
-  return {{"photos", count},
-          {"delta_e00", error / n},
-          {"delta_e00_grey", grey_error / n},
-          {"colorfulness", colorfulness / n},
-          {"colorfulness_truth", true_colorfulness / n}};
+  const AutomaticScore mean = MeanScore(scores);
+  return {{"photos", scores.size()},
+          {"delta_e00", mean.delta_e00},
+          {"delta_e00_grey", mean.delta_e00_grey},
+          {"colourfulness", mean.colourfulness},
+          {"colourfulness_truth", mean.true_colourfulness}};
 }
 
 void RunPretrain(const PretrainArguments& args) {

@@ -5,6 +5,7 @@
 
 namespace color3d {
 
+void AddAutomaticCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
