@@ -4,13 +4,13 @@
 
 #include <cmath>
 #include <cstring>
-#include <set>
 #include <utility>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/encoder/random_features.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/weight_tensors.h"
 #include "core/image/codec.h"
 
 namespace color3d {
@@ -32,37 +32,6 @@ std::string DigestOf(const ConvNextConfig& config, const WeightMap& weights) {
   }
   return hash.FinishHex();
 }
-
-// Hands out weights by name, checks shapes, and remembers what was asked for.
-class WeightReader {
- public:
-  explicit WeightReader(const WeightMap& weights) : weights_(weights) {}
-
-  torch::Tensor Take(const std::string& name, std::vector<int64_t> shape) {
-    const auto found = weights_.find(name);
-    if (found == weights_.end()) {
-      throw InvalidArgument("the encoder weights lack \"" + name + "\"");
-    }
-    if (found->second.shape != shape) {
-      throw InvalidArgument("encoder weight \"" + name + "\" has another shape than its config");
-    }
-    used_.insert(name);
-    torch::Tensor tensor = torch::empty(shape, torch::kFloat32);
-    std::memcpy(tensor.data_ptr<float>(),
-                found->second.values.data(),
-                found->second.values.size() * sizeof(float));
-    return shape.size() == 4 ? tensor.contiguous(at::MemoryFormat::ChannelsLast) : tensor;
-  }
-  void ExpectAllUsed() const {
-    for (const auto& [name, array] : weights_) {
-      if (!used_.count(name)) throw InvalidArgument("unknown encoder weight \"" + name + "\"");
-    }
-  }
-
- private:
-  const WeightMap& weights_;
-  std::set<std::string> used_;
-};
 
 // Layer norm over the channels of [B,C,H,W]; free of copies when x is channels-last.
 torch::Tensor ChannelNorm(const torch::Tensor& x,
@@ -117,45 +86,45 @@ Image ImageFromTensor(const torch::Tensor& tensor) {
   return image;
 }
 
-ConvNext::ConvNext(const ConvNextConfig& config, const WeightMap& weights, std::string description)
+ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description)
     : config_(config), digest_(DigestOf(config, weights)), description_(std::move(description)) {
-  WeightReader reader(weights);
+  WeightReader reader(std::move(weights), "the encoder weights");
   for (int i = 0; i < config.StageCount(); ++i) {
     Stage stage;
     const int64_t c = config.dims[i];
     const std::string down = "downsample_layers." + std::to_string(i) + ".";
     if (i == 0) {
       stage.down_weight =
-          reader.Take(down + "0.weight", {c, 3, config.stem_kernel, config.stem_kernel});
-      stage.down_bias = reader.Take(down + "0.bias", {c});
-      stage.down_norm_weight = reader.Take(down + "1.weight", {c});
-      stage.down_norm_bias = reader.Take(down + "1.bias", {c});
+          TakeTensor(reader, down + "0.weight", {c, 3, config.stem_kernel, config.stem_kernel});
+      stage.down_bias = TakeTensor(reader, down + "0.bias", {c});
+      stage.down_norm_weight = TakeTensor(reader, down + "1.weight", {c});
+      stage.down_norm_bias = TakeTensor(reader, down + "1.bias", {c});
     } else {
       const int64_t before = config.dims[i - 1];
-      stage.down_norm_weight = reader.Take(down + "0.weight", {before});
-      stage.down_norm_bias = reader.Take(down + "0.bias", {before});
-      stage.down_weight = reader.Take(down + "1.weight", {c, before, 2, 2});
-      stage.down_bias = reader.Take(down + "1.bias", {c});
+      stage.down_norm_weight = TakeTensor(reader, down + "0.weight", {before});
+      stage.down_norm_bias = TakeTensor(reader, down + "0.bias", {before});
+      stage.down_weight = TakeTensor(reader, down + "1.weight", {c, before, 2, 2});
+      stage.down_bias = TakeTensor(reader, down + "1.bias", {c});
     }
     for (int j = 0; j < config.depths[i]; ++j) {
       const std::string name = "stages." + std::to_string(i) + "." + std::to_string(j) + ".";
       Block block;
-      block.dwconv_weight = reader.Take(name + "dwconv.weight", {c, 1, 7, 7});
-      block.dwconv_bias = reader.Take(name + "dwconv.bias", {c});
-      block.norm_weight = reader.Take(name + "norm.weight", {c});
-      block.norm_bias = reader.Take(name + "norm.bias", {c});
-      block.pwconv1_weight = reader.Take(name + "pwconv1.weight", {4 * c, c});
-      block.pwconv1_bias = reader.Take(name + "pwconv1.bias", {4 * c});
-      block.pwconv2_weight = reader.Take(name + "pwconv2.weight", {c, 4 * c});
-      block.pwconv2_bias = reader.Take(name + "pwconv2.bias", {c});
-      block.gamma = reader.Take(name + "gamma", {c});
+      block.dwconv_weight = TakeTensor(reader, name + "dwconv.weight", {c, 1, 7, 7});
+      block.dwconv_bias = TakeTensor(reader, name + "dwconv.bias", {c});
+      block.norm_weight = TakeTensor(reader, name + "norm.weight", {c});
+      block.norm_bias = TakeTensor(reader, name + "norm.bias", {c});
+      block.pwconv1_weight = TakeTensor(reader, name + "pwconv1.weight", {4 * c, c});
+      block.pwconv1_bias = TakeTensor(reader, name + "pwconv1.bias", {4 * c});
+      block.pwconv2_weight = TakeTensor(reader, name + "pwconv2.weight", {c, 4 * c});
+      block.pwconv2_bias = TakeTensor(reader, name + "pwconv2.bias", {c});
+      block.gamma = TakeTensor(reader, name + "gamma", {c});
       stage.blocks.push_back(std::move(block));
     }
-    stage.norm_weight = reader.Take("norm" + std::to_string(i) + ".weight", {c});
-    stage.norm_bias = reader.Take("norm" + std::to_string(i) + ".bias", {c});
+    stage.norm_weight = TakeTensor(reader, "norm" + std::to_string(i) + ".weight", {c});
+    stage.norm_bias = TakeTensor(reader, "norm" + std::to_string(i) + ".bias", {c});
     stages_.push_back(std::move(stage));
   }
-  reader.ExpectAllUsed();
+  reader.Finish();
 }
 
 torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {

@@ -11,7 +11,7 @@
 
 #include "core/encoder/convnext_config.h"
 #include "core/encoder/encoder.h"
-#include "core/encoder/weight_map.h"
+#include "core/weights/weight_map.h"
 
 namespace color3d {
 
@@ -25,9 +25,9 @@ class ConvNext : public Encoder {
   // returns the same shape, or an undefined tensor for nothing.
   using BlockAdapter = std::function<torch::Tensor(int stage, int block, const torch::Tensor&)>;
 
-  // Throws Error{kInvalidArgument} naming the first weight that is missing, unexpected or has
-  // another shape than `config` asks for.
-  ConvNext(const ConvNextConfig& config, const WeightMap& weights, std::string description);
+  // Throws Error{kInvalidArgument} naming the weights that are missing, unexpected or have another
+  // shape than `config` asks for. Takes the weights' memory over.
+  ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description);
 
   const ConvNextConfig& config() const { return config_; }
   const std::string& digest() const override { return digest_; }

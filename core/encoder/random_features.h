@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "core/encoder/convnext_config.h"
-#include "core/encoder/weight_map.h"
+#include "core/weights/weight_map.h"
 
 namespace color3d {
 
