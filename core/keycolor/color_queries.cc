@@ -1,6 +1,6 @@
 #include "core/keycolor/color_queries.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cmath>
 #include <numbers>

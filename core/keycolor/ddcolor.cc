@@ -1,6 +1,6 @@
 #include "core/keycolor/ddcolor.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,7 @@
 #include "core/encoder/convnext.h"
 #include "core/encoder/convnext_weights.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/weight_digest.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/ddcolor_decoder.h"
@@ -42,9 +43,9 @@ bool Ddcolor::Recognises(const WeightMap& weights) {
          weights.count("refine_net.0.0.weight_orig") > 0;
 }
 
-Ddcolor::Ddcolor(WeightMap weights) {
+Ddcolor::Ddcolor(WeightMap weights) : digest_(DigestOfWeights("DDColor", weights)) {
   WithTorchErrors("DDColor", [&] {
-    torch::NoGradGuard no_grad;
+    at::NoGradGuard no_grad;
     ConvNextWeights encoder = TakeConvNextWeights(weights);
     encoder_ = std::make_unique<const ConvNext>(
         encoder.config, std::move(encoder.weights), encoder.description);
@@ -71,7 +72,7 @@ Image Ddcolor::Predict(const Image& gray_rgb) const {
                           " with " + std::to_string(gray_rgb.channels));
   }
   return WithTorchErrors("DDColor", [&] {
-    torch::NoGradGuard no_grad;
+    at::NoGradGuard no_grad;
     const torch::Tensor input = ConvNext::NormaliseInput(TensorFromImage(gray_rgb));
     return ImageFromTensor(decoder_->Forward(encoder_->Taps(input), input));
   });
@@ -80,7 +81,7 @@ Image Ddcolor::Predict(const Image& gray_rgb) const {
 AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
   CheckLuminance(luminance);
   const Image coarse = WithTorchErrors("DDColor", [&] {
-    torch::NoGradGuard no_grad;
+    at::NoGradGuard no_grad;
     const Image square = Resize(luminance, kNetworkSidePx, kNetworkSidePx);
     const torch::Tensor input = encoder_->Input(TensorFromImage(square));
     return ImageFromTensor(decoder_->Forward(encoder_->Taps(input), input));

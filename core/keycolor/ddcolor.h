@@ -27,6 +27,7 @@ class Ddcolor : public AutomaticColorizer {
   // it is, so the confidence is 1 everywhere.
   AutomaticColor Colorize(const Image& luminance) const override;
   const std::string& description() const override { return description_; }
+  const std::string& digest() const override { return digest_; }
 
   const ConvNext& encoder() const { return *encoder_; }
   // The bare network: ab of grey RGB in 0..1 (3 channels, sides multiples of 32), same size.
@@ -35,6 +36,7 @@ class Ddcolor : public AutomaticColorizer {
  private:
   std::unique_ptr<const ConvNext> encoder_;
   std::unique_ptr<const DdcolorDecoder> decoder_;
+  std::string digest_;
   std::string description_;
 };
 

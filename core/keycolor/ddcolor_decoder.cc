@@ -1,6 +1,6 @@
 #include "core/keycolor/ddcolor_decoder.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 

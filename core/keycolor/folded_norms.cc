@@ -1,6 +1,6 @@
 #include "core/keycolor/folded_norms.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 namespace color3d {
 namespace {
