@@ -58,6 +58,18 @@ std::shared_ptr<const ConvNext> RequireConvNext(const std::shared_ptr<const Enco
   return network;
 }
 
+// The decoder has a level for every tap, and pictures are padded to kPadMultiple.
+void CheckTaps(const ConvNextConfig& encoder, const TrainingRecipe& recipe) {
+  const size_t levels = recipe.model.widths.size();
+  const int last_stride = encoder.Stride(encoder.StageCount() - 1);
+  if (encoder.dims.size() == levels && kPadMultiple % last_stride == 0) return;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "the colorizer works on an encoder of " + std::to_string(levels) +
+                  " stages with strides up to " + std::to_string(kPadMultiple) + "; this one has " +
+                  std::to_string(encoder.dims.size()) + " with strides up to " +
+                  std::to_string(last_stride));
+}
+
 std::array<float, 2> MeanAb(const Image& ab) {
   std::array<float, 2> mean{};
   for (int c = 0; c < 2; ++c) {
@@ -112,6 +124,7 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
   parts.encoder = RequireConvNext(encoder);
   parts.options = options;
   const TrainingRecipe recipe = RecipeFor(options);
+  CheckTaps(parts.encoder->config(), recipe);
   return WithTorchErrors("personalization", [&]() -> std::shared_ptr<const Colorizer> {
     SetTorchThreads(options.threads);
     const Image l = FitWithin(luminance, options.max_side_px);
