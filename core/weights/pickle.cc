@@ -14,6 +14,7 @@ using Kind = PickleValue::Kind;
 // A large language model's state dict has some 1e5 values; one byte can make a value, so a pickle's
 // size alone does not bound the memory.
 constexpr size_t kMaxValues = 500'000;
+constexpr size_t kMaxTensors = 100'000;
 
 // The callables that are known. Storages stand for themselves and carry their number format.
 enum Callable : int64_t {
@@ -401,6 +402,7 @@ std::vector<int64_t> Unpickler::Sizes(uint32_t index) const {
 }
 
 void Unpickler::PushTensor(const std::vector<uint32_t>& arguments) {
+  if (graph_.tensors.size() >= kMaxTensors) throw Damaged("has more than 100000 tensors");
   if (arguments.size() < 4) throw Damaged("has a tensor without storage, offset, size and stride");
   PickleTensor tensor;
   tensor.storage =

@@ -68,11 +68,11 @@ class ArchiveReader {
   explicit ArchiveReader(const ByteSource& source)
       : source_(source), directory_(ReadZipDirectory(source)) {
     FindStem();
-    const auto order = directory_.find(stem_ + "byteorder");
-    if (order != directory_.end() && order->second.size == 3) {  // "big", not "little"
+    const ZipRecord* order = FindStored(directory_, stem_ + "byteorder", source);
+    if (order && source.ReadString(order->offset, std::min<uint64_t>(order->size, 3)) == "big") {
       throw source.Refusal("it was written on a big-endian machine; save it again on another");
     }
-    const ZipRecord& pickle = directory_.at(stem_ + "data.pkl");
+    const ZipRecord& pickle = *FindStored(directory_, stem_ + "data.pkl", source);
     if (pickle.size > kMaxPickleBytes) {
       throw source.Refusal("its data.pkl has " + std::to_string(pickle.size) +
                            " bytes, far more than a state dict needs");
@@ -170,14 +170,14 @@ class ArchiveReader {
   std::vector<float> ReadTensor(const std::string& name,
                                 const PickleTensor& tensor,
                                 const PickleStorage& storage) {
-    const auto found = directory_.find(stem_ + "data/" + std::string(storage.key));
-    if (found == directory_.end()) {
+    const ZipRecord* record =
+        FindStored(directory_, stem_ + "data/" + std::string(storage.key), source_);
+    if (!record) {
       throw source_.Refusal("the data of " + QuotedName(name) + " (record " +
                             QuotedName(storage.key) + ") are missing");
     }
     const auto bytes = static_cast<uint64_t>(ElementBytes(storage.type));
-    const uint64_t there =
-        std::min(static_cast<uint64_t>(storage.count), found->second.size / bytes);
+    const uint64_t there = std::min(static_cast<uint64_t>(storage.count), record->size / bytes);
     const int64_t count = CheckedElementCount(source_, name, tensor.shape);
     const auto span = static_cast<uint64_t>(SpanOf(tensor));
     if (span > there || static_cast<uint64_t>(tensor.offset) > there - span) {
@@ -186,11 +186,8 @@ class ArchiveReader {
     }
     const bool contiguous = IsContiguous(tensor);
     Spend(static_cast<uint64_t>(count) + (contiguous ? 0 : span));
-    std::vector<float> values =
-        ReadElements(source_,
-                     found->second.offset + static_cast<uint64_t>(tensor.offset) * bytes,
-                     storage.type,
-                     span);
+    std::vector<float> values = ReadElements(
+        source_, record->offset + static_cast<uint64_t>(tensor.offset) * bytes, storage.type, span);
     return contiguous ? values : Gather(values, tensor, count);
   }
 

@@ -74,7 +74,8 @@ Central FindCentral(const ByteSource& source) {
 struct Listed {
   std::string name;
   uint64_t local_offset = 0;
-  uint64_t size = 0;
+  uint64_t size = 0;  // in the file
+  bool compressed = false;
 };
 
 // The zip64 extra field holds, in this order, those of (size, stored size, offset) whose 32-bit
@@ -118,21 +119,20 @@ uint64_t ReadListed(const ByteSource& source, std::string_view bytes, Listed& li
   if (Field<uint16_t>(bytes, 8) & 1) {
     throw source.Refusal("the record " + QuotedName(listed.name) + " is encrypted");
   }
-  listed.size = Field<uint32_t>(bytes, 24);
-  uint64_t stored_size = Field<uint32_t>(bytes, 20);
+  uint64_t size = Field<uint32_t>(bytes, 24), stored_size = Field<uint32_t>(bytes, 20);
   listed.local_offset = Field<uint32_t>(bytes, 42);
-  if (std::max({listed.size, stored_size, listed.local_offset}) == 0xffffffff) {
+  if (std::max({size, stored_size, listed.local_offset}) == 0xffffffff) {
     ApplyZip64(source,
                bytes.substr(kCentralBytes + name_bytes, extra_bytes),
-               listed.size,
+               size,
                stored_size,
                listed.local_offset);
   }
-  if (Field<uint16_t>(bytes, 10) != 0 || stored_size != listed.size) {
-    throw source.Refusal("the record " + QuotedName(listed.name) +
-                         " is compressed, which PyTorch never does; pack the archive again with "
-                         "stored records (zip -0)");
+  listed.compressed = Field<uint16_t>(bytes, 10) != 0;
+  if (!listed.compressed && stored_size != size) {
+    throw source.Refusal("the record " + QuotedName(listed.name) + " has two sizes");
   }
+  listed.size = stored_size;
   return length;
 }
 
@@ -151,7 +151,7 @@ ZipRecord Locate(const ByteSource& source, const Listed& listed) {
     throw source.Refusal("the record " + QuotedName(listed.name) + " of " +
                          std::to_string(listed.size) + " bytes is not inside the file");
   }
-  return {offset, listed.size};
+  return {offset, listed.size, listed.compressed};
 }
 
 }  // namespace
@@ -182,6 +182,19 @@ ZipDirectory ReadZipDirectory(const ByteSource& source) {
     }
   }
   return directory;
+}
+
+const ZipRecord* FindStored(const ZipDirectory& directory,
+                            const std::string& name,
+                            const ByteSource& source) {
+  const auto found = directory.find(name);
+  if (found == directory.end()) return nullptr;
+  if (found->second.compressed) {
+    throw source.Refusal("the record " + QuotedName(name) +
+                         " is compressed, which PyTorch never does; pack the archive again with "
+                         "stored records (zip -0)");
+  }
+  return &found->second;
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-#include "tests/support/weight_files.h"
+#include "core/weights/test_weight_files.h"
 
 #include <bit>
 #include <cstring>
