@@ -46,8 +46,7 @@ torch::Tensor CenterSquare(const torch::Tensor& rgb, int64_t side) {
   const int64_t width = rgb.size(3);
   const int64_t shorter = std::min(height, width);
   // The longer side is rounded down, the cut to the nearest even number, as in the publication.
-  const torch::Tensor resized =
-      ResizeBicubic(rgb, side * height / shorter, side * width / shorter);
+  const torch::Tensor resized = ResizeBicubic(rgb, side * height / shorter, side * width / shorter);
   const auto top = static_cast<int64_t>(std::nearbyint((resized.size(2) - side) / 2.0));
   const auto left = static_cast<int64_t>(std::nearbyint((resized.size(3) - side) / 2.0));
   return resized.slice(2, top, top + side).slice(3, left, left + side).contiguous();

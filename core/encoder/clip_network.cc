@@ -101,8 +101,7 @@ void ClipNetwork::TakeText(WeightReader& reader) {
   text_ = TakeTower(reader, "transformer.resblocks.", width);
   norm_final_ = {TakeTensor(reader, "ln_final.weight", {width}),
                  TakeTensor(reader, "ln_final.bias", {width})};
-  text_projection_ =
-      TakeTensor(reader, "text_projection", {width, vision_projection_.size(1)});
+  text_projection_ = TakeTensor(reader, "text_projection", {width, vision_projection_.size(1)});
 }
 
 ClipNetwork::ClipNetwork(WeightMap weights, bool quick_gelu) : quick_gelu_(quick_gelu) {
@@ -137,18 +136,17 @@ torch::Tensor ClipNetwork::RunBlock(const Tower& tower,
   const int64_t batch = x.size(0);
   const int64_t count = x.size(1);
   const int64_t head_width = tower.width / tower.heads;
-  const torch::Tensor qkv = torch::linear(LayerNorm(x, block.norm1.weight, block.norm1.bias),
-                                          block.in.weight,
-                                          block.in.bias)
-                                .view({batch, count, 3, tower.heads, head_width})
-                                .permute({2, 0, 3, 1, 4});  // [3,B,heads,N,head_width]
+  const torch::Tensor qkv =
+      torch::linear(
+          LayerNorm(x, block.norm1.weight, block.norm1.bias), block.in.weight, block.in.bias)
+          .view({batch, count, 3, tower.heads, head_width})
+          .permute({2, 0, 3, 1, 4});  // [3,B,heads,N,head_width]
   const double scale = 1.0 / std::sqrt(static_cast<double>(head_width));
   torch::Tensor scores = torch::matmul(qkv[0] * scale, qkv[1].transpose(-2, -1));
   if (causal) {
     scores = scores + torch::full({count, count}, -INFINITY).triu(1);
   }
-  const torch::Tensor mixed =
-      torch::matmul(scores.softmax(-1), qkv[2]).transpose(1, 2).flatten(2);
+  const torch::Tensor mixed = torch::matmul(scores.softmax(-1), qkv[2]).transpose(1, 2).flatten(2);
   const torch::Tensor y = x + torch::linear(mixed, block.out.weight, block.out.bias);
   torch::Tensor hidden = torch::linear(
       LayerNorm(y, block.norm2.weight, block.norm2.bias), block.expand.weight, block.expand.bias);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kBytes = 256;
 constexpr int kControlTokens = 2;
-constexpr size_t kMaxTextBytes = 2000;          // pair merging is quadratic in a word's length
+constexpr size_t kMaxTextBytes = 2000;           // pair merging is quadratic in a word's length
 constexpr size_t kMaxVocabularyBytes = 1 << 24;  // the published one has 3.1 MB
 constexpr const char* kEndOfWord = "</w>";
 

@@ -16,8 +16,8 @@ class ClipTokenizer {
   // `merges`: the text of the published vocabulary, one header line and then one merge "left right"
   // per line, best first (bpe_simple_vocab_16e6.txt, or merges.txt as other hubs call it).
   // `vocabulary_size` is the number of rows of the token embedding (49408 in all published models):
-  // 2 * 256 bytes, the merges, start and end of text. Throws Error{kInvalidArgument} naming `source`
-  // when the text holds fewer merges, or a line that is no merge.
+  // 2 * 256 bytes, the merges, start and end of text. Throws Error{kInvalidArgument} naming
+  // `source` when the text holds fewer merges, or a line that is no merge.
   ClipTokenizer(std::string_view merges, int vocabulary_size, const std::string& source);
   // The same from a file, plain or gzip.
   static ClipTokenizer FromFile(const std::filesystem::path& path, int vocabulary_size);

@@ -86,8 +86,7 @@ TEST(ClipTokenizerTest, ReadsAPlainFile) {
 
 TEST(ClipTokenizerTest, AgreesWithTheAuthorsTokens) {
   const std::filesystem::path data = COLOR3D_SHARED_DATA;
-  const std::filesystem::path vocabulary =
-      data / "weights/clip_vocab/bpe_simple_vocab_16e6.txt.gz";
+  const std::filesystem::path vocabulary = data / "weights/clip_vocab/bpe_simple_vocab_16e6.txt.gz";
   const std::filesystem::path expected = data / "golden/clip_mini.expected.safetensors";
   if (!std::filesystem::exists(vocabulary) || !std::filesystem::exists(expected)) {
     GTEST_SKIP() << "no shared data";

@@ -10,7 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/random.h"
 #include "core/encoder/clip.h"
-#include "tests/support/synthetic_networks.h"
+#include "core/encoder/synthetic_networks.h"
 
 namespace color3d {
 namespace {
@@ -51,7 +51,8 @@ WeightMap HuggingFaceLayout(const WeightMap& openai) {
       continue;
     }
     if (name == "positional_embedding") name = "text_model.embeddings.position_embedding.weight";
-    Replace(name, "visual.positional_embedding", "vision_model.embeddings.position_embedding.weight");
+    Replace(
+        name, "visual.positional_embedding", "vision_model.embeddings.position_embedding.weight");
     Replace(name, "visual.class_embedding", "vision_model.embeddings.class_embedding");
     Replace(name, "visual.conv1.weight", "vision_model.embeddings.patch_embedding.weight");
     Replace(name, "visual.ln_pre", "vision_model.pre_layrnorm");
@@ -136,7 +137,8 @@ TEST(ClipModelTest, WithoutVocabularyOnlyPictures) {
   WeightMap pictures_only = SyntheticClipWeights({}, 7);
   std::erase_if(pictures_only, [](const auto& item) { return !item.first.starts_with("visual."); });
   ClipModel vision(pictures_only, true);
-  EXPECT_EQ(vision.ImageFeatures(RandomPicture(90, 50)), model.ImageFeatures(RandomPicture(90, 50)));
+  EXPECT_EQ(vision.ImageFeatures(RandomPicture(90, 50)),
+            model.ImageFeatures(RandomPicture(90, 50)));
   EXPECT_THROW(vision.TextFeatures("sky"), Error);
   EXPECT_THROW(vision.LoadVocabulary("/nonexistent"), Error);
 }

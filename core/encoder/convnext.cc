@@ -75,7 +75,9 @@ Image ImageFromTensor(const torch::Tensor& tensor) {
 }
 
 ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description)
-    : config_(config), digest_(DigestOfWeights(config.ToString(), weights)), description_(std::move(description)) {
+    : config_(config),
+      digest_(DigestOfWeights(config.ToString(), weights)),
+      description_(std::move(description)) {
   WeightReader reader(std::move(weights), "the encoder weights");
   for (int i = 0; i < config.StageCount(); ++i) {
     Stage stage;
@@ -191,9 +193,9 @@ torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px, int sta
 
 std::vector<double> ConvNext::Describe(const Image& luminance) const {
   return WithTorchErrors("encoder", [&] {
-    const torch::Tensor tap = DeepTap(luminance, kDescribeSidePx, config_.StageCount() - 1)[0]
-                                  .flatten(1)
-                                  .to(torch::kFloat64);
+    const torch::Tensor tap =
+        DeepTap(luminance, kDescribeSidePx, config_.StageCount() - 1)[0].flatten(1).to(
+            torch::kFloat64);
     const torch::Tensor pooled =
         torch::cat({tap.mean(1), tap.std(1, /*unbiased=*/false)}).contiguous();
     const double* values = pooled.data_ptr<double>();

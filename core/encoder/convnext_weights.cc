@@ -67,7 +67,9 @@ ConvNextConfig ReadConfig(const WeightMap& weights) {
 
 }  // namespace
 
-bool HoldsConvNext(const WeightMap& weights) { return weights.count(PrefixOf(weights) + kStem) > 0; }
+bool HoldsConvNext(const WeightMap& weights) {
+  return weights.count(PrefixOf(weights) + kStem) > 0;
+}
 
 ConvNextWeights TakeConvNextWeights(WeightMap& weights) {
   if (!HoldsConvNext(weights)) {

@@ -11,8 +11,8 @@
 #include "core/encoder/clip.h"
 #include "core/encoder/encoder.h"
 #include "core/encoder/random_features.h"
+#include "core/encoder/synthetic_networks.h"
 #include "core/weights/weight_file.h"
-#include "tests/support/synthetic_networks.h"
 
 namespace color3d {
 namespace {
@@ -66,7 +66,8 @@ TEST(PublishedEncoderTest, TheActivationIsReadBesideTheWeights) {
   const std::string quick = ClipModel::FromWeightFile(path)->digest();
   WriteFileAtomic(folder.path() / "config.json", R"({"vision_config": {"hidden_act": "gelu"}})");
   EXPECT_NE(ClipModel::FromWeightFile(path)->digest(), quick);
-  WriteFileAtomic(folder.path() / "open_clip_config.json", R"({"model_cfg": {"quick_gelu": true}})");
+  WriteFileAtomic(folder.path() / "open_clip_config.json",
+                  R"({"model_cfg": {"quick_gelu": true}})");
   EXPECT_EQ(ClipModel::FromWeightFile(path)->digest(), quick);
   WriteFileAtomic(folder.path() / "open_clip_config.json", "no json {");
   EXPECT_NO_THROW(ClipModel::FromWeightFile(path));
@@ -92,13 +93,13 @@ TEST(PublishedEncoderTest, ClipAgreesWithTheAuthorsNetwork) {
                            "a golden autumn forest, blue sky & white clouds"};
   for (int i = 0; i < 2; ++i) {
     Image picture(64, 64, 3);
-    std::copy_n(image.values.begin() + i * picture.data.size(), picture.data.size(),
-                picture.data.begin());
+    std::copy_n(
+        image.values.begin() + i * picture.data.size(), picture.data.size(), picture.data.begin());
     const std::vector<float> features = clip->ImageFeatures(picture);
     EXPECT_LT(RelativeError(features, &expected.at("image_features").values[32 * i]), 1e-4);
-    EXPECT_LT(RelativeError(clip->TextFeatures(prompts[i]),
-                            &expected.at("text_features").values[32 * i]),
-              1e-4);
+    EXPECT_LT(
+        RelativeError(clip->TextFeatures(prompts[i]), &expected.at("text_features").values[32 * i]),
+        1e-4);
     const ClipScore score = clip->Score(picture, prompts[i]);
     EXPECT_NEAR(score.cosine, expected.at("cosine").values[4 * i + i], 1e-5);
     EXPECT_DOUBLE_EQ(score.score, 2.5 * std::max(score.cosine, 0.0));

@@ -12,9 +12,9 @@
 namespace color3d {
 
 struct NamedColor {
-  std::string name;   // as written: "pale sky blue", "#4682b4"
+  std::string name;  // as written: "pale sky blue", "#4682b4"
   LabColor lab;
-  size_t words = 0;   // how many words the name takes
+  size_t words = 0;  // how many words the name takes
 };
 
 // The colour whose name starts at `words[begin]`, the longest that fits: modifiers (light, pale,

@@ -82,12 +82,10 @@ ColorQueries::ColorQueries(const std::vector<int64_t>& feature_channels, WeightR
   query_feat_ = TakeTensor(reader, prefix + "query_feat.weight", {query_count, width_});
   query_embed_ = TakeTensor(reader, prefix + "query_embed.weight", {query_count, width_});
   const int64_t levels = static_cast<int64_t>(feature_channels.size());
-  level_embed_ =
-      TakeTensor(reader, prefix + "level_embed.weight", {levels, width_}).unbind(0);
+  level_embed_ = TakeTensor(reader, prefix + "level_embed.weight", {levels, width_}).unbind(0);
   for (int64_t i = 0; i < levels; ++i) {
-    input_proj_.push_back(TakeLinear(reader,
-                                     prefix + "input_proj." + std::to_string(i),
-                                     {width_, feature_channels[i], 1, 1}));
+    input_proj_.push_back(TakeLinear(
+        reader, prefix + "input_proj." + std::to_string(i), {width_, feature_channels[i], 1, 1}));
   }
   for (int64_t i = 0;; ++i) {
     const std::string index = std::to_string(i);

@@ -67,11 +67,8 @@ ChannelAffine TakeBatchNorm(const std::string& name, int64_t channels, WeightRea
 
 }  // namespace
 
-DdcolorDecoder::UpBlock DdcolorDecoder::TakeUpBlock(const std::string& name,
-                                                    int64_t in,
-                                                    int64_t skip,
-                                                    WeightReader& reader,
-                                                    Problems& problems) {
+DdcolorDecoder::UpBlock DdcolorDecoder::TakeUpBlock(
+    const std::string& name, int64_t in, int64_t skip, WeightReader& reader, Problems& problems) {
   UpBlock block;
   const std::string shuffle = name + "shuf.conv.0";
   const int64_t up = SizeOf(reader, shuffle + ".weight_orig", 0) / 4;
@@ -118,10 +115,9 @@ DdcolorDecoder::DdcolorDecoder(const std::vector<int>& dims, WeightReader& reade
                    .t()
                    .reshape({width * kSubPixels});
   problems.Check(last, last_weight_);
-  refine_weight_ =
-      TakeSpectral("refine_net.0.0", {2, queries_->query_count() + 3, 1, 1}, reader)
-          .flatten(1)
-          .contiguous();
+  refine_weight_ = TakeSpectral("refine_net.0.0", {2, queries_->query_count() + 3, 1, 1}, reader)
+                       .flatten(1)
+                       .contiguous();
   refine_bias_ = TakeTensor(reader, "refine_net.0.0.bias", {2});
   problems.Check("refine_net.0.0", refine_weight_);
   reader.Finish();

@@ -33,11 +33,8 @@ class DdcolorDecoder {
     ChannelAffine out;  // batch norm after the rectifier
   };
   struct Problems;
-  UpBlock TakeUpBlock(const std::string& name,
-                      int64_t in,
-                      int64_t skip,
-                      WeightReader& reader,
-                      Problems& problems);
+  UpBlock TakeUpBlock(
+      const std::string& name, int64_t in, int64_t skip, WeightReader& reader, Problems& problems);
   torch::Tensor RunUpBlock(const UpBlock& block,
                            const torch::Tensor& x,
                            const torch::Tensor& tap) const;

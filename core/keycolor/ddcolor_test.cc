@@ -12,9 +12,9 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
+#include "core/encoder/synthetic_networks.h"
 #include "core/keycolor/folded_norms.h"
 #include "core/weights/weight_file.h"
-#include "tests/support/synthetic_networks.h"
 
 namespace color3d {
 namespace {
@@ -39,7 +39,8 @@ TEST(FoldedNormsTest, SpectralNormDividesByTheStoredSingularValue) {
   double sigma = 0.0;
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 4; ++c) {
-      sigma += u[r].item<double>() * v[c].item<double>() * weight[r][c / 2][0][c % 2].item<double>();
+      sigma +=
+          u[r].item<double>() * v[c].item<double>() * weight[r][c / 2][0][c % 2].item<double>();
     }
   }
   const torch::Tensor expected = weight / sigma;

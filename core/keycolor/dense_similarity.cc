@@ -12,7 +12,7 @@ namespace {
 // The picture is monochrome, and a sentence that says so fits it better.
 constexpr const char* kSentences[] = {"a black and white photo of ", "a photo of ", ""};
 constexpr int kMostWindowsPerSide = 16;  // bounds the work on very long pictures
-constexpr float kLeastWeight = 0.05f;  // of a window's border, so that the picture's own counts
+constexpr float kLeastWeight = 0.05f;    // of a window's border, so that the picture's own counts
 
 void Normalise(std::vector<float>& vector) {
   double sum = 1e-30;
@@ -31,8 +31,8 @@ std::vector<int> Starts(int length, int side) {
   std::vector<int> starts;
   for (int i = 0; i < count; ++i) {
     starts.push_back(count == 1 ? 0
-                                : static_cast<int>(std::lround(
-                                      static_cast<double>(i) * (length - side) / (count - 1))));
+                                : static_cast<int>(std::lround(static_cast<double>(i) *
+                                                               (length - side) / (count - 1))));
   }
   return starts;
 }
@@ -145,7 +145,10 @@ Image DenseSimilarity(const TextImageModel& model,
     progress.OnProgress(static_cast<int64_t>(i),
                         static_cast<int64_t>(windows.size()),
                         "looking for the prompt's things");
-    Blend(Cosines(model.PatchFeatures(Cut(srgb, windows[i])), texts), windows[i], scale, sum,
+    Blend(Cosines(model.PatchFeatures(Cut(srgb, windows[i])), texts),
+          windows[i],
+          scale,
+          sum,
           weights);
   }
   for (int c = 0; c < sum.channels; ++c) {

@@ -32,14 +32,14 @@ void CheckPictures(const Image& luminance, const Image& rest) {
     throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
                           std::to_string(luminance.channels));
   }
-  const bool fits = rest.channels == 2 && rest.width == luminance.width &&
-                    rest.height == luminance.height;
+  const bool fits =
+      rest.channels == 2 && rest.width == luminance.width && rest.height == luminance.height;
   if (!rest.Empty() && !fits) {
     throw InvalidArgument("the colours of the rest are " + std::to_string(rest.width) + "x" +
                           std::to_string(rest.height) + " px with " +
                           std::to_string(rest.channels) + " channels, the key view has " +
-                          std::to_string(luminance.width) + "x" +
-                          std::to_string(luminance.height) + " px and needs 2");
+                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
+                          " px and needs 2");
   }
 }
 
@@ -84,12 +84,11 @@ Image Probabilities(const Image& luminance,
   }
   // CLIP's patches are coarse: their borders are brought to the edges of L.
   const Image guide = Resize(luminance, planes.width, planes.height);
-  probabilities = UpsampleGuided(Resize(probabilities,
-                                        std::max(1, planes.width / 4),
-                                        std::max(1, planes.height / 4)),
-                                 guide,
-                                 kGuideRadius,
-                                 kGuideVarianceFloor);
+  probabilities = UpsampleGuided(
+      Resize(probabilities, std::max(1, planes.width / 4), std::max(1, planes.height / 4)),
+      guide,
+      kGuideRadius,
+      kGuideVarianceFloor);
   for (float& value : probabilities.data) value = std::clamp(value, 0.0f, 1.0f);
   return probabilities;
 }
@@ -202,8 +201,8 @@ class HintPlacer {
     const int x = std::min(static_cast<int>(hint.x_px), luminance_.width - 1);
     const int y = std::min(static_cast<int>(hint.y_px), luminance_.height - 1);
     if (best.phrase < static_cast<int>(regions_.size())) {
-      const Chroma chroma = ChromaAtLuminance(regions_[best.phrase].phrase.color.lab,
-                                              luminance_.At(0, y, x));
+      const Chroma chroma =
+          ChromaAtLuminance(regions_[best.phrase].phrase.color.lab, luminance_.At(0, y, x));
       hint.a = chroma.a;
       hint.b = chroma.b;
     } else if (!rest_.Empty()) {

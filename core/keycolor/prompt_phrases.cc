@@ -14,18 +14,34 @@ namespace {
 constexpr size_t kMaxPromptBytes = 2000;
 constexpr size_t kMaxPhrases = 32;
 
-const std::set<std::string_view> kArticles = {
-    "a",   "an",  "the", "some", "its",  "his",   "her",   "their", "my",   "our",
-    "your", "all", "very", "this", "that", "these", "those", "each",  "every"};
+const std::set<std::string_view> kArticles = {"a",
+                                              "an",
+                                              "the",
+                                              "some",
+                                              "its",
+                                              "his",
+                                              "her",
+                                              "their",
+                                              "my",
+                                              "our",
+                                              "your",
+                                              "all",
+                                              "very",
+                                              "this",
+                                              "that",
+                                              "these",
+                                              "those",
+                                              "each",
+                                              "every"};
 // Where a colour after the thing may follow: "the sky is blue", "the house in red".
 const std::set<std::string_view> kLinks = {
     "is", "are", "was", "were", "be", "become", "becomes", "looks", "should", "in", "to", "as"};
 const std::set<std::string_view> kBreaks = {
-    "and",   "with",    "on",    "under", "behind", "over",   "near",  "beside", "against",
-    "above", "below",   "at",    "by",    "through", "from",  "next",  "front",  "while",
-    "but",   "where",   "which", "of",    "for",    "make",   "paint", "color",  "colour",
-    "turn",  "keep",    "has",   "have",  "wears",  "wear",   "wearing", "having", "holding",
-    "holds", "before",  "around", "between", "into", "onto",  "inside", "beneath", "along"};
+    "and",   "with",   "on",     "under",   "behind",  "over", "near",    "beside",  "against",
+    "above", "below",  "at",     "by",      "through", "from", "next",    "front",   "while",
+    "but",   "where",  "which",  "of",      "for",     "make", "paint",   "color",   "colour",
+    "turn",  "keep",   "has",    "have",    "wears",   "wear", "wearing", "having",  "holding",
+    "holds", "before", "around", "between", "into",    "onto", "inside",  "beneath", "along"};
 
 enum class Boundary { kNone, kLink, kBreak };
 

@@ -45,11 +45,10 @@ TEST(PromptPhrasesTest, ColoursAfterThings) {
 }
 
 TEST(PromptPhrasesTest, NamesOfTwoWordsModifiersAndHex) {
-  EXPECT_EQ(Parse("pale sky-blue shirt; #4682B4 door, reddish hair, dark night, #fff wall"),
-            (Pairs{{"pale sky blue", "shirt"},
-                   {"#4682b4", "door"},
-                   {"reddish", "hair"},
-                   {"#fff", "wall"}}));
+  EXPECT_EQ(
+      Parse("pale sky-blue shirt; #4682B4 door, reddish hair, dark night, #fff wall"),
+      (Pairs{
+          {"pale sky blue", "shirt"}, {"#4682b4", "door"}, {"reddish", "hair"}, {"#fff", "wall"}}));
 }
 
 TEST(PromptPhrasesTest, SaysWhatWasLeftOut) {

@@ -22,8 +22,8 @@ class BrightnessModel : public TextImageModel {
     Image features(kGrid, kGrid, 4);
     for (int y = 0; y < kGrid; ++y) {
       for (int x = 0; x < kGrid; ++x) {
-        const float value =
-            srgb.At(0, (2 * y + 1) * srgb.height / (2 * kGrid), (2 * x + 1) * srgb.width / (2 * kGrid));
+        const float value = srgb.At(
+            0, (2 * y + 1) * srgb.height / (2 * kGrid), (2 * x + 1) * srgb.width / (2 * kGrid));
         const int kind = value > 0.7f ? 0 : value > 0.3f ? 1 : 2;
         features.At(kind, y, x) = 3.0f;
         features.At(3, y, x) = 0.3f;
@@ -67,8 +67,8 @@ TEST(PromptTest, PhrasesColourTheirRegions) {
     EXPECT_GT(region.share, 0.15);
     EXPECT_GT(region.score, 0.9);
   }
-  EXPECT_LT(solution.ab.At(1, 20, 80), -5.0f);   // sky: blue
-  EXPECT_LT(solution.ab.At(0, 220, 80), -3.0f);  // grass: green
+  EXPECT_LT(solution.ab.At(1, 20, 80), -5.0f);    // sky: blue
+  EXPECT_LT(solution.ab.At(0, 220, 80), -3.0f);   // grass: green
   EXPECT_GT(solution.ab.At(0, 120, 240), 20.0f);  // wall: red
   EXPECT_GT(solution.confidence.At(0, 20, 80), 0.8f);
   EXPECT_GT(solution.regions[0].mask.At(0, 10, 30), 0.9f);
@@ -120,7 +120,8 @@ TEST(PromptTest, TheSameInputGivesTheSameBytes) {
 }
 
 TEST(PromptTest, TakesPicturesOfAnySize) {
-  for (const auto& [width, height] : {std::pair{1, 1}, std::pair{3, 200}, std::pair{500, 7}, std::pair{20000, 2}}) {
+  for (const auto& [width, height] :
+       {std::pair{1, 1}, std::pair{3, 200}, std::pair{500, 7}, std::pair{20000, 2}}) {
     const Image l(width, height, 1, 85.0f);
     const PromptSolution solution = Solve(l, "blue sky");
     EXPECT_EQ(solution.ab.width, width);
@@ -145,9 +146,9 @@ TEST(PromptTest, StopsWhenCancelled) {
   NullObserver silent;
   CancellationToken cancel;
   cancel.Cancel();
-  EXPECT_THROW(KeyColorFromPrompt(
-                   Scene(100, 80), "blue sky", BrightnessModel(), {}, {}, silent, cancel),
-               Error);
+  EXPECT_THROW(
+      KeyColorFromPrompt(Scene(100, 80), "blue sky", BrightnessModel(), {}, {}, silent, cancel),
+      Error);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "tests/support/synthetic_networks.h"
+#include "core/encoder/synthetic_networks.h"
 
 #include <cmath>
 #include <string>
@@ -50,8 +50,7 @@ class Maker {
     Fill(name + "num_batches_tracked", {}, 1000.0f);
   }
   void Spectral(const std::string& name, const std::vector<int64_t>& shape) {
-    const WeightArray weight =
-        Normal(name + "weight_orig", shape, 1.0 / std::sqrt(FanIn(shape)));
+    const WeightArray weight = Normal(name + "weight_orig", shape, 1.0 / std::sqrt(FanIn(shape)));
     const auto rows = static_cast<size_t>(shape[0]);
     const size_t columns = weight.values.size() / rows;
     std::vector<float> u(rows), v(columns);
@@ -127,8 +126,7 @@ void AddColorDecoder(const SyntheticDdcolor& sizes,
 void AddTower(const std::string& prefix, int64_t width, int layers, Maker& make) {
   for (int i = 0; i < layers; ++i) {
     const std::string name = prefix + std::to_string(i) + ".";
-    make.Normal(
-        name + "attn.in_proj_weight", {3 * width, width}, 1.5 / std::sqrt(double(width)));
+    make.Normal(name + "attn.in_proj_weight", {3 * width, width}, 1.5 / std::sqrt(double(width)));
     make.Normal(name + "attn.in_proj_bias", {3 * width}, 0.02);
     make.Linear(name + "attn.out_proj.", {width, width});
     make.Norm(name + "ln_1.", width);
@@ -140,7 +138,9 @@ void AddTower(const std::string& prefix, int64_t width, int layers, Maker& make)
 
 }  // namespace
 
-SyntheticDdcolor SyntheticDdcolor::Mini() { return {{16, 32, 64, 128}, {1, 1, 2, 1}, 64, 32, 12, 3, 128}; }
+SyntheticDdcolor SyntheticDdcolor::Mini() {
+  return {{16, 32, 64, 128}, {1, 1, 2, 1}, 64, 32, 12, 3, 128};
+}
 
 WeightMap SyntheticDdcolorWeights(const SyntheticDdcolor& sizes, uint64_t seed) {
   WeightMap weights;
