@@ -49,6 +49,9 @@ allow client 'core/(base|color|image)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/color core/image core/weights core/scene core/keyview \
   core/splat core/metrics core/report core/stage server client
+# The networks of keycolor have torch; hints, pictures and prompts do not.
+forbid 'torch/|ATen/|c10/' $(ls core/keycolor/*.h core/keycolor/*.cc |
+  grep -vE '/(color_head|color_queries|ddcolor|embedded_colorizer|folded_norms|script)')
 forbid 'grpc|google/protobuf|color3d/v1|sqlite3|spdlog' core
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base

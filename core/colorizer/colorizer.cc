@@ -58,6 +58,16 @@ std::shared_ptr<const TapEncoder> RequireTaps(const std::shared_ptr<const Encode
   return network;
 }
 
+// Pictures are padded to kPadMultiple.
+void CheckTaps(const ConvNextConfig& encoder) {
+  const int last_stride = encoder.Stride(encoder.StageCount() - 1);
+  if (kPadMultiple % last_stride == 0) return;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "the colorizer works on encoders with strides up to " +
+                  std::to_string(kPadMultiple) + "; this one goes up to " +
+                  std::to_string(last_stride));
+}
+
 std::array<float, 2> MeanAb(const Image& ab) {
   std::array<float, 2> mean{};
   for (int c = 0; c < 2; ++c) {
@@ -112,6 +122,7 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
   parts.encoder = RequireTaps(encoder);
   parts.options = options;
   const TrainingRecipe recipe = RecipeFor(options);
+  CheckTaps(parts.encoder->config());
   return WithTorchErrors("personalization", [&]() -> std::shared_ptr<const Colorizer> {
     SetTorchThreads(options.threads);
     const Image l = FitWithin(luminance, options.max_side_px);

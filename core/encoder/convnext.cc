@@ -1,15 +1,15 @@
 #include "core/encoder/convnext.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cmath>
 #include <cstring>
 #include <utility>
 
-#include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/weight_digest.h"
 #include "core/encoder/weight_tensors.h"
 #include "core/image/codec.h"
 
@@ -19,19 +19,7 @@ namespace {
 constexpr double kNormEpsilon = 1e-6;
 constexpr int kDescribeSidePx = 256;
 constexpr int kDeepSidePx = 384;
-
-std::string DigestOf(const ConvNextConfig& config, const WeightMap& weights) {
-  Sha256 hash;
-  hash.Update(config.ToString());
-  for (const auto& [name, array] : weights) {
-    std::string shape = "\n" + name;
-    for (int64_t size : array.shape) shape += " " + std::to_string(size);
-    hash.Update(shape + "\n");
-    hash.Update(
-        {reinterpret_cast<const char*>(array.values.data()), array.values.size() * sizeof(float)});
-  }
-  return hash.FinishHex();
-}
+constexpr int kDeepStridePx = 16;
 
 // Layer norm over the channels of [B,C,H,W]; free of copies when x is channels-last.
 torch::Tensor ChannelNorm(const torch::Tensor& x,
@@ -87,7 +75,9 @@ Image ImageFromTensor(const torch::Tensor& tensor) {
 }
 
 ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description)
-    : config_(config), digest_(DigestOf(config, weights)), description_(std::move(description)) {
+    : config_(config),
+      digest_(DigestOfWeights(config.ToString(), weights)),
+      description_(std::move(description)) {
   WeightReader reader(std::move(weights), "the encoder weights");
   for (int i = 0; i < config.StageCount(); ++i) {
     Stage stage;
@@ -158,11 +148,14 @@ std::vector<std::pair<std::string, torch::Tensor>> ConvNext::Parameters() const 
 }
 
 torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {
-  torch::NoGradGuard no_grad;
-  const torch::Tensor gray = GrayFromLuminanceTensor(luminance);
+  at::NoGradGuard no_grad;
+  return NormaliseInput(GrayFromLuminanceTensor(luminance));
+}
+
+torch::Tensor ConvNext::NormaliseInput(const torch::Tensor& rgb) {
   const torch::Tensor mean = torch::tensor({0.485f, 0.456f, 0.406f}).view({1, 3, 1, 1});
   const torch::Tensor deviation = torch::tensor({0.229f, 0.224f, 0.225f}).view({1, 3, 1, 1});
-  return ((gray - mean) / deviation).contiguous(at::MemoryFormat::ChannelsLast);
+  return ((rgb - mean) / deviation).contiguous(at::MemoryFormat::ChannelsLast);
 }
 
 torch::Tensor ConvNext::RunBlock(const Block& block,
@@ -179,11 +172,12 @@ torch::Tensor ConvNext::RunBlock(const Block& block,
   return x + y.permute({0, 3, 1, 2});
 }
 
-std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
-                                          const BlockAdapter& adapter) const {
-  std::vector<torch::Tensor> taps;
+std::vector<torch::Tensor> ConvNext::StageOutputs(const torch::Tensor& input,
+                                                  int count,
+                                                  const BlockAdapter& adapter) const {
+  std::vector<torch::Tensor> outputs;
   torch::Tensor x = input;
-  for (int i = 0; i < config_.StageCount(); ++i) {
+  for (int i = 0; i < count; ++i) {
     const Stage& stage = stages_[i];
     if (i == 0) {
       const int border = (config_.stem_kernel - config_.stem_stride) / 2;
@@ -199,27 +193,39 @@ std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
       if (adapter) adapted = adapter(i, static_cast<int>(j), x);
       x = RunBlock(stage.blocks[j], x, adapted);
     }
-    taps.push_back(ChannelNorm(x, stage.norm_weight, stage.norm_bias));
+    outputs.push_back(x);
+  }
+  return outputs;
+}
+
+std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
+                                          const BlockAdapter& adapter) const {
+  std::vector<torch::Tensor> taps = StageOutputs(input, config_.StageCount(), adapter);
+  for (size_t i = 0; i < taps.size(); ++i) {
+    taps[i] = ChannelNorm(taps[i], stages_[i].norm_weight, stages_[i].norm_bias);
   }
   return taps;
 }
 
-torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px) const {
+torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px, int stage) const {
   CheckLuminance(luminance);
-  torch::NoGradGuard no_grad;
+  at::NoGradGuard no_grad;
   const Image small = FitWithin(luminance, max_side_px);
-  const int stride = config_.Stride(config_.StageCount() - 1);
+  const int stride = config_.Stride(stage);
   const int right = (stride - small.width % stride) % stride;
   const int bottom = (stride - small.height % stride) % stride;
   torch::Tensor tensor = TensorFromImage(small);
   // Replication has no limit on the border's width, unlike reflection: 1x1 pictures are fine.
   if (right > 0 || bottom > 0) tensor = torch::replication_pad2d(tensor, {0, right, 0, bottom});
-  return Taps(Input(tensor)).back();
+  const torch::Tensor output = StageOutputs(Input(tensor), stage + 1).back();
+  return ChannelNorm(output, stages_[stage].norm_weight, stages_[stage].norm_bias);
 }
 
 std::vector<double> ConvNext::Describe(const Image& luminance) const {
   return WithTorchErrors("encoder", [&] {
-    const torch::Tensor tap = DeepTap(luminance, kDescribeSidePx)[0].flatten(1).to(torch::kFloat64);
+    const torch::Tensor tap =
+        DeepTap(luminance, kDescribeSidePx, config_.StageCount() - 1)[0].flatten(1).to(
+            torch::kFloat64);
     const torch::Tensor pooled =
         torch::cat({tap.mean(1), tap.std(1, /*unbiased=*/false)}).contiguous();
     const double* values = pooled.data_ptr<double>();
@@ -228,8 +234,13 @@ std::vector<double> ConvNext::Describe(const Image& luminance) const {
 }
 
 Image ConvNext::DeepFeatures(const Image& luminance) const {
-  return WithTorchErrors("encoder",
-                         [&] { return ImageFromTensor(DeepTap(luminance, kDeepSidePx)); });
+  // The published networks go on to stride 32, too coarse to tell which parts two views share.
+  int stage = config_.StageCount() - 1;
+  while (stage > 0 && config_.Stride(stage) > kDeepStridePx) --stage;
+  return WithTorchErrors("encoder", [&] {
+    at::NoGradGuard no_grad;
+    return ImageFromTensor(DeepTap(luminance, kDeepSidePx, stage));
+  });
 }
 
 std::shared_ptr<const Encoder> Encoder::Embedded() {

@@ -37,10 +37,16 @@ class ConvNext : public TapEncoder {
   // Network input [B,3,H,W] of L [B,1,H,W] (0..100): the grey picture Lab(L,0,0) in sRGB,
   // normalised with ImageNet's statistics.
   torch::Tensor Input(const torch::Tensor& luminance) const override;
+  // RGB in 0..1, [B,3,H,W], normalised with ImageNet's statistics, channels-last.
+  static torch::Tensor NormaliseInput(const torch::Tensor& rgb);
   // norm0 .. norm3: taps [B, dims[i], H / Stride(i), W / Stride(i)], channels-last. H and W must be
   // multiples of the last stride. Gradients flow to the adapter, never to the frozen weights.
   std::vector<torch::Tensor> Taps(const torch::Tensor& input,
                                   const BlockAdapter& adapter = {}) const override;
+  // What the stages hand on, before the taps' norms; only the first `count` stages are run.
+  std::vector<torch::Tensor> StageOutputs(const torch::Tensor& input,
+                                          int count,
+                                          const BlockAdapter& adapter = {}) const;
 
  private:
   struct Block {
@@ -55,7 +61,7 @@ class ConvNext : public TapEncoder {
   torch::Tensor RunBlock(const Block& block,
                          const torch::Tensor& x,
                          const torch::Tensor& adapted) const;
-  torch::Tensor DeepTap(const Image& luminance, int max_side_px) const;
+  torch::Tensor DeepTap(const Image& luminance, int max_side_px, int stage) const;
 
   ConvNextConfig config_;
   std::string digest_;

@@ -244,7 +244,12 @@ std::string SerializeSafetensors(const WeightMap& weights,
                     {"data_offsets", {offset, offset + count * size}}};
     offset += count * size;
   }
-  std::string text = header.dump();
+  std::string text;
+  try {
+    text = header.dump();
+  } catch (const nlohmann::json::exception&) {
+    throw InvalidArgument("weights to write: a name or the metadata is not UTF-8");
+  }
   text.resize((text.size() + 7) / 8 * 8, ' ');  // the data starts aligned, as the format asks
   const uint64_t header_bytes = text.size();
   std::string bytes(reinterpret_cast<const char*>(&header_bytes), kLengthBytes);

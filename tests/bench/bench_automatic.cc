@@ -27,7 +27,7 @@ std::shared_ptr<const AutomaticColorizer> MakeColorizer(const AutomaticArguments
   WeightMap weights =
       args.weights_file.empty() ? EmbeddedWeights("") : ReadWeightFile(args.weights_file);
   if (!weights.contains("color_bins")) {
-    throw std::runtime_error("later");
+    return AutomaticColorizer::FromWeightFile(args.weights_file);
   }
   if (args.temperature > 0.0) {
     weights["color_temperature"] = {{1}, {static_cast<float>(args.temperature)}};

@@ -8,6 +8,8 @@ int main(int argc, char** argv) {
   CLI::App app("Benchmarks of Color3D");
   app.require_subcommand(1);
   color3d::AddAutomaticCommand(app);
+  color3d::AddGoldenCommand(app);
+  color3d::AddMakeWeightsCommand(app);
   color3d::AddPipelineCommand(app);
   color3d::AddRasterizeCommand(app);
   color3d::AddReconstructCommand(app);
