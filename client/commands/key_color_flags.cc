@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/lib/blob_transfer.h"
-#include "client/lib/names.h"
+#include "client/lib/scene_upload.h"
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
