@@ -44,6 +44,7 @@ allow core/report 'core/(base|report)'
 allow core/stage 'core/[a-z]+'
 allow server/jobs 'core/base|server/jobs'
 allow server/storage 'core/base|server/(jobs|storage)'
+allow server/backends 'core/(base|keycolor)|server/(ops|backends)'
 allow server/rpc 'core/base|core/image|server/(jobs|storage|ops|rpc)'
 allow client 'core/(base|color|image)|client(/[a-z]+)?'
 

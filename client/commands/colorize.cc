@@ -8,7 +8,6 @@
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
 #include "client/commands/results.h"
-#include "client/lib/blob_transfer.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/scene_upload.h"
@@ -26,7 +25,7 @@ class Colorize {
 
   ExitCode Run() {
     folder_ = CollectPhotos(options_.photos);
-    options_.CheckFiles();
+    options_.Check();
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
     RequireOutBesidePhotos(out_, folder_);
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
@@ -37,7 +36,7 @@ class Colorize {
       return Finish(PrepareBenchmark(*connection_, context_, options_, folder_, display_));
     }
     const std::string scene = Upload();
-    return options_.HasColor() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
+    return options_.color.Given() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
   }
 
  private:
@@ -56,8 +55,7 @@ class Colorize {
   std::string KeyView() const {
     if (!options_.key_view.empty()) return options_.key_view;
     // A file that is called like a photo is that photo, whatever was selected before.
-    const fs::path colored = options_.key_color.empty() ? options_.hints : options_.key_color;
-    const std::string same_stem = PhotoOfSameStem(folder_, colored);
+    const std::string same_stem = PhotoOfSameStem(folder_, options_.color.FileOfView());
     if (!same_stem.empty()) return same_stem;
     std::error_code none;
     if (!fs::is_regular_file(out_ / "key_view.json", none)) return "";
@@ -77,17 +75,7 @@ class Colorize {
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
     colorize->set_key_view(KeyView());
-    const std::string file = options_.key_color.empty() ? options_.hints : options_.key_color;
-    const FileDigest digest = DigestFile(file);
-    v1::KeyColorSource* source = colorize->mutable_key_color();
-    if (!options_.key_color.empty()) {
-      *source->mutable_image() = ToProto(digest);
-    } else if (fs::path(file).extension() == ".json") {
-      *source->mutable_points() = ToProto(digest);
-    } else {
-      *source->mutable_strokes() = ToProto(digest);
-    }
-    UploadMissing(*connection_, {{file, digest}}, [](int64_t, int64_t) {});
+    *colorize->mutable_key_color() = UploadKeyColor(*connection_, options_.color);
     display_.Say("key view " + (colorize->key_view().empty() ? std::string("will be selected")
                                                              : colorize->key_view()));
     return spec;
@@ -148,7 +136,8 @@ class Colorize {
            ".\nColour it by any means and keep its size, then run\n" + again +
            " --key-color COLOURED.png\nor paint a few colour strokes on a transparent PNG of its "
            "size (or list points as JSON), then run\n" +
-           again + " --hints STROKES.png\n";
+           again + " --hints STROKES.png\nor leave the colours to the server:\n" + again +
+           " --auto\n";
   }
 
   ExitCode Detached(const v1::Job& job) {
@@ -222,7 +211,7 @@ void AddColorizeCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ColorizeOptions>();
   CLI::App* colorize = app.add_subcommand(
       "colorize",
-      "Photos to a coloured 3D scene. Without --key-color or --hints: selects the photo to colour");
+      "Photos to a coloured 3D scene. Without a source of colour: selects the photo to colour");
   colorize->fallthrough();
   DeclareOptions(*colorize, options.get());
   colorize->callback([&context, options] {

@@ -17,6 +17,7 @@ std::string StageThatMakes(std::string_view name) {
                                                              {kKeyView, "select_key_view"},
                                                              {kKeyViewGray, "select_key_view"},
                                                              {kKeyColor, "colorize_key_view"},
+                                                             {kKeyColorFacts, "colorize_key_view"},
                                                              {kColorizer, "personalize"},
                                                              {kViewsAb, "colorize_views"},
                                                              {kGeometry, "reconstruct_geometry"},

@@ -158,8 +158,15 @@ std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context)
 
 void PassOnResults(StageContext& context) {
   using namespace artifact;
-  for (const char* name :
-       {kPly, kSplat, kModel, kColorizer, kKeyView, kKeyViewGray, kKeyViewColored, kSfmLog}) {
+  for (const char* name : {kPly,
+                           kSplat,
+                           kModel,
+                           kColorizer,
+                           kKeyView,
+                           kKeyViewGray,
+                           kKeyViewColored,
+                           kKeyColorFacts,
+                           kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }
   for (const std::string& name : context.InputsBelow(kRenders)) context.PassOn(name);

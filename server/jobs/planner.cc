@@ -9,6 +9,7 @@
 
 #include "server/jobs/presets.h"
 #include "server/jobs/spec_check.h"
+#include "server/jobs/spec_names.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -125,6 +126,8 @@ class GraphBuilder {
   void Add(v1::JobSpec spec, const std::string& skip_reason = "");
   void Provide(const Need& need, const std::string& for_kind, NewJob* job);
   void AddSceneStages(const v1::ColorizeSceneSpec& options);
+  // A colorize_views job that names no encoder works with that of the given personalize job.
+  void TakeEncoderOfColorizer(v1::JobSpec* spec) const;
 
   const v1::JobSpec& submitted_;
   std::string submitted_kind_;
@@ -217,9 +220,21 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   graph_.jobs.push_back(std::move(job));
 }
 
+void GraphBuilder::TakeEncoderOfColorizer(v1::JobSpec* spec) const {
+  if (!spec->has_colorize_views() || !spec->colorize_views().encoder().empty()) return;
+  const auto given = given_.find(kColorizer.provider);
+  if (given == given_.end()) return;
+  v1::JobSpec personalize;
+  if (!personalize.ParseFromString(given->second.spec)) {
+    throw Error(ErrorCode::kDataLoss, "the stored spec of " + given->second.name + " is damaged");
+  }
+  spec->mutable_colorize_views()->set_encoder(personalize.personalize().encoder());
+}
+
 NewGraph GraphBuilder::BuildStage() {
   v1::JobSpec spec = submitted_;
   if (spec.seed() == 0) spec.set_seed(1);
+  TakeEncoderOfColorizer(&spec);
   const bool nothing_to_do = spec.has_export_() && spec.export_().has_ply() &&
                              !spec.export_().ply() && !spec.export_().splat();
   Add(std::move(spec),
@@ -257,7 +272,8 @@ void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
   Add(spec);
 
   spec = Common();
-  spec.mutable_colorize_views();
+  // The colorizer runs on the encoder that it was trained with.
+  spec.mutable_colorize_views()->set_encoder(options.personalize().encoder());
   Add(spec);
 
   spec = Common();
@@ -319,6 +335,9 @@ StageKeyPart KeyPartOf(const std::string& serialized_spec) {
   spec.clear_inputs();
   spec.clear_skip_cache();
   part.bytes = kind + '\n' + Serialize(spec);
+  const SpecNames names = NamesIn(spec);
+  for (const NameUse& use : names.models) part.models.push_back(use.name);
+  for (const NameUse& use : names.backends) part.backends.push_back(use.name);
   return part;
 }
 

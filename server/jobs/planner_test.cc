@@ -234,9 +234,6 @@ TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dynamic"));
   spec.mutable_reconstruct_dense();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dense"));
-  spec.mutable_colorize_scene()->mutable_key_color()->set_prompt("a red barn");
-  EXPECT_EQ(PlanError(spec).code, ErrorCode::kUnimplemented);
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("prompt"));
 }
 
 TEST(Planner, KeyColorIsRequired) {

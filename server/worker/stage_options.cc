@@ -21,6 +21,8 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
   SelectKeyViewOptions options;
   options.view = spec.view();
+  options.encoder = spec.encoder();
+  options.features = spec.features();
   switch (spec.strategy()) {
     case v1::SelectKeyViewSpec::STRATEGY_ENTROPY:
       options.selection.strategy = KeyViewStrategy::kEntropy;

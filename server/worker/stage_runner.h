@@ -11,6 +11,7 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
+#include "server/jobs/user_models.h"
 
 namespace color3d {
 
@@ -43,6 +44,8 @@ struct StageRun {
   std::filesystem::path scratch_folder;  // empty; deleted afterwards
   std::vector<JobSummary> graph;         // the root job only: its children
   int threads = 1;
+  int attempt = 1;
+  UserModels models;
 };
 
 struct StageOutput {

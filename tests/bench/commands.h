@@ -17,5 +17,6 @@ void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);
 void AddChromaCommand(CLI::App& app);
+void AddWeightsCommand(CLI::App& app);
 
 }  // namespace color3d

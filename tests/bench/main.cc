@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   color3d::AddColorizerCommand(app);
   color3d::AddPlotCommand(app);
   color3d::AddChromaCommand(app);
+  color3d::AddWeightsCommand(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
