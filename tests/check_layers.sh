@@ -40,7 +40,7 @@ for folder in keyview keycolor augment metrics; do
 done
 allow core/colorizer 'core/(base|color|image|weights|encoder|augment|colorizer)'
 allow core/splat 'core/(base|color|image|scene|splat)'
-allow core/report 'core/(base|report)'
+allow core/report 'core/(base|image|report)'
 allow core/stage 'core/[a-z]+'
 allow server/jobs 'core/base|server/jobs'
 allow server/storage 'core/base|server/(jobs|storage)'
