@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kMutations = 200000;
+constexpr int kMutations = 50000;
 
 void RunOne(const std::string& input) {
   LLVMFuzzerTestOneInput(reinterpret_cast<const uint8_t*>(input.data()), input.size());
