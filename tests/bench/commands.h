@@ -7,6 +7,7 @@ namespace color3d {
 
 void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
+void AddNetworksCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
