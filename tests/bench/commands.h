@@ -8,6 +8,7 @@ namespace color3d {
 void AddAutomaticCommand(CLI::App& app);
 void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
+void AddNetworksCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);

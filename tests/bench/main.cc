@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   color3d::AddAutomaticCommand(app);
   color3d::AddGoldenCommand(app);
   color3d::AddMakeWeightsCommand(app);
+  color3d::AddNetworksCommand(app);
   color3d::AddPipelineCommand(app);
   color3d::AddRasterizeCommand(app);
   color3d::AddReconstructCommand(app);
