@@ -4,7 +4,10 @@
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
+#include "core/encoder/clip.h"
 #include "core/image/codec.h"
+#include "core/keycolor/automatic.h"
+#include "core/keycolor/prompt.h"
 #include "core/keycolor/remote.h"
 
 namespace color3d {
@@ -14,6 +17,7 @@ using nlohmann::ordered_json;
 using Options = ColorizeKeyViewOptions;
 
 constexpr int64_t kMaxPointsBytes = 1 << 26;
+constexpr int kRegionsSidePx = 540;
 
 // White is 1: any grey or colour picture, by its luminance.
 Image ReadMask(const std::filesystem::path& file) {
@@ -23,7 +27,9 @@ Image ReadMask(const std::filesystem::path& file) {
 }
 
 KeyColorResult FromImage(const Options& options, const KeyPhoto& photo, StageContext&) {
-  return {KeyColorFromImage(photo.luminance, ReadImage(options.file)), {}};
+  KeyColorResult result;
+  result.ab = KeyColorFromImage(photo.luminance, ReadImage(options.file));
+  return result;
 }
 
 KeyColorResult FromHints(HintSolution solution) {
@@ -76,6 +82,72 @@ KeyColorResult FromBackend(const Options& options, const KeyPhoto& photo, StageC
   return {std::move(solution.ab), std::move(facts)};
 }
 
+KeyColorResult FromAutomatic(const Options& options, const KeyPhoto& photo, StageContext& context) {
+  const auto colorizer = options.name.empty()
+                             ? AutomaticColorizer::Embedded()
+                             : AutomaticColorizer::FromWeightFile(context.Model(options.name));
+  context.cancel().ThrowIfCancelled();
+  context.progress().OnProgress(0, 1, "colouring the key view");
+  AutomaticColor color = colorizer->Colorize(photo.luminance);
+  KeyColorResult result{std::move(color.ab), {{"description", colorizer->description()}}};
+  result.confidence = std::move(color.confidence);
+  return result;
+}
+
+// The photo with each phrase's colour where the phrase was found: what the user corrects.
+Image DrawRegions(const Image& luminance, const std::vector<PromptRegion>& regions) {
+  const Image l = FitWithin(luminance, kRegionsSidePx);
+  Image ab(l.width, l.height, 2);
+  for (const PromptRegion& region : regions) {
+    if (!region.found) continue;
+    const Image mask = Resize(region.mask, l.width, l.height);
+    for (size_t i = 0; i < l.PlaneSize(); ++i) {
+      ab.Plane(0)[i] += mask.data[i] * static_cast<float>(region.phrase.color.lab.a);
+      ab.Plane(1)[i] += mask.data[i] * static_cast<float>(region.phrase.color.lab.b);
+    }
+  }
+  return SrgbFromLab(JoinLab(l, ab));
+}
+
+ordered_json RegionFacts(const std::vector<PromptRegion>& regions) {
+  ordered_json facts = ordered_json::array();
+  for (const PromptRegion& region : regions) {
+    facts.push_back({{"thing", region.phrase.thing},
+                     {"color", region.phrase.color.name},
+                     {"found", region.found},
+                     {"share", region.share},
+                     {"score", region.score}});
+  }
+  return facts;
+}
+
+KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageContext& context) {
+  const auto clip = ClipModel::FromWeightFile(context.Model(options.name));
+  context.cancel().ThrowIfCancelled();
+  // What no phrase names is coloured as without a prompt.
+  const Image rest = AutomaticColorizer::Embedded()->Colorize(photo.luminance).ab;
+  PromptOptions prompt;
+  prompt.hints = options.hints;
+  PromptSolution solution = KeyColorFromPrompt(
+      photo.luminance, options.prompt, *clip, rest, prompt, context.progress(), context.cancel());
+  std::vector<std::string> warnings = solution.notes;
+  for (const PromptRegion& region : solution.regions) {
+    if (region.found) continue;
+    warnings.push_back("the prompt's \"" + region.phrase.color.name + " " + region.phrase.thing +
+                       "\" was not found in the key view and colours nothing");
+  }
+  KeyColorResult result{std::move(solution.ab),
+                        {{"description", clip->description()},
+                         {"prompt", options.prompt},
+                         {"regions", RegionFacts(solution.regions)},
+                         {"hinted_pixels", solution.spread.hinted_pixels},
+                         {"relative_residual", solution.spread.relative_residual},
+                         {"warnings", warnings}}};
+  result.confidence = std::move(solution.confidence);
+  result.regions = DrawRegions(photo.luminance, solution.regions);
+  return result;
+}
+
 [[noreturn]] KeyColorResult NotBuilt(const Options& options, const KeyPhoto&, StageContext&) {
   throw Error(ErrorCode::kUnimplemented,
               std::string("key colour by ") + KeyColorSourceName(options.source) +
@@ -91,8 +163,8 @@ constexpr Source kSources[] = {{Options::Source::kImage, "image", FromImage},
                                {Options::Source::kStrokes, "strokes", FromStrokes},
                                {Options::Source::kPoints, "points", FromPoints},
                                {Options::Source::kReferences, "references", NotBuilt},
-                               {Options::Source::kPrompt, "prompt", NotBuilt},
-                               {Options::Source::kAutomatic, "automatic", NotBuilt},
+                               {Options::Source::kPrompt, "prompt", FromPrompt},
+                               {Options::Source::kAutomatic, "automatic", FromAutomatic},
                                {Options::Source::kBackend, "backend", FromBackend},
                                {Options::Source::kScript, "script", NotBuilt},
                                {Options::Source::kEdit, "edit", NotBuilt}};

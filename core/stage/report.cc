@@ -166,6 +166,7 @@ void PassOnResults(StageContext& context) {
                            kKeyViewGray,
                            kKeyViewColored,
                            kKeyColorFacts,
+                           kKeyColorRegions,
                            kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }
