@@ -29,6 +29,14 @@ bool IsWithin(const fs::path& path, const fs::path& folder) {
 }  // namespace
 
 void ColorizeOptions::Check() const {
+  if (photos.empty() == scene.empty()) {
+    throw InvalidArgument(photos.empty() ? "give a folder of photos, or --scene scenes/ID"
+                                         : "PHOTOS and --scene do not go together: the scene has "
+                                           "its photos already");
+  }
+  if (benchmark && photos.empty()) {
+    throw InvalidArgument("--benchmark needs the folder of the photos in colour, not --scene");
+  }
   color.Check();
   // What is drawn for a view that is known beforehand cannot be scored against that view.
   const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
@@ -43,8 +51,11 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("PHOTOS",
                  o->photos,
                  "Folder of photos, or one with images/ and a COLMAP model (sparse/0), or with "
-                 "transforms.json and its photos")
-      ->required();
+                 "transforms.json and its photos");
+  app.add_option("--scene",
+                 o->scene,
+                 "In place of PHOTOS: a scene that the server holds, coloured from the key view "
+                 "that `color3d key accept` has accepted");
   app.add_option("-o,--out", o->out, "Folder for the results")->required();
   DeclareKeyColorFlags(app, &o->color);
   app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");

@@ -14,7 +14,8 @@
 namespace color3d::client {
 
 struct ColorizeOptions {
-  std::string photos;
+  std::string photos;  // folder; empty: `scene` is set
+  std::string scene;   // "scenes/ID", whose accepted key view is used
   std::string out;
   KeyColorFlags color;
   std::string key_view;  // view name or stem; empty: selected

@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_archive.h"
-#include "core/colorizer/threads.h"
+#include "core/encoder/threads.h"
 #include "core/encoder/torch_errors.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"

@@ -47,8 +47,7 @@ PersonalModel::PersonalModel(const TapEncoder& encoder,
     AddLevel("decoder." + std::to_string(i) + ".", in, width(i), random);
   }
   // A small head: the first predictions stay near the mean colour of the key view.
-  head_ = NewParameter(
-      "head.weight", {2, width(0), 3, 3}, 0.1 * HeDeviation(9 * width(0)), random);
+  head_ = NewParameter("head.weight", {2, width(0), 3, 3}, 0.1 * HeDeviation(9 * width(0)), random);
   head_bias_ = NewConstant("head.bias", {2}, 0.0f);
   head_bias_[0] = mean_ab[0];
   head_bias_[1] = mean_ab[1];

@@ -62,19 +62,16 @@ torch::Tensor ColorHead::Forward(const std::vector<torch::Tensor>& taps) const {
   torch::Tensor x;
   for (size_t i = 0; i < levels_.size(); ++i) {
     const Level& level = levels_[i];
-    torch::Tensor y =
-        torch::conv2d(taps[taps.size() - 1 - i], level.lateral, level.lateral_bias);
+    torch::Tensor y = torch::conv2d(taps[taps.size() - 1 - i], level.lateral, level.lateral_bias);
     if (x.defined()) {
       y = y + torch::upsample_bilinear2d(x, {y.size(2), y.size(3)}, /*align_corners=*/false);
     }
     x = torch::gelu(torch::conv2d(y, level.fuse, level.fuse_bias, /*stride=*/1, /*padding=*/1));
   }
-  const torch::Tensor normed = torch::layer_norm(x.permute({0, 2, 3, 1}),
-                                                 {x.size(1)},
-                                                 norm_weight_,
-                                                 norm_bias_,
-                                                 kNormEpsilon)
-                                   .permute({0, 3, 1, 2});
+  const torch::Tensor normed =
+      torch::layer_norm(
+          x.permute({0, 2, 3, 1}), {x.size(1)}, norm_weight_, norm_bias_, kNormEpsilon)
+          .permute({0, 3, 1, 2});
   return torch::conv2d(normed, out_, out_bias_);
 }
 

@@ -63,8 +63,7 @@ class EmbeddedColorizer : public AutomaticColorizer {
                      " colours"),
         digest_(encoder_.digest()) {
     Random random(1);
-    head_ = std::make_unique<ColorHead>(
-        encoder_.config(), static_cast<int>(bins_.size(0)), random);
+    head_ = std::make_unique<ColorHead>(encoder_.config(), static_cast<int>(bins_.size(0)), random);
     torch::NoGradGuard no_grad;
     for (const auto& [name, tensor] : head_->Parameters()) {
       const WeightArray& array = Require(weights, "color_head." + name);
@@ -87,11 +86,12 @@ class EmbeddedColorizer : public AutomaticColorizer {
     return WithTorchErrors("automatic colourizer", [&] {
       torch::NoGradGuard no_grad;
       const int stride = encoder_.config().Stride(encoder_.config().StageCount() - 1);
-      const double scale =
-          std::min(1.0, static_cast<double>(kWorkingSidePx) / std::max(luminance.width, luminance.height));
-      const torch::Tensor small = TensorFromImage(Resize(luminance,
-                                                         RoundTo(scale * luminance.width, stride),
-                                                         RoundTo(scale * luminance.height, stride)));
+      const double scale = std::min(
+          1.0, static_cast<double>(kWorkingSidePx) / std::max(luminance.width, luminance.height));
+      const torch::Tensor small =
+          TensorFromImage(Resize(luminance,
+                                 RoundTo(scale * luminance.width, stride),
+                                 RoundTo(scale * luminance.height, stride)));
       // The mean over both mirror images: a thing has one colour whichever way it looks.
       const torch::Tensor p = 0.5 * (Probabilities(small) + Probabilities(small.flip(3)).flip(3));
       const torch::Tensor rows = p.permute({0, 2, 3, 1});
@@ -102,10 +102,9 @@ class EmbeddedColorizer : public AutomaticColorizer {
               .clamp_min(0.0);
       const double half = kHalfConfidenceSpread * kHalfConfidenceSpread;
       AutomaticColor result;
-      result.ab = UpsampleGuided(
-          ImageFromTensor(ab), luminance, kGuideRadius, kGuideVarianceFloor);
-      result.confidence = Resize(
-          ImageFromTensor(half / (half + variance)), luminance.width, luminance.height);
+      result.ab = UpsampleGuided(ImageFromTensor(ab), luminance, kGuideRadius, kGuideVarianceFloor);
+      result.confidence =
+          Resize(ImageFromTensor(half / (half + variance)), luminance.width, luminance.height);
       return result;
     });
   }

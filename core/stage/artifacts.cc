@@ -17,6 +17,7 @@ std::string StageThatMakes(std::string_view name) {
       {kImportFacts, "import_scene"},
       {kKeyView, "select_key_view"},
       {kKeyViewGray, "select_key_view"},
+      {kKeyViewRanking, "select_key_view"},
       {kKeyColor, "colorize_key_view"},
       {kKeyColorFacts, "colorize_key_view"},
       {kKeyColorRegions, "colorize_key_view"},

@@ -18,6 +18,7 @@ inline constexpr char kImportFacts[] = "import.json";
 inline constexpr char kSfmLog[] = "sfm.log";
 inline constexpr char kKeyView[] = "key_view.json";
 inline constexpr char kKeyViewGray[] = "key_view.png";               // as captured, grey: to colour
+inline constexpr char kKeyViewRanking[] = "key_view_ranking.jpg";    // contact sheet
 inline constexpr char kKeyColor[] = "key_color.png";                 // ab, undistorted, see codec.h
 inline constexpr char kKeyColorFacts[] = "key_color.json";           // where the colour came from
 inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which words went where

@@ -31,6 +31,8 @@ class StageContext {
     std::map<std::string, std::filesystem::path> models;  // the user's weights, by name
     RemoteColorizerFactory remote_colorizers;             // the user's model servers; may be empty
     std::string attempt;                                  // unique to this run, e.g. "jobs/3f/2"
+    // Kept between jobs (FileCache); empty: none.
+    std::filesystem::path cache_folder = {};
   };
 
   // The references must outlive the context.
@@ -51,6 +53,7 @@ class StageContext {
   std::unique_ptr<RemoteColorizer> Remote(const std::string& name) const;
   // The encoder of these weights, loaded anew; the embedded one when `model` is empty.
   std::shared_ptr<const Encoder> LoadEncoder(const std::string& model) const;
+  const std::filesystem::path& cache_folder() const { return setup_.cache_folder; }
   CheckpointStore& checkpoints() { return checkpoints_; }
   ProgressObserver& progress() { return progress_; }
   const CancellationToken& cancel() const { return cancel_; }

@@ -27,7 +27,8 @@ struct SelectKeyViewOptions {
   std::string encoder;   // weights by name in StageContext::Model; empty: the embedded encoder
   std::string features;  // CLIP weights by name; empty: the encoder's features
 };
-// scene.json -> key_view.json, key_view.png. Only training views can win.
+// scene.json (import.json) -> key_view.json, key_view.png, key_view_ranking.jpg. Only training
+// views can win. Features of photos that were seen before come from the context's cache folder.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
 struct ColorizeKeyViewOptions {

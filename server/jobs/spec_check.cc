@@ -262,9 +262,12 @@ void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
   }
 }
 
-void CheckColorizeScene(const v1::ColorizeSceneSpec& spec) {
+// `has_inputs`: the colour may come from a job among them; the planner sees to that.
+void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
-  CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
+  if (!has_inputs || spec.has_key_color() || in_options) {
+    CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
+  }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
   CheckTruth(spec.truth(), "truth");
 }
@@ -302,7 +305,7 @@ void CheckSpec(const v1::JobSpec& spec) {
     NotBuilt(kind, "GetServerInfo lists the job kinds that are");
   }
   CheckMessage(spec, "");
-  if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene());
+  if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene(), spec.inputs_size() > 0);
   if (spec.has_colorize_key_view()) {
     CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
   }

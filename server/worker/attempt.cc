@@ -149,6 +149,7 @@ void Attempt::Prepare() {
   run_.scene_folder = scratch_ / "scene";
   run_.output_folder = scratch_ / "out";
   run_.scratch_folder = scratch_ / "tmp";
+  run_.cache_folder = context_.paths.Cache();
   for (const fs::path& folder : {run_.scene_folder, run_.output_folder, run_.scratch_folder}) {
     fs::create_directories(folder);
   }

@@ -27,6 +27,9 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
     case v1::SelectKeyViewSpec::STRATEGY_ENTROPY:
       options.selection.strategy = KeyViewStrategy::kEntropy;
       break;
+    case v1::SelectKeyViewSpec::STRATEGY_TRACKS:
+      options.selection.strategy = KeyViewStrategy::kTracks;
+      break;
     case v1::SelectKeyViewSpec::STRATEGY_MANUAL:
       options.selection.strategy = KeyViewStrategy::kManual;
       break;

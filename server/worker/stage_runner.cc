@@ -126,6 +126,7 @@ class CoreStageRunner : public StageRunner {
     setup.scratch_folder = run.scratch_folder;
     setup.threads = run.threads;
     setup.seed = spec.seed() == 0 ? 1 : spec.seed();
+    setup.cache_folder = run.cache_folder;
     setup.models = run.models.files;
     setup.remote_colorizers = [&run](const std::string& name) {
       return MakeGrpcColorizer(run.models.backends, name);

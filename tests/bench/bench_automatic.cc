@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "core/colorizer/threads.h"
 #include "core/encoder/embedded/embedded_weights.h"
+#include "core/encoder/threads.h"
 #include "core/weights/weight_file.h"
 #include "tests/bench/automatic_scores.h"
 #include "tests/bench/commands.h"
@@ -67,7 +67,8 @@ void AddAutomaticCommand(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("automatic", "colour photographs without help, score against the truth");
   command->add_option("--photos", args->photos_folder, "folder of colour photographs")->required();
-  command->add_option("--weights", args->weights_file, "of `pretrain`, or DDColor's; else embedded");
+  command->add_option(
+      "--weights", args->weights_file, "of `pretrain`, or DDColor's; else embedded");
   command->add_option("--out", args->out_folder, "grey, coloured and true side by side, as PNG");
   command->add_option("--temperature", args->temperature, "of the colour distribution, else stored")
       ->check(CLI::Range(0.05, 2.0));

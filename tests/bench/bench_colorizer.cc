@@ -111,9 +111,9 @@ void AddColorizerCommand(CLI::App& app) {
   command->add_option("--iterations", args->options.iterations);
   command->add_option("--time-limit", args->options.time_limit_seconds, "seconds");
   command->add_option("--threads", args->options.threads);
-  command->add_option("--encoder",
-                      args->encoder,
-                      "embedded, random, squeezenet=FILE.onnx, or a weight file")
+  command
+      ->add_option(
+          "--encoder", args->encoder, "embedded, random, squeezenet=FILE.onnx, or a weight file")
       ->capture_default_str();
   command->add_flag("--paper", args->paper, "the paper's recipe");
   command->callback([args] { RunColorizer(*args); });

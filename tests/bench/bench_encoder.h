@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// "embedded", "random" (the same network before training), "squeezenet=FILE.onnx", or a weight file:
-// one of ours ("encoder.*", as `pretrain` writes it) or a published one. Throws
+// "embedded", "random" (the same network before training), "squeezenet=FILE.onnx", or a weight
+// file: one of ours ("encoder.*", as `pretrain` writes it) or a published one. Throws
 // Error{kInvalidArgument} for anything else.
 std::shared_ptr<const Encoder> BenchEncoder(const std::string& name);
 

@@ -6,9 +6,9 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/encoder/threads.h"
 #include "core/keycolor/automatic.h"
 #include "core/weights/safetensors.h"
-#include "core/colorizer/threads.h"
 #include "tests/bench/automatic_scores.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/pretrain/pretrainer.h"
@@ -122,11 +122,11 @@ void AddPretrainCommand(CLI::App& app) {
       ->required();
   command->add_option("--iterations", args->options.iterations)->check(CLI::Range(1, 100000000));
   command->add_option("--batch", args->options.batch)->check(CLI::Range(1, 4096));
-  command->add_option("--size", args->options.size_px, "px, first half")->check(CLI::Range(64, 512));
+  command->add_option("--size", args->options.size_px, "px, first half")
+      ->check(CLI::Range(64, 512));
   command->add_option("--late-size", args->options.late_size_px, "px, second half")
       ->check(CLI::Range(64, 512));
-  command->add_option("--learning-rate", args->options.learning_rate)
-      ->check(CLI::Range(1e-6, 1.0));
+  command->add_option("--learning-rate", args->options.learning_rate)->check(CLI::Range(1e-6, 1.0));
   command->add_option("--temperature", args->temperature, "of the shipped colour distribution")
       ->check(CLI::Range(0.05, 2.0));
   command->add_option("--threads", args->threads)->check(CLI::Range(1, 256));

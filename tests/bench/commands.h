@@ -15,6 +15,7 @@ void AddPosesCommand(CLI::App& app);
 void AddPretrainCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
+void AddKeyViewCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);
 void AddChromaCommand(CLI::App& app);
 void AddWeightsCommand(CLI::App& app);

@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   color3d::AddPretrainCommand(app);
   color3d::AddStabilityCommand(app);
   color3d::AddColorizerCommand(app);
+  color3d::AddKeyViewCommand(app);
   color3d::AddPlotCommand(app);
   color3d::AddChromaCommand(app);
   color3d::AddWeightsCommand(app);

@@ -50,7 +50,8 @@ PhotoSet::PhotoSet(const std::vector<PhotoFolder>& folders) {
       if (image.channels != 3 || IsGray(image)) continue;
       Photo photo{image.width, image.height, {}};
       photo.data.reserve(image.data.size());
-      for (float v : image.data) photo.data.push_back(static_cast<uint8_t>(std::lround(255.0f * v)));
+      for (float v : image.data)
+        photo.data.push_back(static_cast<uint8_t>(std::lround(255.0f * v)));
       photos_.push_back(std::move(photo));
     }
     const size_t count = photos_.size() - before;

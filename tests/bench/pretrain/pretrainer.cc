@@ -77,11 +77,9 @@ Pretrainer::Pretrainer(const PretrainOptions& options,
     bins_[static_cast<int64_t>(i)][0] = bins[i].center_ab[0];
     bins_[static_cast<int64_t>(i)][1] = bins[i].center_ab[1];
   }
-  bin_weights_ =
-      torch::tensor(RebalancingWeights(bins, kUniformShare, options.rebalancing_power));
+  bin_weights_ = torch::tensor(RebalancingWeights(bins, kUniformShare, options.rebalancing_power));
   Random start(options.seed, 3);
-  head_ = std::make_unique<ColorHead>(
-      encoder_->config(), static_cast<int>(bins.size()), start);
+  head_ = std::make_unique<ColorHead>(encoder_->config(), static_cast<int>(bins.size()), start);
   for (const auto& [name, tensor] : encoder_->Parameters()) {
     parameters_.emplace_back("encoder." + name, tensor);
   }
@@ -190,9 +188,9 @@ PretrainLosses Pretrainer::Step() {
     OptimiserStep();
     bad_steps_ = 0;
   } else if (++bad_steps_ >= kMaxBadSteps) {
-    throw Error(ErrorCode::kInternal, "pre-training diverged at iteration " +
-                                          std::to_string(iteration_) +
-                                          ": lower --learning-rate");
+    throw Error(ErrorCode::kInternal,
+                "pre-training diverged at iteration " + std::to_string(iteration_) +
+                    ": lower --learning-rate");
   }
   ++iteration_;
   return losses;
@@ -219,8 +217,7 @@ void Pretrainer::OptimiserStep() {
   const double t = static_cast<double>(iteration_ + 1);
   const double progress = std::min(1.0, t / options_.iterations);
   const double cosine = 0.5 * (1.0 + std::cos(std::numbers::pi * progress));
-  const double rate =
-      options_.learning_rate * (0.01 + 0.99 * cosine) * std::min(1.0, t / kWarmUp);
+  const double rate = options_.learning_rate * (0.01 + 0.99 * cosine) * std::min(1.0, t / kWarmUp);
   const double clip = std::isfinite(norm) ? std::min(1.0, kMaxGradient / (norm + 1e-12)) : 0.0;
   const double keep = std::min(0.999, (1.0 + t) / (10.0 + t));
   for (size_t i = 0; i < parameters_.size(); ++i) {
@@ -289,9 +286,9 @@ WeightMap Pretrainer::AveragedWeights() const {
   WeightMap weights;
   const auto add = [&weights](const std::string& name, const torch::Tensor& tensor) {
     const torch::Tensor plain = tensor.detach().contiguous(at::MemoryFormat::Contiguous);
-    weights[name] = {plain.sizes().vec(),
-                     std::vector<float>(plain.data_ptr<float>(),
-                                        plain.data_ptr<float>() + plain.numel())};
+    weights[name] = {
+        plain.sizes().vec(),
+        std::vector<float>(plain.data_ptr<float>(), plain.data_ptr<float>() + plain.numel())};
   };
   for (size_t i = 0; i < parameters_.size(); ++i) {
     if (!parameters_[i].first.starts_with("match.")) add(parameters_[i].first, average_[i]);

@@ -23,8 +23,8 @@ namespace color3d {
 struct PretrainOptions {
   int iterations = 8000;
   int batch = 16;
-  int size_px = 128;           // crops in the first half
-  int late_size_px = 192;      // and in the second
+  int size_px = 128;            // crops in the first half
+  int late_size_px = 192;       // and in the second
   double learning_rate = 2e-3;  // at its highest, then a cosine to 1 %
   double weight_decay = 0.02;
   double distillation_weight = 1.0;

@@ -58,7 +58,8 @@ TEST_F(PretrainerTest, AResumedRunEndsAsAnUninterruptedOne) {
   const WeightMap expected = straight.AveragedWeights();
   const WeightMap actual = resumed.AveragedWeights();
   ASSERT_EQ(expected.size(), actual.size());
-  for (const auto& [name, array] : expected) ASSERT_EQ(array.values, actual.at(name).values) << name;
+  for (const auto& [name, array] : expected)
+    ASSERT_EQ(array.values, actual.at(name).values) << name;
 }
 
 TEST_F(PretrainerTest, WhatItWritesIsAnAutomaticColourizer) {

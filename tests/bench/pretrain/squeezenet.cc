@@ -109,8 +109,8 @@ torch::Tensor SqueezeNet::Convolve(const std::string& name,
                                    const torch::Tensor& x,
                                    int padding) const {
   const int stride = name == "conv1" ? 2 : 1;
-  return torch::relu(torch::conv2d(
-      x, weights_.at(name + "_w_0"), weights_.at(name + "_b_0"), stride, padding));
+  return torch::relu(
+      torch::conv2d(x, weights_.at(name + "_w_0"), weights_.at(name + "_b_0"), stride, padding));
 }
 
 torch::Tensor SqueezeNet::Fire(int index, const torch::Tensor& x) const {
