@@ -1,0 +1,12 @@
+// Whether two pictures show the same, by their luminances. Internal to core/keycolor.
+#pragma once
+
+#include "core/base/image.h"
+
+namespace color3d {
+
+// Compares the first planes (L 0..100) of two pictures of equal size. Throws
+// Error{kInvalidArgument} starting with `what` when they do not correlate.
+void ExpectSameSubject(const Image& luminance, const Image& other, const char* what);
+
+}  // namespace color3d
