@@ -16,7 +16,7 @@ struct AggregateGraph {
   std::vector<int64_t> row_begin;  // node_count + 1 entries
   std::vector<int32_t> neighbor;
   std::vector<float> weight;
-  std::vector<float> data;         // per node, as in GridSystem
+  std::vector<float> data;  // per node, as in GridSystem
 
   int64_t NodeCount() const { return static_cast<int64_t>(data.size()); }
 };

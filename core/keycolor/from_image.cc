@@ -1,36 +1,16 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <vector>
 
 #include "core/base/error.h"
 #include "core/keycolor/keycolor.h"
-#include "core/keycolor/same_subject.h"
+#include "core/keycolor/picture_checks.h"
 
 namespace color3d {
 namespace {
 
-constexpr double kMeanChromaOfGray = 1.5;
-constexpr double kPercentileChromaOfGray = 4.0;
-
 std::string SizeOf(const Image& image) {
   return std::to_string(image.width) + "x" + std::to_string(image.height);
-}
-
-void ExpectColor(const Image& ab) {
-  std::vector<float> chroma(ab.PlaneSize());
-  double mean = 0.0;
-  for (size_t i = 0; i < chroma.size(); ++i) {
-    chroma[i] = std::hypot(ab.Plane(0)[i], ab.Plane(1)[i]);
-    mean += chroma[i] / static_cast<double>(chroma.size());
-  }
-  const size_t rank = std::min(chroma.size() - 1, chroma.size() * 99 / 100);
-  std::nth_element(
-      chroma.begin(), chroma.begin() + static_cast<std::ptrdiff_t>(rank), chroma.end());
-  if (mean < kMeanChromaOfGray && chroma[rank] < kPercentileChromaOfGray) {
-    throw InvalidArgument("the coloured picture has no colour (mean chroma " +
-                          std::to_string(mean) + " Lab units); colour it first");
-  }
 }
 
 }  // namespace
@@ -56,7 +36,7 @@ Image KeyColorFromImage(const Image& luminance, const Image& coloured) {
   const Image lab = LabFromSrgb(coloured);
   Image ab(lab.width, lab.height, 2);
   std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-  ExpectColor(ab);
+  ExpectColor(lab, "the coloured picture");
   ExpectSameSubject(luminance, lab, "the coloured picture");
   return ab;
 }

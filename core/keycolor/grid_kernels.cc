@@ -109,7 +109,8 @@ void Combine(const GridPair& p,
   CombinePlane(f(p[1]), x.b.data(), f(q[1]), y.b.data(), begin, end);
 }
 
-void Scale(const GridPlane& scale, const GridVector& f, int64_t begin, int64_t end, GridVector& out) {
+void Scale(
+    const GridPlane& scale, const GridVector& f, int64_t begin, int64_t end, GridVector& out) {
   const Tag d;
   for (int64_t i = begin; i < end; i += static_cast<int64_t>(hn::Lanes(d))) {
     const Vec step = hn::LoadU(d, scale.data() + i);
@@ -142,10 +143,10 @@ void Jacobi(const GridSystem& s,
     const Stencil stencil = LoadStencil(s, i);
     const Vec data = hn::LoadU(d, s.data.data() + i);
     const Vec step = hn::LoadU(d, scale.data() + i);
-    const Vec a = hn::Add(hn::LoadU(d, f.a.data() + i),
-                          MinusApplied(stencil, data, u.a.data() + i));
-    const Vec b = hn::Add(hn::LoadU(d, f.b.data() + i),
-                          MinusApplied(stencil, data, u.b.data() + i));
+    const Vec a =
+        hn::Add(hn::LoadU(d, f.a.data() + i), MinusApplied(stencil, data, u.a.data() + i));
+    const Vec b =
+        hn::Add(hn::LoadU(d, f.b.data() + i), MinusApplied(stencil, data, u.b.data() + i));
     hn::StoreU(hn::MulAdd(step, a, hn::LoadU(d, u.a.data() + i)), d, out.a.data() + i);
     hn::StoreU(hn::MulAdd(step, b, hn::LoadU(d, u.b.data() + i)), d, out.b.data() + i);
   }

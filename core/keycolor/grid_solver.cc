@@ -44,8 +44,8 @@ class Solver {
     ComputeScale();
     clusters_ = ClusterGrid(system_, pool_);
     cancel_.ThrowIfCancelled();
-    cycle_ = std::make_unique<AggregateCycle>(
-        CoarsenGrid(system_, clusters_, pool_), pool_, cancel_);
+    cycle_ =
+        std::make_unique<AggregateCycle>(CoarsenGrid(system_, clusters_, pool_), pool_, cancel_);
     for (auto* vector : {&u_, &r_, &z_, &p_, &ap_, &t_}) *vector = MakeVector(system_);
   }
 
@@ -151,9 +151,8 @@ class Solver {
     std::vector<float>& f = cycle_->right_side();
     const int64_t n = system_.PixelCount();
     pool_.ForEach(static_cast<int64_t>(clusters_.first.size()) - 1, [&](int64_t range, int) {
-      std::fill(f.begin() + 2 * clusters_.first[range],
-                f.begin() + 2 * clusters_.first[range + 1],
-                0.0f);
+      std::fill(
+          f.begin() + 2 * clusters_.first[range], f.begin() + 2 * clusters_.first[range + 1], 0.0f);
       const int64_t begin = range * clusters_.range_nodes;
       for (int64_t i = begin; i < std::min(n, begin + clusters_.range_nodes); ++i) {
         const int64_t c = clusters_.of_node[i];
@@ -190,9 +189,8 @@ class Solver {
     if (solution.iterations == 0) rz_start_ = rz;
     while (solution.iterations < options.max_iterations) {
       cancel_.ThrowIfCancelled();
-      const GridPair p_ap = SumChunks([&](int64_t begin, int64_t end) {
-        return GridApply(system_, p_, begin, end, ap_);
-      });
+      const GridPair p_ap = SumChunks(
+          [&](int64_t begin, int64_t end) { return GridApply(system_, p_, begin, end, ap_); });
       const GridPair alpha{Quotient(rz[0], p_ap[0]), Quotient(rz[1], p_ap[1])};
       const GridPair rr = SumChunks([&](int64_t begin, int64_t end) {
         GridCombine({1.0, 1.0}, u_, alpha, p_, begin, end);

@@ -37,10 +37,10 @@ class GridPlane {
 struct GridSystem {
   int width = 0;
   int height = 0;
-  GridPlane right;              // weight of the edge to (x+1, y)
-  GridPlane down;               // to (x, y+1)
-  GridPlane down_right;         // to (x+1, y+1)
-  GridPlane down_left;          // to (x-1, y+1)
+  GridPlane right;       // weight of the edge to (x+1, y)
+  GridPlane down;        // to (x, y+1)
+  GridPlane down_right;  // to (x+1, y+1)
+  GridPlane down_left;   // to (x-1, y+1)
   GridPlane data;
   std::vector<uint8_t> pinned;  // 1 where u is the target exactly; empty: nowhere
 

@@ -203,9 +203,9 @@ TEST(GridSolverTest, StopsWhenCancelledOrOutOfIterations) {
   CancellationToken cancel;
   cancel.Cancel();
   ThreadPool pool(1);
-  EXPECT_THROW(
-      SolveGridSystem(GridSystem(system), target, {1e-6, 9}, pool, [](int, double) {}, cancel),
-      Error);
+  EXPECT_THROW(SolveGridSystem(
+                   GridSystem(system), target, {1e-6, 9}, pool, [](int, double) {}, cancel),
+               Error);
   const GridSolution solution = Solve(system, target, {1e-6, 1});
   EXPECT_FALSE(solution.converged);
   EXPECT_EQ(solution.iterations, 1);

@@ -107,8 +107,7 @@ class HintDrawer {
     }
     float* as = map_.ab.Plane(0);
     float* bs = map_.ab.Plane(1);
-    if (map_.hinted[i] && entry_of_[i] != entry_ &&
-        std::hypot(as[i] - a, bs[i] - b) > kSameColor) {
+    if (map_.hinted[i] && entry_of_[i] != entry_ && std::hypot(as[i] - a, bs[i] - b) > kSameColor) {
       if (contradictions_++ == 0) first_pair_ = {entry_of_[i], entry_};
     }
     map_.hinted[i] = 1;
@@ -131,8 +130,10 @@ class HintDrawer {
       return x == std::min(static_cast<int>(end[0]), width_ - 1) &&
              y == std::min(static_cast<int>(end[1]), height_ - 1);
     };
-    for (int y = low(std::min(p[1], q[1]), height_); y <= high(std::max(p[1], q[1]), height_); ++y) {
-      for (int x = low(std::min(p[0], q[0]), width_); x <= high(std::max(p[0], q[0]), width_); ++x) {
+    for (int y = low(std::min(p[1], q[1]), height_); y <= high(std::max(p[1], q[1]), height_);
+         ++y) {
+      for (int x = low(std::min(p[0], q[0]), width_); x <= high(std::max(p[0], q[0]), width_);
+           ++x) {
         const bool inside = SquaredDistance(x + 0.5, y + 0.5, p, q) <= radius * radius;
         if (inside || under(p, x, y) || under(q, x, y)) Set(x, y);
       }

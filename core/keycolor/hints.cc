@@ -104,8 +104,8 @@ HintSolution Solve(const Image& luminance,
     solution = SolveAtSize(luminance, std::move(hints), options, progress, cancel);
   } else {
     const Image small = FitWithin(luminance, options.max_side_px);
-    solution = SolveAtSize(
-        small, Reduce(hints, small.width, small.height), options, progress, cancel);
+    solution =
+        SolveAtSize(small, Reduce(hints, small.width, small.height), options, progress, cancel);
     solution.ab = UpsampleGuided(solution.ab, luminance, kGuideRadius, kGuideVarianceFloor);
     for (size_t i = 0; i < hints.hinted.size(); ++i) {
       if (!hints.hinted[i]) continue;

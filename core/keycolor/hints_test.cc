@@ -90,10 +90,10 @@ TEST(HintsTest, OfContradictingHintsTheLastWinsWithAWarning) {
 
 TEST(HintsTest, TwoHintsOnAFlatRegionBlendSmoothly) {
   // Along a narrow strip the interpolant is linear: no plateau, no step.
-  const HintSolution solution =
-      Spread(Image(101, 3, 1, 50.0f),
-             {{0, 0, 0, 40, 0, ColorHint::Shape::kRegion, {}, {{0, 0}, {1, 0}, {1, 3}, {0, 3}}},
-              {0, 0, 0, -40, 0, ColorHint::Shape::kRegion, {}, {{100, 0}, {101, 0}, {101, 3}, {100, 3}}}});
+  const HintSolution solution = Spread(
+      Image(101, 3, 1, 50.0f),
+      {{0, 0, 0, 40, 0, ColorHint::Shape::kRegion, {}, {{0, 0}, {1, 0}, {1, 3}, {0, 3}}},
+       {0, 0, 0, -40, 0, ColorHint::Shape::kRegion, {}, {{100, 0}, {101, 0}, {101, 3}, {100, 3}}}});
   for (int x = 0; x <= 100; ++x) EXPECT_NEAR(solution.ab.At(0, 1, x), 40.0f - 0.8f * x, 0.3f);
 }
 
@@ -103,8 +103,11 @@ TEST(HintsTest, TenThousandHintsAreExactAndFinite) {
   for (float& value : luminance.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
   std::vector<ColorHint> hints;
   for (int k = 0; k < 10000; ++k) {
-    hints.push_back({random.NextUniform(0, 400), random.NextUniform(0, 300), 0,
-                     random.NextUniform(-80, 80), random.NextUniform(-80, 80)});
+    hints.push_back({random.NextUniform(0, 400),
+                     random.NextUniform(0, 300),
+                     0,
+                     random.NextUniform(-80, 80),
+                     random.NextUniform(-80, 80)});
   }
   const HintSolution solution = Spread(luminance, hints);
   EXPECT_LE(solution.relative_residual, 1e-4);

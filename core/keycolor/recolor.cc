@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
-#include "core/keycolor/same_subject.h"
+#include "core/keycolor/picture_checks.h"
 
 namespace color3d {
 namespace {
@@ -47,8 +47,9 @@ std::vector<uint8_t> Allowed(const Image* mask, const Image& original) {
     count += allowed[i];
   }
   if (count == 0) {
-    throw InvalidArgument("the mask allows no change (nowhere is it brighter than 0.5); paint white "
-                          "where colour may change");
+    throw InvalidArgument(
+        "the mask allows no change (nowhere is it brighter than 0.5); paint white "
+        "where colour may change");
   }
   return allowed;
 }

@@ -5,9 +5,11 @@
 
 namespace color3d {
 
+void AddHintsCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
+void AddReferenceCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);

@@ -1,7 +1,8 @@
-#include "core/keycolor/same_subject.h"
+#include "core/keycolor/picture_checks.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@ namespace {
 
 constexpr int kCompareSidePx = 256;
 constexpr double kMinCorrelation = 0.5;
+constexpr double kMeanChromaOfGray = 1.5;
+constexpr double kPercentileChromaOfGray = 4.0;
 constexpr double kFlatDeviation = 0.5;  // L units: below this a picture shows nothing
 
 struct Moments {
@@ -58,6 +61,22 @@ void ExpectSameSubject(const Image& luminance, const Image& other, const char* w
       std::string(what) + " does not look like the key view (correlation of luminances " +
       std::to_string(moments.correlation) + ", needed > " + std::to_string(kMinCorrelation) +
       "); colour the photo that was chosen as key view");
+}
+
+void ExpectColor(const Image& lab, const char* what) {
+  std::vector<float> chroma(lab.PlaneSize());
+  double mean = 0.0;
+  for (size_t i = 0; i < chroma.size(); ++i) {
+    chroma[i] = std::hypot(lab.Plane(1)[i], lab.Plane(2)[i]);
+    mean += chroma[i] / static_cast<double>(chroma.size());
+  }
+  const size_t rank = std::min(chroma.size() - 1, chroma.size() * 99 / 100);
+  std::nth_element(
+      chroma.begin(), chroma.begin() + static_cast<std::ptrdiff_t>(rank), chroma.end());
+  if (mean < kMeanChromaOfGray && chroma[rank] < kPercentileChromaOfGray) {
+    throw InvalidArgument(std::string(what) + " has no colour (mean chroma " +
+                          std::to_string(mean) + " Lab units); colour it first");
+  }
 }
 
 }  // namespace color3d
