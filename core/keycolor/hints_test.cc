@@ -47,7 +47,7 @@ TEST(HintsTest, ColourStopsAtALuminanceEdge) {
     EXPECT_NEAR(solution.ab.At(1, y, 38), 20.0f, 2.0f);
     EXPECT_NEAR(solution.ab.At(1, y, 42), 10.0f, 2.0f);
   }
-  EXPECT_LE(solution.relative_residual, 1e-4);
+  EXPECT_LE(solution.relative_residual, 5e-4);
   EXPECT_GT(solution.hinted_pixels, 20);
 }
 
@@ -110,7 +110,7 @@ TEST(HintsTest, TenThousandHintsAreExactAndFinite) {
                      random.NextUniform(-80, 80)});
   }
   const HintSolution solution = Spread(luminance, hints);
-  EXPECT_LE(solution.relative_residual, 1e-4);
+  EXPECT_LE(solution.relative_residual, 5e-4);
   for (float value : solution.ab.data) ASSERT_LE(std::abs(value), 81.0f);
   const ColorHint& last = hints.back();
   EXPECT_EQ(solution.ab.At(0, static_cast<int>(last.y_px), static_cast<int>(last.x_px)),

@@ -16,7 +16,7 @@ struct ReferenceOptions {
   int spread_side_px = 1024;    // longer side at which matches are spread, 64..8192
   int bank_size = 12000;        // cells of all references that are compared with, 100..100000
   int neighbours = 8;           // matches that are blended, 1..64
-  double sigma = 1.0;           // as HintOptions
+  double sigma = 0.5;           // as HintOptions
   double match_weight = 0.1;    // of a certain match against the edges of flat regions (1), > 0
   double low_confidence = 0.1;  // mean confidence below which chroma fades and a warning is given
   int threads = 0;              // 0: what the machine has; the result is the same for any number
