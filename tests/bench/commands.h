@@ -8,9 +8,11 @@ namespace color3d {
 void AddAutomaticCommand(CLI::App& app);
 void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
+void AddHintsCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
+void AddReferenceCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
 void AddPretrainCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
