@@ -78,6 +78,11 @@ std::vector<RemotePoint> PointsToSend(const Image& luminance,
                                       double scale_y) {
   std::vector<RemotePoint> points;
   for (const ColorHint& hint : hints) {
+    if (hint.shape != ColorHint::Shape::kDisc || hint.fill == ColorHint::Fill::kAutomatic) {
+      throw InvalidArgument(
+          "a backend takes points with colours; give lines, regions and labels "
+          "without a backend");
+    }
     if (!(hint.x_px >= 0.0 && hint.x_px < luminance.width && hint.y_px >= 0.0 &&
           hint.y_px < luminance.height)) {
       throw InvalidArgument("the colour point at (" + std::to_string(hint.x_px) + ", " +

@@ -8,7 +8,10 @@
 #include "core/image/codec.h"
 #include "core/keycolor/automatic.h"
 #include "core/keycolor/prompt.h"
+#include "core/keycolor/recolor.h"
+#include "core/keycolor/reference.h"
 #include "core/keycolor/remote.h"
+#include "core/keycolor/script.h"
 
 namespace color3d {
 namespace {
@@ -48,11 +51,57 @@ KeyColorResult FromStrokes(const Options& options, const KeyPhoto& photo, StageC
 }
 
 KeyColorResult FromPoints(const Options& options, const KeyPhoto& photo, StageContext& context) {
-  return FromHints(KeyColorFromHints(photo.luminance,
-                                     ParseHintsJson(ReadFile(options.file, kMaxPointsBytes)),
-                                     options.hints,
-                                     context.progress(),
-                                     context.cancel()));
+  const auto hints = ParseHintsJson(ReadFile(options.file, kMaxPointsBytes));
+  const Image labels = options.labels.empty() ? Image() : ReadImage(options.labels);
+  const bool asks_automatic = std::any_of(hints.begin(), hints.end(), [](const ColorHint& hint) {
+    return hint.fill == ColorHint::Fill::kAutomatic;
+  });
+  const Image automatic =
+      asks_automatic ? AutomaticColorizer::Embedded()->Colorize(photo.luminance).ab : Image();
+  HintPictures pictures;
+  if (!labels.Empty()) pictures.labels = &labels;
+  if (asks_automatic) pictures.automatic_ab = &automatic;
+  return FromHints(KeyColorFromHints(
+      photo.luminance, hints, options.hints, context.progress(), context.cancel(), pictures));
+}
+
+KeyColorResult FromReferences(const Options& options,
+                              const KeyPhoto& photo,
+                              StageContext& context) {
+  std::vector<Image> references;
+  for (const std::filesystem::path& file : options.references) {
+    references.push_back(ReadImage(file));
+  }
+  const auto encoder = context.LoadEncoder(options.name);
+  ReferenceOptions reference;
+  reference.threads = context.threads();
+  reference.seed = static_cast<unsigned>(context.seed());
+  ReferenceSolution solution = KeyColorFromReferences(
+      photo.luminance, references, *encoder, reference, context.progress(), context.cancel());
+  KeyColorResult result{std::move(solution.ab),
+                        {{"description", encoder->description()},
+                         {"explained", solution.explained},
+                         {"mean_confidence", solution.mean_confidence},
+                         {"iterations", solution.iterations},
+                         {"relative_residual", solution.relative_residual}}};
+  result.confidence = std::move(solution.confidence);
+  return result;
+}
+
+KeyColorResult FromScript(const Options& options, const KeyPhoto& photo, StageContext& context) {
+  context.progress().OnProgress(0, 1, "running the script " + options.name);
+  ScriptColor color = KeyColorFromScript(photo.luminance, context.Model(options.name));
+  return {std::move(color.ab),
+          {{"script", options.name}, {"mean_luminance_difference", color.luminance_deviation}}};
+}
+
+KeyColorResult FromEdit(const Options& options, const KeyPhoto& photo, StageContext&) {
+  const Image mask = options.mask.empty() ? Image() : ReadImage(options.mask);
+  KeyColorResult result;
+  result.ab =
+      KeyColorFromEdit(photo.srgb, ReadImage(options.file), options.mask.empty() ? nullptr : &mask);
+  result.facts = {{"masked", !options.mask.empty()}};
+  return result;
 }
 
 KeyColorResult FromBackend(const Options& options, const KeyPhoto& photo, StageContext& context) {
@@ -148,12 +197,6 @@ KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageCo
   return result;
 }
 
-[[noreturn]] KeyColorResult NotBuilt(const Options& options, const KeyPhoto&, StageContext&) {
-  throw Error(ErrorCode::kUnimplemented,
-              std::string("key colour by ") + KeyColorSourceName(options.source) +
-                  " is not built yet; give an image, strokes or points");
-}
-
 struct Source {
   Options::Source source;
   const char* name;
@@ -162,12 +205,12 @@ struct Source {
 constexpr Source kSources[] = {{Options::Source::kImage, "image", FromImage},
                                {Options::Source::kStrokes, "strokes", FromStrokes},
                                {Options::Source::kPoints, "points", FromPoints},
-                               {Options::Source::kReferences, "references", NotBuilt},
+                               {Options::Source::kReferences, "references", FromReferences},
                                {Options::Source::kPrompt, "prompt", FromPrompt},
                                {Options::Source::kAutomatic, "automatic", FromAutomatic},
                                {Options::Source::kBackend, "backend", FromBackend},
-                               {Options::Source::kScript, "script", NotBuilt},
-                               {Options::Source::kEdit, "edit", NotBuilt}};
+                               {Options::Source::kScript, "script", FromScript},
+                               {Options::Source::kEdit, "edit", FromEdit}};
 
 const Source& Find(Options::Source source) {
   const auto* found = std::find_if(std::begin(kSources),
