@@ -5,6 +5,7 @@
 #include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/encoder/clip.h"
+#include "core/encoder/threads.h"
 #include "core/image/codec.h"
 #include "core/keycolor/automatic.h"
 #include "core/keycolor/prompt.h"
@@ -229,7 +230,10 @@ const char* KeyColorSourceName(ColorizeKeyViewOptions::Source source) { return F
 KeyColorResult SolveKeyColor(const ColorizeKeyViewOptions& options,
                              const KeyPhoto& photo,
                              StageContext& context) {
-  return Find(options.source).solve(options, photo, context);
+  SetTorchThreads(context.threads());
+  ColorizeKeyViewOptions with_threads = options;
+  with_threads.hints.threads = context.threads();
+  return Find(options.source).solve(with_threads, photo, context);
 }
 
 }  // namespace color3d
