@@ -1,12 +1,8 @@
 #include "client/commands/colorize_options.h"
 
 #include <map>
-#include <nlohmann/json.hpp>
 
-#include "client/lib/names.h"
 #include "core/base/error.h"
-#include "core/base/files.h"
-#include "core/image/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;

@@ -1,16 +1,16 @@
 #include "core/encoder/convnext.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cmath>
 #include <cstring>
-#include <set>
 #include <utility>
 
-#include "core/base/digest.h"
 #include "core/base/error.h"
-#include "core/encoder/random_features.h"
+#include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/weight_digest.h"
+#include "core/encoder/weight_tensors.h"
 #include "core/image/codec.h"
 
 namespace color3d {
@@ -19,50 +19,7 @@ namespace {
 constexpr double kNormEpsilon = 1e-6;
 constexpr int kDescribeSidePx = 256;
 constexpr int kDeepSidePx = 384;
-
-std::string DigestOf(const ConvNextConfig& config, const WeightMap& weights) {
-  Sha256 hash;
-  hash.Update(config.ToString());
-  for (const auto& [name, array] : weights) {
-    std::string shape = "\n" + name;
-    for (int64_t size : array.shape) shape += " " + std::to_string(size);
-    hash.Update(shape + "\n");
-    hash.Update(
-        {reinterpret_cast<const char*>(array.values.data()), array.values.size() * sizeof(float)});
-  }
-  return hash.FinishHex();
-}
-
-// Hands out weights by name, checks shapes, and remembers what was asked for.
-class WeightReader {
- public:
-  explicit WeightReader(const WeightMap& weights) : weights_(weights) {}
-
-  torch::Tensor Take(const std::string& name, std::vector<int64_t> shape) {
-    const auto found = weights_.find(name);
-    if (found == weights_.end()) {
-      throw InvalidArgument("the encoder weights lack \"" + name + "\"");
-    }
-    if (found->second.shape != shape) {
-      throw InvalidArgument("encoder weight \"" + name + "\" has another shape than its config");
-    }
-    used_.insert(name);
-    torch::Tensor tensor = torch::empty(shape, torch::kFloat32);
-    std::memcpy(tensor.data_ptr<float>(),
-                found->second.values.data(),
-                found->second.values.size() * sizeof(float));
-    return shape.size() == 4 ? tensor.contiguous(at::MemoryFormat::ChannelsLast) : tensor;
-  }
-  void ExpectAllUsed() const {
-    for (const auto& [name, array] : weights_) {
-      if (!used_.count(name)) throw InvalidArgument("unknown encoder weight \"" + name + "\"");
-    }
-  }
-
- private:
-  const WeightMap& weights_;
-  std::set<std::string> used_;
-};
+constexpr int kDeepStridePx = 16;
 
 // Layer norm over the channels of [B,C,H,W]; free of copies when x is channels-last.
 torch::Tensor ChannelNorm(const torch::Tensor& x,
@@ -117,53 +74,88 @@ Image ImageFromTensor(const torch::Tensor& tensor) {
   return image;
 }
 
-ConvNext::ConvNext(const ConvNextConfig& config, const WeightMap& weights, std::string description)
-    : config_(config), digest_(DigestOf(config, weights)), description_(std::move(description)) {
-  WeightReader reader(weights);
+ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description)
+    : config_(config),
+      digest_(DigestOfWeights(config.ToString(), weights)),
+      description_(std::move(description)) {
+  WeightReader reader(std::move(weights), "the encoder weights");
   for (int i = 0; i < config.StageCount(); ++i) {
     Stage stage;
     const int64_t c = config.dims[i];
     const std::string down = "downsample_layers." + std::to_string(i) + ".";
     if (i == 0) {
       stage.down_weight =
-          reader.Take(down + "0.weight", {c, 3, config.stem_kernel, config.stem_kernel});
-      stage.down_bias = reader.Take(down + "0.bias", {c});
-      stage.down_norm_weight = reader.Take(down + "1.weight", {c});
-      stage.down_norm_bias = reader.Take(down + "1.bias", {c});
+          TakeTensor(reader, down + "0.weight", {c, 3, config.stem_kernel, config.stem_kernel});
+      stage.down_bias = TakeTensor(reader, down + "0.bias", {c});
+      stage.down_norm_weight = TakeTensor(reader, down + "1.weight", {c});
+      stage.down_norm_bias = TakeTensor(reader, down + "1.bias", {c});
     } else {
       const int64_t before = config.dims[i - 1];
-      stage.down_norm_weight = reader.Take(down + "0.weight", {before});
-      stage.down_norm_bias = reader.Take(down + "0.bias", {before});
-      stage.down_weight = reader.Take(down + "1.weight", {c, before, 2, 2});
-      stage.down_bias = reader.Take(down + "1.bias", {c});
+      stage.down_norm_weight = TakeTensor(reader, down + "0.weight", {before});
+      stage.down_norm_bias = TakeTensor(reader, down + "0.bias", {before});
+      stage.down_weight = TakeTensor(reader, down + "1.weight", {c, before, 2, 2});
+      stage.down_bias = TakeTensor(reader, down + "1.bias", {c});
     }
     for (int j = 0; j < config.depths[i]; ++j) {
       const std::string name = "stages." + std::to_string(i) + "." + std::to_string(j) + ".";
       Block block;
-      block.dwconv_weight = reader.Take(name + "dwconv.weight", {c, 1, 7, 7});
-      block.dwconv_bias = reader.Take(name + "dwconv.bias", {c});
-      block.norm_weight = reader.Take(name + "norm.weight", {c});
-      block.norm_bias = reader.Take(name + "norm.bias", {c});
-      block.pwconv1_weight = reader.Take(name + "pwconv1.weight", {4 * c, c});
-      block.pwconv1_bias = reader.Take(name + "pwconv1.bias", {4 * c});
-      block.pwconv2_weight = reader.Take(name + "pwconv2.weight", {c, 4 * c});
-      block.pwconv2_bias = reader.Take(name + "pwconv2.bias", {c});
-      block.gamma = reader.Take(name + "gamma", {c});
+      block.dwconv_weight = TakeTensor(reader, name + "dwconv.weight", {c, 1, 7, 7});
+      block.dwconv_bias = TakeTensor(reader, name + "dwconv.bias", {c});
+      block.norm_weight = TakeTensor(reader, name + "norm.weight", {c});
+      block.norm_bias = TakeTensor(reader, name + "norm.bias", {c});
+      block.pwconv1_weight = TakeTensor(reader, name + "pwconv1.weight", {4 * c, c});
+      block.pwconv1_bias = TakeTensor(reader, name + "pwconv1.bias", {4 * c});
+      block.pwconv2_weight = TakeTensor(reader, name + "pwconv2.weight", {c, 4 * c});
+      block.pwconv2_bias = TakeTensor(reader, name + "pwconv2.bias", {c});
+      block.gamma = TakeTensor(reader, name + "gamma", {c});
       stage.blocks.push_back(std::move(block));
     }
-    stage.norm_weight = reader.Take("norm" + std::to_string(i) + ".weight", {c});
-    stage.norm_bias = reader.Take("norm" + std::to_string(i) + ".bias", {c});
+    stage.norm_weight = TakeTensor(reader, "norm" + std::to_string(i) + ".weight", {c});
+    stage.norm_bias = TakeTensor(reader, "norm" + std::to_string(i) + ".bias", {c});
     stages_.push_back(std::move(stage));
   }
-  reader.ExpectAllUsed();
+  reader.Finish();
+}
+
+std::vector<std::pair<std::string, torch::Tensor>> ConvNext::Parameters() const {
+  std::vector<std::pair<std::string, torch::Tensor>> parameters;
+  for (size_t i = 0; i < stages_.size(); ++i) {
+    const Stage& stage = stages_[i];
+    const std::string down = "downsample_layers." + std::to_string(i) + ".";
+    const std::string conv = down + (i == 0 ? "0." : "1.");
+    const std::string norm = down + (i == 0 ? "1." : "0.");
+    parameters.emplace_back(conv + "weight", stage.down_weight);
+    parameters.emplace_back(conv + "bias", stage.down_bias);
+    parameters.emplace_back(norm + "weight", stage.down_norm_weight);
+    parameters.emplace_back(norm + "bias", stage.down_norm_bias);
+    for (size_t j = 0; j < stage.blocks.size(); ++j) {
+      const Block& block = stage.blocks[j];
+      const std::string name = "stages." + std::to_string(i) + "." + std::to_string(j) + ".";
+      parameters.emplace_back(name + "dwconv.weight", block.dwconv_weight);
+      parameters.emplace_back(name + "dwconv.bias", block.dwconv_bias);
+      parameters.emplace_back(name + "norm.weight", block.norm_weight);
+      parameters.emplace_back(name + "norm.bias", block.norm_bias);
+      parameters.emplace_back(name + "pwconv1.weight", block.pwconv1_weight);
+      parameters.emplace_back(name + "pwconv1.bias", block.pwconv1_bias);
+      parameters.emplace_back(name + "pwconv2.weight", block.pwconv2_weight);
+      parameters.emplace_back(name + "pwconv2.bias", block.pwconv2_bias);
+      parameters.emplace_back(name + "gamma", block.gamma);
+    }
+    parameters.emplace_back("norm" + std::to_string(i) + ".weight", stage.norm_weight);
+    parameters.emplace_back("norm" + std::to_string(i) + ".bias", stage.norm_bias);
+  }
+  return parameters;
 }
 
 torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {
-  torch::NoGradGuard no_grad;
-  const torch::Tensor gray = GrayFromLuminanceTensor(luminance);
+  at::NoGradGuard no_grad;
+  return NormaliseInput(GrayFromLuminanceTensor(luminance));
+}
+
+torch::Tensor ConvNext::NormaliseInput(const torch::Tensor& rgb) {
   const torch::Tensor mean = torch::tensor({0.485f, 0.456f, 0.406f}).view({1, 3, 1, 1});
   const torch::Tensor deviation = torch::tensor({0.229f, 0.224f, 0.225f}).view({1, 3, 1, 1});
-  return ((gray - mean) / deviation).contiguous(at::MemoryFormat::ChannelsLast);
+  return ((rgb - mean) / deviation).contiguous(at::MemoryFormat::ChannelsLast);
 }
 
 torch::Tensor ConvNext::RunBlock(const Block& block,
@@ -180,11 +172,12 @@ torch::Tensor ConvNext::RunBlock(const Block& block,
   return x + y.permute({0, 3, 1, 2});
 }
 
-std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
-                                          const BlockAdapter& adapter) const {
-  std::vector<torch::Tensor> taps;
+std::vector<torch::Tensor> ConvNext::StageOutputs(const torch::Tensor& input,
+                                                  int count,
+                                                  const BlockAdapter& adapter) const {
+  std::vector<torch::Tensor> outputs;
   torch::Tensor x = input;
-  for (int i = 0; i < config_.StageCount(); ++i) {
+  for (int i = 0; i < count; ++i) {
     const Stage& stage = stages_[i];
     if (i == 0) {
       const int border = (config_.stem_kernel - config_.stem_stride) / 2;
@@ -200,27 +193,39 @@ std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
       if (adapter) adapted = adapter(i, static_cast<int>(j), x);
       x = RunBlock(stage.blocks[j], x, adapted);
     }
-    taps.push_back(ChannelNorm(x, stage.norm_weight, stage.norm_bias));
+    outputs.push_back(x);
+  }
+  return outputs;
+}
+
+std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
+                                          const BlockAdapter& adapter) const {
+  std::vector<torch::Tensor> taps = StageOutputs(input, config_.StageCount(), adapter);
+  for (size_t i = 0; i < taps.size(); ++i) {
+    taps[i] = ChannelNorm(taps[i], stages_[i].norm_weight, stages_[i].norm_bias);
   }
   return taps;
 }
 
-torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px) const {
+torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px, int stage) const {
   CheckLuminance(luminance);
-  torch::NoGradGuard no_grad;
+  at::NoGradGuard no_grad;
   const Image small = FitWithin(luminance, max_side_px);
-  const int stride = config_.Stride(config_.StageCount() - 1);
+  const int stride = config_.Stride(stage);
   const int right = (stride - small.width % stride) % stride;
   const int bottom = (stride - small.height % stride) % stride;
   torch::Tensor tensor = TensorFromImage(small);
   // Replication has no limit on the border's width, unlike reflection: 1x1 pictures are fine.
   if (right > 0 || bottom > 0) tensor = torch::replication_pad2d(tensor, {0, right, 0, bottom});
-  return Taps(Input(tensor)).back();
+  const torch::Tensor output = StageOutputs(Input(tensor), stage + 1).back();
+  return ChannelNorm(output, stages_[stage].norm_weight, stages_[stage].norm_bias);
 }
 
 std::vector<double> ConvNext::Describe(const Image& luminance) const {
   return WithTorchErrors("encoder", [&] {
-    const torch::Tensor tap = DeepTap(luminance, kDescribeSidePx)[0].flatten(1).to(torch::kFloat64);
+    const torch::Tensor tap =
+        DeepTap(luminance, kDescribeSidePx, config_.StageCount() - 1)[0].flatten(1).to(
+            torch::kFloat64);
     const torch::Tensor pooled =
         torch::cat({tap.mean(1), tap.std(1, /*unbiased=*/false)}).contiguous();
     const double* values = pooled.data_ptr<double>();
@@ -229,19 +234,21 @@ std::vector<double> ConvNext::Describe(const Image& luminance) const {
 }
 
 Image ConvNext::DeepFeatures(const Image& luminance) const {
-  return WithTorchErrors("encoder",
-                         [&] { return ImageFromTensor(DeepTap(luminance, kDeepSidePx)); });
+  // The published networks go on to stride 32, too coarse to tell which parts two views share.
+  int stage = config_.StageCount() - 1;
+  while (stage > 0 && config_.Stride(stage) > kDeepStridePx) --stage;
+  return WithTorchErrors("encoder", [&] {
+    at::NoGradGuard no_grad;
+    return ImageFromTensor(DeepTap(luminance, kDeepSidePx, stage));
+  });
 }
 
 std::shared_ptr<const Encoder> Encoder::Embedded() {
-  const ConvNextConfig config;
-  constexpr uint64_t kSeed = 2026;
-  // Built anew for each caller that asks: 0.7 M weights take some milliseconds, and nothing global
+  // Built anew for each caller: unpacking 4 M weights takes some milliseconds, and nothing global
   // outlives the caller.
+  const ConvNextConfig config;
   return std::make_shared<const ConvNext>(
-      config,
-      RandomFeatureWeights(config, kSeed),
-      "embedded ConvNeXt, " + config.ToString() + ", seeded random features");
+      config, EmbeddedWeights("encoder."), "embedded ConvNeXt, " + config.ToString());
 }
 
 }  // namespace color3d

@@ -2,6 +2,7 @@
 // construction, so any number of threads may call it. No torch in this interface.
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,9 +13,12 @@ namespace color3d {
 
 class Encoder {
  public:
-  // The embedded encoder: a compact ConvNeXt. Until pre-trained weights are shipped its weights are
-  // seeded random features (always the same).
+  // The embedded encoder: a compact ConvNeXt, pre-trained by us (core/encoder/embedded/CARD.md).
   static std::shared_ptr<const Encoder> Embedded();
+  // A published network: the ConvNeXt of a DDColor, a plain ConvNeXt (names as its authors'), or a
+  // CLIP ViT, which describes pictures but cannot be personalized. Throws Error{kInvalidArgument}
+  // listing the weights that are missing, unexpected or misshapen.
+  static std::shared_ptr<const Encoder> FromWeightFile(const std::filesystem::path& path);
   virtual ~Encoder() = default;
 
   // SHA-256 over architecture and weights: names the encoder in colorizer files.

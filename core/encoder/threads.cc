@@ -2,8 +2,14 @@
 
 #include <ATen/Parallel.h>
 
+#include <algorithm>
+#include <thread>
+
 namespace color3d {
 
-void UseOneTorchThread() { at::set_num_threads(1); }
+void SetTorchThreads(int threads) {
+  if (threads <= 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  if (at::get_num_threads() != threads) at::set_num_threads(threads);
+}
 
 }  // namespace color3d

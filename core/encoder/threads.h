@@ -1,9 +1,9 @@
-// For callers that run an encoder on several threads of their own.
+// How many threads torch may use in the calling thread's operations.
 #pragma once
 
 namespace color3d {
 
-// From now on torch's operations of the calling thread stay on it.
-void UseOneTorchThread();
+// 0: what the machine has. Callers that run an encoder on threads of their own set 1 on each.
+void SetTorchThreads(int threads);
 
 }  // namespace color3d

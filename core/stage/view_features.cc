@@ -78,7 +78,7 @@ std::vector<ViewFeatures> CollectViewFeatures(const Encoder& describer,
     context.cancel().ThrowIfCancelled();
     pool.ForEach(std::min(round, count - begin), [&](int64_t k, int) {
       if (context.cancel().IsCancelled()) return;
-      UseOneTorchThread();
+      SetTorchThreads(1);
       ViewFeatures& view = features[begin + k];
       view = Provide(describer, encoder, photos[begin + k], cache);
       view.KeepCells(CellsForCoverage(photos.size(), view.channels));

@@ -128,6 +128,20 @@ std::string FileIdentity(const fs::path& file) {
          number(facts.st_ctim.tv_sec) + number(facts.st_ctim.tv_nsec);
 }
 
+std::vector<fs::path> FilesOfModel(const fs::path& file) {
+  std::vector<fs::path> files = {file};
+  for (const char* name : {"bpe_simple_vocab_16e6.txt",
+                           "bpe_simple_vocab_16e6.txt.gz",
+                           "merges.txt",
+                           "config.json",
+                           "open_clip_config.json"}) {
+    std::error_code none;
+    const fs::path beside = file.parent_path() / name;
+    if (beside != file && fs::is_regular_file(beside, none)) files.push_back(beside);
+  }
+  return files;
+}
+
 FileDigest FileDigests::Of(const fs::path& file) {
   const std::lock_guard lock(mutex_);
   const std::string identity = FileIdentity(file);

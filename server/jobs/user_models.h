@@ -46,6 +46,10 @@ std::string LooksLike(const std::filesystem::path& file);
 // What tells one state of a file from another without reading it; empty when there is no such file.
 std::string FileIdentity(const std::filesystem::path& file);
 
+// The file itself and what models read beside it when it is there: CLIP's vocabulary and
+// configuration. Whoever compares states of a model compares all of them.
+std::vector<std::filesystem::path> FilesOfModel(const std::filesystem::path& file);
+
 // Digests of large files, read again only when the file has changed. Thread-safe; two threads that
 // ask for the same file read it once.
 class FileDigests {

@@ -44,6 +44,15 @@ std::string MediaType(const std::string& name) {
   return type != types.end() ? type->second : "application/octet-stream";
 }
 
+// Of a model's file and all that is read beside it.
+std::string IdentityOf(const fs::path& model) {
+  std::string identity;
+  for (const fs::path& part : FilesOfModel(model)) {
+    identity += part.filename().string() + ' ' + FileIdentity(part) + '\n';
+  }
+  return identity;
+}
+
 class StoredBlobs : public BlobSource {
  public:
   explicit StoredBlobs(const BlobStore& blobs) : blobs_(blobs) {}
@@ -101,7 +110,7 @@ class Attempt {
   struct ModelFile {
     fs::path file;
     std::string identity;
-    std::string sha256;
+    std::string digests;
   };
   std::map<std::string, ModelFile> models_;  // those that the spec names
   LeaseKeeper keeper_;
@@ -176,7 +185,7 @@ void Attempt::Prepare() {
   }
   // Names say nothing of what they stand for: other weights under an old name are other work. What
   // a backend computes cannot be known; its address stands for it.
-  for (const std::string& name : part.models) material += models_.at(name).sha256 + '\n';
+  for (const std::string& name : part.models) material += models_.at(name).digests;
   for (const std::string& name : part.backends) {
     const auto address = context_.models.backends.find(name);
     if (address != context_.models.backends.end()) material += address->second + '\n';
@@ -193,8 +202,11 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
                       "it has: " + NamesOf(context_.models.files) + "); start it with --model " +
                       name + "=FILE and retry the job");
     }
-    const std::string identity = FileIdentity(file->second);
-    models_[name] = {file->second, identity, context_.digests.Of(file->second).sha256};
+    ModelFile& model = models_[name];
+    model = {file->second, IdentityOf(file->second), ""};
+    for (const fs::path& part : FilesOfModel(file->second)) {
+      model.digests += part.filename().string() + ' ' + context_.digests.Of(part).sha256 + '\n';
+    }
     keeper_.token().ThrowIfCancelled();
   }
 }
@@ -202,7 +214,7 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
 // The stage has read the files some time after their digests were taken.
 void Attempt::RequireModelsUnchanged() const {
   for (const auto& [name, model] : models_) {
-    if (FileIdentity(model.file) == model.identity) continue;
+    if (IdentityOf(model.file) == model.identity) continue;
     throw ServiceError(ErrorCode::kAborted,
                        "MODEL_CHANGED",
                        "the file of the model '" + name + "' (" + model.file.string() +

@@ -1,0 +1,71 @@
+// The two towers of CLIP (Radford et al. 2021): a vision transformer for pictures, a causal
+// transformer for text, into one space. Torch in the interface; used inside core/encoder only.
+// Immutable after construction, thread-safe.
+#pragma once
+
+#include <torch/types.h>
+
+#include <string>
+#include <vector>
+
+#include "core/weights/weight_reader.h"
+
+namespace color3d {
+
+class ClipNetwork {
+ public:
+  // `weights` under OpenAI's names. `quick_gelu`: x * sigmoid(1.702 x) in the feed-forward layers,
+  // else the exact GELU. A file without a text tower is taken too. Throws Error{kInvalidArgument}
+  // listing what is missing, unexpected or misshapen.
+  ClipNetwork(WeightMap weights, bool quick_gelu);
+
+  int input_side_px() const { return grid_ * patch_px_; }
+  int grid() const { return grid_; }  // patches per side
+  bool HasText() const { return token_embedding_.defined(); }
+  int vocabulary_size() const;
+  int context() const;
+  std::string ToString() const;
+
+  // [B,E] of pictures [B,3,S,S] in 0..1, S = input_side_px().
+  torch::Tensor EncodeImages(const torch::Tensor& rgb) const;
+  // [B,E,grid,grid]: where in the picture. The last layer's attention is replaced by its value path
+  // alone, so that a patch keeps to what it shows itself (Zhou et al. 2022, "Extract free dense
+  // labels from CLIP").
+  torch::Tensor EncodePatches(const torch::Tensor& rgb) const;
+  // [B,E] of token numbers [B,T], T <= context(); the feature is read at the largest number, which
+  // is the end of text.
+  torch::Tensor EncodeTokens(const torch::Tensor& tokens) const;
+
+ private:
+  struct Linear {
+    torch::Tensor weight, bias;
+  };
+  struct Block {
+    Linear in, out, norm1, norm2, expand, contract;
+  };
+  struct Tower {
+    int64_t width = 0;
+    int64_t heads = 0;
+    std::vector<Block> blocks;
+  };
+  static Tower TakeTower(WeightReader& reader, const std::string& prefix, int64_t width);
+  void TakeVision(WeightReader& reader);
+  void TakeText(WeightReader& reader);
+  torch::Tensor RunBlock(const Tower& tower,
+                         const Block& block,
+                         const torch::Tensor& x,
+                         bool causal) const;
+  // Tokens [B, 1 + grid^2, width] after all blocks but the last `left_out`.
+  torch::Tensor RunVision(const torch::Tensor& rgb, int left_out) const;
+
+  bool quick_gelu_;
+  int grid_ = 0;
+  int patch_px_ = 0;
+  Tower vision_, text_;
+  torch::Tensor patch_weight_, class_embedding_, vision_position_, vision_projection_;
+  Linear norm_pre_, norm_post_;
+  torch::Tensor token_embedding_, text_position_, text_projection_;
+  Linear norm_final_;
+};
+
+}  // namespace color3d

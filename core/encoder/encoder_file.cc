@@ -1,0 +1,34 @@
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/encoder/clip.h"
+#include "core/encoder/clip_weights.h"
+#include "core/encoder/convnext.h"
+#include "core/encoder/convnext_weights.h"
+#include "core/encoder/encoder.h"
+#include "core/encoder/torch_errors.h"
+#include "core/weights/weight_file.h"
+
+namespace color3d {
+
+std::shared_ptr<const Encoder> Encoder::FromWeightFile(const std::filesystem::path& path) {
+  WeightMap weights = ReadWeightFile(path);
+  if (HoldsConvNext(weights)) {
+    ConvNextWeights found = TakeConvNextWeights(weights);
+    weights.clear();  // a decoder, which is not needed here
+    return WithTorchErrors("encoder", [&] {
+      return std::make_shared<const ConvNext>(
+          found.config, std::move(found.weights), found.description);
+    });
+  }
+  if (HoldsClip(weights)) {
+    weights.clear();
+    return ClipModel::FromWeightFile(path);
+  }
+  throw InvalidArgument(path.string() + " holds no known encoder (" +
+                        std::to_string(weights.size()) +
+                        " arrays): known are DDColor, ConvNeXt with its authors' names, and CLIP "
+                        "with a ViT");
+}
+
+}  // namespace color3d

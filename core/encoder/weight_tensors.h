@@ -1,0 +1,34 @@
+// Arrays of a weight file as tensors, without a second copy.
+#pragma once
+
+#include <torch/types.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/weights/weight_reader.h"
+
+namespace color3d {
+
+// float32 tensor that takes the array's memory over.
+inline torch::Tensor TensorFromWeights(WeightArray array) {
+  auto values = std::make_shared<std::vector<float>>(std::move(array.values));
+  float* data = values->data();
+  return torch::from_blob(
+      data,
+      array.shape,
+      [values = std::move(values)](void*) mutable { values.reset(); },
+      torch::kFloat32);
+}
+
+// WeightReader::Take as a tensor; channels-last when it has four dimensions.
+inline torch::Tensor TakeTensor(WeightReader& reader,
+                                const std::string& name,
+                                const std::vector<int64_t>& shape) {
+  const torch::Tensor tensor = TensorFromWeights(reader.Take(name, shape));
+  return shape.size() == 4 ? tensor.contiguous(at::MemoryFormat::ChannelsLast) : tensor;
+}
+
+}  // namespace color3d

@@ -1,0 +1,58 @@
+// DDColor's colour decoder (Kang et al. 2023, section 3.3): learnt colour queries that look at the
+// picture's features in turn and at each other. Torch inside core/keycolor only. Immutable,
+// thread-safe.
+#pragma once
+
+#include <torch/types.h>
+
+#include <vector>
+
+#include "core/weights/weight_reader.h"
+
+namespace color3d {
+
+class ColorQueries {
+ public:
+  // Takes "decoder.color_decoder.*". `feature_channels`: of the decoder's levels, coarse to fine.
+  ColorQueries(const std::vector<int64_t>& feature_channels, WeightReader& reader);
+
+  int64_t query_count() const { return query_feat_.size(0); }
+  // Width of an answer, which is also that of the pixel features it is multiplied with.
+  int64_t embedding_channels() const { return embed_[2].weight.size(0); }
+  // [query_count, embedding_channels] from the decoder's levels [1,C,h,w], coarse to fine.
+  torch::Tensor Forward(const std::vector<torch::Tensor>& levels) const;
+
+ private:
+  struct Linear {
+    torch::Tensor weight, bias;
+  };
+  struct Attention {
+    torch::Tensor in_weight, in_bias;  // q, k, v stacked
+    Linear out;
+    Linear norm;
+  };
+  struct Layer {
+    Attention cross, self;
+    Linear linear1, linear2, norm;
+  };
+  static Linear TakeLinear(WeightReader& reader,
+                           const std::string& name,
+                           const std::vector<int64_t>& shape);
+  Attention TakeAttention(WeightReader& reader,
+                          const std::string& name,
+                          const std::string& inner) const;
+  torch::Tensor Attend(const Attention& attention,
+                       const torch::Tensor& queries,
+                       const torch::Tensor& keys,
+                       const torch::Tensor& values) const;
+
+  int64_t width_ = 0;
+  torch::Tensor query_feat_, query_embed_;
+  std::vector<torch::Tensor> level_embed_;
+  std::vector<Linear> input_proj_;
+  std::vector<Layer> layers_;
+  Linear decoder_norm_;
+  Linear embed_[3];
+};
+
+}  // namespace color3d

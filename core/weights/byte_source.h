@@ -1,0 +1,71 @@
+// Where the weight readers get their bytes: a file or memory. Nothing is mapped, so a file that
+// shrinks while it is read gives an error and not a signal, and the resident memory is what the
+// reader keeps. Immutable; ReadAt() may be called from any thread.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "core/base/error.h"
+
+namespace color3d {
+
+class ByteSource {
+ public:
+  virtual ~ByteSource() = default;
+  ByteSource(const ByteSource&) = delete;
+  ByteSource& operator=(const ByteSource&) = delete;
+
+  uint64_t size() const { return size_; }
+  // Copies `count` bytes from `offset` to `out`. Throws Error{kInvalidArgument} when the range is
+  // not inside the source, kDataLoss when the file cannot be read.
+  void ReadAt(uint64_t offset, uint64_t count, void* out) const;
+  std::string ReadString(uint64_t offset, uint64_t count) const;
+  // Error{kInvalidArgument} that names the source and the reason.
+  Error Refusal(const std::string& reason) const;
+
+ protected:
+  ByteSource(std::string name, uint64_t size) : name_(std::move(name)), size_(size) {}
+  virtual void DoRead(uint64_t offset, uint64_t count, char* out) const = 0;
+  const std::string& name() const { return name_; }
+
+ private:
+  std::string name_;
+  uint64_t size_;
+};
+
+// The bytes must outlive the source. `name` starts the messages.
+class MemorySource : public ByteSource {
+ public:
+  explicit MemorySource(std::string_view bytes, const std::string& name = "weight file");
+
+ private:
+  void DoRead(uint64_t offset, uint64_t count, char* out) const override;
+  std::string_view bytes_;
+};
+
+// Throws Error{kNotFound} when there is no such regular file, kFailedPrecondition when it cannot be
+// opened.
+class FileSource : public ByteSource {
+ public:
+  explicit FileSource(const std::filesystem::path& path);
+  ~FileSource() override;
+
+ private:
+  struct Opened {
+    int descriptor;
+    uint64_t size;
+  };
+  static Opened Open(const std::filesystem::path& path);
+  FileSource(const std::filesystem::path& path, const Opened& opened);
+  void DoRead(uint64_t offset, uint64_t count, char* out) const override;
+  int descriptor_;
+};
+
+// A name out of a file for a one-line message: quoted, cut at 100 characters, and every byte that
+// is not printable ASCII as '?'.
+std::string QuotedName(std::string_view name);
+
+}  // namespace color3d

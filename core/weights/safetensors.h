@@ -1,0 +1,29 @@
+// The safetensors format: u64 header length, a JSON header {name: {dtype, shape, data_offsets}},
+// then the data without gaps. https://github.com/huggingface/safetensors#format
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "core/weights/byte_source.h"
+#include "core/weights/weight_map.h"
+
+namespace color3d {
+
+// The header's `__metadata__`.
+using WeightMetadata = std::map<std::string, std::string>;
+
+// All arrays as float32, whatever their stored type (F32, F16, BF16, F64, integers, BOOL). Throws
+// Error{kInvalidArgument}, naming the file and the reason, when anything in it breaks the format;
+// memory stays within a small multiple of the file's size. `metadata` may be null.
+WeightMap ReadSafetensors(const ByteSource& source, WeightMetadata* metadata = nullptr);
+WeightMap ParseSafetensors(std::string_view bytes, WeightMetadata* metadata = nullptr);
+
+// The bytes of a safetensors file, float32 or (`half`) float16. Throws Error{kInvalidArgument}
+// naming the array whose shape and values disagree, or that does not fit float16.
+std::string SerializeSafetensors(const WeightMap& weights,
+                                 bool half,
+                                 const WeightMetadata& metadata = {});
+
+}  // namespace color3d
