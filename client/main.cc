@@ -48,6 +48,7 @@ int Main(int argc, char** argv) {
   AddColorizeCommand(app, context);
   AddInspectCommand(app, context);
   AddSceneCommands(app, context);
+  AddKeyCommands(app, context);
   AddJobCommands(app, context);
   AddArtifactCommands(app, context);
   AddServerCommands(app, context);

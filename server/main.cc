@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
+#include <sstream>
 
 #include "core/base/error.h"
 #include "server/ops/process.h"
@@ -35,6 +36,20 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       "--insecure-any-address",
       options->insecure_any_address,
       "Allow --listen on other than loopback addresses; there is no authentication yet");
+  serve
+      ->add_option("--model",
+                   options->models,
+                   "NAME=FILE: weights that jobs may name (DDColor, ConvNeXt, CLIP, TorchScript); "
+                   "repeatable. Also COLOR3D_MODELS, separated by ';'")
+      ->allow_extra_args(false);
+  serve
+      ->add_option(
+          "--backend",
+          options->backends,
+          "NAME=ADDRESS: a ColorBackend server: HOST:PORT or unix:PATH on this machine, "
+          "https://HOST:PORT, or http://HOST:PORT in a network you trust; repeatable. Also "
+          "COLOR3D_BACKENDS, separated by ';'")
+      ->allow_extra_args(false);
   serve->add_option("--reserve-mib", options->reserve_mib, "Disk space to keep free, MiB")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
@@ -56,6 +71,16 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--max-attempts", options->max_attempts)->group("");
   serve->add_option("--stop-grace-seconds", options->stop_grace_seconds)->group("");
   serve->add_option("--worker-backoff-ms", options->worker_backoff_ms)->group("");
+}
+
+// Flags win over the environment.
+void TakeFromEnvironment(const char* variable, std::vector<std::string>* values) {
+  const char* text = std::getenv(variable);
+  if (text == nullptr || !values->empty()) return;
+  std::istringstream stream(text);
+  for (std::string value; std::getline(stream, value, ';');) {
+    if (!value.empty()) values->push_back(value);
+  }
 }
 
 // Replaces this process by color3d-worker with the arguments after "worker".
@@ -80,6 +105,8 @@ int Main(int argc, char** argv) {
   app.require_subcommand(1);
   AddServe(serve, &options);
   CLI11_PARSE(app, argc, argv);
+  TakeFromEnvironment("COLOR3D_MODELS", &options.models);
+  TakeFromEnvironment("COLOR3D_BACKENDS", &options.backends);
   // Our own checks say more than gRPC's log does.
   ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   try {

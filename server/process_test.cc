@@ -190,6 +190,72 @@ TEST_F(ProcessTest, FailuresAreReportedWithTheirReason) {
   EXPECT_EQ(run("steps=1").state(), v1::Job::STATE_SUCCEEDED) << "the service lives on";
 }
 
+// A name says nothing of what it stands for.
+TEST_F(ProcessTest, OtherWeightsUnderTheSameNameAreOtherWork) {
+  const fs::path weights = scratch_.path() / "weights";
+  WriteFileAtomic(weights, "first");
+  ServerProcess server(scratch_.path(), {"--model", "mine=" + weights.string()});
+  TestClient& client = server.client();
+  v1::JobSpec spec = ScriptedSpec(client.MakeScene().name(), "steps=1");
+  spec.mutable_select_key_view()->set_encoder("mine");
+  const auto is_cached = [&] {
+    const v1::Job job = client.WaitFinished(client.Create(spec).name());
+    EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.error().message();
+    return job.cached();
+  };
+  EXPECT_FALSE(is_cached());
+  EXPECT_TRUE(is_cached());
+  WriteFileAtomic(weights, "other");
+  EXPECT_FALSE(is_cached()) << "the result of the old weights was served";
+  EXPECT_TRUE(is_cached());
+  WriteFileAtomic(weights, "first");
+  EXPECT_TRUE(is_cached()) << "equal bytes are equal work";
+  fs::remove(weights);
+  const v1::Job job = client.WaitFinished(client.Create(spec).name());
+  EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
+}
+
+TEST_F(ProcessTest, WeightsReplacedUnderARunningJobAreNoticed) {
+  const fs::path weights = scratch_.path() / "weights";
+  WriteFileAtomic(weights, "first");
+  ServerProcess server(scratch_.path(), {"--model", "mine=" + weights.string()});
+  TestClient& client = server.client();
+  v1::JobSpec spec = ScriptedSpec(client.MakeScene().name(), "steps=40,ms=50");
+  spec.mutable_select_key_view()->set_encoder("mine");
+  const std::string name = client.Create(spec).name();
+  WaitForStep(client, name, 2);
+  WriteFileAtomic(weights, "other");
+  const v1::Job job = client.WaitFinished(name);
+  EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.error().message();
+  EXPECT_EQ(job.attempt(), 2) << "what was begun with the old weights was published";
+}
+
+TEST_F(ProcessTest, ModelsAreListedAndUnknownOnesRefused) {
+  const fs::path weights = scratch_.path() / "weights";
+  WriteFileAtomic(weights, "........{\"visual.conv1.weight\":");
+  ServerProcess server(scratch_.path(),
+                       {"--model", "mine=" + weights.string(), "--backend", "gone=127.0.0.1:1"});
+  TestClient& client = server.client();
+  v1::ServerInfo info;
+  grpc::ClientContext context;
+  ASSERT_TRUE(client.server->GetServerInfo(&context, {}, &info).ok());
+  ASSERT_EQ(info.models_size(), 1);
+  EXPECT_EQ(info.models(0).name(), "mine");
+  EXPECT_EQ(info.models(0).kind(), "clip");
+  EXPECT_EQ(info.models(0).sha256(), DigestFile(weights).sha256);
+  ASSERT_EQ(info.backends_size(), 1);
+  EXPECT_FALSE(info.backends(0).reachable());
+  EXPECT_NE(info.backends(0).problem(), "");
+  v1::JobSpec spec = ScriptedSpec(client.MakeScene().name(), "steps=1");
+  spec.mutable_select_key_view()->set_encoder("yours");
+  try {
+    client.Create(spec);
+    FAIL() << "a model that there is not was accepted";
+  } catch (const std::runtime_error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("it has: mine"));
+  }
+}
+
 TEST_F(ProcessTest, RunningJobIsCancelledSoon) {
   ServerProcess server(scratch_.path(), {});
   TestClient& client = server.client();

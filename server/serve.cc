@@ -11,8 +11,11 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "server/backends/backend_address.h"
+#include "server/backends/backend_prober.h"
 #include "server/jobs/sqlite_job_store.h"
 #include "server/maintenance.h"
+#include "server/ops/address.h"
 #include "server/ops/process.h"
 #include "server/rpc/rpc_server.h"
 #include "server/storage/blob_store.h"
@@ -38,7 +41,7 @@ void CheckOptions(const ServeOptions& options) {
   }
 }
 
-SupervisorOptions WorkerSetup(const ServeOptions& options) {
+SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& models) {
   SupervisorOptions setup;
   setup.program =
       options.worker_program.empty() ? ProgramFolder() / "color3d-worker" : options.worker_program;
@@ -73,10 +76,25 @@ SupervisorOptions WorkerSetup(const ServeOptions& options) {
                      std::to_string(options.retry_backoff_ms),
                      "--reserve-mib",
                      std::to_string(options.reserve_mib)};
+  const std::vector<std::string> model_flags = ToFlags(models);
+  setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
   setup.max_stopped = Milliseconds(3.0 * options.lease_seconds);
   setup.max_backoff = std::chrono::milliseconds(options.worker_backoff_ms);
   setup.first_backoff = std::min(setup.first_backoff, setup.max_backoff);
   return setup;
+}
+
+std::map<std::string, BackendState> ProbeForInfo(BackendProber& prober) {
+  std::map<std::string, BackendState> states;
+  for (const auto& [name, answer] : prober.Probe()) {
+    states[name] = {answer.reachable,
+                    answer.ready,
+                    answer.info.description,
+                    {answer.info.capabilities.begin(), answer.info.capabilities.end()},
+                    answer.info.max_pixels,
+                    answer.problem};
+  }
+  return states;
 }
 
 // Blocks the stop signals for all threads that start later, and waits for them here.
@@ -111,7 +129,10 @@ class StopSignals {
 void Serve(const ServeOptions& options) {
   SetUpLog("server", options.log_level, {});
   CheckOptions(options);
-  const SupervisorOptions worker_setup = WorkerSetup(options);
+  const UserModels models = ParseUserModels(options.models, options.backends);
+  RequireReadable(models);
+  for (const auto& [name, address] : models.backends) ParseBackendAddress(name, address);
+  const SupervisorOptions worker_setup = WorkerSetup(options, models);
   const StopSignals signals;
   const DataPaths paths(options.data_folder);
   PrepareDataFolder(paths);
@@ -130,6 +151,9 @@ void Serve(const ServeOptions& options) {
   rpc.listen = options.listen;
   rpc.version = COLOR3D_VERSION;
   rpc.limits.max_unfinished_jobs = options.max_unfinished_jobs;
+  rpc.models = models;
+  const auto prober = std::make_shared<BackendProber>(models.backends);
+  rpc.probe_backends = [prober] { return ProbeForInfo(*prober); };
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
   ExpireDeadWorkers(background);
 

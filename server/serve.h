@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace color3d {
 
@@ -18,6 +19,8 @@ struct ServeOptions {
   double drain_seconds = 20.0;
   int64_t reserve_mib = 256;
   int max_unfinished_jobs = 2'000;
+  std::vector<std::string> models;    // "NAME=FILE"
+  std::vector<std::string> backends;  // "NAME=ADDRESS"
   // For tests.
   std::filesystem::path worker_program;  // empty: color3d-worker beside this program
   double lease_seconds = 60.0;

@@ -40,10 +40,11 @@ for folder in keyview keycolor augment metrics; do
 done
 allow core/colorizer 'core/(base|color|image|weights|encoder|augment|colorizer)'
 allow core/splat 'core/(base|color|image|scene|splat)'
-allow core/report 'core/(base|report)'
-allow core/stage 'core/[a-z]+'
+allow core/report 'core/(base|image|report)'
+allow core/stage 'core/[a-z]+|tests/support'  # its tests render a scene
 allow server/jobs 'core/base|server/jobs'
 allow server/storage 'core/base|server/(jobs|storage)'
+allow server/backends 'core/(base|keycolor)|server/(ops|backends)'
 allow server/rpc 'core/base|core/image|server/(jobs|storage|ops|rpc)'
 allow client 'core/(base|color|image)|client(/[a-z]+)?'
 

@@ -111,12 +111,16 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   v1::JobSpec spec = ColorizeSpec(options, scene.name());
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
   colorize->set_key_view(selection.key_view);
+  if (options.color.Given()) {
+    *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
+  }
   std::vector<UploadFile> uploads;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);
     const bool is_key = view.name == selection.key_view;
     if (original == originals.end() || (!is_key && !view.held_out)) continue;
     const bool has_color = copies.in_color.contains(view.image_file);
+    if (is_key && options.color.Given()) continue;
     if (is_key && !has_color) {
       throw InvalidArgument("the key view " + view.name +
                             " is monochrome itself; choose one in colour with --key-view");

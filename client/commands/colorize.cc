@@ -7,11 +7,11 @@
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
+#include "client/commands/key_jobs.h"
 #include "client/commands/results.h"
-#include "client/lib/blob_transfer.h"
+#include "client/commands/scene_target.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
-#include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
 
@@ -25,39 +25,63 @@ class Colorize {
       : context_(context), options_(options), out_(options.out), display_(context.json) {}
 
   ExitCode Run() {
+    options_.Check();
+    if (!options_.scene.empty()) return RunStored();
     folder_ = CollectPhotos(options_.photos);
-    options_.CheckFiles();
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
     RequireOutBesidePhotos(out_, folder_);
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);
-    PrepareOut(out_);
-    connection_ = std::make_unique<Connection>(context_.server, *context_.interrupt);
+    Connect();
     if (options_.benchmark) {
       return Finish(PrepareBenchmark(*connection_, context_, options_, folder_, display_));
     }
-    const std::string scene = Upload();
-    return options_.HasColor() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
+    const std::string scene = UploadFolder(*connection_, context_, folder_, display_);
+    return options_.color.Given() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
   }
 
  private:
-  std::string Upload() {
-    const auto entries = BuildManifest(folder_, *context_.interrupt);
-    const std::string name = fs::absolute(folder_.root).filename().string();
-    const v1::Scene scene =
-        UploadScene(*connection_, entries, name, [&](int64_t done, int64_t total) {
-          display_.OnTransfer("uploading", done, total);
-        });
-    display_.Say(scene.name() + ": " + std::to_string(scene.photo_count()) + " photos");
-    return scene.name();
+  void Connect() {
+    PrepareOut(out_);
+    connection_ = std::make_unique<Connection>(context_.server, *context_.interrupt);
+  }
+
+  // A scene of the server's: by the colour given here, else by the accepted one.
+  ExitCode RunStored() {
+    Connect();
+    const std::string scene = ResourceName(options_.scene, "scenes");
+    return Finish(options_.color.Given() ? ColorSpec(scene) : AcceptedSpec(scene));
+  }
+
+  v1::JobSpec AcceptedSpec(const std::string& scene) {
+    if (!options_.key_view.empty() || options_.hold_out) {
+      throw InvalidArgument(
+          "--key-view and --hold-out were settled when the key view was selected (`color3d key "
+          "select`); leave them out");
+    }
+    const KeyState state = ReadKeyState(*connection_, scene);
+    if (!state.accepted) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  scene +
+                      " has no accepted key view: give a source of colour (--auto, ...), or "
+                      "select, colour and accept one (`color3d key select`, `key colour`, `key "
+                      "accept`)");
+    }
+    v1::JobSpec spec = ColorizeSpec(options_, scene);
+    spec.mutable_colorize_scene()->clear_select_key_view();
+    for (const std::string& input : WithItsInputs(*connection_, *state.accepted)) {
+      spec.add_inputs(input);
+    }
+    display_.Say("key view " + ReadChoice(*connection_, *state.accepted).view + ", as accepted (" +
+                 state.accepted->name() + ")");
+    return spec;
   }
 
   // The view that the user's colour belongs to; empty: the server selects.
   std::string KeyView() const {
     if (!options_.key_view.empty()) return options_.key_view;
     // A file that is called like a photo is that photo, whatever was selected before.
-    const fs::path colored = options_.key_color.empty() ? options_.hints : options_.key_color;
-    const std::string same_stem = PhotoOfSameStem(folder_, colored);
+    const std::string same_stem = PhotoOfSameStem(folder_, options_.color.FileOfView());
     if (!same_stem.empty()) return same_stem;
     std::error_code none;
     if (!fs::is_regular_file(out_ / "key_view.json", none)) return "";
@@ -77,17 +101,7 @@ class Colorize {
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
     colorize->set_key_view(KeyView());
-    const std::string file = options_.key_color.empty() ? options_.hints : options_.key_color;
-    const FileDigest digest = DigestFile(file);
-    v1::KeyColorSource* source = colorize->mutable_key_color();
-    if (!options_.key_color.empty()) {
-      *source->mutable_image() = ToProto(digest);
-    } else if (fs::path(file).extension() == ".json") {
-      *source->mutable_points() = ToProto(digest);
-    } else {
-      *source->mutable_strokes() = ToProto(digest);
-    }
-    UploadMissing(*connection_, {{file, digest}}, [](int64_t, int64_t) {});
+    *colorize->mutable_key_color() = UploadKeyColor(*connection_, options_.color);
     display_.Say("key view " + (colorize->key_view().empty() ? std::string("will be selected")
                                                              : colorize->key_view()));
     return spec;
@@ -97,8 +111,9 @@ class Colorize {
   ExitCode Finish(const v1::JobSpec& spec) {
     const v1::Job submitted = SubmitJob(*connection_, spec);
     if (options_.detach) return Detached(submitted);
-    const v1::Job job = FollowToSuccess({submitted.name()});
-    const auto files = Download(job);
+    const v1::Job job =
+        FollowToSuccess(*connection_, context_, {submitted.name()}, out_.string(), display_);
+    const auto files = DownloadResults(*connection_, context_, job, out_, display_);
     if (context_.json) {
       const auto metrics = Metrics();
       PrintJson({{"job", job.name()},
@@ -123,8 +138,8 @@ class Colorize {
     const v1::Job submitted = SubmitJob(*connection_, spec);
     if (options_.detach) return Detached(submitted);
     jobs.push_back(submitted.name());
-    const v1::Job job = FollowToSuccess(jobs);
-    const auto files = Download(job);
+    const v1::Job job = FollowToSuccess(*connection_, context_, jobs, out_.string(), display_);
+    const auto files = DownloadResults(*connection_, context_, job, out_, display_);
     const auto key_view = nlohmann::json::parse(
         ReadFile(out_ / "key_view.json"), nullptr, /*allow_exceptions=*/false);
     const std::string view = key_view.is_object() ? key_view.value("view", "") : "";
@@ -148,7 +163,8 @@ class Colorize {
            ".\nColour it by any means and keep its size, then run\n" + again +
            " --key-color COLOURED.png\nor paint a few colour strokes on a transparent PNG of its "
            "size (or list points as JSON), then run\n" +
-           again + " --hints STROKES.png\n";
+           again + " --hints STROKES.png\nor leave the colours to the server:\n" + again +
+           " --auto\n";
   }
 
   ExitCode Detached(const v1::Job& job) {
@@ -159,45 +175,6 @@ class Colorize {
       PrintNote(context_, ReattachHint(context_, job.name(), out_.string()));
     }
     return ExitCode::kOk;
-  }
-
-  // The last of `jobs`, once all have ended and it has succeeded.
-  v1::Job FollowToSuccess(const std::vector<std::string>& jobs) {
-    if (!Follow(*connection_, jobs, context_, display_)) {
-      throw CommandFailure(ExitCode::kDetached,
-                           "detached; " + jobs.back() + " goes on; " +
-                               ReattachHint(context_, jobs.back(), out_.string()));
-    }
-    for (const std::string& name : jobs) {
-      const v1::Job job = GetJob(*connection_, name);
-      RequireSuccess(*connection_, context_, job);
-      if (!context_.json) PrintWarnings(job);
-      if (name == jobs.back()) return job;
-    }
-    throw Error(ErrorCode::kInternal, "no job was submitted");
-  }
-
-  void PrintWarnings(const v1::Job& job) {
-    for (const std::string& warning : job.warnings()) PrintNote(context_, warning);
-    for (const v1::Job& child : ListChildren(*connection_, job.name())) {
-      for (const std::string& warning : child.warnings()) {
-        PrintNote(context_, child.kind() + ": " + warning);
-      }
-    }
-  }
-
-  std::vector<std::string> Download(const v1::Job& job) {
-    try {
-      return DownloadArtifacts(
-          *connection_, {job.artifacts().begin(), job.artifacts().end()}, out_, display_);
-    } catch (const Error& e) {
-      if (e.code() != ErrorCode::kCancelled) throw;
-      throw CommandFailure(
-          ExitCode::kDetached,
-          job.name() + " is done, its results are partly here; fetch them with `" +
-              CommandLine(context_, {"artifact", "download", job.name(), "-o", out_.string()}) +
-              "`");
-    }
   }
 
   nlohmann::ordered_json Metrics() const {
@@ -222,7 +199,7 @@ void AddColorizeCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ColorizeOptions>();
   CLI::App* colorize = app.add_subcommand(
       "colorize",
-      "Photos to a coloured 3D scene. Without --key-color or --hints: selects the photo to colour");
+      "Photos to a coloured 3D scene. Without a source of colour: selects the photo to colour");
   colorize->fallthrough();
   DeclareOptions(*colorize, options.get());
   colorize->callback([&context, options] {

@@ -1,12 +1,8 @@
 #include "client/commands/colorize_options.h"
 
 #include <map>
-#include <nlohmann/json.hpp>
 
-#include "client/lib/names.h"
 #include "core/base/error.h"
-#include "core/base/files.h"
-#include "core/image/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -16,27 +12,6 @@ v1::Preset PresetOf(const std::string& name) {
   if (name == "best") return v1::PRESET_BEST;
   if (name == "paper") return v1::PRESET_PAPER;
   return v1::PRESET_FAST;
-}
-
-void RequireImage(const std::string& option, const std::string& file) {
-  std::error_code none;
-  if (!fs::is_regular_file(file, none)) {
-    throw Error(ErrorCode::kNotFound,
-                option + ": there is no file " + file + "; give the coloured key view");
-  }
-  try {
-    ProbeImage(ReadFile(file), file);
-  } catch (const Error& e) {
-    throw Error(e.code(), option + ": " + e.what());
-  }
-}
-
-void RequirePoints(const std::string& file) {
-  const std::string format = R"([{"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}, ...])";
-  const auto json = nlohmann::json::parse(ReadFile(file), nullptr, /*allow_exceptions=*/false);
-  if (!json.is_array() || json.empty()) {
-    throw InvalidArgument("--hints: " + file + " is not a JSON list of points: " + format);
-  }
 }
 
 fs::path Canonical(const fs::path& path) {
@@ -53,13 +28,22 @@ bool IsWithin(const fs::path& path, const fs::path& folder) {
 
 }  // namespace
 
-void ColorizeOptions::CheckFiles() const {
-  if (!key_color.empty()) RequireImage("--key-color", key_color);
-  if (hints.empty()) return;
-  if (fs::path(hints).extension() == ".json") {
-    RequirePoints(hints);
-  } else {
-    RequireImage("--hints", hints);
+void ColorizeOptions::Check() const {
+  if (photos.empty() == scene.empty()) {
+    throw InvalidArgument(photos.empty() ? "give a folder of photos, or --scene scenes/ID"
+                                         : "PHOTOS and --scene do not go together: the scene has "
+                                           "its photos already");
+  }
+  if (benchmark && photos.empty()) {
+    throw InvalidArgument("--benchmark needs the folder of the photos in colour, not --scene");
+  }
+  color.Check();
+  // What is drawn for a view that is known beforehand cannot be scored against that view.
+  const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
+  if (benchmark && for_one_view) {
+    throw InvalidArgument(
+        "--benchmark colours the key view with its own true colours, or by --auto, --prompt, "
+        "--reference, --backend or --script; leave out the picture of the key view");
   }
 }
 
@@ -67,15 +51,13 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("PHOTOS",
                  o->photos,
                  "Folder of photos, or one with images/ and a COLMAP model (sparse/0), or with "
-                 "transforms.json and its photos")
-      ->required();
+                 "transforms.json and its photos");
+  app.add_option("--scene",
+                 o->scene,
+                 "In place of PHOTOS: a scene that the server holds, coloured from the key view "
+                 "that `color3d key accept` has accepted");
   app.add_option("-o,--out", o->out, "Folder for the results")->required();
-  CLI::Option* color =
-      app.add_option("--key-color", o->key_color, "The key view, coloured (JPEG, PNG or TIFF)");
-  CLI::Option* hints = app.add_option(
-      "--hints",
-      o->hints,
-      "Colour strokes (PNG of the key view's size, transparent elsewhere) or points (JSON)");
+  DeclareKeyColorFlags(app, &o->color);
   app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");
   app.add_option("--preset", o->preset, "How much time quality is worth: fast, best or paper")
       ->capture_default_str()
@@ -88,10 +70,9 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
                  "Shorten the preset's schedules to end in about this time: 90s, 5m, 1h")
       ->transform(CLI::AsNumberWithUnit(
           std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}}));
-  CLI::Option* benchmark = app.add_flag(
+  app.add_flag(
       "--benchmark", o->benchmark, "Photos in colour: drop their colour and score against it");
-  color->excludes(hints)->excludes(benchmark);
-  hints->excludes(benchmark);
+  app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");
@@ -123,6 +104,7 @@ v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene)
 v1::JobSpec SelectSpec(const ColorizeOptions& options, const std::string& scene) {
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
+  select->set_encoder(options.encoder);
   if (!options.key_view.empty()) {
     select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
     select->set_view(options.key_view);
@@ -136,6 +118,10 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
   colorize->set_preset(PresetOf(options.preset));
+  if (!options.encoder.empty()) {
+    colorize->mutable_select_key_view()->set_encoder(options.encoder);
+    colorize->mutable_personalize()->set_encoder(options.encoder);
+  }
   if (options.time_budget_seconds > 0.0) {
     colorize->set_time_budget_seconds(options.time_budget_seconds);
   }

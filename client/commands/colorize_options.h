@@ -7,17 +7,19 @@
 #include <optional>
 #include <string>
 
+#include "client/commands/key_color_flags.h"
 #include "client/lib/photo_folder.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {
 
 struct ColorizeOptions {
-  std::string photos;
+  std::string photos;  // folder; empty: `scene` is set
+  std::string scene;   // "scenes/ID", whose accepted key view is used
   std::string out;
-  std::string key_color;  // coloured key view
-  std::string hints;      // strokes, or points as .json
-  std::string key_view;   // view name or stem; empty: selected
+  KeyColorFlags color;
+  std::string key_view;  // view name or stem; empty: selected
+  std::string encoder;   // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";
   bool benchmark = false;
   bool detach = false;
@@ -30,10 +32,9 @@ struct ColorizeOptions {
   std::optional<int> colorizer_iterations;
   std::optional<int> chroma_iterations;
 
-  bool HasColor() const { return !key_color.empty() || !hints.empty(); }
-  // What can be said without the server: throws Error when the key colour is missing or not an
-  // image, or the hints cannot be read.
-  void CheckFiles() const;
+  // What can be said without the server: throws Error when options do not go together or files
+  // cannot be read.
+  void Check() const;
 };
 
 void DeclareOptions(CLI::App& app, ColorizeOptions* options);

@@ -37,6 +37,7 @@ class CommandFailure : public std::runtime_error {
 void AddColorizeCommand(CLI::App& app, Context& context);
 void AddInspectCommand(CLI::App& app, Context& context);
 void AddSceneCommands(CLI::App& app, Context& context);
+void AddKeyCommands(CLI::App& app, Context& context);
 void AddJobCommands(CLI::App& app, Context& context);
 void AddArtifactCommands(CLI::App& app, Context& context);
 void AddServerCommands(CLI::App& app, Context& context);

@@ -2,11 +2,24 @@
 
 #include <set>
 
+#include "client/commands/console.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/text.h"
 
 namespace color3d::client {
+namespace {
+
+void PrintWarnings(Connection& connection, const Context& context, const v1::Job& job) {
+  for (const std::string& warning : job.warnings()) PrintNote(context, warning);
+  for (const v1::Job& child : ListChildren(connection, job.name())) {
+    for (const std::string& warning : child.warnings()) {
+      PrintNote(context, child.kind() + ": " + warning);
+    }
+  }
+}
+
+}  // namespace
 
 v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec) {
   v1::CreateJobRequest request;
@@ -86,6 +99,25 @@ void RequireSuccess(Connection& connection, const Context& context, const v1::Jo
                "` goes on from its last checkpoint";
   }
   throw CommandFailure(code == ExitCode::kOk ? ExitCode::kJobFailed : code, message);
+}
+
+v1::Job FollowToSuccess(Connection& connection,
+                        const Context& context,
+                        const std::vector<std::string>& jobs,
+                        const std::string& out,
+                        ProgressDisplay& display) {
+  if (!Follow(connection, jobs, context, display)) {
+    throw CommandFailure(
+        ExitCode::kDetached,
+        "detached; " + jobs.back() + " goes on; " + ReattachHint(context, jobs.back(), out));
+  }
+  v1::Job job;
+  for (const std::string& name : jobs) {
+    job = GetJob(connection, name);
+    RequireSuccess(connection, context, job);
+    if (!context.json) PrintWarnings(connection, context, job);
+  }
+  return job;
 }
 
 }  // namespace color3d::client

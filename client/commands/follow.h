@@ -27,6 +27,15 @@ std::string ReattachHint(const Context& context, const std::string& job, const s
 // Throws CommandFailure that names the stage and why, unless the job has succeeded.
 void RequireSuccess(Connection& connection, const Context& context, const v1::Job& job);
 
+// Follows `jobs` to their end, requires all to succeed, prints their warnings (and their stages')
+// and returns the last, fresh. Throws CommandFailure; one of kDetached after Ctrl-C says how to
+// attach again. `out` is the folder for the results; may be empty.
+v1::Job FollowToSuccess(Connection& connection,
+                        const Context& context,
+                        const std::vector<std::string>& jobs,
+                        const std::string& out,
+                        ProgressDisplay& display);
+
 // "color3d ARGUMENTS", with --server when it was given.
 std::string CommandLine(const Context& context, std::vector<std::string> arguments);
 

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "client/commands/follow.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
@@ -97,6 +98,23 @@ std::vector<std::string> DownloadArtifacts(Connection& connection,
   }
   display.Clear();
   return names;
+}
+
+std::vector<std::string> DownloadResults(Connection& connection,
+                                         const Context& context,
+                                         const v1::Job& job,
+                                         const fs::path& out,
+                                         ProgressDisplay& display) {
+  try {
+    return DownloadArtifacts(
+        connection, {job.artifacts().begin(), job.artifacts().end()}, out, display);
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::kCancelled) throw;
+    throw CommandFailure(
+        ExitCode::kDetached,
+        job.name() + " is done, its results are partly here; fetch them with `" +
+            CommandLine(context, {"artifact", "download", job.name(), "-o", out.string()}) + "`");
+  }
 }
 
 std::string Summary(const fs::path& out) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/command.h"
 #include "client/commands/progress_display.h"
 #include "client/lib/connection.h"
 #include "color3d/v1/job.pb.h"
@@ -26,6 +27,14 @@ std::vector<std::string> DownloadArtifacts(Connection& connection,
                                            const std::vector<v1::Artifact>& artifacts,
                                            const std::filesystem::path& out,
                                            ProgressDisplay& display);
+
+// All of a job's artifacts. After Ctrl-C throws CommandFailure{kDetached} that says how to fetch
+// the rest.
+std::vector<std::string> DownloadResults(Connection& connection,
+                                         const Context& context,
+                                         const v1::Job& job,
+                                         const std::filesystem::path& out,
+                                         ProgressDisplay& display);
 
 // A few lines about out/metrics.json and what lies in `out`, for people.
 std::string Summary(const std::filesystem::path& out);

@@ -5,15 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <thread>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/personal_colorizer.h"
 #include "core/colorizer/recipe.h"
-#include "core/colorizer/threads.h"
 #include "core/colorizer/trainer.h"
+#include "core/encoder/threads.h"
 #include "core/encoder/torch_errors.h"
 #include "core/image/codec.h"
 
@@ -48,26 +47,24 @@ void CheckKeyView(const Image& luminance, const Image& ab) {
   }
 }
 
-std::shared_ptr<const ConvNext> RequireConvNext(const std::shared_ptr<const Encoder>& encoder) {
-  auto network = std::dynamic_pointer_cast<const ConvNext>(encoder);
+std::shared_ptr<const TapEncoder> RequireTaps(const std::shared_ptr<const Encoder>& encoder) {
+  auto network = std::dynamic_pointer_cast<const TapEncoder>(encoder);
   if (!network) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "the colorizer works on a ConvNeXt encoder; this one is " +
-                    (encoder ? encoder->description() : std::string("null")));
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "the colorizer needs an encoder that shows its feature maps (a ConvNeXt); this one is " +
+            (encoder ? encoder->description() : std::string("null")));
   }
   return network;
 }
 
-// The decoder has a level for every tap, and pictures are padded to kPadMultiple.
-void CheckTaps(const ConvNextConfig& encoder, const TrainingRecipe& recipe) {
-  const size_t levels = recipe.model.widths.size();
+// Pictures are padded to kPadMultiple.
+void CheckTaps(const ConvNextConfig& encoder) {
   const int last_stride = encoder.Stride(encoder.StageCount() - 1);
-  if (encoder.dims.size() == levels && kPadMultiple % last_stride == 0) return;
+  if (kPadMultiple % last_stride == 0) return;
   throw Error(ErrorCode::kFailedPrecondition,
-              "the colorizer works on an encoder of " + std::to_string(levels) +
-                  " stages with strides up to " + std::to_string(kPadMultiple) + "; this one has " +
-                  std::to_string(encoder.dims.size()) + " with strides up to " +
-                  std::to_string(last_stride));
+              "the colorizer works on encoders with strides up to " + std::to_string(kPadMultiple) +
+                  "; this one goes up to " + std::to_string(last_stride));
 }
 
 std::array<float, 2> MeanAb(const Image& ab) {
@@ -81,11 +78,6 @@ std::array<float, 2> MeanAb(const Image& ab) {
 }
 
 }  // namespace
-
-void SetTorchThreads(int threads) {
-  if (threads <= 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  if (at::get_num_threads() != threads) at::set_num_threads(threads);
-}
 
 void ColorizerOptions::Validate() const {
   CheckRange("iterations", iterations, 0, 100000);
@@ -121,10 +113,10 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
   options.Validate();
   CheckKeyView(luminance, ab);
   PersonalColorizer::Parts parts;
-  parts.encoder = RequireConvNext(encoder);
+  parts.encoder = RequireTaps(encoder);
   parts.options = options;
   const TrainingRecipe recipe = RecipeFor(options);
-  CheckTaps(parts.encoder->config(), recipe);
+  CheckTaps(parts.encoder->config());
   return WithTorchErrors("personalization", [&]() -> std::shared_ptr<const Colorizer> {
     SetTorchThreads(options.threads);
     const Image l = FitWithin(luminance, options.max_side_px);
@@ -153,7 +145,7 @@ std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
                                                int threads) {
   return WithTorchErrors("colorizer file", [&] {
-    return PersonalColorizer::Deserialize(bytes, RequireConvNext(encoder), threads);
+    return PersonalColorizer::Deserialize(bytes, RequireTaps(encoder), threads);
   });
 }
 

@@ -86,6 +86,12 @@ Projection Whiten(const torch::Tensor& samples, int64_t dims, double weight) {
   return projection;
 }
 
+double TapWeight(const FeatureNeighboursOptions& options, int stride_px) {
+  size_t octave = 0;
+  while (octave + 1 < options.tap_weights.size() && (4 << octave) <= stride_px) ++octave;
+  return options.tap_weights[octave];
+}
+
 torch::Tensor SampleRows(int64_t count, int64_t wanted, Random& random) {
   std::vector<int64_t> rows(count);
   std::iota(rows.begin(), rows.end(), int64_t{0});
@@ -122,7 +128,7 @@ torch::Tensor VerticalPosition(const torch::Tensor& luminance,
 
 }  // namespace
 
-FeatureNeighbours::FeatureNeighbours(const ConvNext& encoder,
+FeatureNeighbours::FeatureNeighbours(const TapEncoder& encoder,
                                      const Image& luminance,
                                      const Image& ab,
                                      const FeatureNeighboursOptions& options,
@@ -153,8 +159,9 @@ FeatureNeighbours::FeatureNeighbours(const ConvNext& encoder,
   for (size_t i = 0; i < blocks.size(); ++i) {
     const torch::Tensor samples = torch::cat(blocks[i]).index_select(0, rows);
     const bool is_tap = i + 1 < blocks.size();
-    const Projection projection = Whiten(
-        samples, options.dims_per_tap, is_tap ? options.tap_weights[i] : options.luminance_weight);
+    const double weight = is_tap ? TapWeight(options, encoder.config().Stride(static_cast<int>(i)))
+                                 : options.luminance_weight;
+    const Projection projection = Whiten(samples, options.dims_per_tap, weight);
     state_["mean." + std::to_string(i)] = projection.mean;
     state_["matrix." + std::to_string(i)] = projection.matrix;
     bank.push_back(torch::mm(samples - projection.mean, projection.matrix));
@@ -171,7 +178,7 @@ FeatureNeighbours::FeatureNeighbours(const FeatureNeighboursOptions& options,
     : options_(options), state_(std::move(state)) {}
 
 std::unique_ptr<FeatureNeighbours> FeatureNeighbours::FromArchive(
-    const ConvNext& encoder,
+    const TapEncoder& encoder,
     const FeatureNeighboursOptions& options,
     const std::string& what,
     Archive& archive) {

@@ -5,6 +5,7 @@
 
 #include <torch/types.h>
 
+#include <array>
 #include <map>
 #include <memory>
 #include <string>
@@ -24,8 +25,9 @@ struct FeatureNeighboursOptions {
   std::vector<double> scales{0.8, 1.0, 1.25};  // of the key view, so that sizes may differ
   int bank_size = 12000;                       // cells, drawn at random from all scales
   int dims_per_tap = 16;                       // kept by PCA
-  // Shares of the distance, fine to coarse: fine taps tell texture, coarse ones tell things.
-  std::vector<double> tap_weights{0.3, 0.5, 1.0, 1.0};
+  // Shares of the distance for taps at strides 2, 4, 8, 16, 32: fine taps tell texture, coarse ones
+  // tell things.
+  std::array<double, 5> tap_weights{0.3, 0.5, 1.0, 1.0, 1.0};
   double luminance_weight = 1.0;
   double position_weight = 0.0;  // of the height in the picture; no gain on the whole
   // The softmax's width is temperature * (distance of the best match + floor): sharp where the key
@@ -43,7 +45,7 @@ struct NeighbourColors {
 class FeatureNeighbours {
  public:
   // `luminance` 1 channel, `ab` 2 channels: the key view at training size.
-  FeatureNeighbours(const ConvNext& encoder,
+  FeatureNeighbours(const TapEncoder& encoder,
                     const Image& luminance,
                     const Image& ab,
                     const FeatureNeighboursOptions& options,
@@ -72,7 +74,7 @@ class FeatureNeighbours {
   static bool IsStoredAsHalf(const std::string& name) { return name == "bank" || name == "colors"; }
   // Takes the arrays "neighbours.*" out of the archive. Throws Error{kInvalidArgument} starting
   // with `what` when one is missing or does not fit.
-  static std::unique_ptr<FeatureNeighbours> FromArchive(const ConvNext& encoder,
+  static std::unique_ptr<FeatureNeighbours> FromArchive(const TapEncoder& encoder,
                                                         const FeatureNeighboursOptions& options,
                                                         const std::string& what,
                                                         Archive& archive);

@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_archive.h"
-#include "core/colorizer/threads.h"
+#include "core/encoder/threads.h"
 #include "core/encoder/torch_errors.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
@@ -160,7 +160,7 @@ std::string PersonalColorizer::Serialize() const {
 }
 
 std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
-    std::string_view bytes, std::shared_ptr<const ConvNext> encoder, int threads) {
+    std::string_view bytes, std::shared_ptr<const TapEncoder> encoder, int threads) {
   Archive archive = ReadArchive(bytes, kMagic, kVersion, kWhat);
   Parts parts;
   bool has_neighbours = false;

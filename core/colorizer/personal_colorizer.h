@@ -17,7 +17,7 @@ namespace color3d {
 class PersonalColorizer : public Colorizer {
  public:
   struct Parts {
-    std::shared_ptr<const ConvNext> encoder;
+    std::shared_ptr<const TapEncoder> encoder;
     ColorizerOptions options;
     std::unique_ptr<PersonalModel> model;           // refers to *encoder
     std::unique_ptr<FeatureNeighbours> neighbours;  // may be null
@@ -30,7 +30,7 @@ class PersonalColorizer : public Colorizer {
   std::string Serialize() const override;
 
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
-                                                      std::shared_ptr<const ConvNext> encoder,
+                                                      std::shared_ptr<const TapEncoder> encoder,
                                                       int threads);
 
  private:

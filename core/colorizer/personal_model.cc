@@ -27,25 +27,27 @@ torch::Tensor UpsampleTwice(const torch::Tensor& x) {
 
 }  // namespace
 
-PersonalModel::PersonalModel(const ConvNext& encoder,
+int DecoderWidth(int stride) {
+  if (stride <= 2) return 32;
+  if (stride <= 4) return 64;
+  return stride <= 8 ? 96 : 128;
+}
+
+PersonalModel::PersonalModel(const TapEncoder& encoder,
                              const PersonalModelConfig& config,
                              const std::array<float, 2>& mean_ab,
                              Random& random)
     : encoder_(encoder), config_(config) {
   const std::vector<int>& dims = encoder.config().dims;
-  if (config.widths.size() != dims.size()) {
-    throw InvalidArgument("the decoder has " + std::to_string(config.widths.size()) +
-                          " levels, the encoder " + std::to_string(dims.size()) + " taps");
-  }
   const int count = static_cast<int>(dims.size());
+  const auto width = [&](int level) { return DecoderWidth(encoder.config().Stride(level)); };
   for (int i = 0; i < count; ++i) {
     // The finest level also sees L itself; all but the coarsest see the level below.
-    const int64_t in = dims[i] + (i == 0 ? 1 : 0) + (i + 1 < count ? config.widths[i + 1] : 0);
-    AddLevel("decoder." + std::to_string(i) + ".", in, config.widths[i], random);
+    const int64_t in = dims[i] + (i == 0 ? 1 : 0) + (i + 1 < count ? width(i + 1) : 0);
+    AddLevel("decoder." + std::to_string(i) + ".", in, width(i), random);
   }
   // A small head: the first predictions stay near the mean colour of the key view.
-  head_ = NewParameter(
-      "head.weight", {2, config.widths[0], 3, 3}, 0.1 * HeDeviation(9 * config.widths[0]), random);
+  head_ = NewParameter("head.weight", {2, width(0), 3, 3}, 0.1 * HeDeviation(9 * width(0)), random);
   head_bias_ = NewConstant("head.bias", {2}, 0.0f);
   head_bias_[0] = mean_ab[0];
   head_bias_[1] = mean_ab[1];

@@ -16,8 +16,6 @@
 namespace color3d {
 
 struct PersonalModelConfig {
-  std::vector<int> widths{
-      32, 64, 96, 128};        // decoder channels at the encoder's taps, fine to coarse
   bool instance_norm = false;  // per picture (paper); otherwise statistics frozen from the key view
   bool adapters = false;       // Conv-Adapters in every block of the stages >= first_adapter_stage
   int first_adapter_stage = 0;
@@ -25,11 +23,14 @@ struct PersonalModelConfig {
   int adapter_reduction = 8;  // gamma
 };
 
+// Decoder channels at a tap of this stride: 32 at 2 px, 64 at 4, 96 at 8, 128 from 16 on.
+int DecoderWidth(int stride);
+
 class PersonalModel {
  public:
   // Random start, the same for the same generator. `encoder` must outlive the model. The adapters
   // start at zero and the head at (0, 0) plus `mean_ab` (Lab units / kAbScale).
-  PersonalModel(const ConvNext& encoder,
+  PersonalModel(const TapEncoder& encoder,
                 const PersonalModelConfig& config,
                 const std::array<float, 2>& mean_ab,
                 Random& random);
@@ -90,7 +91,7 @@ class PersonalModel {
   torch::Tensor RunBlock(const ResidualBlock& block, const torch::Tensor& x) const;
   torch::Tensor Adapt(int stage, int block, const torch::Tensor& x) const;
 
-  const ConvNext& encoder_;
+  const TapEncoder& encoder_;
   PersonalModelConfig config_;
   std::vector<Level> levels_;  // fine to coarse
   std::vector<std::vector<Adapter>> adapters_;

@@ -31,7 +31,6 @@ class TrainingTest : public testing::Test {
  protected:
   TrainingTest() : encoder_(SmallEncoder(), RandomFeatureWeights(SmallEncoder(), 1), "small") {
     at::set_num_threads(1);
-    recipe_.model.widths = {8, 8};
     options_.iterations = 60;
     options_.crop_px = 64;
     luminance_ = Image(96, 64, 1);
@@ -151,7 +150,6 @@ TEST_F(TrainingTest, ConsistencyAndPaperRecipesTrain) {
     options_.consistency_weight = 1.0;
     options_.iterations = 4;
     recipe_ = RecipeFor(options_);
-    recipe_.model.widths = {8, 8};
     PersonalModel model = MakeModel();
     NoCheckpoints checkpoints;
     Warnings progress;
@@ -280,7 +278,7 @@ TEST(AdamTest, ANonFiniteGradientChangesNothing) {
 
 TEST_F(TrainingTest, NeighboursOfTheKeyViewHaveItsColours) {
   FeatureNeighboursOptions options;
-  options.tap_weights = {1.0, 1.0};
+  options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
   const FeatureNeighbours neighbours(encoder_, luminance_, ab_, options, Random(1), {});
   const torch::Tensor l = KeyTensor();
   const NeighbourColors found =
@@ -294,7 +292,7 @@ TEST_F(TrainingTest, NeighboursOfTheKeyViewHaveItsColours) {
 
 TEST_F(TrainingTest, NeighboursAgreeWithTheDefinitionInFloat64) {
   FeatureNeighboursOptions options;
-  options.tap_weights = {1.0, 1.0};
+  options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
   options.bank_size = 300;
   const FeatureNeighbours neighbours(encoder_, luminance_, ab_, options, Random(1), {});
   const torch::Tensor bank = neighbours.State().at("bank").to(torch::kFloat64);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/encoder/random_features.h"
+#include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/encoder/weight_tensors.h"
@@ -117,6 +117,36 @@ ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string 
   reader.Finish();
 }
 
+std::vector<std::pair<std::string, torch::Tensor>> ConvNext::Parameters() const {
+  std::vector<std::pair<std::string, torch::Tensor>> parameters;
+  for (size_t i = 0; i < stages_.size(); ++i) {
+    const Stage& stage = stages_[i];
+    const std::string down = "downsample_layers." + std::to_string(i) + ".";
+    const std::string conv = down + (i == 0 ? "0." : "1.");
+    const std::string norm = down + (i == 0 ? "1." : "0.");
+    parameters.emplace_back(conv + "weight", stage.down_weight);
+    parameters.emplace_back(conv + "bias", stage.down_bias);
+    parameters.emplace_back(norm + "weight", stage.down_norm_weight);
+    parameters.emplace_back(norm + "bias", stage.down_norm_bias);
+    for (size_t j = 0; j < stage.blocks.size(); ++j) {
+      const Block& block = stage.blocks[j];
+      const std::string name = "stages." + std::to_string(i) + "." + std::to_string(j) + ".";
+      parameters.emplace_back(name + "dwconv.weight", block.dwconv_weight);
+      parameters.emplace_back(name + "dwconv.bias", block.dwconv_bias);
+      parameters.emplace_back(name + "norm.weight", block.norm_weight);
+      parameters.emplace_back(name + "norm.bias", block.norm_bias);
+      parameters.emplace_back(name + "pwconv1.weight", block.pwconv1_weight);
+      parameters.emplace_back(name + "pwconv1.bias", block.pwconv1_bias);
+      parameters.emplace_back(name + "pwconv2.weight", block.pwconv2_weight);
+      parameters.emplace_back(name + "pwconv2.bias", block.pwconv2_bias);
+      parameters.emplace_back(name + "gamma", block.gamma);
+    }
+    parameters.emplace_back("norm" + std::to_string(i) + ".weight", stage.norm_weight);
+    parameters.emplace_back("norm" + std::to_string(i) + ".bias", stage.norm_bias);
+  }
+  return parameters;
+}
+
 torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {
   at::NoGradGuard no_grad;
   return NormaliseInput(GrayFromLuminanceTensor(luminance));
@@ -214,14 +244,11 @@ Image ConvNext::DeepFeatures(const Image& luminance) const {
 }
 
 std::shared_ptr<const Encoder> Encoder::Embedded() {
-  const ConvNextConfig config;
-  constexpr uint64_t kSeed = 2026;
-  // Built anew for each caller that asks: 0.7 M weights take some milliseconds, and nothing global
+  // Built anew for each caller: unpacking 4 M weights takes some milliseconds, and nothing global
   // outlives the caller.
+  const ConvNextConfig config;
   return std::make_shared<const ConvNext>(
-      config,
-      RandomFeatureWeights(config, kSeed),
-      "embedded ConvNeXt, " + config.ToString() + ", seeded random features");
+      config, EmbeddedWeights("encoder."), "embedded ConvNeXt, " + config.ToString());
 }
 
 }  // namespace color3d

@@ -4,13 +4,12 @@
 
 #include <torch/types.h>
 
-#include <functional>
-#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/encoder/convnext_config.h"
-#include "core/encoder/encoder.h"
+#include "core/encoder/tap_encoder.h"
 #include "core/weights/weight_map.h"
 
 namespace color3d {
@@ -19,17 +18,17 @@ namespace color3d {
 torch::Tensor TensorFromImage(const Image& image);   // [1,C,H,W]
 Image ImageFromTensor(const torch::Tensor& tensor);  // [1,C,H,W] or [C,H,W], any memory format
 
-class ConvNext : public Encoder {
+class ConvNext : public TapEncoder {
  public:
-  // Added to the output of a block's depth-wise convolution: gets the block's input [B,C,h,w] and
-  // returns the same shape, or an undefined tensor for nothing.
-  using BlockAdapter = std::function<torch::Tensor(int stage, int block, const torch::Tensor&)>;
-
   // Throws Error{kInvalidArgument} naming the weights that are missing, unexpected or have another
   // shape than `config` asks for. Takes the weights' memory over.
   ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description);
 
-  const ConvNextConfig& config() const { return config_; }
+  const ConvNextConfig& config() const override { return config_; }
+  // Every weight by its published name, in a fixed order; storage is shared. For pre-training only:
+  // whoever switches gradients on or changes a value owns the object alone, and its digest is that
+  // of the weights it was made from.
+  std::vector<std::pair<std::string, torch::Tensor>> Parameters() const;
   const std::string& digest() const override { return digest_; }
   const std::string& description() const override { return description_; }
   std::vector<double> Describe(const Image& luminance) const override;
@@ -37,13 +36,13 @@ class ConvNext : public Encoder {
 
   // Network input [B,3,H,W] of L [B,1,H,W] (0..100): the grey picture Lab(L,0,0) in sRGB,
   // normalised with ImageNet's statistics.
-  torch::Tensor Input(const torch::Tensor& luminance) const;
+  torch::Tensor Input(const torch::Tensor& luminance) const override;
   // RGB in 0..1, [B,3,H,W], normalised with ImageNet's statistics, channels-last.
   static torch::Tensor NormaliseInput(const torch::Tensor& rgb);
   // norm0 .. norm3: taps [B, dims[i], H / Stride(i), W / Stride(i)], channels-last. H and W must be
   // multiples of the last stride. Gradients flow to the adapter, never to the frozen weights.
   std::vector<torch::Tensor> Taps(const torch::Tensor& input,
-                                  const BlockAdapter& adapter = {}) const;
+                                  const BlockAdapter& adapter = {}) const override;
   // What the stages hand on, before the taps' norms; only the first `count` stages are run.
   std::vector<torch::Tensor> StageOutputs(const torch::Tensor& input,
                                           int count,

@@ -11,8 +11,8 @@ struct ConvNextConfig {
   // ours looks 8x8 at stride 2, because chroma has to be predicted at stride 2 to be sharp.
   int stem_kernel = 8;
   int stem_stride = 2;
-  std::vector<int> dims{32, 64, 128, 192};  // channels per stage; each stage halves the size
-  std::vector<int> depths{1, 1, 2, 1};      // blocks per stage
+  std::vector<int> dims{24, 48, 96, 192, 384};  // channels per stage; each stage halves the size
+  std::vector<int> depths{0, 2, 3, 4, 2};       // blocks per stage; the finest is the stem alone
 
   int StageCount() const { return static_cast<int>(dims.size()); }
   // Stride of a stage's tap in pixels of the input picture.

@@ -13,8 +13,7 @@ namespace color3d {
 
 class Encoder {
  public:
-  // The embedded encoder: a compact ConvNeXt. Until pre-trained weights are shipped its weights are
-  // seeded random features (always the same).
+  // The embedded encoder: a compact ConvNeXt, pre-trained by us (core/encoder/embedded/CARD.md).
   static std::shared_ptr<const Encoder> Embedded();
   // A published network: the ConvNeXt of a DDColor, a plain ConvNeXt (names as its authors'), or a
   // CLIP ViT, which describes pictures but cannot be personalized. Throws Error{kInvalidArgument}

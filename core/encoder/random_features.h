@@ -1,6 +1,6 @@
-// Weights for the embedded encoder until pre-trained ones are shipped: random features that
-// resemble a scattering transform (Bruna & Mallat 2013). Deterministic: our own generator, no
-// torch.
+// A ConvNeXt that has learned nothing: random features that resemble a scattering transform (Bruna
+// & Mallat 2013). What pre-training starts from and is compared with. Deterministic: our own
+// generator, no torch.
 #pragma once
 
 #include <cstdint>

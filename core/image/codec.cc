@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/image/orientation.h"
+#include "core/image/reduced.h"
 
 namespace color3d {
 namespace {
@@ -88,14 +89,23 @@ Image SelectChannels(Image image, const ImageInfo& info, bool keep_alpha) {
   return out;
 }
 
-cv::Mat DecodeStored(std::string_view bytes, const std::string& file_name, const ImageInfo& info) {
+// `reduction`: 1, or 2, 4, 8 for JPEG files, whose sides are divided by it (rounded up).
+cv::Mat DecodeStored(std::string_view bytes,
+                     const std::string& file_name,
+                     const ImageInfo& info,
+                     int reduction) {
+  const int flags = reduction == 2   ? cv::IMREAD_REDUCED_COLOR_2
+                    : reduction == 4 ? cv::IMREAD_REDUCED_COLOR_4
+                    : reduction == 8 ? cv::IMREAD_REDUCED_COLOR_8
+                                     : cv::IMREAD_UNCHANGED;
   const std::string tiff = info.format == ImageFormat::kTiff ? TiffAsStored(bytes) : std::string();
   const std::string_view source = tiff.empty() ? bytes : std::string_view(tiff);
   cv::Mat mat;
   try {
     const cv::Mat input(
         1, static_cast<int>(source.size()), CV_8U, const_cast<char*>(source.data()));
-    mat = cv::imdecode(input, cv::IMREAD_UNCHANGED);
+    mat = cv::imdecode(
+        input, reduction == 1 ? flags : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION));
   } catch (const cv::Exception& e) {
     throw InvalidArgument(file_name + " cannot be decoded (" + e.err + "); save it again");
   }
@@ -104,7 +114,8 @@ cv::Mat DecodeStored(std::string_view bytes, const std::string& file_name, const
                           " cannot be decoded: its image data is damaged or of a rare "
                           "kind; save it again as JPEG or PNG");
   }
-  if (mat.cols != info.width || mat.rows != info.height) {
+  const auto reduced = [reduction](int size) { return (size + reduction - 1) / reduction; };
+  if (mat.cols != reduced(info.width) || mat.rows != reduced(info.height)) {
     throw InvalidArgument(file_name + " is damaged: its header and its data differ in size");
   }
   return mat;
@@ -131,11 +142,12 @@ void CheckEncodable(const Image& image, bool alpha_allowed) {
   }
 }
 
-}  // namespace
-
-Image DecodeImage(std::string_view bytes, const std::string& file_name, bool keep_alpha) {
-  const ImageInfo info = ProbeImage(bytes, file_name);
-  const cv::Mat mat = DecodeStored(bytes, file_name, info);
+Image Decode(std::string_view bytes,
+             const std::string& file_name,
+             const ImageInfo& info,
+             int reduction,
+             bool keep_alpha) {
+  const cv::Mat mat = DecodeStored(bytes, file_name, info, reduction);
   Image image;
   if (mat.depth() == CV_8U) {
     image = PlanarFromMat<uint8_t>(mat, 1.0f / 255.0f);
@@ -150,6 +162,28 @@ Image DecodeImage(std::string_view bytes, const std::string& file_name, bool kee
   }
   image = SelectChannels(std::move(image), info, keep_alpha);
   return Oriented(image, ReadOrientation(bytes));
+}
+
+}  // namespace
+
+Image DecodeImage(std::string_view bytes, const std::string& file_name, bool keep_alpha) {
+  return Decode(bytes, file_name, ProbeImage(bytes, file_name), /*reduction=*/1, keep_alpha);
+}
+
+Image ReadImageWithin(const std::filesystem::path& path, int max_side_px) {
+  if (max_side_px < 1) {
+    throw InvalidArgument("a picture cannot be reduced to " + std::to_string(max_side_px) + " px");
+  }
+  const std::string bytes = ReadFile(path);
+  const std::string name = path.filename().string();
+  const ImageInfo info = ProbeImage(bytes, name);
+  int reduction = 1;
+  if (info.format == ImageFormat::kJpeg) {
+    // Twice the wanted size is left, so that the last step still averages areas.
+    const int side = std::max(info.width, info.height);
+    while (reduction < 8 && side / (2 * reduction) >= 2 * max_side_px) reduction *= 2;
+  }
+  return FitWithin(Decode(bytes, name, info, reduction, /*keep_alpha=*/false), max_side_px);
 }
 
 Image ReadImage(const std::filesystem::path& path, bool keep_alpha) {

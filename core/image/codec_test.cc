@@ -13,6 +13,7 @@
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "core/image/orientation.h"
+#include "core/image/reduced.h"
 
 namespace color3d {
 namespace {
@@ -299,6 +300,36 @@ TEST(Codec, OddSizes) {
     const Image image = Noise(width, height, 1);
     EXPECT_LE(WorstDifference(DecodeImage(EncodePng16(image), "a.png"), image), 1e-5);
   }
+}
+
+TEST(ReadImageWithinTest, LargeJpegsKeepLookOrientationAndChannels) {
+  Image image(1601, 1203, 3);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      image.At(0, y, x) = static_cast<float>(x) / 1601.0f;
+      image.At(1, y, x) = static_cast<float>(y) / 1203.0f;
+      image.At(2, y, x) = 0.4f;
+    }
+  }
+  const ScratchFolder folder;
+  for (int channels : {1, 3}) {
+    Image written(image.width, image.height, channels);
+    std::copy_n(image.data.begin(), written.data.size(), written.data.begin());
+    WriteFileAtomic(folder.path() / "a.jpg", EncodeJpeg(written, 95));
+    const Image small = ReadImageWithin(folder.path() / "a.jpg", 160);
+    const Image expected = FitWithin(ReadImage(folder.path() / "a.jpg"), 160);
+    ASSERT_EQ(small.width, 160);
+    ASSERT_EQ(small.height, expected.height);
+    ASSERT_EQ(small.channels, channels);
+    for (size_t i = 0; i < small.data.size(); ++i) {
+      ASSERT_NEAR(small.data[i], expected.data[i], 0.02f);
+    }
+    WriteFileAtomic(folder.path() / "a.png", EncodePng8(written));
+    EXPECT_EQ(ReadImageWithin(folder.path() / "a.png", 160).data,
+              FitWithin(ReadImage(folder.path() / "a.png"), 160).data);
+  }
+  EXPECT_EQ(ReadImageWithin(folder.path() / "a.png", 5000).width, 1601);
+  EXPECT_THROW(ReadImageWithin(folder.path() / "a.png", 0), Error);
 }
 
 }  // namespace

@@ -13,49 +13,70 @@ namespace color3d {
 namespace {
 
 constexpr int kMaxComponents = 32;
-// Multiply-adds of all products together; sets how many cells of each view take part.
+// Multiply-adds of all products together, and of the covariance.
 constexpr double kWorkBudget = 2e10;
-constexpr int kMinCells = 48;
-constexpr int kMaxCells = 400;
+constexpr double kCovarianceBudget = 4e9;
+// Cells that all views together should be asked about: enough for the mean of any of them.
+constexpr int kQueries = 8000;
+constexpr int kMinQueriesPerView = 3;
+constexpr int kMinBankCells = 48;
+// Queries of one matrix product: their distances stay in the cache.
+constexpr int kBatch = 256;
 
-int CellsPerView(size_t views, int dims) {
-  const double pairs = static_cast<double>(views) * static_cast<double>(views);
-  const double cells = std::sqrt(kWorkBudget / (pairs * dims));
-  return std::clamp(static_cast<int>(cells), kMinCells, kMaxCells);
+struct CellCounts {
+  int bank = 0;     // of the view that explains
+  int queries = 0;  // of each view that is explained
+};
+
+CellCounts CountsFor(size_t views, int dims) {
+  const double n = static_cast<double>(views);
+  const int queries =
+      std::clamp(static_cast<int>(kQueries / n), kMinQueriesPerView, ViewFeatures::kMaxCells);
+  const double bank = kWorkBudget / (n * n * queries * dims);
+  return {static_cast<int>(std::clamp<double>(bank, kMinBankCells, ViewFeatures::kMaxCells)),
+          queries};
 }
 
-// One column per taken cell; cells are taken at even steps through the grid.
-Eigen::MatrixXf TakeCells(const Image& features, int wanted) {
-  const int64_t available = static_cast<int64_t>(features.PlaneSize());
-  const int64_t taken = std::min<int64_t>(available, wanted);
-  Eigen::MatrixXf cells(features.channels, taken);
-  for (int64_t i = 0; i < taken; ++i) {
-    const int64_t cell = (2 * i + 1) * available / (2 * taken);
-    for (int c = 0; c < features.channels; ++c) {
-      const float value = features.Plane(c)[cell];
-      cells(c, i) = std::isfinite(value) ? value : 0.0f;
-    }
+// One column for each of the first `count` cells.
+Eigen::MatrixXf Cells(const ViewFeatures& view, int count) {
+  Eigen::MatrixXf cells(view.channels, std::min(count, view.Cells()));
+  for (Eigen::Index i = 0; i < cells.size(); ++i) {
+    cells.data()[i] =
+        Eigen::half_impl::half_to_float(Eigen::half_impl::raw_uint16_to_half(view.deep[i]));
   }
   return cells;
 }
 
 // Standardises all views together and projects onto the leading principal components. Distances are
 // afterwards root mean squares per channel of the standardised features.
-void Project(std::vector<Eigen::MatrixXf>& views) {
-  const Eigen::Index channels = views[0].rows();
+struct Projection {
+  Eigen::MatrixXf matrix;
+  Eigen::VectorXf offset;
+
+  Eigen::MatrixXf Apply(const Eigen::MatrixXf& cells) const {
+    return (matrix * cells).colwise() - offset;
+  }
+};
+
+Projection FitProjection(const std::vector<const ViewFeatures*>& views, int cells_per_view) {
+  const Eigen::Index channels = views[0]->channels;
+  const double affordable =
+      kCovarianceBudget / (static_cast<double>(channels * channels) * views.size());
+  const int taken = std::clamp(static_cast<int>(affordable), 4, cells_per_view);
   double count = 0.0;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(channels);
-  for (const auto& view : views) {
-    mean += view.cast<double>().rowwise().sum();
-    count += static_cast<double>(view.cols());
+  for (const ViewFeatures* view : views) {
+    const Eigen::MatrixXf cells = Cells(*view, taken);
+    mean += cells.cast<double>().rowwise().sum();
+    count += static_cast<double>(cells.cols());
   }
   mean /= count;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(channels, channels);
-  for (const auto& view : views) {
-    const Eigen::MatrixXd centred = view.cast<double>().colwise() - mean;
-    covariance += centred * centred.transpose();
+  for (const ViewFeatures* view : views) {
+    const Eigen::MatrixXd centred = Cells(*view, taken).cast<double>().colwise() - mean;
+    covariance.selfadjointView<Eigen::Lower>().rankUpdate(centred);
   }
-  covariance /= count;
+  covariance = Eigen::MatrixXd(covariance.selfadjointView<Eigen::Lower>()) / count;
   // A channel that never changes carries nothing and must not be blown up.
   const double floor = 1e-12 + 1e-9 * covariance.diagonal().maxCoeff();
   const Eigen::VectorXd scale = (covariance.diagonal().array() > floor)
@@ -65,57 +86,113 @@ void Project(std::vector<Eigen::MatrixXf>& views) {
   covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance);
   const Eigen::Index kept = std::min<Eigen::Index>(channels, kMaxComponents);
-  const Eigen::MatrixXf projection =
+  Projection projection;
+  projection.matrix =
       (solver.eigenvectors().rightCols(kept).transpose() * scale.asDiagonal()).cast<float>();
-  const Eigen::VectorXf offset = projection * mean.cast<float>();
-  for (auto& view : views) view = ((projection * view).colwise() - offset).eval();
+  projection.offset = projection.matrix * mean.cast<float>();
+  return projection;
 }
 
-// Mean over the columns of `to` of the distance to the nearest column of `from`.
-double MeanNearest(const Eigen::MatrixXf& from,
-                   const Eigen::VectorXf& from_squares,
-                   const Eigen::MatrixXf& to,
-                   const Eigen::VectorXf& to_squares) {
-  Eigen::MatrixXf distances = -2.0f * from.transpose() * to;
-  distances.colwise() += from_squares;
-  double sum = 0.0;
-  for (Eigen::Index j = 0; j < to.cols(); ++j) {
-    sum += std::sqrt(std::max(0.0f, distances.col(j).minCoeff() + to_squares[j]));
+// The cells that are to be explained: `owner[q]` is the view of column q, and each view weighs the
+// same however many cells it has.
+struct Queries {
+  Eigen::MatrixXf cells;
+  Eigen::VectorXf squares;
+  std::vector<int> owner;
+  std::vector<double> weight;
+};
+
+Queries GatherQueries(const std::vector<Eigen::MatrixXf>& cells, int per_view) {
+  Eigen::Index total = 0;
+  for (const auto& view : cells) total += std::min<Eigen::Index>(per_view, view.cols());
+  Queries queries;
+  queries.cells.resize(cells[0].rows(), total);
+  Eigen::Index column = 0;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    const Eigen::Index count = std::min<Eigen::Index>(per_view, cells[i].cols());
+    queries.cells.middleCols(column, count) = cells[i].leftCols(count);
+    queries.owner.insert(queries.owner.end(), count, static_cast<int>(i));
+    queries.weight.insert(queries.weight.end(), count, 1.0 / static_cast<double>(count));
+    column += count;
   }
-  return sum / static_cast<double>(to.cols());
+  queries.squares = queries.cells.colwise().squaredNorm().transpose();
+  return queries;
+}
+
+// Mean over the other views' queries of the distance to the nearest column of `bank`.
+double MeanNearest(const Eigen::MatrixXf& bank, const Queries& queries, int self, size_t views) {
+  if (views < 2) return 0.0;
+  const Eigen::VectorXf bank_squares = bank.colwise().squaredNorm().transpose();
+  const Eigen::MatrixXf minus_two_bank = -2.0f * bank.transpose();
+  double sum = 0.0;
+  for (Eigen::Index begin = 0; begin < queries.cells.cols(); begin += kBatch) {
+    const Eigen::Index count = std::min<Eigen::Index>(kBatch, queries.cells.cols() - begin);
+    Eigen::MatrixXf distances = minus_two_bank * queries.cells.middleCols(begin, count);
+    distances.colwise() += bank_squares;
+    for (Eigen::Index j = 0; j < count; ++j) {
+      const size_t query = static_cast<size_t>(begin + j);
+      if (queries.owner[query] == self) continue;
+      const float squared = distances.col(j).minCoeff() + queries.squares[begin + j];
+      sum += queries.weight[query] * std::sqrt(std::max(0.0f, squared));
+    }
+  }
+  return sum / static_cast<double>(views - 1);
+}
+
+std::vector<const ViewFeatures*> KeptViews(const std::vector<ViewFeatures>& views,
+                                           const std::vector<bool>& kept,
+                                           std::vector<int>* indices) {
+  std::vector<const ViewFeatures*> chosen;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (!kept.at(i)) continue;
+    chosen.push_back(&views[i]);
+    indices->push_back(static_cast<int>(i));
+    if (views[i].Cells() > 0 && views[i].channels == chosen[0]->channels) continue;
+    throw InvalidArgument("coverage needs features with one channel count for every view, got " +
+                          std::to_string(chosen[0]->channels) + " and " +
+                          std::to_string(views[i].channels));
+  }
+  if (chosen.empty()) throw InvalidArgument("coverage needs at least one view");
+  return chosen;
 }
 
 }  // namespace
 
-std::vector<std::vector<double>> FeatureDistances(const std::vector<Image>& deep_features,
-                                                  ProgressObserver& progress,
-                                                  const CancellationToken& cancel) {
-  const size_t n = deep_features.size();
-  if (n == 0) throw InvalidArgument("coverage needs at least one view");
-  const int channels = deep_features[0].channels;
-  for (const Image& features : deep_features) {
-    if (features.Empty() || features.channels != channels) {
-      throw InvalidArgument("coverage needs features with one channel count for every view, got " +
-                            std::to_string(channels) + " and " + std::to_string(features.channels));
-    }
-  }
-  const int cells = CellsPerView(n, std::min(channels, kMaxComponents));
-  std::vector<Eigen::MatrixXf> views;
-  for (const Image& features : deep_features) views.push_back(TakeCells(features, cells));
-  Project(views);
-  std::vector<Eigen::VectorXf> squares;
-  for (const auto& view : views) squares.push_back(view.colwise().squaredNorm().transpose());
-  std::vector<std::vector<double>> distance(n, std::vector<double>(n, 0.0));
+int CellsForCoverage(size_t views, int channels) {
+  const CellCounts counts =
+      CountsFor(std::max<size_t>(views, 1), std::min(channels, kMaxComponents));
+  return std::max(counts.bank, counts.queries);
+}
+
+std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
+                                         const std::vector<bool>& kept,
+                                         ProgressObserver& progress,
+                                         const CancellationToken& cancel) {
+  std::vector<int> indices;
+  const std::vector<const ViewFeatures*> chosen = KeptViews(views, kept, &indices);
+  const int64_t n = static_cast<int64_t>(chosen.size());
+  const CellCounts counts = CountsFor(chosen.size(), std::min(chosen[0]->channels, kMaxComponents));
+  const int taken = std::max(counts.bank, counts.queries);
+  cancel.ThrowIfCancelled();
+  const Projection projection = FitProjection(chosen, taken);
   ThreadPool pool;
-  for (size_t i = 0; i < n; ++i) {
+  std::vector<Eigen::MatrixXf> cells(chosen.size());
+  pool.ForEach(n, [&](int64_t i, int) { cells[i] = projection.Apply(Cells(*chosen[i], taken)); });
+  const Queries queries = GatherQueries(cells, counts.queries);
+  std::vector<double> means(views.size(), 0.0);
+  // In rounds, so that cancellation and progress stay on the calling thread.
+  const int64_t round = 4 * pool.thread_count();
+  for (int64_t begin = 0; begin < n; begin += round) {
     cancel.ThrowIfCancelled();
-    pool.ForEach(static_cast<int64_t>(n), [&](int64_t j, int) {
-      if (static_cast<size_t>(j) == i) return;
-      distance[i][j] = MeanNearest(views[i], squares[i], views[j], squares[j]);
+    pool.ForEach(std::min(round, n - begin), [&](int64_t k, int) {
+      const int64_t i = begin + k;
+      const Eigen::Index bank = std::min<Eigen::Index>(counts.bank, cells[i].cols());
+      means[indices[i]] =
+          MeanNearest(cells[i].leftCols(bank), queries, static_cast<int>(i), chosen.size());
     });
-    progress.OnProgress(static_cast<int64_t>(i) + 1, static_cast<int64_t>(n), "comparing views");
+    progress.OnProgress(std::min(n, begin + round), n, "comparing views");
   }
-  return distance;
+  return means;
 }
 
 }  // namespace color3d

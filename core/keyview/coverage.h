@@ -1,23 +1,28 @@
-// How well one view's deep features explain another's: the input of the coverage strategy
+// How well one view's deep features explain the other views: the score of the coverage strategy
 // (METHOD.md "Stage 1a"). Pure, thread-safe.
 #pragma once
 
 #include <vector>
 
 #include "core/base/cancellation.h"
-#include "core/base/image.h"
 #include "core/base/progress.h"
+#include "core/keyview/view_features.h"
 
 namespace color3d {
 
-// deep_features[i]: view i's features on a coarse grid (Encoder::DeepFeatures), equal channel
-// counts, any grid sizes. Returns d with d[i][j] = mean over the grid cells of view j of the root
-// mean squared distance to the nearest cell of view i; features are standardised over all views and
-// reduced to their leading principal components first, and cells are thinned out evenly, so that
-// some hundred views take seconds. d[i][i] = 0. Values that are not finite count as 0. Throws
-// Error{kInvalidArgument} when there is no view, a view has no cells, or channel counts differ.
-std::vector<std::vector<double>> FeatureDistances(const std::vector<Image>& deep_features,
-                                                  ProgressObserver& progress,
-                                                  const CancellationToken& cancel);
+// Entry i, for every kept view i: the mean over the other kept views' cells of the root mean
+// squared distance to the nearest cell of view i; 0 for the others and for a single view. Features
+// are standardised over all kept views and reduced to their leading principal components. Cells are
+// thinned out as views become more (first those that are explained, down to a few of each view), so
+// that 300 views take seconds and 2000 some ten seconds. The same numbers for any thread count.
+// Throws Error{kInvalidArgument} when no view is kept, a kept view has no cells, or channel counts
+// differ.
+std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
+                                         const std::vector<bool>& kept,
+                                         ProgressObserver& progress,
+                                         const CancellationToken& cancel);
+
+// How many cells of each view MeanFeatureDistances looks at, at most.
+int CellsForCoverage(size_t views, int channels);
 
 }  // namespace color3d

@@ -1,21 +1,24 @@
 #include "core/keyview/select.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
+#include "core/keyview/median.h"
 
 namespace color3d {
 namespace {
 
-using Matrix = std::vector<std::vector<double>>;
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr double kGuardDeviations = 2.0;  // METHOD.md "Stage 1a": median - 2 MAD
 // Rounding is no deviation: near-identical views have a MAD of almost nothing.
 constexpr double kGuardSlack = 1e-6;
 constexpr int kGuardMinViews = 5;
+constexpr Eigen::Index kTile = 64;
 
 bool IsUsable(const std::vector<double>& feature) {
   bool nonzero = false;
@@ -26,90 +29,77 @@ bool IsUsable(const std::vector<double>& feature) {
   return nonzero;
 }
 
-// Rows of unit length; unusable ones become empty.
-Matrix Normalised(const Matrix& features) {
-  Matrix rows;
-  for (const std::vector<double>& feature : features) {
-    if (feature.size() != features[0].size() || feature.empty()) {
-      throw InvalidArgument("view descriptors must have one length >= 1, got " +
-                            std::to_string(features[0].size()) + " and " +
-                            std::to_string(feature.size()));
-    }
-    if (!IsUsable(feature)) {
-      rows.emplace_back();
-      continue;
-    }
+void CheckLengths(const std::vector<std::vector<double>>& descriptors) {
+  if (descriptors.empty()) throw InvalidArgument("there is no view to choose a key view from");
+  for (const std::vector<double>& descriptor : descriptors) {
+    if (descriptor.size() == descriptors[0].size() && !descriptor.empty()) continue;
+    throw InvalidArgument("view descriptors must have one length >= 1, got " +
+                          std::to_string(descriptors[0].size()) + " and " +
+                          std::to_string(descriptor.size()));
+  }
+}
+
+// One row of unit length for each index.
+Matrix UnitRows(const std::vector<std::vector<double>>& descriptors,
+                const std::vector<int>& indices) {
+  Matrix rows(indices.size(), descriptors[0].size());
+  for (size_t i = 0; i < indices.size(); ++i) {
+    const std::vector<double>& values = descriptors[indices[i]];
+    auto row = rows.row(static_cast<Eigen::Index>(i));
+    row = Eigen::Map<const Eigen::RowVectorXd>(values.data(), row.size());
     // Divided by the largest value first, so that squares neither overflow nor vanish.
-    double largest = 0.0;
-    for (double value : feature) largest = std::max(largest, std::abs(value));
-    double squares = 0.0;
-    for (double value : feature) squares += (value / largest) * (value / largest);
-    const double norm = std::sqrt(squares);
-    std::vector<double> row(feature.size());
-    for (size_t i = 0; i < row.size(); ++i) row[i] = feature[i] / largest / norm;
-    rows.push_back(std::move(row));
+    row /= row.cwiseAbs().maxCoeff();
+    row /= row.norm();
   }
   return rows;
 }
 
-double Dot(const std::vector<double>& x, const std::vector<double>& y) {
-  return std::inner_product(x.begin(), x.end(), y.begin(), 0.0);
+std::vector<int> IndicesOf(const std::vector<bool>& kept) {
+  std::vector<int> indices;
+  for (size_t i = 0; i < kept.size(); ++i) {
+    if (kept[i]) indices.push_back(static_cast<int>(i));
+  }
+  return indices;
 }
 
-std::string ListOf(const std::vector<int>& indices) {
-  std::string text;
-  for (size_t i = 0; i < indices.size() && i < 8; ++i) {
-    text += (i ? ", " : "") + std::to_string(indices[i]);
+// rows rows^T, its lower triangle in tiles: each entry is one product, whatever the thread count.
+Matrix Cosines(const Matrix& rows, ThreadPool& pool) {
+  const Eigen::Index n = rows.rows();
+  const Eigen::Index tiles = (n + kTile - 1) / kTile;
+  Matrix cosines(n, n);
+  pool.ForEach(tiles * (tiles + 1) / 2, [&](int64_t pair, int) {
+    Eigen::Index i = 0;
+    for (; pair > i; ++i) pair -= i + 1;
+    const Eigen::Index top = i * kTile;
+    const Eigen::Index left = pair * kTile;
+    const Eigen::Index height = std::min(kTile, n - top);
+    const Eigen::Index width = std::min(kTile, n - left);
+    const Matrix tile = (rows.middleRows(top, height) * rows.middleRows(left, width).transpose())
+                            .cwiseMax(-1.0)
+                            .cwiseMin(1.0);
+    cosines.block(top, left, height, width) = tile;
+    if (pair != i) cosines.block(left, top, width, height) = tile.transpose();
+  });
+  // The diagonal tiles are not symmetric to the last bit.
+  for (Eigen::Index i = 0; i < n; ++i) {
+    cosines(i, i) = 1.0;
+    for (Eigen::Index j = i / kTile * kTile; j < i; ++j) cosines(j, i) = cosines(i, j);
   }
-  return indices.size() > 8 ? text + ", ..." : text;
-}
-
-double Median(std::vector<double> values) {
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  if (values.size() % 2 == 1) return values[middle];
-  const double upper = values[middle];
-  return 0.5 * (upper + *std::max_element(values.begin(), values.begin() + middle));
-}
-
-struct Similarities {
-  std::vector<int> usable;  // view indices
-  Matrix cosine;            // usable x usable
-  std::vector<double> mean_to_others;
-};
-
-Similarities ComputeSimilarities(const Matrix& features) {
-  const Matrix rows = Normalised(features);
-  Similarities result;
-  for (size_t i = 0; i < rows.size(); ++i) {
-    if (!rows[i].empty()) result.usable.push_back(static_cast<int>(i));
-  }
-  const size_t n = result.usable.size();
-  result.cosine.assign(n, std::vector<double>(n, 1.0));
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t j = 0; j < i; ++j) {
-      const double cosine =
-          std::clamp(Dot(rows[result.usable[i]], rows[result.usable[j]]), -1.0, 1.0);
-      result.cosine[i][j] = result.cosine[j][i] = cosine;
-    }
-  }
-  for (size_t i = 0; i < n; ++i) {
-    const double sum = std::accumulate(result.cosine[i].begin(), result.cosine[i].end(), 0.0) - 1.0;
-    result.mean_to_others.push_back(n > 1 ? sum / static_cast<double>(n - 1) : 1.0);
-  }
-  return result;
+  return cosines;
 }
 
 // H_i = -sum_j P_ij log P_ij, P = softmax(S_i / temperature), written as log Z - <S> / temperature
 // with the largest similarity taken out: exact for any temperature.
-double RowEntropy(const std::vector<double>& row, size_t self, const KeyViewOptions& options) {
+double RowEntropy(const Eigen::Ref<const Eigen::RowVectorXd>& row,
+                  Eigen::Index self,
+                  const KeyViewOptions& options) {
   double largest = -std::numeric_limits<double>::infinity();
-  for (size_t j = 0; j < row.size(); ++j) {
+  for (Eigen::Index j = 0; j < row.size(); ++j) {
     if (!(options.exclude_self && j == self)) largest = std::max(largest, row[j]);
   }
   double sum = 0.0;
   double weighted = 0.0;
-  for (size_t j = 0; j < row.size(); ++j) {
+  for (Eigen::Index j = 0; j < row.size(); ++j) {
     if (options.exclude_self && j == self) continue;
     const double logit = (row[j] - largest) / options.temperature;
     const double weight = std::exp(logit);
@@ -119,141 +109,143 @@ double RowEntropy(const std::vector<double>& row, size_t self, const KeyViewOpti
   return sum > 0.0 ? std::log(sum) - weighted / sum : 0.0;
 }
 
-// Marks views whose mean similarity to the others lies far below the rest's (an outlier frame:
-// lens cap, blur). It is equally unlike all others, which the entropy formula takes for variety.
-void ApplyOutlierGuard(std::vector<RankedView>& views, std::vector<std::string>& warnings) {
+void SetAsideUnusable(const std::vector<std::vector<double>>& descriptors, GuardedViews* guarded) {
+  std::string list;
+  int count = 0;
+  for (size_t i = 0; i < descriptors.size(); ++i) {
+    if (IsUsable(descriptors[i])) continue;
+    guarded->views[i].set_aside = "no usable features";
+    if (++count <= 8) list += (list.empty() ? "" : ", ") + std::to_string(i);
+  }
+  if (count == 0) return;
+  if (static_cast<size_t>(count) == descriptors.size()) {
+    throw InvalidArgument(
+        "no view has a usable descriptor (all are zero or not finite); are the photos all black?");
+  }
+  guarded->warnings.push_back("key view: " + std::to_string(count) +
+                              " views have a zero or non-finite descriptor and were set aside "
+                              "(view " +
+                              list + (count > 8 ? ", ..." : "") + ")");
+}
+
+// A frame whose mean similarity to the others lies far below the rest's is equally unlike all
+// others, which the entropy formula takes for variety.
+void SetAsideOutliers(GuardedViews* guarded) {
   std::vector<double> means;
-  for (const RankedView& view : views) {
-    if (!view.set_aside) means.push_back(view.mean_similarity);
+  for (const RankedView& view : guarded->views) {
+    if (view.set_aside.empty()) means.push_back(view.mean_similarity);
   }
   if (static_cast<int>(means.size()) < kGuardMinViews) return;
   const double median = Median(means);
   std::vector<double> deviations;
   for (double mean : means) deviations.push_back(std::abs(mean - median));
   const double limit = median - kGuardDeviations * Median(deviations) - kGuardSlack;
-  std::vector<int> rejected;
-  for (RankedView& view : views) {
-    if (view.set_aside || view.mean_similarity >= limit) continue;
-    view.set_aside = true;
-    rejected.push_back(view.index);
-  }
-  if (!rejected.empty()) {
-    warnings.push_back("key view: " + std::to_string(rejected.size()) +
-                       " views are unlike the others and were set aside");
+  for (RankedView& view : guarded->views) {
+    if (view.set_aside.empty() && view.mean_similarity < limit)
+      view.set_aside = "unlike the others";
   }
 }
 
-std::vector<RankedView> UsableViews(const Similarities& similarities,
-                                    size_t view_count,
-                                    std::vector<std::string>& warnings) {
-  if (similarities.usable.empty()) {
-    throw InvalidArgument(
-        "no view has a usable descriptor (all are zero or not finite); are the photos all black?");
+// Mean cosine to the other kept views; of kept views and of all others alike.
+void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
+                          GuardedViews* guarded) {
+  const std::vector<bool> kept = guarded->Kept();
+  const Matrix kept_rows = UnitRows(descriptors, IndicesOf(kept));
+  const Eigen::VectorXd total = kept_rows.colwise().sum().transpose();
+  const double count = static_cast<double>(kept_rows.rows());
+  for (RankedView& view : guarded->views) {
+    if (!IsUsable(descriptors[view.index])) continue;
+    const double sum = UnitRows(descriptors, {view.index}).row(0).dot(total);
+    const double own = kept[view.index] ? 1.0 : 0.0;
+    view.mean_similarity = count - own > 0.0 ? (sum - own) / (count - own) : 1.0;
   }
-  std::vector<RankedView> views(view_count);
-  std::vector<int> unusable;
-  for (size_t i = 0; i < view_count; ++i) {
-    views[i].index = static_cast<int>(i);
-    views[i].set_aside = true;
-  }
-  for (size_t i = 0; i < similarities.usable.size(); ++i) {
-    RankedView& view = views[similarities.usable[i]];
-    view.set_aside = false;
-    view.mean_similarity = similarities.mean_to_others[i];
-  }
-  for (const RankedView& view : views) {
-    if (view.set_aside) unusable.push_back(view.index);
-  }
-  if (!unusable.empty()) {
-    warnings.push_back("key view: " + std::to_string(unusable.size()) +
-                       " views have a zero or non-finite descriptor and were set aside (view " +
-                       ListOf(unusable) + ")");
-  }
-  return views;
-}
-
-KeyViewSelection Rank(std::vector<RankedView> views,
-                      const KeyViewOptions& options,
-                      std::vector<std::string> warnings) {
-  std::stable_sort(views.begin(), views.end(), [](const RankedView& x, const RankedView& y) {
-    if (x.set_aside != y.set_aside) return y.set_aside;
-    return x.score > y.score;
-  });
-  if (options.strategy == KeyViewStrategy::kManual) {
-    const auto chosen = std::find_if(views.begin(), views.end(), [&](const RankedView& view) {
-      return view.index == options.manual_index;
-    });
-    if (chosen->set_aside) warnings.push_back("key view: the chosen view is unlike all others");
-    std::rotate(views.begin(), chosen, chosen + 1);
-  }
-  KeyViewSelection selection;
-  selection.index = views[0].index;
-  if (views.size() > 1 && !views[1].set_aside) selection.margin = views[0].score - views[1].score;
-  selection.ranking = std::move(views);
-  selection.warnings = std::move(warnings);
-  return selection;
 }
 
 }  // namespace
 
-void KeyViewOptions::Validate(int view_count) const {
-  if (view_count < 1) throw InvalidArgument("there is no view to choose a key view from");
-  if (!(temperature > 0.0) || !std::isfinite(temperature)) {
-    throw InvalidArgument("key view option temperature is " + std::to_string(temperature) +
-                          ", it must be > 0");
-  }
-  if (strategy == KeyViewStrategy::kManual && (manual_index < 0 || manual_index >= view_count)) {
-    throw InvalidArgument("key view option manual_index is " + std::to_string(manual_index) +
-                          ", the scene has views 0 to " + std::to_string(view_count - 1));
-  }
+void KeyViewOptions::Validate() const {
+  if (temperature > 0.0 && std::isfinite(temperature)) return;
+  throw InvalidArgument("key view option temperature is " + std::to_string(temperature) +
+                        ", it must be > 0");
 }
 
-KeyViewSelection SelectKeyViewByEntropy(const std::vector<std::vector<double>>& features,
-                                        const KeyViewOptions& options) {
-  options.Validate(static_cast<int>(features.size()));
-  const Similarities similarities = ComputeSimilarities(features);
-  std::vector<std::string> warnings;
-  std::vector<RankedView> views = UsableViews(similarities, features.size(), warnings);
-  for (size_t i = 0; i < similarities.usable.size(); ++i) {
-    views[similarities.usable[i]].score = RowEntropy(similarities.cosine[i], i, options);
-  }
-  if (options.outlier_guard) ApplyOutlierGuard(views, warnings);
-  return Rank(std::move(views), options, std::move(warnings));
+std::vector<bool> GuardedViews::Kept() const {
+  std::vector<bool> kept;
+  for (const RankedView& view : views) kept.push_back(view.set_aside.empty());
+  return kept;
 }
 
-KeyViewSelection SelectKeyViewByCoverage(const std::vector<std::vector<double>>& mean_distance,
-                                         const std::vector<std::vector<double>>& features,
-                                         const KeyViewOptions& options) {
-  const size_t n = features.size();
-  options.Validate(static_cast<int>(n));
-  if (mean_distance.size() != n) {
-    throw InvalidArgument("coverage has distances for " + std::to_string(mean_distance.size()) +
-                          " views and descriptors for " + std::to_string(n));
+GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
+                        const std::vector<std::string>& unfit,
+                        const KeyViewOptions& options) {
+  options.Validate();
+  CheckLengths(descriptors);
+  if (!unfit.empty() && unfit.size() != descriptors.size()) {
+    throw InvalidArgument("frames were judged for " + std::to_string(unfit.size()) +
+                          " views, descriptors are there for " +
+                          std::to_string(descriptors.size()));
   }
-  const Similarities similarities = ComputeSimilarities(features);
-  std::vector<std::string> warnings;
-  std::vector<RankedView> views = UsableViews(similarities, n, warnings);
-  for (RankedView& view : views) {
-    if (mean_distance[view.index].size() != n) {
-      throw InvalidArgument("the coverage matrix of " + std::to_string(n) + " views has a row of " +
-                            std::to_string(mean_distance[view.index].size()));
+  GuardedViews guarded;
+  guarded.views.resize(descriptors.size());
+  for (size_t i = 0; i < descriptors.size(); ++i) guarded.views[i].index = static_cast<int>(i);
+  SetAsideUnusable(descriptors, &guarded);
+  if (options.outlier_guard && !unfit.empty()) {
+    GuardedViews fit = guarded;
+    for (RankedView& view : fit.views) {
+      if (view.set_aside.empty()) view.set_aside = unfit[view.index];
     }
-    if (view.set_aside) continue;
-    double sum = 0.0;
-    int count = 0;
-    for (int other : similarities.usable) {
-      if (other == view.index) continue;
-      sum += mean_distance[view.index][other];
-      ++count;
-    }
-    view.score = count > 0 ? -sum / count : 0.0;
+    const std::vector<bool> kept = fit.Kept();
+    if (std::find(kept.begin(), kept.end(), true) != kept.end()) guarded = std::move(fit);
+  }
+  FillMeanSimilarities(descriptors, &guarded);
+  if (options.outlier_guard) SetAsideOutliers(&guarded);
+  return guarded;
+}
+
+std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& descriptors,
+                                     const std::vector<bool>& kept,
+                                     const KeyViewOptions& options) {
+  options.Validate();
+  CheckLengths(descriptors);
+  const std::vector<int> indices = IndicesOf(kept);
+  ThreadPool pool;
+  const Matrix cosines = Cosines(UnitRows(descriptors, indices), pool);
+  std::vector<double> entropies(descriptors.size(), 0.0);
+  pool.ForEach(static_cast<int64_t>(indices.size()), [&](int64_t i, int) {
+    entropies[indices[i]] = RowEntropy(cosines.row(i), i, options);
+  });
+  return entropies;
+}
+
+KeyViewSelection RankViews(GuardedViews guarded, const std::vector<double>& scores) {
+  if (scores.size() != guarded.views.size()) {
+    throw InvalidArgument("there are scores for " + std::to_string(scores.size()) + " of " +
+                          std::to_string(guarded.views.size()) + " views");
+  }
+  std::vector<double> kept_scores;
+  for (RankedView& view : guarded.views) {
+    if (!view.set_aside.empty()) continue;
+    view.score = scores[view.index];
     if (!std::isfinite(view.score)) {
-      throw InvalidArgument("the coverage of view " + std::to_string(view.index) +
-                            " is not finite");
+      throw InvalidArgument("the score of view " + std::to_string(view.index) + " is not finite");
     }
+    kept_scores.push_back(view.score);
   }
-  if (options.outlier_guard) ApplyOutlierGuard(views, warnings);
-  return Rank(std::move(views), options, std::move(warnings));
+  std::stable_sort(
+      guarded.views.begin(), guarded.views.end(), [](const RankedView& x, const RankedView& y) {
+        if (x.set_aside.empty() != y.set_aside.empty()) return x.set_aside.empty();
+        return x.score > y.score;
+      });
+  KeyViewSelection selection;
+  selection.index = guarded.views[0].index;
+  if (kept_scores.size() > 1) {
+    selection.margin = guarded.views[0].score - guarded.views[1].score;
+    const double spread = guarded.views[0].score - Median(kept_scores);
+    selection.decisiveness = spread > 0.0 ? std::min(1.0, selection.margin / spread) : 0.0;
+  }
+  selection.ranking = std::move(guarded.views);
+  selection.warnings = std::move(guarded.warnings);
+  return selection;
 }
 
 }  // namespace color3d

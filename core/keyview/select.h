@@ -1,4 +1,6 @@
-// Key view selection (METHOD.md "Stage 1a"): which photo the user should colour. Pure, float64.
+// Key view selection (METHOD.md "Stage 1a"): which photo the user should colour. First views that
+// must not win are set aside, then the strategy's scores rank the rest. Pure, float64, the same
+// answer on every run; thread-safe.
 #pragma once
 
 #include <string>
@@ -6,42 +8,59 @@
 
 namespace color3d {
 
-enum class KeyViewStrategy { kEntropy, kCoverage, kManual };
+enum class KeyViewStrategy { kEntropy, kCoverage, kTracks, kManual };
 
 struct KeyViewOptions {
   KeyViewStrategy strategy = KeyViewStrategy::kCoverage;
   double temperature = 1.0;   // of the softmax, > 0
   bool exclude_self = false;  // leave the view's similarity to itself out of the softmax
-  bool outlier_guard = true;  // set aside views with mean similarity < median - 2 MAD
-  int manual_index = -1;      // for kManual: the chosen view
-  void Validate(int view_count) const;
+  // Set aside frames that show nothing (UnfitFrames) and, among 5 views or more, those with mean
+  // similarity < median - 2 MAD.
+  bool outlier_guard = true;
+  void Validate() const;  // throws Error{kInvalidArgument}
 };
 
 struct RankedView {
   int index = 0;
-  double score = 0.0;            // entropy (nats), or minus the mean nearest-feature distance
+  double score = 0.0;            // larger is better; 0 for views that were set aside
   double mean_similarity = 0.0;  // cosine to the other views
-  bool set_aside = false;        // by the outlier guard
+  std::string set_aside;         // why; empty: the view takes part
 };
+
+struct GuardedViews {
+  std::vector<RankedView> views;  // by index, without scores
+  std::vector<std::string> warnings;
+
+  // One entry a view: it takes part.
+  std::vector<bool> Kept() const;
+};
+
+// descriptors[i] is view i's (any length >= 1, all equal). Zero or non-finite ones are set aside in
+// any case; unfit[i] (UnfitFrames; may be empty for no such check) and the similarity guard count
+// when options.outlier_guard. Throws Error{kInvalidArgument} for no views, descriptors of several
+// lengths, or when no view is left.
+GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
+                        const std::vector<std::string>& unfit,
+                        const KeyViewOptions& options);
+
+// The paper's score of every kept view, 0 for the others: H_i = -sum_j P_ij log P_ij (nats) with P
+// the row softmax of S / temperature, S the cosine similarities among the kept views. Memory grows
+// with views^2: 32 MB for 2000.
+std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& descriptors,
+                                     const std::vector<bool>& kept,
+                                     const KeyViewOptions& options);
 
 struct KeyViewSelection {
   int index = 0;
-  double margin = 0.0;              // score of the winner minus the next one's
-  std::vector<RankedView> ranking;  // best first; views that were set aside last
+  double margin = 0.0;  // score of the winner minus the next one's
+  // The margin as a share of the distance from the winner to the median of the views that take
+  // part, 0..1: how clearly the winner stands out. 1 when there is no other view.
+  double decisiveness = 1.0;
+  std::vector<RankedView> ranking;  // best first, ties by index; views that were set aside last
   std::vector<std::string> warnings;
 };
 
-// features[i] is view i's descriptor (any length >= 1, all equal). H_i = -sum_j P_ij log P_ij with
-// P the row softmax of S / temperature, S the cosine similarities; ties to the lowest index. Zero
-// or non-finite descriptors are set aside with a warning. Throws Error{kInvalidArgument} for no
-// views or when no descriptor is usable.
-KeyViewSelection SelectKeyViewByEntropy(const std::vector<std::vector<double>>& features,
-                                        const KeyViewOptions& options);
-
-// mean_distance[i][j]: how badly view i explains view j (mean nearest-neighbour distance of j's
-// deep features to i's). Chooses the row with the smallest mean over j != i.
-KeyViewSelection SelectKeyViewByCoverage(const std::vector<std::vector<double>>& mean_distance,
-                                         const std::vector<std::vector<double>>& features,
-                                         const KeyViewOptions& options);
+// scores[i] is view i's. Throws Error{kInvalidArgument} when a kept view's is not finite.
+KeyViewSelection RankViews(GuardedViews guarded, const std::vector<double>& scores);
 
 }  // namespace color3d

@@ -16,6 +16,7 @@ background:Canvas;color:CanvasText}
 h1{font-size:1.5rem;margin-bottom:.2rem}h2{font-size:1.1rem;margin-top:2rem;border-bottom:1px solid #8884}
 .row{display:flex;flex-wrap:wrap;gap:12px;margin:.4rem 0 1rem}
 figure{margin:0;flex:1 1 240px;max-width:540px}img{width:100%;border-radius:4px;display:block}
+.wide figure{max-width:none}
 figcaption{font-size:.85rem;opacity:.75}
 table{border-collapse:collapse}td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top}
 td.v{text-align:right;font-variant-numeric:tabular-nums}
@@ -55,6 +56,23 @@ std::string RowHtml(const ReportRow& row) {
   return html + "</div>";
 }
 
+std::string KeyViewHtml(const ReportKeyView& key) {
+  std::string html = "<h2>Key view</h2>";
+  for (const std::string& note : key.notes) html += "<p>" + EscapeHtml(note) + "</p>";
+  html += RowHtml(key.pictures);
+  if (!key.color_facts.empty()) {
+    html += "<h3>Its colour</h3><table>";
+    for (const auto& [name, text] : key.color_facts) {
+      html += "<tr><td>" + EscapeHtml(name) + "</td><td>" + EscapeHtml(text) + "</td></tr>";
+    }
+    html += "</table>";
+  }
+  if (!key.ranking.bytes.empty()) {
+    html += "<div class=\"wide\">" + PictureHtml(key.ranking) + "</div>";
+  }
+  return html;
+}
+
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   std::string html =
       "<h2>Plan</h2><table><tr><th>step</th><th></th><th>why</th><th>estimate, s</th>"
@@ -81,7 +99,7 @@ std::string RenderReport(const ReportData& data) {
   for (const std::string& warning : data.warnings) {
     html += "<p class=\"warn\">" + EscapeHtml(warning) + "</p>";
   }
-  if (!data.key_view.pictures.empty()) html += "<h2>Key view</h2>" + RowHtml(data.key_view);
+  if (!data.key_view.pictures.pictures.empty()) html += KeyViewHtml(data.key_view);
   if (!data.views.empty()) html += "<h2>Views</h2>";
   for (const ReportRow& row : data.views) html += RowHtml(row);
   if (!data.metrics.empty()) {

@@ -22,10 +22,18 @@ struct ReportRow {
   std::vector<ReportPicture> pictures;
 };
 
+// How the key view was chosen and where its colour comes from.
+struct ReportKeyView {
+  ReportRow pictures;
+  std::vector<std::string> notes;  // paragraphs of plain text
+  ReportPicture ranking;           // contact sheet over the whole width; may be empty
+  std::vector<std::pair<std::string, std::string>> color_facts;
+};
+
 struct ReportData {
   std::string title;
   std::string summary;  // one paragraph of plain text
-  ReportRow key_view;
+  ReportKeyView key_view;
   std::vector<ReportRow> views;
   std::vector<std::pair<std::string, double>> metrics;
   std::vector<CurvePoint> curves;

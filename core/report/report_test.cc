@@ -108,5 +108,19 @@ TEST(Report, EscapesTextAndPlotsConstantCurves) {
   EXPECT_NE(html.find("polyline"), std::string::npos);
 }
 
+TEST(Report, KeyViewSectionTellsChoiceAndColour) {
+  ReportData data;
+  data.key_view.pictures = {"a.jpg", {{"as captured", "\x89PNG"}}};
+  data.key_view.notes = {"Best of 5 views, narrowly ahead of <b>."};
+  data.key_view.ranking = {"all candidates", "\xff\xd8jpeg"};
+  data.key_view.color_facts = {{"source", "prompt"}, {"regions", "\"sky\" & lawn"}};
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("narrowly ahead of &lt;b&gt;."), std::string::npos);
+  EXPECT_NE(html.find("<td>source</td><td>prompt</td>"), std::string::npos);
+  EXPECT_NE(html.find("&amp; lawn"), std::string::npos);
+  EXPECT_NE(html.find("data:image/jpeg"), std::string::npos);
+  EXPECT_EQ(RenderReport({}).find("Key view"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace color3d

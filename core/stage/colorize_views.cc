@@ -5,11 +5,11 @@
 
 namespace color3d {
 
-void RunColorizeViews(int max_side_px, StageContext& context) {
+void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder) {
   CheckMaxSide(max_side_px);
   const Scene scene = ReadScene(context);
   const auto colorizer = LoadColorizer(
-      context.ReadInput(artifact::kColorizer), Encoder::Embedded(), context.threads());
+      context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), context.threads());
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
   const auto total = static_cast<int64_t>(scene.views.size());
   for (int64_t i = 0; i < total; ++i) {

@@ -5,7 +5,9 @@
 
 namespace color3d {
 
-void RunPersonalize(const ColorizerOptions& options, StageContext& context) {
+void RunPersonalize(const ColorizerOptions& options,
+                    StageContext& context,
+                    const std::string& encoder) {
   options.Validate();
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
@@ -13,7 +15,7 @@ void RunPersonalize(const ColorizerOptions& options, StageContext& context) {
   const auto luminance = images.Luminance(key);
   const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
   const Image ab = Resize(color.ab, luminance->width, luminance->height);
-  const auto colorizer = TrainColorizer(Encoder::Embedded(),
+  const auto colorizer = TrainColorizer(context.LoadEncoder(encoder),
                                         *luminance,
                                         ab,
                                         options,

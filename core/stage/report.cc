@@ -8,6 +8,7 @@
 #include "core/report/report_page.h"
 #include "core/report/scene_plan.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/report_key_view.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -158,8 +159,16 @@ std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context)
 
 void PassOnResults(StageContext& context) {
   using namespace artifact;
-  for (const char* name :
-       {kPly, kSplat, kModel, kColorizer, kKeyView, kKeyViewGray, kKeyViewColored, kSfmLog}) {
+  for (const char* name : {kPly,
+                           kSplat,
+                           kModel,
+                           kColorizer,
+                           kKeyView,
+                           kKeyViewGray,
+                           kKeyViewRanking,
+                           kKeyViewColored,
+                           kKeyColorFacts,
+                           kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }
   for (const std::string& name : context.InputsBelow(kRenders)) context.PassOn(name);
@@ -175,9 +184,11 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   ReportData data;
   data.title = "Color3D: " + std::to_string(scene.views.size()) + " views in colour";
   data.summary = Summary(scene, metrics, scene.views[key].name);
-  data.key_view = {scene.views[key].name,
-                   {Picture(context, artifact::kKeyViewGray, "as captured"),
-                    Picture(context, artifact::kKeyViewColored, "as coloured by the user")}};
+  data.key_view = ReportOfKeyView(
+      {scene.views[key].name,
+       {Picture(context, artifact::kKeyViewGray, "as captured"),
+        Picture(context, artifact::kKeyViewColored, "coloured: all colours come from here")}},
+      context);
   data.views = ViewRows(scene, context);
   for (const auto& [name, value] : metrics.items()) {
     data.metrics.emplace_back(name, value.get<double>());

@@ -1,103 +1,164 @@
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "core/color/lab.h"
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
 #include "core/keyview/coverage.h"
-#include "core/scene/view_images.h"
+#include "core/keyview/tracks.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/key_view_ranking.h"
 #include "core/stage/stages.h"
+#include "core/stage/view_features.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kFeatureSidePx = 384;
+constexpr int kThumbnailSidePx = 260;
 
 const char* StrategyName(KeyViewStrategy strategy) {
   switch (strategy) {
     case KeyViewStrategy::kEntropy:
       return "entropy";
-    case KeyViewStrategy::kCoverage:
-      return "coverage";
+    case KeyViewStrategy::kTracks:
+      return "tracks";
     case KeyViewStrategy::kManual:
       return "manual";
+    case KeyViewStrategy::kCoverage:
+      break;
   }
   return "coverage";
 }
 
-// Candidates are the training views: a held-out view must never lend its colour.
-KeyViewSelection Select(const SelectKeyViewOptions& options,
-                        const Scene& scene,
-                        const std::vector<int>& candidates,
-                        StageContext& context) {
-  KeyViewSelection selection;
-  if (options.selection.strategy == KeyViewStrategy::kManual) {
-    const int view = scene.FindView(options.view);
-    const auto found = std::find(candidates.begin(), candidates.end(), view);
-    if (found == candidates.end()) {
-      throw InvalidArgument("the view " + scene.views[view].name +
-                            " is held out for evaluation and cannot be the key view");
+// Per sparse point the candidates that see it. Empty when the points are made up.
+std::vector<std::vector<int>> TracksOf(const Scene& scene,
+                                       const std::vector<int>& candidates,
+                                       const StageContext& context) {
+  if (context.HasInput(artifact::kImportFacts) &&
+      ImportFactsFromJson(context.ReadInput(artifact::kImportFacts)).random_points) {
+    return {};
+  }
+  std::vector<int> candidate_of(scene.views.size(), -1);
+  for (size_t i = 0; i < candidates.size(); ++i) candidate_of[candidates[i]] = static_cast<int>(i);
+  std::vector<std::vector<int>> tracks;
+  for (const SparsePoint& point : scene.points) {
+    tracks.emplace_back();
+    for (int view : point.views) {
+      if (candidate_of.at(view) >= 0) tracks.back().push_back(candidate_of[view]);
     }
-    selection.index = static_cast<int>(found - candidates.begin());
-    selection.ranking = {{selection.index, 0.0, 0.0, false}};
-    return selection;
   }
-  const ViewImages images(scene, context.scene_folder(), kFeatureSidePx, 0);
-  const auto encoder = Encoder::Embedded();
-  const bool coverage = options.selection.strategy == KeyViewStrategy::kCoverage;
+  return tracks;
+}
+
+std::vector<double> CoverageScores(const std::vector<ViewFeatures>& features,
+                                   const std::vector<bool>& kept,
+                                   StageContext& context) {
+  std::vector<double> scores =
+      MeanFeatureDistances(features, kept, context.progress(), context.cancel());
+  for (double& score : scores) score = -score;
+  return scores;
+}
+
+void ChooseManually(const std::string& name,
+                    const Scene& scene,
+                    const std::vector<int>& candidates,
+                    KeyViewRanking* ranking) {
+  const int view = scene.FindView(name);
+  const auto found = std::find(candidates.begin(), candidates.end(), view);
+  if (found == candidates.end()) {
+    throw InvalidArgument("the view " + scene.views[view].name +
+                          " is held out for evaluation and cannot be the key view");
+  }
+  ranking->selection.index = static_cast<int>(found - candidates.begin());
+  ranking->selection.ranking = {{ranking->selection.index, 0.0, 0.0, ""}};
+}
+
+void ChooseByScore(const SelectKeyViewOptions& stage_options,
+                   const Scene& scene,
+                   const std::vector<int>& candidates,
+                   StageContext& context,
+                   KeyViewRanking* ranking) {
+  std::vector<std::filesystem::path> photos;
+  for (int view : candidates) {
+    photos.push_back(context.scene_folder() / scene.views[view].image_file);
+  }
+  const KeyViewOptions& options = stage_options.selection;
+  const auto encoder = context.LoadEncoder(stage_options.encoder);
+  const auto describer =
+      stage_options.features.empty() ? encoder : context.LoadEncoder(stage_options.features);
+  ranking->encoder = encoder->description();
+  if (describer != encoder) ranking->encoder += "; " + describer->description();
+  ranking->features = CollectViewFeatures(*describer, *encoder, photos, context);
   std::vector<std::vector<double>> descriptors;
-  std::vector<Image> deep;
-  for (size_t i = 0; i < candidates.size(); ++i) {
-    context.cancel().ThrowIfCancelled();
-    const auto luminance = images.Luminance(candidates[i]);
-    descriptors.push_back(encoder->Describe(*luminance));
-    if (coverage) deep.push_back(encoder->DeepFeatures(*luminance));
-    context.progress().OnProgress(
-        static_cast<int64_t>(i) + 1, static_cast<int64_t>(candidates.size()), "features");
+  std::vector<FrameContent> contents;
+  for (const ViewFeatures& view : ranking->features) {
+    descriptors.push_back(view.descriptor);
+    contents.push_back(view.content);
   }
-  if (!coverage) return SelectKeyViewByEntropy(descriptors, options.selection);
-  const auto distances = FeatureDistances(deep, context.progress(), context.cancel());
-  return SelectKeyViewByCoverage(distances, descriptors, options.selection);
+  GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents), options);
+  const std::vector<bool> kept = guarded.Kept();
+  KeyViewStrategy strategy = options.strategy;
+  std::vector<double> scores;
+  if (strategy == KeyViewStrategy::kTracks) {
+    const auto tracks = TracksOf(scene, candidates, context);
+    const std::string reason = tracks.empty() ? "the scene has no points from structure-from-motion"
+                                              : WhyTracksAreNoUse(tracks, kept);
+    if (reason.empty()) {
+      scores = TrackCoverage(tracks, kept);
+    } else {
+      strategy = KeyViewStrategy::kCoverage;
+      ranking->fallback = "Coverage in place of tracks: " + reason + ".";
+      context.progress().OnWarning("key view: " + ranking->fallback);
+    }
+  }
+  if (strategy == KeyViewStrategy::kEntropy) {
+    scores = SoftmaxEntropies(descriptors, kept, options);
+  } else if (strategy == KeyViewStrategy::kCoverage) {
+    scores = CoverageScores(ranking->features, kept, context);
+  }
+  ranking->strategy = StrategyName(strategy);
+  ranking->selection = RankViews(std::move(guarded), scores);
 }
 
 // The views that the guard set aside, by the names that the user knows.
-void WarnOfViewsSetAside(const KeyViewSelection& selection,
-                         const Scene& scene,
-                         const std::vector<int>& candidates,
-                         ProgressObserver& progress) {
+void WarnOfViewsSetAside(const KeyViewRanking& ranking, ProgressObserver& progress) {
+  constexpr int kMostNamed = 8;
   std::string names;
-  for (const RankedView& ranked : selection.ranking) {
-    if (ranked.set_aside) names += " " + scene.views[candidates[ranked.index]].name;
+  int count = 0;
+  for (const RankedView& ranked : ranking.selection.ranking) {
+    if (ranked.set_aside.empty() || ++count > kMostNamed) continue;
+    names +=
+        (names.empty() ? " " : ", ") + ranking.names[ranked.index] + " (" + ranked.set_aside + ")";
   }
-  if (!names.empty()) progress.OnWarning("key view: set aside:" + names);
+  if (count > kMostNamed) names += " and " + std::to_string(count - kMostNamed) + " more";
+  if (count > 0) progress.OnWarning("key view: set aside:" + names);
 }
 
 }  // namespace
 
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
+  // A held-out view must never lend its colour.
   const std::vector<int> candidates = scene.TrainingViews();
-  const KeyViewSelection selection = Select(options, scene, candidates, context);
-  for (const std::string& warning : selection.warnings) context.progress().OnWarning(warning);
-  WarnOfViewsSetAside(selection, scene, candidates, context.progress());
-
-  const View& key = scene.views[candidates[selection.index]];
-  nlohmann::ordered_json result{{"view", key.name},
-                                {"strategy", StrategyName(options.selection.strategy)},
-                                {"margin", selection.margin}};
-  for (const RankedView& ranked : selection.ranking) {
-    result["ranking"].push_back({{"view", scene.views[candidates[ranked.index]].name},
-                                 {"score", ranked.score},
-                                 {"mean_similarity", ranked.mean_similarity},
-                                 {"set_aside", ranked.set_aside}});
+  KeyViewRanking ranking;
+  ranking.strategy = StrategyName(options.selection.strategy);
+  for (int view : candidates) ranking.names.push_back(scene.views[view].name);
+  if (options.selection.strategy == KeyViewStrategy::kManual) {
+    ChooseManually(options.view, scene, candidates, &ranking);
+  } else {
+    ChooseByScore(options, scene, candidates, context, &ranking);
   }
+  for (const std::string& warning : ranking.selection.warnings) {
+    context.progress().OnWarning(warning);
+  }
+  WarnOfViewsSetAside(ranking, context.progress());
+  const View& key = scene.views[candidates[ranking.selection.index]];
   // The photo as captured, in grey: what the user colours.
-  const Image luminance = LuminanceFromSrgb(ReadImage(context.scene_folder() / key.image_file));
-  Image gray = luminance;
+  Image gray = LuminanceFromSrgb(ReadImage(context.scene_folder() / key.image_file));
   for (float& v : gray.data) v = static_cast<float>(GrayFromLuminance(v));
-  context.WriteOutput(artifact::kKeyView, result.dump(1) + "\n");
+  context.WriteOutput(artifact::kKeyView, KeyViewToJson(ranking));
   context.WriteOutput(artifact::kKeyViewGray, EncodePng8(gray));
+  context.WriteOutput(artifact::kKeyViewRanking,
+                      KeyViewSheetJpeg(ranking, FitWithin(gray, kThumbnailSidePx)));
 }
 
 }  // namespace color3d

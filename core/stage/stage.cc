@@ -27,6 +27,31 @@ int64_t StageContext::MemoryBytes() const {
   return static_cast<int64_t>(kShare * static_cast<double>(AvailableMemoryBytes()));
 }
 
+std::filesystem::path StageContext::Model(const std::string& name) const {
+  const auto found = setup_.models.find(name);
+  if (found != setup_.models.end()) return found->second;
+  std::string known;
+  for (const auto& [other, file] : setup_.models) known += (known.empty() ? "" : ", ") + other;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "this server has no model '" + name +
+                  "' (it has: " + (known.empty() ? "none" : known) + "); start it with --model " +
+                  name + "=FILE and retry the job");
+}
+
+std::unique_ptr<RemoteColorizer> StageContext::Remote(const std::string& name) const {
+  if (!setup_.remote_colorizers) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "this server has no backend '" + name + "'; start it with --backend " + name +
+                    "=ADDRESS and retry the job");
+  }
+  return setup_.remote_colorizers(name);
+}
+
+std::shared_ptr<const Encoder> StageContext::LoadEncoder(const std::string& model) const {
+  if (model.empty()) return Encoder::Embedded();
+  throw Error(ErrorCode::kUnimplemented, "encoders from weight files are not built yet");
+}
+
 std::filesystem::path StageContext::Input(const std::string& name) const {
   const auto found = setup_.inputs.find(name);
   if (found == setup_.inputs.end()) {

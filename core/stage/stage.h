@@ -5,12 +5,15 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
+#include "core/encoder/encoder.h"
+#include "core/keycolor/remote.h"
 
 namespace color3d {
 
@@ -25,6 +28,11 @@ class StageContext {
     int threads = 1;
     uint64_t seed = 1;
     int64_t memory_bytes = 0;  // that the stage may take; 0: 60 % of what is available
+    std::map<std::string, std::filesystem::path> models;  // the user's weights, by name
+    RemoteColorizerFactory remote_colorizers;             // the user's model servers; may be empty
+    std::string attempt;                                  // unique to this run, e.g. "jobs/3f/2"
+    // Kept between jobs (FileCache); empty: none.
+    std::filesystem::path cache_folder = {};
   };
 
   // The references must outlive the context.
@@ -38,6 +46,14 @@ class StageContext {
   int threads() const { return setup_.threads; }
   uint64_t seed() const { return setup_.seed; }
   int64_t MemoryBytes() const;
+  const std::string& attempt() const { return setup_.attempt; }
+  // File of the user's weights. Throws Error{kFailedPrecondition} naming those that there are.
+  std::filesystem::path Model(const std::string& name) const;
+  // A model server of the user's. Throws as Model.
+  std::unique_ptr<RemoteColorizer> Remote(const std::string& name) const;
+  // The encoder of these weights, loaded anew; the embedded one when `model` is empty.
+  std::shared_ptr<const Encoder> LoadEncoder(const std::string& model) const;
+  const std::filesystem::path& cache_folder() const { return setup_.cache_folder; }
   CheckpointStore& checkpoints() { return checkpoints_; }
   ProgressObserver& progress() { return progress_; }
   const CancellationToken& cancel() const { return cancel_; }

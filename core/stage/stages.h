@@ -23,25 +23,45 @@ void RunImportScene(const ImportOptions& options, StageContext& context);
 
 struct SelectKeyViewOptions {
   KeyViewOptions selection;
-  std::string view;  // for KeyViewStrategy::kManual: name or unique file stem
+  std::string view;      // for KeyViewStrategy::kManual: name or unique file stem
+  std::string encoder;   // weights by name in StageContext::Model; empty: the embedded encoder
+  std::string features;  // CLIP weights by name; empty: the encoder's features
 };
-// scene.json -> key_view.json, key_view.png. Only training views can win.
+// scene.json (import.json) -> key_view.json, key_view.png, key_view_ranking.jpg. Only training
+// views can win. Features of photos that were seen before come from the context's cache folder.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
 struct ColorizeKeyViewOptions {
-  enum class Source { kImage, kStrokes, kPoints };
+  enum class Source {
+    kImage,
+    kStrokes,
+    kPoints,
+    kReferences,
+    kPrompt,
+    kAutomatic,
+    kBackend,
+    kScript,
+    kEdit
+  };
   Source source = Source::kImage;
-  std::filesystem::path file;  // picture, strokes or JSON points
+  std::filesystem::path file;  // image, strokes, points (JSON), edit; backend: points, may be empty
+  std::vector<std::filesystem::path> references;  // references: 1..16; backend: at most 1
+  std::filesystem::path mask;                     // edit and backend; empty: everywhere
+  std::string prompt;                             // prompt; backend, may be empty
+  std::string name;  // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
 };
-// scene.json, key_view.json -> key_color.png, key_view_coloured.png.
+// scene.json, key_view.json -> key_color.png, key_view_coloured.png, key_color.json.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
-// scene.json, key_view.json, key_color.png -> colorizer.c3c.
-void RunPersonalize(const ColorizerOptions& options, StageContext& context);
+// scene.json, key_view.json, key_color.png -> colorizer.c3c. `encoder`: as SelectKeyViewOptions.
+void RunPersonalize(const ColorizerOptions& options,
+                    StageContext& context,
+                    const std::string& encoder = "");
 
-// scene.json, colorizer.c3c -> views_ab/*.png for every view at max_side_px (64..4096).
-void RunColorizeViews(int max_side_px, StageContext& context);
+// scene.json, colorizer.c3c -> views_ab/*.png for every view at max_side_px (64..4096). `encoder`:
+// the one that the colorizer was trained with.
+void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
 
 // scene.json -> geometry.c3g, trained at max_side_px (64..4096), and memory_plan.json: with little
 // memory the size and the number of Gaussians are smaller, and a warning says so.

@@ -188,7 +188,8 @@ class ArchiveReader {
     Spend(static_cast<uint64_t>(count) + (contiguous ? 0 : span));
     std::vector<float> values = ReadElements(
         source_, record->offset + static_cast<uint64_t>(tensor.offset) * bytes, storage.type, span);
-    return contiguous ? values : Gather(values, tensor, count);
+    if (contiguous) return values;
+    return Gather(values, tensor, count);
   }
 
   // Many views of one storage, or views that repeat elements, must not multiply a file's size.

@@ -104,6 +104,7 @@ struct SceneRecord {
   std::vector<SceneFileRecord> files;  // left empty in lists
   int64_t create_ms = 0;
   int64_t commit_ms = 0;
+  std::string key_color_job;  // accepted; empty: none
 };
 
 struct WorkerRecord {

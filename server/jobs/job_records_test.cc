@@ -67,6 +67,51 @@ TEST_F(JobRecordsTest, NewerSchemaIsRefused) {
   EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_VERSION");
 }
 
+// A data directory of version 1 goes on with its scenes.
+TEST_F(JobRecordsTest, StoreOfVersion1IsBroughtUpToDate) {
+  SceneRecord scene;
+  scene.name = "scenes/test";
+  store_->CreateScene(scene, {});
+  store_.reset();
+  {
+    SqliteDatabase old(scratch_.path() / "jobs.db");
+    old.Exec("alter table scene drop column key_color_job");
+    old.Exec("update schema_version set version=1");
+  }
+  Open();
+  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "");
+  store_.reset();
+  Open();  // and is read as the new version from then on
+  EXPECT_EQ(store_->ListScenes(0, 10).size(), 1u);
+}
+
+TEST_F(JobRecordsTest, OnlyAColouredKeyViewOfTheSceneIsAccepted) {
+  for (const char* name : {"scenes/test", "scenes/other"}) {
+    SceneRecord scene;
+    scene.name = name;
+    store_->CreateScene(scene, {});
+  }
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  graph.jobs = {Job("colorize_key_view")};
+  const std::string job = store_->CreateGraph(graph, {}, kNoLimit).name;
+  const auto accept = [&](const std::string& scene, const std::string& name) {
+    return store_->AcceptKeyColor(scene, name, {}).key_color_job;
+  };
+  EXPECT_EQ(ReasonThrown([&] { accept("scenes/test", job); }), "WRONG_STATE");
+  Succeed(ClaimOne());
+  EXPECT_EQ(accept("scenes/test", job), job);
+  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, job);
+  EXPECT_THROW(accept("scenes/other", job), Error);
+  EXPECT_THROW(accept("scenes/test", CreateSingle().name), Error);
+  EXPECT_EQ(ReasonThrown([&] { accept("scenes/test", "jobs/0000"); }), "JOB_NOT_FOUND");
+  EXPECT_EQ(ReasonThrown([&] { accept("scenes/none", job); }), "SCENE_NOT_FOUND");
+  EXPECT_EQ(accept("scenes/test", ""), "");
+  accept("scenes/test", job);
+  store_->Delete(job, {});
+  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "") << "a job that is gone";
+}
+
 TEST_F(JobRecordsTest, GarbageFileIsReportedNotCrashed) {
   store_.reset();
   std::filesystem::remove(scratch_.path() / "jobs.db-wal");

@@ -104,6 +104,11 @@ class JobStore {
                                     StoredLayout layout,
                                     int photo_count,
                                     const RequestKey& request) = 0;
+  // `job`: a colorize_key_view job of this scene that has succeeded, or empty to take it back.
+  // kNotFound, kInvalidArgument or kFailedPrecondition otherwise.
+  virtual SceneRecord AcceptKeyColor(const std::string& name,
+                                     const std::string& job,
+                                     const RequestKey& request) = 0;
   // Refused while a job of the scene is not finished; its finished jobs stay.
   virtual void DeleteScene(const std::string& name, const RequestKey& request) = 0;
 

@@ -9,6 +9,7 @@
 
 #include "server/jobs/presets.h"
 #include "server/jobs/spec_check.h"
+#include "server/jobs/spec_names.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -125,6 +126,10 @@ class GraphBuilder {
   void Add(v1::JobSpec spec, const std::string& skip_reason = "");
   void Provide(const Need& need, const std::string& for_kind, NewJob* job);
   void AddSceneStages(const v1::ColorizeSceneSpec& options);
+  // What a colorize_scene job may be given, and that its options do not ask for something else.
+  void CheckGiven(const v1::ColorizeSceneSpec& options) const;
+  // A colorize_views job that names no encoder works with that of the given personalize job.
+  void TakeEncoderOfColorizer(v1::JobSpec* spec) const;
 
   const v1::JobSpec& submitted_;
   std::string submitted_kind_;
@@ -207,6 +212,7 @@ void GraphBuilder::Provide(const Need& need, const std::string& for_kind, NewJob
 void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   NewJob job;
   job.kind = KindOf(spec);
+  if (submitted_.has_colorize_scene() && given_.contains(job.kind)) return;
   job.skip_reason = skip_reason;
   for (const Need& need : NeedsOf(job.kind)) Provide(need, job.kind, &job);
   ApplyPreset(preset_, max_side_px_, &spec);
@@ -217,9 +223,21 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   graph_.jobs.push_back(std::move(job));
 }
 
+void GraphBuilder::TakeEncoderOfColorizer(v1::JobSpec* spec) const {
+  if (!spec->has_colorize_views() || !spec->colorize_views().encoder().empty()) return;
+  const auto given = given_.find(kColorizer.provider);
+  if (given == given_.end()) return;
+  v1::JobSpec personalize;
+  if (!personalize.ParseFromString(given->second.spec)) {
+    throw Error(ErrorCode::kDataLoss, "the stored spec of " + given->second.name + " is damaged");
+  }
+  spec->mutable_colorize_views()->set_encoder(personalize.personalize().encoder());
+}
+
 NewGraph GraphBuilder::BuildStage() {
   v1::JobSpec spec = submitted_;
   if (spec.seed() == 0) spec.set_seed(1);
+  TakeEncoderOfColorizer(&spec);
   const bool nothing_to_do = spec.has_export_() && spec.export_().has_ply() &&
                              !spec.export_().ply() && !spec.export_().splat();
   Add(std::move(spec),
@@ -257,7 +275,8 @@ void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
   Add(spec);
 
   spec = Common();
-  spec.mutable_colorize_views();
+  // The colorizer runs on the encoder that it was trained with.
+  spec.mutable_colorize_views()->set_encoder(options.personalize().encoder());
   Add(spec);
 
   spec = Common();
@@ -277,12 +296,52 @@ void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
   Add(spec, options.truth().empty() ? "no true colours were given" : "");
 }
 
-NewGraph GraphBuilder::BuildColorizeScene() {
-  if (submitted_.inputs_size() > 0) {
-    throw InvalidArgument(
-        "inputs is set, but colorize_scene makes everything itself (equal work is taken from the "
-        "stage cache); leave it empty");
+void GraphBuilder::CheckGiven(const v1::ColorizeSceneSpec& options) const {
+  const std::pair<const char*, bool> asked_for[] = {
+      {"import_scene", options.has_import_scene()},
+      {"select_key_view", !options.key_view().empty() || options.has_select_key_view()},
+      {"colorize_key_view",
+       options.has_key_color() || options.colorize_key_view().has_source() ||
+           options.colorize_key_view().has_hint_sigma()}};
+  std::string missing;  // the first stage before a given one that is not given
+  for (const auto& [kind, asked] : asked_for) {
+    const auto given = given_.find(kind);
+    if (given == given_.end()) {
+      if (missing.empty()) missing = kind;
+      continue;
+    }
+    if (asked) {
+      throw InvalidArgument("the input " + given->second.name + " is the " + kind +
+                            " job, but colorize_scene has options for that stage too; leave one "
+                            "of them out");
+    }
+    if (!missing.empty()) {
+      throw InvalidArgument("the input " + given->second.name + " (" + kind +
+                            ") comes without the " + missing +
+                            " job that it read; add that to spec.inputs");
+    }
+    if (given->second.state != JobState::kSucceeded) {
+      throw ServiceError(ErrorCode::kFailedPrecondition,
+                         "INPUT_MISSING",
+                         "the input " + given->second.name + " is " +
+                             JobStateName(given->second.state) + ", it must have succeeded");
+    }
   }
+  for (const auto& [kind, job] : given_) {
+    if (kind == "import_scene" || kind == "select_key_view" || kind == "colorize_key_view")
+      continue;
+    throw InvalidArgument("the input " + job.name + " is a " + kind +
+                          " job; colorize_scene takes import_scene, select_key_view and "
+                          "colorize_key_view jobs and makes the rest itself");
+  }
+  if (!given_.contains("colorize_key_view") && !asked_for[2].second) {
+    throw InvalidArgument(
+        "key_color is required: no input is a colorize_key_view job that would give it");
+  }
+}
+
+NewGraph GraphBuilder::BuildColorizeScene() {
+  if (submitted_.inputs_size() > 0) CheckGiven(submitted_.colorize_scene());
   AddSceneStages(submitted_.colorize_scene());
   NewJob root;
   root.kind = "colorize_scene";
@@ -290,6 +349,7 @@ NewGraph GraphBuilder::BuildColorizeScene() {
   if (spec.seed() == 0) spec.set_seed(1);
   root.spec = Serialize(spec);
   for (size_t i = 0; i < graph_.jobs.size(); ++i) root.inputs.push_back(static_cast<int>(i));
+  for (const auto& [kind, job] : given_) root.input_jobs.push_back(job.name);
   for (const FileDigest& digest : SpecBlobs(spec)) root.blobs.push_back(digest.sha256);
   graph_.jobs.push_back(std::move(root));
   return std::move(graph_);
@@ -319,6 +379,9 @@ StageKeyPart KeyPartOf(const std::string& serialized_spec) {
   spec.clear_inputs();
   spec.clear_skip_cache();
   part.bytes = kind + '\n' + Serialize(spec);
+  const SpecNames names = NamesIn(spec);
+  for (const NameUse& use : names.models) part.models.push_back(use.name);
+  for (const NameUse& use : names.backends) part.backends.push_back(use.name);
   return part;
 }
 

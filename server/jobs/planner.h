@@ -24,6 +24,10 @@ NewGraph PlanJob(const v1::JobSpec& spec,
 struct StageKeyPart {
   std::string bytes;
   bool skip_cache = false;  // do not look it up, but let later jobs find the result
+  // What the bytes name without saying what it is: the caller adds the files' digests and the
+  // backends' addresses, so that other weights under an old name are other work.
+  std::vector<std::string> models;
+  std::vector<std::string> backends;
 };
 StageKeyPart KeyPartOf(const std::string& serialized_spec);
 

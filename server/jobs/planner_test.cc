@@ -234,9 +234,6 @@ TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dynamic"));
   spec.mutable_reconstruct_dense();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dense"));
-  spec.mutable_colorize_scene()->mutable_key_color()->set_prompt("a red barn");
-  EXPECT_EQ(PlanError(spec).code, ErrorCode::kUnimplemented);
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("prompt"));
 }
 
 TEST(Planner, KeyColorIsRequired) {
@@ -294,6 +291,49 @@ TEST(Planner, ExportOfNothingIsSkipped) {
               HasSubstr("ply"));
   spec.mutable_export_()->set_splat(true);
   EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
+}
+
+JobRecord Done(const std::string& kind) {
+  JobRecord job;
+  job.name = "jobs/" + kind;
+  job.kind = kind;
+  job.scene = "scenes/test";
+  job.state = JobState::kSucceeded;
+  return job;
+}
+
+TEST(PlanColorizeScene, TakesAnAcceptedKeyViewInPlaceOfMakingItsOwn) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_colorize_scene();
+  spec.add_inputs("jobs/colorize_key_view");
+  std::vector<JobRecord> inputs{
+      Done("import_scene"), Done("select_key_view"), Done("colorize_key_view")};
+  const NewGraph graph = PlanJob(spec, inputs, kTwentyPhotos);
+  for (const NewJob& job : graph.jobs) {
+    EXPECT_NE(job.kind, "import_scene");
+    EXPECT_NE(job.kind, "select_key_view");
+    EXPECT_NE(job.kind, "colorize_key_view");
+  }
+  const NewJob& personalize = graph.jobs[IndexOf(graph, "personalize")];
+  EXPECT_THAT(personalize.input_jobs,
+              ElementsAre("jobs/import_scene", "jobs/select_key_view", "jobs/colorize_key_view"));
+  EXPECT_EQ(graph.jobs.back().kind, "colorize_scene");
+  EXPECT_EQ(graph.jobs.back().input_jobs.size(), 3u) << "the report shows them, too";
+
+  spec.mutable_colorize_scene()->set_key_view("a.jpg");
+  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("jobs/select_key_view"));
+  spec.mutable_colorize_scene()->clear_key_view();
+  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = SomeDigest("key");
+  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("jobs/colorize_key_view"));
+  spec.mutable_colorize_scene()->clear_key_color();
+  inputs[2].state = JobState::kRunning;
+  EXPECT_EQ(PlanError(spec, inputs).reason, "INPUT_MISSING");
+  inputs[2].state = JobState::kSucceeded;
+  inputs.erase(inputs.begin() + 1);
+  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("without the select_key_view"));
+  EXPECT_THAT(PlanError(spec, {Done("import_scene")}).message, HasSubstr("key_color is required"));
+  EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
 }
 
 TEST(StageKey, DependsOnOptionsAndSeedOnly) {

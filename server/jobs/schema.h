@@ -3,7 +3,11 @@
 
 namespace color3d {
 
-constexpr int kSchemaVersion = 1;
+constexpr int kSchemaVersion = 2;
+
+// From version 1 to 2.
+constexpr char kAddKeyColorJob[] =
+    "alter table scene add column key_color_job text not null default ''";
 
 constexpr char kSchema[] = R"sql(
 create table scene(
@@ -11,7 +15,8 @@ create table scene(
   name text not null unique, display_name text not null,
   active integer not null default 0, layout integer not null default 0,
   photo_count integer not null default 0,
-  create_ms integer not null, commit_ms integer not null default 0);
+  create_ms integer not null, commit_ms integer not null default 0,
+  key_color_job text not null default '');
 create table scene_file(
   scene_id integer not null references scene on delete cascade,
   path text not null, sha256 text not null, size_bytes integer not null,

@@ -163,27 +163,88 @@ void CheckMessage(const Message& message, const std::string& path) {
   throw ServiceError(ErrorCode::kUnimplemented, "NOT_BUILT", what + " is not built yet; " + remedy);
 }
 
+constexpr int kMaxReferences = 16;
+constexpr size_t kMaxPromptBytes = 1000;
+
+bool TakesModel(v1::KeyColorSource::SourceCase source) {
+  return source == v1::KeyColorSource::kPrompt || source == v1::KeyColorSource::kAutomatic ||
+         source == v1::KeyColorSource::kReference || source == v1::KeyColorSource::kReferences;
+}
+
+void CheckPrompt(const std::string& prompt, const std::string& path) {
+  if (prompt.find_first_not_of(" \t\r\n") == std::string::npos) {
+    Reject(path, " is empty; say what has which colour, e.g. \"red brick, green lawn\"");
+  }
+  if (prompt.size() > kMaxPromptBytes) {
+    Reject(path,
+           " has " + std::to_string(prompt.size()) + " bytes; at most " +
+               std::to_string(kMaxPromptBytes) + " are allowed");
+  }
+}
+
+void CheckReferences(const v1::References& references, const std::string& path) {
+  const int count = references.images_size();
+  if (count < 1 || count > kMaxReferences) {
+    Reject(path,
+           ".images has " + std::to_string(count) + " pictures; 1 to " +
+               std::to_string(kMaxReferences) + " are allowed");
+  }
+}
+
+// What only some sources take.
+void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& path) {
+  if (!source.model().empty() && !TakesModel(source.source_case())) {
+    Reject(path + ".model",
+           " is '" + source.model() +
+               "', but only prompt, automatic and references work with a model; leave it out");
+  }
+  if (source.has_backend_input() && source.source_case() != v1::KeyColorSource::kBackend) {
+    Reject(path + ".backend_input", " is set, but the source is no backend; leave it out");
+  }
+  if (source.has_backend_input() && !source.backend_input().prompt().empty()) {
+    CheckPrompt(source.backend_input().prompt(), path + ".backend_input.prompt");
+  }
+}
+
 void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
-  const std::string remedy = "give key_color.image, .strokes or .points";
+  CheckKeyColorExtras(source, path);
   switch (source.source_case()) {
     case v1::KeyColorSource::kImage:
     case v1::KeyColorSource::kStrokes:
     case v1::KeyColorSource::kPoints:
-      return;
     case v1::KeyColorSource::kReference:
-      NotBuilt(path + ".reference", remedy);
+      return;
+    case v1::KeyColorSource::kReferences:
+      return CheckReferences(source.references(), path + ".references");
     case v1::KeyColorSource::kPrompt:
-      NotBuilt(path + ".prompt", remedy);
+      CheckPrompt(source.prompt(), path + ".prompt");
+      if (source.model().empty()) {
+        Reject(path + ".model",
+               " is required with a prompt: the name of CLIP weights that the server was started "
+               "with (--model NAME=FILE)");
+      }
+      return;
     case v1::KeyColorSource::kAutomatic:
-      NotBuilt(path + ".automatic", remedy);
+      if (!source.automatic()) Reject(path + ".automatic", " is false; set it to true");
+      return;
     case v1::KeyColorSource::kBackend:
-      NotBuilt(path + ".backend", remedy);
+      if (source.backend().empty()) Reject(path + ".backend", " is empty; name a backend");
+      return;
+    case v1::KeyColorSource::kScript:
+      if (source.script().empty()) Reject(path + ".script", " is empty; name a model");
+      return;
+    case v1::KeyColorSource::kEdit:
+      if (!source.edit().has_image()) {
+        Reject(path + ".edit.image", " is required: the edited key photo");
+      }
+      return;
     case v1::KeyColorSource::SOURCE_NOT_SET:
       break;
   }
   Reject(path,
-         " is required: the key view in colour (image, strokes or points). To learn which photo is "
-         "the key view, first run select_key_view and read its artifact key_view.json");
+         " is required: where the key view's colour comes from (image, strokes, points, automatic, "
+         "...). To learn which photo is the key view, first run select_key_view and read its "
+         "artifact key_view.json; `automatic` needs nothing of the user");
 }
 
 void CheckTruth(const google::protobuf::RepeatedPtrField<v1::TruthImage>& truth,
@@ -201,9 +262,12 @@ void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
   }
 }
 
-void CheckColorizeScene(const v1::ColorizeSceneSpec& spec) {
+// `has_inputs`: the colour may come from a job among them; the planner sees to that.
+void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
-  CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
+  if (!has_inputs || spec.has_key_color() || in_options) {
+    CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
+  }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
   CheckTruth(spec.truth(), "truth");
 }
@@ -241,7 +305,7 @@ void CheckSpec(const v1::JobSpec& spec) {
     NotBuilt(kind, "GetServerInfo lists the job kinds that are");
   }
   CheckMessage(spec, "");
-  if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene());
+  if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene(), spec.inputs_size() > 0);
   if (spec.has_colorize_key_view()) {
     CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
   }

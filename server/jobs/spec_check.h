@@ -17,8 +17,9 @@ std::string KindOf(const v1::JobSpec& spec);
 // Kinds that can run, in the order of the pipeline.
 const std::vector<std::string>& BuiltKinds();
 
-// Throws Error: kInvalidArgument naming field, value and range; kUnimplemented naming the kind or
-// the colour source.
+// Throws Error: kInvalidArgument naming field, value and range; kUnimplemented naming the kind.
+// Names of models and backends are checked by CheckNames (spec_names.h), where the configuration
+// is.
 void CheckSpec(const v1::JobSpec& spec);
 
 // Every digest that the spec names, without repetition.

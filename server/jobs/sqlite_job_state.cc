@@ -293,6 +293,10 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
   if (reader.Step()) {
     throw WrongState(JobFromRow(reader), "it reads results of " + name + ", which must stay");
   }
+  db_->Run(
+      "update scene set key_color_job='' where key_color_job in (select name from job where job_id "
+      "in (" +
+      list + "))");
   db_->Run("delete from job where job_id in (" + list + ")");
   RecordRequest(request, name);
   transaction.Commit();

@@ -25,6 +25,12 @@ void SqliteJobStore::OpenSchema() {
   db_->Exec("create table if not exists schema_version(version integer not null)");
   SqliteStatement version(db_->handle(), "select version from schema_version");
   if (version.Step()) {
+    if (version.Int(0) == 1) {
+      db_->Exec(kAddKeyColorJob);
+      db_->Run("update schema_version set version=?", kSchemaVersion);
+      transaction.Commit();
+      return;
+    }
     if (version.Int(0) != kSchemaVersion) {
       throw ServiceError(ErrorCode::kFailedPrecondition,
                          "STORE_VERSION",

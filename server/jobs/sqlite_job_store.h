@@ -36,6 +36,9 @@ class SqliteJobStore : public JobStore {
                             StoredLayout layout,
                             int photo_count,
                             const RequestKey& request) override;
+  SceneRecord AcceptKeyColor(const std::string& name,
+                             const std::string& job,
+                             const RequestKey& request) override;
   void DeleteScene(const std::string& name, const RequestKey& request) override;
 
   JobRecord CreateGraph(const NewGraph& graph,

@@ -16,12 +16,13 @@ SceneRecord SceneFromRow(const SqliteStatement& row) {
   scene.photo_count = static_cast<int>(row.Int(5));
   scene.create_ms = row.Int(6);
   scene.commit_ms = row.Int(7);
+  scene.key_color_job = row.Text(8);
   return scene;
 }
 
 constexpr char kSelectScene[] =
-    "select scene_id, name, display_name, active, layout, photo_count, create_ms, commit_ms "
-    "from scene ";
+    "select scene_id, name, display_name, active, layout, photo_count, create_ms, commit_ms, "
+    "key_color_job from scene ";
 
 }  // namespace
 
@@ -104,6 +105,33 @@ SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
       photo_count,
       Now(),
       name);
+  RecordRequest(request, name);
+  SceneRecord scene = RequireScene(name, true);
+  transaction.Commit();
+  return scene;
+}
+
+SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
+                                           const std::string& job,
+                                           const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (const auto resource = CheckRequest(request)) return RequireScene(*resource, true);
+  RequireScene(name, false);
+  if (!job.empty()) {
+    const JobRecord record = RequireJob(job);
+    if (record.kind != "colorize_key_view" || record.scene != name) {
+      throw InvalidArgument(job + " is a " + record.kind + " job of " + record.scene +
+                            "; give a colorize_key_view job of " + name);
+    }
+    if (record.state != JobState::kSucceeded) {
+      throw ServiceError(ErrorCode::kFailedPrecondition,
+                         "WRONG_STATE",
+                         job + " is " + JobStateName(record.state) +
+                             "; only a key view that has been coloured can be accepted");
+    }
+  }
+  db_->Run("update scene set key_color_job=? where name=?", job, name);
   RecordRequest(request, name);
   SceneRecord scene = RequireScene(name, true);
   transaction.Commit();

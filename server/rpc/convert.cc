@@ -35,6 +35,7 @@ v1::Scene ToProto(const SceneRecord& scene) {
     *entry->mutable_digest() = ToProto(file.digest);
   }
   proto.set_photo_count(scene.photo_count);
+  proto.set_key_color_job(scene.key_color_job);
   *proto.mutable_create_time() = ToTimestamp(scene.create_ms);
   if (scene.commit_ms != 0) *proto.mutable_commit_time() = ToTimestamp(scene.commit_ms);
   return proto;

@@ -5,6 +5,7 @@
 #include "server/jobs/spec_check.h"
 #include "server/ops/process.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/utf8.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -21,6 +22,41 @@ class RefuseColorizeImages final
   }
   void OnDone() override { delete this; }
 };
+
+void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
+  for (const auto& [name, file] : parts.models.files) {
+    v1::ModelInfo* model = info->add_models();
+    model->set_name(name);
+    try {
+      const FileDigest digest = parts.digests.Of(file);
+      model->set_kind(LooksLike(file));
+      model->set_size_bytes(digest.size_bytes);
+      model->set_sha256(digest.sha256);
+    } catch (const Error& e) {
+      model->set_problem(CleanUtf8(e.what()));
+    }
+  }
+}
+
+void ListBackends(const RpcParts& parts, v1::ServerInfo* info) {
+  if (parts.models.backends.empty()) return;
+  std::map<std::string, BackendState> states;
+  if (parts.probe_backends) states = parts.probe_backends();
+  for (const auto& [name, address] : parts.models.backends) {
+    const BackendState& state = states[name];
+    v1::BackendStatus* backend = info->add_backends();
+    backend->set_name(name);
+    backend->set_address(address);
+    backend->set_reachable(state.reachable);
+    backend->set_ready(state.ready);
+    backend->set_description(CleanUtf8(state.description));
+    for (const std::string& capability : state.capabilities) {
+      backend->add_capabilities(capability);
+    }
+    backend->set_max_pixels(state.max_pixels);
+    backend->set_problem(CleanUtf8(state.problem));
+  }
+}
 
 }  // namespace
 
@@ -80,6 +116,8 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
       entry->set_memory_bytes(worker.memory_bytes);
       entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
     }
+    ListModels(parts_, out);
+    ListBackends(parts_, out);
     out->set_draining(parts_.draining.load());
     out->set_memory_bytes(ResidentMemoryBytes());
     out->set_disk_free_bytes(parts_.blobs.FreeBytes());

@@ -6,6 +6,7 @@
 
 #include "server/jobs/planner.h"
 #include "server/jobs/spec_check.h"
+#include "server/jobs/spec_names.h"
 #include "server/rpc/convert.h"
 #include "server/service_error.h"
 
@@ -69,6 +70,7 @@ JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& req
     throw InvalidArgument("priority is " + std::to_string(priority) + "; the range is 0 to 1000");
   }
   CheckSpec(request.spec());
+  CheckNames(request.spec(), parts.models);
   CheckBlobs(parts, request.spec());
   NewGraph graph = PlanJob(request.spec(),
                            LoadInputs(parts, request.spec()),

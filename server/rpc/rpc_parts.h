@@ -8,9 +8,12 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
+#include <vector>
 
 #include "server/jobs/job_store.h"
+#include "server/jobs/user_models.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/executor.h"
 #include "server/storage/blob_store.h"
@@ -27,6 +30,18 @@ struct ServiceLimits {
   int max_chunk_bytes = 2 << 20;
 };
 
+// What a backend said of itself, or why it did not.
+struct BackendState {
+  bool reachable = false;
+  bool ready = false;
+  std::string description;
+  std::vector<std::string> capabilities;
+  int64_t max_pixels = 0;
+  std::string problem;
+};
+// By name; blocks a few seconds at most, and is called from any thread of the executor.
+using BackendProbe = std::function<std::map<std::string, BackendState>()>;
+
 struct RpcParts {
   JobStore& store;
   BlobStore& blobs;
@@ -36,6 +51,9 @@ struct RpcParts {
   ServiceLimits limits;
   Clock clock;
   std::string version;
+  UserModels models;
+  FileDigests& digests;
+  BackendProbe probe_backends;
 };
 
 // Answers a unary call from the executor: `body(request, response)` may block and throw.

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "server/ops/address.h"
 #include "server/rpc/blob_service.h"
 #include "server/rpc/info_services.h"
 #include "server/rpc/job_service.h"
@@ -18,29 +19,10 @@
 namespace color3d {
 namespace {
 
-struct HostPort {
-  std::string host;
-  std::string port;
-};
-
-HostPort SplitListen(const std::string& listen) {
-  const size_t colon = listen.rfind(':');
-  if (colon == std::string::npos || colon + 1 == listen.size()) {
-    throw InvalidArgument("cannot listen on '" + listen +
-                          "': it must be HOST:PORT, e.g. "
-                          "127.0.0.1:50551");
-  }
-  std::string host = listen.substr(0, colon);
-  if (host.size() > 1 && host.front() == '[' && host.back() == ']') {
-    host = host.substr(1, host.size() - 2);
-  }
-  return {host, listen.substr(colon + 1)};
-}
-
 // gRPC does not say why it could not bind: try it with a plain socket first.
 void CheckAddress(const std::string& listen) {
   if (listen.rfind("unix:", 0) == 0) return;
-  const HostPort address = SplitListen(listen);
+  const HostPort address = SplitHostPort(listen);
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
@@ -67,12 +49,6 @@ void CheckAddress(const std::string& listen) {
 
 }  // namespace
 
-bool IsLoopback(const std::string& listen) {
-  if (listen.rfind("unix:", 0) == 0) return true;
-  const std::string host = SplitListen(listen).host;
-  return host == "localhost" || host == "::1" || host.rfind("127.", 0) == 0;
-}
-
 struct RpcServer::Services {
   Services(const RpcParts& parts, WatchHub& hub)
       : scenes(parts),
@@ -95,9 +71,19 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                      UploadStore& uploads,
                      const Clock& clock) {
   CheckAddress(options.listen);
+  digests_ = std::make_unique<FileDigests>();
   executor_ = std::make_unique<Executor>(options.executor_threads);
-  parts_.reset(new RpcParts{
-      store, blobs, uploads, *executor_, draining_, options.limits, clock, options.version});
+  parts_.reset(new RpcParts{store,
+                            blobs,
+                            uploads,
+                            *executor_,
+                            draining_,
+                            options.limits,
+                            clock,
+                            options.version,
+                            options.models,
+                            *digests_,
+                            options.probe_backends});
   hub_ = std::make_unique<WatchHub>(*parts_, options.watch);
   services_ = std::make_unique<Services>(*parts_, *hub_);
   grpc::EnableDefaultHealthCheckService(true);

@@ -21,6 +21,8 @@ struct RpcServerOptions {
   ServiceLimits limits;
   WatchTiming watch;
   std::string version = "0";
+  UserModels models;
+  BackendProbe probe_backends;  // may be empty: then backends are listed unprobed
 };
 
 class RpcServer {
@@ -47,14 +49,12 @@ class RpcServer {
   struct Services;
   std::string address_;
   std::atomic<bool> draining_{false};
+  std::unique_ptr<FileDigests> digests_;
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<RpcParts> parts_;
   std::unique_ptr<WatchHub> hub_;
   std::unique_ptr<Services> services_;
   std::unique_ptr<grpc::Server> server_;
 };
-
-// Whether the address can be reached from this machine only (loopback or a Unix socket).
-bool IsLoopback(const std::string& listen);
 
 }  // namespace color3d

@@ -115,6 +115,16 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerCont
   });
 }
 
+grpc::ServerUnaryReactor* SceneServiceImpl::AcceptKeyColor(grpc::CallbackServerContext* context,
+                                                           const v1::AcceptKeyColorRequest* request,
+                                                           v1::Scene* response) {
+  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
+    CheckName(in.name(), "scenes");
+    if (!in.job().empty()) CheckName(in.job(), "jobs");
+    *out = ToProto(parts_.store.AcceptKeyColor(in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
+  });
+}
+
 grpc::ServerUnaryReactor* SceneServiceImpl::DeleteScene(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSceneRequest* request,
                                                         v1::DeleteSceneResponse* response) {

@@ -22,6 +22,9 @@ class SceneServiceImpl final : public v1::SceneService::CallbackService {
   grpc::ServerUnaryReactor* CommitScene(grpc::CallbackServerContext* context,
                                         const v1::CommitSceneRequest* request,
                                         v1::Scene* response) override;
+  grpc::ServerUnaryReactor* AcceptKeyColor(grpc::CallbackServerContext* context,
+                                           const v1::AcceptKeyColorRequest* request,
+                                           v1::Scene* response) override;
   grpc::ServerUnaryReactor* DeleteScene(grpc::CallbackServerContext* context,
                                         const v1::DeleteSceneRequest* request,
                                         v1::DeleteSceneResponse* response) override;

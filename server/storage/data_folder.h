@@ -12,6 +12,8 @@ struct DataPaths {
   std::filesystem::path Blobs() const { return root / "blobs"; }
   std::filesystem::path Uploads() const { return root / "uploads"; }
   std::filesystem::path Scratch() const { return root / "scratch"; }
+  // May be deleted at any time.
+  std::filesystem::path Cache() const { return root / "cache"; }
   std::filesystem::path Logs() const { return root / "logs"; }
   std::filesystem::path Lock() const { return root / "lock"; }
 };

@@ -44,6 +44,15 @@ std::string MediaType(const std::string& name) {
   return type != types.end() ? type->second : "application/octet-stream";
 }
 
+// Of a model's file and all that is read beside it.
+std::string IdentityOf(const fs::path& model) {
+  std::string identity;
+  for (const fs::path& part : FilesOfModel(model)) {
+    identity += part.filename().string() + ' ' + FileIdentity(part) + '\n';
+  }
+  return identity;
+}
+
 class StoredBlobs : public BlobSource {
  public:
   explicit StoredBlobs(const BlobStore& blobs) : blobs_(blobs) {}
@@ -80,6 +89,8 @@ class Attempt {
 
  private:
   void Prepare();
+  void NoteModels(const std::vector<std::string>& names);
+  void RequireModelsUnchanged() const;
   bool ServeFromCache();
   void Compute();
   void Publish(const StageOutput& output);
@@ -96,6 +107,12 @@ class Attempt {
   StageRun run_;
   std::string stage_key_;
   std::map<std::string, ArtifactRecord> input_artifacts_;
+  struct ModelFile {
+    fs::path file;
+    std::string identity;
+    std::string digests;
+  };
+  std::map<std::string, ModelFile> models_;  // those that the spec names
   LeaseKeeper keeper_;
   BlobCheckpoints checkpoints_;
 };
@@ -127,9 +144,12 @@ void Attempt::Prepare() {
   run_.job_name = job_.name;
   run_.spec = job_.spec;
   run_.threads = context_.threads;
+  run_.attempt = job_.attempt;
+  run_.models = context_.models;
   run_.scene_folder = scratch_ / "scene";
   run_.output_folder = scratch_ / "out";
   run_.scratch_folder = scratch_ / "tmp";
+  run_.cache_folder = context_.paths.Cache();
   for (const fs::path& folder : {run_.scene_folder, run_.output_folder, run_.scratch_folder}) {
     fs::create_directories(folder);
   }
@@ -157,12 +177,49 @@ void Attempt::Prepare() {
                           child.warnings});
   }
   const StageKeyPart part = KeyPartOf(job_.spec);
+  NoteModels(part.models);
   if (part.bytes.empty()) return;
   std::string material = context_.code_version + '\n' + Sha256Hex(manifest) + '\n';
   for (const auto& [name, artifact] : input_artifacts_) {
     material += name + '\n' + artifact.digest.sha256 + '\n';
   }
+  // Names say nothing of what they stand for: other weights under an old name are other work. What
+  // a backend computes cannot be known; its address stands for it.
+  for (const std::string& name : part.models) material += models_.at(name).digests;
+  for (const std::string& name : part.backends) {
+    const auto address = context_.models.backends.find(name);
+    if (address != context_.models.backends.end()) material += address->second + '\n';
+  }
   stage_key_ = Sha256Hex(material + part.bytes);
+}
+
+void Attempt::NoteModels(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    const auto file = context_.models.files.find(name);
+    if (file == context_.models.files.end()) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  job_.kind + " needs the model '" + name + "', which this server does not have (" +
+                      "it has: " + NamesOf(context_.models.files) + "); start it with --model " +
+                      name + "=FILE and retry the job");
+    }
+    ModelFile& model = models_[name];
+    model = {file->second, IdentityOf(file->second), ""};
+    for (const fs::path& part : FilesOfModel(file->second)) {
+      model.digests += part.filename().string() + ' ' + context_.digests.Of(part).sha256 + '\n';
+    }
+    keeper_.token().ThrowIfCancelled();
+  }
+}
+
+// The stage has read the files some time after their digests were taken.
+void Attempt::RequireModelsUnchanged() const {
+  for (const auto& [name, model] : models_) {
+    if (IdentityOf(model.file) == model.identity) continue;
+    throw ServiceError(ErrorCode::kAborted,
+                       "MODEL_CHANGED",
+                       "the file of the model '" + name + "' (" + model.file.string() +
+                           ") was replaced while " + job_.kind + " ran; retry the job");
+  }
 }
 
 bool Attempt::ServeFromCache() {
@@ -188,6 +245,7 @@ void Attempt::Compute() {
   StoredBlobs blobs(context_.blobs);
   const StageOutput output =
       context_.runner.Run(run_, blobs, checkpoints_, keeper_, keeper_.token());
+  RequireModelsUnchanged();
   Publish(output);
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "server/jobs/job_store.h"
+#include "server/jobs/user_models.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
 #include "server/worker/lease_keeper.h"
@@ -26,6 +27,8 @@ struct AttemptContext {
   int threads = 1;
   // Part of the stage cache's key: results of other code are not reused.
   std::string code_version;
+  const UserModels& models;
+  FileDigests& digests;
   const std::atomic<bool>& draining;
   // Called on the heartbeat thread while a job runs.
   std::function<void(const JobRecord&)> on_heartbeat;

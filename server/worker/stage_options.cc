@@ -21,9 +21,14 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
   SelectKeyViewOptions options;
   options.view = spec.view();
+  options.encoder = spec.encoder();
+  options.features = spec.features();
   switch (spec.strategy()) {
     case v1::SelectKeyViewSpec::STRATEGY_ENTROPY:
       options.selection.strategy = KeyViewStrategy::kEntropy;
+      break;
+    case v1::SelectKeyViewSpec::STRATEGY_TRACKS:
+      options.selection.strategy = KeyViewStrategy::kTracks;
       break;
     case v1::SelectKeyViewSpec::STRATEGY_MANUAL:
       options.selection.strategy = KeyViewStrategy::kManual;

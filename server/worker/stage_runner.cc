@@ -4,6 +4,7 @@
 #include "core/report/curves.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
+#include "server/backends/grpc_colorizer.h"
 #include "server/worker/stage_options.h"
 
 namespace color3d {
@@ -11,26 +12,77 @@ namespace {
 
 using v1::JobSpec;
 
-ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, BlobSource& blobs) {
+// A blob's file; empty when the spec does not name one.
+std::filesystem::path FetchIf(bool present, const v1::Digest& digest, BlobSource& blobs) {
+  return present ? blobs.Fetch(digest.sha256()) : std::filesystem::path();
+}
+
+ColorizeKeyViewOptions BackendOptionsFrom(const v1::KeyColorSource& source, BlobSource& blobs) {
+  const v1::BackendInput& input = source.backend_input();
   ColorizeKeyViewOptions options;
-  options.hints = HintOptionsFrom(spec);
-  const v1::KeyColorSource& source = spec.source();
+  options.source = ColorizeKeyViewOptions::Source::kBackend;
+  options.name = source.backend();
+  options.prompt = input.prompt();
+  options.file = FetchIf(input.has_points(), input.points(), blobs);
+  options.mask = FetchIf(input.has_mask(), input.mask(), blobs);
+  if (input.has_reference()) options.references = {blobs.Fetch(input.reference().sha256())};
+  return options;
+}
+
+ColorizeKeyViewOptions SourceOptionsFrom(const v1::KeyColorSource& source, BlobSource& blobs) {
+  using Source = ColorizeKeyViewOptions::Source;
+  ColorizeKeyViewOptions options;
+  options.name = source.model();
   switch (source.source_case()) {
     case v1::KeyColorSource::kImage:
-      options.source = ColorizeKeyViewOptions::Source::kImage;
+      options.source = Source::kImage;
       options.file = blobs.Fetch(source.image().sha256());
       break;
     case v1::KeyColorSource::kStrokes:
-      options.source = ColorizeKeyViewOptions::Source::kStrokes;
+      options.source = Source::kStrokes;
       options.file = blobs.Fetch(source.strokes().sha256());
       break;
     case v1::KeyColorSource::kPoints:
-      options.source = ColorizeKeyViewOptions::Source::kPoints;
+      options.source = Source::kPoints;
       options.file = blobs.Fetch(source.points().sha256());
       break;
-    default:
-      throw Error(ErrorCode::kUnimplemented, "this source of key colour is not built yet");
+    case v1::KeyColorSource::kReference:
+      options.source = Source::kReferences;
+      options.references = {blobs.Fetch(source.reference().sha256())};
+      break;
+    case v1::KeyColorSource::kReferences:
+      options.source = Source::kReferences;
+      for (const v1::Digest& image : source.references().images()) {
+        options.references.push_back(blobs.Fetch(image.sha256()));
+      }
+      break;
+    case v1::KeyColorSource::kPrompt:
+      options.source = Source::kPrompt;
+      options.prompt = source.prompt();
+      break;
+    case v1::KeyColorSource::kAutomatic:
+      options.source = Source::kAutomatic;
+      break;
+    case v1::KeyColorSource::kBackend:
+      return BackendOptionsFrom(source, blobs);
+    case v1::KeyColorSource::kScript:
+      options.source = Source::kScript;
+      options.name = source.script();
+      break;
+    case v1::KeyColorSource::kEdit:
+      options.source = Source::kEdit;
+      options.file = blobs.Fetch(source.edit().image().sha256());
+      options.mask = FetchIf(source.edit().has_mask(), source.edit().mask(), blobs);
+      break;
+    case v1::KeyColorSource::SOURCE_NOT_SET:
+      throw InvalidArgument("the job does not say where the key view's colour comes from");
   }
+  return options;
+}
+
+ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, BlobSource& blobs) {
+  ColorizeKeyViewOptions options = SourceOptionsFrom(spec.source(), blobs);
+  options.hints = HintOptionsFrom(spec);
   return options;
 }
 
@@ -67,15 +119,20 @@ class CoreStageRunner : public StageRunner {
             ? std::string()
             : JobSpec::descriptor()->FindFieldByNumber(spec.stage_case())->name();
     CurveRecorder recorder(kind, progress, checkpoints);
-    StageContext context({run.scene_folder,
-                          run.inputs,
-                          run.output_folder,
-                          run.scratch_folder,
-                          run.threads,
-                          spec.seed() == 0 ? 1 : spec.seed()},
-                         recorder,
-                         recorder,
-                         cancel);
+    StageContext::Setup setup;
+    setup.scene_folder = run.scene_folder;
+    setup.inputs = run.inputs;
+    setup.output_folder = run.output_folder;
+    setup.scratch_folder = run.scratch_folder;
+    setup.threads = run.threads;
+    setup.seed = spec.seed() == 0 ? 1 : spec.seed();
+    setup.cache_folder = run.cache_folder;
+    setup.models = run.models.files;
+    setup.remote_colorizers = [&run](const std::string& name) {
+      return MakeGrpcColorizer(run.models.backends, name);
+    };
+    setup.attempt = run.job_name + "/" + std::to_string(run.attempt);
+    StageContext context(std::move(setup), recorder, recorder, cancel);
     RunStage(spec, kind, run, blobs, context);
     const auto points = recorder.points();
     if (!points.empty() && kind != "colorize_scene") {
@@ -99,12 +156,14 @@ class CoreStageRunner : public StageRunner {
         return RunColorizeKeyView(KeyColorOptions(spec.colorize_key_view(), blobs), context);
       case JobSpec::kPersonalize:
         return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()),
-                              context);
+                              context,
+                              spec.personalize().encoder());
       case JobSpec::kColorizeViews:
         return RunColorizeViews(spec.colorize_views().has_max_side_px()
                                     ? spec.colorize_views().max_side_px()
                                     : kDefaultMaxSidePx,
-                                context);
+                                context,
+                                spec.colorize_views().encoder());
       case JobSpec::kReconstructGeometry:
         return RunReconstructGeometry(
             GeometryOptionsFrom(spec.reconstruct_geometry(), context.seed()),

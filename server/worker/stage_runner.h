@@ -11,6 +11,7 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
+#include "server/jobs/user_models.h"
 
 namespace color3d {
 
@@ -41,8 +42,11 @@ struct StageRun {
   std::map<std::string, std::filesystem::path> inputs;
   std::filesystem::path output_folder;   // empty; what the runner leaves here may be published
   std::filesystem::path scratch_folder;  // empty; deleted afterwards
+  std::filesystem::path cache_folder;    // shared by all jobs of the server; empty: none
   std::vector<JobSummary> graph;         // the root job only: its children
   int threads = 1;
+  int attempt = 1;
+  UserModels models;
 };
 
 struct StageOutput {

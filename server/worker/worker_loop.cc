@@ -31,6 +31,8 @@ class WorkerLoop {
                  options.checkpoint_interval,
                  options.threads,
                  options.code_version,
+                 options_.models,
+                 digests_,
                  draining,
                  [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); }} {}
 
@@ -56,6 +58,7 @@ class WorkerLoop {
   SqliteJobStore store_;
   SqliteJobStore heartbeat_store_;
   BlobStore blobs_;
+  FileDigests digests_;
   const std::atomic<bool>& draining_;
   const AttemptContext context_;
   int jobs_done_ = 0;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "server/jobs/user_models.h"
 #include "server/worker/lease_keeper.h"
 #include "server/worker/stage_runner.h"
 
@@ -28,6 +29,7 @@ struct WorkerOptions {
   int recycle_jobs = 200;
   pid_t parent = 0;  // 0: started by hand
   std::string code_version;
+  UserModels models;
 };
 
 // Returns when `draining` turns true, the parent is gone or the process should be recycled.

@@ -24,6 +24,8 @@ struct WorkerArguments {
   double stuck_seconds = 900.0;
   double drain_grace_seconds = 15.0;
   double stop_grace_seconds = 60.0;
+  std::vector<std::string> models;
+  std::vector<std::string> backends;
 };
 
 std::chrono::milliseconds Milliseconds(double seconds) {
@@ -41,6 +43,10 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
       ->capture_default_str();
   app->add_option("--log-level", arguments->log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
+  app->add_option("--model", arguments->models, "NAME=FILE: weights that jobs may name")
+      ->allow_extra_args(false);
+  app->add_option("--backend", arguments->backends, "NAME=ADDRESS: a ColorBackend server")
+      ->allow_extra_args(false);
   app->add_option("--parent-pid", options.parent)->group("");
   app->add_option("--lease-seconds", arguments->lease_seconds)->group("");
   app->add_option("--heartbeat-seconds", arguments->heartbeat_seconds)->group("");
@@ -62,6 +68,7 @@ void Complete(WorkerArguments* arguments) {
   options.timing.stop_grace = Milliseconds(arguments->stop_grace_seconds);
   options.timing.drain_grace = Milliseconds(arguments->drain_grace_seconds);
   options.checkpoint_interval = Milliseconds(arguments->checkpoint_seconds);
+  options.models = ParseUserModels(arguments->models, arguments->backends);
   // Another build may compute something else: its results are not taken for ours.
   if (options.code_version.empty()) {
     options.code_version = std::string(COLOR3D_VERSION) + " " + DigestFile("/proc/self/exe").sha256;

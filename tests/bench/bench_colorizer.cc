@@ -10,6 +10,7 @@
 #include "core/image/codec.h"
 #include "core/image/probe.h"
 #include "core/report/curves.h"
+#include "tests/bench/bench_encoder.h"
 #include "tests/bench/commands.h"
 
 namespace color3d {
@@ -21,6 +22,7 @@ struct ColorizerArguments {
   std::string out_folder;
   int side_px = 400;
   bool paper = false;
+  std::string encoder = "embedded";
   ColorizerOptions options;
 };
 
@@ -54,7 +56,7 @@ void RunColorizer(const ColorizerArguments& args) {
   const Image key_lab = load(key);
   ColorizerOptions options = args.options;
   if (args.paper) options.recipe = ColorizerOptions::Recipe::kPaper;
-  const auto colorizer = TrainColorizer(Encoder::Embedded(),
+  const auto colorizer = TrainColorizer(BenchEncoder(args.encoder),
                                         Luminance(key_lab),
                                         Chroma(key_lab),
                                         options,
@@ -109,6 +111,10 @@ void AddColorizerCommand(CLI::App& app) {
   command->add_option("--iterations", args->options.iterations);
   command->add_option("--time-limit", args->options.time_limit_seconds, "seconds");
   command->add_option("--threads", args->options.threads);
+  command
+      ->add_option(
+          "--encoder", args->encoder, "embedded, random, squeezenet=FILE.onnx, or a weight file")
+      ->capture_default_str();
   command->add_flag("--paper", args->paper, "the paper's recipe");
   command->callback([args] { RunColorizer(*args); });
 }

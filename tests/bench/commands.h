@@ -5,6 +5,7 @@
 
 namespace color3d {
 
+void AddAutomaticCommand(CLI::App& app);
 void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
 void AddNetworksCommand(CLI::App& app);
@@ -12,9 +13,12 @@ void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
+void AddPretrainCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
+void AddKeyViewCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);
 void AddChromaCommand(CLI::App& app);
+void AddWeightsCommand(CLI::App& app);
 
 }  // namespace color3d

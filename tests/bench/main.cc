@@ -7,6 +7,7 @@
 int main(int argc, char** argv) {
   CLI::App app("Benchmarks of Color3D");
   app.require_subcommand(1);
+  color3d::AddAutomaticCommand(app);
   color3d::AddGoldenCommand(app);
   color3d::AddMakeWeightsCommand(app);
   color3d::AddNetworksCommand(app);
@@ -14,10 +15,13 @@ int main(int argc, char** argv) {
   color3d::AddRasterizeCommand(app);
   color3d::AddReconstructCommand(app);
   color3d::AddPosesCommand(app);
+  color3d::AddPretrainCommand(app);
   color3d::AddStabilityCommand(app);
   color3d::AddColorizerCommand(app);
+  color3d::AddKeyViewCommand(app);
   color3d::AddPlotCommand(app);
   color3d::AddChromaCommand(app);
+  color3d::AddWeightsCommand(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

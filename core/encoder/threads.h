@@ -3,7 +3,7 @@
 
 namespace color3d {
 
-// 0: what the machine has.
+// 0: what the machine has. Callers that run an encoder on threads of their own set 1 on each.
 void SetTorchThreads(int threads);
 
 }  // namespace color3d

@@ -1,0 +1,284 @@
+// `color3d key`: choose, colour, look at and accept the key view before the long job starts.
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/follow.h"
+#include "client/commands/key_color_flags.h"
+#include "client/commands/key_jobs.h"
+#include "client/commands/results.h"
+#include "client/commands/scene_target.h"
+#include "client/lib/job_watch.h"
+#include "client/lib/names.h"
+#include "core/base/error.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+struct KeyOptions {
+  std::string target;  // folder or scenes/ID
+  std::string out = "key_view";
+  std::string view;
+  std::string strategy;
+  std::string encoder;   // weights by name in the server's configuration
+  std::string features;  // CLIP weights, likewise
+  std::string job;
+  bool hold_out = false;
+  KeyColorFlags color;
+};
+
+class Key {
+ public:
+  Key(const Context& context, const KeyOptions& options)
+      : context_(context),
+        options_(options),
+        display_(context.json),
+        connection_(context.server, *context.interrupt) {}
+
+  ExitCode Select();
+  ExitCode Colour();
+  ExitCode Show();
+  ExitCode Accept();
+
+ private:
+  std::string Scene() { return ResolveScene(connection_, context_, options_.target, display_); }
+  v1::JobSpec Spec(const std::string& scene) const {
+    v1::JobSpec spec;
+    spec.set_scene(scene);
+    return spec;
+  }
+  // Submits the selection that the options ask for, with the import that it needs.
+  v1::Job SubmitSelection(const std::string& scene);
+  v1::Job Follow(const std::vector<std::string>& jobs) {
+    return FollowToSuccess(connection_, context_, jobs, options_.out, display_);
+  }
+  // The selection that a new colour goes with: the one asked for, else the newest.
+  std::vector<std::string> SelectionFor(const std::string& scene);
+  std::string Command(std::vector<std::string> arguments) const {
+    return "  " + CommandLine(context_, std::move(arguments)) + "\n";
+  }
+  // What can be done with the chosen view.
+  std::string HowToColour(const std::string& scene) const;
+
+  const Context& context_;
+  const KeyOptions& options_;
+  ProgressDisplay display_;
+  Connection connection_;
+};
+
+v1::Job Key::SubmitSelection(const std::string& scene) {
+  v1::JobSpec spec = Spec(scene);
+  v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
+  if (!options_.view.empty()) {
+    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+    select->set_view(options_.view);
+  } else if (options_.strategy == "entropy") {
+    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_ENTROPY);
+  } else if (options_.strategy == "tracks") {
+    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_TRACKS);
+  } else if (options_.strategy == "coverage") {
+    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_COVERAGE);
+  }
+  select->set_encoder(options_.encoder);
+  select->set_features(options_.features);
+  if (options_.hold_out) {
+    v1::JobSpec import = Spec(scene);
+    import.mutable_import_scene()->set_hold_out_every_eighth(true);
+    spec.add_inputs(SubmitJob(connection_, import).name());
+  }
+  return SubmitJob(connection_, spec);
+}
+
+std::string Key::HowToColour(const std::string& scene) const {
+  return "Colour it, for instance\n" + Command({"key", "colour", scene, "--auto"}) +
+         Command({"key", "colour", scene, "--image", "COLOURED.png"}) +
+         Command({"key", "colour", scene, "--hints", "STROKES.png"}) + "or take another view\n" +
+         Command({"key", "select", scene, "--view", "NAME"});
+}
+
+ExitCode Key::Select() {
+  PrepareOut(options_.out);
+  const std::string scene = Scene();
+  const v1::Job submitted = SubmitSelection(scene);
+  const v1::Job job = Follow({submitted.name()});
+  const KeyViewChoice choice = ReadChoice(connection_, job);
+  const auto files = DownloadResults(connection_, context_, job, options_.out, display_);
+  if (context_.json) {
+    PrintJson({{"scene", scene},
+               {"job", job.name()},
+               {"key_view", choice.view},
+               {"description", choice.description},
+               {"out", options_.out},
+               {"files", files}});
+    return ExitCode::kOk;
+  }
+  const fs::path out(options_.out);
+  PrintText("key view   " + choice.view + "\n           " + choice.description + "\nto colour  " +
+            (out / "key_view.png").string() + "\nranking    " +
+            (out / "key_view_ranking.jpg").string() + "\n" + HowToColour(scene));
+  return ExitCode::kOk;
+}
+
+std::vector<std::string> Key::SelectionFor(const std::string& scene) {
+  if (!options_.view.empty() || options_.hold_out) {
+    const v1::Job select = SubmitSelection(scene);
+    return WithItsInputs(connection_, select);
+  }
+  const KeyState state = ReadKeyState(connection_, scene);
+  if (state.selected) return WithItsInputs(connection_, *state.selected);
+  return {};  // the server selects
+}
+
+ExitCode Key::Colour() {
+  options_.color.Check();
+  if (!options_.color.Given()) {
+    throw InvalidArgument(
+        "say where the colour comes from: --auto, --image, --hints, --reference, --prompt, "
+        "--backend, --script or --edit");
+  }
+  PrepareOut(options_.out);
+  const std::string scene = Scene();
+  v1::JobSpec spec = Spec(scene);
+  *spec.mutable_colorize_key_view()->mutable_source() = UploadKeyColor(connection_, options_.color);
+  for (const std::string& input : SelectionFor(scene)) spec.add_inputs(input);
+  const v1::Job submitted = SubmitJob(connection_, spec);
+  const v1::Job job = Follow({submitted.name()});
+  const KeyViewChoice choice = ReadChoice(connection_, job);
+  const auto files = DownloadResults(connection_, context_, job, options_.out, display_);
+  if (context_.json) {
+    PrintJson({{"scene", scene},
+               {"job", job.name()},
+               {"key_view", choice.view},
+               {"source", DescribeSource(job)},
+               {"out", options_.out},
+               {"files", files}});
+    return ExitCode::kOk;
+  }
+  PrintText("key view   " + choice.view + "\ncolour     from " + DescribeSource(job) +
+            "\nlook at    " + (fs::path(options_.out) / "key_view_coloured.png").string() +
+            "\nIf you like it, accept it\n" + Command({"key", "accept", scene}) +
+            "or colour it again in another way: each try is kept.\n");
+  return ExitCode::kOk;
+}
+
+ExitCode Key::Show() {
+  const std::string scene = Scene();
+  const KeyState state = ReadKeyState(connection_, scene);
+  const auto name = [](const std::optional<v1::Job>& job) {
+    return job ? nlohmann::ordered_json(job->name()) : nlohmann::ordered_json();
+  };
+  const v1::Job* newest = state.accepted   ? &*state.accepted
+                          : state.colored  ? &*state.colored
+                          : state.selected ? &*state.selected
+                                           : nullptr;
+  const KeyViewChoice choice =
+      newest != nullptr ? ReadChoice(connection_, *newest) : KeyViewChoice{};
+  if (context_.json) {
+    PrintJson({{"scene", scene},
+               {"key_view", choice.view},
+               {"description", choice.description},
+               {"selected", name(state.selected)},
+               {"coloured", name(state.colored)},
+               {"accepted", name(state.accepted)}});
+    return ExitCode::kOk;
+  }
+  if (newest == nullptr) {
+    PrintText(scene + " has no key view yet: select one\n" + Command({"key", "select", scene}));
+    return ExitCode::kOk;
+  }
+  std::string text = scene + "\nkey view   " + choice.view + "\n";
+  if (!choice.description.empty()) text += "           " + choice.description + "\n";
+  const auto line = [&](const char* label, const std::optional<v1::Job>& job) {
+    text += std::string(label) + (job ? job->name() + ", from " + DescribeSource(*job) : "none");
+    text += "\n";
+  };
+  line("coloured   ", state.colored);
+  line("accepted   ", state.accepted);
+  text += "pictures and figures\n" +
+          Command({"artifact", "download", newest->name(), "-o", options_.out});
+  text += state.accepted
+              ? "colour the scene\n" + Command({"colorize", "--scene", scene, "-o", "OUT"})
+          : state.colored ? "accept the colour\n" + Command({"key", "accept", scene})
+                          : HowToColour(scene);
+  PrintText(text);
+  return ExitCode::kOk;
+}
+
+ExitCode Key::Accept() {
+  const std::string scene = Scene();
+  std::string job = options_.job.empty() ? "" : ResourceName(options_.job, "jobs");
+  if (job.empty()) {
+    const KeyState state = ReadKeyState(connection_, scene);
+    if (!state.colored) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  "no key view of " + scene + " has been coloured yet; first run `" +
+                      CommandLine(context_, {"key", "colour", scene, "--auto"}) + "`");
+    }
+    job = state.colored->name();
+  }
+  AcceptKeyColor(connection_, scene, job);
+  const KeyViewChoice choice = ReadChoice(connection_, GetJob(connection_, job));
+  if (context_.json) {
+    PrintJson({{"scene", scene}, {"job", job}, {"key_view", choice.view}, {"accepted", true}});
+  } else {
+    PrintText("accepted " + choice.view + " as " + job + " coloured it; now colour the scene\n" +
+              Command({"colorize", "--scene", scene, "-o", "OUT"}));
+  }
+  return ExitCode::kOk;
+}
+
+void AddTarget(CLI::App* command, KeyOptions* options) {
+  command->fallthrough();
+  command->add_option("SCENE", options->target, "scenes/ID, or a folder of photos")->required();
+}
+
+void AddView(CLI::App* command, KeyOptions* options) {
+  command->add_option("--view", options->view, "Take this photo (its name) as the key view");
+  command->add_flag("--hold-out", options->hold_out, "Hold out every eighth view");
+  command->add_option("-o,--out", options->out, "Folder for the pictures")->capture_default_str();
+}
+
+}  // namespace
+
+void AddKeyCommands(CLI::App& app, Context& context) {
+  CLI::App* key =
+      app.add_subcommand("key", "Select, colour and accept the picture that all colours come from");
+  key->require_subcommand(1)->fallthrough();
+  const auto options = std::make_shared<KeyOptions>();
+  const auto run = [&context, options](CLI::App* command, ExitCode (Key::*action)()) {
+    command->callback([&context, options, action] {
+      context.action = [&context, options, action] { return (Key(context, *options).*action)(); };
+    });
+  };
+
+  CLI::App* select = key->add_subcommand("select", "Find the photo that is best coloured");
+  AddTarget(select, options.get());
+  AddView(select, options.get());
+  select->add_option("--strategy", options->strategy, "coverage (default), tracks or entropy")
+      ->check(CLI::IsMember({"coverage", "tracks", "entropy"}));
+  select->add_option(
+      "--encoder", options->encoder, "Weights that this server knows, to compare by");
+  select->add_option("--features", options->features, "CLIP weights that this server knows");
+  run(select, &Key::Select);
+
+  CLI::App* colour = key->add_subcommand("colour", "Colour it, and fetch it to look at");
+  colour->alias("color");
+  AddTarget(colour, options.get());
+  AddView(colour, options.get());
+  DeclareKeyColorFlags(*colour, &options->color);
+  run(colour, &Key::Colour);
+
+  CLI::App* show = key->add_subcommand("show", "What is selected, coloured and accepted");
+  AddTarget(show, options.get());
+  run(show, &Key::Show);
+
+  CLI::App* accept = key->add_subcommand("accept", "Use the newest colour for the scene");
+  AddTarget(accept, options.get());
+  accept->add_option("--job", options->job, "An older one: the job that coloured it");
+  run(accept, &Key::Accept);
+}
+
+}  // namespace color3d::client

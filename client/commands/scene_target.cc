@@ -1,0 +1,42 @@
+#include "client/commands/scene_target.h"
+
+#include <filesystem>
+
+#include "client/commands/console.h"
+#include "client/lib/scene_upload.h"
+#include "core/base/error.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+
+std::string UploadFolder(Connection& connection,
+                         const Context& context,
+                         const PhotoFolder& folder,
+                         ProgressDisplay& display) {
+  const auto entries = BuildManifest(folder, *context.interrupt);
+  const std::string name = fs::absolute(folder.root).filename().string();
+  const v1::Scene scene = UploadScene(connection, entries, name, [&](int64_t done, int64_t total) {
+    display.OnTransfer("uploading", done, total);
+  });
+  display.Say(scene.name() + ": " + std::to_string(scene.photo_count()) + " photos");
+  return scene.name();
+}
+
+std::string ResolveScene(Connection& connection,
+                         const Context& context,
+                         const std::string& text,
+                         ProgressDisplay& display) {
+  std::error_code none;
+  if (!fs::is_directory(text, none)) {
+    if (text.starts_with("scenes/")) return text;
+    throw Error(ErrorCode::kNotFound,
+                "'" + text +
+                    "' is neither a folder of photos nor a scene of the server's "
+                    "(scenes/ID; `color3d scene list` shows them)");
+  }
+  const PhotoFolder folder = CollectPhotos(text);
+  for (const std::string& note : folder.notes) PrintNote(context, note);
+  return UploadFolder(connection, context, folder, display);
+}
+
+}  // namespace color3d::client

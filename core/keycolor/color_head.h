@@ -1,0 +1,47 @@
+// The colour head of the embedded automatic colourizer: from the frozen encoder's taps to a
+// distribution over colour bins. A feature pyramid (Lin et al. 2017): coarse taps say what a thing
+// is, fine ones where it ends. Torch in the interface; used by the automatic colourizer and its
+// pre-training only. Forward is const and thread-safe.
+#pragma once
+
+#include <torch/types.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/random.h"
+#include "core/encoder/convnext_config.h"
+
+namespace color3d {
+
+class ColorHead {
+ public:
+  // Random start. `encoder` has at least 3 taps; all but the finest are used.
+  ColorHead(const ConvNextConfig& encoder, int bin_count, Random& random);
+
+  // Logits [B,bins,h,w] at the second tap's stride, of the taps of ConvNext::Taps.
+  torch::Tensor Forward(const std::vector<torch::Tensor>& taps) const;
+
+  // By name, in a fixed order; storage is shared.
+  const std::vector<std::pair<std::string, torch::Tensor>>& Parameters() const {
+    return parameters_;
+  }
+
+ private:
+  struct Level {
+    torch::Tensor lateral, lateral_bias;  // 1x1, tap -> width
+    torch::Tensor fuse, fuse_bias;        // 3x3, width -> next finer width
+  };
+  torch::Tensor NewWeight(const std::string& name,
+                          std::vector<int64_t> shape,
+                          double gain,
+                          Random& random);
+
+  std::vector<Level> levels_;  // coarse to fine
+  torch::Tensor norm_weight_, norm_bias_;
+  torch::Tensor out_, out_bias_;
+  std::vector<std::pair<std::string, torch::Tensor>> parameters_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,130 @@
+#include "core/keyview/frame_content.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/error.h"
+#include "core/keyview/median.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kBlockPx = 8;
+// Of a block: sensor noise and JPEG ringing in a black or white area stay below.
+constexpr double kFlatDeviation = 0.8;
+// Of a whole frame that shows nothing.
+constexpr double kBlankDeviation = 1.5;
+// Shares of the scene's median. A sharp view of a plain corner keeps half; a blur of 1 % of the
+// picture's width leaves a quarter of the detail; a frame half covered has half of the structure.
+constexpr double kLeastDetail = 0.33;
+constexpr double kLeastStructure = 0.66;
+// Photographs reduced to some hundred px have 0.8 and more.
+constexpr double kNoiseCorrelation = 0.4;
+
+struct Moments {
+  double mean = 0.0;
+  double variance = 0.0;
+};
+
+Moments MomentsOf(const Image& image, int x0, int y0, int width, int height) {
+  double sum = 0.0;
+  double squares = 0.0;
+  for (int y = y0; y < y0 + height; ++y) {
+    for (int x = x0; x < x0 + width; ++x) {
+      const double value = image.At(0, y, x);
+      sum += value;
+      squares += value * value;
+    }
+  }
+  const double count = static_cast<double>(width) * height;
+  const double mean = sum / count;
+  return {mean, std::max(0.0, squares / count - mean * mean)};
+}
+
+double StructuredShare(const Image& image) {
+  int blocks = 0;
+  int structured = 0;
+  for (int y = 0; y + kBlockPx <= image.height; y += kBlockPx) {
+    for (int x = 0; x + kBlockPx <= image.width; x += kBlockPx) {
+      ++blocks;
+      const double variance = MomentsOf(image, x, y, kBlockPx, kBlockPx).variance;
+      if (variance > kFlatDeviation * kFlatDeviation) ++structured;
+    }
+  }
+  return blocks > 0 ? static_cast<double>(structured) / blocks : 1.0;
+}
+
+double MeanLaplacian(const Image& image) {
+  if (image.width < 3 || image.height < 3) return 0.0;
+  double sum = 0.0;
+  for (int y = 1; y + 1 < image.height; ++y) {
+    for (int x = 1; x + 1 < image.width; ++x) {
+      sum += std::abs(4.0 * image.At(0, y, x) - image.At(0, y, x - 1) - image.At(0, y, x + 1) -
+                      image.At(0, y - 1, x) - image.At(0, y + 1, x));
+    }
+  }
+  return sum / ((image.width - 2.0) * (image.height - 2.0));
+}
+
+// 1 - E[(difference of neighbours)^2] / (2 variance).
+double NeighbourCorrelation(const Image& image, double variance) {
+  double sum = 0.0;
+  double count = 0.0;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 1; x < image.width; ++x) {
+      const double difference = image.At(0, y, x) - image.At(0, y, x - 1);
+      sum += difference * difference;
+      count += 1.0;
+    }
+  }
+  return variance > 0.0 && count > 0.0 ? 1.0 - sum / count / (2.0 * variance) : 1.0;
+}
+
+template <typename Field>
+double MedianOf(const std::vector<FrameContent>& frames, Field field) {
+  std::vector<double> values;
+  for (const FrameContent& frame : frames) values.push_back(frame.*field);
+  return Median(std::move(values));
+}
+
+}  // namespace
+
+FrameContent MeasureFrameContent(const Image& luminance) {
+  if (luminance.Empty() || luminance.channels != 1) {
+    throw InvalidArgument("a frame must be a picture of 1 channel, this one has " +
+                          std::to_string(luminance.channels));
+  }
+  Image finite = luminance;
+  for (float& value : finite.data) value = std::isfinite(value) ? value : 0.0f;
+  const Moments whole = MomentsOf(finite, 0, 0, finite.width, finite.height);
+  return {std::sqrt(whole.variance),
+          MeanLaplacian(finite),
+          StructuredShare(finite),
+          NeighbourCorrelation(finite, whole.variance)};
+}
+
+std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames) {
+  std::vector<std::string> reasons(frames.size());
+  if (frames.empty()) return reasons;
+  const double detail = MedianOf(frames, &FrameContent::detail);
+  const double structure = MedianOf(frames, &FrameContent::structure);
+  const double correlation = MedianOf(frames, &FrameContent::correlation);
+  size_t unfit = 0;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const FrameContent& frame = frames[i];
+    if (frame.deviation < kBlankDeviation) {
+      reasons[i] = "blank";
+    } else if (frame.correlation < kNoiseCorrelation && correlation > 1.5 * kNoiseCorrelation) {
+      reasons[i] = "noise";
+    } else if (frame.structure < kLeastStructure * structure) {
+      reasons[i] = "much of it is empty";
+    } else if (frame.detail < kLeastDetail * detail) {
+      reasons[i] = "blurred";
+    }
+    if (!reasons[i].empty()) ++unfit;
+  }
+  if (unfit == frames.size()) reasons.assign(frames.size(), "");
+  return reasons;
+}
+
+}  // namespace color3d

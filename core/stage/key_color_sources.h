@@ -1,0 +1,31 @@
+// Every way to colour the key view, behind one table: the stage knows none of them by name.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/image.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+
+struct KeyPhoto {
+  Image srgb;       // as stored: 1 channel or 3, as captured
+  Image luminance;  // 1 channel, L 0..100
+};
+
+struct KeyColorResult {
+  Image ab;  // 2 channels, Lab units, size of the photo
+  // For the report and for programs: what the source tells of itself beyond its name. "warnings" is
+  // a list of lines; those are shown to the user, too.
+  nlohmann::ordered_json facts = nlohmann::ordered_json::object();
+};
+
+// "image", "strokes", ... as in stage.proto.
+const char* KeyColorSourceName(ColorizeKeyViewOptions::Source source);
+
+// Throws Error: what the source throws, kInvalidArgument when an option that it needs is missing.
+KeyColorResult SolveKeyColor(const ColorizeKeyViewOptions& options,
+                             const KeyPhoto& photo,
+                             StageContext& context);
+
+}  // namespace color3d

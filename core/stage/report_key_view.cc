@@ -1,0 +1,74 @@
+#include "core/stage/report_key_view.h"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "core/stage/artifacts.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json ParseInput(const StageContext& context, const char* name) {
+  try {
+    return ordered_json::parse(context.ReadInput(name));
+  } catch (const ordered_json::exception& e) {
+    throw InvalidArgument(std::string(name) + " is damaged: " + e.what());
+  }
+}
+
+// As people read it: no quotes and braces, numbers with four digits.
+std::string FactText(const ordered_json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) {
+    char text[40];
+    std::snprintf(text, sizeof(text), "%.4g", value.get<double>());
+    return text;
+  }
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  if (!value.is_structured()) return value.dump();
+  std::string text;
+  for (const auto& [name, part] : value.items()) {
+    if (!text.empty()) text += value.is_array() ? "; " : ", ";
+    text += (value.is_array() ? "" : name + " ") + FactText(part);
+  }
+  return text;
+}
+
+void AddChoice(const ordered_json& key_view, ReportKeyView* report) {
+  for (const char* field : {"description", "encoder"}) {
+    const auto found = key_view.find(field);
+    if (found == key_view.end() || !found->is_string()) continue;
+    const std::string text = *found;
+    report->notes.push_back(std::string(field) == "encoder" ? "Features: " + text + "." : text);
+  }
+}
+
+void AddColor(const ordered_json& facts, ReportKeyView* report) {
+  for (const auto& [name, value] : facts.items()) {
+    if (name == "view" || name == "warnings" || value.is_null()) continue;
+    std::string label = name;
+    for (char& c : label) c = c == '_' ? ' ' : c;
+    report->color_facts.emplace_back(label, FactText(value));
+  }
+}
+
+}  // namespace
+
+ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context) {
+  ReportKeyView report;
+  report.pictures = std::move(pictures);
+  if (context.HasInput(artifact::kKeyView)) {
+    AddChoice(ParseInput(context, artifact::kKeyView), &report);
+  }
+  if (context.HasInput(artifact::kKeyColorFacts)) {
+    AddColor(ParseInput(context, artifact::kKeyColorFacts), &report);
+  }
+  if (context.HasInput(artifact::kKeyViewRanking)) {
+    report.ranking = {"All candidates, best first", context.ReadInput(artifact::kKeyViewRanking)};
+  }
+  return report;
+}
+
+}  // namespace color3d

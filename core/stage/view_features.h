@@ -1,0 +1,23 @@
+// What key view selection wants to know of every candidate, computed on all threads or taken from
+// the cache. For this folder and the benchmarks.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "core/encoder/encoder.h"
+#include "core/keyview/view_features.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+// One entry a photo, the same bytes whether cached or not. Features are those of the photo as
+// captured (its lens distortion hardly matters here), so that they stay valid when poses change: a
+// photo is computed once for each encoder. `describer` gives the descriptor (it may be a CLIP image
+// tower), `encoder` the deep features. Throws Error naming a photo that cannot be read.
+std::vector<ViewFeatures> CollectViewFeatures(const Encoder& describer,
+                                              const Encoder& encoder,
+                                              const std::vector<std::filesystem::path>& photos,
+                                              StageContext& context);
+
+}  // namespace color3d

@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""A model server for color3d in Python: wrap a colourization model of your own here.
+
+The README beside this file says how to install and run it. Replace colorize() by a call of your
+model; the rest is the protocol (proto/color3d/backend/v1/backend.proto).
+"""
+
+import argparse
+import concurrent.futures
+import io
+import sys
+
+import grpc
+import numpy as np
+from PIL import Image
+
+from color3d.backend.v1 import backend_pb2, backend_pb2_grpc
+
+MAX_MESSAGE_BYTES = 256 << 20
+MAX_PIXELS = 50_000_000
+
+
+def read_gray(png):
+    """The photo as height x width floats, 0..1, from 8 or 16 bits."""
+    picture = np.asarray(Image.open(io.BytesIO(png)))
+    if picture.ndim != 2:
+        raise ValueError("the photo is not a grey PNG")
+    return picture.astype(np.float32) / (255.0 if picture.dtype == np.uint8 else 65535.0)
+
+
+def write_rgb(rgb):
+    """PNG of height x width x 3 floats, 0..1."""
+    stream = io.BytesIO()
+    Image.fromarray((np.clip(rgb, 0, 1) * 255 + 0.5).astype(np.uint8)).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def colorize(gray, prompt, seed, report):
+    """Your model goes here: height x width greys in, height x width x 3 colours out, both 0..1.
+
+    This one knows no model: sepia, or blueprint blue when the prompt asks for blue. The luminance
+    may change a little; color3d puts the photo's own back. Call report(0..1) as you go: it raises
+    when nobody waits for the result any more.
+    """
+    del seed  # nothing here is random
+    tint = (0.85, 1.0, 1.35) if "blue" in prompt.lower() else (1.2, 1.0, 0.72)
+    report(0.5)
+    return gray[..., None] * np.array(tint, np.float32)
+
+
+class Backend(backend_pb2_grpc.ColorBackendServicer):
+    def GetInfo(self, request, context):
+        return backend_pb2.BackendInfo(
+            name="color3d python example",
+            version="1",
+            license="Apache-2.0",
+            capabilities=[
+                backend_pb2.CAPABILITY_AUTOMATIC,
+                backend_pb2.CAPABILITY_TEXT_PROMPT,
+                backend_pb2.CAPABILITY_SEED,
+            ],
+            max_pixels=MAX_PIXELS,
+            deterministic=True,
+            ready=True,  # False while the model loads: color3d asks again
+        )
+
+    def Colorize(self, request, context):
+        yield backend_pb2.ColorizeUpdate(progress=0.0)
+        try:
+            gray = read_gray(request.image)
+            if gray.size > MAX_PIXELS:
+                raise ValueError(f"the photo has {gray.size} pixels; at most {MAX_PIXELS}")
+
+            def report(progress):
+                del progress  # a model that runs for minutes should yield it from here
+                if not context.is_active():
+                    raise RuntimeError("cancelled")
+
+            rgb = colorize(gray, request.prompt, request.seed, report)
+        except (ValueError, OSError) as error:
+            context.abort(grpc.StatusCode.INVALID_ARGUMENT, str(error))
+        if rgb.shape != gray.shape + (3,) or not np.isfinite(rgb).all():
+            context.abort(grpc.StatusCode.INTERNAL, f"the model returned shape {rgb.shape}")
+        yield backend_pb2.ColorizeUpdate(image=write_rgb(rgb))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--listen", default="127.0.0.1:50662", help="HOST:PORT")
+    arguments = parser.parse_args()
+    server = grpc.server(
+        concurrent.futures.ThreadPoolExecutor(max_workers=4),
+        options=[
+            ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
+            ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
+            ("grpc.so_reuseport", 0),
+        ],
+    )
+    backend_pb2_grpc.add_ColorBackendServicer_to_server(Backend(), server)
+    try:
+        port = server.add_insecure_port(arguments.listen)
+    except RuntimeError:
+        port = 0
+    if port == 0:
+        sys.exit(f"backend.py: cannot listen on {arguments.listen}; choose another with --listen")
+    server.start()
+    print(f"backend.py listens on port {port}", flush=True)
+    server.wait_for_termination()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+#include "server/backends/backend_call.h"
+
+#include <algorithm>
+
+namespace color3d {
+namespace {
+
+constexpr std::chrono::milliseconds kLook{50};
+constexpr size_t kMaxMessageBytes = 300;
+
+// What the backend says, as one line of plain text.
+std::string Quoted(const std::string& message) {
+  std::string text = message.substr(0, kMaxMessageBytes);
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 32 || c > 126; }, ' ');
+  return text.empty() ? "it gives no reason" : "\"" + text + "\"";
+}
+
+}  // namespace
+
+CancelWatch::CancelWatch(grpc::ClientContext& context, const CancellationToken& cancel) {
+  thread_ = std::thread([this, &context, &cancel] {
+    std::unique_lock lock(mutex_);
+    while (!done_ && !cancel.IsCancelled()) wake_.wait_for(lock, kLook);
+    if (!done_) context.TryCancel();
+  });
+}
+
+CancelWatch::~CancelWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void SleepUnlessCancelled(std::chrono::milliseconds time, const CancellationToken& cancel) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  for (;;) {
+    cancel.ThrowIfCancelled();
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        end - std::chrono::steady_clock::now());
+    if (left.count() <= 0) return;
+    std::this_thread::sleep_for(std::min(left, kLook));
+  }
+}
+
+Error BackendError(const std::string& name, const std::string& target, const grpc::Status& status) {
+  const std::string who = "the backend '" + name + "' (" + target + ")";
+  const std::string said = Quoted(status.error_message());
+  switch (status.error_code()) {
+    case grpc::StatusCode::UNAVAILABLE:
+      return Error(ErrorCode::kUnavailable,
+                   who + " cannot be reached: " + said + "; start it, then retry the job");
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+      return Error(ErrorCode::kDeadlineExceeded,
+                   who + " did not answer in time; retry with a smaller photo or a faster backend");
+    case grpc::StatusCode::CANCELLED:
+      return Error(ErrorCode::kUnavailable, who + " broke off: " + said + "; retry the job");
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return Error(ErrorCode::kFailedPrecondition,
+                   who + " does not speak color3d.backend.v1.ColorBackend: " + said);
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return Error(ErrorCode::kFailedPrecondition,
+                   who + " sent or was sent too much at once: " + said);
+    default:
+      return Error(ErrorCode::kFailedPrecondition, who + " failed: " + said);
+  }
+}
+
+}  // namespace color3d

@@ -1,0 +1,36 @@
+// A user's model server as a RemoteColorizer: color3d.backend.v1.ColorBackend over gRPC.
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "core/keycolor/remote.h"
+#include "server/backends/backend_address.h"
+
+namespace color3d {
+
+struct GrpcColorizerOptions {
+  // Longest Colorize; below the time after which a stage without progress counts as stuck.
+  std::chrono::milliseconds deadline{600'000};
+  std::chrono::milliseconds info_deadline{5'000};
+  // A backend that loads its model is asked again for this long.
+  std::chrono::milliseconds ready_patience{60'000};
+  std::chrono::milliseconds ready_poll{500};
+  // UNAVAILABLE is tried again, each wait twice the one before.
+  int tries = 4;
+  std::chrono::milliseconds first_backoff{300};
+  int max_message_bytes = 256 << 20;
+};
+
+// Connects when it is first used. Throws Error{kInvalidArgument} for a bad address.
+std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(const std::string& name,
+                                                   const std::string& address,
+                                                   const GrpcColorizerOptions& options = {});
+
+// One of the configured ones. Throws Error{kFailedPrecondition} naming those that there are.
+std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(
+    const std::map<std::string, std::string>& backends, const std::string& name);
+
+}  // namespace color3d

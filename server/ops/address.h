@@ -1,0 +1,20 @@
+// Addresses as users write them: HOST:PORT or unix:PATH.
+#pragma once
+
+#include <string>
+
+namespace color3d {
+
+struct HostPort {
+  std::string host;  // without the brackets of IPv6
+  std::string port;
+};
+
+// Throws Error{kInvalidArgument} naming `text` unless it is HOST:PORT.
+HostPort SplitHostPort(const std::string& text);
+
+// Whether the address can be reached from this machine only (loopback or a Unix socket). Throws as
+// SplitHostPort.
+bool IsLoopback(const std::string& address);
+
+}  // namespace color3d

@@ -1,0 +1,137 @@
+// color3d-bench pretrain: trains the embedded encoder and automatic colourizer, resumable.
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/encoder/threads.h"
+#include "core/keycolor/automatic.h"
+#include "core/weights/safetensors.h"
+#include "tests/bench/automatic_scores.h"
+#include "tests/bench/commands.h"
+#include "tests/bench/pretrain/pretrainer.h"
+
+namespace color3d {
+namespace {
+
+struct PretrainArguments {
+  std::vector<std::string> photos;
+  std::string validate_folder;
+  std::string teacher_file;
+  std::string checkpoint_file;
+  std::string out_file;
+  int validate_every = 500;
+  int validate_photos = 40;
+  int max_side_px = 256;
+  int threads = 2;
+  double stop_after_seconds = 0.0;
+  double temperature = 0.6;
+  PretrainOptions options;
+};
+
+double Seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// "FOLDER" or "FOLDER=WEIGHT".
+PhotoFolder ParseFolder(const std::string& text) {
+  const size_t equals = text.rfind('=');
+  if (equals == std::string::npos) return {text, 1.0};
+  return {text.substr(0, equals), std::stod(text.substr(equals + 1))};
+}
+
+// Mean colour error and colourfulness over photographs that are never trained on.
+nlohmann::ordered_json Validate(const PretrainArguments& args, const WeightMap& weights) {
+  const auto colorizer = AutomaticColorizer::FromPretrained(weights);
+  std::vector<AutomaticScore> scores;
+  for (const auto& photo : PhotosBelow(args.validate_folder, args.validate_photos)) {
+    scores.push_back(ScoreAutomatic(*colorizer, photo, args.max_side_px));
+  }
+  const AutomaticScore mean = MeanScore(scores);
+  return {{"photos", scores.size()},
+          {"delta_e00", mean.delta_e00},
+          {"delta_e00_grey", mean.delta_e00_grey},
+          {"colourfulness", mean.colourfulness},
+          {"colourfulness_truth", mean.true_colourfulness}};
+}
+
+void RunPretrain(const PretrainArguments& args) {
+  SetTorchThreads(args.threads);
+  std::vector<PhotoFolder> folders;
+  for (const std::string& text : args.photos) folders.push_back(ParseFolder(text));
+  const PhotoSet photos(folders);
+  std::optional<SqueezeNet> teacher;
+  if (!args.teacher_file.empty()) teacher.emplace(args.teacher_file);
+  Pretrainer trainer(args.options, photos, std::move(teacher));
+  nlohmann::ordered_json notes{{"photos", photos.size()}, {"seconds", 0.0}};
+  notes["curve"] = nlohmann::ordered_json::array();
+  if (std::filesystem::exists(args.checkpoint_file)) {
+    notes = nlohmann::ordered_json::parse(trainer.Restore(ReadFile(args.checkpoint_file)));
+  }
+  const double before = notes["seconds"].get<double>();
+  const double start = Seconds();
+  PretrainLosses mean;
+  int averaged = 0;
+  const auto save = [&] {
+    notes["seconds"] = before + Seconds() - start;
+    WriteFileAtomic(args.checkpoint_file, trainer.Checkpoint(notes.dump()));
+    WeightMap weights = trainer.AveragedWeights();
+    weights["color_temperature"] = {{1}, {static_cast<float>(args.temperature)}};
+    nlohmann::ordered_json point{{"iteration", trainer.iteration()},
+                                 {"seconds", notes["seconds"]},
+                                 {"loss_color", mean.color / std::max(1, averaged)},
+                                 {"loss_distillation", mean.distillation / std::max(1, averaged)},
+                                 {"loss_logits", mean.logits / std::max(1, averaged)}};
+    if (!args.validate_folder.empty()) point.update(Validate(args, weights));
+    notes["curve"].push_back(point);
+    std::printf("%s\n", point.dump().c_str());
+    std::fflush(stdout);
+    WriteFileAtomic(args.out_file,
+                    SerializeSafetensors(weights, true, {{"curve", notes["curve"].dump()}}));
+    mean = {};
+    averaged = 0;
+  };
+  while (trainer.iteration() < args.options.iterations) {
+    const PretrainLosses losses = trainer.Step();
+    mean.color += losses.color;
+    mean.distillation += losses.distillation;
+    mean.logits += losses.logits;
+    ++averaged;
+    if (trainer.iteration() % args.validate_every == 0) save();
+    if (args.stop_after_seconds > 0.0 && Seconds() - start > args.stop_after_seconds) break;
+  }
+  if (averaged > 0) save();
+}
+
+}  // namespace
+
+void AddPretrainCommand(CLI::App& app) {
+  auto args = std::make_shared<PretrainArguments>();
+  CLI::App* command = app.add_subcommand(
+      "pretrain", "train the embedded encoder and automatic colourizer on colour photographs");
+  command->add_option("--photos", args->photos, "FOLDER or FOLDER=WEIGHT, repeatable")->required();
+  command->add_option("--validate", args->validate_folder, "photographs never trained on");
+  command->add_option("--validate-every", args->validate_every, "iterations")
+      ->check(CLI::Range(1, 1000000));
+  command->add_option("--validate-photos", args->validate_photos)->check(CLI::Range(1, 100000));
+  command->add_option("--teacher", args->teacher_file, "SqueezeNet 1.1 as ONNX, to distil from");
+  command->add_option("--checkpoint", args->checkpoint_file, "resumed when it exists")->required();
+  command->add_option("-o,--out", args->out_file, "weights, safetensors, half precision")
+      ->required();
+  command->add_option("--iterations", args->options.iterations)->check(CLI::Range(1, 100000000));
+  command->add_option("--batch", args->options.batch)->check(CLI::Range(1, 4096));
+  command->add_option("--size", args->options.size_px, "px, first half")
+      ->check(CLI::Range(64, 512));
+  command->add_option("--late-size", args->options.late_size_px, "px, second half")
+      ->check(CLI::Range(64, 512));
+  command->add_option("--learning-rate", args->options.learning_rate)->check(CLI::Range(1e-6, 1.0));
+  command->add_option("--temperature", args->temperature, "of the shipped colour distribution")
+      ->check(CLI::Range(0.05, 2.0));
+  command->add_option("--threads", args->threads)->check(CLI::Range(1, 256));
+  command->add_option("--stop-after", args->stop_after_seconds, "seconds; resume later");
+  command->callback([args] { RunPretrain(*args); });
+}
+
+}  // namespace color3d

@@ -1,0 +1,39 @@
+// What every fuzz target defines. libFuzzer drives it in builds with COLOR3D_FUZZ; in all others
+// replay_main.cc runs the seeds and seeded mutations of them as a test.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+
+// Returns 0; anything that is wrong aborts.
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
+
+namespace color3d {
+
+// Inputs to start from: well formed and nearly well formed.
+std::vector<std::string> FuzzSeeds();
+
+// Runs the reader on one input. The only thing that it may throw is Error{kInvalidArgument} with a
+// message of one line: anything else is a finding.
+template <typename Reader>
+int ReadOrRefuse(Reader&& reader) {
+  try {
+    reader();
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    if (error.code() != ErrorCode::kInvalidArgument || message.empty() ||
+        message.find('\n') != std::string::npos) {
+      std::fprintf(stderr, "not a refusal: %s: %s\n", ErrorCodeName(error.code()), error.what());
+      std::abort();
+    }
+  }
+  return 0;
+}
+
+}  // namespace color3d

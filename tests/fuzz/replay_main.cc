@@ -1,0 +1,102 @@
+// Runs a fuzz target without libFuzzer: on its seeds, on every prefix of them, and on seeded
+// mutations. The same inputs on every run. With a folder as argument it writes the seeds there
+// instead, for libFuzzer to start from; with files as arguments it replays those.
+#include <filesystem>
+#include <string>
+
+#include "core/base/files.h"
+#include "core/base/random.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kMutations = 50000;
+
+void RunOne(const std::string& input) {
+  LLVMFuzzerTestOneInput(reinterpret_cast<const uint8_t*>(input.data()), input.size());
+}
+
+// Numbers at which readers go wrong.
+uint64_t StrangeNumber(Random& random) {
+  constexpr uint64_t kStrange[] = {0,
+                                   1,
+                                   0x7f,
+                                   0x80,
+                                   0xff,
+                                   0x7fff,
+                                   0xffff,
+                                   0x7fffffff,
+                                   0x80000000,
+                                   0xffffffff,
+                                   uint64_t{1} << 60,
+                                   ~uint64_t{0} >> 1,
+                                   ~uint64_t{0}};
+  return kStrange[random.NextBelow(std::size(kStrange))];
+}
+
+void Mutate(const std::vector<std::string>& seeds, Random& random, std::string& input) {
+  const auto at = [&] { return random.NextBelow(static_cast<uint32_t>(input.size()) + 1); };
+  const size_t place = at();
+  switch (random.NextBelow(6)) {
+    case 0:  // one bit
+      if (place < input.size()) input[place] ^= static_cast<char>(1 << random.NextBelow(8));
+      break;
+    case 1:  // one byte
+      if (place < input.size()) input[place] = static_cast<char>(random.NextBelow(256));
+      break;
+    case 2:  // cut a range
+      input.erase(place, random.NextBelow(16));
+      break;
+    case 3: {  // repeat a range
+      const std::string range = input.substr(at(), random.NextBelow(64));
+      input.insert(place, range);
+      break;
+    }
+    case 4: {  // a number of 1, 2, 4 or 8 bytes
+      const uint64_t number = StrangeNumber(random);
+      const size_t size = size_t{1} << random.NextBelow(4);
+      if (place + size > input.size()) break;
+      input.replace(place, size, reinterpret_cast<const char*>(&number), size);
+      break;
+    }
+    default: {  // the head of this and the tail of another
+      const std::string& other = seeds[random.NextBelow(static_cast<uint32_t>(seeds.size()))];
+      const size_t tail = random.NextBelow(static_cast<uint32_t>(other.size()) + 1);
+      input = input.substr(0, place) + other.substr(tail);
+      break;
+    }
+  }
+}
+
+void Replay(const std::vector<std::string>& seeds) {
+  for (const std::string& seed : seeds) {
+    for (size_t size = 0; size <= seed.size(); ++size) RunOne(seed.substr(0, size));
+  }
+  Random random(/*seed=*/4);
+  for (int i = 0; i < kMutations; ++i) {
+    std::string input = seeds[random.NextBelow(static_cast<uint32_t>(seeds.size()))];
+    const uint32_t count = 1 + random.NextBelow(4);
+    for (uint32_t j = 0; j < count; ++j) Mutate(seeds, random, input);
+    RunOne(input);
+  }
+}
+
+}  // namespace
+}  // namespace color3d
+
+int main(int argc, char** argv) {
+  const std::vector<std::string> seeds = color3d::FuzzSeeds();
+  if (argc < 2) color3d::Replay(seeds);
+  for (int i = 1; i < argc; ++i) {
+    const std::filesystem::path path = argv[i];
+    if (!std::filesystem::is_directory(path)) {
+      color3d::RunOne(color3d::ReadFile(path));
+      continue;
+    }
+    for (size_t j = 0; j < seeds.size(); ++j) {
+      color3d::WriteFileAtomic(path / ("seed" + std::to_string(j)), seeds[j]);
+    }
+  }
+  return 0;
+}
