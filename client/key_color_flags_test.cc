@@ -51,7 +51,7 @@ TEST_F(KeyColorFlagsTest, EverySourceStandsAlone) {
                                                {"--key-color", "PNG"},
                                                {"--image", "PNG"},
                                                {"--hints", "PNG"},
-                                               {"--points", "JSON"},
+                                               {"--points", "JSON", "--labels", "PNG"},
                                                {"--reference", "PNG", "--reference", "PNG"},
                                                {"--prompt", "red brick", "--model", "clip"},
                                                {"--edit", "PNG", "--mask", "PNG"},
@@ -86,6 +86,7 @@ TEST_F(KeyColorFlagsTest, WhatNeedsAnotherFlagSaysWhich) {
   EXPECT_THAT(Complaint({"--key-color", "PNG", "--model", "x"}), HasSubstr("leave it out"));
   EXPECT_THAT(Complaint({"--backend", "b", "--model", "x"}), HasSubstr("leave it out"));
   EXPECT_THAT(Complaint({"--auto", "--mask", "PNG"}), HasSubstr("--edit or --backend"));
+  EXPECT_THAT(Complaint({"--hints", "PNG", "--labels", "PNG"}), HasSubstr(".json"));
   EXPECT_THAT(Complaint({"--mask", "PNG"}), HasSubstr("--edit or --backend"));
   EXPECT_THAT(Complaint({"--backend", "b", "--hints", "PNG"}), HasSubstr(".json"));
   EXPECT_THAT(Complaint({"--backend", "b", "--reference", "PNG", "--reference", "PNG"}),

@@ -9,7 +9,7 @@ packages=(
   libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libabsl-dev
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
-  libgtest-dev libgmock-dev libbenchmark-dev
+  libicu-dev zlib1g-dev libgtest-dev libgmock-dev libbenchmark-dev
 )
 
 if ! command -v apt-get >/dev/null 2>&1; then

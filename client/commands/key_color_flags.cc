@@ -40,6 +40,7 @@ void CheckFiles(const KeyColorFlags& flags) {
   if (!flags.image.empty()) RequireImage("--key-color", flags.image);
   if (!flags.edit.empty()) RequireImage("--edit", flags.edit);
   if (!flags.mask.empty()) RequireImage("--mask", flags.mask);
+  if (!flags.labels.empty()) RequireImage("--labels", flags.labels);
   for (const std::string& file : flags.references) RequireImage("--reference", file);
   if (flags.hints.empty()) return;
   if (IsJson(flags.hints)) {
@@ -77,6 +78,11 @@ void CheckCombination(const KeyColorFlags& flags) {
   if (!flags.mask.empty() && flags.edit.empty() && !backend) {
     throw InvalidArgument(
         "--mask says where --edit or --backend may change colour; give one of them");
+  }
+  if (!flags.labels.empty() && (backend || flags.hints.empty() || !IsJson(flags.hints))) {
+    throw InvalidArgument(
+        "--labels goes with --hints points in a .json file, whose \"label\" entries "
+        "name its values; leave it out");
   }
   if (backend && !flags.hints.empty() && !IsJson(flags.hints)) {
     throw InvalidArgument("--hints for a backend must be points (a .json file), not " +
@@ -144,6 +150,7 @@ v1::KeyColorSource MakeSource(const KeyColorFlags& flags, Uploads* uploads) {
     source.set_prompt(flags.prompt);
   } else if (IsJson(flags.hints)) {
     *source.mutable_points() = uploads->Add(flags.hints);
+    if (!flags.labels.empty()) *source.mutable_labels() = uploads->Add(flags.labels);
   } else {
     *source.mutable_strokes() = uploads->Add(flags.hints);
   }
@@ -175,7 +182,9 @@ void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
   text("--key-color,--image", &flags->image, "The key view, coloured (JPEG, PNG or TIFF)");
   text("--hints,--strokes,--points",
        &flags->hints,
-       "Colour strokes (PNG of the key view's size, transparent elsewhere) or points (JSON)");
+       "Colour strokes (PNG of the key view's size, transparent elsewhere), or points, lines and "
+       "regions (JSON)");
+  text("--labels", &flags->labels, "Grey PNG whose values the \"label\" entries of points name");
   app.add_option("--reference",
                  flags->references,
                  "Coloured picture of something similar; repeatable: the best match wins")

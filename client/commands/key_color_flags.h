@@ -13,6 +13,7 @@ namespace color3d::client {
 struct KeyColorFlags {
   std::string image;   // the key view, coloured
   std::string hints;   // strokes, or points as .json
+  std::string labels;  // picture that the points' labels refer to
   std::string edit;    // the key view in colour, edited
   std::string mask;    // of edit and backend
   std::string prompt;  // of its own, or for the backend

@@ -3,31 +3,10 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/keycolor/coloured_picture.h"
 #include "core/keycolor/keycolor.h"
+#include "core/keycolor/picture_checks.h"
 
 namespace color3d {
-namespace {
-
-void ExpectSameSubject(const Image& luminance, const Image& coloured_luminance) {
-  const LuminanceAgreement agreement = CompareLuminance(luminance, coloured_luminance);
-  if (agreement.SameSubject()) return;
-  throw InvalidArgument(
-      "the coloured picture does not look like the key view (correlation of luminances " +
-      std::to_string(agreement.correlation) + ", needed > " +
-      std::to_string(LuminanceAgreement::kMinCorrelation) +
-      "); colour the photo that was chosen as key view");
-}
-
-void ExpectColor(const Image& ab) {
-  const ChromaLevel chroma = MeasureChroma(ab);
-  if (chroma.IsGray()) {
-    throw InvalidArgument("the coloured picture has no colour (mean chroma " +
-                          std::to_string(chroma.mean) + " Lab units); colour it first");
-  }
-}
-
-}  // namespace
 
 Image KeyColorFromImage(const Image& luminance, const Image& coloured) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -48,14 +27,10 @@ Image KeyColorFromImage(const Image& luminance, const Image& coloured) {
     }
   }
   const Image lab = LabFromSrgb(coloured);
-  Image l(lab.width, lab.height, 1);
   Image ab(lab.width, lab.height, 2);
-  std::copy_n(lab.data.begin(), l.data.size(), l.data.begin());
-  std::copy_n(lab.data.begin() + static_cast<std::ptrdiff_t>(l.data.size()),
-              ab.data.size(),
-              ab.data.begin());
-  ExpectColor(ab);
-  ExpectSameSubject(luminance, l);
+  std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
+  ExpectColor(lab, "the coloured picture");
+  ExpectSameSubject(luminance, lab, "the coloured picture");
   return ab;
 }
 

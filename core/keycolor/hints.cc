@@ -4,21 +4,17 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/keycolor/edge_weights.h"
 #include "core/keycolor/grid_solver.h"
+#include "core/keycolor/hint_map.h"
 #include "core/keycolor/keycolor.h"
 
 namespace color3d {
 namespace {
 
-// Edge weights are at most 1: a hinted pixel keeps its colour to a few thousandths.
-constexpr double kHintWeight = 1000.0;
-// Least weight of an edge: regions without a hint of their own take their neighbours' colour.
-constexpr double kWeightFloor = 1e-5;
-constexpr double kLeastCoverage = 1e-3;
-constexpr float kAlphaOfHint = 0.5f;
-constexpr float kChromaOfHint = 6.0f;
 constexpr int kGuideRadius = 2;
 constexpr float kGuideVarianceFloor = 20.0f;
 
@@ -41,57 +37,42 @@ void CheckLuminance(const Image& luminance) {
   }
 }
 
-// Hints on the solver's grid: how much of each pixel is hinted, and the mean colour there.
-struct HintMap {
-  Image coverage;  // 1 channel, 0..1
-  Image ab;        // 2 channels, already divided by the coverage
-};
-
-// w = exp(-dL^2 / (2 sigma^2)), by Levin et al. 2004 with a fixed sigma; diagonal neighbours are
-// further away and count less.
-GridSystem BuildSystem(const Image& l, double sigma) {
-  GridSystem system(l.width, l.height);
-  const double factor = -0.5 / (sigma * sigma);
-  auto weight = [&](int x0, int y0, int x1, int y1) {
-    const double difference = l.At(0, y0, x0) - l.At(0, y1, x1);
-    const double distance = x0 != x1 && y0 != y1 ? std::sqrt(2.0) : 1.0;
-    return (std::exp(factor * difference * difference) + kWeightFloor) / distance;
-  };
-  for (int y = 0; y < l.height; ++y) {
-    for (int x = 0; x < l.width; ++x) {
-      const size_t i = static_cast<size_t>(y) * l.width + x;
-      const bool has_right = x + 1 < l.width;
-      const bool has_down = y + 1 < l.height;
-      if (has_right) system.right[i] = weight(x, y, x + 1, y);
-      if (has_down) system.down[i] = weight(x, y, x, y + 1);
-      if (has_right && has_down) system.down_right[i] = weight(x, y, x + 1, y + 1);
-      if (x > 0 && has_down) system.down_left[i] = weight(x, y, x - 1, y + 1);
-    }
+// The hints on a smaller grid: mean colour of the hinted pixels in a cell; a cell with any is
+// hinted, so that thin strokes survive.
+HintMap Reduce(const HintMap& full, int width, int height) {
+  Image weighted(full.ab.width, full.ab.height, 3);
+  for (size_t i = 0; i < full.hinted.size(); ++i) {
+    if (!full.hinted[i]) continue;
+    weighted.Plane(0)[i] = full.ab.Plane(0)[i];
+    weighted.Plane(1)[i] = full.ab.Plane(1)[i];
+    weighted.Plane(2)[i] = 1.0f;
   }
-  return system;
+  weighted = Resize(weighted, width, height);
+  HintMap small{std::vector<uint8_t>(weighted.PlaneSize(), 0), Image(width, height, 2)};
+  for (size_t i = 0; i < small.hinted.size(); ++i) {
+    const float share = weighted.Plane(2)[i];
+    if (share < 1e-4f) continue;
+    small.hinted[i] = 1;
+    small.ab.Plane(0)[i] = weighted.Plane(0)[i] / share;
+    small.ab.Plane(1)[i] = weighted.Plane(1)[i] / share;
+  }
+  return small;
 }
 
-HintSolution Solve(const Image& luminance,
-                   const Image& small,
-                   const HintMap& hints,
-                   const HintOptions& options,
-                   ProgressObserver& progress,
-                   const CancellationToken& cancel) {
-  GridSystem system = BuildSystem(small, options.sigma);
-  std::vector<double> target(2 * small.PlaneSize(), 0.0);
-  HintSolution solution;
-  for (size_t i = 0; i < small.PlaneSize(); ++i) {
-    if (hints.coverage.data[i] < kLeastCoverage) continue;
-    ++solution.hinted_pixels;
-    system.data[i] = kHintWeight * hints.coverage.data[i];
-    target[2 * i] = hints.ab.Plane(0)[i];
-    target[2 * i + 1] = hints.ab.Plane(1)[i];
-  }
-  const GridSolution solved = SolveGridSystem(
-      system,
-      target,
-      options.tolerance,
-      options.max_iterations,
+// Spreads hints over a picture of the same size; fills all of the solution but hinted_pixels.
+HintSolution SolveAtSize(const Image& luminance,
+                         HintMap hints,
+                         const HintOptions& options,
+                         ProgressObserver& progress,
+                         const CancellationToken& cancel) {
+  ThreadPool pool(options.threads);
+  GridSystem system = SystemOfLuminance(luminance, options.sigma, pool);
+  system.pinned = std::move(hints.hinted);
+  GridSolution solved = SolveGridSystem(
+      std::move(system),
+      hints.ab.data,
+      {options.tolerance, options.max_iterations},
+      pool,
       [&](int iteration, double residual) {
         progress.OnError(iteration, "relative_residual", residual);
         progress.OnProgress(iteration, 0, "spreading the colour hints");
@@ -102,104 +83,48 @@ HintSolution Solve(const Image& luminance,
         "colour hints: the solver stopped after " + std::to_string(solved.iterations) +
         " iterations at a relative residual of " + std::to_string(solved.relative_residual));
   }
+  HintSolution solution;
   solution.iterations = solved.iterations;
   solution.relative_residual = solved.relative_residual;
-  Image ab(small.width, small.height, 2);
-  for (size_t i = 0; i < small.PlaneSize(); ++i) {
-    ab.Plane(0)[i] = static_cast<float>(solved.u[2 * i]);
-    ab.Plane(1)[i] = static_cast<float>(solved.u[2 * i + 1]);
-  }
-  const bool reduced = small.width != luminance.width || small.height != luminance.height;
-  solution.ab =
-      reduced ? UpsampleGuided(ab, luminance, kGuideRadius, kGuideVarianceFloor) : std::move(ab);
+  solution.ab.width = luminance.width;
+  solution.ab.height = luminance.height;
+  solution.ab.channels = 2;
+  solution.ab.data = std::move(solved.u);
   return solution;
 }
 
-// Mask and colour of the strokes at full size, reduced by area so that thin strokes survive.
-HintMap MapFromStrokes(const Image& strokes, int width, int height) {
-  Image rgb(strokes.width, strokes.height, 3);
-  std::copy_n(strokes.data.begin(), rgb.data.size(), rgb.data.begin());
-  for (float& value : rgb.data) value = std::isfinite(value) ? value : 0.0f;
-  const Image lab = LabFromSrgb(rgb);
-  Image coverage(strokes.width, strokes.height, 1);
-  Image weighted(strokes.width, strokes.height, 2);
-  for (size_t i = 0; i < lab.PlaneSize(); ++i) {
-    const float a = lab.Plane(1)[i];
-    const float b = lab.Plane(2)[i];
-    const bool hinted = strokes.channels == 4 ? strokes.Plane(3)[i] > kAlphaOfHint
-                                              : std::hypot(a, b) > kChromaOfHint;
-    if (!hinted) continue;
-    coverage.data[i] = 1.0f;
-    weighted.Plane(0)[i] = a;
-    weighted.Plane(1)[i] = b;
-  }
-  HintMap map{Resize(coverage, width, height), Resize(weighted, width, height)};
-  for (size_t i = 0; i < map.coverage.PlaneSize(); ++i) {
-    const float share = std::max(map.coverage.data[i], static_cast<float>(kLeastCoverage));
-    map.ab.Plane(0)[i] /= share;
-    map.ab.Plane(1)[i] /= share;
-  }
-  return map;
-}
-
-// Discs; where several overlap, their colours are averaged. At least the pixel under the centre.
-HintMap MapFromHints(const std::vector<ColorHint>& hints, double scale, int width, int height) {
-  HintMap map{Image(width, height, 1), Image(width, height, 2)};
-  for (const ColorHint& hint : hints) {
-    const double cx = hint.x_px * scale;
-    const double cy = hint.y_px * scale;
-    const double radius = hint.radius_px * scale;
-    const int center_x = std::min(static_cast<int>(cx), width - 1);
-    const int center_y = std::min(static_cast<int>(cy), height - 1);
-    const int reach = static_cast<int>(std::min(radius + 1.0, 1.0 + width + height));
-    for (int y = std::max(0, center_y - reach); y <= std::min(height - 1, center_y + reach); ++y) {
-      for (int x = std::max(0, center_x - reach); x <= std::min(width - 1, center_x + reach); ++x) {
-        const bool inside = std::hypot(x + 0.5 - cx, y + 0.5 - cy) <= radius;
-        if (!inside && !(x == center_x && y == center_y)) continue;
-        map.coverage.At(0, y, x) += 1.0f;
-        map.ab.At(0, y, x) += static_cast<float>(hint.a);
-        map.ab.At(1, y, x) += static_cast<float>(hint.b);
-      }
+HintSolution Solve(const Image& luminance,
+                   HintMap hints,
+                   const HintOptions& options,
+                   ProgressObserver& progress,
+                   const CancellationToken& cancel) {
+  const int64_t hinted = std::count(hints.hinted.begin(), hints.hinted.end(), 1);
+  HintSolution solution;
+  if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
+    solution = SolveAtSize(luminance, std::move(hints), options, progress, cancel);
+  } else {
+    const Image small = FitWithin(luminance, options.max_side_px);
+    solution =
+        SolveAtSize(small, Reduce(hints, small.width, small.height), options, progress, cancel);
+    solution.ab = UpsampleGuided(solution.ab, luminance, kGuideRadius, kGuideVarianceFloor);
+    for (size_t i = 0; i < hints.hinted.size(); ++i) {
+      if (!hints.hinted[i]) continue;
+      solution.ab.Plane(0)[i] = hints.ab.Plane(0)[i];
+      solution.ab.Plane(1)[i] = hints.ab.Plane(1)[i];
     }
   }
-  for (size_t i = 0; i < map.coverage.PlaneSize(); ++i) {
-    const float count = std::max(map.coverage.data[i], 1.0f);
-    map.ab.Plane(0)[i] /= count;
-    map.ab.Plane(1)[i] /= count;
-    map.coverage.data[i] = std::min(map.coverage.data[i], 1.0f);
-  }
-  return map;
-}
-
-void CheckHints(const std::vector<ColorHint>& hints, const Image& luminance) {
-  if (hints.empty()) throw InvalidArgument("there is no colour hint; give at least one");
-  for (size_t i = 0; i < hints.size(); ++i) {
-    const ColorHint& hint = hints[i];
-    const std::string name = "colour hint " + std::to_string(i);
-    if (!(hint.x_px >= 0.0 && hint.x_px < luminance.width && hint.y_px >= 0.0 &&
-          hint.y_px < luminance.height)) {
-      throw InvalidArgument(name + " at (" + std::to_string(hint.x_px) + ", " +
-                            std::to_string(hint.y_px) + ") lies outside of the key view of " +
-                            std::to_string(luminance.width) + "x" +
-                            std::to_string(luminance.height) + " px");
-    }
-    if (!(hint.radius_px >= 0.0) || !std::isfinite(hint.radius_px)) {
-      throw InvalidArgument(name + " has the radius " + std::to_string(hint.radius_px) +
-                            " px, it must be >= 0");
-    }
-    if (!(std::abs(hint.a) <= 128.0) || !(std::abs(hint.b) <= 128.0)) {
-      throw InvalidArgument(name + " has a colour outside of -128..128 Lab units");
-    }
-  }
+  solution.hinted_pixels = hinted;
+  return solution;
 }
 
 }  // namespace
 
 void HintOptions::Validate() const {
   CheckRange("sigma", sigma, 1e-3, 1e3);
-  CheckRange("max_side_px", max_side_px, 64, 8192);
-  CheckRange("tolerance", tolerance, 1e-12, 0.1);
+  CheckRange("max_side_px", max_side_px, 64, 16384);
+  CheckRange("tolerance", tolerance, 1e-6, 0.1);
   CheckRange("max_iterations", max_iterations, 1, 1000000);
+  CheckRange("threads", threads, 0, 1024);
 }
 
 HintSolution KeyColorFromStrokes(const Image& luminance,
@@ -218,33 +143,26 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
     throw InvalidArgument("the strokes picture has " + std::to_string(strokes.channels) +
                           " channels, it must have 3 (RGB) or 4 (RGBA)");
   }
-  const Image small = FitWithin(luminance, options.max_side_px);
-  const HintMap map = MapFromStrokes(strokes, small.width, small.height);
-  const bool any = std::any_of(map.coverage.data.begin(), map.coverage.data.end(), [](float value) {
-    return value >= kLeastCoverage;
-  });
-  if (!any) {
+  HintMap hints = HintsOfStrokes(strokes);
+  if (std::find(hints.hinted.begin(), hints.hinted.end(), 1) == hints.hinted.end()) {
     throw InvalidArgument(
         strokes.channels == 4
             ? "the strokes picture hints no pixel (nowhere is alpha above 0.5)"
             : "the strokes picture hints no pixel (nowhere does chroma exceed 6 Lab units)");
   }
-  return Solve(luminance, small, map, options, progress, cancel);
+  return Solve(luminance, std::move(hints), options, progress, cancel);
 }
 
 HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
                                ProgressObserver& progress,
-                               const CancellationToken& cancel) {
+                               const CancellationToken& cancel,
+                               const HintPictures& pictures) {
   options.Validate();
   CheckLuminance(luminance);
-  CheckHints(hints, luminance);
-  const Image small = FitWithin(luminance, options.max_side_px);
-  const double scale = static_cast<double>(small.width) / luminance.width;
   return Solve(luminance,
-               small,
-               MapFromHints(hints, scale, small.width, small.height),
+               DrawHints(hints, pictures, luminance.width, luminance.height, progress, cancel),
                options,
                progress,
                cancel);

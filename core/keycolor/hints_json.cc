@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -14,6 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr size_t kMaxHints = 100000;
+constexpr size_t kMaxPoints = 10000;
 
 double Number(const Json& entry, const char* field, const std::string& name) {
   if (!entry.contains(field) || !entry[field].is_number()) {
@@ -38,20 +41,57 @@ LabColor ParseHexColor(const std::string& text, const std::string& name) {
                               static_cast<double>(value & 255) / 255.0});
 }
 
-ColorHint ParseHint(const Json& entry, const std::string& name) {
-  if (!entry.is_object()) throw InvalidArgument(name + " is not an object");
-  for (const auto& [key, value] : entry.items()) {
-    if (key != "x" && key != "y" && key != "radius" && key != "color") {
-      throw InvalidArgument(name + " has the unknown field \"" + key +
-                            "\"; known are x, y, radius and color");
-    }
+std::vector<std::array<double, 2>> Points(const Json& points, const std::string& name) {
+  const char* shape = "it must look like [[10, 20], [80, 25], ...]";
+  if (!points.is_array() || points.empty() || points.size() > kMaxPoints) {
+    throw InvalidArgument(name + " has no list of 1 to " + std::to_string(kMaxPoints) +
+                          " points; " + shape);
   }
-  ColorHint hint;
-  hint.x_px = Number(entry, "x", name);
-  hint.y_px = Number(entry, "y", name);
-  if (entry.contains("radius")) hint.radius_px = Number(entry, "radius", name);
+  std::vector<std::array<double, 2>> result;
+  for (const Json& point : points) {
+    if (!point.is_array() || point.size() != 2 || !point[0].is_number() || !point[1].is_number()) {
+      throw InvalidArgument(name + " has a point that is no pair of numbers; " + shape);
+    }
+    result.push_back({point[0].get<double>(), point[1].get<double>()});
+  }
+  return result;
+}
+
+// The one of "x", "line", "region" and "label" that the entry has, with the fields that go with it.
+void ParseShape(const Json& entry, const std::string& name, ColorHint& hint) {
+  if (entry.contains("line")) {
+    hint.shape = ColorHint::Shape::kLine;
+    hint.points_px = Points(entry["line"], name);
+    if (entry.contains("width")) hint.radius_px = Number(entry, "width", name) / 2.0;
+  } else if (entry.contains("region")) {
+    hint.shape = ColorHint::Shape::kRegion;
+    hint.points_px = Points(entry["region"], name);
+  } else if (entry.contains("label")) {
+    hint.shape = ColorHint::Shape::kLabel;
+    const double label = Number(entry, "label", name);
+    if (label != std::floor(label) || label < 0.0 || label > 255.0) {
+      throw InvalidArgument(name + " has a label that is no whole number of 0 to 255");
+    }
+    hint.label = static_cast<int>(label);
+  } else {
+    hint.x_px = Number(entry, "x", name);
+    hint.y_px = Number(entry, "y", name);
+    if (entry.contains("radius")) hint.radius_px = Number(entry, "radius", name);
+  }
   if (hint.x_px < 0.0 || hint.y_px < 0.0 || hint.radius_px < 0.0) {
-    throw InvalidArgument(name + " has a negative coordinate or radius");
+    throw InvalidArgument(name + " has a negative coordinate, radius or width");
+  }
+}
+
+void ParseFill(const Json& entry, const std::string& name, ColorHint& hint) {
+  if (entry.contains("keep")) {
+    const std::string keep = entry["keep"].is_string() ? entry["keep"].get<std::string>() : "";
+    if (entry.contains("color")) throw InvalidArgument(name + " has both \"color\" and \"keep\"");
+    if (keep != "neutral" && keep != "auto") {
+      throw InvalidArgument(name + " has a \"keep\" that is neither \"neutral\" nor \"auto\"");
+    }
+    hint.fill = keep == "auto" ? ColorHint::Fill::kAutomatic : ColorHint::Fill::kNeutral;
+    return;
   }
   if (!entry.contains("color") || !entry["color"].is_string()) {
     throw InvalidArgument(name + " lacks the text \"color\", such as \"#a0522d\"");
@@ -59,6 +99,30 @@ ColorHint ParseHint(const Json& entry, const std::string& name) {
   const LabColor lab = ParseHexColor(entry["color"].get<std::string>(), name);
   hint.a = lab.a;
   hint.b = lab.b;
+}
+
+// Fields of an entry by its shape, "color" and "keep" aside.
+std::vector<std::string> FieldsOf(const Json& entry) {
+  if (entry.contains("line")) return {"line", "width"};
+  if (entry.contains("region")) return {"region"};
+  if (entry.contains("label")) return {"label"};
+  return {"x", "y", "radius"};
+}
+
+ColorHint ParseHint(const Json& entry, const std::string& name) {
+  if (!entry.is_object()) throw InvalidArgument(name + " is not an object");
+  std::vector<std::string> fields = FieldsOf(entry);
+  fields.insert(fields.end(), {"color", "keep"});
+  for (const auto& [key, value] : entry.items()) {
+    if (std::find(fields.begin(), fields.end(), key) != fields.end()) continue;
+    std::string known;
+    for (const std::string& field : fields) known += (known.empty() ? "" : ", ") + field;
+    throw InvalidArgument(name + " has the unknown field \"" + key.substr(0, 32) +
+                          "\"; known with this shape are " + known);
+  }
+  ColorHint hint;
+  ParseShape(entry, name, hint);
+  ParseFill(entry, name, hint);
   return hint;
 }
 

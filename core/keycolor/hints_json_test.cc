@@ -39,6 +39,20 @@ TEST(HintsJsonTest, NamesTheBadEntry) {
                                      R"([{"x":-1,"y":1,"color":"#000000"}])",
                                      R"([{"x":1,"y":1,"radius":-2,"color":"#000000"}])",
                                      R"([{"x":1,"y":1,"colour":"#000000","color":"#000000"}])"};
+  const std::vector<std::string> bad_shapes{
+      R"([{"line":[],"color":"#000000"}])",
+      R"([{"line":[[1,2,3]],"color":"#000000"}])",
+      R"([{"line":[[1,2]],"radius":3,"color":"#000000"}])",
+      R"([{"line":[[1,2]],"width":-1,"color":"#000000"}])",
+      R"([{"region":"all","color":"#000000"}])",
+      R"([{"region":[[0,0],[1,"a"],[1,1]],"color":"#000000"}])",
+      R"([{"label":256,"color":"#000000"}])",
+      R"([{"label":1.5,"color":"#000000"}])",
+      R"([{"label":1,"x":1,"color":"#000000"}])",
+      R"([{"label":1}])",
+      R"([{"label":1,"keep":"red"}])",
+      R"([{"label":1,"keep":"auto","color":"#000000"}])"};
+  for (const std::string& json : bad_shapes) EXPECT_THROW(ParseHintsJson(json), Error) << json;
   for (const std::string& json : bad) EXPECT_THROW(ParseHintsJson(json), Error) << json;
   try {
     ParseHintsJson(R"([{"x":1,"y":1,"color":"#000000"},{"x":1,"y":1,"color":"blue"}])");

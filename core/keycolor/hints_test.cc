@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/random.h"
 #include "core/keycolor/keycolor.h"
 
 namespace color3d {
@@ -16,7 +17,9 @@ struct Recorder : NullObserver {
   void OnError(int64_t, const std::string& name, double value) override {
     if (name == "relative_residual") last_residual = value;
   }
+  void OnWarning(const std::string& message) override { warning = message; }
   double last_residual = -1.0;
+  std::string warning;
 };
 
 HintSolution Spread(const Image& luminance,
@@ -44,7 +47,7 @@ TEST(HintsTest, ColourStopsAtALuminanceEdge) {
     EXPECT_NEAR(solution.ab.At(1, y, 38), 20.0f, 2.0f);
     EXPECT_NEAR(solution.ab.At(1, y, 42), 10.0f, 2.0f);
   }
-  EXPECT_LE(solution.relative_residual, 1e-6);
+  EXPECT_LE(solution.relative_residual, 5e-4);
   EXPECT_GT(solution.hinted_pixels, 20);
 }
 
@@ -52,7 +55,7 @@ TEST(HintsTest, ReportsTheResidual) {
   Recorder recorder;
   const HintSolution solution =
       KeyColorFromHints(TwoHalves(40, 40), {{10, 10, 2, 50, 20}}, {}, recorder, {});
-  EXPECT_EQ(recorder.last_residual, solution.relative_residual);
+  EXPECT_NEAR(recorder.last_residual, solution.relative_residual, 1e-5);
 }
 
 TEST(HintsTest, FlatPictureTakesItsOnlyHint) {
@@ -66,16 +69,114 @@ TEST(HintsTest, FlatPictureTakesItsOnlyHint) {
 TEST(HintsTest, OppositeHintsOnePixelApartBothHold) {
   const HintSolution solution =
       Spread(Image(33, 33, 1, 50.0f), {{16.5, 16.5, 0, 80, 80}, {17.5, 16.5, 0, -80, -80}});
-  EXPECT_NEAR(solution.ab.At(0, 16, 16), 80.0f, 1.5f);
-  EXPECT_NEAR(solution.ab.At(0, 16, 17), -80.0f, 1.5f);
+  EXPECT_EQ(solution.ab.At(0, 16, 16), 80.0f);
+  EXPECT_EQ(solution.ab.At(0, 16, 17), -80.0f);
   for (float value : solution.ab.data) EXPECT_LE(std::abs(value), 80.5f);
 }
 
-TEST(HintsTest, HintsOnTheSamePixelAreAveraged) {
+TEST(HintsTest, OfContradictingHintsTheLastWinsWithAWarning) {
+  const Image luminance(9, 9, 1, 50.0f);
+  Recorder recorder;
+  const HintSolution solution = KeyColorFromHints(
+      luminance, {{4.5, 4.5, 0, 60, 0}, {4.5, 4.5, 0, -20, 10}}, {}, recorder, {});
+  EXPECT_EQ(solution.ab.At(0, 4, 4), -20.0f);
+  EXPECT_EQ(solution.ab.At(1, 4, 4), 10.0f);
+  EXPECT_NE(recorder.warning.find("1 pixels"), std::string::npos) << recorder.warning;
+  EXPECT_NE(recorder.warning.find("0 and 1"), std::string::npos) << recorder.warning;
+  Recorder agreeing;
+  KeyColorFromHints(luminance, {{4.5, 4.5, 0, 60, 0}, {4.5, 4.5, 3, 61, 0}}, {}, agreeing, {});
+  EXPECT_EQ(agreeing.warning, "");
+}
+
+TEST(HintsTest, TwoHintsOnAFlatRegionBlendSmoothly) {
+  // Along a narrow strip the interpolant is linear: no plateau, no step.
+  const HintSolution solution = Spread(
+      Image(101, 3, 1, 50.0f),
+      {{0, 0, 0, 40, 0, ColorHint::Shape::kRegion, {}, {{0, 0}, {1, 0}, {1, 3}, {0, 3}}},
+       {0, 0, 0, -40, 0, ColorHint::Shape::kRegion, {}, {{100, 0}, {101, 0}, {101, 3}, {100, 3}}}});
+  for (int x = 0; x <= 100; ++x) EXPECT_NEAR(solution.ab.At(0, 1, x), 40.0f - 0.8f * x, 0.3f);
+}
+
+TEST(HintsTest, TenThousandHintsAreExactAndFinite) {
+  Image luminance(400, 300, 1);
+  Random random(4);
+  for (float& value : luminance.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
+  std::vector<ColorHint> hints;
+  for (int k = 0; k < 10000; ++k) {
+    hints.push_back({random.NextUniform(0, 400),
+                     random.NextUniform(0, 300),
+                     0,
+                     random.NextUniform(-80, 80),
+                     random.NextUniform(-80, 80)});
+  }
+  const HintSolution solution = Spread(luminance, hints);
+  EXPECT_LE(solution.relative_residual, 5e-4);
+  for (float value : solution.ab.data) ASSERT_LE(std::abs(value), 81.0f);
+  const ColorHint& last = hints.back();
+  EXPECT_EQ(solution.ab.At(0, static_cast<int>(last.y_px), static_cast<int>(last.x_px)),
+            static_cast<float>(last.a));
+}
+
+TEST(HintsTest, BlackWhiteAndCheckeredPicturesHaveFiniteAnswers) {
+  Image checkered(64, 64, 1);
+  for (int i = 0; i < 64 * 64; ++i) checkered.data[i] = (i + i / 64) % 2 ? 100.0f : 0.0f;
+  for (const Image& luminance : {Image(64, 64, 1, 0.0f), Image(64, 64, 1, 100.0f), checkered}) {
+    const HintSolution solution = Spread(luminance, {{20, 20, 0, 30, -30}});
+    for (size_t i = 0; i < solution.ab.PlaneSize(); ++i) {
+      ASSERT_NEAR(solution.ab.Plane(0)[i], 30.0f, 0.5f);
+    }
+  }
+}
+
+TEST(HintsTest, RegionsAreLockedExactly) {
+  const Image luminance = TwoHalves(60, 40);
+  const Image automatic(60, 40, 2, 12.5f);
+  Image labels(60, 40, 1, 0.0f);
+  for (int x = 0; x < 10; ++x) labels.At(0, 39, x) = 3.0f / 255.0f;
+  const std::vector<ColorHint> hints = ParseHintsJson(R"([
+      {"region": [[2, 2], [12, 2], [12, 12], [2, 12]], "color": "#a0522d"},
+      {"region": [[40, 2], [50, 2], [50, 12], [40, 12]], "keep": "neutral"},
+      {"line": [[30, 30], [50, 30]], "width": 2, "keep": "auto"},
+      {"label": 3, "color": "#0000ff"}])");
+  Recorder recorder;
   const HintSolution solution =
-      Spread(Image(9, 9, 1, 50.0f), {{4.5, 4.5, 0, 60, 0}, {4.5, 4.5, 0, -20, 10}});
-  EXPECT_NEAR(solution.ab.At(0, 4, 4), 20.0f, 0.1f);
-  EXPECT_NEAR(solution.ab.At(1, 4, 4), 5.0f, 0.1f);
+      KeyColorFromHints(luminance, hints, {}, recorder, {}, {&labels, &automatic});
+  EXPECT_EQ(solution.ab.At(0, 7, 7), static_cast<float>(hints[0].a));
+  EXPECT_EQ(solution.ab.At(1, 2, 2), static_cast<float>(hints[0].b));
+  EXPECT_NE(solution.ab.At(1, 1, 1), static_cast<float>(hints[0].b));
+  EXPECT_EQ(solution.ab.At(0, 7, 45), 0.0f);
+  EXPECT_EQ(solution.ab.At(0, 30, 40), 12.5f);
+  EXPECT_EQ(solution.ab.At(1, 39, 9), static_cast<float>(hints[3].b));
+  EXPECT_EQ(solution.hinted_pixels, 100 + 100 + 44 + 10);
+}
+
+TEST(HintsTest, LocksThatReferToNothingAreRefusedByName) {
+  const Image luminance = TwoHalves(60, 40);
+  const auto message_of = [&](const char* json, const HintPictures& pictures) -> std::string {
+    Recorder recorder;
+    try {
+      KeyColorFromHints(luminance, ParseHintsJson(json), {}, recorder, {}, pictures);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const Image labels(60, 40, 1), wrong(61, 40, 1);
+  const char* good = R"([{"x": 1, "y": 1, "color": "#ff0000"}, )";
+  const std::string first(good);
+  const auto expect = [&](const std::string& entry, const HintPictures& pictures, const char* say) {
+    const std::string message = message_of((first + entry + "]").c_str(), pictures);
+    EXPECT_NE(message.find("hint 1"), std::string::npos) << message;
+    EXPECT_NE(message.find(say), std::string::npos) << message;
+  };
+  expect(R"({"label": 3, "color": "#ff0000"})", {}, "no label picture");
+  expect(R"({"label": 3, "color": "#ff0000"})", {&labels, nullptr}, "holds no pixel");
+  expect(R"({"x": 1, "y": 1, "keep": "auto"})", {}, "automatic");
+  expect(R"({"region": [[0, 0], [70, 0], [0, 9]], "color": "#ff0000"})", {}, "outside");
+  expect(R"({"region": [[0, 0], [9, 0]], "color": "#ff0000"})", {}, "3 at least");
+  EXPECT_NE(message_of((first + R"({"label": 0, "color": "#ff0000"}])").c_str(), {&wrong, nullptr})
+                .find("61x40"),
+            std::string::npos);
 }
 
 TEST(HintsTest, AHintThatCoversEverythingIsTheAnswer) {

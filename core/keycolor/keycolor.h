@@ -2,6 +2,8 @@
 // key photo's size as captured; L of the photo is always kept, only a and b are decided here.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -18,27 +20,43 @@ namespace color3d {
 // (it shows something else).
 Image KeyColorFromImage(const Image& luminance, const Image& coloured);
 
+// Pixels whose colour is given: a disc, a line, a polygon, or a label of a label picture.
 struct ColorHint {
   double x_px = 0.0;  // centre of a disc, px from the upper left corner of the photo
   double y_px = 0.0;
-  double radius_px = 2.0;
-  double a = 0.0;  // Lab units
+  double radius_px = 2.0;  // of a disc; half the width of a line
+  double a = 0.0;          // Lab units
   double b = 0.0;
+
+  enum class Shape { kDisc, kLine, kRegion, kLabel };
+  // kNeutral: no colour (a = b = 0). kAutomatic: what the automatic colourizer says there.
+  enum class Fill { kColor, kNeutral, kAutomatic };
+  Shape shape = Shape::kDisc;
+  Fill fill = Fill::kColor;
+  std::vector<std::array<double, 2>> points_px = {};  // (x, y) of a line or region
+  int label = 0;                                      // 0..255
 };
 
 struct HintOptions {
-  double sigma = 2.0;       // L difference (0..100) at which two neighbours stop to agree, > 0
-  int max_side_px = 1024;   // solved at this size, upsampled guided by L; 64..8192
-  double tolerance = 1e-6;  // relative residual of the conjugate gradients
-  int max_iterations = 2000;
+  double sigma = 0.5;       // L difference (0..100) at which two neighbours half agree, > 0
+  int max_side_px = 8192;   // larger photos are solved at this size, then upsampled guided by L
+  double tolerance = 5e-4;  // relative residual of the conjugate gradients
+  int max_iterations = 200;
+  int threads = 0;  // 0: what the machine has; the result is the same for any number
   void Validate() const;
 };
 
 struct HintSolution {
-  Image ab;  // 2 channels, Lab units, size of `luminance`
+  Image ab;  // 2 channels, Lab units, size of `luminance`; hinted pixels hold their hint exactly
   int iterations = 0;
-  double relative_residual = 0.0;
-  int hinted_pixels = 0;
+  double relative_residual = 0.0;  // of the system without the hinted pixels
+  int64_t hinted_pixels = 0;
+};
+
+// Pictures of the key photo's size that hints may refer to.
+struct HintPictures {
+  const Image* labels = nullptr;        // 1 channel, value * 255 is the label
+  const Image* automatic_ab = nullptr;  // 2 channels, for Fill::kAutomatic
 };
 
 // Strokes as a picture of the key photo's size: 4 channels (pixels with alpha > 0.5 are hints), or
@@ -49,13 +67,23 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
                                  const HintOptions& options,
                                  ProgressObserver& progress,
                                  const CancellationToken& cancel);
-// JSON: [{"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}, ...]. Throws Error{kInvalidArgument}
-// naming the entry; hints outside the picture are an error.
+
+// A JSON list of entries, each one of
+//   {"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}     a disc; radius 2 when left out
+//   {"line": [[10, 20], [80, 25]], "width": 4, "color": "#a0522d"}   width 4 when left out
+//   {"region": [[10, 20], [80, 25], [40, 90]], "color": "#a0522d"}   a polygon (even-odd)
+//   {"label": 3, "color": "#a0522d"}                         all pixels of that label
+// in px of the key photo. Instead of "color", "keep": "neutral" takes the colour away, and
+// "keep": "auto" keeps the automatic colourizer's. Throws Error{kInvalidArgument} naming the entry.
 std::vector<ColorHint> ParseHintsJson(const std::string& json);
+
+// Hints outside the picture, or that hold no pixel, are an error naming the entry. Where several
+// overlap, the last one wins; that they contradict each other is a warning.
 HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
                                ProgressObserver& progress,
-                               const CancellationToken& cancel);
+                               const CancellationToken& cancel,
+                               const HintPictures& pictures = {});
 
 }  // namespace color3d

@@ -7,7 +7,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
-#include "core/keycolor/coloured_picture.h"
+#include "core/keycolor/picture_checks.h"
 
 namespace color3d {
 namespace {
@@ -78,6 +78,11 @@ std::vector<RemotePoint> PointsToSend(const Image& luminance,
                                       double scale_y) {
   std::vector<RemotePoint> points;
   for (const ColorHint& hint : hints) {
+    if (hint.shape != ColorHint::Shape::kDisc || hint.fill == ColorHint::Fill::kAutomatic) {
+      throw InvalidArgument(
+          "a backend takes points with colours; give lines, regions and labels "
+          "without a backend");
+    }
     if (!(hint.x_px >= 0.0 && hint.x_px < luminance.width && hint.y_px >= 0.0 &&
           hint.y_px < luminance.height)) {
       throw InvalidArgument("the colour point at (" + std::to_string(hint.x_px) + ", " +
@@ -137,11 +142,11 @@ Image ReadAnswer(const std::string& bytes, const Image& sent, const RemoteOption
 }
 
 void JudgeLuminance(const Image& luminance,
-                    const Image& answer_luminance,
+                    const Image& answer,
                     const RemoteOptions& options,
                     RemoteSolution* solution) {
-  const LuminanceAgreement agreement = CompareLuminance(
-      Resize(luminance, answer_luminance.width, answer_luminance.height), answer_luminance);
+  const LuminanceAgreement agreement =
+      CompareLuminance(Resize(luminance, answer.width, answer.height), answer);
   solution->mean_luminance_difference = agreement.mean_difference;
   solution->luminance_correlation = agreement.correlation;
   if (!agreement.SameSubject()) {
@@ -193,12 +198,10 @@ RemoteSolution KeyColorFromRemote(const Image& luminance,
   solution.answer_height = answer.height;
 
   const Image lab = LabFromSrgb(answer);
-  Image l(lab.width, lab.height, 1);
   Image ab(lab.width, lab.height, 2);
-  std::copy_n(lab.Plane(0), l.data.size(), l.data.begin());
   std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-  JudgeLuminance(luminance, l, options, &solution);
-  const ChromaLevel chroma = MeasureChroma(ab);
+  JudgeLuminance(luminance, lab, options, &solution);
+  const ChromaLevel chroma = MeasureChroma(lab);
   if (chroma.IsGray()) {
     Refuse(options,
            "answered without colour (mean chroma " + std::to_string(chroma.mean) + " Lab units)");

@@ -171,6 +171,9 @@ TEST_F(RemoteTest, InputThatDoesNotFitThePhotoIsRefusedBeforeItIsSent) {
   EXPECT_THAT(Complaint(), HasSubstr("outside the key view of 96x64"));
   EXPECT_EQ(code_, ErrorCode::kInvalidArgument);
   options_.points[0].x_px = 3.0;
+  options_.points[0].shape = ColorHint::Shape::kLine;
+  EXPECT_THAT(Complaint(), HasSubstr("takes points with colours"));
+  options_.points[0].shape = ColorHint::Shape::kDisc;
   options_.mask = Image(4, 4, 1);
   EXPECT_THAT(Complaint(), HasSubstr("the mask is 4x4"));
   EXPECT_TRUE(remote_.request.image_png.empty());

@@ -19,7 +19,7 @@ constexpr int kTextPx = 12;
 constexpr int kLinePx = 20;
 constexpr int kMinColumns = 3;
 constexpr int kMaxColumns = 8;
-constexpr int kAsideColumns = 10;
+constexpr int kAsideColumns = 8;
 constexpr float kAsideStrength = 0.45f;
 
 constexpr DrawColor kPaper{0.97f, 0.97f, 0.96f};

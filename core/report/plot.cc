@@ -115,7 +115,7 @@ std::string PlotElements(const Plot& plot) {
   std::string svg = TextAt(8, 16, "start", "t", EscapeHtml(plot.title));
   if (min_y > max_y) return svg;
   const Axis x_axis(min_x, max_x, kLeft, kWidth - kRight, plot.log_seconds);
-  const Axis y_axis(min_y, max_y, kHeight - kBottom, kTop, false);
+  const Axis y_axis(min_y, max_y, kHeight - kBottom, kTop, plot.log_values && min_y > 0.0);
   svg += Grid(x_axis, y_axis);
   for (size_t i = 0; i < plot.series.size(); ++i) {
     const std::string color = std::string("c c") + std::to_string(i % kColors);
@@ -178,7 +178,8 @@ std::string PlotsSvg(const std::vector<CurvePoint>& points) {
   std::string svg;
   for (const std::string& title : order) {
     svg += "<svg class=\"plot\" " + ViewBox(kWidth, kHeight) + ">" +
-           PlotElements({title, {{"", groups[title]}}}) + "</svg>";
+           PlotElements({title, {{"", groups[title]}}, false, title.ends_with("residual")}) +
+           "</svg>";
   }
   return svg;
 }

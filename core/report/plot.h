@@ -17,13 +17,14 @@ struct Plot {
   std::string title;
   std::vector<PlotSeries> series;  // at most 6 colours; a legend when there are several
   bool log_seconds = false;        // points at 0 s are left out then
+  bool log_values = false;         // unless a value is not positive
 };
 
 // A file of its own: the plots side by side, with their styles.
 std::string FigureSvg(const std::vector<Plot>& plots);
 
 // For a page that brings the styles: one plot for each (stage, error_name) among `points`, in order
-// of first appearance.
+// of first appearance. Those of residuals have a logarithmic axis.
 std::string PlotsSvg(const std::vector<CurvePoint>& points);
 
 // The five characters that HTML gives a meaning, replaced by entities.

@@ -77,6 +77,14 @@ TEST(Plot, FigureDrawsEverySeriesOnItsAxes) {
   EXPECT_EQ(std::count(first.begin(), first.end(), ','), 2);
 }
 
+TEST(Plot, ResidualsHaveALogarithmicAxis) {
+  const std::vector<CurvePoint> points{{"key", 1.0, 1, "relative_residual", 0.1},
+                                       {"key", 2.0, 2, "relative_residual", 0.0001}};
+  EXPECT_NE(PlotsSvg(points).find(">0.001<"), std::string::npos);
+  const std::vector<CurvePoint> zero{{"key", 1.0, 1, "relative_residual", 0.0}};
+  EXPECT_EQ(PlotsSvg(zero).find("nan"), std::string::npos);
+}
+
 TEST(ScenePlan, LeavesOutWhatTheSceneDoesNotNeed) {
   PlanFacts facts;
   facts.has_poses = true;

@@ -12,23 +12,25 @@ namespace color3d {
 
 std::string StageThatMakes(std::string_view name) {
   using namespace artifact;
-  const std::pair<std::string_view, const char*> makers[] = {{kScene, "import_scene"},
-                                                             {kImportFacts, "import_scene"},
-                                                             {kKeyView, "select_key_view"},
-                                                             {kKeyViewGray, "select_key_view"},
-                                                             {kKeyViewRanking, "select_key_view"},
-                                                             {kKeyColor, "colorize_key_view"},
-                                                             {kKeyColorFacts, "colorize_key_view"},
-                                                             {kColorizer, "personalize"},
-                                                             {kViewsAb, "colorize_views"},
-                                                             {kGeometry, "reconstruct_geometry"},
-                                                             {kModel, "solve_chroma"},
-                                                             {kMemoryPlan, "reconstruct_geometry"},
-                                                             {kPly, "export"},
-                                                             {kSplat, "export"},
-                                                             {kExportScores, "export"},
-                                                             {kRenders, "render"},
-                                                             {kScores, "evaluate"}};
+  const std::pair<std::string_view, const char*> makers[] = {
+      {kScene, "import_scene"},
+      {kImportFacts, "import_scene"},
+      {kKeyView, "select_key_view"},
+      {kKeyViewGray, "select_key_view"},
+      {kKeyViewRanking, "select_key_view"},
+      {kKeyColor, "colorize_key_view"},
+      {kKeyColorFacts, "colorize_key_view"},
+      {kKeyColorRegions, "colorize_key_view"},
+      {kColorizer, "personalize"},
+      {kViewsAb, "colorize_views"},
+      {kGeometry, "reconstruct_geometry"},
+      {kModel, "solve_chroma"},
+      {kMemoryPlan, "reconstruct_geometry"},
+      {kPly, "export"},
+      {kSplat, "export"},
+      {kExportScores, "export"},
+      {kRenders, "render"},
+      {kScores, "evaluate"}};
   for (const auto& [prefix, kind] : makers) {
     if (name.starts_with(prefix)) return kind;
   }

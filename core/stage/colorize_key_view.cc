@@ -23,9 +23,15 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   }
   // Everything after this works on undistorted pictures.
   const ViewImages images(scene, context.scene_folder(), 0, 0);
-  context.WriteOutput(artifact::kKeyColor, EncodeAbPng(images.Undistort(key, result.ab)));
+  const Image confidence =
+      result.confidence.Empty() ? Image() : images.Undistort(key, result.confidence);
+  context.WriteOutput(artifact::kKeyColor,
+                      EncodeAbPng(images.Undistort(key, result.ab), confidence));
   context.WriteOutput(artifact::kKeyViewColored,
                       EncodePng8(SrgbFromLab(JoinLab(photo.luminance, result.ab))));
+  if (!result.regions.Empty()) {
+    context.WriteOutput(artifact::kKeyColorRegions, EncodeJpeg(result.regions));
+  }
   context.WriteOutput(artifact::kKeyColorFacts, facts.dump(1) + "\n");
 }
 

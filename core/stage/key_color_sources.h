@@ -18,6 +18,8 @@ struct KeyColorResult {
   // For the report and for programs: what the source tells of itself beyond its name. "warnings" is
   // a list of lines; those are shown to the user, too.
   nlohmann::ordered_json facts = nlohmann::ordered_json::object();
+  Image confidence;  // 1 channel, 0..1; empty: sure everywhere
+  Image regions;     // sRGB of any size, what was taken for what; empty: nothing to show
 };
 
 // "image", "strokes", ... as in stage.proto.

@@ -168,6 +168,7 @@ void PassOnResults(StageContext& context) {
                            kKeyViewRanking,
                            kKeyViewColored,
                            kKeyColorFacts,
+                           kKeyColorRegions,
                            kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }

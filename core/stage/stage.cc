@@ -49,7 +49,7 @@ std::unique_ptr<RemoteColorizer> StageContext::Remote(const std::string& name) c
 
 std::shared_ptr<const Encoder> StageContext::LoadEncoder(const std::string& model) const {
   if (model.empty()) return Encoder::Embedded();
-  throw Error(ErrorCode::kUnimplemented, "encoders from weight files are not built yet");
+  return Encoder::FromWeightFile(Model(model));
 }
 
 std::filesystem::path StageContext::Input(const std::string& name) const {

@@ -8,6 +8,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/key_color_sources.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -23,11 +24,18 @@ class StageTest : public ::testing::Test {
  protected:
   StageContext MakeContext() {
     std::filesystem::create_directories(scratch_.path() / "out");
-    return StageContext(
-        {scratch_.path(), inputs_, scratch_.path() / "out", scratch_.path(), 1, 1, memory_bytes_},
-        none_,
-        observer_,
-        cancel_);
+    return StageContext({scratch_.path(),
+                         inputs_,
+                         scratch_.path() / "out",
+                         scratch_.path(),
+                         1,
+                         1,
+                         memory_bytes_,
+                         models_,
+                         remote_},
+                        none_,
+                        observer_,
+                        cancel_);
   }
   void AddInput(const std::string& name, const std::string& bytes) {
     const auto path = scratch_.path() / ("in" + std::to_string(inputs_.size()));
@@ -41,6 +49,8 @@ class StageTest : public ::testing::Test {
   Warnings observer_;
   CancellationToken cancel_;
   int64_t memory_bytes_ = 0;
+  std::map<std::string, std::filesystem::path> models_;
+  RemoteColorizerFactory remote_;
 };
 
 // Three photos of a ramp, with made-up poses, as an imported scene.
@@ -135,6 +145,66 @@ TEST_F(StageTest, KeyColourKeepsTheCapturedLuminanceAndTheGivenChroma) {
   // The middle of the ramp is far from black and white, so nothing was clipped by the gamut.
   EXPECT_NEAR(map.ab.At(0, 16, 24), 8.0f, 0.1f);
   EXPECT_NEAR(map.ab.At(1, 16, 24), -6.0f, 0.1f);
+}
+
+// Sepia, and brighter than what it was sent.
+class SepiaBackend : public RemoteColorizer {
+ public:
+  RemoteInfo GetInfo(ProgressObserver&, const CancellationToken&) override {
+    return {"sepia 1", {capability::kAutomatic}, 0, true};
+  }
+  std::string Colorize(const RemoteRequest& request,
+                       ProgressObserver&,
+                       const CancellationToken&) override {
+    Image l = LuminanceFromSrgb(DecodeImage(request.image_png, "sent"));
+    for (float& value : l.data) value = 0.8f * value + 15.0f;
+    return EncodePng8(SrgbFromLab(JoinLab(l, Image(l.width, l.height, 2, 12.0f))));
+  }
+};
+
+TEST_F(StageTest, TheBackendsFactsAndWarningsReachTheUser) {
+  AddInput(artifact::kScene, SceneToJson(RampScene(scratch_.path(), 48, 32)));
+  AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
+  remote_ = [](const std::string& name) {
+    EXPECT_EQ(name, "sepia");
+    return std::make_unique<SepiaBackend>();
+  };
+  ColorizeKeyViewOptions options;
+  options.source = ColorizeKeyViewOptions::Source::kBackend;
+  options.name = "sepia";
+  StageContext context = MakeContext();
+  RunColorizeKeyView(options, context);
+  const auto facts = nlohmann::json::parse(ReadFile(scratch_.path() / "out/key_color.json"));
+  EXPECT_EQ(facts.at("source"), "backend");
+  EXPECT_EQ(facts.at("view"), "p1.png");
+  EXPECT_EQ(facts.at("description"), "sepia 1");
+  EXPECT_GT(facts.at("mean_luminance_difference").get<double>(), 5.0);
+  EXPECT_NE(observer_.text.find("changed the luminance"), std::string::npos) << observer_.text;
+  const Image shown = ReadImage(scratch_.path() / "out/key_view_coloured.png");
+  const Image photo = ReadImage(scratch_.path() / "p1.png");
+  EXPECT_NEAR(LuminanceFromSrgb(shown).At(0, 16, 24), LuminanceFromSrgb(photo).At(0, 16, 24), 1.0)
+      << "the photo's own luminance was not put back";
+}
+
+TEST_F(StageTest, NamesThatAreNotThereAreListedWithTheRemedy) {
+  models_ = {{"clip", scratch_.path() / "clip"}};
+  const StageContext context = MakeContext();
+  EXPECT_EQ(context.Model("clip"), scratch_.path() / "clip");
+  try {
+    context.LoadEncoder("tiny");
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kFailedPrecondition);
+    EXPECT_NE(std::string(e.what()).find("it has: clip"), std::string::npos) << e.what();
+  }
+  EXPECT_THROW(context.Remote("none"), Error);
+}
+
+TEST_F(StageTest, EverySourceOfKeyColourHasItsPlaceInTheTable) {
+  using Source = ColorizeKeyViewOptions::Source;
+  for (int i = 0; i <= static_cast<int>(Source::kEdit); ++i) {
+    EXPECT_NE(std::string(KeyColorSourceName(static_cast<Source>(i))), "") << i;
+  }
 }
 
 TEST_F(StageTest, EvaluationRefusesTruthOfTrainingViews) {

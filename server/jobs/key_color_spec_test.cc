@@ -92,6 +92,11 @@ TEST(KeyColorSpec, OptionsOfAnotherSourceAreRefused) {
                 s->mutable_backend_input();
               }),
               HasSubstr("key_color.backend_input"));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                *s->mutable_strokes() = SomeDigest("s");
+                *s->mutable_labels() = SomeDigest("l");
+              }),
+              HasSubstr("key_color.labels"));
 }
 
 v1::JobSpec SpecWithNames() {

@@ -201,6 +201,9 @@ void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& pa
   if (source.has_backend_input() && source.source_case() != v1::KeyColorSource::kBackend) {
     Reject(path + ".backend_input", " is set, but the source is no backend; leave it out");
   }
+  if (source.has_labels() && source.source_case() != v1::KeyColorSource::kPoints) {
+    Reject(path + ".labels", " is set, but only points refer to labels; leave it out");
+  }
   if (source.has_backend_input() && !source.backend_input().prompt().empty()) {
     CheckPrompt(source.backend_input().prompt(), path + ".backend_input.prompt");
   }

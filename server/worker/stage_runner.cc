@@ -45,6 +45,7 @@ ColorizeKeyViewOptions SourceOptionsFrom(const v1::KeyColorSource& source, BlobS
     case v1::KeyColorSource::kPoints:
       options.source = Source::kPoints;
       options.file = blobs.Fetch(source.points().sha256());
+      options.labels = FetchIf(source.has_labels(), source.labels(), blobs);
       break;
     case v1::KeyColorSource::kReference:
       options.source = Source::kReferences;

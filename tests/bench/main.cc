@@ -22,6 +22,8 @@ int main(int argc, char** argv) {
   color3d::AddPlotCommand(app);
   color3d::AddChromaCommand(app);
   color3d::AddWeightsCommand(app);
+  color3d::AddHintsCommand(app);
+  color3d::AddReferenceCommand(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -1,6 +1,7 @@
 // Every way to colour the key view through a real server, with real model servers beside it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -153,6 +154,62 @@ TEST_F(KeyColorTest, CancellingTheJobStopsTheBackendsWork) {
   EXPECT_TRUE(
       WaitUntil([&] { return NewestJob("colorize_key_view").state() == v1::Job::STATE_CANCELLED; },
                 seconds(20)));
+}
+
+// The whole pipeline, from photos alone.
+TEST_F(KeyColorTest, AutoNeedsNothingOfTheUser) {
+  StartServer();
+  WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
+  const ProcessResult result =
+      Client(Lines{"colorize", Path("room").string(), "-o", Path("out").string(), "--auto"} +
+             QuickOptions());
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  const json facts = json::parse(ReadFile(Path("out") / "key_color.json"));
+  EXPECT_EQ(facts.at("source"), "automatic");
+  EXPECT_NE(facts.at("description"), "");
+  EXPECT_FALSE(IsGray(ReadImage(Path("out") / "key_view_coloured.png")));
+  ASSERT_FALSE(ListFiles(Path("out") / "renders").empty());
+  EXPECT_TRUE(fs::is_regular_file(Path("out") / "scene.ply"));
+}
+
+// Red and blue swapped, allowed on the left half only.
+TEST_F(KeyColorTest, AnEditChangesColourInsideItsMaskOnly) {
+  StartServer();
+  WriteProceduralScene(Path("room"), SmallRoom(4));
+  const Image photo = ReadImage(Path("room") / "images" / "view002.png");
+  Image edited = photo;
+  std::swap_ranges(edited.Plane(0), edited.Plane(0) + edited.PlaneSize(), edited.Plane(2));
+  Image mask(photo.width, photo.height, 1);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width / 2; ++x) mask.At(0, y, x) = 1.0f;
+  }
+  WriteFileAtomic(Path("edited.png"), EncodePng8(edited));
+  WriteFileAtomic(Path("mask.png"), EncodePng8(mask));
+  const ProcessResult result = Client({"key",
+                                       "colour",
+                                       Path("room").string(),
+                                       "--view",
+                                       "view002",
+                                       "--edit",
+                                       Path("edited.png").string(),
+                                       "--mask",
+                                       Path("mask.png").string(),
+                                       "-o",
+                                       Path("key").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  const Image before = LabFromSrgb(photo);
+  const Image after = LabFromSrgb(ReadImage(Path("key") / "key_view_coloured.png"));
+  double inside = 0.0, outside = 0.0;
+  for (int y = 0; y < photo.height; ++y) {
+    for (int x = 0; x < photo.width; ++x) {
+      const double change = std::hypot(after.At(1, y, x) - before.At(1, y, x),
+                                       after.At(2, y, x) - before.At(2, y, x));
+      double& worst = x < photo.width / 2 ? inside : outside;
+      worst = std::max(worst, change);
+    }
+  }
+  EXPECT_GT(inside, 20.0);
+  EXPECT_LT(outside, 2.5) << "8 bits round that much";
 }
 
 TEST_F(KeyColorTest, NamesThatTheServerDoesNotKnowAreRefusedAtOnce) {

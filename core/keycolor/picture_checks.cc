@@ -1,9 +1,11 @@
-#include "core/keycolor/coloured_picture.h"
+#include "core/keycolor/picture_checks.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/image/codec.h"
 
 namespace color3d {
@@ -12,6 +14,12 @@ namespace {
 constexpr int kCompareSidePx = 256;
 constexpr double kFlatDeviation = 0.5;  // L units: below this a picture shows nothing
 
+std::vector<float> SmallLuminance(const Image& picture) {
+  Image luminance(picture.width, picture.height, 1);
+  std::copy_n(picture.Plane(0), luminance.data.size(), luminance.data.begin());
+  return FitWithin(luminance, kCompareSidePx).data;
+}
+
 }  // namespace
 
 std::string SizeText(const Image& image) {
@@ -19,8 +27,8 @@ std::string SizeText(const Image& image) {
 }
 
 LuminanceAgreement CompareLuminance(const Image& first, const Image& second) {
-  const std::vector<float> x = FitWithin(first, kCompareSidePx).data;
-  const std::vector<float> y = FitWithin(second, kCompareSidePx).data;
+  const std::vector<float> x = SmallLuminance(first);
+  const std::vector<float> y = SmallLuminance(second);
   const double n = static_cast<double>(x.size());
   double mean_x = 0.0, mean_y = 0.0;
   for (size_t i = 0; i < x.size(); ++i) {
@@ -40,11 +48,11 @@ LuminanceAgreement CompareLuminance(const Image& first, const Image& second) {
   return agreement;
 }
 
-ChromaLevel MeasureChroma(const Image& ab) {
-  std::vector<float> chroma(ab.PlaneSize());
+ChromaLevel MeasureChroma(const Image& lab) {
+  std::vector<float> chroma(lab.PlaneSize());
   ChromaLevel level;
   for (size_t i = 0; i < chroma.size(); ++i) {
-    chroma[i] = std::hypot(ab.Plane(0)[i], ab.Plane(1)[i]);
+    chroma[i] = std::hypot(lab.Plane(1)[i], lab.Plane(2)[i]);
     level.mean += chroma[i] / static_cast<double>(chroma.size());
   }
   const size_t rank = std::min(chroma.size() - 1, chroma.size() * 99 / 100);
@@ -52,6 +60,24 @@ ChromaLevel MeasureChroma(const Image& ab) {
       chroma.begin(), chroma.begin() + static_cast<std::ptrdiff_t>(rank), chroma.end());
   level.percentile99 = chroma[rank];
   return level;
+}
+
+void ExpectSameSubject(const Image& luminance, const Image& other, const char* what) {
+  const LuminanceAgreement agreement = CompareLuminance(luminance, other);
+  if (agreement.SameSubject()) return;
+  throw InvalidArgument(std::string(what) +
+                        " does not look like the key view (correlation of luminances " +
+                        std::to_string(agreement.correlation) + ", needed > " +
+                        std::to_string(LuminanceAgreement::kMinCorrelation) +
+                        "); colour the photo that was chosen as key view");
+}
+
+void ExpectColor(const Image& lab, const char* what) {
+  const ChromaLevel chroma = MeasureChroma(lab);
+  if (chroma.IsGray()) {
+    throw InvalidArgument(std::string(what) + " has no colour (mean chroma " +
+                          std::to_string(chroma.mean) + " Lab units); colour it first");
+  }
 }
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
 // Is a picture in colour, and does it show what another one shows? Asked of everything that a user
-// or a model gives as the coloured key view. Pure functions, thread-safe.
+// or a model gives as the coloured key view. Pure functions, thread-safe. Internal to core/keycolor.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ struct LuminanceAgreement {
   static constexpr double kMinCorrelation = 0.5;
   bool SameSubject() const { return both_flat || correlation > kMinCorrelation; }
 };
-// Two 1-channel L pictures (0..100) of one size, compared at 256 px.
+// The first planes (L 0..100) of two pictures of equal size, compared at 256 px.
 LuminanceAgreement CompareLuminance(const Image& first, const Image& second);
 
 struct ChromaLevel {
@@ -28,7 +28,12 @@ struct ChromaLevel {
   // Compression alone makes a little chroma of grey.
   bool IsGray() const { return mean < 1.5 && percentile99 < 4.0; }
 };
-// Of a 2-channel ab picture.
-ChromaLevel MeasureChroma(const Image& ab);
+// Of a Lab picture.
+ChromaLevel MeasureChroma(const Image& lab);
+
+// Throws Error{kInvalidArgument} starting with `what` when the first planes do not correlate.
+void ExpectSameSubject(const Image& luminance, const Image& other, const char* what);
+// Throws Error{kInvalidArgument} starting with `what` when a Lab picture has hardly any chroma.
+void ExpectColor(const Image& lab, const char* what);
 
 }  // namespace color3d

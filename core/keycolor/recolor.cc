@@ -1,0 +1,113 @@
+#include "core/keycolor/recolor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/color/lab.h"
+#include "core/keycolor/picture_checks.h"
+
+namespace color3d {
+namespace {
+
+// Chroma (Lab units) below which a difference is no edit: twice what 8 bits per channel round to.
+constexpr float kLeastChange = 2.0f;
+constexpr int kFeatherPx = 2;
+
+std::string SizeOf(const Image& image) {
+  return std::to_string(image.width) + "x" + std::to_string(image.height);
+}
+
+void CheckPicture(const Image& picture, const char* what, const Image& original) {
+  if (picture.width != original.width || picture.height != original.height) {
+    throw InvalidArgument(std::string(what) + " is " + SizeOf(picture) + " px, the key view " +
+                          SizeOf(original) + "; save it at the key view's size");
+  }
+  for (float value : picture.data) {
+    if (!std::isfinite(value)) {
+      throw InvalidArgument(std::string(what) + " holds a value that is not finite");
+    }
+  }
+}
+
+// 1 where colour may change.
+std::vector<uint8_t> Allowed(const Image* mask, const Image& original) {
+  std::vector<uint8_t> allowed(original.PlaneSize(), 1);
+  if (mask == nullptr) return allowed;
+  CheckPicture(*mask, "the mask", original);
+  const int colors = mask->channels >= 3 ? 3 : 1;
+  int64_t count = 0;
+  for (size_t i = 0; i < allowed.size(); ++i) {
+    float sum = 0.0f;
+    for (int c = 0; c < colors; ++c) sum += mask->Plane(c)[i];
+    allowed[i] = sum > 0.5f * static_cast<float>(colors);
+    count += allowed[i];
+  }
+  if (count == 0) {
+    throw InvalidArgument(
+        "the mask allows no change (nowhere is it brighter than 0.5); paint white "
+        "where colour may change");
+  }
+  return allowed;
+}
+
+// The share of the edit: 0 outside, rising over the first pixels inside to 1. City-block steps from
+// the outside, so that the outermost pixels inside already take a part.
+std::vector<float> Shares(const std::vector<uint8_t>& allowed, int width, int height) {
+  std::vector<float> shares(allowed.begin(), allowed.end());
+  std::vector<uint8_t> left = allowed;  // not reached from the outside yet
+  for (int step = 1; step <= kFeatherPx; ++step) {
+    std::vector<uint8_t> next = left;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const size_t i = static_cast<size_t>(y) * width + x;
+        if (!left[i]) continue;
+        const bool border = (x > 0 && !left[i - 1]) || (x + 1 < width && !left[i + 1]) ||
+                            (y > 0 && !left[i - width]) || (y + 1 < height && !left[i + width]);
+        if (!border) continue;
+        next[i] = 0;
+        shares[i] = static_cast<float>(step) / static_cast<float>(kFeatherPx + 1);
+      }
+    }
+    left.swap(next);
+  }
+  return shares;
+}
+
+}  // namespace
+
+Image KeyColorFromEdit(const Image& original_srgb, const Image& edited_srgb, const Image* mask) {
+  if (original_srgb.channels != 3 || original_srgb.Empty()) {
+    throw InvalidArgument("recolouring needs a key photo in colour, it has " +
+                          std::to_string(original_srgb.channels) + " channels");
+  }
+  if (edited_srgb.channels != 3) {
+    throw InvalidArgument("the edited picture has " + std::to_string(edited_srgb.channels) +
+                          " channels, it must have 3 (RGB)");
+  }
+  CheckPicture(edited_srgb, "the edited picture", original_srgb);
+  const std::vector<uint8_t> allowed = Allowed(mask, original_srgb);
+  const Image before = LabFromSrgb(original_srgb);
+  const Image after = LabFromSrgb(edited_srgb);
+  ExpectSameSubject(before, after, "the edited picture");
+  const std::vector<float> shares = Shares(allowed, before.width, before.height);
+  Image ab(before.width, before.height, 2);
+  bool changed = false;
+  for (size_t i = 0; i < ab.PlaneSize(); ++i) {
+    const float da = after.Plane(1)[i] - before.Plane(1)[i];
+    const float db = after.Plane(2)[i] - before.Plane(2)[i];
+    if (allowed[i] && std::hypot(da, db) > kLeastChange) changed = true;
+    ab.Plane(0)[i] = before.Plane(1)[i] + shares[i] * da;
+    ab.Plane(1)[i] = before.Plane(2)[i] + shares[i] * db;
+  }
+  if (!changed) {
+    throw InvalidArgument(std::string("the edited picture has the key photo's colours") +
+                          (mask != nullptr ? " inside the mask" : "") + "; nothing would change");
+  }
+  return ab;
+}
+
+}  // namespace color3d

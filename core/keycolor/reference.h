@@ -1,0 +1,51 @@
+// Colours of the key view from other coloured pictures: another photo of the place, a postcard,
+// another view.
+#pragma once
+
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/image.h"
+#include "core/base/progress.h"
+#include "core/encoder/encoder.h"
+
+namespace color3d {
+
+struct ReferenceOptions {
+  int match_side_px = 448;      // longer side at which pictures are compared, 64..1024
+  int spread_side_px = 1024;    // longer side at which matches are spread, 64..8192
+  int bank_size = 12000;        // cells of all references that are compared with, 100..100000
+  int neighbours = 8;           // matches that are blended, 1..64
+  double sigma = 0.5;           // as HintOptions
+  double match_weight = 0.1;    // of a certain match against the edges of flat regions (1), > 0
+  double low_confidence = 0.1;  // mean confidence below which chroma fades and a warning is given
+  int threads = 0;              // 0: what the machine has; the result is the same for any number
+  unsigned seed = 1;            // which cells enter the bank
+  void Validate() const;
+};
+
+struct ReferenceSolution {
+  Image ab;          // 2 channels, Lab units, size of `luminance`
+  Image confidence;  // 1 channel, 0..1, size of `luminance`: of the matches, before spreading
+  // Share of the key view's confidence that comes from each reference; sums to 1 (or all 0).
+  std::vector<double> explained;
+  double mean_confidence = 0.0;
+  int iterations = 0;
+  double relative_residual = 0.0;
+};
+
+// `luminance` 1 channel, L 0..100; `references_srgb` 3 channels sRGB 0..1 each, any sizes from 16
+// px. Cells of 4 px are matched by whitened encoder features (whose shares of the distance are
+// fixed) and local luminance statistics of the references, histogram-matched to the key view; the
+// best matches are blended. Confidence is high where the match is as close as cells within a
+// reference are to one another, is mutual, and its candidates agree on the colour. Matches then
+// spread along the luminance like soft hints. Throws Error{kInvalidArgument} naming a reference
+// without colour or too small; unrelated references give a warning with the mean confidence.
+ReferenceSolution KeyColorFromReferences(const Image& luminance,
+                                         const std::vector<Image>& references_srgb,
+                                         const Encoder& encoder,
+                                         const ReferenceOptions& options,
+                                         ProgressObserver& progress,
+                                         const CancellationToken& cancel);
+
+}  // namespace color3d
