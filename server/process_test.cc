@@ -11,6 +11,7 @@
 #include <sstream>
 #include <thread>
 
+#include "core/base/digest.h"
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "server/jobs/sqlite_db.h"
