@@ -229,7 +229,7 @@ void Judge(const CellMatches& matches,
   for (double& share : solution.explained) share = total > 0.0 ? share / total : 0.0;
   solution.mean_confidence = total / static_cast<double>(matches.confidence.size());
   if (solution.mean_confidence >= options.low_confidence) return;
-  const double fade = solution.mean_confidence / options.low_confidence;
+  const double fade = std::pow(solution.mean_confidence / options.low_confidence, 2);
   progress.OnWarning("the reference pictures hardly resemble the key view (mean confidence " +
                      std::to_string(solution.mean_confidence) + ", expected " +
                      std::to_string(options.low_confidence) + " or more): chroma is faded to " +

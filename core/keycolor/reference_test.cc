@@ -62,13 +62,13 @@ double MeanError(const Image& ab, const Image& lab) {
 }
 
 TEST(ReferenceTest, ColoursFollowTexture) {
-  const Image key = Bands(120, 80, 40);
+  const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution = KeyColorFromReferences(
-      LuminanceOf(key), {SrgbFromLab(Bands(144, 96, 0))}, *Encoder::Embedded(), {}, recorder, {});
-  ASSERT_EQ(solution.ab.width, 120);
-  ASSERT_EQ(solution.ab.height, 80);
-  const double gray = MeanError(Image(120, 80, 2), key);
+      LuminanceOf(key), {SrgbFromLab(Bands(420, 180, 0))}, *Encoder::Embedded(), {}, recorder, {});
+  ASSERT_EQ(solution.ab.width, 360);
+  ASSERT_EQ(solution.ab.height, 160);
+  const double gray = MeanError(Image(360, 160, 2), key);
   EXPECT_LT(MeanError(solution.ab, key), 0.35 * gray);
   EXPECT_EQ(recorder.warning, "");
   for (float value : solution.confidence.data) {
@@ -78,11 +78,11 @@ TEST(ReferenceTest, ColoursFollowTexture) {
 }
 
 TEST(ReferenceTest, OfSeveralReferencesTheAlikeOneExplains) {
-  const Image key = Bands(120, 80, 40);
+  const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution =
       KeyColorFromReferences(LuminanceOf(key),
-                             {SrgbFromLab(Stripes(64, 64)), SrgbFromLab(Bands(120, 80, 0))},
+                             {SrgbFromLab(Stripes(64, 64)), SrgbFromLab(Bands(420, 180, 0))},
                              *Encoder::Embedded(),
                              {},
                              recorder,
@@ -93,7 +93,7 @@ TEST(ReferenceTest, OfSeveralReferencesTheAlikeOneExplains) {
 }
 
 TEST(ReferenceTest, AnUnrelatedReferenceWarnsAndFades) {
-  const Image key = Bands(120, 80, 40);
+  const Image key = Bands(360, 160, 120);
   ReferenceOptions options;
   options.low_confidence = 1.0;  // nothing is that certain
   Recorder recorder;
