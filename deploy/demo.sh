@@ -76,4 +76,5 @@ if [ -f "$out/report.html" ]; then
 else
   echo "demo: colour $out/key_view.png by any means, then:"
   echo "  deploy/demo.sh $photos $out -- --key-color COLOURED.png"
+  echo "or leave the colours to the server: deploy/demo.sh $photos $out -- --auto"
 fi

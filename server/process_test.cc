@@ -11,6 +11,7 @@
 #include <sstream>
 #include <thread>
 
+#include "core/base/digest.h"
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "server/jobs/sqlite_db.h"
@@ -213,6 +214,7 @@ TEST_F(ProcessTest, OtherWeightsUnderTheSameNameAreOtherWork) {
   fs::remove(weights);
   const v1::Job job = client.WaitFinished(client.Create(spec).name());
   EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
+  EXPECT_THAT(job.error().message(), HasSubstr("put it back"));
 }
 
 TEST_F(ProcessTest, WeightsReplacedUnderARunningJobAreNoticed) {

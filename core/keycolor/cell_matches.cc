@@ -51,7 +51,7 @@ Blend BlendNearest(const std::vector<std::pair<float, int32_t>>& nearest, const 
 CellMatches MatchCells(const CellMatrix& queries,
                        const CellBank& bank,
                        int neighbours,
-                       double usual_distance,
+                       double distance_scale,
                        ThreadPool& pool,
                        const CancellationToken& cancel) {
   const Eigen::Index cells = queries.rows(), entries = bank.features.rows();
@@ -90,27 +90,31 @@ CellMatches MatchCells(const CellMatrix& queries,
     const double distance = best_distance[i];
     const double mutual =
         (nearest_query[0](best[i]) + kDistanceFloor) / (distance + kDistanceFloor);
-    const double closeness = std::exp(-std::pow(distance / (usual_distance + kDistanceFloor), 2));
+    const double closeness = std::exp(-std::pow(distance / (distance_scale + kDistanceFloor), 2));
     matches.confidence[i] *= static_cast<float>(closeness * std::sqrt(std::min(1.0, mutual)));
   }
   return matches;
 }
 
-double UsualDistance(const CellMatrix& sample, const CellMatrix& features) {
+double DistanceScale(const CellMatrix& sample, const CellMatrix& features) {
   const Eigen::RowVectorXf squares = features.rowwise().squaredNorm();
   const CellMatrix d = Distances(sample, features, squares);
-  std::vector<float> nearest;
+  std::vector<float> nearest, any;
   for (Eigen::Index q = 0; q < d.rows(); ++q) {
     float best = std::numeric_limits<float>::infinity();
     for (Eigen::Index k = 0; k < d.cols(); ++k) {
-      // The cell itself, and its copies at other scales, are no other place.
+      // The cell itself is no other.
       if (d(q, k) > 1e-4f) best = std::min(best, d(q, k));
     }
     if (std::isfinite(best)) nearest.push_back(best);
+    any.push_back(d(q, (q + d.cols() / 2) % d.cols()));
   }
   if (nearest.empty()) return 1.0;
-  std::nth_element(nearest.begin(), nearest.begin() + nearest.size() / 2, nearest.end());
-  return nearest[nearest.size() / 2];
+  const auto median = [](std::vector<float>& values) {
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return static_cast<double>(values[values.size() / 2]);
+  };
+  return std::sqrt(median(nearest) * median(any));
 }
 
 }  // namespace color3d

@@ -22,17 +22,17 @@ struct CellMatches {
   std::vector<int32_t> reference;  // of the nearest
 };
 
-// Confidence of a match = closeness (its squared distance against `usual_distance`) x mutuality
+// Confidence of a match = closeness (its squared distance against `distance_scale`) x mutuality
 // (whether another cell is nearer to the matched one) x agreement of the blended colours.
 CellMatches MatchCells(const CellMatrix& queries,
                        const CellBank& bank,
                        int neighbours,
-                       double usual_distance,
+                       double distance_scale,
                        ThreadPool& pool,
                        const CancellationToken& cancel);
 
-// Median over a sample of the bank of the squared distance to the nearest cell of another place:
-// how near cells of one picture usually are.
-double UsualDistance(const CellMatrix& sample, const CellMatrix& features);
+// Squared distance at which a match is no better than chance, half-way (geometrically) between how
+// near cells of the references are to their nearest others and how far two of them are apart.
+double DistanceScale(const CellMatrix& sample, const CellMatrix& features);
 
 }  // namespace color3d

@@ -18,9 +18,9 @@
 namespace color3d {
 namespace {
 
-// The network saw things at this size in training; a bigger picture is coloured small and brought
-// to its size along the edges of L.
-constexpr int kWorkingSidePx = 320;
+// The network saw things at about these sizes in training; a bigger picture is coloured small and
+// brought to its size along the edges of L. Falling.
+constexpr int kWorkingSidesPx[] = {320, 224};
 constexpr int kGuideRadius = 2;
 constexpr float kGuideVarianceFloor = 4.0f;
 // Spread of the colours in question (Lab units) at which the confidence is one half.
@@ -85,15 +85,7 @@ class EmbeddedColorizer : public AutomaticColorizer {
     }
     return WithTorchErrors("automatic colourizer", [&] {
       torch::NoGradGuard no_grad;
-      const int stride = encoder_.config().Stride(encoder_.config().StageCount() - 1);
-      const double scale = std::min(
-          1.0, static_cast<double>(kWorkingSidePx) / std::max(luminance.width, luminance.height));
-      const torch::Tensor small =
-          TensorFromImage(Resize(luminance,
-                                 RoundTo(scale * luminance.width, stride),
-                                 RoundTo(scale * luminance.height, stride)));
-      // The mean over both mirror images: a thing has one colour whichever way it looks.
-      const torch::Tensor p = 0.5 * (Probabilities(small) + Probabilities(small.flip(3)).flip(3));
+      const torch::Tensor p = MeanProbabilities(luminance);
       const torch::Tensor rows = p.permute({0, 2, 3, 1});
       const torch::Tensor ab = torch::matmul(rows, bins_).permute({0, 3, 1, 2});
       const torch::Tensor variance =
@@ -115,6 +107,28 @@ class EmbeddedColorizer : public AutomaticColorizer {
   torch::Tensor Probabilities(const torch::Tensor& luminance) const {
     return torch::softmax(head_->Forward(encoder_.Taps(encoder_.Input(luminance))) / temperature_,
                           1);
+  }
+
+  // The mean over sizes and mirror images: a thing has one colour however near it is and whichever
+  // way it looks. [1,K,h,w] on the finest grid.
+  torch::Tensor MeanProbabilities(const Image& luminance) const {
+    const int stride = encoder_.config().Stride(encoder_.config().StageCount() - 1);
+    torch::Tensor sum;
+    for (int side : kWorkingSidesPx) {
+      const double scale =
+          std::min(1.0, static_cast<double>(side) / std::max(luminance.width, luminance.height));
+      const torch::Tensor small =
+          TensorFromImage(Resize(luminance,
+                                 RoundTo(scale * luminance.width, stride),
+                                 RoundTo(scale * luminance.height, stride)));
+      torch::Tensor p = Probabilities(small) + Probabilities(small.flip(3)).flip(3);
+      if (sum.defined()) {
+        p = torch::upsample_bilinear2d(p, {sum.size(2), sum.size(3)}, /*align_corners=*/false);
+        p = p + sum;
+      }
+      sum = p;
+    }
+    return sum / sum.sum(1, /*keepdim=*/true);
   }
 
   ConvNext encoder_;

@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kMinSidePx = 16;
 constexpr std::array<double, 3> kScales{0.75, 1.0, 1.33};  // of a reference: sizes of things differ
-constexpr Eigen::Index kUsualSample = 500;
+constexpr Eigen::Index kScaleSample = 500;
 constexpr int kLevels = 1024;  // of the histograms of L
 // Smallest weight of a match: regions without any get their neighbours' colour.
 constexpr float kLeastConfidence = 1e-4f;
@@ -266,11 +266,11 @@ ReferenceSolution KeyColorFromReferences(const Image& luminance,
   const Whitening whitening(raw.blocks);
   const CellBank bank{whitening.Apply(raw.blocks), std::move(raw.ab), std::move(raw.reference)};
   const CellFeatures cells = DescribeCells(encoder, small);
-  const double usual = UsualDistance(
-      bank.features.topRows(std::min(kUsualSample, bank.features.rows())), bank.features);
+  const double scale = DistanceScale(
+      bank.features.topRows(std::min(kScaleSample, bank.features.rows())), bank.features);
   progress.OnProgress(0, 0, "matching the reference pictures");
   const CellMatches matches =
-      MatchCells(whitening.Apply(cells.blocks), bank, options.neighbours, usual, pool, cancel);
+      MatchCells(whitening.Apply(cells.blocks), bank, options.neighbours, scale, pool, cancel);
   ReferenceSolution solution;
   const CellMatrix confidence = Eigen::Map<const CellMatrix>(
       matches.confidence.data(), static_cast<Eigen::Index>(matches.confidence.size()), 1);

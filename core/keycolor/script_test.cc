@@ -79,7 +79,7 @@ TEST_F(ScriptTest, WhatCannotBeUsedIsNamed) {
   };
   expect("  return x\n", "[1, 1, 64, 64]");
   expect("  return torch.cat([x, x], 1)[0]\n", "[2, 64, 64]");
-  expect("  return torch.cat([x, x], 1).to(torch.int)\n", "type int");
+  expect("  return torch.cat([x, x], 1).int()\n", "type int");
   expect("  return torch.cat([x, x], 1) * float('nan')\n", "nan");
   expect("  return torch.cat([x, x], 1) * 100.0\n", "6000");
   expect("  return torch.cat([x, x, x], 1)\n", "60.0");

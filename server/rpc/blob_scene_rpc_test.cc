@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/ops/address.h"
 #include "server/rpc/rpc_test_fixture.h"
 
 namespace color3d::testing {
