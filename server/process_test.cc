@@ -214,6 +214,7 @@ TEST_F(ProcessTest, OtherWeightsUnderTheSameNameAreOtherWork) {
   fs::remove(weights);
   const v1::Job job = client.WaitFinished(client.Create(spec).name());
   EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
+  EXPECT_THAT(job.error().message(), HasSubstr("put it back"));
 }
 
 TEST_F(ProcessTest, WeightsReplacedUnderARunningJobAreNoticed) {

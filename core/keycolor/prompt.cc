@@ -261,7 +261,6 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
     if (region.found) continue;
     solution.notes.push_back("\"" + region.phrase.thing +
                              "\" was not found in the key view; its colour is not used");
-    progress.OnWarning("prompt: " + solution.notes.back());
   }
   if (!any) throw NothingFound(solution.regions);
   const HintPlacer placer(

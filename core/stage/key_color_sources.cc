@@ -180,19 +180,13 @@ KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageCo
   prompt.hints = options.hints;
   PromptSolution solution = KeyColorFromPrompt(
       photo.luminance, options.prompt, *clip, rest, prompt, context.progress(), context.cancel());
-  std::vector<std::string> warnings = solution.notes;
-  for (const PromptRegion& region : solution.regions) {
-    if (region.found) continue;
-    warnings.push_back("the prompt's \"" + region.phrase.color.name + " " + region.phrase.thing +
-                       "\" was not found in the key view and colours nothing");
-  }
   KeyColorResult result{std::move(solution.ab),
                         {{"description", clip->description()},
                          {"prompt", options.prompt},
                          {"regions", RegionFacts(solution.regions)},
                          {"hinted_pixels", solution.spread.hinted_pixels},
                          {"relative_residual", solution.spread.relative_residual},
-                         {"warnings", warnings}}};
+                         {"warnings", solution.notes}}};
   result.confidence = std::move(solution.confidence);
   result.regions = DrawRegions(photo.luminance, solution.regions);
   return result;

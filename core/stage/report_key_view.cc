@@ -65,6 +65,10 @@ ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context) {
   if (context.HasInput(artifact::kKeyColorFacts)) {
     AddColor(ParseInput(context, artifact::kKeyColorFacts), &report);
   }
+  if (context.HasInput(artifact::kKeyColorRegions)) {
+    report.pictures.pictures.push_back({"what each colour of the prompt was taken for",
+                                        context.ReadInput(artifact::kKeyColorRegions)});
+  }
   if (context.HasInput(artifact::kKeyViewRanking)) {
     report.ranking = {"All candidates, best first", context.ReadInput(artifact::kKeyViewRanking)};
   }

@@ -202,6 +202,12 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
                       "it has: " + NamesOf(context_.models.files) + "); start it with --model " +
                       name + "=FILE and retry the job");
     }
+    std::error_code none;
+    if (!fs::is_regular_file(file->second, none)) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  "the file of the model '" + name + "' (" + file->second.string() +
+                      ") is gone; put it back and retry the job");
+    }
     ModelFile& model = models_[name];
     model = {file->second, IdentityOf(file->second), ""};
     for (const fs::path& part : FilesOfModel(file->second)) {

@@ -141,9 +141,13 @@ std::string CompareClip(WeightMap weights,
     return "tokens: not compared, give --vocabulary (and prompts in the expected file's metadata)";
   }
   clip.LoadVocabulary(args.vocabulary);
+  const nlohmann::json list = nlohmann::json::parse(prompts->second, nullptr, false);
   std::vector<float> all_tokens;
-  for (const std::string& prompt : nlohmann::json::parse(prompts->second)) {
-    const std::vector<float> ours = AsFloats(clip.Tokens(prompt));
+  for (const nlohmann::json& prompt : list) {
+    if (!prompt.is_string()) {
+      throw InvalidArgument("the expected file's \"prompts\" are no JSON list of texts");
+    }
+    const std::vector<float> ours = AsFloats(clip.Tokens(prompt.get<std::string>()));
     all_tokens.insert(all_tokens.end(), ours.begin(), ours.end());
   }
   comparison.Add("tokens", all_tokens);

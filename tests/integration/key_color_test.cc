@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "tests/integration/service_fixture.h"

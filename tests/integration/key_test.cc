@@ -90,7 +90,7 @@ TEST_F(KeyTest, AnotherViewAndAnOlderColourCanBeTaken) {
 TEST_F(KeyTest, EveryStrategySharesTheFeaturesOfTheFirst) {
   const std::string room = Path("room").string(), out = Path("key").string();
   Ask({"key", "select", room, "-o", out});
-  const fs::path cache = Path("data") / "cache" / "view_features";
+  const fs::path cache = Path("server") / "data" / "cache" / "view_features";
   const std::vector<std::string> entries = ListFiles(cache);
   EXPECT_EQ(entries.size(), 6u);
   for (const char* strategy : {"entropy", "tracks"}) {
