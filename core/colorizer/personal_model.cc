@@ -13,6 +13,7 @@ constexpr int kBlocksPerLevel = 2;
 constexpr double kLeak = 0.2;
 constexpr double kNormEpsilon = 1e-5;
 constexpr double kMeanSquareShare = 0.01;
+constexpr double kFlatChange = 0.03;  // variance over mean square; natural pictures have 0.3 to 1
 
 torch::Tensor LeakyRelu(const torch::Tensor& x) { return torch::leaky_relu(x, kLeak); }
 
@@ -143,11 +144,15 @@ torch::Tensor PersonalModel::Normalise(const Norm& norm, const torch::Tensor& x)
   if (measuring_statistics_) {
     const torch::Tensor flat = x.permute({1, 0, 2, 3}).flatten(1);
     norm.mean.copy_(flat.mean(1));
-    // The share of the mean square keeps a channel that is constant over the key view (a flat
-    // picture) from being blown up where another view does change.
-    norm.inverse_deviation.copy_(
-        (flat.var(1, /*unbiased=*/false) + kMeanSquareShare * flat.square().mean(1) + kNormEpsilon)
-            .rsqrt());
+    const torch::Tensor mean_square = flat.square().mean(1);
+    const torch::Tensor variance = flat.var(1, /*unbiased=*/false);
+    // A share of the mean square keeps a channel that is constant over the key view from being
+    // blown up where another view does change; where the whole layer is constant (a flat picture)
+    // the share is 1, or a dozen layers would multiply the least change by thousands.
+    const double change =
+        variance.mean().item<double>() / (mean_square.mean().item<double>() + kNormEpsilon);
+    const double share = kMeanSquareShare + std::exp(-change / kFlatChange);
+    norm.inverse_deviation.copy_((variance + share * mean_square + kNormEpsilon).rsqrt());
   }
   const torch::Tensor scale = norm.weight * norm.inverse_deviation;
   const torch::Tensor shift = norm.bias - norm.mean * scale;

@@ -216,13 +216,15 @@ TEST(ConvNextTest, InputIsTheImageNetNormalisedGrayOfL) {
 }
 
 TEST(ConvNextTest, TapsHaveTheirStridesAndAreNormalised) {
-  const auto encoder = std::dynamic_pointer_cast<const ConvNext>(Encoder::Embedded());
-  ASSERT_TRUE(encoder);
+  // Untrained norms have no scale and shift of their own.
+  const ConvNextConfig config;
+  const auto encoder =
+      std::make_shared<const ConvNext>(config, RandomFeatureWeights(config, 1), "random");
   torch::NoGradGuard no_grad;
   const torch::Tensor input = encoder->Input(TensorFromImage(RandomLuminance(96, 64, 1)));
   const std::vector<torch::Tensor> taps = encoder->Taps(input);
-  ASSERT_EQ(taps.size(), 4u);
-  for (int i = 0; i < 4; ++i) {
+  ASSERT_EQ(taps.size(), 5u);
+  for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(taps[i].size(1), encoder->config().dims[i]);
     EXPECT_EQ(taps[i].size(2), 64 / encoder->config().Stride(i));
     EXPECT_EQ(taps[i].size(3), 96 / encoder->config().Stride(i));
