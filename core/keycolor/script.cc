@@ -34,9 +34,9 @@ std::string FirstLine(const std::exception& error) {
   const std::string text = error.what();
   const size_t begin = text.find_first_not_of(" \n");
   if (begin == std::string::npos) return "no message";
-  // TorchScript puts the message of a raised exception last.
-  const size_t raised = text.rfind("RuntimeError: ");
-  const size_t from = raised == std::string::npos ? begin : raised;
+  // TorchScript puts what was raised last: "AssertionError: ...".
+  const size_t raised = text.rfind("Error: ");
+  const size_t from = raised == std::string::npos ? begin : text.rfind('\n', raised) + 1;
   return text.substr(from, std::min<size_t>(text.find('\n', from) - from, 200));
 }
 
