@@ -215,7 +215,7 @@ TEST(ColorizerTest, DegenerateKeyViewsTrain) {
   for (const auto& [width, height] : {std::pair{1, 1}, {64, 64}, {7, 200}}) {
     const Key flat{Image(width, height, 1, 50.0f), Image(width, height, 2, 20.0f)};
     const Image ab = Train(flat, Quick(2))->Colorize(flat.luminance);
-    for (float value : ab.data) ASSERT_NEAR(value, 20.0f, 6.0f) << width << "x" << height;
+    for (float value : ab.data) ASSERT_NEAR(value, 20.0f, 4.0f) << width << "x" << height;
   }
 }
 

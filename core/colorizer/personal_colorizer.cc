@@ -25,6 +25,7 @@ constexpr char kWhat[] = "the colorizer file";
 // Guided upsampling: windows of 5x5 cells; contrasts of L below about 4 units are no edges.
 constexpr int kGuideRadius = 2;
 constexpr float kGuideVarianceFloor = 20.0f;
+constexpr double kMaxAb = 128.0;  // Lab units; sRGB spans about -108..98
 
 Image CropTo(const Image& image, int width, int height) {
   Image out(width, height, image.channels);
@@ -91,6 +92,8 @@ torch::Tensor PersonalColorizer::Predict(const torch::Tensor& luminance, int pic
       decoded = 0.5 * (decoded + kAbScale * model.Forward(luminance.flip({3})).flip({3}));
     }
   }
+  // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
+  if (decode) decoded = decoded.clamp(-kMaxAb, kMaxAb);
   if (!parts_.neighbours) return decoded;
   if (!decode || model.config().adapters) {
     taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
