@@ -2,13 +2,9 @@
 
 #include <torch/torch.h>
 
-#include <utility>
-
-#include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/encoder/convnext.h"
 #include "core/encoder/random_features.h"
-#include "core/weights/weight_file.h"
 #include "tests/bench/pretrain/squeezenet.h"
 
 namespace color3d {
@@ -76,16 +72,7 @@ std::shared_ptr<const Encoder> BenchEncoder(const std::string& name) {
   if (name.starts_with(kSqueezeNet)) {
     return std::make_shared<const SqueezeNetEncoder>(name.substr(sizeof(kSqueezeNet) - 1));
   }
-  WeightMap weights = ReadWeightFile(name);
-  WeightMap encoder;
-  constexpr char kPrefix[] = "encoder.";
-  for (auto& [key, array] : weights) {
-    if (key.starts_with(kPrefix)) encoder[key.substr(sizeof(kPrefix) - 1)] = std::move(array);
-  }
-  if (encoder.contains("downsample_layers.0.0.weight")) {
-    return std::make_shared<const ConvNext>(config, std::move(encoder), "pre-trained, " + name);
-  }
-  throw InvalidArgument(name + " is no encoder: give embedded, random, squeezenet=FILE or a file");
+  return Encoder::FromWeightFile(name);
 }
 
 }  // namespace color3d
