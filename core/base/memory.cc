@@ -21,6 +21,16 @@ std::optional<int64_t> NumberIn(const fs::path& file) {
   return value;
 }
 
+// A "Name:  123 kB" line of /proc/self/status, in bytes.
+int64_t StatusBytes(const std::string& field) {
+  std::ifstream status("/proc/self/status");
+  std::string line;
+  while (std::getline(status, line)) {
+    if (line.rfind(field, 0) == 0) return std::stoll(line.substr(field.size())) * 1024;
+  }
+  return 0;
+}
+
 // What a control group leaves, or INT64_MAX when it has no limit.
 int64_t LeftInGroup(const fs::path& folder, const char* limit_file, const char* usage_file) {
   const std::optional<int64_t> limit = NumberIn(folder / limit_file);
@@ -66,6 +76,14 @@ int64_t AvailableMemoryBytes(const fs::path& root) {
     }
   }
   return least;
+}
+
+int64_t ResidentMemoryBytes() { return StatusBytes("VmRSS:"); }
+int64_t PeakMemoryBytes() { return StatusBytes("VmHWM:"); }
+
+void ResetPeakMemory() {
+  std::ofstream clear("/proc/self/clear_refs");
+  clear << "5";
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// How much memory this process may still take. Thread-safe.
+// How much memory this process takes, and may still take. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -9,5 +9,12 @@ namespace color3d {
 // The least of MemAvailable and of what the process's control groups (version 1 or 2) leave below
 // their limits, bytes; INT64_MAX when the system tells neither. `root` stands for "/" in tests.
 int64_t AvailableMemoryBytes(const std::filesystem::path& root = "/");
+
+// Resident memory now; 0 when unknown.
+int64_t ResidentMemoryBytes();
+
+// Largest resident memory since the last reset (or since the start, where the kernel cannot reset).
+int64_t PeakMemoryBytes();
+void ResetPeakMemory();
 
 }  // namespace color3d

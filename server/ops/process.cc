@@ -5,35 +5,12 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <fstream>
 #include <memory>
 #include <vector>
 
 #include "core/base/error.h"
 
 namespace color3d {
-namespace {
-
-// A "Name:  123 kB" line of /proc/self/status, in bytes.
-int64_t StatusBytes(const std::string& field) {
-  std::ifstream status("/proc/self/status");
-  std::string line;
-  while (std::getline(status, line)) {
-    if (line.rfind(field, 0) == 0) return std::stoll(line.substr(field.size())) * 1024;
-  }
-  return 0;
-}
-
-}  // namespace
-
-int64_t ResidentMemoryBytes() { return StatusBytes("VmRSS:"); }
-int64_t PeakMemoryBytes() { return StatusBytes("VmHWM:"); }
-
-void ResetPeakMemory() {
-  std::ofstream clear("/proc/self/clear_refs");
-  clear << "5";
-}
-
 std::filesystem::path ProgramFolder() {
   std::error_code error;
   return std::filesystem::read_symlink("/proc/self/exe", error).parent_path();

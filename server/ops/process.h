@@ -7,13 +7,6 @@
 
 namespace color3d {
 
-// Resident memory now; 0 when unknown.
-int64_t ResidentMemoryBytes();
-
-// Largest resident memory since the last reset (or since the start, where the kernel cannot reset).
-int64_t PeakMemoryBytes();
-void ResetPeakMemory();
-
 // The folder that holds the running program.
 std::filesystem::path ProgramFolder();
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/memory.h"
 #include "server/jobs/spec_check.h"
 #include "server/ops/process.h"
 #include "server/rpc/convert.h"

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/base/files.h"
+#include "core/base/memory.h"
 #include "server/jobs/planner.h"
 #include "server/ops/process.h"
 #include "server/service_error.h"

@@ -5,6 +5,7 @@
 
 #include <thread>
 
+#include "core/base/memory.h"
 #include "server/jobs/sqlite_job_store.h"
 #include "server/ops/process.h"
 #include "server/worker/attempt.h"

@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/memory.h"
 #include "core/base/random.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
@@ -60,15 +60,6 @@ class ResidualCurve : public NullObserver {
  private:
   Clock clock_;
 };
-
-// Most memory that the process has held so far.
-double PeakGigabytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.rfind("VmHWM:", 0) == 0) return std::stod(line.substr(6)) * 1024.0 / 1e9;
-  }
-  return 0.0;
-}
 
 // Discs, ramps and a checkered floor: flat regions, fine detail and hard edges.
 Image ProceduralSrgb(int width, int height) {
@@ -142,7 +133,7 @@ Json RunOurs(const Problem& problem, const HintOptions& options) {
           {"iterations", solution.iterations},
           {"relative_residual", solution.relative_residual},
           {"hints_exact", HintsHoldExactly(problem, solution.ab)},
-          {"peak_gb", PeakGigabytes()},
+          {"peak_gb", PeakMemoryBytes() / 1e9},
           {"residual_by_seconds", curve.points}};
 }
 

@@ -4,11 +4,11 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/base/memory.h"
 #include "core/encoder/encoder.h"
 #include "core/encoder/synthetic_networks.h"
 #include "core/keycolor/automatic.h"
@@ -28,17 +28,6 @@ struct NetworksArguments {
   int threads = 1;
 };
 
-// A line of /proc/self/status in bytes; 0 where there is no such file.
-int64_t StatusBytes(const std::string& key) {
-  std::ifstream status("/proc/self/status");
-  std::string word;
-  while (status >> word) {
-    int64_t kilobytes = 0;
-    if (word == key + ":" && status >> kilobytes) return kilobytes * 1024;
-  }
-  return 0;
-}
-
 template <typename Body>
 double SecondsOf(Body&& body) {
   const auto start = std::chrono::steady_clock::now();
@@ -56,13 +45,13 @@ void RunNetworks(const NetworksArguments& args) {
   }
   // A small network first: what the libraries take once is not counted with the weights.
   Ddcolor(SyntheticDdcolorWeights(SyntheticDdcolor::Mini(), 1)).Colorize(Image(8, 8, 1, 50.0f));
-  const int64_t before = StatusBytes("VmRSS");
+  const int64_t before = ResidentMemoryBytes();
   nlohmann::ordered_json result{{"weights", args.weights_file}, {"threads", args.threads}};
   const auto loaded = [&](double seconds, const std::string& description) {
     result["description"] = description;
     result["load_seconds"] = seconds;
-    result["peak_bytes_above_start"] = StatusBytes("VmHWM") - before;
-    result["bytes_kept"] = StatusBytes("VmRSS") - before;
+    result["peak_bytes_above_start"] = PeakMemoryBytes() - before;
+    result["bytes_kept"] = ResidentMemoryBytes() - before;
   };
   if (args.as == "auto") {
     std::shared_ptr<const AutomaticColorizer> network;
@@ -79,7 +68,7 @@ void RunNetworks(const NetworksArguments& args) {
     result["describe_seconds"] = SecondsOf([&] { network->Describe(luminance); });
     result["deep_features_seconds"] = SecondsOf([&] { network->DeepFeatures(luminance); });
   }
-  result["peak_bytes_with_pictures"] = StatusBytes("VmHWM") - before;
+  result["peak_bytes_with_pictures"] = PeakMemoryBytes() - before;
   WriteResult(result, args.json_file);
 }
 

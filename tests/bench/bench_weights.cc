@@ -5,13 +5,13 @@
 
 #include <chrono>
 #include <cstdlib>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/memory.h"
 #include "core/base/random.h"
 #include "core/weights/test_weight_files.h"
 #include "core/weights/weight_file.h"
@@ -33,17 +33,6 @@ struct LoadFigures {
   int64_t arrays = 0;
 };
 
-// A line of /proc/self/status, bytes.
-int64_t StatusBytes(const std::string& key) {
-  std::ifstream status("/proc/self/status");
-  std::string word;
-  while (status >> word) {
-    int64_t kilobytes = 0;
-    if (word == key + ":" && status >> kilobytes) return kilobytes * 1024;
-  }
-  return 0;
-}
-
 // Loads in a child process, so that one file's peak does not hide the next one's.
 LoadFigures MeasureLoad(const std::filesystem::path& path) {
   int ends[2];
@@ -53,12 +42,12 @@ LoadFigures MeasureLoad(const std::filesystem::path& path) {
   if (child == 0) {
     LoadFigures figures;
     try {
-      const int64_t before = StatusBytes("VmRSS");
+      const int64_t before = ResidentMemoryBytes();
       const auto start = std::chrono::steady_clock::now();
       const WeightMap weights = ReadWeightFile(path);
       figures.seconds =
           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      figures.peak_bytes = StatusBytes("VmHWM") - before;
+      figures.peak_bytes = PeakMemoryBytes() - before;
       figures.arrays = static_cast<int64_t>(weights.size());
       for (const auto& [name, array] : weights) {
         figures.array_bytes += static_cast<int64_t>(array.values.size() * sizeof(float));
