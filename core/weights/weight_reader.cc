@@ -42,9 +42,9 @@ std::string ShapeText(const std::vector<int64_t>& shape) {
 }
 
 WeightReader::WeightReader(WeightMap weights, std::string what)
-    : weights_(std::move(weights)), what_(std::move(what)), placeholder_budget_(16 << 20) {
+    : weights_(std::move(weights)), what_(std::move(what)), zeros_budget_(16 << 20) {
   for (const auto& [name, array] : weights_) {
-    placeholder_budget_ += static_cast<int64_t>(array.values.size());
+    zeros_budget_ += static_cast<int64_t>(array.values.size());
   }
 }
 
@@ -57,26 +57,26 @@ WeightArray WeightReader::Take(const std::string& name, const std::vector<int64_
   const auto found = weights_.find(name);
   if (found == weights_.end()) {
     missing_.insert(QuotedName(name) + " " + ShapeText(shape));
-    return Placeholder(shape);
+    return Zeros(shape);
   }
   WeightArray array = std::move(found->second);
   weights_.erase(found);
   if (array.shape != shape) {
     misshapen_.push_back(QuotedName(name) + " is " + ShapeText(array.shape) + ", expected " +
                          ShapeText(shape));
-    return Placeholder(shape);
+    return Zeros(shape);
   }
   if (!AllFinite(array.values)) not_finite_.push_back(QuotedName(name));
   return array;
 }
 
-WeightArray WeightReader::Placeholder(const std::vector<int64_t>& shape) {
+WeightArray WeightReader::Zeros(const std::vector<int64_t>& shape) {
   int64_t count = 1;
   for (int64_t size : shape) {
-    if (size < 0 || (size > 0 && count > placeholder_budget_ / size)) Report(/*complete=*/false);
+    if (size < 0 || (size > 0 && count > zeros_budget_ / size)) Report(/*complete=*/false);
     count *= size;
   }
-  placeholder_budget_ -= count;
+  zeros_budget_ -= count;
   return {shape, std::vector<float>(static_cast<size_t>(count), 0.0f)};
 }
 

@@ -42,11 +42,11 @@ class WeightReader {
 
  private:
   [[noreturn]] void Report(bool complete) const;
-  WeightArray Placeholder(const std::vector<int64_t>& shape);
+  WeightArray Zeros(const std::vector<int64_t>& shape);
 
   WeightMap weights_;
   std::string what_;
-  int64_t placeholder_budget_;
+  int64_t zeros_budget_;
   std::set<std::string> missing_;
   std::vector<std::string> misshapen_;
   std::vector<std::string> not_finite_;
