@@ -48,6 +48,27 @@ HWY_INLINE Vec MinusApplied(const Stencil& stencil, Vec data, const float* u) {
   return hn::NegMulAdd(data, center, sum);
 }
 
+// A register of both components.
+struct VecPair {
+  Vec a, b;
+};
+
+HWY_INLINE VecPair MinusApplied(const GridSystem& s, const GridVector& u, int64_t i) {
+  const Stencil stencil = LoadStencil(s, i);
+  const Vec data = hn::LoadU(Tag(), s.data.data() + i);
+  return {MinusApplied(stencil, data, u.a.data() + i), MinusApplied(stencil, data, u.b.data() + i)};
+}
+
+HWY_INLINE VecPair ResidualAt(const GridSystem& s,
+                              const GridVector& u,
+                              const GridVector& f,
+                              int64_t i) {
+  const Tag d;
+  const VecPair applied = MinusApplied(s, u, i);
+  return {hn::Add(hn::LoadU(d, f.a.data() + i), applied.a),
+          hn::Add(hn::LoadU(d, f.b.data() + i), applied.b)};
+}
+
 void Residual(const GridSystem& s,
               const GridVector& u,
               const GridVector& f,
@@ -56,12 +77,9 @@ void Residual(const GridSystem& s,
               GridVector& out) {
   const Tag d;
   for (int64_t i = begin; i < end; i += static_cast<int64_t>(hn::Lanes(d))) {
-    const Stencil stencil = LoadStencil(s, i);
-    const Vec data = hn::LoadU(d, s.data.data() + i);
-    const Vec a = MinusApplied(stencil, data, u.a.data() + i);
-    const Vec b = MinusApplied(stencil, data, u.b.data() + i);
-    hn::StoreU(hn::Add(hn::LoadU(d, f.a.data() + i), a), d, out.a.data() + i);
-    hn::StoreU(hn::Add(hn::LoadU(d, f.b.data() + i), b), d, out.b.data() + i);
+    const VecPair residual = ResidualAt(s, u, f, i);
+    hn::StoreU(residual.a, d, out.a.data() + i);
+    hn::StoreU(residual.b, d, out.b.data() + i);
   }
 }
 
@@ -123,10 +141,9 @@ GridPair Apply(
     const GridSystem& s, const GridVector& u, int64_t begin, int64_t end, GridVector& out) {
   const Tag d;
   for (int64_t i = begin; i < end; i += static_cast<int64_t>(hn::Lanes(d))) {
-    const Stencil stencil = LoadStencil(s, i);
-    const Vec data = hn::LoadU(d, s.data.data() + i);
-    hn::StoreU(hn::Neg(MinusApplied(stencil, data, u.a.data() + i)), d, out.a.data() + i);
-    hn::StoreU(hn::Neg(MinusApplied(stencil, data, u.b.data() + i)), d, out.b.data() + i);
+    const VecPair applied = MinusApplied(s, u, i);
+    hn::StoreU(hn::Neg(applied.a), d, out.a.data() + i);
+    hn::StoreU(hn::Neg(applied.b), d, out.b.data() + i);
   }
   return Dot(u, out, begin, end);
 }
@@ -140,15 +157,10 @@ void Jacobi(const GridSystem& s,
             GridVector& out) {
   const Tag d;
   for (int64_t i = begin; i < end; i += static_cast<int64_t>(hn::Lanes(d))) {
-    const Stencil stencil = LoadStencil(s, i);
-    const Vec data = hn::LoadU(d, s.data.data() + i);
     const Vec step = hn::LoadU(d, scale.data() + i);
-    const Vec a =
-        hn::Add(hn::LoadU(d, f.a.data() + i), MinusApplied(stencil, data, u.a.data() + i));
-    const Vec b =
-        hn::Add(hn::LoadU(d, f.b.data() + i), MinusApplied(stencil, data, u.b.data() + i));
-    hn::StoreU(hn::MulAdd(step, a, hn::LoadU(d, u.a.data() + i)), d, out.a.data() + i);
-    hn::StoreU(hn::MulAdd(step, b, hn::LoadU(d, u.b.data() + i)), d, out.b.data() + i);
+    const VecPair residual = ResidualAt(s, u, f, i);
+    hn::StoreU(hn::MulAdd(step, residual.a, hn::LoadU(d, u.a.data() + i)), d, out.a.data() + i);
+    hn::StoreU(hn::MulAdd(step, residual.b, hn::LoadU(d, u.b.data() + i)), d, out.b.data() + i);
   }
 }
 
