@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "core/base/error.h"
 #include "core/encoder/convnext.h"
 #include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/weight_digest.h"
+#include "core/encoder/weight_tensors.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/automatic.h"
@@ -35,20 +36,6 @@ WeightMap WithPrefix(const WeightMap& weights, const std::string& prefix) {
   return part;
 }
 
-const WeightArray& Require(const WeightMap& weights, const std::string& name) {
-  const auto found = weights.find(name);
-  if (found == weights.end()) {
-    throw InvalidArgument("the automatic colourizer's weights lack \"" + name + "\"");
-  }
-  return found->second;
-}
-
-torch::Tensor TensorFrom(const WeightArray& array) {
-  torch::Tensor tensor = torch::empty(array.shape);
-  std::memcpy(tensor.data_ptr<float>(), array.values.data(), array.values.size() * sizeof(float));
-  return tensor;
-}
-
 int RoundTo(double value, int multiple) {
   return std::max(1, static_cast<int>(std::lround(value / multiple))) * multiple;
 }
@@ -57,22 +44,22 @@ class EmbeddedColorizer : public AutomaticColorizer {
  public:
   explicit EmbeddedColorizer(const WeightMap& weights)
       : encoder_(ConvNextConfig(), WithPrefix(weights, "encoder."), "embedded ConvNeXt"),
-        bins_(TensorFrom(Require(weights, "color_bins"))),
-        temperature_(Require(weights, "color_temperature").values.at(0)),
-        description_("embedded automatic colourizer, " + std::to_string(bins_.size(0)) +
-                     " colours"),
-        digest_(encoder_.digest()) {
+        digest_(DigestOfWeights(encoder_.config().ToString(), weights)) {
+    WeightReader reader(weights, "the automatic colourizer's weights");
+    reader.IgnorePrefix("encoder.");
+    const std::vector<int64_t> bins_shape = reader.ShapeOf("color_bins");
+    const int64_t bin_count = bins_shape.empty() ? 1 : std::max<int64_t>(1, bins_shape[0]);
+    bins_ = TakeTensor(reader, "color_bins", {bin_count, 2});
+    temperature_ = reader.Take("color_temperature", {1}).values[0];
     Random random(1);
-    head_ = std::make_unique<ColorHead>(encoder_.config(), static_cast<int>(bins_.size(0)), random);
+    head_ = std::make_unique<ColorHead>(encoder_.config(), static_cast<int>(bin_count), random);
     torch::NoGradGuard no_grad;
     for (const auto& [name, tensor] : head_->Parameters()) {
-      const WeightArray& array = Require(weights, "color_head." + name);
-      if (array.shape != tensor.sizes().vec()) {
-        throw InvalidArgument("colour head weight \"" + name + "\" has another shape");
-      }
       torch::Tensor target = tensor;
-      target.copy_(TensorFrom(array));
+      target.copy_(TakeTensor(reader, "color_head." + name, tensor.sizes().vec()));
     }
+    reader.Finish();
+    description_ = "embedded automatic colourizer, " + std::to_string(bin_count) + " colours";
   }
 
   const std::string& description() const override { return description_; }
@@ -134,7 +121,7 @@ class EmbeddedColorizer : public AutomaticColorizer {
   ConvNext encoder_;
   std::unique_ptr<ColorHead> head_;
   torch::Tensor bins_;  // [K,2]
-  double temperature_;
+  double temperature_ = 1.0;
   std::string description_;
   std::string digest_;
 };
