@@ -10,6 +10,7 @@
 #include "core/base/random.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/encoder/embedded/embedded_weights.h"
 #include "core/image/codec.h"
 
@@ -121,8 +122,7 @@ TEST(AutomaticColorizerTest, ColoursHeldOutPhotographsBetterThanGrey) {
   double true_colourfulness = 0.0;
   for (size_t i = 0; i < files.size(); i += 2) {
     const Image truth = LabFromSrgb(FitWithin(ReadImage(files[i]), 256));
-    Image luminance(truth.width, truth.height, 1);
-    std::copy_n(truth.Plane(0), truth.PlaneSize(), luminance.data.begin());
+    const Image luminance = LuminanceOfLab(truth);
     const Image predicted = JoinLab(luminance, colorizer->Colorize(luminance).ab);
     error += MeanDeltaE00(predicted, truth);
     grey_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);

@@ -7,6 +7,7 @@
 #include "core/base/error.h"
 #include "core/base/random.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/keycolor/keycolor.h"
 
 namespace color3d {
@@ -25,12 +26,6 @@ Image MakeLab(int width, int height) {
   return lab;
 }
 
-Image LuminanceOf(const Image& lab) {
-  Image l(lab.width, lab.height, 1);
-  std::copy_n(lab.data.begin(), l.data.size(), l.data.begin());
-  return l;
-}
-
 std::string MessageOf(const Image& luminance, const Image& coloured) {
   try {
     KeyColorFromImage(luminance, coloured);
@@ -43,7 +38,7 @@ std::string MessageOf(const Image& luminance, const Image& coloured) {
 
 TEST(KeyColorFromImageTest, ReturnsTheChroma) {
   const Image lab = MakeLab(60, 40);
-  const Image ab = KeyColorFromImage(LuminanceOf(lab), SrgbFromLab(lab));
+  const Image ab = KeyColorFromImage(LuminanceOfLab(lab), SrgbFromLab(lab));
   ASSERT_EQ(ab.channels, 2);
   for (int y = 0; y < 40; ++y) {
     for (int x = 0; x < 60; ++x) {
@@ -55,7 +50,7 @@ TEST(KeyColorFromImageTest, ReturnsTheChroma) {
 
 TEST(KeyColorFromImageTest, AChangedToneCurveIsStillTheSamePicture) {
   Image lab = MakeLab(60, 40);
-  const Image luminance = LuminanceOf(lab);
+  const Image luminance = LuminanceOfLab(lab);
   for (size_t i = 0; i < lab.PlaneSize(); ++i) lab.data[i] = 20.0f + 0.6f * lab.data[i];
   EXPECT_EQ(MessageOf(luminance, SrgbFromLab(lab)), "");
 }
@@ -69,7 +64,7 @@ TEST(KeyColorFromImageTest, AnotherSizeIsRefusedWithBothSizes) {
 
 TEST(KeyColorFromImageTest, AGrayPictureIsRefused) {
   Image lab = MakeLab(60, 40);
-  const Image luminance = LuminanceOf(lab);
+  const Image luminance = LuminanceOfLab(lab);
   for (int c = 1; c < 3; ++c) std::fill_n(lab.Plane(c), lab.PlaneSize(), 0.5f);
   EXPECT_NE(MessageOf(luminance, SrgbFromLab(lab)).find("has no colour"), std::string::npos);
   EXPECT_NE(MessageOf(luminance, Image(60, 40, 1, 0.5f)).find("has no colour"), std::string::npos);
@@ -77,7 +72,7 @@ TEST(KeyColorFromImageTest, AGrayPictureIsRefused) {
 
 TEST(KeyColorFromImageTest, ASmallColouredObjectIsColour) {
   Image lab = MakeLab(60, 40);
-  const Image luminance = LuminanceOf(lab);
+  const Image luminance = LuminanceOfLab(lab);
   for (int c = 1; c < 3; ++c) std::fill_n(lab.Plane(c), lab.PlaneSize(), 0.0f);
   for (int y = 0; y < 8; ++y) {
     for (int x = 0; x < 8; ++x) lab.At(2, y, x) = 30.0f;
@@ -93,7 +88,7 @@ TEST(KeyColorFromImageTest, AnotherPictureIsRefused) {
   EXPECT_NE(MessageOf(other, SrgbFromLab(lab)).find("does not look like the key view"),
             std::string::npos);
   // A negative of the picture is another picture, too.
-  Image negative = LuminanceOf(lab);
+  Image negative = LuminanceOfLab(lab);
   for (float& value : negative.data) value = 100.0f - value;
   EXPECT_NE(MessageOf(negative, SrgbFromLab(lab)), "");
 }
@@ -102,7 +97,7 @@ TEST(KeyColorFromImageTest, FlatPicturesHaveADefinedAnswer) {
   Image coloured(20, 20, 3, 0.4f);
   std::fill_n(coloured.Plane(0), coloured.PlaneSize(), 0.6f);
   EXPECT_EQ(MessageOf(Image(20, 20, 1, 50.0f), coloured), "");
-  const Image structured = LuminanceOf(MakeLab(20, 20));
+  const Image structured = LuminanceOfLab(MakeLab(20, 20));
   EXPECT_NE(MessageOf(structured, coloured), "");
 }
 
@@ -110,7 +105,7 @@ TEST(KeyColorFromImageTest, NonFiniteValuesAreRefused) {
   const Image lab = MakeLab(20, 20);
   Image coloured = SrgbFromLab(lab);
   coloured.data[3] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_NE(MessageOf(LuminanceOf(lab), coloured), "");
+  EXPECT_NE(MessageOf(LuminanceOfLab(lab), coloured), "");
 }
 
 }  // namespace

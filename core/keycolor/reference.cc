@@ -12,6 +12,7 @@
 #include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/cell_features.h"
@@ -146,10 +147,8 @@ RawBank BuildBank(const std::vector<Image>& references,
   for (size_t k = 0; k < references.size(); ++k) {
     const Image lab = LabFromSrgb(FitWithin(references[k], options.match_side_px));
     ExpectColor(lab, ("reference picture " + std::to_string(k)).c_str());
-    Image luminance(lab.width, lab.height, 1), ab(lab.width, lab.height, 2);
-    std::copy_n(lab.Plane(0), luminance.data.size(), luminance.data.begin());
-    std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-    luminance = MatchHistogram(luminance, key_luminance);
+    const Image luminance = MatchHistogram(LuminanceOfLab(lab), key_luminance);
+    const Image ab = ChromaOfLab(lab);
     for (double scale : kScales) {
       cancel.ThrowIfCancelled();
       const auto scaled = [scale](int side) {

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 
 namespace color3d {
 namespace {
@@ -35,12 +36,6 @@ Image Bands(int width, int height, int shift) {
   return lab;
 }
 
-Image LuminanceOf(const Image& lab) {
-  Image l(lab.width, lab.height, 1);
-  std::copy_n(lab.data.begin(), l.data.size(), l.data.begin());
-  return l;
-}
-
 // Vertical fine stripes of strong contrast: nothing of the kind is in Bands.
 Image Stripes(int width, int height) {
   Image lab(width, height, 3);
@@ -64,8 +59,12 @@ double MeanError(const Image& ab, const Image& lab) {
 TEST(ReferenceTest, ColoursFollowTexture) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
-  const ReferenceSolution solution = KeyColorFromReferences(
-      LuminanceOf(key), {SrgbFromLab(Bands(420, 180, 0))}, *Encoder::Embedded(), {}, recorder, {});
+  const ReferenceSolution solution = KeyColorFromReferences(LuminanceOfLab(key),
+                                                            {SrgbFromLab(Bands(420, 180, 0))},
+                                                            *Encoder::Embedded(),
+                                                            {},
+                                                            recorder,
+                                                            {});
   ASSERT_EQ(solution.ab.width, 360);
   ASSERT_EQ(solution.ab.height, 160);
   const double gray = MeanError(Image(360, 160, 2), key);
@@ -81,7 +80,7 @@ TEST(ReferenceTest, OfSeveralReferencesTheAlikeOneExplains) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution =
-      KeyColorFromReferences(LuminanceOf(key),
+      KeyColorFromReferences(LuminanceOfLab(key),
                              {SrgbFromLab(Stripes(64, 64)), SrgbFromLab(Bands(420, 180, 0))},
                              *Encoder::Embedded(),
                              {},
@@ -97,7 +96,7 @@ TEST(ReferenceTest, AnUnrelatedReferenceWarnsAndFades) {
   ReferenceOptions options;
   options.low_confidence = 1.0;  // nothing is that certain
   Recorder recorder;
-  const ReferenceSolution solution = KeyColorFromReferences(LuminanceOf(key),
+  const ReferenceSolution solution = KeyColorFromReferences(LuminanceOfLab(key),
                                                             {SrgbFromLab(Stripes(64, 64))},
                                                             *Encoder::Embedded(),
                                                             options,
@@ -116,14 +115,14 @@ TEST(ReferenceTest, TheNumberOfThreadsDoesNotChangeABit) {
     options.threads = threads;
     Recorder recorder;
     const ReferenceSolution solution = KeyColorFromReferences(
-        LuminanceOf(key), references, *Encoder::Embedded(), options, recorder, {});
+        LuminanceOfLab(key), references, *Encoder::Embedded(), options, recorder, {});
     if (first.empty()) first = solution.ab.data;
     EXPECT_EQ(first, solution.ab.data);
   }
 }
 
 TEST(ReferenceTest, ReferencesWithoutUseAreRefusedByNumber) {
-  const Image luminance = LuminanceOf(Bands(100, 70, 0));
+  const Image luminance = LuminanceOfLab(Bands(100, 70, 0));
   const Image good = SrgbFromLab(Bands(100, 70, 0));
   const auto message_of = [&](const std::vector<Image>& references) -> std::string {
     Recorder recorder;

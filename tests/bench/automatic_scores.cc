@@ -6,6 +6,7 @@
 #include "core/base/files.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/image/probe.h"
 
@@ -53,8 +54,7 @@ AutomaticScore ScoreAutomatic(const AutomaticColorizer& colorizer,
                               int max_side_px,
                               const std::filesystem::path& out_folder) {
   const Image truth = LabFromSrgb(FitWithin(ReadImage(photo), max_side_px));
-  Image luminance(truth.width, truth.height, 1);
-  std::copy_n(truth.Plane(0), truth.PlaneSize(), luminance.data.begin());
+  const Image luminance = LuminanceOfLab(truth);
   const Image grey = JoinLab(luminance, Image(truth.width, truth.height, 2));
   const Image predicted = JoinLab(luminance, colorizer.Colorize(luminance).ab);
   const Image srgb = SrgbFromLab(predicted);

@@ -6,6 +6,7 @@
 #include "core/base/files.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/colorizer/colorizer.h"
 #include "core/image/codec.h"
 #include "core/image/probe.h"
@@ -26,18 +27,6 @@ struct ColorizerArguments {
   ColorizerOptions options;
 };
 
-Image Chroma(const Image& lab) {
-  Image ab(lab.width, lab.height, 2);
-  std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-  return ab;
-}
-
-Image Luminance(const Image& lab) {
-  Image l(lab.width, lab.height, 1);
-  std::copy_n(lab.Plane(0), l.data.size(), l.data.begin());
-  return l;
-}
-
 void RunColorizer(const ColorizerArguments& args) {
   std::vector<std::string> photos;
   for (const std::string& name : ListFiles(args.photos_folder)) {
@@ -57,8 +46,8 @@ void RunColorizer(const ColorizerArguments& args) {
   ColorizerOptions options = args.options;
   if (args.paper) options.recipe = ColorizerOptions::Recipe::kPaper;
   const auto colorizer = TrainColorizer(BenchEncoder(args.encoder),
-                                        Luminance(key_lab),
-                                        Chroma(key_lab),
+                                        LuminanceOfLab(key_lab),
+                                        ChromaOfLab(key_lab),
                                         options,
                                         recorder,
                                         recorder,
@@ -71,7 +60,7 @@ void RunColorizer(const ColorizerArguments& args) {
   for (size_t i = 0; i < photos.size(); i += 8) {
     if (photos[i] == key) continue;
     const Image truth = load(photos[i]);
-    const Image luminance = Luminance(truth);
+    const Image luminance = LuminanceOfLab(truth);
     const auto start = std::chrono::steady_clock::now();
     const Image predicted = JoinLab(luminance, colorizer->Colorize(luminance));
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -9,6 +9,7 @@
 #include "core/base/files.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/colorizer/colorizer.h"
 #include "core/image/codec.h"
 #include "core/image/reduced.h"
@@ -111,12 +112,12 @@ class ErrorOfKeys {
     NullObserver silent;
     NoCheckpoints none;
     const auto colorizer = TrainColorizer(
-        encoder_, Luminance(truth_[key]), Chroma(truth_[key]), options, none, silent, {});
+        encoder_, LuminanceOfLab(truth_[key]), ChromaOfLab(truth_[key]), options, none, silent, {});
     double sum = 0.0;
     int count = 0;
     for (int test : tests_) {
       if (test == key) continue;
-      const Image l = Luminance(truth_[test]);
+      const Image l = LuminanceOfLab(truth_[test]);
       sum += MeanDeltaE00(JoinLab(l, colorizer->Colorize(l)), truth_[test]);
       ++count;
     }
@@ -124,17 +125,6 @@ class ErrorOfKeys {
   }
 
  private:
-  static Image Luminance(const Image& lab) {
-    Image l(lab.width, lab.height, 1);
-    std::copy_n(lab.Plane(0), l.data.size(), l.data.begin());
-    return l;
-  }
-  static Image Chroma(const Image& lab) {
-    Image ab(lab.width, lab.height, 2);
-    std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-    return ab;
-  }
-
   const KeyViewArguments& args_;
   std::shared_ptr<const Encoder> encoder_;
   std::vector<Image> truth_;

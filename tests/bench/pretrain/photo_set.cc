@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/image/probe.h"
 
@@ -85,10 +86,8 @@ TrainingCrop PhotoSet::Crop(int size_px, Random& random) const {
   TrainingCrop result;
   result.srgb = Resize(crop, size_px, size_px);
   const Image lab = LabFromSrgb(result.srgb);
-  result.luminance = Image(size_px, size_px, 1);
-  std::copy_n(lab.Plane(0), lab.PlaneSize(), result.luminance.data.begin());
-  result.ab = Image(size_px, size_px, 2);
-  std::copy_n(lab.Plane(1), 2 * lab.PlaneSize(), result.ab.data.begin());
+  result.luminance = LuminanceOfLab(lab);
+  result.ab = ChromaOfLab(lab);
   Degrade(result.luminance, random);
   return result;
 }
