@@ -55,6 +55,18 @@ class Key {
   v1::Job Follow(const std::vector<std::string>& jobs) {
     return FollowToSuccess(connection_, context_, jobs, options_.out, display_);
   }
+  // A submitted job at its end, what it chose, and the files that it left in options_.out.
+  struct Fetched {
+    v1::Job job;
+    KeyViewChoice choice;
+    std::vector<std::string> files;
+  };
+  Fetched Fetch(const v1::Job& submitted) {
+    const v1::Job job = Follow({submitted.name()});
+    return {job,
+            ReadChoice(connection_, job),
+            DownloadResults(connection_, context_, job, options_.out, display_)};
+  }
   // The selection that a new colour goes with: the one asked for, else the newest.
   std::vector<std::string> SelectionFor(const std::string& scene);
   std::string Command(std::vector<std::string> arguments) const {
@@ -103,9 +115,7 @@ ExitCode Key::Select() {
   PrepareOut(options_.out);
   const std::string scene = Scene();
   const v1::Job submitted = SubmitSelection(scene);
-  const v1::Job job = Follow({submitted.name()});
-  const KeyViewChoice choice = ReadChoice(connection_, job);
-  const auto files = DownloadResults(connection_, context_, job, options_.out, display_);
+  const auto [job, choice, files] = Fetch(submitted);
   if (context_.json) {
     PrintJson({{"scene", scene},
                {"job", job.name()},
@@ -145,9 +155,7 @@ ExitCode Key::Colour() {
   *spec.mutable_colorize_key_view()->mutable_source() = UploadKeyColor(connection_, options_.color);
   for (const std::string& input : SelectionFor(scene)) spec.add_inputs(input);
   const v1::Job submitted = SubmitJob(connection_, spec);
-  const v1::Job job = Follow({submitted.name()});
-  const KeyViewChoice choice = ReadChoice(connection_, job);
-  const auto files = DownloadResults(connection_, context_, job, options_.out, display_);
+  const auto [job, choice, files] = Fetch(submitted);
   if (context_.json) {
     PrintJson({{"scene", scene},
                {"job", job.name()},
