@@ -30,10 +30,19 @@ struct ColorizerOptions {
   void Validate() const;
 };
 
+struct ColorPrediction {
+  Image ab;  // 2 channels, Lab units
+  // 1 channel: mean squared distance per feature dimension to the most similar place of the key
+  // view, 0: the same; about 1 where nothing is alike. Empty for colorizers without neighbours.
+  Image distance;
+};
+
 // Immutable once trained; thread-safe to use.
 class Colorizer {
  public:
   virtual ~Colorizer() = default;
+  // As Colorize, with how far each place is from anything that was seen.
+  virtual ColorPrediction Predict(const Image& luminance) const = 0;
   // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
   // than the training size are coloured at that size and upsampled guided by L.
   virtual Image Colorize(const Image& luminance) const = 0;
