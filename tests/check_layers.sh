@@ -35,9 +35,10 @@ allow core/image 'core/(base|image)'
 allow core/weights 'core/(base|weights)'
 allow core/scene 'core/(base|color|image|scene)'
 allow core/encoder 'core/(base|color|image|weights|encoder)'
-for folder in keyview keycolor augment carry metrics; do
+for folder in keyview keycolor augment metrics; do
   allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
 done
+allow core/carry 'core/(base|color|image|scene|keycolor|carry)'
 allow core/colorizer 'core/(base|color|image|weights|encoder|augment|colorizer)'
 allow core/splat 'core/(base|color|image|scene|splat)'
 allow core/report 'core/(base|image|report)'

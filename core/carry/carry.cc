@@ -63,9 +63,8 @@ Correspondence Correspond(const SurfaceView& source, const SurfaceView& target, 
       const double depth = target.depth.At(0, y, x);
       if (!(depth > 0.0)) continue;
       const Eigen::Vector3d ray((x + 0.5 - c.cx) / c.fx, (y + 0.5 - c.cy) / c.fy, 1.0);
-      const Eigen::Vector3d p =
-          cam_from_world * (center + world_from_cam * (depth * ray)) +
-          source.cam_from_world.translation;
+      const Eigen::Vector3d p = cam_from_world * (center + world_from_cam * (depth * ray)) +
+                                source.cam_from_world.translation;
       if (!(p.z() > 1e-6)) continue;
       const double sx = source.camera.fx * p.x() / p.z() + source.camera.cx;
       const double sy = source.camera.fy * p.y() / p.z() + source.camera.cy;
@@ -89,8 +88,8 @@ Image WarpedLuminance(const SurfaceView& source,
   for (int y = 0; y < warped.height; ++y) {
     for (int x = 0; x < warped.width; ++x) {
       if (map.visible.At(0, y, x) < kSeen) continue;
-      warped.At(0, y, x) = Bilinear(
-          source.luminance, 0, map.position.At(0, y, x), map.position.At(1, y, x));
+      warped.At(0, y, x) =
+          Bilinear(source.luminance, 0, map.position.At(0, y, x), map.position.At(1, y, x));
     }
   }
   return warped;
@@ -159,13 +158,28 @@ void CheckSizes(const SurfaceView& view, const char* which) {
   }
 }
 
+void CheckPositive(const char* field, double value) {
+  if (!(value > 0.0 && value <= 1e6)) {
+    throw InvalidArgument(std::string("carry option ") + field + " is " + std::to_string(value) +
+                          "; it must be above 0 and at most 1e6");
+  }
+}
+
 }  // namespace
+
+void CarryOptions::Validate() const {
+  CheckPositive("depth_tolerance", depth_tolerance);
+  CheckPositive("luminance_tolerance", luminance_tolerance);
+  CheckPositive("structure_tolerance", structure_tolerance);
+  if (flow_tolerance_px != 0.0) CheckPositive("flow_tolerance_px", flow_tolerance_px);
+}
 
 CarriedColor CarryColor(const SurfaceView& source,
                         const Image& ab,
                         const Image& confidence,
                         const SurfaceView& target,
                         const CarryOptions& options) {
+  options.Validate();
   CheckSizes(source, "source");
   CheckSizes(target, "target");
   Correspondence map = Correspond(source, target, options.depth_tolerance);
@@ -191,6 +205,34 @@ CarriedColor CarryColor(const SurfaceView& source,
     }
   }
   return out;
+}
+
+void TakeSurer(const CarriedColor& other, CarriedColor* color) {
+  for (size_t i = 0; i < color->confidence.data.size(); ++i) {
+    if (!(other.confidence.data[i] > color->confidence.data[i])) continue;
+    color->confidence.data[i] = other.confidence.data[i];
+    for (int c = 0; c < 2; ++c) color->ab.Plane(c)[i] = other.ab.Plane(c)[i];
+  }
+}
+
+void FillFrom(const CarriedColor& other, CarriedColor* color) {
+  for (size_t i = 0; i < color->confidence.data.size(); ++i) {
+    const float first = color->confidence.data[i];
+    const float second = (1.0f - first) * other.confidence.data[i];
+    const float sum = first + second;
+    if (!(sum > 0.0f)) continue;
+    for (int c = 0; c < 2; ++c) {
+      float& ab = color->ab.Plane(c)[i];
+      ab = (first * ab + second * other.ab.Plane(c)[i]) / sum;
+    }
+    color->confidence.data[i] = sum;
+  }
+}
+
+double Coverage(const CarriedColor& color, float least) {
+  size_t covered = 0;
+  for (float value : color.confidence.data) covered += value > least ? 1 : 0;
+  return static_cast<double>(covered) / static_cast<double>(color.confidence.data.size());
 }
 
 }  // namespace color3d

@@ -18,13 +18,13 @@ struct SurfaceView {
 
 struct CarryOptions {
   // Depth of the surface against the source's depth there, relative: confidence falls to 1/e.
-  double depth_tolerance = 0.02;
+  double depth_tolerance = 0.03;
   // Difference of the mean L of a small window, L units: confidence falls to 1/e.
-  double luminance_tolerance = 15.0;
+  double luminance_tolerance = 20.0;
   // What is left of the window's structure, as a share of it: confidence falls to 1/e.
-  double structure_tolerance = 1.0;
+  double structure_tolerance = 0.7;
   // Registration by optical flow on top of geometry: displacement at which confidence falls to 1/e.
-  double flow_tolerance_px = 6.0;
+  double flow_tolerance_px = 4.0;
   void Validate() const;
 };
 
@@ -39,5 +39,13 @@ CarriedColor CarryColor(const SurfaceView& source,
                         const Image& confidence,
                         const SurfaceView& target,
                         const CarryOptions& options);
+
+// Takes `other` where `color` is less sure: per pixel the surer of two attempts at the same source.
+void TakeSurer(const CarriedColor& other, CarriedColor* color);
+// Adds a source of lower rank: its colours count only as far as `color` leaves room, so that two
+// sources never average.
+void FillFrom(const CarriedColor& other, CarriedColor* color);
+// Share of the pixels of confidence above `least`.
+double Coverage(const CarriedColor& color, float least);
 
 }  // namespace color3d

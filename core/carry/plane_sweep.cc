@@ -65,13 +65,13 @@ void WarpThroughPlane(const PosedLuminance& reference,
   const Eigen::Matrix3d rotation =
       (source.cam_from_world.rotation * reference.cam_from_world.rotation.conjugate())
           .toRotationMatrix();
-  const Eigen::Vector3d translation = source.cam_from_world.Apply(reference.cam_from_world.Center());
+  const Eigen::Vector3d translation =
+      source.cam_from_world.Apply(reference.cam_from_world.Center());
   Eigen::Matrix3d k_source, from_pixel;
   k_source << s.fx, 0, s.cx, 0, s.fy, s.cy, 0, 0, 1;
   from_pixel << 1 / r.fx, 0, -r.cx / r.fx, 0, 1 / r.fy, -r.cy / r.fy, 0, 0, 1;
   const Eigen::Matrix3f h =
-      (k_source * (depth * rotation * from_pixel +
-                   translation * Eigen::RowVector3d(0, 0, 1)))
+      (k_source * (depth * rotation * from_pixel + translation * Eigen::RowVector3d(0, 0, 1)))
           .cast<float>();
   const Image& picture = *source.luminance;
   const int width = r.width, height = r.height;
@@ -241,8 +241,8 @@ void PickPlane(const int16_t* sum, int planes, double* plane, double* margin) {
     const double low = sum[best - 1] - sum[best], high = sum[best + 1] - sum[best];
     if (low + high > 0) *plane += 0.5 * (low - high) / (low + high);
   }
-  *margin = second < (1 << 30) ? static_cast<double>(second - sum[best]) / std::max<int>(1, second)
-                               : 1.0;
+  *margin =
+      second < (1 << 30) ? static_cast<double>(second - sum[best]) / std::max<int>(1, second) : 1.0;
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace color3d {
 
 struct PosedLuminance {
-  Camera camera;        // of the picture
+  Camera camera;  // of the picture
   Pose cam_from_world;
   const Image* luminance = nullptr;  // 1 channel, L 0..100
 };

@@ -156,8 +156,7 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
     const TrainingPicture& key = pictures.front();
     if (recipe.neighbours) {
       parts.neighbours = std::make_unique<FeatureNeighbours>(*parts.encoder,
-                                                             key.luminance,
-                                                             key.ab,
+                                                             pictures,
                                                              recipe.neighbour_options,
                                                              Random(options.seed, /*stream=*/3),
                                                              cancel);

@@ -20,7 +20,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kMagic[] = "C3DCOLR1";
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;  // 2: weights of the neighbours
 constexpr char kWhat[] = "the colorizer file";
 // Guided upsampling: windows of 5x5 cells; contrasts of L below about 4 units are no edges.
 constexpr int kGuideRadius = 2;

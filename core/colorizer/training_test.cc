@@ -320,8 +320,7 @@ TEST(AdamTest, ANonFiniteGradientChangesNothing) {
 TEST_F(TrainingTest, NeighboursOfTheKeyViewHaveItsColours) {
   FeatureNeighboursOptions options;
   options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
-  const FeatureNeighbours neighbours(
-      encoder_, pictures_[0].luminance, pictures_[0].ab, options, Random(1), {});
+  const FeatureNeighbours neighbours(encoder_, pictures_, options, Random(1), {});
   const torch::Tensor l = KeyTensor();
   const NeighbourColors found =
       neighbours.Lookup(encoder_.Taps(encoder_.Input(l)), l, pictures_[0].luminance.height);
@@ -336,8 +335,7 @@ TEST_F(TrainingTest, NeighboursAgreeWithTheDefinitionInFloat64) {
   FeatureNeighboursOptions options;
   options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
   options.bank_size = 300;
-  const FeatureNeighbours neighbours(
-      encoder_, pictures_[0].luminance, pictures_[0].ab, options, Random(1), {});
+  const FeatureNeighbours neighbours(encoder_, pictures_, options, Random(1), {});
   const torch::Tensor bank = neighbours.State().at("bank").to(torch::kFloat64);
   const torch::Tensor colors = neighbours.State().at("colors").to(torch::kFloat64);
   const torch::Tensor answer =

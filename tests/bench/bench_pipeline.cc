@@ -20,7 +20,20 @@ struct PipelineArguments {
   ColorizerOptions colorizer;
   ChromaOptions chroma;
   bool paper = false;
+  bool carry = true;
+  std::string geometry_from;
 };
+
+// What an earlier run with the same scene left of a stage, in place of running it.
+bool TakeFrom(const std::string& folder,
+              const std::vector<std::string>& names,
+              StageContext& context) {
+  if (folder.empty()) return false;
+  for (const std::string& name : names) {
+    context.WriteOutput(name, ReadFile(std::filesystem::path(folder) / name));
+  }
+  return true;
+}
 
 void RunPipeline(const PipelineArguments& args) {
   LocalPipeline pipeline(
@@ -31,6 +44,7 @@ void RunPipeline(const PipelineArguments& args) {
     ImportOptions options;
     options.hold_out_every_eighth = true;
     options.threads = args.threads;
+    if (TakeFrom(args.geometry_from, {artifact::kScene, artifact::kImportFacts}, c)) return;
     RunImportScene(options, c);
   });
   pipeline.Run("select_key_view", [&](StageContext& c) {
@@ -45,14 +59,22 @@ void RunPipeline(const PipelineArguments& args) {
     options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
     RunColorizeKeyView(options, c);
   });
+  pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
+    if (TakeFrom(args.geometry_from, {artifact::kGeometry, artifact::kMemoryPlan}, c)) return;
+    RunReconstructGeometry(args.geometry, args.max_side_px, c);
+  });
+  if (args.carry) {
+    pipeline.Run("carry_color", [&](StageContext& c) {
+      CarryColorOptions options;
+      options.max_side_px = args.max_side_px;
+      RunCarryColor(options, c);
+    });
+  }
   ColorizerOptions colorizer = args.colorizer;
   colorizer.threads = args.threads;
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
   pipeline.Run("personalize", [&](StageContext& c) { RunPersonalize(colorizer, c); });
   pipeline.Run("colorize_views", [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
-  pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
-    RunReconstructGeometry(args.geometry, args.max_side_px, c);
-  });
   pipeline.Run("solve_chroma", [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
   pipeline.Run("export", [&](StageContext& c) { RunExport({}, c); });
   pipeline.Run("render", [&](StageContext& c) {
@@ -88,6 +110,10 @@ void AddPipelineCommand(CLI::App& app) {
   command->add_option("--max-gaussians", args->geometry.max_gaussians);
   command->add_option("--colorizer-iterations", args->colorizer.iterations);
   command->add_option("--chroma-iterations", args->chroma.iterations);
+  command->add_option("--geometry-from",
+                      args->geometry_from,
+                      "output of an earlier run on the same scene: its poses and geometry are taken");
+  command->add_flag("--carry,!--no-carry", args->carry, "geometry first");
   command->add_flag("--paper", args->paper, "the paper's colorizer recipe");
   command->callback([args] { RunPipeline(*args); });
 }
