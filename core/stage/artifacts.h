@@ -25,6 +25,10 @@ inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which wo
 inline constexpr char kKeyViewColored[] = "key_view_coloured.png";   // for people
 inline constexpr char kColorizer[] = "colorizer.c3c";
 inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
+// + view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255).
+inline constexpr char kProvenance[] = "provenance/";
+inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
+inline constexpr char kAugmentationSheet[] = "augmentations.jpg";
 inline constexpr char kGeometry[] = "geometry.c3g";
 inline constexpr char kMemoryPlan[] = "memory_plan.json";
 inline constexpr char kModel[] = "model.c3g";
@@ -72,5 +76,9 @@ Scene ReadScene(const StageContext& context);
 
 // Colour map of one view from its artifact, resized to width x height px.
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height);
+
+// How sure that colour is, from its provenance: 1 channel, seen + inferred / 2, 0..1, resized to
+// width x height px. Empty when the view has no provenance.
+Image ReadViewConfidence(const StageContext& context, const View& view, int width, int height);
 
 }  // namespace color3d

@@ -38,6 +38,11 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
       // The key view's colours are the user's own; the others are the colorizer's prediction.
       made->ab = view == key ? Resize(key_color.ab, camera.width, camera.height)
                              : ReadViewAb(context, scene.views[view], camera.width, camera.height);
+      made->confidence =
+          ReadViewConfidence(context, scene.views[view], camera.width, camera.height);
+      if (made->confidence.Empty() && view == key) {
+        made->confidence = Image(camera.width, camera.height, 1, 1.0f);
+      }
       target = std::move(made);
     }
     return target;

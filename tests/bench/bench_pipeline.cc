@@ -20,13 +20,35 @@ struct PipelineArguments {
   ColorizerOptions colorizer;
   ChromaOptions chroma;
   bool paper = false;
+  bool bound = false;
+  bool rescore = false;
+  std::string geometry_file;
 };
+
+// The scene folder has the true colours of all views.
+void Evaluate(const PipelineArguments& args, const Scene& scene, StageContext& context) {
+  EvaluateOptions options;
+  options.bound = args.bound;
+  options.chroma = args.chroma;
+  for (const View& view : scene.views) {
+    auto& truth = view.held_out ? options.truth : options.training_truth;
+    truth.push_back({view.name, context.scene_folder() / view.image_file});
+  }
+  RunEvaluate(options, context);
+}
 
 void RunPipeline(const PipelineArguments& args) {
   LocalPipeline pipeline(
       args.scene_folder, args.out_folder, args.threads, args.seed, [](const std::string& text) {
         std::fprintf(stderr, "%s\n", text.c_str());
       });
+  if (args.rescore) {
+    pipeline.TakeAll();
+    const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
+    pipeline.Run("evaluate", [&](StageContext& c) { Evaluate(args, scene, c); });
+    std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kScores)).c_str());
+    return;
+  }
   pipeline.Run("import_scene", [&](StageContext& c) {
     ImportOptions options;
     options.hold_out_every_eighth = true;
@@ -50,9 +72,13 @@ void RunPipeline(const PipelineArguments& args) {
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
   pipeline.Run("personalize", [&](StageContext& c) { RunPersonalize(colorizer, c); });
   pipeline.Run("colorize_views", [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
-  pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
-    RunReconstructGeometry(args.geometry, args.max_side_px, c);
-  });
+  if (args.geometry_file.empty()) {
+    pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
+      RunReconstructGeometry(args.geometry, args.max_side_px, c);
+    });
+  } else {
+    pipeline.Take(artifact::kGeometry, args.geometry_file);
+  }
   pipeline.Run("solve_chroma", [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
   pipeline.Run("export", [&](StageContext& c) { RunExport({}, c); });
   pipeline.Run("render", [&](StageContext& c) {
@@ -60,13 +86,7 @@ void RunPipeline(const PipelineArguments& args) {
     options.max_side_px = args.max_side_px;
     RunRender(options, c);
   });
-  pipeline.Run("evaluate", [&](StageContext& c) {
-    std::vector<TruthFile> truth;
-    for (int view : scene.HeldOutViews()) {
-      truth.push_back({scene.views[view].name, c.scene_folder() / scene.views[view].image_file});
-    }
-    RunEvaluate(truth, c);
-  });
+  pipeline.Run("evaluate", [&](StageContext& c) { Evaluate(args, scene, c); });
   pipeline.Run("colorize_scene", [&](StageContext& c) { RunReport(pipeline.summaries(), c); });
   std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kMetrics)).c_str());
 }
@@ -89,6 +109,15 @@ void AddPipelineCommand(CLI::App& app) {
   command->add_option("--colorizer-iterations", args->colorizer.iterations);
   command->add_option("--chroma-iterations", args->chroma.iterations);
   command->add_flag("--paper", args->paper, "the paper's colorizer recipe");
+  command
+      ->add_option("--geometry",
+                   args->geometry_file,
+                   "geometry.c3g of an earlier run of the scene at this size, in place of training")
+      ->check(CLI::ExistingFile);
+  command->add_flag(
+      "--rescore", args->rescore, "run evaluation alone, on what an earlier run left in --out");
+  command->add_flag(
+      "--bound", args->bound, "also score the same geometry under the true colours of all views");
   command->callback([args] { RunPipeline(*args); });
 }
 
