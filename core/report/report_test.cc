@@ -134,18 +134,20 @@ TEST(Report, EscapesTextAndPlotsConstantCurves) {
 
 TEST(Report, SectionsShowWhatTheyHave) {
   ReportData data;
-  data.sections.push_back({"Where <colour> comes from",
-                           {"61 % seen & verified."},
-                           {{{"view", "seen"}, {{"a<b.jpg", "0.61"}}}},
-                           {"sheet", "\xff\xd8jpeg"},
-                           {{"a.jpg", {{"provenance", "\x89PNG"}}}},
-                           {{"personalize", 1.0, 1, "heldout_l1", 2.0}}});
+  data.sections.push_back(
+      {"Where <colour> comes from",
+       {"61 % seen & verified."},
+       {{{"view", "seen"}, {{"a<b.jpg", "0.61"}}}},
+       {"sheet", "\xff\xd8jpeg"},
+       {{"a.jpg", {{"provenance", "\x89PNG"}}}},
+       {{"personalize", 1.0, 1, "heldout_l1", 2.0}, {"personalize", 2.0, 2, "heldout_l1", 1.0}}});
   data.sections.push_back({"Empty one"});
   const std::string html = RenderReport(data);
   EXPECT_NE(html.find("<h2>Where &lt;colour&gt; comes from</h2>"), std::string::npos);
   EXPECT_NE(html.find("61 % seen &amp; verified."), std::string::npos);
   EXPECT_NE(html.find("<tr><td>a&lt;b.jpg</td><td class=\"v\">0.61</td></tr>"), std::string::npos);
   EXPECT_NE(html.find("personalize: heldout_l1"), std::string::npos);
+  EXPECT_EQ(PlotsSvg({{"evaluate", 1.0, 0, "delta_e00", 2.0}}), "") << "one point is no curve";
   EXPECT_NE(html.find("data:image/png"), std::string::npos);
   EXPECT_TRUE(html.find("<h2>Empty one</h2></body>") != std::string::npos) << html;
 }
