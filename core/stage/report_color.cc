@@ -14,7 +14,7 @@ using nlohmann::ordered_json;
 
 constexpr int kPictureSidePx = 400;
 constexpr size_t kMostRows = 20;     // of the table
-constexpr size_t kMostPictures = 4;  // views shown with their provenance
+constexpr size_t kMostPictures = 4;  // views shown with their provenance, of all certainties
 
 ordered_json ParseInput(const StageContext& context, const char* name) {
   try {
@@ -134,74 +134,90 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
   return metrics;
 }
 
-ReportSection ColorFacts::SourceSection() const {
-  ReportSection section;
-  section.title = "Where the colour comes from";
+std::string ColorFacts::SourceSummary() const {
   std::string summary;
   if (!views_.empty()) {
     summary = Percent(mean_.seen) + " of all pixels show what a key view shows, " +
               Percent(mean_.inferred) + " resemble something in it, and " + Percent(mean_.guessed) +
-              " are a guess.";
+              " are a guess. ";
   }
-  if (coverage_) {
-    summary += (summary.empty() ? "" : " ") + std::string("The coloured views cover ") +
-               Percent(*coverage_) + " of the scene.";
-  }
-  if (!summary.empty()) section.notes.push_back(summary);
+  if (coverage_) summary += "The coloured views cover " + Percent(*coverage_) + " of the scene. ";
   for (const auto& [name, coverage] : key_views_) {
-    if (coverage >= 0.0) section.notes.push_back(name + " covers " + Percent(coverage) + ".");
+    if (coverage >= 0.0) summary += name + " covers " + Percent(coverage) + ". ";
   }
+  return summary;
+}
+
+std::vector<ColorFacts::ViewFacts> ColorFacts::LeastCertainFirst() const {
+  std::vector<ViewFacts> views = views_;
+  std::stable_sort(views.begin(), views.end(), [](const ViewFacts& x, const ViewFacts& y) {
+    return x.shares.seen + 0.5 * x.shares.inferred < y.shares.seen + 0.5 * y.shares.inferred;
+  });
+  return views;
+}
+
+ReportTable ColorFacts::ShareTable() const {
+  const std::vector<ViewFacts> views = LeastCertainFirst();
+  ReportTable table{{"view, least certain first", "seen", "inferred", "guessed"}, {}};
+  for (size_t i = 0; i < std::min(views.size(), kMostRows); ++i) {
+    const SourceShares& s = views[i].shares;
+    table.rows.push_back({scene_.views[views[i].view].name,
+                          Percent(s.seen),
+                          Percent(s.inferred),
+                          Percent(s.guessed)});
+  }
+  if (views.size() > kMostRows) {
+    table.rows.push_back({"and " + std::to_string(views.size() - kMostRows) + " more"});
+  }
+  return table;
+}
+
+ReportTable ColorFacts::ErrorTable() const {
+  ReportTable table{{"held-out pixels", "share", "colour error, CIEDE2000"}, {}};
+  for (const char* source : {"seen", "inferred", "guessed"}) {
+    const auto share = errors_by_source_.find(std::string("share_") + source);
+    const auto error = errors_by_source_.find(std::string("delta_e00_") + source);
+    if (share == errors_by_source_.end() || error == errors_by_source_.end()) continue;
+    table.rows.push_back({source, Percent(share->second), Text("%.2f", error->second)});
+  }
+  return table;
+}
+
+std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
+  const std::vector<ViewFacts> views = LeastCertainFirst();
+  const size_t wanted = std::min(views.size(), kMostPictures);
+  std::vector<ReportRow> rows;
+  for (size_t k = 0; k < wanted; ++k) {
+    const View& view = scene_.views[views[k * views.size() / wanted].view];
+    ReportRow row{view.name, {}};
+    for (const std::string& name : {ViewArtifact(artifact::kColored2d, view, ".jpg"),
+                                    ViewArtifact(artifact::kRenders, view, ".png")}) {
+      if (!context_.HasInput(name)) continue;
+      row.pictures.push_back(
+          SmallPicture(DecodeImage(context_.ReadInput(name), name), "its colours"));
+      break;
+    }
+    const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
+    row.pictures.push_back(SmallPicture(DecodeImage(context_.ReadInput(name), name),
+                                        "green: seen, blue: inferred, red: guessed"));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+ReportSection ColorFacts::SourceSection() const {
+  ReportSection section;
+  section.title = "Where the colour comes from";
+  const std::string summary = SourceSummary();
+  if (!summary.empty()) section.notes.push_back(summary);
   if (next_) {
     section.notes.push_back("To see more of it in its own colours, colour " + next_->name +
                             " next: that raises the coverage from " + Percent(next_->coverage_now) +
                             " to " + Percent(next_->coverage_with) + ".");
   }
-  if (views_.empty()) return section;
-
-  std::vector<ViewFacts> worst = views_;
-  std::stable_sort(worst.begin(), worst.end(), [](const ViewFacts& x, const ViewFacts& y) {
-    return x.shares.seen + 0.5 * x.shares.inferred < y.shares.seen + 0.5 * y.shares.inferred;
-  });
-  ReportTable table{{"view, least certain first", "seen", "inferred", "guessed"}, {}};
-  for (size_t i = 0; i < std::min(worst.size(), kMostRows); ++i) {
-    const SourceShares& s = worst[i].shares;
-    table.rows.push_back({scene_.views[worst[i].view].name,
-                          Percent(s.seen),
-                          Percent(s.inferred),
-                          Percent(s.guessed)});
-  }
-  if (worst.size() > kMostRows) {
-    table.rows.push_back({"and " + std::to_string(worst.size() - kMostRows) + " more"});
-  }
-  section.tables.push_back(std::move(table));
-  if (!errors_by_source_.empty()) {
-    ReportTable errors{{"held-out pixels", "share", "colour error, CIEDE2000"}, {}};
-    for (const char* source : {"seen", "inferred", "guessed"}) {
-      const auto share = errors_by_source_.find(std::string("share_") + source);
-      const auto error = errors_by_source_.find(std::string("delta_e00_") + source);
-      if (share == errors_by_source_.end() || error == errors_by_source_.end()) continue;
-      errors.rows.push_back({source, Percent(share->second), Text("%.2f", error->second)});
-    }
-    section.tables.push_back(std::move(errors));
-  }
-  // From the least to the most certain.
-  for (size_t k = 0; k < std::min(worst.size(), kMostPictures); ++k) {
-    const size_t i = k * worst.size() / std::min(worst.size(), kMostPictures);
-    const View& view = scene_.views[worst[i].view];
-    const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
-    ReportRow row{view.name, {}};
-    const std::string colored = ViewArtifact(artifact::kColored2d, view, ".jpg");
-    const std::string rendered = ViewArtifact(artifact::kRenders, view, ".png");
-    for (const std::string& picture : {colored, rendered}) {
-      if (!context_.HasInput(picture)) continue;
-      row.pictures.push_back(
-          SmallPicture(DecodeImage(context_.ReadInput(picture), picture), "its colours"));
-      break;
-    }
-    row.pictures.push_back(SmallPicture(DecodeImage(context_.ReadInput(name), name),
-                                        "green: seen, blue: inferred, red: guessed"));
-    section.rows.push_back(std::move(row));
-  }
+  if (!views_.empty()) section.tables.push_back(ShareTable());
+  if (!errors_by_source_.empty()) section.tables.push_back(ErrorTable());
+  section.rows = ProvenanceRows();
   return section;
 }
 

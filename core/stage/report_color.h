@@ -53,6 +53,11 @@ class ColorFacts {
   void ReadProvenance();
   void ReadCarry();
   void ReadScores();
+  std::string SourceSummary() const;
+  std::vector<ViewFacts> LeastCertainFirst() const;
+  ReportTable ShareTable() const;
+  ReportTable ErrorTable() const;
+  std::vector<ReportRow> ProvenanceRows() const;
   ReportSection SourceSection() const;
   ReportSection AgreementSection() const;
   ReportSection PersonalizationSection(std::vector<CurvePoint> curves) const;
