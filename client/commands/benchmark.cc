@@ -118,24 +118,25 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   std::vector<UploadFile> uploads;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);
-    const bool is_key = view.name == selection.key_view;
-    if (original == originals.end() || (!is_key && !view.held_out)) continue;
-    const bool has_color = copies.in_color.contains(view.image_file);
-    if (is_key && options.color.Given()) continue;
-    if (is_key && !has_color) {
-      throw InvalidArgument("the key view " + view.name +
-                            " is monochrome itself; choose one in colour with --key-view");
+    const bool is_key = view.name == selection.key_view && !options.color.Given();
+    const bool is_bound = options.bound && !view.held_out;
+    if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
+    if (!copies.in_color.contains(view.image_file)) {
+      if (view.held_out) continue;  // nothing to score against
+      throw InvalidArgument(is_key ? "the key view " + view.name +
+                                         " is monochrome itself; choose one in colour with "
+                                         "--key-view"
+                                   : view.name +
+                                         " is monochrome itself; --bound needs the true "
+                                         "colours of all views: leave it out");
     }
-    if (!has_color) continue;  // nothing to score against
     uploads.push_back({original->second->file, DigestFile(original->second->file)});
     const v1::Digest digest = ToProto(uploads.back().digest);
-    if (is_key) {
-      *colorize->mutable_key_color()->mutable_image() = digest;
-    } else {
-      v1::TruthImage* truth = colorize->add_truth();
-      truth->set_view(view.name);
-      *truth->mutable_image() = digest;
-    }
+    if (is_key) *colorize->mutable_key_color()->mutable_image() = digest;
+    if (!view.held_out && !is_bound) continue;
+    v1::TruthImage* truth = view.held_out ? colorize->add_truth() : colorize->add_training_truth();
+    truth->set_view(view.name);
+    *truth->mutable_image() = digest;
   }
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);

@@ -37,6 +37,9 @@ void ColorizeOptions::Check() const {
   if (benchmark && photos.empty()) {
     throw InvalidArgument("--benchmark needs the folder of the photos in colour, not --scene");
   }
+  if (bound && !benchmark) {
+    throw InvalidArgument("--bound is a part of the score; it needs --benchmark");
+  }
   color.Check();
   for (const std::string& text : more_keys) ParseMoreKey(text);
   // What is drawn for a view that is known beforehand cannot be scored against that view.
@@ -109,6 +112,10 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
           std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}}));
   app.add_flag(
       "--benchmark", o->benchmark, "Photos in colour: drop their colour and score against it");
+  app.add_flag(
+      "--bound",
+      o->bound,
+      "With --benchmark: also score the same geometry under the true colours of all views");
   app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");

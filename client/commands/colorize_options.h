@@ -24,6 +24,7 @@ struct ColorizeOptions {
   std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";
   bool benchmark = false;
+  bool bound = false;  // of the benchmark: upload all true colours, and score what they would give
   bool detach = false;
   bool hold_out = false;
   uint64_t seed = 0;                 // 0: the server's default

@@ -79,6 +79,36 @@ class Axis {
   bool logarithmic_;
 };
 
+constexpr size_t kMostMarkers = 12;  // lines of more points need no dots
+
+// A mark at each point, so that a line of one point is seen.
+std::string Markers(const PlotSeries& series,
+                    const std::string& color,
+                    const Axis& x_axis,
+                    const Axis& y_axis,
+                    bool log_seconds) {
+  std::string svg;
+  if (series.points.size() > kMostMarkers) return svg;
+  for (const CurvePoint& p : series.points) {
+    if (log_seconds && !(p.seconds > 0.0)) continue;
+    svg += "<circle class=\"" + color + "\" r=\"2\" cx=\"" + Format("%.1f", x_axis.Px(p.seconds)) +
+           "\" cy=\"" + Format("%.1f", y_axis.Px(p.value)) + "\"/>";
+  }
+  return svg;
+}
+
+// The legend goes where the lines do not end: errors fall to the lower right, qualities rise.
+bool LegendAtTop(const Plot& plot, const Axis& y_axis) {
+  double sum = 0.0;
+  int count = 0;
+  for (const PlotSeries& series : plot.series) {
+    if (series.points.empty()) continue;
+    sum += y_axis.Px(series.points.back().value);
+    ++count;
+  }
+  return count > 0 && sum / count > 0.5 * (kTop + kHeight - kBottom);
+}
+
 std::string TextAt(
     double x, double y, const char* anchor, const char* style, const std::string& t) {
   return std::string("<text class=\"") + style + "\" text-anchor=\"" + anchor + "\" x=\"" +
@@ -117,6 +147,7 @@ std::string PlotElements(const Plot& plot) {
   const Axis x_axis(min_x, max_x, kLeft, kWidth - kRight, plot.log_seconds);
   const Axis y_axis(min_y, max_y, kHeight - kBottom, kTop, plot.log_values && min_y > 0.0);
   svg += Grid(x_axis, y_axis);
+  const bool legend_at_top = LegendAtTop(plot, y_axis);
   for (size_t i = 0; i < plot.series.size(); ++i) {
     const std::string color = std::string("c c") + std::to_string(i % kColors);
     svg += "<polyline class=\"" + color + "\" points=\"";
@@ -124,9 +155,10 @@ std::string PlotElements(const Plot& plot) {
       if (!shown(p)) continue;
       svg += Format("%.1f", x_axis.Px(p.seconds)) + "," + Format("%.1f", y_axis.Px(p.value)) + " ";
     }
-    svg += "\"/>";
+    svg += "\"/>" + Markers(plot.series[i], color, x_axis, y_axis, plot.log_seconds);
     if (plot.series.size() == 1) continue;
-    const double y = kHeight - kBottom - 8.0 - 14.0 * static_cast<double>(i);
+    const double row = 14.0 * static_cast<double>(i);
+    const double y = legend_at_top ? kTop + 10.0 + row : kHeight - kBottom - 8.0 - row;
     svg += "<line class=\"" + color + "\" x1=\"" + Format("%.1f", kWidth - kRight - 18) +
            "\" x2=\"" + Format("%.1f", kWidth - kRight) + "\" y1=\"" + Format("%.1f", y - 3.5) +
            "\" y2=\"" + Format("%.1f", y - 3.5) + "\"/>" +
@@ -177,6 +209,7 @@ std::string PlotsSvg(const std::vector<CurvePoint>& points) {
   }
   std::string svg;
   for (const std::string& title : order) {
+    if (groups[title].size() < 2) continue;
     svg += "<svg class=\"plot\" " + ViewBox(kWidth, kHeight) + ">" +
            PlotElements({title, {{"", groups[title]}}, false, title.ends_with("residual")}) +
            "</svg>";

@@ -24,7 +24,8 @@ struct Plot {
 std::string FigureSvg(const std::vector<Plot>& plots);
 
 // For a page that brings the styles: one plot for each (stage, error_name) among `points`, in order
-// of first appearance. Those of residuals have a logarithmic axis.
+// of first appearance; single points are no curve and are left out. Those of residuals have a
+// logarithmic axis.
 std::string PlotsSvg(const std::vector<CurvePoint>& points);
 
 // The five characters that HTML gives a meaning, replaced by entities.

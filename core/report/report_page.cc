@@ -73,6 +73,36 @@ std::string KeyViewHtml(const ReportKeyView& key) {
   return html;
 }
 
+std::string TableHtml(const ReportTable& table) {
+  std::string html = "<table><tr>";
+  for (const std::string& column : table.columns) html += "<th>" + EscapeHtml(column) + "</th>";
+  html += "</tr>";
+  for (const std::vector<std::string>& row : table.rows) {
+    html += "<tr>";
+    for (size_t i = 0; i < row.size(); ++i) {
+      html += std::string(i == 0 ? "<td>" : "<td class=\"v\">") + EscapeHtml(row[i]) + "</td>";
+    }
+    html += "</tr>";
+  }
+  return html + "</table>";
+}
+
+std::string CurvesHtml(const std::vector<CurvePoint>& curves) {
+  return "<div class=\"plots\">" + PlotsSvg(curves) + "</div>";
+}
+
+std::string SectionHtml(const ReportSection& section) {
+  std::string html = "<h2>" + EscapeHtml(section.title) + "</h2>";
+  for (const std::string& note : section.notes) html += "<p>" + EscapeHtml(note) + "</p>";
+  for (const ReportTable& table : section.tables) html += TableHtml(table);
+  if (!section.curves.empty()) html += CurvesHtml(section.curves);
+  if (!section.wide.bytes.empty()) {
+    html += "<div class=\"wide\">" + PictureHtml(section.wide) + "</div>";
+  }
+  for (const ReportRow& row : section.rows) html += RowHtml(row);
+  return html;
+}
+
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   std::string html =
       "<h2>Plan</h2><table><tr><th>step</th><th></th><th>why</th><th>estimate, s</th>"
@@ -100,6 +130,7 @@ std::string RenderReport(const ReportData& data) {
     html += "<p class=\"warn\">" + EscapeHtml(warning) + "</p>";
   }
   if (!data.key_view.pictures.pictures.empty()) html += KeyViewHtml(data.key_view);
+  for (const ReportSection& section : data.sections) html += SectionHtml(section);
   if (!data.views.empty()) html += "<h2>Views</h2>";
   for (const ReportRow& row : data.views) html += RowHtml(row);
   if (!data.metrics.empty()) {
@@ -111,7 +142,7 @@ std::string RenderReport(const ReportData& data) {
     html += "</table>";
   }
   if (!data.curves.empty()) {
-    html += "<h2>Error against time</h2><div class=\"plots\">" + PlotsSvg(data.curves) + "</div>";
+    html += "<h2>Error against time</h2>" + CurvesHtml(data.curves);
   }
   if (!data.plan.empty()) html += PlanHtml(data.plan);
   return html + "</body></html>\n";

@@ -30,10 +30,26 @@ struct ReportKeyView {
   std::vector<std::pair<std::string, std::string>> color_facts;
 };
 
+struct ReportTable {
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> rows;  // the first column is a name, the others numbers
+};
+
+// A chapter of any content; what is empty is left out.
+struct ReportSection {
+  std::string title;
+  std::vector<std::string> notes;  // paragraphs of plain text
+  std::vector<ReportTable> tables;
+  ReportPicture wide;  // over the whole width
+  std::vector<ReportRow> rows;
+  std::vector<CurvePoint> curves;
+};
+
 struct ReportData {
   std::string title;
   std::string summary;  // one paragraph of plain text
   ReportKeyView key_view;
+  std::vector<ReportSection> sections;  // between the key view and the views
   std::vector<ReportRow> views;
   std::vector<std::pair<std::string, double>> metrics;
   std::vector<CurvePoint> curves;

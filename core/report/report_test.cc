@@ -77,6 +77,22 @@ TEST(Plot, FigureDrawsEverySeriesOnItsAxes) {
   EXPECT_EQ(std::count(first.begin(), first.end(), ','), 2);
 }
 
+TEST(Plot, ALineOfOnePointIsSeenAndTheLegendIsWhereNoLineEnds) {
+  Plot falling{"error", {{"x", {{"", 1.0, 0, "", 9.0}, {"", 9.0, 0, "", 1.0}}}, {"y", {}}}};
+  falling.series[1].points = {{"", 5.0, 0, "", 2.0}};
+  const std::string low = FigureSvg({falling});
+  EXPECT_NE(low.find("<circle"), std::string::npos);
+  const auto legend_y = [](const std::string& svg) {
+    const size_t at = svg.rfind("y=\"", svg.find(">x</text>")) + 3;
+    return std::stod(svg.substr(at));
+  };
+  EXPECT_LT(legend_y(low), 60.0);
+  for (PlotSeries& series : falling.series) {
+    for (CurvePoint& p : series.points) p.value = 10.0 - p.value;
+  }
+  EXPECT_GT(legend_y(FigureSvg({falling})), 120.0);
+}
+
 TEST(Plot, ResidualsHaveALogarithmicAxis) {
   const std::vector<CurvePoint> points{{"key", 1.0, 1, "relative_residual", 0.1},
                                        {"key", 2.0, 2, "relative_residual", 0.0001}};
@@ -114,6 +130,26 @@ TEST(Report, EscapesTextAndPlotsConstantCurves) {
   EXPECT_NE(html.find("data:image/jpeg;base64,/9hqcGVn"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
   EXPECT_NE(html.find("polyline"), std::string::npos);
+}
+
+TEST(Report, SectionsShowWhatTheyHave) {
+  ReportData data;
+  data.sections.push_back(
+      {"Where <colour> comes from",
+       {"61 % seen & verified."},
+       {{{"view", "seen"}, {{"a<b.jpg", "0.61"}}}},
+       {"sheet", "\xff\xd8jpeg"},
+       {{"a.jpg", {{"provenance", "\x89PNG"}}}},
+       {{"personalize", 1.0, 1, "heldout_l1", 2.0}, {"personalize", 2.0, 2, "heldout_l1", 1.0}}});
+  data.sections.push_back({"Empty one"});
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("<h2>Where &lt;colour&gt; comes from</h2>"), std::string::npos);
+  EXPECT_NE(html.find("61 % seen &amp; verified."), std::string::npos);
+  EXPECT_NE(html.find("<tr><td>a&lt;b.jpg</td><td class=\"v\">0.61</td></tr>"), std::string::npos);
+  EXPECT_NE(html.find("personalize: heldout_l1"), std::string::npos);
+  EXPECT_EQ(PlotsSvg({{"evaluate", 1.0, 0, "delta_e00", 2.0}}), "") << "one point is no curve";
+  EXPECT_NE(html.find("data:image/png"), std::string::npos);
+  EXPECT_TRUE(html.find("<h2>Empty one</h2></body>") != std::string::npos) << html;
 }
 
 TEST(Report, KeyViewSectionTellsChoiceAndColour) {

@@ -26,14 +26,19 @@ GaussianModel FitChromaOn(const GaussianModel& geometry,
       options.solver == ChromaOptions::Solver::kConjugateGradients && options.iterations > 0;
   ChromaSystem system(parameters.block, parameters.color, options.memory_budget_bytes, pool);
   std::vector<int> colored;  // positions in problem.training
+  bool all_confident = true;
   for (size_t k = 0; k < problem.training.size(); ++k) {
     cancel.ThrowIfCancelled();
     const PosedCamera& view = problem.training[k];
     ChromaPlanes planes;
     if (!LoadChromaPlanes(problem, view, &planes)) continue;
     colored.push_back(static_cast<int>(k));
-    system.AddView(
-        MakeRasterCamera(view.camera, view.cam_from_world), planes.ab, planes.weight, solve);
+    all_confident = all_confident && planes.has_confidence;
+    system.AddView(MakeRasterCamera(view.camera, view.cam_from_world),
+                   planes.ab,
+                   planes.weight,
+                   planes.confidence,
+                   solve);
     progress.OnProgress(static_cast<int64_t>(k), 0, "chroma: reading the coloured views");
   }
   const std::vector<char> seen = SetClosedForm(system, pool, parameters);
@@ -47,7 +52,10 @@ GaussianModel FitChromaOn(const GaussianModel& geometry,
     }
     FillUnseen(seen, pool, parameters);
   }
-  return parameters.ToModel(geometry);
+  GaussianModel model = parameters.ToModel(geometry);
+  model.confidence.clear();  // of an earlier chroma
+  if (all_confident && !colored.empty()) model.confidence = MeanConfidence(system, seen);
+  return model;
 }
 
 }  // namespace color3d

@@ -1,5 +1,6 @@
 #include "core/splat/chroma_start.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/splat/neighbors.h"
@@ -32,6 +33,16 @@ std::vector<char> SetClosedForm(const ChromaSystem& system,
   }
   FillUnseen(seen, pool, parameters);
   return seen;
+}
+
+std::vector<float> MeanConfidence(const ChromaSystem& system, const std::vector<char>& seen) {
+  std::vector<float> mean(system.count(), 0.0f);
+  for (int64_t i = 0; i < system.count(); ++i) {
+    if (seen[i] == 0) continue;
+    const double share = system.confidence_sum()[i] / system.seen_weight()[i];
+    mean[i] = static_cast<float>(std::clamp(share, 0.0, 1.0));
+  }
+  return mean;
 }
 
 void FillUnseen(const std::vector<char>& seen, ThreadPool& pool, ChromaParameters& parameters) {

@@ -17,6 +17,9 @@ std::vector<char> SetClosedForm(const ChromaSystem& system,
                                 ThreadPool& pool,
                                 ChromaParameters& parameters);
 
+// Visibility-weighted mean of the targets' confidence, 0..1; 0 for Gaussians that are not seen.
+std::vector<float> MeanConfidence(const ChromaSystem& system, const std::vector<char>& seen);
+
 // Gaussians that no target pixel sees take the mean of their nearest seen neighbours (degree 0),
 // nearer ones counting more. With no neighbour at all they stay as they are.
 void FillUnseen(const std::vector<char>& seen, ThreadPool& pool, ChromaParameters& parameters);

@@ -12,9 +12,16 @@ namespace {
 
 constexpr int kTileFloats = 2 * kTilePixels;  // of a tile's picture
 
-// Copies a tile's targets and weights; pixels outside, and those of weight 0, get zeros.
-void LoadTile(
-    const PlaneBuffer& ab, const PlaneBuffer& weight, int x0, int y0, float* target, float* mask) {
+// Copies a tile's targets and weights; pixels outside, and those of weight 0, get zeros. `sure`
+// gets weights in its first channel, weights times confidence in its second.
+void LoadTile(const PlaneBuffer& ab,
+              const PlaneBuffer& weight,
+              const PlaneBuffer& confidence,
+              int x0,
+              int y0,
+              float* target,
+              float* mask,
+              float* sure) {
   for (int b = 0; b < kTileBlocks; ++b) {
     for (int lane = 0; lane < kBlockPixels; ++lane) {
       const int x = x0 + PixelX(b, lane), y = y0 + PixelY(b, lane);
@@ -24,6 +31,9 @@ void LoadTile(
       t[0] = w > 0.0f ? ab.Row(0, y)[x] : 0.0f;
       t[kBlockPixels] = w > 0.0f ? ab.Row(1, y)[x] : 0.0f;
       mask[kBlockPixels * b + lane] = w > 0.0f ? w : 0.0f;
+      float* s = sure + 2 * kBlockPixels * b + lane;
+      s[0] = w > 0.0f ? w : 0.0f;
+      s[kBlockPixels] = w > 0.0f ? w * confidence.Row(0, y)[x] : 0.0f;
     }
   }
 }
@@ -74,6 +84,7 @@ ChromaSystem::ChromaSystem(const ParameterBlock& parameters,
       pool_(pool) {
   seen_weight_.assign(count(), 0.0);
   target_sum_.assign(2 * count(), 0.0);
+  confidence_sum_.assign(count(), 0.0);
   pixel_sums_.resize(pool.thread_count());
 }
 
@@ -92,6 +103,7 @@ void ChromaSystem::BinView(const RasterCamera& camera) {
 void ChromaSystem::AddView(const RasterCamera& camera,
                            const PlaneBuffer& ab,
                            const PlaneBuffer& weight,
+                           const PlaneBuffer& confidence,
                            bool keep) {
   auto view = std::make_unique<View>();
   view->camera = camera;
@@ -106,29 +118,31 @@ void ChromaSystem::AddView(const RasterCamera& camera,
   const int threads = pool_.thread_count();
   pool_.ForRanges(threads, [&](int64_t thread, int64_t, int) {
     TileWeights w;
-    alignas(64) float picture[kTileFloats], ones[kTileFloats];
+    alignas(64) float picture[kTileFloats], sure[kTileFloats];
     for (int tile = static_cast<int>(thread); tile < view->tiles; tile += threads) {
       const float* target = view->Target(tile);
       const float* mask = view->Mask(tile);
       LoadTile(ab,
                weight,
+               confidence,
                tile % lists_.tiles_x * kTileSide,
                tile / lists_.tiles_x * kTileSide,
                view->Target(tile),
-               view->Mask(tile));
+               view->Mask(tile),
+               sure);
       BuildTileWeights(splats_, lists_, tile, camera.width, camera.height, w);
       for (int i = 0; i < kTileFloats; ++i) {
-        ones[i] = mask[i / (2 * kBlockPixels) * kBlockPixels + i % kBlockPixels];
-        picture[i] = ones[i] * target[i];
+        picture[i] = mask[i / (2 * kBlockPixels) * kBlockPixels + i % kBlockPixels] * target[i];
       }
       TileAdjoint(w, picture, sums_[thread].data());
-      TileAdjoint(w, ones, right_[thread].data());
+      TileAdjoint(w, sure, right_[thread].data());
       if (view->kept) view->weights[tile] = w;
     }
   });
   for (int64_t i = 0; i < count(); ++i) {
     for (int t = 0; t < threads; ++t) {
       seen_weight_[i] += right_[t][2 * i];
+      confidence_sum_[i] += right_[t][2 * i + 1];
       target_sum_[2 * i] += sums_[t][2 * i];
       target_sum_[2 * i + 1] += sums_[t][2 * i + 1];
     }

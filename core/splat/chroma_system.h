@@ -42,11 +42,12 @@ class ChromaSystem {
                ThreadPool& pool);
   ~ChromaSystem();
 
-  // `ab`: 2 channels, target chroma from neutral; `weight`: 1 channel, 0..1. With `keep` false only
-  // the sums below are taken.
+  // `ab`: 2 channels, target chroma from neutral; `weight`, `confidence`: 1 channel, 0..1. With
+  // `keep` false only the sums below are taken.
   void AddView(const RasterCamera& camera,
                const PlaneBuffer& ab,
                const PlaneBuffer& weight,
+               const PlaneBuffer& confidence,
                bool keep);
 
   int64_t count() const { return parameters_.count(); }
@@ -55,6 +56,8 @@ class ChromaSystem {
   // Over all views and pixels: sum of weight w, [i], and of weight w t, [2 i + c].
   const std::vector<double>& seen_weight() const { return seen_weight_; }
   const std::vector<double>& target_sum() const { return target_sum_; }
+  // The same of weight w confidence, [i].
+  const std::vector<double>& confidence_sum() const { return confidence_sum_; }
 
   // One ordered-subsets sweep: D and a step from each view alone (Andersen & Kak 1984; Hudson &
   // Larkin 1994). x += relaxation * B^-1 W_v^T D (t - W_v x), with B the larger of the row sums of
@@ -114,7 +117,7 @@ class ChromaSystem {
   int64_t kept_bytes_ = 0;
   ThreadPool& pool_;
   std::vector<std::unique_ptr<View>> views_;
-  std::vector<double> seen_weight_, target_sum_;
+  std::vector<double> seen_weight_, target_sum_, confidence_sum_;
   // Work space.
   SplatBuffer splats_;
   TileBinner binner_;

@@ -22,11 +22,15 @@ void CheckSizes(const ChromaTarget& target, const PosedCamera& view) {
     return image.channels == channels && image.width == view.camera.width &&
            image.height == view.camera.height;
   };
-  if (fits(target.ab, 2) && (target.weight.Empty() || fits(target.weight, 1))) return;
+  if (fits(target.ab, 2) && (target.weight.Empty() || fits(target.weight, 1)) &&
+      (target.confidence.Empty() || fits(target.confidence, 1))) {
+    return;
+  }
   throw InvalidArgument(
       "chroma target of view " + std::to_string(view.view) + " is " + SizeOf(target.ab) +
-      ", its weight " + SizeOf(target.weight) + "; " + std::to_string(view.camera.width) + "x" +
-      std::to_string(view.camera.height) + "x2 and the same size with one channel are needed");
+      ", its weight " + SizeOf(target.weight) + ", its confidence " + SizeOf(target.confidence) +
+      "; " + std::to_string(view.camera.width) + "x" + std::to_string(view.camera.height) +
+      "x2 and the same size with one channel are needed");
 }
 
 // Comparisons that NaN fails.
@@ -52,11 +56,17 @@ bool LoadChromaPlanes(const ChromaProblem& problem, const PosedCamera& view, Chr
   CheckSizes(*given, view);
   CheckValues(given->ab, -kMaxChroma, kMaxChroma, "chroma", view.view);
   CheckValues(given->weight, -kWeightSlack, 1.0f + kWeightSlack, "weight", view.view);
+  CheckValues(given->confidence, 0.0f, 1.0f, "confidence", view.view);
   planes->ab = PlanesFromImage(given->ab, 0.0f, 1.0f / 255.0f);
   planes->weight =
       given->weight.Empty()
           ? PlanesFromImage(Image(given->ab.width, given->ab.height, 1, 1.0f), 0.0f, 1.0f)
           : PlanesFromImage(given->weight, 0.0f, 1.0f);
+  planes->has_confidence = !given->confidence.Empty();
+  planes->confidence = PlanesFromImage(
+      planes->has_confidence ? given->confidence : Image(given->ab.width, given->ab.height, 1),
+      0.0f,
+      1.0f);
   return true;
 }
 

@@ -10,8 +10,10 @@
 namespace color3d {
 
 struct ChromaPlanes {
-  PlaneBuffer ab;      // 2 channels: chroma from neutral, range 1 (Lab units / 255)
-  PlaneBuffer weight;  // 1 channel, 0..1
+  PlaneBuffer ab;          // 2 channels: chroma from neutral, range 1 (Lab units / 255)
+  PlaneBuffer weight;      // 1 channel, 0..1
+  PlaneBuffer confidence;  // 1 channel, 0..1; zeros when unknown
+  bool has_confidence = false;
 };
 
 // Reads the target of one view. False when it has none. Throws Error{kInvalidArgument} for another

@@ -30,7 +30,10 @@ std::string Numbers(const Eigen::Vector3d& v) {
   return text;
 }
 
-std::string PlyHeader(size_t count, int coefficients, const ExportFrame& frame) {
+std::string PlyHeader(size_t count,
+                      int coefficients,
+                      bool with_confidence,
+                      const ExportFrame& frame) {
   std::string h = "ply\nformat binary_little_endian 1.0\n";
   if (!frame.left_out.isZero(0.0)) h += "comment offset" + Numbers(frame.left_out) + "\n";
   h += "element vertex " + std::to_string(count) + "\n";
@@ -41,6 +44,7 @@ std::string PlyHeader(size_t count, int coefficients, const ExportFrame& frame) 
   property("opacity");
   for (int i = 0; i < 3; ++i) property("scale_" + std::to_string(i));
   for (int i = 0; i < 4; ++i) property("rot_" + std::to_string(i));
+  if (with_confidence) property("confidence");
   return h + "end_header\n";
 }
 
@@ -101,10 +105,12 @@ ExportFrame ExportFrameOf(const Scene& scene) {
 std::string EncodeGaussianPly(const GaussianModel& model,
                               const RgbHarmonics& rgb,
                               const ExportFrame& frame,
-                              ThreadPool& pool) {
+                              ThreadPool& pool,
+                              bool with_confidence) {
   CheckColors(model, rgb);
   const int coefficients = ShCoefficients(rgb.degree);
-  const size_t row_floats = 17 + 3 * static_cast<size_t>(coefficients - 1);
+  const size_t row_floats =
+      17 + 3 * static_cast<size_t>(coefficients - 1) + (with_confidence ? 1 : 0);
   const float log_scale_shift = static_cast<float>(std::log(frame.scale));
   std::vector<float> rows(model.size() * row_floats, 0.0f);  // normals stay zero
   pool.ForRanges(static_cast<int64_t>(model.size()), [&](int64_t begin, int64_t end, int) {
@@ -120,9 +126,10 @@ std::string EncodeGaussianPly(const GaussianModel& model,
       *out++ = model.opacity_logit[i];
       for (int k = 0; k < 3; ++k) *out++ = model.log_scale[3 * i + k] + log_scale_shift;
       FileRotation(model, i, out);
+      if (with_confidence && !model.confidence.empty()) out[4] = model.confidence[i];
     }
   });
-  std::string bytes = PlyHeader(model.size(), coefficients, frame);
+  std::string bytes = PlyHeader(model.size(), coefficients, with_confidence, frame);
   bytes.append(reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(float));
   return bytes;
 }

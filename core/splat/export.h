@@ -22,12 +22,15 @@ struct ExportFrame {
 ExportFrame ExportFrameOf(const Scene& scene);
 
 // Binary little-endian PLY bytes with x y z nx ny nz f_dc_* f_rest_* opacity scale_* rot_*. An
-// offset that was left out stands in a header comment "offset x y z". Throws
-// Error{kInvalidArgument} when `rgb` is of another number of Gaussians.
+// offset that was left out stands in a header comment "offset x y z". `with_confidence` adds a last
+// property "confidence" (the model's; 0 where it has none), which viewers that know only the
+// standard list may refuse. Throws Error{kInvalidArgument} when `rgb` is of another number of
+// Gaussians.
 std::string EncodeGaussianPly(const GaussianModel& model,
                               const RgbHarmonics& rgb,
                               const ExportFrame& frame,
-                              ThreadPool& pool);
+                              ThreadPool& pool,
+                              bool with_confidence = false);
 
 // The .splat layout (antimatter15/splat): per Gaussian 3 float32 position, 3 float32 scale, 4 uint8
 // RGBA, 4 uint8 rotation (w x y z, 128 + 128 q), largest volume times opacity first, so that a

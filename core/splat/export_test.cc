@@ -172,6 +172,31 @@ TEST(ExportTest, PlyHasTheStandardLayout) {
       EncodeGaussianPly(m, DegreeZero(FitRgbHarmonics(DullModel(4, 1, 0), pool)), {}, pool), Error);
 }
 
+TEST(ExportTest, ConfidenceIsTheLastPropertyWhenAskedFor) {
+  ThreadPool pool(2);
+  GaussianModel m = DullModel(4, 1, 0);
+  const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
+  m.confidence = {0.125f, 0.25f, 1.0f, 0.0f};
+  const std::string plain = EncodeGaussianPly(m, rgb, {}, pool);
+  EXPECT_THAT(plain, testing::Not(testing::HasSubstr("confidence")));
+  const std::string bytes = EncodeGaussianPly(m, rgb, {}, pool, /*with_confidence=*/true);
+  EXPECT_THAT(bytes, testing::HasSubstr("property float rot_3\nproperty float confidence\nend_"));
+  const size_t row = 17 + 9 + 1;
+  const size_t body = bytes.find("end_header\n") + 11;
+  ASSERT_EQ(bytes.size(), body + 4 * row * sizeof(float));
+  const size_t plain_body = plain.find("end_header\n") + 11;
+  for (size_t i = 0; i < 4; ++i) {
+    const char* begin = bytes.data() + body + i * row * sizeof(float);
+    float confidence = 0.0f;
+    std::memcpy(&confidence, begin + (row - 1) * sizeof(float), sizeof(float));
+    EXPECT_EQ(confidence, m.confidence[i]);
+    EXPECT_EQ(std::memcmp(begin,
+                          plain.data() + plain_body + i * (row - 1) * sizeof(float),
+                          (row - 1) * sizeof(float)),
+              0);
+  }
+}
+
 struct SplatRow {
   float position[3];
   float scale[3];

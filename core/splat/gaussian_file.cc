@@ -14,8 +14,9 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "files are little-endian");
 
 constexpr char kMagic[8] = {'C', '3', 'D', 'G', 'A', 'U', 'S', 'S'};
-constexpr uint32_t kVersion = 1;
-constexpr size_t kDigestBytes = 64;  // hexadecimal SHA-256 of all that stands before it
+constexpr uint32_t kPlainVersion = 1;
+constexpr uint32_t kConfidenceVersion = 2;  // confidence is the last buffer
+constexpr size_t kDigestBytes = 64;         // hexadecimal SHA-256 of all that stands before it
 
 struct Header {
   char magic[8];
@@ -28,7 +29,7 @@ struct Header {
 static_assert(sizeof(Header) == 32);
 
 template <class Model, class Visit>
-void ForEachBuffer(Model& m, Visit&& visit) {
+void ForEachBuffer(Model& m, bool with_confidence, Visit&& visit) {
   const int chroma = m.channels == 3 ? ShCoefficients(m.chroma_sh_degree) : 0;
   visit("position", m.position, 3);
   visit("log_scale", m.log_scale, 3);
@@ -37,6 +38,7 @@ void ForEachBuffer(Model& m, Visit&& visit) {
   visit("sh_l", m.sh_l, ShCoefficients(m.sh_degree));
   visit("sh_a", m.sh_a, chroma);
   visit("sh_b", m.sh_b, chroma);
+  if (with_confidence) visit("confidence", m.confidence, 1);
 }
 
 Error Refuse(const std::string& why) {
@@ -62,9 +64,10 @@ Header ReadHeader(std::string_view bytes) {
   if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) {
     throw Refuse("it does not begin with C3DGAUSS");
   }
-  if (h.version != kVersion) {
-    throw Refuse("version " + std::to_string(h.version) + "; this program reads version " +
-                 std::to_string(kVersion) + ", update it");
+  if (h.version != kPlainVersion && h.version != kConfidenceVersion) {
+    throw Refuse("version " + std::to_string(h.version) + "; this program reads versions " +
+                 std::to_string(kPlainVersion) + " and " + std::to_string(kConfidenceVersion) +
+                 ", update it");
   }
   if ((h.channels != 1 && h.channels != 3) || h.sh_degree > 3 || h.chroma_sh_degree > 3) {
     throw Refuse("channels " + std::to_string(h.channels) + " or a degree is out of range");
@@ -78,20 +81,22 @@ std::string SerializeGaussians(const GaussianModel& model) {
   CheckModel(model);
   Header h{};
   std::memcpy(h.magic, kMagic, sizeof(kMagic));
-  h.version = kVersion;
+  const bool with_confidence = !model.confidence.empty();
+  h.version = with_confidence ? kConfidenceVersion : kPlainVersion;
   h.channels = static_cast<uint32_t>(model.channels);
   h.sh_degree = static_cast<uint32_t>(model.sh_degree);
   h.chroma_sh_degree = static_cast<uint32_t>(model.chroma_sh_degree);
   h.count = model.size();
   std::string bytes(reinterpret_cast<const char*>(&h), sizeof(h));
-  ForEachBuffer(model, [&](const char* name, const std::vector<float>& buffer, int width) {
+  const auto append = [&](const char* name, const std::vector<float>& buffer, int width) {
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) {
       throw Error(ErrorCode::kInternal,
                   "a Gaussian model was to be saved whose " + place + " is not finite");
     }
     bytes.append(reinterpret_cast<const char*>(buffer.data()), buffer.size() * sizeof(float));
-  });
+  };
+  ForEachBuffer(model, with_confidence, append);
   return bytes + Sha256Hex(bytes);
 }
 
@@ -102,7 +107,10 @@ GaussianModel ParseGaussians(std::string_view bytes) {
   model.sh_degree = static_cast<int>(h.sh_degree);
   model.chroma_sh_degree = static_cast<int>(h.chroma_sh_degree);
   size_t floats_each = 0;
-  ForEachBuffer(model, [&](const char*, std::vector<float>&, int width) { floats_each += width; });
+  const bool with_confidence = h.version == kConfidenceVersion;
+  ForEachBuffer(model, with_confidence, [&](const char*, std::vector<float>&, int width) {
+    floats_each += width;
+  });
   const size_t body = bytes.size() - sizeof(Header) - kDigestBytes;
   const size_t bytes_each = floats_each * sizeof(float);
   if (body % bytes_each != 0 || body / bytes_each != h.count) {
@@ -112,13 +120,14 @@ GaussianModel ParseGaussians(std::string_view bytes) {
   const std::string_view content = bytes.substr(0, bytes.size() - kDigestBytes);
   if (Sha256Hex(content) != bytes.substr(content.size())) throw Refuse("the checksum is wrong");
   const char* next = bytes.data() + sizeof(Header);
-  ForEachBuffer(model, [&](const char* name, std::vector<float>& buffer, int width) {
+  ForEachBuffer(model, with_confidence, [&](const char* name, auto& buffer, int width) {
     buffer.resize(static_cast<size_t>(h.count) * width);
     std::memcpy(buffer.data(), next, buffer.size() * sizeof(float));
     next += buffer.size() * sizeof(float);
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) throw Refuse("the " + place + " is not finite");
   });
+  CheckModel(model);
   return model;
 }
 

@@ -25,6 +25,9 @@ struct GaussianModel {
   std::vector<float> sh_l;
   std::vector<float> sh_a;  // empty when channels == 1
   std::vector<float> sh_b;
+  // 1: how sure the colour is, 0..1 (1: seen in a key view, 0.5: inferred, 0: guessed). Empty when
+  // nobody knows; no kernel looks at it.
+  std::vector<float> confidence;
 
   size_t size() const { return opacity_logit.size(); }
 };
@@ -33,7 +36,8 @@ struct GaussianModel {
 // 0.1, luminance 0.5. Throws Error{kInvalidArgument} when the scene has no points.
 GaussianModel InitialGaussians(const Scene& scene);
 
-// Native file, with a versioned header and a checksum: all of the model, bit for bit.
+// Native file, with a versioned header and a checksum: all of the model, bit for bit. Version 1
+// without confidence, version 2 with it.
 std::string SerializeGaussians(const GaussianModel& model);
 // Throws Error{kInvalidArgument} on anything else (wrong magic, newer version, truncated, NaN).
 GaussianModel ParseGaussians(std::string_view bytes);

@@ -54,6 +54,12 @@ void CheckModel(const GaussianModel& model) {
   const int chroma = model.channels == 3 ? ShCoefficients(model.chroma_sh_degree) : 0;
   CheckSize(model.sh_a, n, chroma, "sh_a");
   CheckSize(model.sh_b, n, chroma, "sh_b");
+  if (!model.confidence.empty()) CheckSize(model.confidence, n, 1, "confidence");
+  for (size_t i = 0; i < model.confidence.size(); ++i) {
+    if (model.confidence[i] >= 0.0f && model.confidence[i] <= 1.0f) continue;
+    throw InvalidArgument("Gaussian model: confidence of Gaussian " + std::to_string(i) + " is " +
+                          std::to_string(model.confidence[i]) + "; it must be 0 to 1");
+  }
 }
 
 ParameterBlock ParametersFromModel(const GaussianModel& model) {

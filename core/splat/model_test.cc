@@ -30,6 +30,24 @@ TEST(GaussianFileTest, RoundTripsBitForBit) {
   }
 }
 
+TEST(GaussianFileTest, ConfidenceIsKeptAndFilesWithoutItStayAsTheyWere) {
+  GaussianModel m = RandomModel({5, 3, 1, 0});
+  const std::string plain = SerializeGaussians(m);
+  EXPECT_EQ(plain[8], 1) << "version 1, which older programs read";
+  EXPECT_TRUE(ParseGaussians(plain).confidence.empty());
+  m.confidence = {0.0f, 0.25f, 0.5f, 0.75f, 1.0f};
+  const std::string bytes = SerializeGaussians(m);
+  EXPECT_EQ(bytes[8], 2);
+  EXPECT_EQ(bytes.size(), plain.size() + 5 * sizeof(float));
+  const GaussianModel back = ParseGaussians(bytes);
+  EXPECT_EQ(back.confidence, m.confidence);
+  EXPECT_EQ(back.sh_b, m.sh_b);
+  m.confidence[3] = 1.5f;
+  EXPECT_THROW(SerializeGaussians(m), Error);
+  m.confidence = {1.0f};
+  EXPECT_THROW(SerializeGaussians(m), Error);
+}
+
 void ExpectRefused(const std::string& bytes, const std::string& why) {
   try {
     ParseGaussians(bytes);
@@ -58,6 +76,9 @@ TEST(GaussianFileTest, HostileBytesAreRefused) {
   bytes = good;
   bytes[100] ^= 1;
   ExpectRefused(bytes, "checksum");
+  bytes = content;
+  bytes[8] = 2;  // without the confidence that version 2 has
+  ExpectRefused(Signed(bytes), "claims");
   bytes = content;
   const uint64_t huge = ~uint64_t{0} / 8;
   std::memcpy(bytes.data() + 24, &huge, 8);

@@ -75,18 +75,22 @@ GaussianModel TrainGeometry(const Scene& scene,
                             ProgressObserver& progress,
                             const CancellationToken& cancel);
 
-// Target chroma of one training view at the working size: 2 channels (Lab units) and an optional
-// 1-channel weight 0..1 (empty: all 1).
+// Target chroma of one training view at the working size: 2 channels (Lab units), an optional
+// 1-channel weight 0..1 (empty: all 1), and how sure the colour is, 1 channel 0..1 (empty:
+// unknown).
 struct ChromaTarget {
   Image ab;
   Image weight;
+  Image confidence;
 };
 using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
 
 // Expands a 1-channel model to L', a', b' and fits chroma with geometry fixed: closed form first
 // (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by
 // ordered-subsets sweeps and reweighted conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM).
-// Gaussians that no training view sees get their nearest seen neighbours' chroma. Curves:
+// Gaussians that no training view sees get their nearest seen neighbours' chroma. When all targets
+// say their confidence, the model's is its mean over the pixels that show the Gaussian, weighted as
+// in the closed form, and 0 for one that no view sees. Curves:
 // "train_l1_ab" (Lab units) and, of conjugate gradients, "chroma_residual" (relative). Throws
 // Error{kInvalidArgument} for targets of another size than the view's camera or with values that
 // are not finite, Error{kCancelled}.

@@ -365,6 +365,49 @@ TEST(FitChromaTest, PixelsOfNoWeightDoNotCount) {
   EXPECT_LT(AbError(model, s, 2, pool), 8.0);
 }
 
+TEST(FitChromaTest, ConfidenceIsTheMeanOverThePixelsThatShowTheGaussian) {
+  const ProceduralScene s = MakeRoomCorner(4, 64, 48, 1500);
+  ThreadPool pool(2);
+  NoCheckpoints none;
+  NullObserver observer;
+  ChromaOptions options;
+  options.iterations = 5;
+  ChromaProblem problem = ChromaProblemOf(s);
+  GaussianModel geometry = GreyRoom(s);
+  geometry.position.insert(geometry.position.end(), {0.0f, 0.0f, -40.0f});  // behind all cameras
+  geometry.log_scale.insert(geometry.log_scale.end(), {-3.0f, -3.0f, -3.0f});
+  geometry.rotation.insert(geometry.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
+  geometry.opacity_logit.push_back(3.0f);
+  geometry.sh_l.push_back(0.0f);
+  double guessed_weight = 1.0;
+  bool last_knows = true;
+  problem.targets = [&](int view) {
+    auto target = std::make_shared<ChromaTarget>();
+    target->ab = s.Ab(view);
+    target->confidence = Image(64, 48, 1, view % 2 == 0 ? 1.0f : 0.0f);
+    if (view % 2 == 1) target->weight = Image(64, 48, 1, static_cast<float>(guessed_weight));
+    if (view == 3 && !last_knows) target->confidence = Image();
+    return target;
+  };
+  const auto fit = [&] {
+    return FitChromaOn(geometry, problem, options, pool, none, observer, CancellationToken());
+  };
+  const std::vector<float> even = fit().confidence;
+  ASSERT_EQ(even.size(), geometry.size());
+  double sum = 0.0;
+  for (const float c : even) sum += c;
+  EXPECT_NEAR(sum / even.size(), 0.5, 0.1);  // half of the views are sure
+  EXPECT_EQ(even.back(), 0.0f) << "nobody saw it";
+  // What counts less for the colour counts less for its confidence.
+  guessed_weight = 0.0;
+  const std::vector<float> sure = fit().confidence;
+  double ones = 0.0;
+  for (const float c : sure) ones += c > 0.999f;
+  EXPECT_GT(ones / sure.size(), 0.8);
+  last_knows = false;
+  EXPECT_TRUE(fit().confidence.empty());
+}
+
 TEST(FitChromaTest, ATargetOfAnotherSizeIsRefused) {
   const ProceduralScene s = MakeRoomCorner(2, 64, 48, 100);
   ThreadPool pool(1);

@@ -1,5 +1,6 @@
 #include "core/stage/artifacts.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -111,6 +112,18 @@ Image ReadViewAb(const StageContext& context, const View& view, int width, int h
   AbMap map = DecodeAbPng(context.ReadInput(name), name);
   if (map.ab.width == width && map.ab.height == height) return std::move(map.ab);
   return Resize(map.ab, width, height);
+}
+
+Image ReadViewConfidence(const StageContext& context, const View& view, int width, int height) {
+  const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
+  if (!context.HasInput(name)) return {};
+  const Image shares = DecodeImage(context.ReadInput(name), name);
+  if (shares.channels != 3) throw InvalidArgument(name + " is grey; it must be RGB");
+  Image confidence(shares.width, shares.height, 1);
+  for (size_t i = 0; i < confidence.data.size(); ++i) {
+    confidence.data[i] = std::min(1.0f, shares.Plane(1)[i] + 0.5f * shares.Plane(2)[i]);
+  }
+  return Resize(confidence, width, height);
 }
 
 }  // namespace color3d

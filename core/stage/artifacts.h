@@ -29,6 +29,10 @@ inline constexpr char kCarried[] = "carried/";      // + view's stem + ".png": a
 inline constexpr char kCarryFacts[] = "carry.json";  // coverage of each view
 inline constexpr char kProvenance[] = "provenance/";  // + view's stem + ".png", see fusion.h
 inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
+// + view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255).
+inline constexpr char kProvenance[] = "provenance/";
+inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
+inline constexpr char kAugmentationSheet[] = "augmentations.jpg";
 inline constexpr char kGeometry[] = "geometry.c3g";
 inline constexpr char kMemoryPlan[] = "memory_plan.json";
 inline constexpr char kModel[] = "model.c3g";
@@ -79,5 +83,9 @@ CarriedColor ReadCarried(const StageContext& context, const View& view, int widt
 
 // Colour map of one view from its artifact, resized to width x height px.
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height);
+
+// How sure that colour is, from its provenance: 1 channel, seen + inferred / 2, 0..1, resized to
+// width x height px. Empty when the view has no provenance.
+Image ReadViewConfidence(const StageContext& context, const View& view, int width, int height);
 
 }  // namespace color3d

@@ -1,98 +1,173 @@
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 
-#include "core/color/difference.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/image/codec.h"
-#include "core/metrics/quality.h"
 #include "core/scene/view_images.h"
 #include "core/splat/render.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/chroma_bound.h"
+#include "core/stage/consistency_scores.h"
 #include "core/stage/stages.h"
+#include "core/stage/view_scores.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kColorSidePx = 400;  // colour differences are measured at this size
+using nlohmann::ordered_json;
+using TruthFiles = std::map<int, std::filesystem::path>;  // by view
 
-Image Plane(const Image& image, int first, int count) {
-  Image planes(image.width, image.height, count);
-  std::copy_n(image.Plane(first), planes.data.size(), planes.data.begin());
-  return planes;
+// Longer side at which the view was coloured.
+int ColoredSide(const StageContext& context, const View& view) {
+  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  const ImageInfo info = ProbeImage(context.ReadInput(name), name);
+  return std::max(info.width, info.height);
 }
 
-// True L with other chroma: a colour error that a luminance error cannot hide.
-Image UnderTrueL(const Image& true_lab, const Image& ab) {
-  return JoinLab(Plane(true_lab, 0, 1), ab);
+TruthFiles FilesByView(const std::vector<TruthFile>& truth, bool held_out, const Scene& scene) {
+  TruthFiles files;
+  for (const TruthFile& file : truth) {
+    const int index = scene.FindView(file.view);
+    if (scene.views[index].held_out != held_out) {
+      throw InvalidArgument(
+          "truth was given for " + scene.views[index].name + ", which is a " +
+          (held_out ? "training view; only held-out views are scored"
+                    : "held-out view; only training views bound what a reconstruction can reach"));
+    }
+    files[index] = file.file;
+  }
+  return files;
 }
 
-using Scores = std::map<std::string, double>;
+// Scores of all held-out views that have a truth, as they come.
+class HeldOutScores {
+ public:
+  HeldOutScores(const Scene& scene,
+                const GaussianModel& model,
+                const std::optional<GaussianModel>& bound,
+                ThreadPool& pool,
+                StageContext& context)
+      : scene_(scene), model_(model), bound_(bound), pool_(pool), context_(context) {}
 
-Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image& view_ab) {
-  Scores v;
-  const Image true_lab = LabFromSrgb(true_srgb);
-  const Image rendered_srgb = SrgbFromLab(rendered_lab);
-  v["psnr_rgb"] = Psnr(rendered_srgb, true_srgb, 1.0);
-  v["ssim_rgb"] = Ssim(rendered_srgb, true_srgb, 1.0);
-  v["psnr_l"] = Psnr(Plane(rendered_lab, 0, 1), Plane(true_lab, 0, 1), 100.0);
-  v["ab_rmse"] = AbRmse(rendered_lab, true_lab);
-  v["colourfulness"] = Colourfulness(rendered_srgb);
-  v["colourfulness_truth"] = Colourfulness(true_srgb);
+  void Add(int index, const std::filesystem::path& truth) {
+    const View& view = scene_.views[index];
+    const std::string ab_name = ViewArtifact(artifact::kViewsAb, view, ".png");
+    const Image ab = DecodeAbPng(context_.ReadInput(ab_name), ab_name).ab;
+    const ViewImages images(scene_, context_.scene_folder(), std::max(ab.width, ab.height), 0);
+    const Image captured = ReadImage(truth);
+    if (captured.channels != 3) throw InvalidArgument("the truth of " + view.name + " is grey");
+    const Image true_srgb = images.Undistort(index, captured);
+    const Camera camera = images.WorkingCamera(index);
+    Scores scores =
+        ScoreView(true_srgb, RenderView(model_, camera, view.cam_from_world, pool_).lab, ab);
+    if (bound_) {
+      scores["delta_e00_chroma_bound"] =
+          ChromaError(true_srgb, RenderView(*bound_, camera, view.cam_from_world, pool_).lab);
+    }
+    const std::string provenance = ViewArtifact(artifact::kProvenance, view, ".png");
+    if (context_.HasInput(provenance)) {
+      sources_.Add(true_srgb, ab, DecodeImage(context_.ReadInput(provenance), provenance));
+    }
+    ordered_json entry{{"view", view.name}};
+    for (const auto& [name, value] : scores) {
+      entry[name] = value;
+      sum_[name] += value;
+    }
+    views_.push_back(std::move(entry));
+    const Image colored = SrgbFromLab(JoinLab(LuminanceOfLab(LabFromSrgb(true_srgb)),
+                                              Resize(ab, true_srgb.width, true_srgb.height)));
+    context_.WriteOutput(ViewArtifact(artifact::kTruths, view, ".jpg"), EncodeJpeg(true_srgb));
+    context_.WriteOutput(ViewArtifact(artifact::kColored2d, view, ".jpg"), EncodeJpeg(colored));
+  }
 
-  const Image truth = FitWithin(true_lab, kColorSidePx);
-  const Image rendered = FitWithin(rendered_lab, kColorSidePx);
-  const Image direct = FitWithin(view_ab, kColorSidePx);
-  v["delta_e00"] = MeanDeltaE00(rendered, truth);
-  v["delta_e00_chroma"] = MeanDeltaE00(UnderTrueL(truth, Plane(rendered, 1, 2)), truth);
-  v["delta_e00_chroma_2d"] = MeanDeltaE00(UnderTrueL(truth, direct), truth);
-  v["delta_e00_grey"] = MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
-  return v;
+  // Empty when nothing was added.
+  Scores Mean() const {
+    Scores mean;
+    for (const auto& [name, value] : sum_) mean[name] = value / static_cast<double>(views_.size());
+    const double truth = mean.contains("colourfulness_truth") ? mean["colourfulness_truth"] : 0.0;
+    if (truth > 0.0) {
+      mean["colourfulness_ratio"] = mean["colourfulness"] / truth;
+      mean["colourfulness_ratio_2d"] = mean["colourfulness_2d"] / truth;
+    }
+    return mean;
+  }
+  const ordered_json& views() const { return views_; }
+  const SourceErrors& sources() const { return sources_; }
+
+ private:
+  const Scene& scene_;
+  const GaussianModel& model_;
+  const std::optional<GaussianModel>& bound_;
+  ThreadPool& pool_;
+  StageContext& context_;
+  ordered_json views_ = ordered_json::array();
+  Scores sum_;
+  SourceErrors sources_;
+};
+
+ordered_json JsonOf(const Consistency& c) {
+  return {{"pairs", c.pairs},
+          {"matches", c.matches},
+          {"me", c.me},
+          {"me_de00", c.me_de00},
+          {"tc_short", c.tc_short},
+          {"tc_long", c.tc_long},
+          {"tc", c.tc}};
+}
+
+ordered_json JsonOf(const ConsistencyScores& scores) {
+  ordered_json json = ordered_json::object();
+  if (scores.rendered.pairs > 0) {
+    json["rendered"] = JsonOf(scores.rendered);
+    json["coloured_views"] = JsonOf(scores.colored);
+    if (scores.truth) json["truth"] = JsonOf(*scores.truth);
+  }
+  return json;
 }
 
 }  // namespace
 
-void RunEvaluate(const std::vector<TruthFile>& truth, StageContext& context) {
-  if (truth.empty()) throw InvalidArgument("there is no truth to evaluate against");
+void EvaluateOptions::Validate() const {
+  chroma.Validate();
+  if (bound && (truth.empty() || training_truth.empty())) {
+    throw InvalidArgument(
+        "the bound needs true colours of held-out and of all training views; give both or leave "
+        "the bound out");
+  }
+}
+
+void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
+  options.Validate();
   const Scene scene = ReadScene(context);
+  const TruthFiles held_out = FilesByView(options.truth, true, scene);
+  const TruthFiles training = FilesByView(options.training_truth, false, scene);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   ThreadPool pool(context.threads());
-  nlohmann::ordered_json per_view = nlohmann::ordered_json::array();
-  std::map<std::string, double> mean;
-  for (size_t i = 0; i < truth.size(); ++i) {
-    context.cancel().ThrowIfCancelled();
-    const int index = scene.FindView(truth[i].view);
-    const View& view = scene.views[index];
-    if (!view.held_out) {
-      throw InvalidArgument("truth was given for " + view.name +
-                            ", which is a training view; only held-out views are scored");
-    }
-    const std::string ab_name = ViewArtifact(artifact::kViewsAb, view, ".png");
-    const AbMap map = DecodeAbPng(context.ReadInput(ab_name), ab_name);
-    const int side = std::max(map.ab.width, map.ab.height);
-    const ViewImages images(scene, context.scene_folder(), side, 0);
-    const Image captured = ReadImage(truth[i].file);
-    if (captured.channels != 3) throw InvalidArgument("the truth of " + view.name + " is grey");
-    const Image true_srgb = images.Undistort(index, captured);
-    const RenderedView rendered =
-        RenderView(model, images.WorkingCamera(index), view.cam_from_world, pool);
-    const Scores scores = ScoreView(true_srgb, rendered.lab, map.ab);
-    nlohmann::ordered_json entry{{"view", view.name}};
-    for (const auto& [name, value] : scores) {
-      entry[name] = value;
-      mean[name] += value / static_cast<double>(truth.size());
-    }
-    per_view.push_back(std::move(entry));
-    const Image colored = SrgbFromLab(JoinLab(Plane(LabFromSrgb(true_srgb), 0, 1), map.ab));
-    context.WriteOutput(ViewArtifact(artifact::kTruths, view, ".jpg"), EncodeJpeg(true_srgb));
-    context.WriteOutput(ViewArtifact(artifact::kColored2d, view, ".jpg"), EncodeJpeg(colored));
-    context.progress().OnProgress(
-        static_cast<int64_t>(i) + 1, static_cast<int64_t>(truth.size()), "scoring " + view.name);
+  std::optional<GaussianModel> bound;
+  if (options.bound) {
+    const int side = ColoredSide(context, scene.views[scene.TrainingViews().at(0)]);
+    bound = FitTrueChroma(model, scene, training, side, options.chroma, pool, context);
   }
+  HeldOutScores scores(scene, model, bound, pool, context);
+  int64_t done = 0;
+  for (const auto& [view, file] : held_out) {
+    context.cancel().ThrowIfCancelled();
+    scores.Add(view, file);
+    context.progress().OnProgress(
+        ++done, static_cast<int64_t>(held_out.size()), "scoring " + scene.views[view].name);
+  }
+  TruthFiles all = held_out;
+  all.insert(training.begin(), training.end());
+  const ConsistencyScores consistency = ScoreConsistency(scene, model, all, pool, context);
+  const Scores mean = scores.Mean();
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
-  context.WriteOutput(artifact::kScores,
-                      nlohmann::ordered_json{{"mean", mean}, {"views", per_view}}.dump(1) + "\n");
+  ordered_json json{{"mean", mean}, {"views", scores.views()}};
+  json["consistency"] = JsonOf(consistency);
+  if (!scores.sources().Empty()) json["sources"] = scores.sources().Result();
+  context.WriteOutput(artifact::kScores, json.dump(1) + "\n");
 }
 
 }  // namespace color3d

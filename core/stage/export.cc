@@ -40,6 +40,9 @@ void ExportOptions::Validate() const {
   if (!ply && !splat) {
     throw InvalidArgument("the export has nothing to write; ask for ply or splat");
   }
+  if (confidence && !ply) {
+    throw InvalidArgument("only a PLY can carry confidence; ask for ply too");
+  }
 }
 
 void RunExport(const ExportOptions& options, StageContext& context) {
@@ -47,6 +50,11 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   ThreadPool pool(context.threads());
+  const bool with_confidence = options.confidence && !model.confidence.empty();
+  if (options.confidence && !with_confidence) {
+    context.progress().OnWarning(
+        "the model does not know where its colours come from: scene.ply has no confidence");
+  }
   const ExportFrame frame = ExportFrameOf(scene);
   if (!frame.left_out.isZero(0.0)) {
     context.progress().OnWarning(
@@ -68,7 +76,8 @@ void RunExport(const ExportOptions& options, StageContext& context) {
     context.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
     context.progress().OnError(refine.epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
     scores["ply"] = ScoresOf(rgb, names);
-    context.WriteOutput(artifact::kPly, EncodeGaussianPly(model, rgb.harmonics, frame, pool));
+    context.WriteOutput(artifact::kPly,
+                        EncodeGaussianPly(model, rgb.harmonics, frame, pool, with_confidence));
   }
   if (options.splat) {
     const RgbRefinement rgb = refined(DegreeZero(fitted));

@@ -8,6 +8,7 @@
 #include "core/report/report_page.h"
 #include "core/report/scene_plan.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/report_color.h"
 #include "core/stage/report_key_view.h"
 #include "core/stage/stages.h"
 
@@ -25,7 +26,9 @@ ReportPicture Picture(const StageContext& context, const std::string& name, std:
 }
 
 // Keys in the order in which people read them.
-ordered_json CollectMetrics(const std::vector<StageSummary>& stages, StageContext& context) {
+ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
+                            const ColorFacts& colors,
+                            StageContext& context) {
   ordered_json metrics = ordered_json::object();
   if (context.HasInput(artifact::kScores)) {
     const auto mean = ordered_json::parse(context.ReadInput(artifact::kScores)).at("mean");
@@ -36,12 +39,16 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages, StageContex
                              "delta_e00",
                              "delta_e00_chroma",
                              "delta_e00_chroma_2d",
+                             "delta_e00_chroma_bound",
                              "delta_e00_grey",
                              "colourfulness",
-                             "colourfulness_truth"}) {
-      metrics[name] = mean.at(name);
+                             "colourfulness_truth",
+                             "colourfulness_ratio",
+                             "colourfulness_ratio_2d"}) {
+      if (mean.contains(name)) metrics[name] = mean.at(name);
     }
   }
+  for (const auto& [name, value] : colors.Metrics()) metrics[name] = value;
   if (context.HasInput(artifact::kExportScores)) {
     const auto scores = ordered_json::parse(context.ReadInput(artifact::kExportScores));
     for (const auto& [format, values] : scores.items()) {
@@ -84,6 +91,7 @@ double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kin
 
 std::vector<PlanStep> CollectPlan(const Scene& scene,
                                   const std::vector<StageSummary>& stages,
+                                  bool has_truth,
                                   const StageContext& context) {
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   const auto key_view = ordered_json::parse(context.ReadInput(artifact::kKeyView));
@@ -91,7 +99,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   plan_facts.has_poses = !facts.ran_structure_from_motion;
   plan_facts.has_distortion = facts.undistorted;
   plan_facts.has_sparse_points = !facts.random_points;
-  plan_facts.has_truth = context.HasInput(artifact::kScores);
+  plan_facts.has_truth = has_truth;
   plan_facts.key_view_given = key_view.at("strategy") == "manual";
   plan_facts.views = static_cast<int>(scene.views.size());
   plan_facts.training_views = static_cast<int>(scene.TrainingViews().size());
@@ -122,7 +130,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     add_reason("luminance_geometry", memory.at("note"));
   }
   for (const StageSummary& s : stages) {
-    if (s.state == "SKIPPED" && s.kind != "evaluate") {
+    if (s.state == "SKIPPED") {
       plan.push_back({s.kind, false, s.skip_reason, 0.0, -1.0});
     }
   }
@@ -180,7 +188,8 @@ void PassOnResults(StageContext& context) {
 void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
-  const ordered_json metrics = CollectMetrics(stages, context);
+  const ColorFacts colors(scene, context);
+  const ordered_json metrics = CollectMetrics(stages, colors, context);
 
   ReportData data;
   data.title = "Color3D: " + std::to_string(scene.views.size()) + " views in colour";
@@ -190,17 +199,24 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
        {Picture(context, artifact::kKeyViewGray, "as captured"),
         Picture(context, artifact::kKeyViewColored, "coloured: all colours come from here")}},
       context);
+  const std::vector<CurvePoint> curves = CollectCurves(context);
+  std::vector<CurvePoint> personalization;
+  std::partition_copy(curves.begin(),
+                      curves.end(),
+                      std::back_inserter(personalization),
+                      std::back_inserter(data.curves),
+                      [](const CurvePoint& p) { return p.stage == "personalize"; });
+  data.sections = colors.Sections(std::move(personalization));
   data.views = ViewRows(scene, context);
   for (const auto& [name, value] : metrics.items()) {
     data.metrics.emplace_back(name, value.get<double>());
   }
-  data.curves = CollectCurves(context);
-  data.plan = CollectPlan(scene, stages, context);
+  data.plan = CollectPlan(scene, stages, metrics.contains("delta_e00"), context);
   for (const StageSummary& s : stages) {
     for (const std::string& w : s.warnings) data.warnings.push_back(s.kind + ": " + w);
   }
   context.WriteOutput(artifact::kMetrics, metrics.dump(1) + "\n");
-  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(data.curves));
+  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(curves));
   context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));
   context.WriteOutput(artifact::kReport, RenderReport(data));
   PassOnResults(context);

@@ -60,6 +60,11 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
       if (view != key) {
         made->weight = WeightOf(context, scene.views[view], camera.width, camera.height);
       }
+      made->confidence =
+          ReadViewConfidence(context, scene.views[view], camera.width, camera.height);
+      if (made->confidence.Empty() && view == key) {
+        made->confidence = Image(camera.width, camera.height, 1, 1.0f);
+      }
       target = std::move(made);
     }
     return target;

@@ -90,12 +90,15 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
 // memory the size and the number of Gaussians are smaller, and a warning says so.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
 
-// scene.json, key_view.json, key_color.png, views_ab/*, geometry.c3g -> model.c3g.
+// scene.json, key_view.json, key_color.png, views_ab/* (provenance/*), geometry.c3g -> model.c3g,
+// with confidence when every training view has its provenance.
 void RunSolveChroma(const ChromaOptions& options, StageContext& context);
 
 struct ExportOptions {
   bool ply = true;    // 3DGS with RGB spherical harmonics
   bool splat = true;  // 32 bytes a Gaussian, no view dependence
+  // PLY with a property "confidence", which strict viewers may refuse; needs a model that has it.
+  bool confidence = false;
   void Validate() const;
 };
 // scene.json, model.c3g -> scene.ply, scene.splat, export.json (what RGB loses against our
@@ -115,8 +118,19 @@ struct TruthFile {
   std::string view;
   std::filesystem::path file;
 };
-// scene.json, model.c3g, views_ab/* -> scores.json, truths/*.jpg, coloured_views/*.jpg.
-void RunEvaluate(const std::vector<TruthFile>& truth, StageContext& context);
+struct EvaluateOptions {
+  std::vector<TruthFile> truth;           // of held-out views: these are scored. May be empty
+  std::vector<TruthFile> training_truth;  // of training views. May be empty
+  // Also score what the same geometry reaches under the true colours of all training views
+  // ("delta_e00_chroma_bound"): what the reconstruction itself costs. About as long as
+  // solve_chroma.
+  bool bound = false;
+  ChromaOptions chroma;  // of the bound
+  void Validate() const;
+};
+// scene.json, model.c3g, views_ab/* (provenance/*) -> scores.json, truths/*.jpg,
+// coloured_views/*.jpg. Without any truth only the consistency between views (ME, TC) is scored.
+void RunEvaluate(const EvaluateOptions& options, StageContext& context);
 
 // What became of the other stages of the graph.
 struct StageSummary {

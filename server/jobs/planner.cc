@@ -328,7 +328,8 @@ void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
 
   spec = Common();
   *spec.mutable_evaluate()->mutable_truth() = options.truth();
-  Add(spec, options.truth().empty() ? "no true colours were given" : "");
+  *spec.mutable_evaluate()->mutable_training_truth() = options.training_truth();
+  Add(spec);
 }
 
 void GraphBuilder::CheckGiven(const v1::ColorizeSceneSpec& options) const {

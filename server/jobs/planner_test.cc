@@ -121,7 +121,7 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
     const int index = IndexOf(graph, job.kind);
     for (const int input : job.inputs) EXPECT_LT(input, index);
   }
-  EXPECT_EQ(graph.jobs[IndexOf(graph, "evaluate")].skip_reason, "no true colours were given");
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "evaluate")].skip_reason, "") << "views are compared anyway";
   EXPECT_EQ(graph.jobs[IndexOf(graph, "render")].skip_reason, "");
   EXPECT_THAT(graph.jobs.back().blobs, ElementsAre(Sha256Hex("key")));
   EXPECT_EQ(SpecOf(graph, "colorize_key_view").colorize_key_view().source().image().sha256(),
@@ -156,14 +156,18 @@ TEST(Planner, KeyViewMakesTheSelectionManual) {
   EXPECT_EQ(select.select_key_view().view(), "a.jpg");
 }
 
-TEST(Planner, TruthBringsEvaluation) {
+TEST(Planner, TruthGoesToEvaluation) {
   v1::JobSpec spec = SceneSpec();
   v1::TruthImage* truth = spec.mutable_colorize_scene()->add_truth();
   truth->set_view("b.jpg");
   *truth->mutable_image() = SomeDigest("truth");
+  truth = spec.mutable_colorize_scene()->add_training_truth();
+  truth->set_view("c.jpg");
+  *truth->mutable_image() = SomeDigest("training truth");
   const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
-  EXPECT_EQ(graph.jobs[IndexOf(graph, "evaluate")].skip_reason, "");
-  EXPECT_EQ(graph.jobs.back().blobs.size(), 2u);
+  EXPECT_EQ(SpecOf(graph, "evaluate").evaluate().truth(0).view(), "b.jpg");
+  EXPECT_EQ(SpecOf(graph, "evaluate").evaluate().training_truth(0).view(), "c.jpg");
+  EXPECT_EQ(graph.jobs.back().blobs.size(), 3u);
 }
 
 TEST(Planner, SingleStagesBringSimplePrerequisites) {

@@ -264,6 +264,15 @@ void CheckTruth(const google::protobuf::RepeatedPtrField<v1::TruthImage>& truth,
   }
 }
 
+void CheckTraining(const google::protobuf::RepeatedPtrField<v1::TruthImage>& training,
+                   bool has_truth,
+                   const std::string& path) {
+  CheckTruth(training, path);
+  if (!training.empty() && !has_truth) {
+    Reject(path, " is given without the truth of held-out views; there is nothing to score");
+  }
+}
+
 void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
   if (spec.strategy() == v1::SelectKeyViewSpec::STRATEGY_MANUAL && spec.view().empty()) {
     Reject(path, ".view is required with STRATEGY_MANUAL: the name of a photo");
@@ -296,6 +305,7 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
   CheckCarryColor(spec.carry_color(), "carry_color");
   CheckTruth(spec.truth(), "truth");
+  CheckTraining(spec.training_truth(), !spec.truth().empty(), "training_truth");
 }
 
 }  // namespace
@@ -340,9 +350,9 @@ void CheckSpec(const v1::JobSpec& spec) {
   if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
   if (spec.has_evaluate()) {
     CheckTruth(spec.evaluate().truth(), "evaluate.truth");
-    if (spec.evaluate().truth().empty()) {
-      Reject("evaluate.truth", " is empty; give at least one view with its true colours");
-    }
+    CheckTraining(spec.evaluate().training_truth(),
+                  !spec.evaluate().truth().empty(),
+                  "evaluate.training_truth");
   }
 }
 

@@ -106,6 +106,7 @@ ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   ExportOptions options;
   if (spec.has_ply()) options.ply = spec.ply();
   options.splat = spec.has_splat() ? spec.splat() : options.ply;
+  options.confidence = spec.confidence();
   return options;
 }
 

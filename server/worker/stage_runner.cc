@@ -96,11 +96,15 @@ CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs
 }
 
 void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {
-  std::vector<TruthFile> truth;
+  EvaluateOptions options;
   for (const v1::TruthImage& image : spec.truth()) {
-    truth.push_back({image.view(), blobs.Fetch(image.image().sha256())});
+    options.truth.push_back({image.view(), blobs.Fetch(image.image().sha256())});
   }
-  RunEvaluate(truth, context);
+  for (const v1::TruthImage& image : spec.training_truth()) {
+    options.training_truth.push_back({image.view(), blobs.Fetch(image.image().sha256())});
+  }
+  options.bound = spec.training_truth_size() > 0;
+  RunEvaluate(options, context);
 }
 
 void RunRootReport(const std::vector<JobSummary>& graph, StageContext& context) {

@@ -21,18 +21,21 @@ struct PipelineArguments {
   ChromaOptions chroma;
   bool paper = false;
   bool carry = true;
-  std::string geometry_from;
+  bool bound = false;
+  bool rescore = false;
+  std::string geometry_file;
 };
 
-// What an earlier run with the same scene left of a stage, in place of running it.
-bool TakeFrom(const std::string& folder,
-              const std::vector<std::string>& names,
-              StageContext& context) {
-  if (folder.empty()) return false;
-  for (const std::string& name : names) {
-    context.WriteOutput(name, ReadFile(std::filesystem::path(folder) / name));
+// The scene folder has the true colours of all views.
+void Evaluate(const PipelineArguments& args, const Scene& scene, StageContext& context) {
+  EvaluateOptions options;
+  options.bound = args.bound;
+  options.chroma = args.chroma;
+  for (const View& view : scene.views) {
+    auto& truth = view.held_out ? options.truth : options.training_truth;
+    truth.push_back({view.name, context.scene_folder() / view.image_file});
   }
-  return true;
+  RunEvaluate(options, context);
 }
 
 void RunPipeline(const PipelineArguments& args) {
@@ -40,11 +43,17 @@ void RunPipeline(const PipelineArguments& args) {
       args.scene_folder, args.out_folder, args.threads, args.seed, [](const std::string& text) {
         std::fprintf(stderr, "%s\n", text.c_str());
       });
+  if (args.rescore) {
+    pipeline.TakeAll();
+    const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
+    pipeline.Run("evaluate", [&](StageContext& c) { Evaluate(args, scene, c); });
+    std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kScores)).c_str());
+    return;
+  }
   pipeline.Run("import_scene", [&](StageContext& c) {
     ImportOptions options;
     options.hold_out_every_eighth = true;
     options.threads = args.threads;
-    if (TakeFrom(args.geometry_from, {artifact::kScene, artifact::kImportFacts}, c)) return;
     RunImportScene(options, c);
   });
   pipeline.Run("select_key_view", [&](StageContext& c) {
@@ -59,10 +68,13 @@ void RunPipeline(const PipelineArguments& args) {
     options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
     RunColorizeKeyView(options, c);
   });
-  pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
-    if (TakeFrom(args.geometry_from, {artifact::kGeometry, artifact::kMemoryPlan}, c)) return;
-    RunReconstructGeometry(args.geometry, args.max_side_px, c);
-  });
+  if (args.geometry_file.empty()) {
+    pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
+      RunReconstructGeometry(args.geometry, args.max_side_px, c);
+    });
+  } else {
+    pipeline.Take(artifact::kGeometry, args.geometry_file);
+  }
   if (args.carry) {
     pipeline.Run("carry_color", [&](StageContext& c) {
       CarryColorOptions options;
@@ -82,13 +94,7 @@ void RunPipeline(const PipelineArguments& args) {
     options.max_side_px = args.max_side_px;
     RunRender(options, c);
   });
-  pipeline.Run("evaluate", [&](StageContext& c) {
-    std::vector<TruthFile> truth;
-    for (int view : scene.HeldOutViews()) {
-      truth.push_back({scene.views[view].name, c.scene_folder() / scene.views[view].image_file});
-    }
-    RunEvaluate(truth, c);
-  });
+  pipeline.Run("evaluate", [&](StageContext& c) { Evaluate(args, scene, c); });
   pipeline.Run("colorize_scene", [&](StageContext& c) { RunReport(pipeline.summaries(), c); });
   std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kMetrics)).c_str());
 }
@@ -110,11 +116,17 @@ void AddPipelineCommand(CLI::App& app) {
   command->add_option("--max-gaussians", args->geometry.max_gaussians);
   command->add_option("--colorizer-iterations", args->colorizer.iterations);
   command->add_option("--chroma-iterations", args->chroma.iterations);
-  command->add_option("--geometry-from",
-                      args->geometry_from,
-                      "output of an earlier run on the same scene: its poses and geometry are taken");
   command->add_flag("--carry,!--no-carry", args->carry, "geometry first");
   command->add_flag("--paper", args->paper, "the paper's colorizer recipe");
+  command
+      ->add_option("--geometry",
+                   args->geometry_file,
+                   "geometry.c3g of an earlier run of the scene at this size, in place of training")
+      ->check(CLI::ExistingFile);
+  command->add_flag(
+      "--rescore", args->rescore, "run evaluation alone, on what an earlier run left in --out");
+  command->add_flag(
+      "--bound", args->bound, "also score the same geometry under the true colours of all views");
   command->callback([args] { RunPipeline(*args); });
 }
 

@@ -1,11 +1,16 @@
-// color3d-bench plot: results of `reconstruct` as one figure, a panel per scene, a line per label.
+// color3d-bench plot: error against seconds of several results as one figure, a panel per scene. Of
+// `reconstruct`: a line per label. Of `suite`: a line per variant from its curves, or, with
+// --metric, through the variants whose names agree up to '@' (fast@100, fast@300, ...).
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/report/plot.h"
+#include "core/stage/artifacts.h"
 #include "tests/bench/commands.h"
+#include "tests/bench/suite_results.h"
 
 namespace color3d {
 namespace {
@@ -15,14 +20,27 @@ struct PlotArguments {
   std::string svg_file;
   std::string quality = "psnr_db";
   std::string label = "preset";
+  std::string suite_folder;
+  std::string curve;   // STAGE:ERROR_NAME
+  std::string metric;  // of metrics.json
+  std::string seconds = "seconds_total";
+  bool linear = false;
 };
 
-Plot& PlotOfScene(const std::string& scene, std::vector<Plot>& plots) {
+Plot& PlotOfTitle(const std::string& title, bool log_seconds, std::vector<Plot>& plots) {
   for (Plot& plot : plots) {
-    if (plot.title == scene) return plot;
+    if (plot.title == title) return plot;
   }
-  plots.push_back({scene, {}, /*log_seconds=*/true});
+  plots.push_back({title, {}, log_seconds});
   return plots.back();
+}
+
+PlotSeries& SeriesOf(const std::string& name, Plot& plot) {
+  for (PlotSeries& series : plot.series) {
+    if (series.name == name) return series;
+  }
+  plot.series.push_back({name, {}});
+  return plot.series.back();
 }
 
 void AddResult(const std::string& file, const PlotArguments& args, std::vector<Plot>& plots) {
@@ -36,18 +54,65 @@ void AddResult(const std::string& file, const PlotArguments& args, std::vector<P
   if (series.points.empty()) throw InvalidArgument(file + " has no held-out views");
   const std::string name =
       scene.has_filename() ? scene.filename().string() : scene.parent_path().filename().string();
-  PlotOfScene(name + ": " + args.quality, plots).series.push_back(std::move(series));
+  PlotOfTitle(name + ": " + args.quality, !args.linear, plots).series.push_back(std::move(series));
+}
+
+// One run's curve.
+void AddCurve(const SuiteRun& run, const PlotArguments& args, std::vector<Plot>& plots) {
+  const size_t colon = args.curve.find(':');
+  if (colon == std::string::npos) {
+    throw InvalidArgument("\"" + args.curve + "\" is no curve; give STAGE:ERROR_NAME");
+  }
+  const std::string stage = args.curve.substr(0, colon), error = args.curve.substr(colon + 1);
+  const std::filesystem::path file = std::filesystem::path(args.suite_folder) / run.SceneName() /
+                                     run.variant / artifact::kAllCurves;
+  Plot& plot = PlotOfTitle(run.SceneName() + ": " + error, !args.linear, plots);
+  for (const CurvePoint& point : CurvesFromCsv(ReadFile(file))) {
+    if (point.stage != stage || point.error_name != error) continue;
+    SeriesOf(run.variant, plot).points.push_back(point);
+  }
+}
+
+// One run as a point of its variant's line.
+void AddPoint(const SuiteRun& run, const PlotArguments& args, std::vector<Plot>& plots) {
+  Plot& plot = PlotOfTitle(run.SceneName() + ": " + args.metric, !args.linear, plots);
+  const double seconds = run.metrics.at(args.seconds), value = run.metrics.at(args.metric);
+  SeriesOf(run.variant.substr(0, run.variant.find('@')), plot)
+      .points.push_back({"", seconds, 0, args.metric, value});
+}
+
+void AddSuite(const PlotArguments& args, std::vector<Plot>& plots) {
+  if (args.curve.empty() == args.metric.empty()) {
+    throw InvalidArgument("a figure of a suite shows either --curve or --metric");
+  }
+  const std::filesystem::path jsonl = std::filesystem::path(args.suite_folder) / "results.jsonl";
+  for (const SuiteRun& run : ReadSuiteResults(jsonl)) {
+    args.curve.empty() ? AddPoint(run, args, plots) : AddCurve(run, args, plots);
+  }
+  for (Plot& plot : plots) {
+    for (PlotSeries& series : plot.series) {
+      std::stable_sort(
+          series.points.begin(), series.points.end(), [](const CurvePoint& x, const CurvePoint& y) {
+            return x.seconds < y.seconds;
+          });
+    }
+  }
+  if (plots.empty()) throw InvalidArgument(jsonl.string() + " has no finished runs");
 }
 
 void RunPlot(const PlotArguments& args) {
   std::vector<Plot> plots;
-  for (const std::string& file : args.json_files) {
-    try {
+  std::string file = args.suite_folder;
+  try {
+    if (!args.suite_folder.empty()) AddSuite(args, plots);
+    for (const std::string& result : args.json_files) {
+      file = result;
       AddResult(file, args, plots);
-    } catch (const nlohmann::json::exception& e) {
-      throw InvalidArgument(file + " is no result of color3d-bench reconstruct: " + e.what());
     }
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument(file + " is no result that has these figures: " + e.what());
   }
+  if (plots.empty()) throw InvalidArgument("give results of reconstruct, or --suite");
   WriteFileAtomic(args.svg_file, FigureSvg(plots));
 }
 
@@ -57,10 +122,15 @@ void AddPlotCommand(CLI::App& app) {
   auto args = std::make_shared<PlotArguments>();
   CLI::App* command =
       app.add_subcommand("plot", "error against seconds of several results, as SVG");
-  command->add_option("files", args->json_files, "JSON of `reconstruct`")->required();
+  command->add_option("files", args->json_files, "JSON of `reconstruct`");
   command->add_option("--svg", args->svg_file)->required();
   command->add_option("--quality", args->quality, "psnr_db, ssim or l1")->capture_default_str();
   command->add_option("--label", args->label, "field that names a line")->capture_default_str();
+  command->add_option("--suite", args->suite_folder, "the --out folder of `suite`");
+  command->add_option("--curve", args->curve, "STAGE:ERROR_NAME of its curves.csv");
+  command->add_option("--metric", args->metric, "of its metrics.json, e.g. delta_e00_chroma_2d");
+  command->add_option("--seconds", args->seconds, "that go with --metric")->capture_default_str();
+  command->add_flag("--linear", args->linear, "seconds on a linear axis");
   command->callback([args] { RunPlot(*args); });
 }
 

@@ -18,6 +18,7 @@ void AddReferenceCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
 void AddPretrainCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
+void AddSuiteCommand(CLI::App& app);
 void AddColorizerCommand(CLI::App& app);
 void AddKeyViewCommand(CLI::App& app);
 void AddPlotCommand(CLI::App& app);

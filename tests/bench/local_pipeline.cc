@@ -47,6 +47,10 @@ LocalPipeline::LocalPipeline(std::filesystem::path scene_folder,
   std::filesystem::create_directories(out_folder_);
 }
 
+void LocalPipeline::TakeAll() {
+  for (const std::string& name : ListFiles(out_folder_)) Take(name, out_folder_ / name);
+}
+
 void LocalPipeline::Run(const std::string& kind, const std::function<void(StageContext&)>& stage) {
   NoCheckpoints none;
   SayingObserver observer(kind, say_);

@@ -24,6 +24,10 @@ class LocalPipeline {
   // Runs `stage` as job kind `kind` with all artifacts made so far as inputs.
   void Run(const std::string& kind, const std::function<void(StageContext&)>& stage);
 
+  // What an earlier run left, as if its stage had run: one artifact, or all in `out_folder`.
+  void Take(const std::string& name, const std::filesystem::path& file) { artifacts_[name] = file; }
+  void TakeAll();
+
   std::filesystem::path ArtifactPath(const std::string& name) const { return artifacts_.at(name); }
   const std::vector<StageSummary>& summaries() const { return summaries_; }
 

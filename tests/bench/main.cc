@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   color3d::AddPosesCommand(app);
   color3d::AddPretrainCommand(app);
   color3d::AddStabilityCommand(app);
+  color3d::AddSuiteCommand(app);
   color3d::AddColorizerCommand(app);
   color3d::AddKeyViewCommand(app);
   color3d::AddPlotCommand(app);

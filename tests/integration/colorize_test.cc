@@ -124,8 +124,12 @@ int CountCached(const std::vector<v1::Job>& jobs) {
 TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecondTime) {
   WriteProceduralScene(Path("room"), SmallRoom());
   const auto command = [&](const std::string& out) {
-    return std::vector<std::string>{
-               "colorize", Path("room").string(), "-o", Path(out).string(), "--benchmark"} +
+    return std::vector<std::string>{"colorize",
+                                    Path("room").string(),
+                                    "-o",
+                                    Path(out).string(),
+                                    "--benchmark",
+                                    "--bound"} +
            QuickOptions();
   };
   const ProcessResult first = Client(command("first"));
@@ -133,6 +137,10 @@ TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecon
   ExpectResults(Path("first"), 2);
   const json metrics = json::parse(ReadFile(Path("first") / "metrics.json"));
   ExpectMetrics(metrics);
+  EXPECT_LT(metrics.at("delta_e00_chroma_bound"), metrics.at("delta_e00_grey"));
+  for (const char* name : {"me", "me_2d", "me_truth", "tc", "tc_2d", "tc_truth"}) {
+    EXPECT_GT(metrics.value(name, 0.0), 0.0) << name;
+  }
   const std::string curves = ReadFile(Path("first") / "curves.csv");
   for (const char* stage : {"personalize", "reconstruct_geometry", "solve_chroma"}) {
     EXPECT_NE(curves.find(stage), std::string::npos) << stage << " left no curve";
@@ -176,6 +184,7 @@ TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColourItThenTheScene) {
   ExpectResults(Path("out"), 2);
   const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
   EXPECT_FALSE(metrics.contains("psnr_rgb")) << "there was no truth to score against";
+  EXPECT_GT(metrics.value("me", 0.0), 0.0) << "views can be compared without truth";
   EXPECT_GT(metrics.at("gaussians").get<int>(), 500);
   EXPECT_EQ(KeyView(Path("out")), name);
 }

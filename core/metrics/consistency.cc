@@ -1,0 +1,213 @@
+#include "core/metrics/consistency.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/color/difference.h"
+
+namespace color3d {
+namespace {
+
+void CheckDepth(const PosedDepth& view) {
+  const Image& d = view.depth;
+  if (d.channels == 1 && d.width == view.camera.width && d.height == view.camera.height &&
+      !d.Empty() && view.camera.fx > 0.0 && view.camera.fy > 0.0) {
+    return;
+  }
+  throw InvalidArgument("a depth map of " + std::to_string(d.width) + " x " +
+                        std::to_string(d.height) + " x " + std::to_string(d.channels) +
+                        " does not fit its camera of " + std::to_string(view.camera.width) + " x " +
+                        std::to_string(view.camera.height) + " px");
+}
+
+// The four pixels around (u, v), whose centres are at +0.5, and their shares.
+struct Corners {
+  int x = 0, y = 0;         // upper left
+  int right = 0, down = 0;  // steps to the others; 0 at the border
+  double fx = 0.0, fy = 0.0;
+
+  double Mix(const Image& image, int c) const {
+    const double top = image.At(c, y, x) * (1.0 - fx) + image.At(c, y, x + right) * fx;
+    const double bottom =
+        image.At(c, y + down, x) * (1.0 - fx) + image.At(c, y + down, x + right) * fx;
+    return top * (1.0 - fy) + bottom * fy;
+  }
+};
+
+// Nothing when (u, v) is not inside of the picture.
+std::optional<Corners> CornersAt(double u, double v, int width, int height) {
+  if (!(u >= 0.0 && v >= 0.0 && u <= width && v <= height)) return std::nullopt;
+  const double x = std::clamp(u - 0.5, 0.0, width - 1.0);
+  const double y = std::clamp(v - 0.5, 0.0, height - 1.0);
+  Corners c;
+  c.x = static_cast<int>(x);
+  c.y = static_cast<int>(y);
+  c.right = c.x + 1 < width ? 1 : 0;
+  c.down = c.y + 1 < height ? 1 : 0;
+  c.fx = x - c.x;
+  c.fy = y - c.y;
+  return c;
+}
+
+// Depth between pixels that all have one.
+double DepthAt(const Image& depth, const Corners& c) {
+  for (const int y : {c.y, c.y + c.down}) {
+    for (const int x : {c.x, c.x + c.right}) {
+      if (!(depth.At(0, y, x) > 0.0f)) return 0.0;
+    }
+  }
+  return c.Mix(depth, 0);
+}
+
+Eigen::Vector3d Ray(const Camera& camera, double u, double v) {
+  return {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0};
+}
+
+// x_to = rotation x_from + translation.
+struct Motion {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+
+  Motion(const Pose& from, const Pose& to)
+      : rotation((to.rotation * from.rotation.conjugate()).toRotationMatrix()),
+        translation(to.translation - rotation * from.translation) {}
+  Eigen::Vector3d Apply(const Eigen::Vector3d& x) const { return rotation * x + translation; }
+};
+
+void CheckPicture(const ColoredPicture& p) {
+  if (p.srgb.channels == 3 && p.lab.channels == 3 && !p.srgb.Empty() &&
+      p.srgb.width == p.lab.width && p.srgb.height == p.lab.height) {
+    return;
+  }
+  throw InvalidArgument("pictures to compare need 3 channels of sRGB and of Lab in one size, got " +
+                        std::to_string(p.srgb.width) + " x " + std::to_string(p.srgb.height) +
+                        " x " + std::to_string(p.srgb.channels) + " and " +
+                        std::to_string(p.lab.width) + " x " + std::to_string(p.lab.height) + " x " +
+                        std::to_string(p.lab.channels));
+}
+
+void AddPairs(int views, int gap, bool long_gap, int most, std::vector<ViewPair>* pairs) {
+  const int64_t there_are = views - gap;
+  const int64_t wanted = std::min<int64_t>(there_are, most);
+  for (int64_t k = 0; k < wanted; ++k) {
+    const int first = static_cast<int>(k * there_are / wanted);
+    pairs->push_back({first, first + gap, long_gap});
+  }
+}
+
+}  // namespace
+
+void MatchOptions::Validate() const {
+  const auto check = [](const char* name, double value, double low, double high) {
+    if (value >= low && value <= high) return;
+    throw InvalidArgument(std::string(name) + " is " + std::to_string(value) + "; it must be " +
+                          std::to_string(low) + " to " + std::to_string(high));
+  };
+  check("max_reprojection_px", max_reprojection_px, 0.0, 100.0);
+  check("depth_tolerance", depth_tolerance, 0.0, 1.0);
+  check("stride_px", stride_px, 1.0, 1000.0);
+}
+
+std::vector<PixelMatch> MatchByGeometry(const PosedDepth& from,
+                                        const PosedDepth& to,
+                                        const MatchOptions& options) {
+  options.Validate();
+  CheckDepth(from);
+  CheckDepth(to);
+  const Motion forth(from.cam_from_world, to.cam_from_world);
+  const Motion back(to.cam_from_world, from.cam_from_world);
+  const double max_distance2 = options.max_reprojection_px * options.max_reprojection_px;
+  std::vector<PixelMatch> matches;
+  for (int y = 0; y < from.camera.height; y += options.stride_px) {
+    for (int x = 0; x < from.camera.width; x += options.stride_px) {
+      const double depth = from.depth.At(0, y, x);
+      if (!(depth > 0.0) || !std::isfinite(depth)) continue;
+      const Eigen::Vector3d there = forth.Apply(depth * Ray(from.camera, x + 0.5, y + 0.5));
+      if (!(there.z() > 0.0)) continue;
+      const double u = to.camera.fx * there.x() / there.z() + to.camera.cx;
+      const double v = to.camera.fy * there.y() / there.z() + to.camera.cy;
+      const auto corners = CornersAt(u, v, to.camera.width, to.camera.height);
+      if (!corners) continue;
+      const double seen = DepthAt(to.depth, *corners);
+      if (!(std::abs(seen - there.z()) <= options.depth_tolerance * there.z())) continue;
+      const Eigen::Vector3d again = back.Apply(seen * Ray(to.camera, u, v));
+      if (!(again.z() > 0.0)) continue;
+      const double dx = from.camera.fx * again.x() / again.z() + from.camera.cx - (x + 0.5);
+      const double dy = from.camera.fy * again.y() / again.z() + from.camera.cy - (y + 0.5);
+      if (!(dx * dx + dy * dy < max_distance2)) continue;
+      matches.push_back({x, y, static_cast<float>(u), static_cast<float>(v)});
+    }
+  }
+  return matches;
+}
+
+PairDifference CompareMatches(const ColoredPicture& from,
+                              const ColoredPicture& to,
+                              const std::vector<PixelMatch>& matches) {
+  CheckPicture(from);
+  CheckPicture(to);
+  PairDifference sum;
+  for (const PixelMatch& m : matches) {
+    const auto corners = CornersAt(m.u, m.v, to.srgb.width, to.srgb.height);
+    if (!corners || m.x < 0 || m.y < 0 || m.x >= from.srgb.width || m.y >= from.srgb.height) {
+      throw InvalidArgument("the match of pixel (" + std::to_string(m.x) + ", " +
+                            std::to_string(m.y) +
+                            ") lies outside of a picture; match views at "
+                            "the pictures' size");
+    }
+    for (int c = 0; c < 3; ++c) {
+      const double d = from.srgb.At(c, m.y, m.x) - corners->Mix(to.srgb, c);
+      sum.absolute_rgb += std::abs(d) / 3.0;
+      sum.squared_rgb += d * d / 3.0;
+    }
+    sum.delta_e00 +=
+        DeltaE00({from.lab.At(0, m.y, m.x), from.lab.At(1, m.y, m.x), from.lab.At(2, m.y, m.x)},
+                 {corners->Mix(to.lab, 0), corners->Mix(to.lab, 1), corners->Mix(to.lab, 2)});
+  }
+  sum.matches = static_cast<int64_t>(matches.size());
+  if (sum.matches == 0) return sum;
+  const auto count = static_cast<double>(sum.matches);
+  return {sum.matches, sum.absolute_rgb / count, sum.squared_rgb / count, sum.delta_e00 / count};
+}
+
+std::vector<ViewPair> ConsistencyPairs(int views, int most) {
+  std::vector<ViewPair> pairs;
+  const int long_gap = std::min(kLongGap, views - 1);
+  if (views > kShortGap) AddPairs(views, kShortGap, false, most, &pairs);
+  if (long_gap > kShortGap) AddPairs(views, long_gap, true, most, &pairs);
+  std::sort(pairs.begin(), pairs.end(), [](const ViewPair& x, const ViewPair& y) {
+    return x.first != y.first ? x.first < y.first : x.second < y.second;
+  });
+  return pairs;
+}
+
+void ConsistencyMeter::Add(const ViewPair& pair, const PairDifference& difference) {
+  if (difference.matches == 0) return;
+  const auto count = static_cast<double>(difference.matches);
+  absolute_ += count * difference.absolute_rgb;
+  delta_e00_ += count * difference.delta_e00;
+  matches_ += difference.matches;
+  squared_[pair.long_gap ? 1 : 0] += difference.squared_rgb;
+  ++pairs_[pair.long_gap ? 1 : 0];
+}
+
+Consistency ConsistencyMeter::Result() const {
+  Consistency c;
+  c.pairs = pairs_[0] + pairs_[1];
+  c.matches = matches_;
+  if (matches_ > 0) {
+    c.me = absolute_ / static_cast<double>(matches_);
+    c.me_de00 = delta_e00_ / static_cast<double>(matches_);
+  }
+  if (pairs_[0] > 0) c.tc_short = squared_[0] / pairs_[0];
+  if (pairs_[1] > 0) c.tc_long = squared_[1] / pairs_[1];
+  if (pairs_[0] == 0) c.tc = c.tc_long;
+  if (pairs_[1] == 0) c.tc = c.tc_short;
+  if (pairs_[0] > 0 && pairs_[1] > 0) c.tc = 0.5 * (c.tc_short + c.tc_long);
+  return c;
+}
+
+}  // namespace color3d
