@@ -23,6 +23,11 @@ inline constexpr char kKeyColor[] = "key_color.png";                 // ab, undi
 inline constexpr char kKeyColorFacts[] = "key_color.json";           // where the colour came from
 inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which words went where
 inline constexpr char kKeyViewColored[] = "key_view_coloured.png";   // for people
+inline constexpr char kAugmentationFacts[] = "augmentations.json";  // what was made, what not, why
+// + name + ".png" (for people, and L), ".ab.png" and ".weight.png"
+inline constexpr char kAugmentations[] = "augmentations/";
+inline constexpr char kAugmentationSheet[] = "augmentations.jpg";  // contact sheet
+inline constexpr char kCarryFacts[] = "carry.json";
 inline constexpr char kColorizer[] = "colorizer.c3c";
 inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
 inline constexpr char kGeometry[] = "geometry.c3g";

@@ -55,6 +55,20 @@ struct ColorizeKeyViewOptions {
 // scene.json, key_view.json -> key_color.png, key_view_coloured.png, key_color.json.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
+struct AugmentationOptions {
+  int samples = 8;  // 0..64, besides the user's own files; 8: the paper's 4 + 1 + 3
+  bool outpaint = true;
+  bool animate = true;
+  bool novel_views = true;
+  std::string backend;    // a generator by name; empty: the embedded surrogates
+  int max_side_px = 400;  // of the pictures, 64..4096
+  void Validate() const;
+};
+// scene.json, key_view.json, key_color.png (geometry.c3g for novel views, carry.json) and the
+// files below augment/ of the scene's folder -> augmentations.json, augmentations/*,
+// augmentations.jpg.
+void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context);
+
 // scene.json, key_view.json, key_color.png -> colorizer.c3c. `encoder`: as SelectKeyViewOptions.
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
