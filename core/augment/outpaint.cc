@@ -295,8 +295,8 @@ class Quilter {
     const Image step = StepAcrossSeam(place, from, first_x, first_y);
     for (int y = 0; y < patch_; ++y) {
       for (int x = 0; x < patch_; ++x) {
-        const int depth = std::min(x - first_x[static_cast<size_t>(y)],
-                                   y - first_y[static_cast<size_t>(x)]);
+        const int depth =
+            std::min(x - first_x[static_cast<size_t>(y)], y - first_y[static_cast<size_t>(x)]);
         if (depth < 0) continue;
         const float share = 1.0f - static_cast<float>(depth) / static_cast<float>(patch_);
         for (int c = 0; c < 3; ++c) {
@@ -325,8 +325,8 @@ class Quilter {
         on_cut.At(0, y, x) = 1.0f;
         if (PixelDifference(place, from, x, y) > kMaxStep * kMaxStep) continue;
         for (int c = 0; c < 3; ++c) {
-          step.At(c, y, x) = canvas_.At(c, place.at.y + y, place.at.x + x) -
-                             source_.At(c, from.y + y, from.x + x);
+          step.At(c, y, x) =
+              canvas_.At(c, place.at.y + y, place.at.x + x) - source_.At(c, from.y + y, from.x + x);
         }
       }
     }

@@ -238,8 +238,8 @@ void GraphBuilder::AddWelcome(const std::string& kind, NewJob* job) const {
     if (planned != planned_.end()) {
       const int index = planned->second;
       if (graph_.jobs[static_cast<size_t>(index)].skip_reason.empty()) job->inputs.push_back(index);
-    } else if (given != given_.end() && (!IsFinished(given->second.state) ||
-                                         given->second.state == JobState::kSucceeded)) {
+    } else if (given != given_.end() &&
+               (!IsFinished(given->second.state) || given->second.state == JobState::kSucceeded)) {
       job->input_jobs.push_back(given->second.name);
     }
   }
