@@ -23,7 +23,7 @@ inline constexpr char kKeyColor[] = "key_color.png";                 // ab, undi
 inline constexpr char kKeyColorFacts[] = "key_color.json";           // where the colour came from
 inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which words went where
 inline constexpr char kKeyViewColored[] = "key_view_coloured.png";   // for people
-inline constexpr char kAugmentationFacts[] = "augmentations.json";  // what was made, what not, why
+inline constexpr char kAugmentationFacts[] = "augmentations.json";   // what was made, what not, why
 // + name + ".png" (for people, and L), ".ab.png" and ".weight.png"
 inline constexpr char kAugmentations[] = "augmentations/";
 inline constexpr char kAugmentationSheet[] = "augmentations.jpg";  // contact sheet

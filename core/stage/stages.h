@@ -69,7 +69,8 @@ struct AugmentationOptions {
 // augmentations.jpg.
 void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context);
 
-// scene.json, key_view.json, key_color.png -> colorizer.c3c. `encoder`: as SelectKeyViewOptions.
+// scene.json, key_view.json, key_color.png (and what generate_augmentations made) -> colorizer.c3c.
+// Warns when the key view has no colour. `encoder`: as SelectKeyViewOptions.
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
                     const std::string& encoder = "");
