@@ -14,10 +14,10 @@ namespace {
 
 // Neighbours whose depths differ by more than this share do not belong to one surface: a plane seen
 // at 80 degrees by 400 px of focal length changes by 1.4 % a pixel.
-constexpr float kMaxDepthStep = 0.025f;
+constexpr float kMaxDepthStep = 0.04f;
 constexpr double kMaxStretch = 2.5;      // target area of one source pixel, px
 constexpr double kMinDepthShare = 0.02;  // of the source depth: nothing may come closer
-constexpr float kHiddenShare = 1.05f;    // this much behind what the target sees: hidden
+constexpr float kHiddenShare = 1.15f;    // this much behind what the target sees: hidden
 
 struct Vertex {
   double x = 0.0;  // target px, pixel centres at whole numbers

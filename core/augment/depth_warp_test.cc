@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "core/augment/depth_filter.h"
+
 namespace color3d {
 namespace {
 
@@ -80,6 +82,26 @@ TEST(DepthWarpTest, HolesShowTheGeometrysLuminanceWithoutWeight) {
   EXPECT_EQ(hidden.weight.At(0, 30, 10), 0.0f);
   EXPECT_EQ(hidden.lab.At(0, 30, 10), 66.0f);
   EXPECT_EQ(hidden.weight.At(0, 31, 10), 1.0f);
+}
+
+TEST(DepthFilterTest, NoiseGoesAndEdgesStay) {
+  Image depth = Wall(true).depth;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) depth.At(0, y, x) *= 1.0f + 0.05f * ((x * 7 + y * 13) % 3 - 1);
+  }
+  depth.At(0, 20, 20) = 0.0f;
+  depth.At(0, 30, 30) = 40.0f;
+  depth.At(0, 40, 60) = std::nanf("");
+  const Image smooth = SmoothDepth(depth);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if ((x == 20 && y == 20) || (x == 60 && y == 40)) {
+        ASSERT_EQ(smooth.At(0, y, x), 0.0f) << "unknown";
+        continue;
+      }
+      ASSERT_NEAR(smooth.At(0, y, x), x < kWidth / 2 ? 2.0f : 4.0f, 0.1f) << x << ", " << y;
+    }
+  }
 }
 
 TEST(DepthWarpTest, ExtremeDepthsAndPosesStayFinite) {

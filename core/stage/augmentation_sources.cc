@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/augment/depth_filter.h"
 #include "core/augment/flow_frame.h"
 #include "core/augment/orbit.h"
 #include "core/augment/outpaint.h"
@@ -57,7 +58,7 @@ Image SolidDepth(const RenderedView& view) {
   for (size_t i = 0; i < depth.PlaneSize(); ++i) {
     if (!(view.opacity.data[i] >= kMinOpacity)) depth.data[i] = 0.0f;
   }
-  return depth;
+  return SmoothDepth(depth);
 }
 
 double Mean(const Image& image) {

@@ -7,6 +7,7 @@
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
@@ -57,11 +58,10 @@ class AugmentationStageTest : public ::testing::Test {
  protected:
   AugmentationStageTest() {
     const Image lab = Painting(kWidth, kHeight);
-    Image gray(kWidth, kHeight, 1), ab(kWidth, kHeight, 2);
+    Image gray(kWidth, kHeight, 1);
     for (size_t i = 0; i < gray.PlaneSize(); ++i) {
       gray.data[i] = static_cast<float>(GrayFromLuminance(lab.Plane(0)[i]));
     }
-    std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
     for (int i = 0; i < 3; ++i) {
       View view;
       view.name = view.image_file = "p" + std::to_string(i) + ".png";
@@ -73,7 +73,7 @@ class AugmentationStageTest : public ::testing::Test {
     }
     AddInput(artifact::kScene, SceneToJson(scene_));
     AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
-    AddInput(artifact::kKeyColor, EncodeAbPng(ab));
+    AddInput(artifact::kKeyColor, EncodeAbPng(ChromaOfLab(lab)));
     options_.max_side_px = kWidth;
     FakeGenerator::info = {"generator 1", {capability::kOutpaint}, 0, true};
     FakeGenerator::requests.clear();
@@ -85,7 +85,7 @@ class AugmentationStageTest : public ::testing::Test {
     WriteFileAtomic(scratch_.path() / "scene" / name, bytes);
   }
   void AddInput(const std::string& name, const std::string& bytes) {
-    const auto path = scratch_.path() / ("in" + std::to_string(inputs_.size()));
+    const auto path = scratch_.path() / ("in" + std::to_string(added_++));
     WriteFileAtomic(path, bytes);
     inputs_[name] = path;
   }
@@ -141,6 +141,7 @@ class AugmentationStageTest : public ::testing::Test {
   NullObserver observer_;
   CancellationToken cancel_;
   std::vector<std::string> outputs_;
+  int added_ = 0;
   ErrorCode code_ = ErrorCode::kInternal;
 };
 
@@ -285,6 +286,64 @@ TEST_F(AugmentationStageTest, BadAnswersOfAGeneratorAreRefused) {
   EXPECT_THAT(Complaint(), HasSubstr("grey"));
   FakeGenerator::info.capabilities = {capability::kAutomatic};
   EXPECT_THAT(Complaint(), HasSubstr("generates none"));
+}
+
+class PersonalizeStageTest : public AugmentationStageTest {
+ protected:
+  std::string Personalize() {
+    StageContext::Setup setup;
+    setup.scene_folder = scratch_.path() / "scene";
+    setup.inputs = inputs_;
+    setup.output_folder = scratch_.path() / "out";
+    std::filesystem::create_directories(setup.output_folder);
+    StageContext context(setup, none_, warnings_, cancel_);
+    ColorizerOptions options;
+    options.iterations = 2;
+    options.crop_px = options.max_side_px = 64;
+    RunPersonalize(options, context);
+    return Output(artifact::kColorizer);
+  }
+  struct Warnings : NullObserver {
+    void OnWarning(const std::string& message) override { text += message; }
+    std::string text;
+  };
+  Warnings warnings_;
+};
+
+TEST_F(PersonalizeStageTest, AKeyViewWithoutColourIsSaid) {
+  Personalize();
+  EXPECT_EQ(warnings_.text, "");
+  AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 0.3f)));
+  Personalize();
+  EXPECT_THAT(warnings_.text, AllOf(HasSubstr("hardly any colour"), HasSubstr("hints")));
+}
+
+TEST_F(PersonalizeStageTest, AKeyColourOfAnotherShapeIsRefused) {
+  AddInput(artifact::kKeyColor, EncodeAbPng(Image(kHeight, kWidth, 2, 30.0f)));
+  try {
+    Personalize();
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("72x96"), HasSubstr("64x48")));
+  }
+  AddInput(artifact::kKeyColor, EncodeAbPng(Image(2 * kWidth, 2 * kHeight, 2, 30.0f)));
+  EXPECT_FALSE(Personalize().empty()) << "another size of the same shape will do";
+}
+
+TEST_F(PersonalizeStageTest, GeneratedPicturesAreLearntFrom) {
+  const Image luminance = LuminanceOfLab(Painting(kWidth, kHeight));
+  const auto colors = [&] {
+    return LoadColorizer(Personalize(), Encoder::Embedded(), 1)->Colorize(luminance).data;
+  };
+  const std::vector<float> alone = colors();
+  Run();
+  for (const std::string& name : outputs_) AddInput(name, Output(name));
+  EXPECT_NE(colors(), alone);
+  AddInput(artifact::kAugmentationFacts, R"({"samples": []})");
+  EXPECT_EQ(colors(), alone);
+  AddInput(artifact::kAugmentationFacts, "[1]");
+  EXPECT_THROW(Personalize(), Error);
 }
 
 TEST_F(AugmentationStageTest, EndsWhenItIsCancelled) {
