@@ -1,5 +1,6 @@
-// The stiff and extreme cases of the splat engine and the colorizer (METHOD.md "Stability"), each run through the
-// real kernels and compared with float64. Used by stability_test and by color3d-bench stability.
+// The stiff and extreme cases of the splat engine and the colorizer (METHOD.md "Stability"), each
+// run through the real kernels and compared with float64. Used by stability_test and by
+// color3d-bench stability.
 //
 // Errors are relative, per buffer: max |fast - reference| / max |reference|. Buffers of values are
 // the colour channels, opacity and depth; buffers of gradients are the rows of parameters, where
