@@ -28,7 +28,7 @@ struct Augmentation {
 // The coloured key view at working size, and what geometry knows of it.
 struct KeyPicture {
   Image lab;      // 3 channels, Lab units
-  Image srgb;     // 3 channels, 0..1: the same for backends, perhaps larger
+  Image srgb;     // 3 channels, 0..1: the same for a backend, perhaps larger
   Camera camera;  // of lab
   Pose cam_from_world;
 };

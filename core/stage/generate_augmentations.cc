@@ -64,7 +64,10 @@ std::optional<double> Coverage(const StageContext& context) {
   return facts["coverage"].get<double>();
 }
 
-KeyPicture ReadKeyPicture(const Scene& scene, int key, int max_side_px, StageContext& context) {
+KeyPicture ReadKeyPicture(const Scene& scene,
+                          int key,
+                          const AugmentationOptions& options,
+                          StageContext& context) {
   const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
   const auto lab_at = [&](int side) {
     const ViewImages images(scene, context.scene_folder(), side, 0);
@@ -72,8 +75,10 @@ KeyPicture ReadKeyPicture(const Scene& scene, int key, int max_side_px, StageCon
     return JoinLab(*l, Resize(color.ab, l->width, l->height));
   };
   KeyPicture picture;
-  picture.lab = lab_at(max_side_px);
-  picture.srgb = SrgbFromLab(lab_at(std::max(max_side_px, kRemoteSidePx)));
+  picture.lab = lab_at(options.max_side_px);
+  if (!options.backend.empty()) {
+    picture.srgb = SrgbFromLab(lab_at(std::max(options.max_side_px, kRemoteSidePx)));
+  }
   picture.camera =
       scene.views[static_cast<size_t>(key)].camera.Scaled(picture.lab.width, picture.lab.height);
   picture.cam_from_world = scene.views[static_cast<size_t>(key)].cam_from_world;
@@ -209,7 +214,7 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
   const int key_index = ReadKeyView(context, scene);
   Outcome outcome;
   outcome.made = AugmentationsFromFiles(options.max_side_px, context);
-  const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);
+  const KeyPicture key = ReadKeyPicture(scene, key_index, options, context);
   std::map<Kind, int> counts = Deal(options);
   LeaveOutNeedless(options, context, &counts, &outcome);
   if (!options.backend.empty() && !counts.empty()) {
