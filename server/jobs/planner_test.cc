@@ -226,8 +226,6 @@ TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
   spec.mutable_generate_augmentations();
   EXPECT_EQ(PlanError(spec).code, ErrorCode::kUnimplemented);
   EXPECT_THAT(PlanError(spec).message, HasSubstr("generate_augmentations"));
-  spec.mutable_personalize_scenes();
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("personalize_scenes"));
   spec.mutable_carry_color();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("carry_color"));
   spec.mutable_reconstruct_dynamic();

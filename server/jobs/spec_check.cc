@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "server/service_error.h"
@@ -265,6 +266,19 @@ void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
   }
 }
 
+void CheckRoutes(const v1::PersonalizeScenesSpec& spec) {
+  if (spec.routes().empty()) Reject("personalize_scenes.routes", " is empty; name a scene");
+  std::set<std::string> scenes;
+  for (int i = 0; i < spec.routes_size(); ++i) {
+    const std::string path = "personalize_scenes.routes[" + std::to_string(i) + "].scene";
+    const std::string& scene = spec.routes(i).scene();
+    if (scene.empty()) Reject(path, " is empty; name a scene");
+    if (!scenes.insert(scene).second) {
+      Reject(path, " is '" + scene + "', which is there already; name each scene once");
+    }
+  }
+}
+
 // `has_inputs`: the colour may come from a job among them; the planner sees to that.
 void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
@@ -292,6 +306,7 @@ const std::vector<std::string>& BuiltKinds() {
                                                  "select_key_view",
                                                  "colorize_key_view",
                                                  "personalize",
+                                                 "personalize_scenes",
                                                  "colorize_views",
                                                  "reconstruct_geometry",
                                                  "solve_chroma",
@@ -313,6 +328,7 @@ void CheckSpec(const v1::JobSpec& spec) {
     CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
   }
   if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
   if (spec.has_evaluate()) {
     CheckTruth(spec.evaluate().truth(), "evaluate.truth");
     if (spec.evaluate().truth().empty()) {
