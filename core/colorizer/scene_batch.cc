@@ -10,6 +10,9 @@ namespace {
 // How soon a waiting scene notices that it was cancelled.
 constexpr auto kCancelPoll = std::chrono::milliseconds(50);
 
+// A session fills two: one trains while the other prepares the next sample.
+constexpr int kMostSlotsOfATurn = 2;
+
 int CoresIfZero(int slots) {
   if (slots > 0) return slots;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -92,7 +95,7 @@ SceneBatch::Turn::Turn(Seat& seat, const CancellationToken& cancel) : seat_(seat
     batch.changed_.wait_for(lock, kCancelPoll);
   }
   member.waiting = false;
-  slots_ = batch.Next() == nullptr ? batch.free_slots_ : 1;
+  slots_ = batch.Next() == nullptr ? std::min(batch.free_slots_, kMostSlotsOfATurn) : 1;
   batch.free_slots_ -= slots_;
   batch.changed_.notify_all();
   start_ = std::chrono::steady_clock::now();

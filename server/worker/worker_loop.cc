@@ -127,16 +127,14 @@ std::optional<JobRecord> WorkerLoop::ClaimCompanion(const JobRecord& first) {
   }
 }
 
-// Continuous batching: scenes join while there is room, and each leaves when it is done.
+// Continuous batching: scenes join while there is room, and each leaves when it is done. One joins
+// at a time between two looks, so that workers without work get their share of the queue.
 void WorkerLoop::RunBatch(const JobRecord& first) {
   AttemptBatch batch(context_);
   batch.Start(first);
   while (batch.size() > 0) {
     if (HasRoom(batch.size())) {
-      if (const auto companion = ClaimCompanion(first)) {
-        batch.Start(*companion);
-        continue;
-      }
+      if (const auto companion = ClaimCompanion(first)) batch.Start(*companion);
     }
     jobs_done_ += batch.Reap(options_.poll);
   }
