@@ -46,7 +46,8 @@ TEST(PlanScenes, EachSceneGetsAPersonalizeJobThatReadsItsOwn) {
     EXPECT_EQ(job.kind, "personalize");
     EXPECT_EQ(job.scene, scene);
     ASSERT_EQ(job.input_jobs.size(), 3u);
-    for (const std::string& input : job.input_jobs) EXPECT_THAT(input, HasSubstr("-" + scene.substr(7)));
+    for (const std::string& input : job.input_jobs)
+      EXPECT_THAT(input, HasSubstr("-" + scene.substr(7)));
     v1::JobSpec spec;
     ASSERT_TRUE(spec.ParseFromString(job.spec));
     EXPECT_EQ(spec.personalize().iterations(), 5);
