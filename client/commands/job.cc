@@ -2,6 +2,7 @@
 
 #include <iostream>
 #include <iterator>
+#include <optional>
 
 #include "client/commands/command.h"
 #include "client/commands/console.h"
@@ -48,6 +49,31 @@ ExitCode RunSubmit(const Context& context, const std::string& file) {
   if (!status.ok()) {
     throw InvalidArgument(file + " is not a JobSpec in JSON: " + std::string(status.message()));
   }
+  Connection connection(context.server, *context.interrupt);
+  PrintJob(context, SubmitJob(connection, spec));
+  return ExitCode::kOk;
+}
+
+struct AllInOneArguments {
+  std::vector<std::string> scenes;  // scenes/ID, or scenes/ID=jobs/ID with the key view's job
+  std::optional<int> iterations;
+  bool again = false;
+};
+
+ExitCode RunAllInOne(const Context& context, const AllInOneArguments& arguments) {
+  v1::JobSpec spec;
+  spec.set_skip_cache(arguments.again);
+  v1::PersonalizeScenesSpec* scenes = spec.mutable_personalize_scenes();
+  for (const std::string& text : arguments.scenes) {
+    const size_t equals = text.find('=');
+    auto* route = scenes->add_routes();
+    route->set_scene(ResourceName(text.substr(0, equals), "scenes"));
+    if (equals != std::string::npos) {
+      route->set_key_color_job(ResourceName(text.substr(equals + 1), "jobs"));
+    }
+  }
+  if (arguments.iterations) scenes->mutable_options()->set_iterations(*arguments.iterations);
+  spec.set_scene(scenes->routes(0).scene());
   Connection connection(context.server, *context.interrupt);
   PrintJob(context, SubmitJob(connection, spec));
   return ExitCode::kOk;
@@ -176,10 +202,29 @@ void AddJobCommands(CLI::App& app, Context& context) {
 
   CLI::App* submit = job->add_subcommand("submit", "Submit a job");
   submit->fallthrough();
-  submit->add_option("SPEC", *file, "JobSpec as JSON (protobuf mapping); - reads stdin")
-      ->required();
-  submit->callback([&context, file] {
-    context.action = [&context, file] { return RunSubmit(context, *file); };
+  auto* spec_option =
+      submit->add_option("SPEC", *file, "JobSpec as JSON (protobuf mapping); - reads stdin");
+  const auto all_in_one = std::make_shared<AllInOneArguments>();
+  auto* scenes_option =
+      submit
+          ->add_option("--all-in-one",
+                       all_in_one->scenes,
+                       "Personalize these scenes together: scenes/ID each, or scenes/ID=jobs/ID "
+                       "with the job that coloured its key view (default: the accepted one)")
+          ->expected(1, 10'000)
+          ->excludes(spec_option);
+  submit->add_option("--iterations", all_in_one->iterations, "With --all-in-one: for each scene")
+      ->needs(scenes_option);
+  submit->add_flag("--again", all_in_one->again, "With --all-in-one: not from the stage cache")
+      ->needs(scenes_option);
+  submit->callback([&context, file, all_in_one] {
+    if (file->empty() && all_in_one->scenes.empty()) {
+      throw CLI::RequiredError("SPEC or --all-in-one");
+    }
+    context.action = [&context, file, all_in_one] {
+      return all_in_one->scenes.empty() ? RunSubmit(context, *file)
+                                        : RunAllInOne(context, *all_in_one);
+    };
   });
 
   CLI::App* list = job->add_subcommand("list", "Newest first");

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_archive.h"
 #include "core/encoder/threads.h"
@@ -20,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kMagic[] = "C3DCOLR1";
-constexpr uint32_t kVersion = 2;  // 2: weights of the neighbours
+constexpr uint32_t kVersion = 3;  // 3: weights of the neighbours
 constexpr char kWhat[] = "the colorizer file";
 // Guided upsampling: windows of 5x5 cells; contrasts of L below about 4 units are no edges.
 constexpr int kGuideRadius = 2;
@@ -37,33 +38,6 @@ Image CropTo(const Image& image, int width, int height) {
   return out;
 }
 
-Json JsonFromOptions(const ColorizerOptions& options) {
-  return {{"recipe", options.recipe == ColorizerOptions::Recipe::kPaper ? "paper" : "ours"},
-          {"iterations", options.iterations},
-          {"time_limit_seconds", options.time_limit_seconds},
-          {"max_side_px", options.max_side_px},
-          {"crop_px", options.crop_px},
-          {"consistency_weight", options.consistency_weight},
-          {"seed", options.seed}};
-}
-
-ColorizerOptions OptionsFromJson(const Json& json) {
-  ColorizerOptions options;
-  const std::string recipe = json.at("recipe");
-  if (recipe != "ours" && recipe != "paper") {
-    throw InvalidArgument(std::string(kWhat) + " names the unknown recipe \"" + recipe + "\"");
-  }
-  options.recipe =
-      recipe == "paper" ? ColorizerOptions::Recipe::kPaper : ColorizerOptions::Recipe::kOurs;
-  options.iterations = json.at("iterations");
-  options.time_limit_seconds = json.at("time_limit_seconds");
-  options.max_side_px = json.at("max_side_px");
-  options.crop_px = json.at("crop_px");
-  options.consistency_weight = json.at("consistency_weight");
-  options.seed = json.at("seed");
-  return options;
-}
-
 }  // namespace
 
 PersonalColorizer::PersonalColorizer(Parts parts)
@@ -74,31 +48,30 @@ PersonalColorizer::PersonalColorizer(Parts parts)
                                                    std::exp(-trained / recipe_.trust_iterations);
   torch::NoGradGuard no_grad;
   parts_.model->RequireGradients(false);
+  parts_.model->set_half_products(false);
   for (auto& [name, tensor] : parts_.model->parameters()) {
     torch::Tensor target = tensor;
     target.copy_(tensor.to(torch::kHalf).to(torch::kFloat32));
   }
 }
 
-PersonalColorizer::Answer PersonalColorizer::Ask(const torch::Tensor& luminance,
+// `taps`: with adapters the adapted ones.
+PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps,
+                                                 const torch::Tensor& luminance,
                                                  int picture_height) const {
   const bool decode = !parts_.neighbours || neighbour_share_ < 1.0;
   const PersonalModel& model = *parts_.model;
-  std::vector<torch::Tensor> taps;
   torch::Tensor decoded;
   if (decode) {
-    taps = model.Taps(luminance);
     decoded = model.Decode(taps, luminance) * kAbScale;
     if (recipe_.flip_average) {
       decoded = 0.5 * (decoded + kAbScale * model.Forward(luminance.flip({3})).flip({3}));
     }
+    // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
+    decoded = decoded.clamp(-kMaxAb, kMaxAb);
   }
-  // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
-  if (decode) decoded = decoded.clamp(-kMaxAb, kMaxAb);
   if (!parts_.neighbours) return {decoded, {}};
-  if (!decode || model.config().adapters) {
-    taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
-  }
+  if (model.config().adapters) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
   const NeighbourColors found = parts_.neighbours->Lookup(taps, luminance, picture_height);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
@@ -108,24 +81,7 @@ PersonalColorizer::Answer PersonalColorizer::Ask(const torch::Tensor& luminance,
   return {torch::lerp(decoded, near, neighbour_share_), found.distance};
 }
 
-ColorPrediction PersonalColorizer::PredictAtTrainingSize(const Image& luminance) const {
-  const torch::Tensor padded = PadToMultiple(TensorFromImage(luminance), kPadMultiple);
-  const Answer answer = Ask(padded, luminance.height);
-  ColorPrediction prediction;
-  const Image fine = UpsampleGuided(
-      ImageFromTensor(answer.ab), ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
-  prediction.ab = CropTo(fine, luminance.width, luminance.height);
-  if (answer.distance.defined()) {
-    const Image coarse = ImageFromTensor(answer.distance.unsqueeze(0));
-    prediction.distance =
-        CropTo(Resize(coarse, fine.width, fine.height), luminance.width, luminance.height);
-  }
-  return prediction;
-}
-
-Image PersonalColorizer::Colorize(const Image& luminance) const { return Predict(luminance).ab; }
-
-ColorPrediction PersonalColorizer::Predict(const Image& luminance) const {
+void PersonalColorizer::Check(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
     throw InvalidArgument("the colorizer takes a picture with 1 channel (L), this one has " +
                           std::to_string(luminance.channels));
@@ -135,17 +91,57 @@ ColorPrediction PersonalColorizer::Predict(const Image& luminance) const {
       throw InvalidArgument("the luminance to be coloured holds a value that is not finite");
     }
   }
+}
+
+std::pair<int, int> PersonalColorizer::PaddedSize(const Image& small) {
+  const auto padded = [](int side) {
+    return (side + kPadMultiple - 1) / kPadMultiple * kPadMultiple;
+  };
+  return {padded(small.width), padded(small.height)};
+}
+
+torch::Tensor PersonalColorizer::Padded(const Image& small) {
+  return PadToMultiple(TensorFromImage(small), kPadMultiple);
+}
+
+void PersonalColorizer::SetThreads() const { SetTorchThreads(parts_.options.threads); }
+
+Image PersonalColorizer::AtTrainingSize(const Image& luminance) const {
+  return FitWithin(luminance, parts_.options.max_side_px);
+}
+
+ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tensor>& taps,
+                                                   const torch::Tensor& padded,
+                                                   const Image& small,
+                                                   const Image& luminance) const {
+  const Answer answer = Ask(taps, padded, small.height);
+  const Image fine = UpsampleGuided(
+      ImageFromTensor(answer.ab), ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
+  ColorPrediction prediction;
+  prediction.ab = CropTo(fine, small.width, small.height);
+  if (answer.distance.defined()) {
+    const Image coarse = ImageFromTensor(answer.distance.unsqueeze(0));
+    prediction.distance =
+        CropTo(Resize(coarse, fine.width, fine.height), small.width, small.height);
+  }
+  if (small.width == luminance.width && small.height == luminance.height) return prediction;
+  prediction.ab = UpsampleGuided(prediction.ab, luminance, kGuideRadius, kGuideVarianceFloor);
+  if (!prediction.distance.Empty()) {
+    prediction.distance = Resize(prediction.distance, luminance.width, luminance.height);
+  }
+  return prediction;
+}
+
+Image PersonalColorizer::Colorize(const Image& luminance) const { return Predict(luminance).ab; }
+
+ColorPrediction PersonalColorizer::Predict(const Image& luminance) const {
+  Check(luminance);
   return WithTorchErrors("colorizer", [&] {
     torch::NoGradGuard no_grad;
-    SetTorchThreads(parts_.options.threads);
-    const Image small = FitWithin(luminance, parts_.options.max_side_px);
-    ColorPrediction prediction = PredictAtTrainingSize(small);
-    if (small.width == luminance.width && small.height == luminance.height) return prediction;
-    prediction.ab = UpsampleGuided(prediction.ab, luminance, kGuideRadius, kGuideVarianceFloor);
-    if (!prediction.distance.Empty()) {
-      prediction.distance = Resize(prediction.distance, luminance.width, luminance.height);
-    }
-    return prediction;
+    SetThreads();
+    const Image small = AtTrainingSize(luminance);
+    const torch::Tensor padded = Padded(small);
+    return PredictFromTaps(parts_.model->Taps(padded), padded, small, luminance);
   });
 }
 

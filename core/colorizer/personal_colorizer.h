@@ -4,13 +4,14 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/feature_neighbours.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
-#include "core/colorizer/trainer.h"
+#include "core/colorizer/training_session.h"
 
 namespace color3d {
 
@@ -30,6 +31,20 @@ class PersonalColorizer : public Colorizer {
   ColorPrediction Predict(const Image& luminance) const override;
   std::string Serialize() const override;
 
+  // The steps of Predict, for whoever runs the encoder over many pictures at once: frozen taps
+  // (UsesFrozenTaps) of Padded(AtTrainingSize(luminance)).
+  static void Check(const Image& luminance);
+  static std::pair<int, int> PaddedSize(const Image& small);  // width, height
+  static torch::Tensor Padded(const Image& small);
+  bool UsesFrozenTaps() const { return !recipe_.model.adapters && !recipe_.flip_average; }
+  const TapEncoder& encoder() const { return *parts_.encoder; }
+  void SetThreads() const;
+  Image AtTrainingSize(const Image& luminance) const;
+  ColorPrediction PredictFromTaps(const std::vector<torch::Tensor>& taps,
+                                  const torch::Tensor& padded,
+                                  const Image& small,
+                                  const Image& luminance) const;
+
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
                                                       std::shared_ptr<const TapEncoder> encoder,
                                                       int threads);
@@ -40,8 +55,9 @@ class PersonalColorizer : public Colorizer {
     torch::Tensor distance;  // [h,w] on the neighbours' grid; undefined without neighbours
   };
   // Of a padded L [1,1,H,W]; `picture_height` before padding.
-  Answer Ask(const torch::Tensor& luminance, int picture_height) const;
-  ColorPrediction PredictAtTrainingSize(const Image& luminance) const;
+  Answer Ask(std::vector<torch::Tensor> taps,
+             const torch::Tensor& luminance,
+             int picture_height) const;
 
   Parts parts_;
   TrainingRecipe recipe_;

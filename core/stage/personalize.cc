@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/color/lab.h"
+#include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
 #include "core/scene/view_images.h"
@@ -94,12 +95,17 @@ void RunPersonalize(const ColorizerOptions& options,
   for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
     pictures.push_back(std::move(picture));
   }
-  const auto colorizer = TrainColorizer(context.LoadEncoder(encoder),
-                                        std::move(pictures),
-                                        options,
-                                        context.checkpoints(),
-                                        context.progress(),
-                                        context.cancel());
+  SceneBatch alone(options.threads);
+  SceneBatch& batch = context.batch() != nullptr ? *context.batch() : alone;
+  const auto colorizer =
+      TrainColorizer(batch.SharedEncoder(encoder, [&] { return context.LoadEncoder(encoder); }),
+                     std::move(pictures),
+                     options,
+                     context.checkpoints(),
+                     context.progress(),
+                     context.cancel(),
+                     batch,
+                     context.project());
   context.WriteOutput(artifact::kColorizer, colorizer->Serialize());
 }
 

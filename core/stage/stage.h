@@ -17,6 +17,8 @@
 
 namespace color3d {
 
+class SceneBatch;
+
 // Lives for one run of one stage, on one thread.
 class StageContext {
  public:
@@ -33,6 +35,8 @@ class StageContext {
     std::string attempt;                                  // unique to this run, e.g. "jobs/3f/2"
     // Kept between jobs (FileCache); empty: none.
     std::filesystem::path cache_folder = {};
+    SceneBatch* batch = nullptr;  // that personalization takes part in; null: alone
+    std::string project = {};     // fairness in the batch is between projects
   };
 
   // The references must outlive the context.
@@ -54,6 +58,8 @@ class StageContext {
   // The encoder of these weights, loaded anew; the embedded one when `model` is empty.
   std::shared_ptr<const Encoder> LoadEncoder(const std::string& model) const;
   const std::filesystem::path& cache_folder() const { return setup_.cache_folder; }
+  SceneBatch* batch() const { return setup_.batch; }
+  const std::string& project() const { return setup_.project; }
   CheckpointStore& checkpoints() { return checkpoints_; }
   ProgressObserver& progress() { return progress_; }
   const CancellationToken& cancel() const { return cancel_; }

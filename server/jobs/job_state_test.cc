@@ -268,5 +268,72 @@ TEST_F(JobStateTest, PriorityThenAge) {
   EXPECT_EQ(ClaimOne().name, first.name);
 }
 
+NewGraph Companions(int count) {
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  for (int i = 0; i < count; ++i) {
+    NewJob job;
+    job.kind = "personalize";
+    job.spec = "a";
+    graph.jobs.push_back(job);
+  }
+  NewJob root;
+  root.kind = "root";
+  for (int i = 0; i < count; ++i) root.inputs.push_back(i);
+  graph.jobs.push_back(root);
+  return graph;
+}
+
+const auto kAnyJob = [](const JobRecord&) { return true; };
+
+TEST_F(JobStateTest, CompanionsTakeTurnsBetweenSubmittedJobs) {
+  const JobRecord many = store_->CreateGraph(Companions(5), {}, kNoLimit);
+  const JobRecord few = store_->CreateGraph(Companions(1), {}, kNoLimit);
+  EXPECT_EQ(ClaimOne().parent, many.name);
+  const auto next = [&] { return store_->ClaimCompanion("w", kLease, "personalize", kAnyJob); };
+  EXPECT_EQ(next()->parent, few.name) << "it has none running yet";
+  const auto third = next();
+  EXPECT_EQ(third->parent, many.name);
+  EXPECT_EQ(third->state, JobState::kRunning);
+  EXPECT_EQ(third->attempt, 1);
+  EXPECT_FALSE(
+      store_->ClaimCompanion("w", kLease, "personalize", [](const JobRecord&) { return false; }));
+}
+
+TEST_F(JobStateTest, CompanionsDoNotOvertakeOtherKinds) {
+  store_->CreateGraph(Companions(2), {}, kNoLimit);
+  ClaimOne();
+  const JobRecord other = CreateSingle();
+  EXPECT_TRUE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob)) << "it came before";
+  store_->CreateGraph(Companions(1), {}, kNoLimit);
+  EXPECT_FALSE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob));
+  EXPECT_EQ(ClaimOne().name, other.name);
+  EXPECT_TRUE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob));
+}
+
+TEST_F(JobStateTest, AJobThatAWorkerWasLostWithGetsNoCompany) {
+  store_->CreateGraph(Companions(1), {}, kNoLimit);
+  ClaimOne();
+  now_ += kLease + 1;
+  EXPECT_EQ(store_->ReapExpired(), 1);
+  now_ += 1'000'000;
+  EXPECT_FALSE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob));
+  EXPECT_EQ(ClaimOne().attempt, 2);
+}
+
+TEST_F(JobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
+  SceneRecord scene;
+  scene.name = "scenes/other";
+  store_->CreateScene(scene, {});
+  NewGraph graph = Companions(2);
+  graph.jobs[1].scene = "scenes/other";
+  EXPECT_EQ(ReasonThrown([&] { store_->CreateGraph(graph, {}, kNoLimit); }), "SCENE_NOT_ACTIVE");
+  store_->ActivateScene("scenes/other", StoredLayout::kPhotos, 1, {});
+  const JobRecord root = store_->CreateGraph(graph, {}, kNoLimit);
+  const auto children = store_->ListChildren(root.name);
+  EXPECT_EQ(children[0].scene, "scenes/test");
+  EXPECT_EQ(children[1].scene, "scenes/other");
+}
+
 }  // namespace
 }  // namespace color3d

@@ -6,6 +6,7 @@
 // (REQUEST_ID_REUSED), kUnavailable (store busy), kResourceExhausted (disk full).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -25,6 +26,7 @@ struct RequestKey {
 
 struct NewJob {
   std::string kind;
+  std::string scene;  // empty: the graph's
   std::string spec;
   std::vector<int> inputs;              // positions in NewGraph::jobs, all smaller than its own
   std::vector<std::string> input_jobs;  // names of jobs that exist
@@ -135,6 +137,14 @@ class JobStore {
 
   // Jobs, from the worker's side.
   virtual std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) = 0;
+  // A job of this kind to run beside those that the worker holds already: one that no worker was
+  // lost with, that no waiting job of another kind comes before, of the submitted job with the
+  // fewest running jobs, and that `accept` agrees to.
+  virtual std::optional<JobRecord> ClaimCompanion(
+      const std::string& worker,
+      int64_t lease_ms,
+      const std::string& kind,
+      const std::function<bool(const JobRecord&)>& accept) = 0;
   // The jobs that this one depends on, in order of creation, with artifacts.
   virtual std::vector<JobRecord> GetInputs(int64_t job_id) = 0;
   // Extends the lease and stores progress and warnings (cheap: not synced to disk).

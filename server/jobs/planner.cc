@@ -442,6 +442,9 @@ NewGraph PlanJob(const v1::JobSpec& spec,
                  const std::vector<JobRecord>& inputs,
                  const SceneFacts& facts) {
   CheckSpec(spec);
+  if (spec.has_personalize_scenes()) {
+    throw Error(ErrorCode::kInternal, "personalize_scenes is planned by PlanPersonalizeScenes");
+  }
   GraphBuilder builder(spec, inputs, facts);
   return spec.has_colorize_scene() ? builder.BuildColorizeScene() : builder.BuildStage();
 }
@@ -453,7 +456,7 @@ StageKeyPart KeyPartOf(const std::string& serialized_spec) {
   }
   StageKeyPart part;
   part.skip_cache = spec.skip_cache();
-  if (spec.has_colorize_scene()) return part;
+  if (spec.has_colorize_scene() || spec.has_personalize_scenes()) return part;
   const std::string kind = KindOf(spec);
   // Where the work happens is no part of what it is: equal scenes give equal results.
   spec.clear_scene();

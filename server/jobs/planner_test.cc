@@ -275,9 +275,6 @@ TEST(Planner, AugmentationOptionsAreChecked) {
 TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
-  spec.mutable_personalize_scenes();
-  EXPECT_EQ(PlanError(spec).code, ErrorCode::kUnimplemented);
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("personalize_scenes"));
   spec.mutable_reconstruct_dynamic();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dynamic"));
   spec.mutable_reconstruct_dense();

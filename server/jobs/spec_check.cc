@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <sstream>
 
 #include "server/service_error.h"
@@ -303,6 +304,19 @@ void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
   }
 }
 
+void CheckRoutes(const v1::PersonalizeScenesSpec& spec) {
+  if (spec.routes().empty()) Reject("personalize_scenes.routes", " is empty; name a scene");
+  std::set<std::string> scenes;
+  for (int i = 0; i < spec.routes_size(); ++i) {
+    const std::string path = "personalize_scenes.routes[" + std::to_string(i) + "].scene";
+    const std::string& scene = spec.routes(i).scene();
+    if (scene.empty()) Reject(path, " is empty; name a scene");
+    if (!scenes.insert(scene).second) {
+      Reject(path, " is '" + scene + "', which is there already; name each scene once");
+    }
+  }
+}
+
 // `has_inputs`: the colour may come from a job among them; the planner sees to that.
 void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
@@ -334,6 +348,7 @@ const std::vector<std::string>& BuiltKinds() {
                                                  "generate_augmentations",
                                                  "personalize",
                                                  "carry_color",
+                                                 "personalize_scenes",
                                                  "colorize_views",
                                                  "reconstruct_geometry",
                                                  "solve_chroma",
@@ -356,6 +371,7 @@ void CheckSpec(const v1::JobSpec& spec) {
   }
   if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), "carry_color");
   if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
   if (spec.has_evaluate()) {
     CheckTruth(spec.evaluate().truth(), "evaluate.truth");
     CheckTraining(spec.evaluate().training_truth(),

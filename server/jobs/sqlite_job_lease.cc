@@ -37,6 +37,44 @@ std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_
   next.Bind(Now());
   if (!next.Step()) return std::nullopt;
   const int64_t id = next.Int(0);
+  JobRecord job = BeginAttempt(id, worker, lease_ms);
+  transaction.Commit();
+  return job;
+}
+
+std::optional<JobRecord> SqliteJobStore::ClaimCompanion(
+    const std::string& worker,
+    int64_t lease_ms,
+    const std::string& kind,
+    const std::function<bool(const JobRecord&)>& accept) {
+  std::lock_guard lock(mutex_);
+  // "project" is the submitted job: scenes of one must not keep out another's.
+  constexpr char kCandidates[] =
+      "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
+      "select 1 from job o where o.state='QUEUED' and o.kind<>?1 and o.run_after_ms<=?2 and "
+      "(o.priority, o.job_id)<(job.priority, job.job_id)) "
+      "order by priority, (select count(*) from job r where r.state='RUNNING' and "
+      "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
+      "limit 16";
+  const auto choose = [&]() -> std::optional<int64_t> {
+    SqliteStatement select(db_->handle(), SelectJob(kCandidates));
+    select.Bind(kind, Now());
+    while (select.Step()) {
+      const JobRecord job = JobFromRow(select);
+      if (accept(job)) return job.id;
+    }
+    return std::nullopt;
+  };
+  if (!choose()) return std::nullopt;  // only reads
+  SqliteTransaction transaction(*db_);
+  const std::optional<int64_t> id = choose();
+  if (!id) return std::nullopt;
+  JobRecord job = BeginAttempt(*id, worker, lease_ms);
+  transaction.Commit();
+  return job;
+}
+
+JobRecord SqliteJobStore::BeginAttempt(int64_t id, const std::string& worker, int64_t lease_ms) {
   db_->Run(
       "update job set state='RUNNING', attempt=attempt+1, lease_epoch=lease_epoch+1, "
       "lease_owner=?, lease_expires_ms=?, eta_seconds=-1, progress_message='', "
@@ -51,9 +89,7 @@ std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_
       Now(),
       id);
   AddEvent(id, /*progress=*/false);
-  JobRecord job = JobById(id);
-  transaction.Commit();
-  return job;
+  return JobById(id);
 }
 
 std::vector<JobRecord> SqliteJobStore::GetInputs(int64_t job_id) {

@@ -123,6 +123,18 @@ void SqliteJobStore::PropagateEnd(const JobRecord& cause) {
   }
 }
 
+namespace {
+
+void RequireActive(const SceneRecord& scene) {
+  if (scene.state == SceneState::kActive) return;
+  throw ServiceError(ErrorCode::kFailedPrecondition,
+                     "SCENE_NOT_ACTIVE",
+                     "the scene '" + scene.name +
+                         "' is not committed; upload its files and call CommitScene first");
+}
+
+}  // namespace
+
 void SqliteJobStore::InsertJob(const NewGraph& graph,
                                size_t index,
                                const std::vector<std::string>& names,
@@ -137,7 +149,7 @@ void SqliteJobStore::InsertJob(const NewGraph& graph,
       names[index],
       is_root ? std::string() : names.back(),
       job.kind,
-      graph.scene,
+      job.scene.empty() ? graph.scene : job.scene,
       job.spec,
       JobStateName(skipped ? JobState::kSkipped : JobState::kBlocked),
       graph.priority,
@@ -171,14 +183,11 @@ JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
   std::lock_guard lock(mutex_);
   SqliteTransaction transaction(*db_);
   if (const auto resource = CheckRequest(request)) return RequireJob(*resource);
-  const SceneRecord scene = RequireScene(graph.scene, false);
-  if (scene.state != SceneState::kActive) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "SCENE_NOT_ACTIVE",
-                       "the scene '" + scene.name +
-                           "' is not committed; upload its files and "
-                           "call CommitScene first");
+  std::set<std::string> scenes = {graph.scene};
+  for (const NewJob& job : graph.jobs) {
+    if (!job.scene.empty()) scenes.insert(job.scene);
   }
+  for (const std::string& name : scenes) RequireActive(RequireScene(name, false));
   SqliteStatement unfinished(db_->handle(), "select count(*) from job where end_ms=0");
   unfinished.Step();
   if (unfinished.Int(0) + static_cast<int64_t>(graph.jobs.size()) > max_unfinished) {

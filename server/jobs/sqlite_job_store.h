@@ -53,6 +53,11 @@ class SqliteJobStore : public JobStore {
   void Delete(const std::string& name, const RequestKey& request) override;
 
   std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
+  std::optional<JobRecord> ClaimCompanion(
+      const std::string& worker,
+      int64_t lease_ms,
+      const std::string& kind,
+      const std::function<bool(const JobRecord&)>& accept) override;
   std::vector<JobRecord> GetInputs(int64_t job_id) override;
   HeartbeatReply Heartbeat(const Lease& lease,
                            const ProgressRecord& progress,
@@ -107,6 +112,7 @@ class SqliteJobStore : public JobStore {
   // State machine (sqlite_job_state.cc).
   void AddEvent(int64_t job_id, bool progress);
   void SetState(int64_t job_id, JobState state);
+  JobRecord BeginAttempt(int64_t job_id, const std::string& worker, int64_t lease_ms);
   void FinishAttempt(const Lease& lease, const char* outcome);
   JobRecord RequireLease(const Lease& lease);
   bool InputsAreReady(int64_t job_id);

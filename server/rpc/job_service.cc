@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "server/jobs/plan_scenes.h"
 #include "server/jobs/planner.h"
 #include "server/jobs/spec_check.h"
 #include "server/jobs/spec_names.h"
@@ -63,22 +64,61 @@ SceneFacts FactsOf(const SceneRecord& scene) {
               }))};
 }
 
+// The route's colorize_key_view job, by default the one that its scene's user accepted, and what it
+// read.
+SceneRouteInputs LoadRoute(const RpcParts& parts,
+                           const v1::PersonalizeScenesSpec::SceneRoute& route) {
+  CheckName(route.scene(), "scenes");
+  const SceneRecord scene = parts.store.GetScene(route.scene());
+  const std::string name =
+      route.key_color_job().empty() ? scene.key_color_job : route.key_color_job();
+  if (name.empty()) {
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "INPUT_MISSING",
+                       "the scene " + scene.name +
+                           " has no accepted key view; accept one, or name its "
+                           "colorize_key_view job in the route's key_color_job");
+  }
+  CheckName(name, "jobs");
+  const JobRecord key_color = parts.store.GetJob(name);
+  if (key_color.kind != "colorize_key_view") {
+    throw InvalidArgument("the key_color_job " + name + " of " + scene.name + " is a " +
+                          key_color.kind + " job; name a colorize_key_view job");
+  }
+  SceneRouteInputs inputs{parts.store.GetInputs(key_color.id), FactsOf(scene)};
+  inputs.jobs.push_back(key_color);
+  return inputs;
+}
+
+NewGraph PlanRequest(const RpcParts& parts, const v1::JobSpec& spec) {
+  if (!spec.has_personalize_scenes()) {
+    return PlanJob(spec, LoadInputs(parts, spec), FactsOf(parts.store.GetScene(spec.scene())));
+  }
+  std::vector<SceneRouteInputs> routes;
+  for (const auto& route : spec.personalize_scenes().routes()) {
+    routes.push_back(LoadRoute(parts, route));
+  }
+  return PlanPersonalizeScenes(spec, routes);
+}
+
 JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& request) {
   const RequestKey key = KeyOf("CreateJob", request);
   if (const auto existing = parts.store.FindRequest(key)) return parts.store.GetJob(*existing);
   RequireNotDraining(parts);
   if (!request.has_spec()) throw InvalidArgument("spec is required");
-  CheckName(request.spec().scene(), "scenes");
+  v1::JobSpec spec = request.spec();
+  if (spec.scene().empty() && spec.personalize_scenes().routes_size() > 0) {
+    spec.set_scene(spec.personalize_scenes().routes(0).scene());
+  }
+  CheckName(spec.scene(), "scenes");
   const int priority = request.has_priority() ? request.priority() : 100;
   if (priority < 0 || priority > 1000) {
     throw InvalidArgument("priority is " + std::to_string(priority) + "; the range is 0 to 1000");
   }
-  CheckSpec(request.spec());
-  CheckNames(request.spec(), parts.models);
-  CheckBlobs(parts, request.spec());
-  NewGraph graph = PlanJob(request.spec(),
-                           LoadInputs(parts, request.spec()),
-                           FactsOf(parts.store.GetScene(request.spec().scene())));
+  CheckSpec(spec);
+  CheckNames(spec, parts.models);
+  CheckBlobs(parts, spec);
+  NewGraph graph = PlanRequest(parts, spec);
   graph.priority = priority;
   JobRecord job = parts.store.CreateGraph(graph, key, parts.limits.max_unfinished_jobs);
   spdlog::info(

@@ -65,7 +65,7 @@ class StoredBlobs : public BlobSource {
 
 class Attempt {
  public:
-  Attempt(const AttemptContext& context, const JobRecord& job)
+  Attempt(const AttemptContext& context, const JobRecord& job, bool in_company)
       : context_(context),
         job_(job),
         tag_(AttemptTag(job)),
@@ -79,7 +79,7 @@ class Attempt {
             [this] { context_.on_heartbeat(job_); },
             [this](StopReason reason) { GiveUp(reason); }),
         checkpoints_(context.store, context.blobs, job, context.checkpoint_interval) {
-    ResetPeakMemory();
+    if (!in_company) ResetPeakMemory();
   }
   ~Attempt() {
     std::error_code error;
@@ -143,6 +143,7 @@ void Attempt::Run() {
 void Attempt::Prepare() {
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
+  run_.project = job_.parent.empty() ? job_.name : job_.parent;
   run_.spec = job_.spec;
   run_.threads = context_.threads;
   run_.attempt = job_.attempt;
@@ -360,8 +361,8 @@ void Attempt::GiveUp(StopReason reason) {
 
 }  // namespace
 
-void RunAttempt(const AttemptContext& context, const JobRecord& job) {
-  Attempt attempt(context, job);
+void RunAttempt(const AttemptContext& context, const JobRecord& job, bool in_company) {
+  Attempt attempt(context, job, in_company);
   attempt.Run();
 }
 

@@ -1,6 +1,9 @@
 #include "server/worker/stage_runner.h"
 
+#include <mutex>
+
 #include "color3d/v1/job.pb.h"
+#include "core/colorizer/scene_batch.h"
 #include "core/report/curves.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
@@ -145,6 +148,8 @@ class CoreStageRunner : public StageRunner {
       return MakeGrpcColorizer(run.models.backends, name);
     };
     setup.attempt = run.job_name + "/" + std::to_string(run.attempt);
+    setup.batch = Batch(run.threads);
+    setup.project = run.project;
     StageContext context(std::move(setup), recorder, recorder, cancel);
     RunStage(spec, kind, run, blobs, context);
     const auto points = recorder.points();
@@ -155,6 +160,13 @@ class CoreStageRunner : public StageRunner {
   }
 
  private:
+  // Of all personalize jobs of this process, made when the first one needs it.
+  SceneBatch* Batch(int threads) {
+    std::lock_guard lock(mutex_);
+    if (!batch_) batch_ = std::make_unique<SceneBatch>(threads);
+    return batch_.get();
+  }
+
   static void RunStage(const JobSpec& spec,
                        const std::string& kind,
                        const StageRun& run,
@@ -199,10 +211,15 @@ class CoreStageRunner : public StageRunner {
         return RunEvaluation(spec.evaluate(), blobs, context);
       case JobSpec::kColorizeScene:
         return RunRootReport(run.graph, context);
+      case JobSpec::kPersonalizeScenes:
+        return;  // its jobs have done it all
       default:
         throw Error(ErrorCode::kUnimplemented, "jobs of kind \"" + kind + "\" are not built yet");
     }
   }
+
+  std::mutex mutex_;
+  std::unique_ptr<SceneBatch> batch_;
 };
 
 }  // namespace

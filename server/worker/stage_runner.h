@@ -36,6 +36,7 @@ class BlobSource {
 
 struct StageRun {
   std::string job_name;                // "jobs/..."
+  std::string project;                 // the submitted job: what fairness is between
   std::string spec;                    // serialised color3d.v1.JobSpec
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
   // Artifacts of the jobs that this one depends on, by artifact name (read-only files).
@@ -57,13 +58,17 @@ struct StageOutput {
 class StageRunner {
  public:
   virtual ~StageRunner() = default;
-  // Runs one attempt. Throws Error; anything else that escapes is an internal error of ours.
+  // Runs one attempt. Throws Error; anything else that escapes is an internal error of ours. Called
+  // from several threads at once for jobs of kRunsInCompany.
   virtual StageOutput Run(const StageRun& run,
                           BlobSource& blobs,
                           CheckpointStore& checkpoints,
                           ProgressObserver& progress,
                           const CancellationToken& cancel) = 0;
 };
+
+// Many jobs of this kind run in one worker at once, sharing an encoder and taking turns.
+inline constexpr char kRunsInCompany[] = "personalize";
 
 // The real one (stage_runner.cc): every stage of core/stage.
 std::unique_ptr<StageRunner> MakeStageRunner();

@@ -5,13 +5,18 @@
 
 #include <thread>
 
+#include "color3d/v1/job.pb.h"
 #include "core/base/memory.h"
 #include "server/jobs/sqlite_job_store.h"
 #include "server/ops/process.h"
 #include "server/worker/attempt.h"
+#include "server/worker/attempt_batch.h"
 
 namespace color3d {
 namespace {
+
+// Left free before one more scene is taken in: decoder, optimiser, averages and activations.
+constexpr int64_t kSceneMemoryBytes = int64_t{512} << 20;
 
 class WorkerLoop {
  public:
@@ -50,8 +55,13 @@ class WorkerLoop {
   }
   void ReportSelf(JobStore& store, const std::string& job) const;
   bool ShouldRecycle() const;
-  // Claims and runs one job; false when there was none.
+  // Claims and runs one job, or a batch of them; false when there was none.
   bool Turn();
+  void RunBatch(const JobRecord& first);
+  // Whether another scene may join `running` ones.
+  bool HasRoom(int running) const;
+  // The next job that can join `first`; none when the queue has none or cannot be read now.
+  std::optional<JobRecord> ClaimCompanion(const JobRecord& first);
 
   const WorkerOptions options_;
   const std::string id_;
@@ -82,10 +92,52 @@ bool WorkerLoop::Turn() {
   const std::optional<JobRecord> job = store_.Claim(id_, options_.timing.lease.count());
   if (!job) return false;
   ReportSelf(store_, job->name);
-  RunAttempt(context_, *job);
-  ++jobs_done_;
+  // A job that a worker was lost with may be what killed it: it gets no company.
+  if (job->kind == kRunsInCompany && options_.batch_scenes > 1 && job->attempt <= 1) {
+    RunBatch(*job);
+  } else {
+    RunAttempt(context_, *job);
+    ++jobs_done_;
+  }
   ReportSelf(store_, "");
   return true;
+}
+
+bool WorkerLoop::HasRoom(int running) const {
+  return running < options_.batch_scenes && !Finished() &&
+         ResidentMemoryBytes() < options_.recycle_memory_bytes &&
+         AvailableMemoryBytes() > kSceneMemoryBytes;
+}
+
+std::optional<JobRecord> WorkerLoop::ClaimCompanion(const JobRecord& first) {
+  const auto encoder_of = [](const JobRecord& job) {
+    v1::JobSpec spec;
+    spec.ParseFromString(job.spec);
+    return spec.personalize().encoder();
+  };
+  const std::string encoder = encoder_of(first);
+  try {
+    return store_.ClaimCompanion(
+        id_, options_.timing.lease.count(), first.kind, [&](const JobRecord& job) {
+          return encoder_of(job) == encoder;
+        });
+  } catch (const Error& e) {
+    spdlog::warn("{} cannot look for company: {}", id_, e.what());
+    return std::nullopt;
+  }
+}
+
+// Continuous batching: scenes join while there is room, and each leaves when it is done. One joins
+// at a time between two looks, so that workers without work get their share of the queue.
+void WorkerLoop::RunBatch(const JobRecord& first) {
+  AttemptBatch batch(context_);
+  batch.Start(first);
+  while (batch.size() > 0) {
+    if (HasRoom(batch.size())) {
+      if (const auto companion = ClaimCompanion(first)) batch.Start(*companion);
+    }
+    jobs_done_ += batch.Reap(options_.poll);
+  }
 }
 
 void WorkerLoop::Run() {

@@ -27,6 +27,8 @@ struct WorkerOptions {
   // torch's memory grows with the number of distinct picture sizes.
   int64_t recycle_memory_bytes = int64_t{2} << 30;
   int recycle_jobs = 200;
+  // Personalize jobs of one encoder that run at once, sharing it; fewer when memory is short.
+  int batch_scenes = 8;
   pid_t parent = 0;  // 0: started by hand
   std::string code_version;
   UserModels models;

@@ -41,6 +41,11 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
   app->add_option("--threads", options.threads, "Threads of computing")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  app->add_option("--batch-scenes",
+                  options.batch_scenes,
+                  "Scenes that are personalized at once, sharing the encoder")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
   app->add_option("--log-level", arguments->log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
   app->add_option("--model", arguments->models, "NAME=FILE: weights that jobs may name")

@@ -1,0 +1,39 @@
+#include "server/worker/attempt_batch.h"
+
+#include <algorithm>
+
+namespace color3d {
+
+AttemptBatch::~AttemptBatch() {
+  for (Running& running : running_) running.thread.join();
+}
+
+void AttemptBatch::Start(const JobRecord& job) {
+  const bool in_company = !running_.empty();
+  Running& running = running_.emplace_back();
+  running.thread = std::thread([this, job, in_company, &running] {
+    RunAttempt(context_, job, in_company);
+    std::lock_guard lock(mutex_);
+    running.ended = true;
+    ended_.notify_all();
+  });
+}
+
+int AttemptBatch::Reap(std::chrono::milliseconds timeout) {
+  const auto ended = [](const Running& running) { return running.ended; };
+  std::list<Running> done;
+  {
+    std::unique_lock lock(mutex_);
+    ended_.wait_for(
+        lock, timeout, [&] { return std::any_of(running_.begin(), running_.end(), ended); });
+    for (auto it = running_.begin(); it != running_.end();) {
+      const auto next = std::next(it);
+      if (it->ended) done.splice(done.end(), running_, it);
+      it = next;
+    }
+  }
+  for (Running& running : done) running.thread.join();
+  return static_cast<int>(done.size());
+}
+
+}  // namespace color3d

@@ -1,0 +1,133 @@
+// `color3d job submit --all-in-one`: the personalize jobs of many scenes run in one worker
+// together, and survive its death.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "tests/integration/service_fixture.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::json;
+using std::chrono::seconds;
+
+// Many scenes (the long test): COLOR3D_ALL_IN_ONE_SCENES=140.
+int SceneCount() {
+  const char* text = std::getenv("COLOR3D_ALL_IN_ONE_SCENES");
+  return text != nullptr ? std::atoi(text) : 5;
+}
+
+class AllInOneTest : public ServiceTest {
+ protected:
+  // `count` scenes of the same tiny photos, each with an accepted key view.
+  std::vector<std::string> MakeScenes(int count) {
+    ProceduralSceneOptions room = SmallRoom(4);
+    room.width = 64;
+    room.height = 48;
+    WriteProceduralScene(Path("room"), room);
+    std::vector<std::string> scenes;
+    for (int i = 0; i < count; ++i) {
+      const ProcessResult created = Client({"scene", "create", Path("room").string(), "--json"});
+      EXPECT_EQ(created.exit_code, 0) << created.err;
+      scenes.push_back(json::parse(created.out).at("name"));
+      const ProcessResult coloured =
+          Client({"key", "colour", scenes.back(), "--auto", "-o", Path("key").string()});
+      EXPECT_EQ(coloured.exit_code, 0) << coloured.out << coloured.err;
+      const ProcessResult accepted = Client({"key", "accept", scenes.back()});
+      EXPECT_EQ(accepted.exit_code, 0) << accepted.err;
+    }
+    return scenes;
+  }
+
+  std::string Submit(const std::vector<std::string>& scenes, int iterations) {
+    const ProcessResult result = Client(
+        std::vector<std::string>{"job", "submit", "--all-in-one"} + scenes +
+        std::vector<std::string>{"--iterations", std::to_string(iterations), "--again", "--json"});
+    EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+    return json::parse(result.out).at("name");
+  }
+
+  std::vector<v1::Job> Children(const std::string& parent) {
+    std::vector<v1::Job> children;
+    for (const v1::Job& job : server().ListJobs()) {
+      if (job.parent() == parent) children.push_back(job);
+    }
+    return children;
+  }
+
+  int CountIn(const std::string& parent, v1::Job::State state) {
+    const auto children = Children(parent);
+    return static_cast<int>(std::count_if(
+        children.begin(), children.end(), [&](const v1::Job& j) { return j.state() == state; }));
+  }
+};
+
+TEST_F(AllInOneTest, ScenesTrainTogetherAndSurviveTheirWorker) {
+  StartServer({"--lease-seconds",
+               "4",
+               "--heartbeat-seconds",
+               "0.3",
+               "--checkpoint-seconds",
+               "0.5",
+               "--retry-backoff-ms",
+               "200"});
+  const std::vector<std::string> scenes = MakeScenes(3);
+  const std::string parent = Submit(scenes, 400);
+  ASSERT_TRUE(WaitUntil([&] { return CountIn(parent, v1::Job::STATE_RUNNING) == 3; }, seconds(60)))
+      << "they do not run together";
+  std::string worker;
+  ASSERT_TRUE(WaitUntil(
+      [&] {
+        const auto children = Children(parent);
+        worker = children[0].worker();
+        return std::all_of(children.begin(), children.end(), [&](const v1::Job& job) {
+          return job.progress().step() > 60 && job.worker() == worker;
+        });
+      },
+      seconds(120)));
+  ::kill(std::atoi(worker.substr(worker.rfind('-') + 1).c_str()), SIGKILL);
+  ASSERT_TRUE(
+      WaitUntil([&] { return CountIn(parent, v1::Job::STATE_SUCCEEDED) == 3; }, seconds(300)));
+  for (const v1::Job& job : Children(parent)) {
+    EXPECT_EQ(job.attempt(), 2) << job.name();
+    EXPECT_GT(job.peak_memory_bytes(), 0);
+  }
+}
+
+TEST_F(AllInOneTest, ManySmallScenesQueueTrainAndFinishUnattended) {
+  StartServer();
+  const int count = SceneCount();
+  const std::vector<std::string> scenes = MakeScenes(count);
+  const std::string parent = Submit(scenes, 6);
+  const ProcessResult watched = Client({"job", "watch", parent}, seconds(1200));
+  EXPECT_EQ(watched.exit_code, 0) << watched.out << watched.err;
+  int64_t peak = 0;
+  std::set<std::string> of_scenes;
+  for (const v1::Job& job : Children(parent)) {
+    EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
+    EXPECT_FALSE(job.cached());
+    peak = std::max(peak, job.peak_memory_bytes());
+    of_scenes.insert(job.spec().scene());
+  }
+  EXPECT_EQ(of_scenes.size(), scenes.size());
+  EXPECT_LT(peak, int64_t{1500} << 20);
+}
+
+TEST_F(AllInOneTest, ASceneWithoutAKeyViewIsNamed) {
+  StartServer();
+  ProceduralSceneOptions room = SmallRoom(4);
+  WriteProceduralScene(Path("room"), room);
+  const ProcessResult created = Client({"scene", "create", Path("room").string(), "--json"});
+  const std::string scene = json::parse(created.out).at("name");
+  ExpectRefusal(
+      Client({"job", "submit", "--all-in-one", scene}), 2, {scene, "no accepted key view"});
+  ExpectRefusal(Client({"job", "submit"}), 2, {"--all-in-one"});
+}
+
+}  // namespace
+}  // namespace color3d
