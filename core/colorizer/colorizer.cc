@@ -21,6 +21,8 @@
 namespace color3d {
 namespace {
 
+constexpr float kMaxGivenAb = 256.0f;
+
 void CheckRange(const char* field, double value, double low, double high) {
   if (!(value >= low && value <= high)) {
     throw InvalidArgument(std::string("colorizer option ") + field + " is " +
@@ -51,6 +53,13 @@ void CheckPicture(const TrainingPicture& picture) {
       if (!std::isfinite(value)) {
         throw InvalidArgument(name + " holds a value that is not finite");
       }
+    }
+  }
+  for (float value : picture.ab.data) {
+    // Far beyond every colour; what is stored in half precision would overflow.
+    if (std::abs(value) > kMaxGivenAb) {
+      throw InvalidArgument(name + " holds the chroma " + std::to_string(value) +
+                            "; a and b are Lab units, at most " + std::to_string(kMaxGivenAb));
     }
   }
   for (float value : picture.weight.data) {

@@ -73,11 +73,14 @@ class RemoteColorizer {
   virtual std::string Colorize(const RemoteRequest& request,
                                ProgressObserver& progress,
                                const CancellationToken& cancel) = 0;
-  // The bytes of 1..samples pictures, unchecked but for their number and size. By default:
-  // Error{kUnimplemented}.
+  // The bytes of 1..samples pictures, unchecked but for their number and size. Defined here, by
+  // default as Error{kUnimplemented}, because those who implement this link no library of ours.
   virtual std::vector<std::string> Generate(const RemoteGenerateRequest& request,
-                                            ProgressObserver& progress,
-                                            const CancellationToken& cancel);
+                                            ProgressObserver&,
+                                            const CancellationToken&) {
+    throw Error(ErrorCode::kUnimplemented,
+                "this backend generates no " + request.kind + " pictures");
+  }
 };
 // By the name in the server's configuration. Throws Error{kFailedPrecondition} for an unknown one.
 using RemoteColorizerFactory =
