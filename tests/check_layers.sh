@@ -38,6 +38,7 @@ allow core/encoder 'core/(base|color|image|weights|encoder)'
 for folder in keyview keycolor augment metrics; do
   allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
 done
+allow core/carry 'core/(base|color|image|scene|keycolor|carry)'
 allow core/colorizer 'core/(base|color|image|weights|encoder|augment|colorizer)'
 allow core/splat 'core/(base|color|image|scene|splat)'
 allow core/report 'core/(base|image|report)'

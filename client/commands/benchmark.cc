@@ -114,6 +114,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   if (options.color.Given()) {
     *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
   }
+  AddMoreKeys(connection, options, colorize);
   std::vector<UploadFile> uploads;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);

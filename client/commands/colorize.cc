@@ -102,6 +102,7 @@ class Colorize {
     v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
     colorize->set_key_view(KeyView());
     *colorize->mutable_key_color() = UploadKeyColor(*connection_, options_.color);
+    AddMoreKeys(*connection_, options_, colorize);
     display_.Say("key view " + (colorize->key_view().empty() ? std::string("will be selected")
                                                              : colorize->key_view()));
     return spec;

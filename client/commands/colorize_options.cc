@@ -41,12 +41,45 @@ void ColorizeOptions::Check() const {
     throw InvalidArgument("--bound is a part of the score; it needs --benchmark");
   }
   color.Check();
+  for (const std::string& text : more_keys) ParseMoreKey(text);
   // What is drawn for a view that is known beforehand cannot be scored against that view.
   const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
   if (benchmark && for_one_view) {
     throw InvalidArgument(
         "--benchmark colours the key view with its own true colours, or by --auto, --prompt, "
         "--reference, --backend or --script; leave out the picture of the key view");
+  }
+}
+
+MoreKey ParseMoreKey(const std::string& text) {
+  const size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+    throw InvalidArgument(
+        "--more-key wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
+        "VIEW=POINTS.json, VIEW=auto); '" +
+        text + "' is not of that form");
+  }
+  const std::string value = text.substr(equals + 1);
+  MoreKey key{text.substr(0, equals), {}};
+  if (value == "auto") {
+    key.color.automatic = true;
+  } else if (fs::path(value).extension() == ".json") {
+    key.color.hints = value;
+  } else {
+    key.color.image = value;
+  }
+  key.color.Check();
+  return key;
+}
+
+void AddMoreKeys(Connection& connection,
+                 const ColorizeOptions& options,
+                 v1::ColorizeSceneSpec* spec) {
+  for (const std::string& text : options.more_keys) {
+    const MoreKey key = ParseMoreKey(text);
+    v1::FurtherKeyView* further = spec->mutable_carry_color()->add_further_key_views();
+    further->set_view(key.view);
+    *further->mutable_color() = UploadKeyColor(connection, key.color);
   }
 }
 
@@ -62,6 +95,10 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("-o,--out", o->out, "Folder for the results")->required();
   DeclareKeyColorFlags(app, &o->color);
   app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");
+  app.add_option("--more-key",
+                 o->more_keys,
+                 "VIEW=COLOURED.png: a further key view, for what the first one does not show; its "
+                 "colours never replace those of the key views before it. May be repeated");
   app.add_option("--preset", o->preset, "How much time quality is worth: fast, best or paper")
       ->capture_default_str()
       ->check([](const std::string& name) -> std::string {

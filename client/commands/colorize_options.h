@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/commands/key_color_flags.h"
 #include "client/lib/photo_folder.h"
@@ -18,6 +19,7 @@ struct ColorizeOptions {
   std::string scene;   // "scenes/ID", whose accepted key view is used
   std::string out;
   KeyColorFlags color;
+  std::vector<std::string> more_keys;  // "VIEW=COLOURED_PICTURE", in order of importance
   std::string key_view;  // view name or stem; empty: selected
   std::string encoder;   // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";
@@ -37,6 +39,20 @@ struct ColorizeOptions {
   // cannot be read.
   void Check() const;
 };
+
+// A further key view: the photo's name and where its colour comes from.
+struct MoreKey {
+  std::string view;
+  KeyColorFlags color;
+};
+// "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto". Throws Error{kInvalidArgument} for other
+// text, and what checking the file throws.
+MoreKey ParseMoreKey(const std::string& text);
+
+// Uploads the pictures of the further key views and names them in the spec.
+void AddMoreKeys(Connection& connection,
+                 const ColorizeOptions& options,
+                 v1::ColorizeSceneSpec* spec);
 
 void DeclareOptions(CLI::App& app, ColorizeOptions* options);
 

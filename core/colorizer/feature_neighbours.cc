@@ -126,51 +126,108 @@ torch::Tensor VerticalPosition(const torch::Tensor& luminance,
   return (y * std::sqrt(12.0 * weight)).unsqueeze(1).expand({height, width}).reshape({-1, 1});
 }
 
+// Appends the cells of a picture, resized.
+void AddCells(const TapEncoder& encoder,
+              const TrainingPicture& picture,
+              double scale,
+              const FeatureNeighboursOptions& options,
+              FeatureNeighbours::Cells* cells) {
+  const int multiple = encoder.config().Stride(encoder.config().StageCount() - 1);
+  const int width = std::max(1, static_cast<int>(std::lround(picture.luminance.width * scale)));
+  const int height = std::max(1, static_cast<int>(std::lround(picture.luminance.height * scale)));
+  const auto prepared = [&](const Image& image) {
+    return PadToMultiple(TensorFromImage(Resize(image, width, height)), multiple);
+  };
+  const auto per_cell = [&](const torch::Tensor& x) {
+    return torch::avg_pool2d(x, {options.stride, options.stride})[0].flatten(1).t();
+  };
+  const torch::Tensor l = prepared(picture.luminance);
+  std::vector<torch::Tensor> blocks = RawBlocks(encoder.Taps(encoder.Input(l)), l, options.stride);
+  const int64_t count = blocks[0].size(0);
+  if (cells->blocks.empty()) {
+    cells->blocks = std::move(blocks);
+  } else {
+    for (size_t i = 0; i < blocks.size(); ++i) {
+      cells->blocks[i] = torch::cat({cells->blocks[i], blocks[i]});
+    }
+  }
+  const auto append = [](torch::Tensor& to, const torch::Tensor& more) {
+    to = to.defined() ? torch::cat({to, more}) : more;
+  };
+  append(cells->positions, VerticalPosition(l, options.stride, height, options.position_weight));
+  append(cells->colors, per_cell(prepared(picture.ab)));
+  append(cells->weights,
+         picture.weight.Empty() ? torch::ones({count})
+                                : per_cell(prepared(picture.weight)).squeeze(1).contiguous());
+}
+
+FeatureNeighbours::Cells Select(const FeatureNeighbours::Cells& cells, const torch::Tensor& rows) {
+  FeatureNeighbours::Cells out;
+  for (const torch::Tensor& block : cells.blocks) {
+    out.blocks.push_back(block.index_select(0, rows));
+  }
+  out.positions = cells.positions.index_select(0, rows);
+  out.colors = cells.colors.index_select(0, rows);
+  out.weights = cells.weights.index_select(0, rows);
+  return out;
+}
+
 }  // namespace
 
 FeatureNeighbours::FeatureNeighbours(const TapEncoder& encoder,
-                                     const Image& luminance,
-                                     const Image& ab,
+                                     std::span<const TrainingPicture> pictures,
                                      const FeatureNeighboursOptions& options,
                                      Random random,
                                      const CancellationToken& cancel)
     : options_(options) {
   torch::NoGradGuard no_grad;
-  const int multiple = encoder.config().Stride(encoder.config().StageCount() - 1);
-  std::vector<std::vector<torch::Tensor>> blocks(encoder.config().StageCount() + 1);
-  std::vector<torch::Tensor> positions;
-  std::vector<torch::Tensor> colors;
+  Cells key;
   for (double scale : options.scales) {
     cancel.ThrowIfCancelled();
-    const int width = std::max(1, static_cast<int>(std::lround(luminance.width * scale)));
-    const int height = std::max(1, static_cast<int>(std::lround(luminance.height * scale)));
-    const torch::Tensor l =
-        PadToMultiple(TensorFromImage(Resize(luminance, width, height)), multiple);
-    const torch::Tensor c = PadToMultiple(TensorFromImage(Resize(ab, width, height)), multiple);
-    const std::vector<torch::Tensor> raw =
-        RawBlocks(encoder.Taps(encoder.Input(l)), l, options.stride);
-    for (size_t i = 0; i < raw.size(); ++i) blocks[i].push_back(raw[i]);
-    positions.push_back(VerticalPosition(l, options.stride, height, options.position_weight));
-    colors.push_back(torch::avg_pool2d(c, {options.stride, options.stride})[0].flatten(1).t());
+    AddCells(encoder, pictures.front(), scale, options, &key);
   }
-  const torch::Tensor all_colors = torch::cat(colors);
-  const torch::Tensor rows = SampleRows(all_colors.size(0), options.bank_size, random);
-  std::vector<torch::Tensor> bank;
-  for (size_t i = 0; i < blocks.size(); ++i) {
-    const torch::Tensor samples = torch::cat(blocks[i]).index_select(0, rows);
-    const bool is_tap = i + 1 < blocks.size();
+  const Cells chosen = Select(key, SampleRows(key.Count(), options.bank_size, random));
+  for (size_t i = 0; i < chosen.blocks.size(); ++i) {
+    const bool is_tap = i + 1 < chosen.blocks.size();
     const double weight = is_tap ? TapWeight(options, encoder.config().Stride(static_cast<int>(i)))
                                  : options.luminance_weight;
-    const Projection projection = Whiten(samples, options.dims_per_tap, weight);
+    const Projection projection = Whiten(chosen.blocks[i], options.dims_per_tap, weight);
     state_["mean." + std::to_string(i)] = projection.mean;
     state_["matrix." + std::to_string(i)] = projection.matrix;
-    bank.push_back(torch::mm(samples - projection.mean, projection.matrix));
   }
-  bank.push_back(torch::cat(positions).index_select(0, rows));
+  std::vector<torch::Tensor> bank{Project(chosen)}, colors{chosen.colors}, weights{chosen.weights};
+  const auto further = static_cast<int64_t>(pictures.size()) - 1;
+  for (int64_t i = 1; i <= further; ++i) {
+    cancel.ThrowIfCancelled();
+    Cells cells;
+    AddCells(encoder, pictures[i], 1.0, options, &cells);
+    const torch::Tensor sure = (cells.weights > options.least_weight).nonzero().squeeze(1);
+    if (sure.size(0) == 0) continue;
+    const torch::Tensor rows =
+        sure.index_select(0, SampleRows(sure.size(0), options.further_bank_size / further, random));
+    const Cells taken = Select(cells, rows);
+    bank.push_back(Project(taken));
+    colors.push_back(taken.colors);
+    weights.push_back(taken.weights);
+  }
   // Rounded to half precision here, so that a colorizer read from its file answers the same.
-  state_["bank"] = torch::cat(bank, 1).to(torch::kHalf).to(torch::kFloat32);
-  state_["colors"] =
-      all_colors.index_select(0, rows).to(torch::kHalf).to(torch::kFloat32).contiguous();
+  const auto stored = [](const std::vector<torch::Tensor>& parts) {
+    return torch::cat(parts).to(torch::kHalf).to(torch::kFloat32).contiguous();
+  };
+  state_["bank"] = stored(bank);
+  state_["colors"] = stored(colors);
+  state_["weights"] = stored(weights);
+}
+
+torch::Tensor FeatureNeighbours::Project(const Cells& cells) const {
+  std::vector<torch::Tensor> parts;
+  for (size_t i = 0; i < cells.blocks.size(); ++i) {
+    const std::string index = std::to_string(i);
+    parts.push_back(
+        torch::mm(cells.blocks[i] - state_.at("mean." + index), state_.at("matrix." + index)));
+  }
+  parts.push_back(cells.positions);
+  return torch::cat(parts, 1);
 }
 
 FeatureNeighbours::FeatureNeighbours(const FeatureNeighboursOptions& options,
@@ -201,6 +258,7 @@ std::unique_ptr<FeatureNeighbours> FeatureNeighbours::FromArchive(
   const int64_t entries = colors->second.shape[0];
   shapes["colors"] = {entries, 2};
   shapes["bank"] = {entries, columns};
+  shapes["weights"] = {entries};
   std::map<std::string, torch::Tensor> state;
   NamedTensors tensors;
   for (const auto& [name, shape] : shapes) {
@@ -214,15 +272,11 @@ std::unique_ptr<FeatureNeighbours> FeatureNeighbours::FromArchive(
 torch::Tensor FeatureNeighbours::Features(const std::vector<torch::Tensor>& taps,
                                           const torch::Tensor& luminance,
                                           int picture_height) const {
-  const std::vector<torch::Tensor> raw = RawBlocks(taps, luminance, options_.stride);
-  std::vector<torch::Tensor> parts;
-  for (size_t i = 0; i < raw.size(); ++i) {
-    const std::string index = std::to_string(i);
-    parts.push_back(torch::mm(raw[i] - state_.at("mean." + index), state_.at("matrix." + index)));
-  }
-  parts.push_back(
-      VerticalPosition(luminance, options_.stride, picture_height, options_.position_weight));
-  return torch::cat(parts, 1);
+  Cells cells;
+  cells.blocks = RawBlocks(taps, luminance, options_.stride);
+  cells.positions =
+      VerticalPosition(luminance, options_.stride, picture_height, options_.position_weight);
+  return Project(cells);
 }
 
 FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor& queries) const {
@@ -230,8 +284,9 @@ FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor
   const torch::Tensor& bank = state_.at("bank");
   const torch::Tensor transposed = bank.t();
   const torch::Tensor bank_squares = bank.square().sum(1);
-  // A column of ones sums the weights in the same product.
-  const torch::Tensor colors = torch::cat({state_.at("colors"), torch::ones({bank.size(0), 1})}, 1);
+  // A last column sums the weights in the same product.
+  const torch::Tensor weights = state_.at("weights").unsqueeze(1);
+  const torch::Tensor colors = torch::cat({state_.at("colors") * weights, weights}, 1);
   std::vector<torch::Tensor> answers;
   std::vector<torch::Tensor> distances;
   for (int64_t begin = 0; begin < queries.size(0); begin += kQueriesAtOnce) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "core/base/image.h"
 #include "core/base/random.h"
 #include "core/colorizer/archive.h"
+#include "core/colorizer/colorizer.h"
 #include "core/encoder/convnext.h"
 
 namespace color3d {
@@ -24,6 +26,8 @@ namespace color3d {
 struct FeatureNeighboursOptions {
   std::vector<double> scales{0.8, 1.0, 1.25};  // of the key view, so that sizes may differ
   int bank_size = 12000;                       // cells, drawn at random from all scales
+  int further_bank_size = 6000;                // cells of all other pictures together
+  double least_weight = 0.25;                  // cells of other pictures that are surer than this
   int dims_per_tap = 16;                       // kept by PCA
   // Shares of the distance for taps at strides 2, 4, 8, 16, 32: fine taps tell texture, coarse ones
   // tell things.
@@ -44,10 +48,10 @@ struct NeighbourColors {
 
 class FeatureNeighbours {
  public:
-  // `luminance` 1 channel, `ab` 2 channels: the key view at training size.
+  // Pictures at training size, the key view first: the feature space is its, the others add cells
+  // whose colours are known (weight).
   FeatureNeighbours(const TapEncoder& encoder,
-                    const Image& luminance,
-                    const Image& ab,
+                    std::span<const TrainingPicture> pictures,
                     const FeatureNeighboursOptions& options,
                     Random random,
                     const CancellationToken& cancel);
@@ -71,7 +75,9 @@ class FeatureNeighbours {
   // Tensors that rebuild the bank: projections, bank, colours. The last two are rounded to half
   // precision already, and stored so.
   const std::map<std::string, torch::Tensor>& State() const { return state_; }
-  static bool IsStoredAsHalf(const std::string& name) { return name == "bank" || name == "colors"; }
+  static bool IsStoredAsHalf(const std::string& name) {
+    return name == "bank" || name == "colors" || name == "weights";
+  }
   // Takes the arrays "neighbours.*" out of the archive. Throws Error{kInvalidArgument} starting
   // with `what` when one is missing or does not fit.
   static std::unique_ptr<FeatureNeighbours> FromArchive(const TapEncoder& encoder,
@@ -79,7 +85,17 @@ class FeatureNeighbours {
                                                         const std::string& what,
                                                         Archive& archive);
 
+  // Places of a picture before projection. Internal.
+  struct Cells {
+    std::vector<torch::Tensor> blocks;  // per tap, then L statistics: [n, channels]
+    torch::Tensor positions;            // [n,1]
+    torch::Tensor colors;               // [n,2], Lab units
+    torch::Tensor weights;              // [n], 0..1
+    int64_t Count() const { return weights.size(0); }
+  };
+
  private:
+  torch::Tensor Project(const Cells& cells) const;
   torch::Tensor Features(const std::vector<torch::Tensor>& taps,
                          const torch::Tensor& luminance,
                          int picture_height) const;

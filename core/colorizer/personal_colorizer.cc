@@ -20,7 +20,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kMagic[] = "C3DCOLR1";
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;  // 2: weights of the neighbours
 constexpr char kWhat[] = "the colorizer file";
 // Guided upsampling: windows of 5x5 cells; contrasts of L below about 4 units are no edges.
 constexpr int kGuideRadius = 2;
@@ -80,7 +80,8 @@ PersonalColorizer::PersonalColorizer(Parts parts)
   }
 }
 
-torch::Tensor PersonalColorizer::Predict(const torch::Tensor& luminance, int picture_height) const {
+PersonalColorizer::Answer PersonalColorizer::Ask(const torch::Tensor& luminance,
+                                                 int picture_height) const {
   const bool decode = !parts_.neighbours || neighbour_share_ < 1.0;
   const PersonalModel& model = *parts_.model;
   std::vector<torch::Tensor> taps;
@@ -94,7 +95,7 @@ torch::Tensor PersonalColorizer::Predict(const torch::Tensor& luminance, int pic
   }
   // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
   if (decode) decoded = decoded.clamp(-kMaxAb, kMaxAb);
-  if (!parts_.neighbours) return decoded;
+  if (!parts_.neighbours) return {decoded, {}};
   if (!decode || model.config().adapters) {
     taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
   }
@@ -103,19 +104,28 @@ torch::Tensor PersonalColorizer::Predict(const torch::Tensor& luminance, int pic
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
   const torch::Tensor near = TensorFromImage(UpsampleGuided(
       ImageFromTensor(found.ab), ImageFromTensor(guide), kGuideRadius, kGuideVarianceFloor));
-  if (!decode) return near;
-  return torch::lerp(decoded, near, neighbour_share_);
+  if (!decode) return {near, found.distance};
+  return {torch::lerp(decoded, near, neighbour_share_), found.distance};
 }
 
-Image PersonalColorizer::ColorizeAtTrainingSize(const Image& luminance) const {
+ColorPrediction PersonalColorizer::PredictAtTrainingSize(const Image& luminance) const {
   const torch::Tensor padded = PadToMultiple(TensorFromImage(luminance), kPadMultiple);
-  const Image coarse = ImageFromTensor(Predict(padded, luminance.height));
-  const Image fine =
-      UpsampleGuided(coarse, ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
-  return CropTo(fine, luminance.width, luminance.height);
+  const Answer answer = Ask(padded, luminance.height);
+  ColorPrediction prediction;
+  const Image fine = UpsampleGuided(
+      ImageFromTensor(answer.ab), ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
+  prediction.ab = CropTo(fine, luminance.width, luminance.height);
+  if (answer.distance.defined()) {
+    const Image coarse = ImageFromTensor(answer.distance.unsqueeze(0));
+    prediction.distance =
+        CropTo(Resize(coarse, fine.width, fine.height), luminance.width, luminance.height);
+  }
+  return prediction;
 }
 
-Image PersonalColorizer::Colorize(const Image& luminance) const {
+Image PersonalColorizer::Colorize(const Image& luminance) const { return Predict(luminance).ab; }
+
+ColorPrediction PersonalColorizer::Predict(const Image& luminance) const {
   if (luminance.channels != 1 || luminance.Empty()) {
     throw InvalidArgument("the colorizer takes a picture with 1 channel (L), this one has " +
                           std::to_string(luminance.channels));
@@ -129,9 +139,13 @@ Image PersonalColorizer::Colorize(const Image& luminance) const {
     torch::NoGradGuard no_grad;
     SetTorchThreads(parts_.options.threads);
     const Image small = FitWithin(luminance, parts_.options.max_side_px);
-    const Image ab = ColorizeAtTrainingSize(small);
-    if (small.width == luminance.width && small.height == luminance.height) return ab;
-    return UpsampleGuided(ab, luminance, kGuideRadius, kGuideVarianceFloor);
+    ColorPrediction prediction = PredictAtTrainingSize(small);
+    if (small.width == luminance.width && small.height == luminance.height) return prediction;
+    prediction.ab = UpsampleGuided(prediction.ab, luminance, kGuideRadius, kGuideVarianceFloor);
+    if (!prediction.distance.Empty()) {
+      prediction.distance = Resize(prediction.distance, luminance.width, luminance.height);
+    }
+    return prediction;
   });
 }
 

@@ -27,6 +27,7 @@ class PersonalColorizer : public Colorizer {
   explicit PersonalColorizer(Parts parts);
 
   Image Colorize(const Image& luminance) const override;
+  ColorPrediction Predict(const Image& luminance) const override;
   std::string Serialize() const override;
 
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
@@ -34,9 +35,13 @@ class PersonalColorizer : public Colorizer {
                                                       int threads);
 
  private:
-  // [1,2,H/s,W/s] ab in Lab units of a padded L [1,1,H,W]; `picture_height` before padding.
-  torch::Tensor Predict(const torch::Tensor& luminance, int picture_height) const;
-  Image ColorizeAtTrainingSize(const Image& luminance) const;
+  struct Answer {
+    torch::Tensor ab;        // [1,2,H/s,W/s], Lab units
+    torch::Tensor distance;  // [h,w] on the neighbours' grid; undefined without neighbours
+  };
+  // Of a padded L [1,1,H,W]; `picture_height` before padding.
+  Answer Ask(const torch::Tensor& luminance, int picture_height) const;
+  ColorPrediction PredictAtTrainingSize(const Image& luminance) const;
 
   Parts parts_;
   TrainingRecipe recipe_;

@@ -23,6 +23,8 @@ std::string StageThatMakes(std::string_view name) {
       {kKeyColorFacts, "colorize_key_view"},
       {kKeyColorRegions, "colorize_key_view"},
       {kColorizer, "personalize"},
+      {kCarried, "carry_color"},
+      {kCarryFacts, "carry_color"},
       {kViewsAb, "colorize_views"},
       {kProvenance, "colorize_views"},
       {kGeometry, "reconstruct_geometry"},
@@ -95,6 +97,14 @@ int ReadKeyView(const StageContext& context, const Scene& scene) {
   } catch (const nlohmann::json::exception& e) {
     throw InvalidArgument(std::string("key_view.json is damaged: ") + e.what());
   }
+}
+
+CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height) {
+  const std::string name = ViewArtifact(artifact::kCarried, view, ".png");
+  if (!context.HasInput(name)) return {Image(width, height, 2), Image(width, height, 1)};
+  const AbMap map = DecodeAbPng(context.ReadInput(name), name);
+  if (map.ab.width == width && map.ab.height == height) return {map.ab, map.confidence};
+  return {Resize(map.ab, width, height), Resize(map.confidence, width, height)};
 }
 
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/image.h"
+#include "core/carry/carry.h"
 #include "core/scene/scene.h"
 
 namespace color3d {
@@ -24,10 +25,11 @@ inline constexpr char kKeyColorFacts[] = "key_color.json";           // where th
 inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which words went where
 inline constexpr char kKeyViewColored[] = "key_view_coloured.png";   // for people
 inline constexpr char kColorizer[] = "colorizer.c3c";
-inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
+inline constexpr char kCarried[] = "carried/";       // + view's stem + ".png": ab and confidence
+inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
+inline constexpr char kViewsAb[] = "views_ab/";      // + view's stem + ".png"
 // + view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255).
 inline constexpr char kProvenance[] = "provenance/";
-inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
 inline constexpr char kAugmentationSheet[] = "augmentations.jpg";
 inline constexpr char kGeometry[] = "geometry.c3g";
 inline constexpr char kMemoryPlan[] = "memory_plan.json";
@@ -73,6 +75,9 @@ ImportFacts ImportFactsFromJson(std::string_view json);
 // The chosen key view by name, with its index in the scene.
 int ReadKeyView(const StageContext& context, const Scene& scene);
 Scene ReadScene(const StageContext& context);
+
+// What was carried into a view, resized; nothing where there is no such artifact.
+CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height);
 
 // Colour map of one view from its artifact, resized to width x height px.
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height);

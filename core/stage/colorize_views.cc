@@ -1,9 +1,24 @@
+#include <algorithm>
+
+#include "core/carry/fusion.h"
 #include "core/image/codec.h"
+#include "core/keycolor/automatic.h"
 #include "core/scene/view_images.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
+namespace {
+
+// The automatic guess where anything of the view is strange enough to need it; empty otherwise.
+Image GuessIfNeeded(const Image& luminance, const Image& distance, const FusionOptions& options) {
+  const bool strange = std::any_of(distance.data.begin(), distance.data.end(), [&](float value) {
+    return value > options.guess_begins;
+  });
+  return strange ? AutomaticColorizer::Embedded()->Colorize(luminance).ab : Image();
+}
+
+}  // namespace
 
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder) {
   CheckMaxSide(max_side_px);
@@ -11,12 +26,26 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), context.threads());
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
+  const FusionOptions options;
+  ThreadPool pool(context.threads());
   const auto total = static_cast<int64_t>(scene.views.size());
   for (int64_t i = 0; i < total; ++i) {
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[static_cast<size_t>(i)];
-    const Image ab = colorizer->Colorize(*images.Luminance(static_cast<int>(i)));
-    context.WriteOutput(ViewArtifact(artifact::kViewsAb, view, ".png"), EncodeAbPng(ab));
+    const auto luminance = images.Luminance(static_cast<int>(i));
+    const ColorPrediction inferred = colorizer->Predict(*luminance);
+    const FusedColor fused =
+        FuseColors(*luminance,
+                   ReadCarried(context, view, luminance->width, luminance->height),
+                   inferred.ab,
+                   inferred.distance,
+                   GuessIfNeeded(*luminance, inferred.distance, options),
+                   options,
+                   pool,
+                   context.cancel());
+    context.WriteOutput(ViewArtifact(artifact::kViewsAb, view, ".png"), EncodeAbPng(fused.ab));
+    context.WriteOutput(ViewArtifact(artifact::kProvenance, view, ".png"),
+                        EncodePng8(fused.provenance));
     context.progress().OnProgress(i + 1, total, "colouring " + view.name);
   }
 }

@@ -1,9 +1,54 @@
+#include <algorithm>
+#include <set>
+
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
+namespace {
+
+// Views that carried colours are learnt from: the best covered ones that are not the key view.
+constexpr int kMostCarriedViews = 12;
+constexpr double kLeastCoverage = 0.05;
+constexpr float kLeastConfidence = 0.3f;
+constexpr double kCarriedShare = 0.5;  // of the samples
+
+std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
+                                             int key,
+                                             const ViewImages& images,
+                                             const StageContext& context) {
+  std::vector<std::pair<double, TrainingPicture>> found;
+  for (int view : scene.TrainingViews()) {
+    const std::string name = ViewArtifact(artifact::kCarried, scene.views[view], ".png");
+    if (view == key || !context.HasInput(name)) continue;
+    const auto luminance = images.Luminance(view);
+    CarriedColor carried =
+        ReadCarried(context, scene.views[view], luminance->width, luminance->height);
+    const double coverage = Coverage(carried, kLeastConfidence);
+    if (coverage < kLeastCoverage) continue;
+    for (float& value : carried.confidence.data) {
+      if (value < kLeastConfidence) value = 0.0f;
+    }
+    found.push_back({-coverage,
+                     {scene.views[view].name,
+                      *luminance,
+                      std::move(carried.ab),
+                      std::move(carried.confidence)}});
+  }
+  std::stable_sort(
+      found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
+  if (found.size() > kMostCarriedViews) found.resize(kMostCarriedViews);
+  std::vector<TrainingPicture> pictures;
+  for (auto& [coverage, picture] : found) {
+    picture.share = kCarriedShare / (1.0 - kCarriedShare) / static_cast<double>(found.size());
+    pictures.push_back(std::move(picture));
+  }
+  return pictures;
+}
+
+}  // namespace
 
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
@@ -15,9 +60,12 @@ void RunPersonalize(const ColorizerOptions& options,
   const auto luminance = images.Luminance(key);
   const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
   const Image ab = Resize(color.ab, luminance->width, luminance->height);
+  std::vector<TrainingPicture> pictures{{"the key view", *luminance, ab}};
+  for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
+    pictures.push_back(std::move(picture));
+  }
   const auto colorizer = TrainColorizer(context.LoadEncoder(encoder),
-                                        *luminance,
-                                        ab,
+                                        std::move(pictures),
                                         options,
                                         context.checkpoints(),
                                         context.progress(),

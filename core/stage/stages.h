@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/carry/carry.h"
+#include "core/carry/plane_sweep.h"
 #include "core/colorizer/colorizer.h"
 #include "core/keycolor/keycolor.h"
 #include "core/keyview/select.h"
@@ -55,13 +57,33 @@ struct ColorizeKeyViewOptions {
 // scene.json, key_view.json -> key_color.png, key_view_coloured.png, key_color.json.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
-// scene.json, key_view.json, key_color.png -> colorizer.c3c. `encoder`: as SelectKeyViewOptions.
+// A key view beside the first one. Of its colours only those are taken that the key views before it
+// have not given already; so they never contradict.
+struct FurtherKeyView {
+  std::string view;  // name or unique file stem
+  ColorizeKeyViewOptions color;
+};
+
+struct CarryColorOptions {
+  int max_side_px = 500;    // of the carried maps, 64..4096
+  int sweep_side_px = 300;  // at which depth is measured, 64..2048
+  int sweep_sources = 4;    // views that each view is compared with, 1..16
+  PlaneSweepOptions sweep{.planes = 96, .large_step = 16.0};
+  CarryOptions carry;
+  std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
+  void Validate() const;
+};
+// scene.json, key_view.json, key_color.png, geometry.c3g -> carried/*.png for every view, carry.json
+// (coverage of each, and the view that would add most).
+void RunCarryColor(const CarryColorOptions& options, StageContext& context);
+
+// scene.json, key_view.json, key_color.png (carried/*) -> colorizer.c3c. `encoder`: as SelectKeyViewOptions.
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
                     const std::string& encoder = "");
 
-// scene.json, colorizer.c3c -> views_ab/*.png for every view at max_side_px (64..4096). `encoder`:
-// the one that the colorizer was trained with.
+// scene.json, colorizer.c3c (carried/*) -> views_ab/*.png and provenance/*.png for every view at
+// max_side_px (64..4096). `encoder`: the one that the colorizer was trained with.
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
 
 // scene.json -> geometry.c3g, trained at max_side_px (64..4096), and memory_plan.json: with little

@@ -36,6 +36,7 @@ constexpr Need kKeyColor = {"colorize_key_view", "key_color.png"};
 constexpr Need kColorizer = {"personalize", "colorizer.c3c"};
 constexpr Need kViewsAb = {"colorize_views", "views_ab/*"};
 constexpr Need kGeometry = {"reconstruct_geometry", "geometry.c3g"};
+constexpr Need kCarried = {"carry_color", "carried/*"};
 constexpr Need kModel = {"solve_chroma", "model.c3g"};
 
 const std::vector<Need>& NeedsOf(const std::string& kind) {
@@ -46,12 +47,24 @@ const std::vector<Need>& NeedsOf(const std::string& kind) {
       {"personalize", {kScene, kKeyView, kKeyColor}},
       {"colorize_views", {kScene, kColorizer}},
       {"reconstruct_geometry", {kScene}},
+      {"carry_color", {kScene, kKeyView, kKeyColor, kGeometry}},
       {"solve_chroma", {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry}},
       {"export", {kScene, kModel}},
       {"render", {kScene, kModel}},
       {"evaluate", {kScene, kKeyView, kKeyColor, kViewsAb, kModel}},
   };
   return needs.at(kind);
+}
+
+// What a kind reads when it is there: planned or given.
+const std::vector<Need>& OptionalNeedsOf(const std::string& kind) {
+  static const std::map<std::string, std::vector<Need>> needs = {
+      {"personalize", {kCarried}},
+      {"colorize_views", {kCarried}},
+  };
+  static const std::vector<Need> none;
+  const auto found = needs.find(kind);
+  return found == needs.end() ? none : found->second;
 }
 
 // These stages need no decision of the user's, so a job of their own brings what it lacks along.
@@ -87,6 +100,9 @@ void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec)
   } else if (spec->has_colorize_views()) {
     auto* s = spec->mutable_colorize_views();
     if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
+  } else if (spec->has_carry_color()) {
+    auto* s = spec->mutable_carry_color();
+    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
   } else if (spec->has_reconstruct_geometry()) {
     auto* s = spec->mutable_reconstruct_geometry();
     if (!s->has_iterations()) s->set_iterations(preset.geometry_iterations);
@@ -107,6 +123,16 @@ void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec)
     auto* s = spec->mutable_render();
     if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
   }
+}
+
+// Why a ColorizeScene graph carries no colour; empty when it does.
+std::string WhyNothingIsCarried(const v1::ColorizeSceneSpec& options) {
+  const v1::CarryColorSpec& carry = options.carry_color();
+  if (carry.has_skip()) return carry.skip() ? "carry_color.skip is set" : "";
+  if (options.preset() == v1::PRESET_PAPER && carry.further_key_views().empty()) {
+    return "the paper's recipe carries no colour through geometry";
+  }
+  return "";
 }
 
 class GraphBuilder {
@@ -215,6 +241,11 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   if (submitted_.has_colorize_scene() && given_.contains(job.kind)) return;
   job.skip_reason = skip_reason;
   for (const Need& need : NeedsOf(job.kind)) Provide(need, job.kind, &job);
+  for (const Need& need : OptionalNeedsOf(job.kind)) {
+    if (planned_.contains(need.provider) || given_.contains(need.provider)) {
+      Provide(need, job.kind, &job);
+    }
+  }
   ApplyPreset(preset_, max_side_px_, &spec);
   if (time_budget_) ApplyTimeBudget(*time_budget_, &spec);
   job.spec = Serialize(spec);
@@ -269,6 +300,10 @@ void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
   spec = Common();
   *spec.mutable_reconstruct_geometry() = options.reconstruct_geometry();
   Add(spec);
+
+  spec = Common();
+  *spec.mutable_carry_color() = options.carry_color();
+  Add(spec, WhyNothingIsCarried(options));
 
   spec = Common();
   *spec.mutable_personalize() = options.personalize();

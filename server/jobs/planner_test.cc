@@ -232,8 +232,6 @@ TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("generate_augmentations"));
   spec.mutable_personalize_scenes();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("personalize_scenes"));
-  spec.mutable_carry_color();
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("carry_color"));
   spec.mutable_reconstruct_dynamic();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dynamic"));
   spec.mutable_reconstruct_dense();

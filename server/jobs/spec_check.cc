@@ -36,6 +36,10 @@ const std::map<std::string, Range>& Ranges() {
       {"PersonalizeSpec.consistency_weight", {0, 10}},
       {"ColorizeViewsSpec.max_side_px", {64, 4096}},
       {"CarryColorSpec.max_reprojection_px", {0.1, 10}},
+      {"CarryColorSpec.max_side_px", {64, 4096}},
+      {"CarryColorSpec.depth_tolerance", {1e-4, 1}},
+      {"CarryColorSpec.depth_side_px", {64, 2048}},
+      {"CarryColorSpec.depth_sources", {1, 16}},
       {"ReconstructGeometrySpec.iterations", {0, 100'000}},
       {"ReconstructGeometrySpec.max_side_px", {64, 4096}},
       {"ReconstructGeometrySpec.max_gaussians", {1, 10'000'000}},
@@ -164,6 +168,7 @@ void CheckMessage(const Message& message, const std::string& path) {
 }
 
 constexpr int kMaxReferences = 16;
+constexpr int kMaxFurtherKeyViews = 16;
 constexpr size_t kMaxPromptBytes = 1000;
 
 bool TakesModel(v1::KeyColorSource::SourceCase source) {
@@ -274,6 +279,23 @@ void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
   }
 }
 
+void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
+  const int count = spec.further_key_views_size();
+  if (count > kMaxFurtherKeyViews) {
+    Reject(path + ".further_key_views",
+           " has " + std::to_string(count) + " entries; at most " +
+               std::to_string(kMaxFurtherKeyViews) + " are allowed");
+  }
+  if (count > 0 && spec.skip()) {
+    Reject(path + ".skip", " is set, but further_key_views need the stage; leave one of them out");
+  }
+  for (int i = 0; i < count; ++i) {
+    const std::string entry = path + ".further_key_views[" + std::to_string(i) + "]";
+    if (spec.further_key_views(i).view().empty()) Reject(entry + ".view", " is empty; name a view");
+    CheckKeyColor(spec.further_key_views(i).color(), entry + ".color");
+  }
+}
+
 // `has_inputs`: the colour may come from a job among them; the planner sees to that.
 void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
@@ -281,6 +303,7 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
     CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
   }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  CheckCarryColor(spec.carry_color(), "carry_color");
   CheckTruth(spec.truth(), "truth");
   CheckTraining(spec.training_truth(), !spec.truth().empty(), "training_truth");
 }
@@ -302,6 +325,7 @@ const std::vector<std::string>& BuiltKinds() {
                                                  "select_key_view",
                                                  "colorize_key_view",
                                                  "personalize",
+                                                 "carry_color",
                                                  "colorize_views",
                                                  "reconstruct_geometry",
                                                  "solve_chroma",
@@ -322,6 +346,7 @@ void CheckSpec(const v1::JobSpec& spec) {
   if (spec.has_colorize_key_view()) {
     CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
   }
+  if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), "carry_color");
   if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
   if (spec.has_evaluate()) {
     CheckTruth(spec.evaluate().truth(), "evaluate.truth");

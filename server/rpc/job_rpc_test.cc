@@ -27,10 +27,10 @@ TEST_F(JobRpcTest, RefusedJobs) {
   const std::string scene = client_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
-  spec.mutable_carry_color();
+  spec.mutable_reconstruct_dense();
   grpc::Status status = CreateStatus(spec);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("carry_color"));
+  EXPECT_THAT(status.error_message(), HasSubstr("reconstruct_dense"));
   *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = DigestOf("absent");
   status = CreateStatus(spec);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);

@@ -63,6 +63,16 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threa
   return options;
 }
 
+CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
+  CarryColorOptions options;
+  options.max_side_px = spec.has_max_side_px() ? spec.max_side_px() : kDefaultMaxSidePx;
+  if (spec.has_max_reprojection_px()) options.carry.flow_tolerance_px = spec.max_reprojection_px();
+  if (spec.has_depth_tolerance()) options.carry.depth_tolerance = spec.depth_tolerance();
+  if (spec.has_depth_side_px()) options.sweep_side_px = spec.depth_side_px();
+  if (spec.has_depth_sources()) options.sweep_sources = spec.depth_sources();
+  return options;
+}
+
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed) {
   GeometryOptions options;
   options.seed = seed;

@@ -12,6 +12,8 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
 // Source and file are set by the caller, which holds the blobs.
 HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed);
+// Further key views are set by the caller, which holds the blobs.
+CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec);
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed);
 ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed);
 ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec);

@@ -87,6 +87,14 @@ ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, Blob
   return options;
 }
 
+CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs) {
+  CarryColorOptions options = CarryOptionsFrom(spec);
+  for (const v1::FurtherKeyView& further : spec.further_key_views()) {
+    options.further.push_back({further.view(), SourceOptionsFrom(further.color(), blobs)});
+  }
+  return options;
+}
+
 void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {
   EvaluateOptions options;
   for (const v1::TruthImage& image : spec.truth()) {
@@ -163,6 +171,8 @@ class CoreStageRunner : public StageRunner {
         return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()),
                               context,
                               spec.personalize().encoder());
+      case JobSpec::kCarryColor:
+        return RunCarryColor(CarryOptions(spec.carry_color(), blobs), context);
       case JobSpec::kColorizeViews:
         return RunColorizeViews(spec.colorize_views().has_max_side_px()
                                     ? spec.colorize_views().max_side_px()

@@ -20,9 +20,10 @@ struct PipelineArguments {
   ColorizerOptions colorizer;
   ChromaOptions chroma;
   bool paper = false;
+  bool carry = true;
+  std::string geometry_from;
   bool bound = false;
   bool rescore = false;
-  std::string geometry_file;
 };
 
 // The scene folder has the true colours of all views.
@@ -35,6 +36,17 @@ void Evaluate(const PipelineArguments& args, const Scene& scene, StageContext& c
     truth.push_back({view.name, context.scene_folder() / view.image_file});
   }
   RunEvaluate(options, context);
+}
+
+// What an earlier run with the same scene left of a stage, in place of running it.
+bool TakeFrom(const std::string& folder,
+              const std::vector<std::string>& names,
+              StageContext& context) {
+  if (folder.empty()) return false;
+  for (const std::string& name : names) {
+    context.WriteOutput(name, ReadFile(std::filesystem::path(folder) / name));
+  }
+  return true;
 }
 
 void RunPipeline(const PipelineArguments& args) {
@@ -53,6 +65,7 @@ void RunPipeline(const PipelineArguments& args) {
     ImportOptions options;
     options.hold_out_every_eighth = true;
     options.threads = args.threads;
+    if (TakeFrom(args.geometry_from, {artifact::kScene, artifact::kImportFacts}, c)) return;
     RunImportScene(options, c);
   });
   pipeline.Run("select_key_view", [&](StageContext& c) {
@@ -67,18 +80,22 @@ void RunPipeline(const PipelineArguments& args) {
     options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
     RunColorizeKeyView(options, c);
   });
+  pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
+    if (TakeFrom(args.geometry_from, {artifact::kGeometry, artifact::kMemoryPlan}, c)) return;
+    RunReconstructGeometry(args.geometry, args.max_side_px, c);
+  });
+  if (args.carry) {
+    pipeline.Run("carry_color", [&](StageContext& c) {
+      CarryColorOptions options;
+      options.max_side_px = args.max_side_px;
+      RunCarryColor(options, c);
+    });
+  }
   ColorizerOptions colorizer = args.colorizer;
   colorizer.threads = args.threads;
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
   pipeline.Run("personalize", [&](StageContext& c) { RunPersonalize(colorizer, c); });
   pipeline.Run("colorize_views", [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
-  if (args.geometry_file.empty()) {
-    pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
-      RunReconstructGeometry(args.geometry, args.max_side_px, c);
-    });
-  } else {
-    pipeline.Take(artifact::kGeometry, args.geometry_file);
-  }
   pipeline.Run("solve_chroma", [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
   pipeline.Run("export", [&](StageContext& c) { RunExport({}, c); });
   pipeline.Run("render", [&](StageContext& c) {
@@ -108,12 +125,12 @@ void AddPipelineCommand(CLI::App& app) {
   command->add_option("--max-gaussians", args->geometry.max_gaussians);
   command->add_option("--colorizer-iterations", args->colorizer.iterations);
   command->add_option("--chroma-iterations", args->chroma.iterations);
+  command->add_option(
+      "--geometry-from",
+      args->geometry_from,
+      "output of an earlier run on the same scene: its poses and geometry are taken");
+  command->add_flag("--carry,!--no-carry", args->carry, "geometry first");
   command->add_flag("--paper", args->paper, "the paper's colorizer recipe");
-  command
-      ->add_option("--geometry",
-                   args->geometry_file,
-                   "geometry.c3g of an earlier run of the scene at this size, in place of training")
-      ->check(CLI::ExistingFile);
   command->add_flag(
       "--rescore", args->rescore, "run evaluation alone, on what an earlier run left in --out");
   command->add_flag(

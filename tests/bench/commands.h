@@ -6,6 +6,7 @@
 namespace color3d {
 
 void AddAutomaticCommand(CLI::App& app);
+void AddCarryCommand(CLI::App& app);
 void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
 void AddNetworksCommand(CLI::App& app);

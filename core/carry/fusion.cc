@@ -1,0 +1,100 @@
+#include "core/carry/fusion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/keycolor/edge_weights.h"
+#include "core/keycolor/grid_solver.h"
+
+namespace color3d {
+namespace {
+
+constexpr double kTolerance = 1e-3;
+
+void CheckRange(const char* field, double value, double low, double high) {
+  if (!(value >= low && value <= high)) {
+    throw InvalidArgument(std::string("fusion option ") + field + " is " + std::to_string(value) +
+                          ", allowed are " + std::to_string(low) + " to " + std::to_string(high));
+  }
+}
+
+void CheckSize(const char* what, const Image& image, int channels, const Image& luminance) {
+  if (image.width != luminance.width || image.height != luminance.height ||
+      image.channels != channels) {
+    throw InvalidArgument(std::string("fusion: the ") + what + " picture is " +
+                          std::to_string(image.width) + "x" + std::to_string(image.height) + "x" +
+                          std::to_string(image.channels) + ", wanted " +
+                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
+                          "x" + std::to_string(channels));
+  }
+}
+
+double SmoothStep(double x, double begin, double end) {
+  const double t = std::clamp((x - begin) / (end - begin), 0.0, 1.0);
+  return t * t * (3.0 - 2.0 * t);
+}
+
+}  // namespace
+
+void FusionOptions::Validate() const {
+  CheckRange("inferred_weight", inferred_weight, 1e-6, 1e3);
+  CheckRange("least_confidence", least_confidence, 0, 1);
+  CheckRange("edge_sigma", edge_sigma, 0.01, 100);
+  CheckRange("guess_begins", guess_begins, 0, 1e6);
+  CheckRange("guess_ends", guess_ends, guess_begins + 1e-6, 2e6);
+  CheckRange("most_guessed", most_guessed, 0, 1);
+  CheckRange("guess_chroma", guess_chroma, 0, 1);
+}
+
+FusedColor FuseColors(const Image& luminance,
+                      const CarriedColor& carried,
+                      const Image& inferred,
+                      const Image& distance,
+                      const Image& guessed,
+                      const FusionOptions& options,
+                      ThreadPool& pool,
+                      const CancellationToken& cancel) {
+  options.Validate();
+  CheckSize("carried", carried.ab, 2, luminance);
+  CheckSize("confidence", carried.confidence, 1, luminance);
+  CheckSize("inferred", inferred, 2, luminance);
+  if (!distance.Empty()) CheckSize("distance", distance, 1, luminance);
+  if (!guessed.Empty()) CheckSize("guessed", guessed, 2, luminance);
+  const size_t pixels = luminance.PlaneSize();
+  FusedColor out{Image(luminance.width, luminance.height, 2),
+                 Image(luminance.width, luminance.height, 3)};
+  GridSystem system = SystemOfLuminance(luminance, options.edge_sigma, pool);
+  std::vector<float> target(2 * pixels);
+  for (size_t i = 0; i < pixels; ++i) {
+    const double confidence = carried.confidence.data[i];
+    const double seen = confidence > options.least_confidence ? confidence : 0.0;
+    const double guess = distance.Empty() ? 0.0
+                                          : options.most_guessed * SmoothStep(distance.data[i],
+                                                                              options.guess_begins,
+                                                                              options.guess_ends);
+    const double total = seen + options.inferred_weight;
+    for (int c = 0; c < 2; ++c) {
+      const double guess_ab = guessed.Empty() ? 0.0 : options.guess_chroma * guessed.Plane(c)[i];
+      const double prior = (1.0 - guess) * inferred.Plane(c)[i] + guess * guess_ab;
+      target[c * pixels + i] = static_cast<float>(
+          (seen * carried.ab.Plane(c)[i] + options.inferred_weight * prior) / total);
+    }
+    system.data[static_cast<int64_t>(i)] = static_cast<float>(total);
+    const double share_seen = seen / total;
+    out.provenance.Plane(0)[i] = static_cast<float>((1.0 - share_seen) * guess);
+    out.provenance.Plane(1)[i] = static_cast<float>(share_seen);
+    out.provenance.Plane(2)[i] = static_cast<float>((1.0 - share_seen) * (1.0 - guess));
+  }
+  GridSolveOptions solve;
+  solve.tolerance = kTolerance;
+  const auto ignore = [](int, double) {};
+  GridSolution solved = SolveGridSystem(std::move(system), target, solve, pool, ignore, cancel);
+  out.ab.data = std::move(solved.u);
+  return out;
+}
+
+}  // namespace color3d

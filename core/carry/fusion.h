@@ -1,0 +1,48 @@
+// The colour of a view from all that is known of it, per pixel by confidence (METHOD.md "Fusion of
+// sources"): carried from a key view > inferred by the personalized colorizer > guessed by the
+// automatic one. Pure functions, thread-safe.
+#pragma once
+
+#include "core/base/cancellation.h"
+#include "core/base/image.h"
+#include "core/base/parallel.h"
+#include "core/carry/carry.h"
+
+namespace color3d {
+
+struct FusionOptions {
+  // The pull of an inferred colour against a carried one of confidence 1. Pixels also hold on to
+  // their neighbours of equal luminance, with 1.
+  double inferred_weight = 0.02;
+  // Carried colours below this confidence are not used, 0..1.
+  double least_confidence = 0.05;
+  // Luminance difference (L units) at which neighbours half agree, as for hints.
+  double edge_sigma = 1.0;
+  // Feature distances (ColorPrediction::distance) where the automatic guess begins to replace the
+  // inferred colour and where it has its full share.
+  double guess_begins = 2.5;
+  double guess_ends = 6.0;
+  double most_guessed = 0.6;  // that full share, 0..1
+  double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
+  void Validate() const;
+};
+
+struct FusedColor {
+  Image ab;          // 2 channels, Lab units
+  Image provenance;  // 3 channels, shares 0..1 that sum to 1: guessed, seen, inferred
+};
+
+// `inferred`: 2 channels; `distance`: 1 channel or empty (nothing is guessed then); `guessed`: 2
+// channels or empty (the guess is grey then). All of the luminance's size. Solves the screened
+// system of hints.h on the view's own luminance, so that small gaps of what was carried are filled
+// from around them.
+FusedColor FuseColors(const Image& luminance,
+                      const CarriedColor& carried,
+                      const Image& inferred,
+                      const Image& distance,
+                      const Image& guessed,
+                      const FusionOptions& options,
+                      ThreadPool& pool,
+                      const CancellationToken& cancel);
+
+}  // namespace color3d

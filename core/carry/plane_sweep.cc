@@ -1,0 +1,293 @@
+#include "core/carry/plane_sweep.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kCensusRadius = 3;  // every second pixel of a 7x7 window
+constexpr int kCensusBits = 24;
+constexpr uint8_t kUnknownCost = 11;  // of a pixel that a source does not show: about chance
+constexpr int kCostScale = 8;         // fixed point of aggregated costs
+
+using Census = std::vector<uint32_t>;
+
+struct Offset {
+  int x, y;
+};
+
+std::vector<Offset> CensusOffsets() {
+  std::vector<Offset> offsets;
+  for (int y = -kCensusRadius; y <= kCensusRadius; ++y) {
+    for (int x = -kCensusRadius; x <= kCensusRadius; ++x) {
+      if ((x + y) % 2 == 0 && (x != 0 || y != 0)) offsets.push_back({x, y});
+    }
+  }
+  offsets.resize(kCensusBits);
+  return offsets;
+}
+
+// One bit per offset: darker than the centre. Borders repeat the outermost pixels.
+void ComputeCensus(const Image& picture, Census* census) {
+  static const std::vector<Offset> offsets = CensusOffsets();
+  const int width = picture.width, height = picture.height;
+  census->assign(picture.PlaneSize(), 0);
+  for (int y = 0; y < height; ++y) {
+    const float* centre = picture.data.data() + static_cast<size_t>(y) * width;
+    uint32_t* out = census->data() + static_cast<size_t>(y) * width;
+    for (int bit = 0; bit < kCensusBits; ++bit) {
+      const int yy = std::clamp(y + offsets[bit].y, 0, height - 1);
+      const float* row = picture.data.data() + static_cast<size_t>(yy) * width;
+      const int dx = offsets[bit].x;
+      const uint32_t mask = 1u << bit;
+      const int begin = std::max(0, -dx), end = std::min(width, width - dx);
+      for (int x = begin; x < end; ++x) out[x] |= row[x + dx] < centre[x] ? mask : 0u;
+      for (int x = 0; x < begin; ++x) out[x] |= row[0] < centre[x] ? mask : 0u;
+      for (int x = end; x < width; ++x) out[x] |= row[width - 1] < centre[x] ? mask : 0u;
+    }
+  }
+}
+
+// The source seen through the plane at this depth of the reference camera. `valid` is 0 outside.
+void WarpThroughPlane(const PosedLuminance& reference,
+                      const PosedLuminance& source,
+                      double depth,
+                      Image* warped,
+                      std::vector<uint8_t>* valid) {
+  const Camera& r = reference.camera;
+  const Camera& s = source.camera;
+  const Eigen::Matrix3d rotation =
+      (source.cam_from_world.rotation * reference.cam_from_world.rotation.conjugate())
+          .toRotationMatrix();
+  const Eigen::Vector3d translation =
+      source.cam_from_world.Apply(reference.cam_from_world.Center());
+  Eigen::Matrix3d k_source, from_pixel;
+  k_source << s.fx, 0, s.cx, 0, s.fy, s.cy, 0, 0, 1;
+  from_pixel << 1 / r.fx, 0, -r.cx / r.fx, 0, 1 / r.fy, -r.cy / r.fy, 0, 0, 1;
+  const Eigen::Matrix3f h =
+      (k_source * (depth * rotation * from_pixel + translation * Eigen::RowVector3d(0, 0, 1)))
+          .cast<float>();
+  const Image& picture = *source.luminance;
+  const int width = r.width, height = r.height;
+  const float max_x = static_cast<float>(picture.width - 1);
+  const float max_y = static_cast<float>(picture.height - 1);
+  for (int y = 0; y < height; ++y) {
+    float* out = warped->data.data() + static_cast<size_t>(y) * width;
+    uint8_t* ok = valid->data() + static_cast<size_t>(y) * width;
+    const float py = y + 0.5f;
+    for (int x = 0; x < width; ++x) {
+      const float px = x + 0.5f;
+      const float w = h(2, 0) * px + h(2, 1) * py + h(2, 2);
+      const float inverse = 1.0f / std::max(w, 1e-6f);
+      const float sx = (h(0, 0) * px + h(0, 1) * py + h(0, 2)) * inverse - 0.5f;
+      const float sy = (h(1, 0) * px + h(1, 1) * py + h(1, 2)) * inverse - 0.5f;
+      const bool inside = w > 1e-6f && sx >= 0.0f && sy >= 0.0f && sx <= max_x && sy <= max_y;
+      ok[x] = inside;
+      const float cx = inside ? sx : 0.0f, cy = inside ? sy : 0.0f;
+      const int x0 = std::min(static_cast<int>(cx), picture.width - 2);
+      const int y0 = std::min(static_cast<int>(cy), picture.height - 2);
+      const float tx = cx - x0, ty = cy - y0;
+      const float* p = picture.data.data() + static_cast<size_t>(y0) * picture.width + x0;
+      const float top = p[0] + tx * (p[1] - p[0]);
+      const float bottom = p[picture.width] + tx * (p[picture.width + 1] - p[picture.width]);
+      out[x] = top + ty * (bottom - top);
+    }
+  }
+}
+
+// Costs of all planes at all pixels, 0..kCensusBits in fixed point, [pixel][plane].
+struct CostVolume {
+  int width, height, planes;
+  std::vector<int16_t> cost;
+};
+
+CostVolume MatchPlanes(const PosedLuminance& reference,
+                       const std::vector<PosedLuminance>& sources,
+                       const std::vector<double>& depths,
+                       const PlaneSweepOptions& options,
+                       const CancellationToken& cancel) {
+  const int width = reference.camera.width, height = reference.camera.height;
+  const int planes = static_cast<int>(depths.size());
+  const size_t pixels = static_cast<size_t>(width) * height;
+  CostVolume volume{width, height, planes, std::vector<int16_t>(pixels * planes)};
+  Census of_reference, of_warped;
+  ComputeCensus(*reference.luminance, &of_reference);
+  Image warped(width, height, 1);
+  std::vector<uint8_t> valid(pixels);
+  const size_t count = sources.size();
+  const size_t kept = (count + 1) / 2;  // the best half: the others may be occluded
+  std::vector<std::vector<uint8_t>> costs(count, std::vector<uint8_t>(pixels));
+  std::vector<uint8_t> sorted(count);
+  for (int d = 0; d < planes; ++d) {
+    cancel.ThrowIfCancelled();
+    for (size_t s = 0; s < count; ++s) {
+      WarpThroughPlane(reference, sources[s], depths[d], &warped, &valid);
+      ComputeCensus(warped, &of_warped);
+      for (size_t i = 0; i < pixels; ++i) {
+        const auto bits = static_cast<uint8_t>(std::popcount(of_reference[i] ^ of_warped[i]));
+        costs[s][i] = valid[i] ? bits : kUnknownCost;
+      }
+    }
+    const int near_bias = static_cast<int>(kCostScale * options.far_bias * d / (planes - 1));
+    for (size_t i = 0; i < pixels; ++i) {
+      for (size_t s = 0; s < count; ++s) sorted[s] = costs[s][i];
+      std::sort(sorted.begin(), sorted.end());
+      int sum = 0;
+      for (size_t s = 0; s < kept; ++s) sum += sorted[s];
+      volume.cost[i * planes + d] =
+          static_cast<int16_t>(sum * kCostScale / static_cast<int>(kept) + near_bias);
+    }
+  }
+  return volume;
+}
+
+// One step of semi-global matching: best cost of a path that arrives at a pixel, per plane.
+void PathStep(const int16_t* cost,
+              const int16_t* previous,
+              int16_t previous_least,
+              int16_t small_step,
+              int16_t large_step,
+              int planes,
+              int16_t* out,
+              int16_t* sum) {
+  const int16_t jump = static_cast<int16_t>(previous_least + large_step);
+  for (int d = 0; d < planes; ++d) {
+    // previous[-1] and previous[planes] are padding with a high cost.
+    int16_t best = std::min(previous[d], jump);
+    best = std::min<int16_t>(best, static_cast<int16_t>(previous[d - 1] + small_step));
+    best = std::min<int16_t>(best, static_cast<int16_t>(previous[d + 1] + small_step));
+    const auto value = static_cast<int16_t>(cost[d] + best - previous_least);
+    out[d] = value;
+    sum[d] = static_cast<int16_t>(sum[d] + value);
+  }
+}
+
+// Adds one direction's path costs to `sum`.
+void AggregateDirection(const CostVolume& volume,
+                        const Image& luminance,
+                        const PlaneSweepOptions& options,
+                        int dx,
+                        int dy,
+                        std::vector<int16_t>& sum) {
+  const int width = volume.width, height = volume.height, planes = volume.planes;
+  const int stride = planes + 2;
+  constexpr int16_t kHigh = 8000;
+  const auto small_step = static_cast<int16_t>(options.small_step * kCostScale);
+  std::vector<int16_t> rows[2];
+  std::vector<int16_t> least[2];
+  for (int i = 0; i < 2; ++i) {
+    rows[i].assign(static_cast<size_t>(width) * stride, kHigh);
+    least[i].assign(width, 0);
+  }
+  const int first_y = dy < 0 ? height - 1 : 0, step_y = dy < 0 ? -1 : 1;
+  const bool backwards = dx < 0 || (dx == 0 && dy < 0);
+  for (int n = 0; n < height; ++n) {
+    const int y = first_y + n * step_y;
+    auto& current = rows[n & 1];
+    auto& current_least = least[n & 1];
+    const auto& above = dy == 0 ? current : rows[1 - (n & 1)];
+    const auto& above_least = dy == 0 ? current_least : least[1 - (n & 1)];
+    for (int m = 0; m < width; ++m) {
+      const int x = backwards ? width - 1 - m : m;
+      const size_t pixel = static_cast<size_t>(y) * width + x;
+      const int16_t* cost = volume.cost.data() + pixel * planes;
+      int16_t* out = current.data() + static_cast<size_t>(x) * stride + 1;
+      int16_t* total = sum.data() + pixel * planes;
+      const int px = x - dx, py = y - dy;
+      if (px < 0 || px >= width || py < 0 || py >= height) {
+        for (int d = 0; d < planes; ++d) {
+          out[d] = cost[d];
+          total[d] = static_cast<int16_t>(total[d] + cost[d]);
+        }
+      } else {
+        const double contrast = std::abs(luminance.At(0, y, x) - luminance.At(0, py, px));
+        const double large = options.large_step / (1.0 + contrast / options.edge_contrast);
+        const auto large_step = static_cast<int16_t>(
+            kCostScale * std::max(large, options.small_step + 1.0 / kCostScale));
+        PathStep(cost,
+                 above.data() + static_cast<size_t>(px) * stride + 1,
+                 above_least[px],
+                 small_step,
+                 large_step,
+                 planes,
+                 out,
+                 total);
+      }
+      int16_t smallest = out[0];
+      for (int d = 1; d < planes; ++d) smallest = std::min(smallest, out[d]);
+      current_least[x] = smallest;
+    }
+  }
+}
+
+// Best plane with a parabola through its neighbours, and how far behind the best other plane lies.
+void PickPlane(const int16_t* sum, int planes, double* plane, double* margin) {
+  int best = 0;
+  for (int d = 1; d < planes; ++d) {
+    if (sum[d] < sum[best]) best = d;
+  }
+  int second = 1 << 30;
+  for (int d = 0; d < planes; ++d) {
+    if (std::abs(d - best) > 2) second = std::min<int>(second, sum[d]);
+  }
+  *plane = best;
+  if (best > 0 && best + 1 < planes) {
+    const double low = sum[best - 1] - sum[best], high = sum[best + 1] - sum[best];
+    if (low + high > 0) *plane += 0.5 * (low - high) / (low + high);
+  }
+  *margin =
+      second < (1 << 30) ? static_cast<double>(second - sum[best]) / std::max<int>(1, second) : 1.0;
+}
+
+}  // namespace
+
+void PlaneSweepOptions::Validate() const {
+  if (planes < 8 || planes > 512) {
+    throw InvalidArgument("plane sweep takes 8 to 512 planes, not " + std::to_string(planes));
+  }
+}
+
+DepthMap SweepPlanes(const PosedLuminance& reference,
+                     const std::vector<PosedLuminance>& sources,
+                     double nearest,
+                     double farthest,
+                     const PlaneSweepOptions& options,
+                     const CancellationToken& cancel) {
+  options.Validate();
+  if (sources.empty()) throw InvalidArgument("plane sweep needs at least one other view");
+  if (!(nearest > 0.0 && farthest > nearest && std::isfinite(farthest))) {
+    throw InvalidArgument("plane sweep between depths " + std::to_string(nearest) + " and " +
+                          std::to_string(farthest) + ": nothing lies between them");
+  }
+  std::vector<double> depths(options.planes);
+  for (int d = 0; d < options.planes; ++d) {
+    const double t = d / (options.planes - 1.0);
+    depths[d] = 1.0 / ((1.0 - t) / farthest + t / nearest);
+  }
+  const CostVolume volume = MatchPlanes(reference, sources, depths, options, cancel);
+  std::vector<int16_t> sum(volume.cost.size());
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (dx == 0 && dy == 0) continue;
+      cancel.ThrowIfCancelled();
+      AggregateDirection(volume, *reference.luminance, options, dx, dy, sum);
+    }
+  }
+  DepthMap map{Image(volume.width, volume.height, 1), Image(volume.width, volume.height, 1)};
+  for (size_t i = 0; i < map.depth.PlaneSize(); ++i) {
+    double plane = 0.0, margin = 0.0;
+    PickPlane(sum.data() + i * options.planes, options.planes, &plane, &margin);
+    const double t = plane / (options.planes - 1.0);
+    map.depth.data[i] = static_cast<float>(1.0 / ((1.0 - t) / farthest + t / nearest));
+    map.confidence.data[i] = static_cast<float>(std::clamp(margin * 4.0, 0.0, 1.0));
+  }
+  return map;
+}
+
+}  // namespace color3d
