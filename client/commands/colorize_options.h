@@ -20,8 +20,8 @@ struct ColorizeOptions {
   std::string out;
   KeyColorFlags color;
   std::vector<std::string> more_keys;  // "VIEW=COLOURED_PICTURE", in order of importance
-  std::string key_view;  // view name or stem; empty: selected
-  std::string encoder;   // weights by name in the server's configuration; empty: the embedded one
+  std::string key_view;                // view name or stem; empty: selected
+  std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";
   bool benchmark = false;
   bool bound = false;  // of the benchmark: upload all true colours, and score what they would give

@@ -14,6 +14,7 @@ namespace color3d {
 namespace {
 
 constexpr double kTolerance = 1e-3;
+constexpr double kMostStrange = 4.0;  // feature distance; beyond, all is equally strange
 
 void CheckRange(const char* field, double value, double low, double high) {
   if (!(value >= low && value <= high)) {
@@ -76,12 +77,15 @@ FusedColor FuseColors(const Image& luminance,
                                           : options.most_guessed * SmoothStep(distance.data[i],
                                                                               options.guess_begins,
                                                                               options.guess_ends);
-    const double total = seen + options.inferred_weight;
+    const double strangeness =
+        distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMostStrange);
+    const double pull = options.inferred_weight / (1.0 + strangeness * strangeness);
+    const double total = seen + pull;
     for (int c = 0; c < 2; ++c) {
       const double guess_ab = guessed.Empty() ? 0.0 : options.guess_chroma * guessed.Plane(c)[i];
       const double prior = (1.0 - guess) * inferred.Plane(c)[i] + guess * guess_ab;
-      target[c * pixels + i] = static_cast<float>(
-          (seen * carried.ab.Plane(c)[i] + options.inferred_weight * prior) / total);
+      target[c * pixels + i] =
+          static_cast<float>((seen * carried.ab.Plane(c)[i] + pull * prior) / total);
     }
     system.data[static_cast<int64_t>(i)] = static_cast<float>(total);
     const double share_seen = seen / total;

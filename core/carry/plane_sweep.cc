@@ -1,7 +1,6 @@
 #include "core/carry/plane_sweep.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -14,7 +13,8 @@ namespace {
 constexpr int kCensusRadius = 3;  // every second pixel of a 7x7 window
 constexpr int kCensusBits = 24;
 constexpr uint8_t kUnknownCost = 11;  // of a pixel that a source does not show: about chance
-constexpr int kCostScale = 8;         // fixed point of aggregated costs
+constexpr size_t kMostSources = 16;
+constexpr int kCostScale = 8;  // fixed point of aggregated costs
 
 using Census = std::vector<uint32_t>;
 
@@ -52,6 +52,30 @@ void ComputeCensus(const Image& picture, Census* census) {
       for (int x = end; x < width; ++x) out[x] |= row[width - 1] < centre[x] ? mask : 0u;
     }
   }
+}
+
+// Set bits of each of the lower 24, in a form that compilers vectorise without popcnt.
+uint8_t CountBits(uint32_t x) {
+  x = x - ((x >> 1) & 0x55555555u);
+  x = (x & 0x33333333u) + ((x >> 2) & 0x33333333u);
+  x = (x + (x >> 4)) & 0x0f0f0f0fu;
+  return static_cast<uint8_t>(x + (x >> 8) + (x >> 16));
+}
+
+// Sum of the `kept` smallest of the sources' costs at a pixel.
+int SumOfSmallest(const std::vector<std::vector<uint8_t>>& costs, size_t pixel, size_t kept) {
+  uint8_t smallest[kMostSources];
+  size_t filled = 0;
+  for (const std::vector<uint8_t>& of_source : costs) {
+    const uint8_t cost = of_source[pixel];
+    if (filled == kept && cost >= smallest[kept - 1]) continue;
+    size_t at = filled < kept ? filled++ : kept - 1;
+    for (; at > 0 && smallest[at - 1] > cost; --at) smallest[at] = smallest[at - 1];
+    smallest[at] = cost;
+  }
+  int sum = 0;
+  for (size_t i = 0; i < kept; ++i) sum += smallest[i];
+  return sum;
 }
 
 // The source seen through the plane at this depth of the reference camera. `valid` is 0 outside.
@@ -110,7 +134,6 @@ struct CostVolume {
 CostVolume MatchPlanes(const PosedLuminance& reference,
                        const std::vector<PosedLuminance>& sources,
                        const std::vector<double>& depths,
-                       const PlaneSweepOptions& options,
                        const CancellationToken& cancel) {
   const int width = reference.camera.width, height = reference.camera.height;
   const int planes = static_cast<int>(depths.size());
@@ -123,25 +146,19 @@ CostVolume MatchPlanes(const PosedLuminance& reference,
   const size_t count = sources.size();
   const size_t kept = (count + 1) / 2;  // the best half: the others may be occluded
   std::vector<std::vector<uint8_t>> costs(count, std::vector<uint8_t>(pixels));
-  std::vector<uint8_t> sorted(count);
   for (int d = 0; d < planes; ++d) {
     cancel.ThrowIfCancelled();
     for (size_t s = 0; s < count; ++s) {
       WarpThroughPlane(reference, sources[s], depths[d], &warped, &valid);
       ComputeCensus(warped, &of_warped);
       for (size_t i = 0; i < pixels; ++i) {
-        const auto bits = static_cast<uint8_t>(std::popcount(of_reference[i] ^ of_warped[i]));
+        const uint8_t bits = CountBits(of_reference[i] ^ of_warped[i]);
         costs[s][i] = valid[i] ? bits : kUnknownCost;
       }
     }
-    const int near_bias = static_cast<int>(kCostScale * options.far_bias * d / (planes - 1));
     for (size_t i = 0; i < pixels; ++i) {
-      for (size_t s = 0; s < count; ++s) sorted[s] = costs[s][i];
-      std::sort(sorted.begin(), sorted.end());
-      int sum = 0;
-      for (size_t s = 0; s < kept; ++s) sum += sorted[s];
-      volume.cost[i * planes + d] =
-          static_cast<int16_t>(sum * kCostScale / static_cast<int>(kept) + near_bias);
+      const int sum = SumOfSmallest(costs, i, kept);
+      volume.cost[i * planes + d] = static_cast<int16_t>(sum * kCostScale / static_cast<int>(kept));
     }
   }
   return volume;
@@ -260,7 +277,10 @@ DepthMap SweepPlanes(const PosedLuminance& reference,
                      const PlaneSweepOptions& options,
                      const CancellationToken& cancel) {
   options.Validate();
-  if (sources.empty()) throw InvalidArgument("plane sweep needs at least one other view");
+  if (sources.empty() || sources.size() > kMostSources) {
+    throw InvalidArgument("plane sweep compares a view with 1 to " + std::to_string(kMostSources) +
+                          " others, not " + std::to_string(sources.size()));
+  }
   if (!(nearest > 0.0 && farthest > nearest && std::isfinite(farthest))) {
     throw InvalidArgument("plane sweep between depths " + std::to_string(nearest) + " and " +
                           std::to_string(farthest) + ": nothing lies between them");
@@ -270,7 +290,7 @@ DepthMap SweepPlanes(const PosedLuminance& reference,
     const double t = d / (options.planes - 1.0);
     depths[d] = 1.0 / ((1.0 - t) / farthest + t / nearest);
   }
-  const CostVolume volume = MatchPlanes(reference, sources, depths, options, cancel);
+  const CostVolume volume = MatchPlanes(reference, sources, depths, cancel);
   std::vector<int16_t> sum(volume.cost.size());
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {

@@ -18,14 +18,12 @@ struct PosedLuminance {
 };
 
 struct PlaneSweepOptions {
-  int planes = 128;  // evenly spaced in inverse depth, 8..512
+  int planes = 96;  // evenly spaced in inverse depth, 8..512
   // Penalties of semi-global matching for a change by one plane and by more, bits of the census;
   // the latter is divided by 1 + |dL| / edge_contrast at edges of L.
   double small_step = 1.5;
-  double large_step = 8.0;
+  double large_step = 16.0;
   double edge_contrast = 8.0;
-  // Cost of the nearest plane over the farthest, bits: what shows no texture (sky) is far away.
-  double far_bias = 1.0;
   void Validate() const;
 };
 
@@ -34,7 +32,7 @@ struct DepthMap {
   Image confidence;  // 1 channel, 0..1: how clearly the best plane beats all others
 };
 
-// `nearest` and `farthest`: > 0, camera depth. `sources`: at least one. Throws
+// `nearest` and `farthest`: > 0, camera depth. `sources`: 1..16. Throws
 // Error{kInvalidArgument} for an empty range or no source, Error{kCancelled}.
 DepthMap SweepPlanes(const PosedLuminance& reference,
                      const std::vector<PosedLuminance>& sources,

@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include "core/carry/fusion.h"
 #include "core/image/codec.h"
 #include "core/keycolor/automatic.h"
@@ -10,12 +8,23 @@
 namespace color3d {
 namespace {
 
-// The automatic guess where anything of the view is strange enough to need it; empty otherwise.
-Image GuessIfNeeded(const Image& luminance, const Image& distance, const FusionOptions& options) {
-  const bool strange = std::any_of(distance.data.begin(), distance.data.end(), [&](float value) {
-    return value > options.guess_begins;
-  });
-  return strange ? AutomaticColorizer::Embedded()->Colorize(luminance).ab : Image();
+constexpr double kWorthGuessing = 0.02;  // share of a view's pixels
+
+// The automatic guess where enough of the view is strange and was not carried; empty otherwise.
+Image GuessIfNeeded(const Image& luminance,
+                    const CarriedColor& carried,
+                    const Image& distance,
+                    const FusionOptions& options) {
+  size_t strange = 0;
+  for (size_t i = 0; i < distance.data.size(); ++i) {
+    strange += distance.data[i] > options.guess_begins &&
+                       carried.confidence.data[i] <= options.least_confidence
+                   ? 1
+                   : 0;
+  }
+  return static_cast<double>(strange) > kWorthGuessing * static_cast<double>(luminance.PlaneSize())
+             ? AutomaticColorizer::Embedded()->Colorize(luminance).ab
+             : Image();
 }
 
 }  // namespace
@@ -34,12 +43,13 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     const View& view = scene.views[static_cast<size_t>(i)];
     const auto luminance = images.Luminance(static_cast<int>(i));
     const ColorPrediction inferred = colorizer->Predict(*luminance);
+    const CarriedColor carried = ReadCarried(context, view, luminance->width, luminance->height);
     const FusedColor fused =
         FuseColors(*luminance,
-                   ReadCarried(context, view, luminance->width, luminance->height),
+                   carried,
                    inferred.ab,
                    inferred.distance,
-                   GuessIfNeeded(*luminance, inferred.distance, options),
+                   GuessIfNeeded(*luminance, carried, inferred.distance, options),
                    options,
                    pool,
                    context.cancel());

@@ -68,7 +68,7 @@ struct CarryColorOptions {
   int max_side_px = 500;    // of the carried maps, 64..4096
   int sweep_side_px = 300;  // at which depth is measured, 64..2048
   int sweep_sources = 4;    // views that each view is compared with, 1..16
-  PlaneSweepOptions sweep{.planes = 96, .large_step = 16.0};
+  PlaneSweepOptions sweep;
   CarryOptions carry;
   std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
   void Validate() const;

@@ -33,7 +33,7 @@ struct CarryArguments {
   int side_px = 500;
   int sweep_px = 400;
   int sources = 4;
-  double fuse_sigma = 1.0, prior = 0.02, weight = 1.0, low = 0.03;
+  double power = 0, scale = 1, fuse_sigma = 1.0, prior = 0.02, weight = 1.0, low = 0.03;
   bool sweep = true;
   bool sweep_only = false;
   CarryOptions options;
@@ -49,13 +49,14 @@ Image Lerp(const Image& from, const Image& to, const Image& share) {
 }
 
 Image Fuse(const Image& l, const Image& prior, const Image& carried, const Image& conf, double sigma,
-           double prior_weight, double carried_weight, double low, ThreadPool& pool) {
+           double prior_weight, double carried_weight, double low, ThreadPool& pool,
+           const Image& distance = {}, double power = 0, double scale = 1) {
   GridSystem system = SystemOfLuminance(l, sigma, pool);
   const size_t n = l.PlaneSize();
   std::vector<float> target(2 * n);
   for (size_t i = 0; i < n; ++i) {
     const float c = std::max(0.0, (conf.data[i] - low)) * carried_weight;
-    const float p = prior_weight;
+    const float p = prior_weight / (distance.Empty() ? 1.0 : 1.0 + std::pow(distance.data[i] / scale, power));
     system.data[i] = c + p;
     for (int k = 0; k < 2; ++k)
       target[k * n + i] = (c * carried.Plane(k)[i] + p * prior.Plane(k)[i]) / (c + p);
@@ -111,7 +112,7 @@ void RunCarry(const CarryArguments& args) {
     std::string names;
     for (int i : plan.sources) { sources.push_back(posed(i)); names += " " + scene.views[i].name; }
     const auto start = std::chrono::steady_clock::now();
-    const std::filesystem::path cached = run / ("depth." + std::to_string(args.sweep_px) + "." + std::to_string(args.sources) + "." + std::to_string(args.sweep_options.planes) + "." + std::to_string(args.sweep_options.large_step) + "." + std::to_string(args.sweep_options.small_step) + "." + std::to_string(args.sweep_options.far_bias) + "." + std::to_string(v) + ".bin");
+    const std::filesystem::path cached = run / ("depth." + std::to_string(args.sweep_px) + "." + std::to_string(args.sources) + "." + std::to_string(args.sweep_options.planes) + "." + std::to_string(args.sweep_options.large_step) + "." + std::to_string(args.sweep_options.small_step) + "." + std::to_string(v) + ".bin");
     if (std::filesystem::exists(cached)) {
       const std::string bytes = ReadFile(cached);
       std::memcpy(s.depth.data.data(), bytes.data(), bytes.size());
@@ -167,9 +168,10 @@ void RunCarry(const CarryArguments& args) {
     const Image fused3 = Lerp(rendered_ab, carried.ab, share);
     const Image l = LuminanceOfLab(truth);
     const auto t0 = std::chrono::steady_clock::now();
-    const Image solved = Fuse(l, direct, carried.ab, carried.confidence, args.fuse_sigma, args.prior, args.weight, args.low, pool);
+    const ColorPrediction predicted = colorizer->Predict(l);
+    const Image solved = Fuse(l, direct, carried.ab, carried.confidence, args.fuse_sigma, args.prior, args.weight, args.low, pool, args.power > 0 ? predicted.distance : Image(), args.power, args.scale);
     fuse_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - t0).count();
-    const Image solved3 = Fuse(l, rendered_ab, carried.ab, carried.confidence, args.fuse_sigma, args.prior, args.weight, args.low, pool);
+    const Image solved3 = Fuse(l, rendered_ab, carried.ab, carried.confidence, args.fuse_sigma, args.prior, args.weight, args.low, pool, args.power > 0 ? predicted.distance : Image(), args.power, args.scale);
     const Image* candidates[6] = {&direct, &rendered_ab, &fused, &fused3, &solved, &solved3};
     const Image small_truth = FitWithin(truth, 400);
     double row[6];
@@ -252,6 +254,8 @@ void AddCarryCommand(CLI::App& app) {
   command->add_option("--luminance-tolerance", args->options.luminance_tolerance);
   command->add_option("--flow-tolerance", args->options.flow_tolerance_px);
   command->add_option("--fuse-sigma", args->fuse_sigma);
+  command->add_option("--power", args->power);
+  command->add_option("--scale", args->scale);
   command->add_option("--prior", args->prior);
   command->add_option("--weight", args->weight);
   command->add_option("--low", args->low);
@@ -262,7 +266,6 @@ void AddCarryCommand(CLI::App& app) {
   command->add_option("--sources", args->sources);
   command->add_option("--planes", args->sweep_options.planes);
   command->add_option("--p1", args->sweep_options.small_step);
-  command->add_option("--bias", args->sweep_options.far_bias);
   command->add_option("--p2", args->sweep_options.large_step);
   command->callback([args] { RunCarry(*args); });
 }

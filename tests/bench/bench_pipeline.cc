@@ -21,9 +21,9 @@ struct PipelineArguments {
   ChromaOptions chroma;
   bool paper = false;
   bool carry = true;
-  std::string geometry_from;
   bool bound = false;
   bool rescore = false;
+  std::string geometry_file;
 };
 
 // The scene folder has the true colours of all views.
@@ -36,17 +36,6 @@ void Evaluate(const PipelineArguments& args, const Scene& scene, StageContext& c
     truth.push_back({view.name, context.scene_folder() / view.image_file});
   }
   RunEvaluate(options, context);
-}
-
-// What an earlier run with the same scene left of a stage, in place of running it.
-bool TakeFrom(const std::string& folder,
-              const std::vector<std::string>& names,
-              StageContext& context) {
-  if (folder.empty()) return false;
-  for (const std::string& name : names) {
-    context.WriteOutput(name, ReadFile(std::filesystem::path(folder) / name));
-  }
-  return true;
 }
 
 void RunPipeline(const PipelineArguments& args) {
@@ -65,7 +54,6 @@ void RunPipeline(const PipelineArguments& args) {
     ImportOptions options;
     options.hold_out_every_eighth = true;
     options.threads = args.threads;
-    if (TakeFrom(args.geometry_from, {artifact::kScene, artifact::kImportFacts}, c)) return;
     RunImportScene(options, c);
   });
   pipeline.Run("select_key_view", [&](StageContext& c) {
@@ -80,10 +68,13 @@ void RunPipeline(const PipelineArguments& args) {
     options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
     RunColorizeKeyView(options, c);
   });
-  pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
-    if (TakeFrom(args.geometry_from, {artifact::kGeometry, artifact::kMemoryPlan}, c)) return;
-    RunReconstructGeometry(args.geometry, args.max_side_px, c);
-  });
+  if (args.geometry_file.empty()) {
+    pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
+      RunReconstructGeometry(args.geometry, args.max_side_px, c);
+    });
+  } else {
+    pipeline.Take(artifact::kGeometry, args.geometry_file);
+  }
   if (args.carry) {
     pipeline.Run("carry_color", [&](StageContext& c) {
       CarryColorOptions options;
@@ -125,12 +116,13 @@ void AddPipelineCommand(CLI::App& app) {
   command->add_option("--max-gaussians", args->geometry.max_gaussians);
   command->add_option("--colorizer-iterations", args->colorizer.iterations);
   command->add_option("--chroma-iterations", args->chroma.iterations);
-  command->add_option(
-      "--geometry-from",
-      args->geometry_from,
-      "output of an earlier run on the same scene: its poses and geometry are taken");
   command->add_flag("--carry,!--no-carry", args->carry, "geometry first");
   command->add_flag("--paper", args->paper, "the paper's colorizer recipe");
+  command
+      ->add_option("--geometry",
+                   args->geometry_file,
+                   "geometry.c3g of an earlier run of the scene at this size, in place of training")
+      ->check(CLI::ExistingFile);
   command->add_flag(
       "--rescore", args->rescore, "run evaluation alone, on what an earlier run left in --out");
   command->add_flag(
