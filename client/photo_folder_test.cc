@@ -56,6 +56,16 @@ TEST_F(PhotoFolderTest, ImagesFolderWinsAndIsReadAtAnyDepth) {
               ElementsAre("images/a.jpg", "images/left/b.png"));
 }
 
+TEST_F(PhotoFolderTest, PicturesInAugmentGoAlongAndAreNoPhotos) {
+  for (const char* name : {"a.jpg", "b.jpg", "augment/x.png", "augment/deep/y.jpg"}) Write(name);
+  const PhotoFolder folder = CollectPhotos(root());
+  EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.jpg"));
+  EXPECT_THAT(Paths(folder.augment_files), ElementsAre("augment/deep/y.jpg", "augment/x.png"));
+  EXPECT_EQ(folder.AllFiles().size(), 4u);
+  Write("augment/notes.txt");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("augment/notes.txt is no picture"));
+}
+
 TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {
   for (const char* name : {"images/a.jpg", "images/b.jpg"}) Write(name);
   for (const char* stem : {"cameras", "images", "points3D"}) {

@@ -127,6 +127,12 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("--max-gaussians", o->max_gaussians, "Hard cap")->check(CLI::Range(1, 10'000'000));
   app.add_option("--colorizer-iterations", o->colorizer_iterations, "Of the scene's colorizer")
       ->check(CLI::Range(0, 100'000));
+  app.add_option("--augment",
+                 o->augment,
+                 "Pictures made from the key view that the colorizer learns from, too (the paper: "
+                 "8); those in PHOTOS/augment/ always count")
+      ->check(CLI::Range(0, 64));
+  app.add_option("--augment-backend", o->augment_backend, "Model server that makes them");
   app.add_option("--chroma-iterations", o->chroma_iterations, "After the closed-form start")
       ->check(CLI::Range(0, 100'000));
 }
@@ -181,6 +187,11 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   }
   if (options.colorizer_iterations) {
     colorize->mutable_personalize()->set_iterations(*options.colorizer_iterations);
+  }
+  if (options.augment || !options.augment_backend.empty()) {
+    v1::GenerateAugmentationsSpec* augment = colorize->mutable_generate_augmentations();
+    if (options.augment) augment->set_samples(*options.augment);
+    augment->set_backend(options.augment_backend);
   }
   if (options.chroma_iterations) {
     colorize->mutable_solve_chroma()->set_iterations(*options.chroma_iterations);

@@ -34,6 +34,8 @@ struct ColorizeOptions {
   std::optional<int> max_gaussians;
   std::optional<int> colorizer_iterations;
   std::optional<int> chroma_iterations;
+  std::optional<int> augment;   // pictures made from the key view
+  std::string augment_backend;  // generator by name; empty: the embedded surrogates
 
   // What can be said without the server: throws Error when options do not go together or files
   // cannot be read.

@@ -15,6 +15,7 @@ namespace {
 
 constexpr size_t kMaxFiles = 10'000;
 constexpr size_t kMaxPathBytes = 1024;
+constexpr char kAugment[] = "augment";
 constexpr char kTransforms[] = "transforms.json";
 constexpr const char* kModelFolders[] = {"sparse/0", "sparse", ""};
 constexpr const char* kModelStems[] = {"cameras", "images", "points3D"};
@@ -120,6 +121,20 @@ void CollectModel(const fs::path& root, PhotoFolder* result) {
   }
 }
 
+// All files, so that one of the wrong kind is refused by name instead of being passed over.
+void CollectAugmentFiles(const fs::path& root, PhotoFolder* result) {
+  if (!IsFolder(root / kAugment)) return;
+  for (const std::string& file : ListFiles(root / kAugment)) {
+    const fs::path path = root / kAugment / file;
+    if (!HasImageExtension(file)) {
+      throw InvalidArgument(path.string() +
+                            " is no picture (JPEG, PNG or TIFF); augment/ is for pictures in "
+                            "colour that the colorizer learns from: move it elsewhere");
+    }
+    result->augment_files.push_back({std::string(kAugment) + "/" + file, path});
+  }
+}
+
 // A subfolder with photos, to name it in the error.
 std::string SubfolderWithPhotos(const fs::path& root) {
   std::error_code none;
@@ -146,7 +161,7 @@ void CheckCounts(const PhotoFolder& folder) {
     throw InvalidArgument(root + " contains one photograph (" + folder.photos[0].path +
                           "); at least 3 that overlap are needed");
   }
-  const size_t files = folder.photos.size() + folder.model_files.size();
+  const size_t files = folder.AllFiles().size();
   if (files > kMaxFiles) {
     throw InvalidArgument(root + " contains " + std::to_string(files) + " files; at most " +
                           std::to_string(kMaxFiles) + " make up a scene");
@@ -168,6 +183,7 @@ void CheckName(const LocalFile& file) {
 std::vector<LocalFile> PhotoFolder::AllFiles() const {
   std::vector<LocalFile> all = photos;
   all.insert(all.end(), model_files.begin(), model_files.end());
+  all.insert(all.end(), augment_files.begin(), augment_files.end());
   return all;
 }
 
@@ -181,9 +197,11 @@ PhotoFolder CollectPhotos(const fs::path& root) {
   }
   CollectImages(result.root, &result);
   CollectModel(result.root, &result);
+  CollectAugmentFiles(result.root, &result);
   const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
   std::sort(result.photos.begin(), result.photos.end(), by_path);
   std::sort(result.model_files.begin(), result.model_files.end(), by_path);
+  std::sort(result.augment_files.begin(), result.augment_files.end(), by_path);
   CheckCounts(result);
   for (const LocalFile& file : result.AllFiles()) CheckName(file);
   const fs::path parent = fs::absolute(result.root).parent_path();

@@ -15,18 +15,19 @@ struct LocalFile {
 
 struct PhotoFolder {
   std::filesystem::path root;
-  std::vector<LocalFile> photos;       // sorted by path
-  std::vector<LocalFile> model_files;  // of a COLMAP model or transforms.json, sorted by path
-  std::vector<std::string> notes;      // what the user may want to know, one line each
+  std::vector<LocalFile> photos;         // sorted by path
+  std::vector<LocalFile> model_files;    // of a COLMAP model or transforms.json, sorted by path
+  std::vector<LocalFile> augment_files;  // pictures in colour for the colorizer, sorted by path
+  std::vector<std::string> notes;        // what the user may want to know, one line each
 
   std::vector<LocalFile> AllFiles() const;
 };
 
 // Photos (.jpg .jpeg .png .tif .tiff) are taken from images/, at any depth, when there is one with
 // photos; else from `root` itself and from the subfolders that transforms.json names. Also taken: a
-// COLMAP model in sparse/0, sparse or `root`, and transforms.json. Nothing else. Throws Error: no
-// such folder, a file instead of a folder, no photos, one photo, more than 10,000 files, names that
-// are not safe or not UTF-8.
+// COLMAP model in sparse/0, sparse or `root`, transforms.json, and everything in augment/ (any
+// depth). Nothing else. Throws Error: no such folder, a file instead of a folder, no photos, one
+// photo, more than 10,000 files, names that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root);
 
 // The photo whose file stem is that of `file` ("x/0007_coloured.png" has the stem "0007_coloured"),

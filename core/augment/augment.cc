@@ -8,15 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "core/augment/elastic_field.h"
 #include "core/base/error.h"
 
 namespace color3d {
 namespace {
 
-struct Point {
-  double x = 0.0;
-  double y = 0.0;
-};
+using Point = PlanePoint;
 
 // Largest share by which the perspective map shrinks or stretches at the middle of an edge, and the
 // largest rotation that goes with it.
@@ -37,55 +35,6 @@ void Check(const Image& luminance, const Image& ab, const AugmentOptions& option
         "elastic_sigma_px > 0");
   }
 }
-
-// Smooth random displacement: cubic B-spline over nodes that are uniform in -alpha..alpha px and
-// lie sigma px apart, so that it never exceeds alpha.
-class ElasticField {
- public:
-  ElasticField(int size_px, double alpha_px, double sigma_px, Random& random)
-      : spacing_(sigma_px), nodes_(static_cast<int>(size_px / sigma_px) + 5) {
-    offsets_.resize(static_cast<size_t>(nodes_) * nodes_);
-    for (Point& offset : offsets_) {
-      offset.x = random.NextUniform(-alpha_px, alpha_px);
-      offset.y = random.NextUniform(-alpha_px, alpha_px);
-    }
-  }
-
-  Point At(double x, double y) const {
-    const Weights wx = At(x);
-    const Weights wy = At(y);
-    Point sum;
-    for (int j = 0; j < 4; ++j) {
-      for (int i = 0; i < 4; ++i) {
-        const Point& node = offsets_[static_cast<size_t>(wy.first + j) * nodes_ + wx.first + i];
-        sum.x += wy.value[j] * wx.value[i] * node.x;
-        sum.y += wy.value[j] * wx.value[i] * node.y;
-      }
-    }
-    return sum;
-  }
-
- private:
-  struct Weights {
-    int first = 0;
-    double value[4] = {};
-  };
-  Weights At(double position) const {
-    const double cell = std::clamp(position / spacing_, 0.0, static_cast<double>(nodes_ - 4));
-    Weights weights;
-    weights.first = std::min(static_cast<int>(cell), nodes_ - 4);
-    const double t = cell - weights.first;
-    weights.value[0] = (1 - t) * (1 - t) * (1 - t) / 6.0;
-    weights.value[1] = (3 * t * t * t - 6 * t * t + 4) / 6.0;
-    weights.value[2] = (-3 * t * t * t + 3 * t * t + 3 * t + 1) / 6.0;
-    weights.value[3] = t * t * t / 6.0;
-    return weights;
-  }
-
-  double spacing_;
-  int nodes_;
-  std::vector<Point> offsets_;
-};
 
 // p -> R p / (1 + g . p) about the middle of the crop; the identity by default.
 struct Perspective {

@@ -118,6 +118,7 @@ void ColorizerOptions::Validate() const {
   CheckRange("time_limit_seconds", time_limit_seconds, 0, 1e7);
   CheckRange("max_side_px", max_side_px, 64, 2048);
   CheckRange("crop_px", crop_px, 64, 1024);
+  CheckRange("learning_rate", learning_rate, 0, 1);
   CheckRange("consistency_weight", consistency_weight, 0, 1e3);
   CheckRange("threads", threads, 0, 1024);
 }
@@ -134,6 +135,7 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
     recipe.warmup_iterations = 0;
     recipe.neighbours = false;
   }
+  if (options.learning_rate > 0.0) recipe.first_learning_rate = options.learning_rate;
   return recipe;
 }
 

@@ -25,6 +25,7 @@ struct ColorizerOptions {
   double time_limit_seconds = 0.0;  // > 0: the schedule is shortened to end in time
   int max_side_px = 400;            // of the key view during training, 64..2048
   int crop_px = 256;                // 64..1024, clipped to the picture
+  double learning_rate = 0.0;       // at the start of the schedule, 0..1; 0: the recipe's
   double consistency_weight = 0.0;  // the paper's A4 term; 0 = off
   int threads = 0;
   uint64_t seed = 1;

@@ -240,6 +240,7 @@ std::string Trainer::Fingerprint() const {
                    options_.iterations,
                    options_.time_limit_seconds,
                    options_.crop_px,
+                   options_.learning_rate,
                    options_.consistency_weight,
                    options_.seed}
                   .dump());

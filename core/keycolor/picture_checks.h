@@ -1,5 +1,6 @@
 // Is a picture in colour, and does it show what another one shows? Asked of everything that a user
-// or a model gives as the coloured key view. Pure functions, thread-safe. Internal to core/keycolor.
+// or a model gives as the coloured key view or as more pictures of its scene. Pure functions,
+// thread-safe.
 #pragma once
 
 #include <string>

@@ -180,6 +180,12 @@ void CheckMask(const Image& luminance, const Image& mask) {
 
 }  // namespace
 
+std::vector<std::string> RemoteColorizer::Generate(const RemoteGenerateRequest& request,
+                                                   ProgressObserver&,
+                                                   const CancellationToken&) {
+  throw Error(ErrorCode::kUnimplemented, "this backend generates no " + request.kind + " pictures");
+}
+
 RemoteSolution KeyColorFromRemote(const Image& luminance,
                                   const RemoteOptions& options,
                                   RemoteColorizer& remote,

@@ -24,6 +24,9 @@ inline constexpr char kReferenceImage[] = "reference_image";
 inline constexpr char kColorPoints[] = "color_points";
 inline constexpr char kMask[] = "mask";
 inline constexpr char kSeed[] = "seed";
+inline constexpr char kOutpaint[] = "outpaint";
+inline constexpr char kAnimate[] = "animate";
+inline constexpr char kNovelView[] = "novel_view";
 }  // namespace capability
 
 struct RemoteInfo {
@@ -49,7 +52,16 @@ struct RemoteRequest {
   uint64_t seed = 0;     // 0: none
 };
 
-// One model server. Used by one thread at a time. Both calls return or throw within their time
+// Pictures of the same scene made from one coloured picture.
+struct RemoteGenerateRequest {
+  std::string idempotency_key;
+  std::string image_png;  // RGB, 8 bits
+  std::string kind;       // capability::kOutpaint, kAnimate or kNovelView
+  int samples = 1;        // 1..64
+  uint64_t seed = 0;      // 0: none
+};
+
+// One model server. Used by one thread at a time. All calls return or throw within their time
 // limit, and soon after `cancel` is set (Error{kCancelled}); Error{kUnavailable} when the server
 // cannot be reached or is not ready, kDeadlineExceeded, or kFailedPrecondition for what it refuses.
 class RemoteColorizer {
@@ -61,6 +73,11 @@ class RemoteColorizer {
   virtual std::string Colorize(const RemoteRequest& request,
                                ProgressObserver& progress,
                                const CancellationToken& cancel) = 0;
+  // The bytes of 1..samples pictures, unchecked but for their number and size. By default:
+  // Error{kUnimplemented}.
+  virtual std::vector<std::string> Generate(const RemoteGenerateRequest& request,
+                                            ProgressObserver& progress,
+                                            const CancellationToken& cancel);
 };
 // By the name in the server's configuration. Throws Error{kFailedPrecondition} for an unknown one.
 using RemoteColorizerFactory =

@@ -24,13 +24,16 @@ inline constexpr char kKeyColor[] = "key_color.png";                 // ab, undi
 inline constexpr char kKeyColorFacts[] = "key_color.json";           // where the colour came from
 inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which words went where
 inline constexpr char kKeyViewColored[] = "key_view_coloured.png";   // for people
+inline constexpr char kAugmentationFacts[] = "augmentations.json";   // what was made, what not, why
+// + name + ".png" (for people, and L), ".ab.png" and ".weight.png"
+inline constexpr char kAugmentations[] = "augmentations/";
+inline constexpr char kAugmentationSheet[] = "augmentations.jpg";  // contact sheet
 inline constexpr char kColorizer[] = "colorizer.c3c";
-inline constexpr char kCarried[] = "carried/";       // + view's stem + ".png": ab and confidence
-inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
-inline constexpr char kViewsAb[] = "views_ab/";      // + view's stem + ".png"
+inline constexpr char kCarried[] = "carried/";      // + view's stem + ".png": ab and confidence
+inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
 // + view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255).
 inline constexpr char kProvenance[] = "provenance/";
-inline constexpr char kAugmentationSheet[] = "augmentations.jpg";
+inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
 inline constexpr char kGeometry[] = "geometry.c3g";
 inline constexpr char kMemoryPlan[] = "memory_plan.json";
 inline constexpr char kModel[] = "model.c3g";

@@ -129,6 +129,16 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     const auto memory = ordered_json::parse(context.ReadInput(artifact::kMemoryPlan));
     add_reason("luminance_geometry", memory.at("note"));
   }
+  if (context.HasInput(artifact::kAugmentationFacts)) {
+    const auto facts = ordered_json::parse(context.ReadInput(artifact::kAugmentationFacts));
+    for (const auto& left_out : facts.at("left_out")) {
+      plan.push_back({"augmentation_" + left_out.at("kind").get<std::string>(),
+                      false,
+                      left_out.at("reason"),
+                      0.0,
+                      -1.0});
+    }
+  }
   for (const StageSummary& s : stages) {
     if (s.state == "SKIPPED") {
       plan.push_back({s.kind, false, s.skip_reason, 0.0, -1.0});
@@ -162,6 +172,10 @@ std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context)
     }
     rows.push_back(std::move(row));
   }
+  if (context.HasInput(artifact::kAugmentationSheet)) {
+    rows.push_back({"Training pictures beside the key view",
+                    {Picture(context, artifact::kAugmentationSheet, "given, or made from it")}});
+  }
   return rows;
 }
 
@@ -177,6 +191,7 @@ void PassOnResults(StageContext& context) {
                            kKeyViewColored,
                            kKeyColorFacts,
                            kKeyColorRegions,
+                           kAugmentationSheet,
                            kSfmLog}) {
     if (context.HasInput(name)) context.PassOn(name);
   }

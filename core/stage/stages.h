@@ -73,11 +73,26 @@ struct CarryColorOptions {
   std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
   void Validate() const;
 };
-// scene.json, key_view.json, key_color.png, geometry.c3g -> carried/*.png for every view, carry.json
-// (coverage of each, and the view that would add most).
+// scene.json, key_view.json, key_color.png, geometry.c3g -> carried/*.png for every view,
+// carry.json (coverage of each, and the view that would add most).
 void RunCarryColor(const CarryColorOptions& options, StageContext& context);
 
-// scene.json, key_view.json, key_color.png (carried/*) -> colorizer.c3c. `encoder`: as SelectKeyViewOptions.
+struct AugmentationOptions {
+  int samples = 8;  // 0..64, besides the user's own files; 8: the paper's 4 + 1 + 3
+  bool outpaint = true;
+  bool animate = true;
+  bool novel_views = true;
+  std::string backend;    // a generator by name; empty: the embedded surrogates
+  int max_side_px = 400;  // of the pictures, 64..4096
+  void Validate() const;
+};
+// scene.json, key_view.json, key_color.png (geometry.c3g for novel views, carry.json) and the
+// files below augment/ of the scene's folder -> augmentations.json, augmentations/*,
+// augmentations.jpg.
+void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context);
+
+// scene.json, key_view.json, key_color.png (carried/*, and what generate_augmentations made) ->
+// colorizer.c3c. Warns when the key view has no colour. `encoder`: as SelectKeyViewOptions.
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
                     const std::string& encoder = "");

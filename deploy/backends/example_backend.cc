@@ -1,6 +1,7 @@
 // color3d-example-backend: the smallest useful model server (color3d.backend.v1.ColorBackend). It
 // colours by luminance and height, as hand-tinted postcards were: warm shadows, green below, blue
-// above. Replace Tint() by a model of your own; everything else can stay.
+// above, and outpaints by mirroring. Replace Tint() and Outpaint() by models of your own;
+// everything else can stay.
 //   color3d-example-backend --listen 127.0.0.1:50661
 //   color3d-server serve --backend example=127.0.0.1:50661 ...
 //   color3d colorize PHOTOS --backend example -o OUT
@@ -27,6 +28,8 @@ namespace {
 
 using backend::v1::ColorizeRequest;
 using backend::v1::ColorizeUpdate;
+using backend::v1::GenerateRequest;
+using backend::v1::GenerateUpdate;
 
 constexpr int64_t kMaxPixels = 50'000'000;
 
@@ -96,6 +99,28 @@ std::string Colorize(const ColorizeRequest& request, Report report) {
   return EncodePng8(SrgbFromLab(JoinLab(l, ab)));
 }
 
+// What takes the place of a generator: the picture at half its size in one corner of the canvas,
+// mirrored beyond its two outer sides.
+Image Outpaint(const Image& srgb, int corner) {
+  const Image part = Resize(srgb, (srgb.width + 1) / 2, (srgb.height + 1) / 2);
+  const auto mirrored = [](int i, int side) {
+    return i < side ? i : std::max(0, 2 * side - 1 - i);
+  };
+  Image canvas(srgb.width, srgb.height, 3);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < canvas.height; ++y) {
+      for (int x = 0; x < canvas.width; ++x) {
+        const int from_x = mirrored(corner % 2 == 0 ? x : canvas.width - 1 - x, part.width);
+        const int from_y = mirrored(corner / 2 == 0 ? y : canvas.height - 1 - y, part.height);
+        canvas.At(c, y, x) = part.At(c,
+                                     corner / 2 == 0 ? from_y : part.height - 1 - from_y,
+                                     corner % 2 == 0 ? from_x : part.width - 1 - from_x);
+      }
+    }
+  }
+  return canvas;
+}
+
 class ExampleBackend : public backend::v1::ColorBackend::Service {
  public:
   explicit ExampleBackend(int delay_ms) : delay_ms_(delay_ms) {}
@@ -109,6 +134,7 @@ class ExampleBackend : public backend::v1::ColorBackend::Service {
     info->add_capabilities(backend::v1::CAPABILITY_AUTOMATIC);
     info->add_capabilities(backend::v1::CAPABILITY_COLOR_POINTS);
     info->add_capabilities(backend::v1::CAPABILITY_MASK);
+    info->add_capabilities(backend::v1::CAPABILITY_OUTPAINT);
     info->set_max_pixels(kMaxPixels);
     info->set_deterministic(true);
     info->set_ready(true);
@@ -128,6 +154,27 @@ class ExampleBackend : public backend::v1::ColorBackend::Service {
       if (picture.empty()) return grpc::Status::CANCELLED;
       update.set_image(picture);
       writer->Write(update);
+      return grpc::Status::OK;
+    } catch (const std::exception& e) {
+      return {grpc::StatusCode::INVALID_ARGUMENT, e.what()};
+    }
+  }
+
+  grpc::Status Generate(grpc::ServerContext* context,
+                        const GenerateRequest* request,
+                        grpc::ServerWriter<GenerateUpdate>* writer) override {
+    if (request->kind() != backend::v1::CAPABILITY_OUTPAINT) {
+      return {grpc::StatusCode::INVALID_ARGUMENT, "this server only outpaints"};
+    }
+    try {
+      const Image srgb = DecodeImage(request->image(), "the key view");
+      if (srgb.channels != 3) throw InvalidArgument("the key view is grey");
+      for (int i = 0; i < request->samples(); ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(delay_ms_));
+        GenerateUpdate update;
+        update.set_image(EncodePng8(Outpaint(srgb, i % 4)));
+        if (context->IsCancelled() || !writer->Write(update)) return grpc::Status::CANCELLED;
+      }
       return grpc::Status::OK;
     } catch (const std::exception& e) {
       return {grpc::StatusCode::INVALID_ARGUMENT, e.what()};

@@ -41,11 +41,11 @@ const char* CapabilityName(int value) {
     case backend::v1::CAPABILITY_SEED:
       return capability::kSeed;
     case backend::v1::CAPABILITY_OUTPAINT:
-      return "outpaint";
+      return capability::kOutpaint;
     case backend::v1::CAPABILITY_ANIMATE:
-      return "animate";
+      return capability::kAnimate;
     case backend::v1::CAPABILITY_NOVEL_VIEW:
-      return "novel_view";
+      return capability::kNovelView;
     default:
       return nullptr;
   }
@@ -68,6 +68,15 @@ backend::v1::ColorizeRequest ToProto(const RemoteRequest& request) {
   return proto;
 }
 
+backend::v1::Capability KindFromName(const std::string& name) {
+  for (const backend::v1::Capability kind : {backend::v1::CAPABILITY_OUTPAINT,
+                                             backend::v1::CAPABILITY_ANIMATE,
+                                             backend::v1::CAPABILITY_NOVEL_VIEW}) {
+    if (name == CapabilityName(kind)) return kind;
+  }
+  throw InvalidArgument("no backend generates pictures of kind '" + name + "'");
+}
+
 class GrpcColorizer : public RemoteColorizer {
  public:
   GrpcColorizer(const std::string& name,
@@ -82,6 +91,9 @@ class GrpcColorizer : public RemoteColorizer {
   std::string Colorize(const RemoteRequest& request,
                        ProgressObserver& progress,
                        const CancellationToken& cancel) override;
+  std::vector<std::string> Generate(const RemoteGenerateRequest& request,
+                                    ProgressObserver& progress,
+                                    const CancellationToken& cancel) override;
 
  private:
   // Repeats `call` while the backend is unavailable. Throws what BackendError makes of its end.
@@ -92,6 +104,12 @@ class GrpcColorizer : public RemoteColorizer {
                             grpc::ClientContext* context,
                             ProgressObserver& progress,
                             std::string* image);
+  grpc::Status GenerateOnce(const backend::v1::GenerateRequest& request,
+                            grpc::ClientContext* context,
+                            ProgressObserver& progress,
+                            std::vector<std::string>* images);
+  void ReportShare(double share, int64_t* step, ProgressObserver& progress) const;
+  void RequireSendable(const google::protobuf::Message& request) const;
   [[noreturn]] void BadStream(const std::string& why) const {
     throw Error(ErrorCode::kFailedPrecondition, "the backend '" + name_ + "' " + why);
   }
@@ -145,6 +163,21 @@ RemoteInfo GrpcColorizer::GetInfo(ProgressObserver& progress, const Cancellation
   }
 }
 
+void GrpcColorizer::ReportShare(double share, int64_t* step, ProgressObserver& progress) const {
+  if (!std::isfinite(share)) return;
+  // Only upwards: a bar that jumps tells nobody anything.
+  *step = std::max<int64_t>(*step, std::llround(std::clamp(share, 0.0, 1.0) * kProgressSteps));
+  progress.OnProgress(*step, kProgressSteps, "backend " + name_);
+}
+
+void GrpcColorizer::RequireSendable(const google::protobuf::Message& request) const {
+  if (request.ByteSizeLong() <= static_cast<size_t>(options_.max_message_bytes)) return;
+  throw InvalidArgument("the photo and what belongs to it take " +
+                        std::to_string(request.ByteSizeLong()) + " bytes; at most " +
+                        std::to_string(options_.max_message_bytes) +
+                        " are sent to a backend: use smaller photos");
+}
+
 grpc::Status GrpcColorizer::ColorizeOnce(const backend::v1::ColorizeRequest& request,
                                          grpc::ClientContext* context,
                                          ProgressObserver& progress,
@@ -160,12 +193,8 @@ grpc::Status GrpcColorizer::ColorizeOnce(const backend::v1::ColorizeRequest& req
     } else if (update.has_image()) {
       *image = std::move(*update.mutable_image());
       if (image->empty()) fault = "answered with an empty picture";
-    } else if (std::isfinite(update.progress())) {
-      // Only upwards: a bar that jumps tells nobody anything.
-      step = std::max(step,
-                      static_cast<int64_t>(
-                          std::llround(std::clamp(update.progress(), 0.0, 1.0) * kProgressSteps)));
-      progress.OnProgress(step, kProgressSteps, "backend " + name_);
+    } else {
+      ReportShare(update.progress(), &step, progress);
     }
   }
   if (!fault.empty()) context->TryCancel();
@@ -178,18 +207,63 @@ std::string GrpcColorizer::Colorize(const RemoteRequest& request,
                                     ProgressObserver& progress,
                                     const CancellationToken& cancel) {
   const backend::v1::ColorizeRequest proto = ToProto(request);
-  if (proto.ByteSizeLong() > static_cast<size_t>(options_.max_message_bytes)) {
-    throw InvalidArgument("the photo and what belongs to it take " +
-                          std::to_string(proto.ByteSizeLong()) + " bytes; at most " +
-                          std::to_string(options_.max_message_bytes) +
-                          " are sent to a backend: use smaller photos");
-  }
+  RequireSendable(proto);
   std::string image;
   Retry(options_.deadline, cancel, [&](grpc::ClientContext* context) {
     return ColorizeOnce(proto, context, progress, &image);
   });
   if (image.empty()) BadStream("ended without a picture");
   return image;
+}
+
+grpc::Status GrpcColorizer::GenerateOnce(const backend::v1::GenerateRequest& request,
+                                         grpc::ClientContext* context,
+                                         ProgressObserver& progress,
+                                         std::vector<std::string>* images) {
+  images->clear();
+  const auto reader = stub_->Generate(context, request);
+  backend::v1::GenerateUpdate update;
+  int64_t step = 0;
+  size_t bytes = 0;
+  std::string fault;
+  while (fault.empty() && reader->Read(&update)) {
+    if (!update.has_image()) {
+      ReportShare(update.progress(), &step, progress);
+      continue;
+    }
+    bytes += update.image().size();
+    if (update.image().empty()) {
+      fault = "answered with an empty picture";
+    } else if (images->size() >= static_cast<size_t>(request.samples())) {
+      fault = "sent more pictures than the " + std::to_string(request.samples()) + " asked for";
+    } else if (bytes > static_cast<size_t>(options_.max_message_bytes)) {
+      fault = "sent more than " + std::to_string(options_.max_message_bytes) + " bytes of pictures";
+    } else {
+      images->push_back(std::move(*update.mutable_image()));
+    }
+  }
+  if (!fault.empty()) context->TryCancel();
+  const grpc::Status status = reader->Finish();
+  if (!fault.empty()) BadStream(fault);
+  return status;
+}
+
+std::vector<std::string> GrpcColorizer::Generate(const RemoteGenerateRequest& request,
+                                                 ProgressObserver& progress,
+                                                 const CancellationToken& cancel) {
+  backend::v1::GenerateRequest proto;
+  proto.set_idempotency_key(request.idempotency_key);
+  proto.set_image(request.image_png);
+  proto.set_kind(KindFromName(request.kind));
+  proto.set_samples(request.samples);
+  proto.set_seed(request.seed);
+  RequireSendable(proto);
+  std::vector<std::string> images;
+  Retry(options_.deadline, cancel, [&](grpc::ClientContext* context) {
+    return GenerateOnce(proto, context, progress, &images);
+  });
+  if (images.empty()) BadStream("ended without a picture");
+  return images;
 }
 
 }  // namespace

@@ -54,7 +54,23 @@ class FakeBackend : public backend::v1::ColorBackend::Service {
     key = request->idempotency_key();
     return behave(context, writer);
   }
+  grpc::Status Generate(grpc::ServerContext*,
+                        const backend::v1::GenerateRequest* request,
+                        grpc::ServerWriter<backend::v1::GenerateUpdate>* writer) override {
+    generate_kind = request->kind();
+    for (int i = 0; i < pictures; ++i) {
+      backend::v1::GenerateUpdate update;
+      update.set_progress(0.1);
+      writer->Write(update);
+      update.set_image(picture);
+      writer->Write(update);
+    }
+    return grpc::Status::OK;
+  }
 
+  int pictures = 2;
+  std::string picture = "png";
+  std::atomic<int> generate_kind{0};
   std::atomic<int> info_calls{0};
   std::atomic<int> calls{0};
   int ready_after = 1;
@@ -238,6 +254,27 @@ TEST_F(GrpcColorizerTest, ProgressIsFiniteAndOnlyGrows) {
   Start();
   Colorize();
   EXPECT_EQ(progress_.steps, (std::vector<int64_t>{500, 500, 1000}));
+}
+
+TEST_F(GrpcColorizerTest, GeneratedPicturesAreCountedAndBounded) {
+  Start();
+  RemoteGenerateRequest request;
+  request.kind = capability::kNovelView;
+  request.samples = 2;
+  const auto generate = [&] { return Remote()->Generate(request, progress_, cancel_); };
+  EXPECT_EQ(generate(), (std::vector<std::string>{"png", "png"}));
+  EXPECT_EQ(backend_.generate_kind, static_cast<int>(backend::v1::CAPABILITY_NOVEL_VIEW));
+  backend_.pictures = 3;
+  EXPECT_THAT(Complaint(generate), HasSubstr("more pictures than the 2"));
+  backend_.pictures = 0;
+  EXPECT_THAT(Complaint(generate), HasSubstr("without a picture"));
+  backend_.pictures = 2;
+  backend_.picture = "";
+  EXPECT_THAT(Complaint(generate), HasSubstr("empty picture"));
+  backend_.picture = std::string(600 << 10, 'x');
+  EXPECT_THAT(Complaint(generate), HasSubstr("bytes of pictures"));
+  request.kind = "film";
+  EXPECT_THAT(Complaint(generate), HasSubstr("'film'"));
 }
 
 TEST_F(GrpcColorizerTest, ItsOwnErrorIsQuotedInOneLine) {

@@ -30,13 +30,13 @@ struct Need {
   const char* provider;
   const char* artifact;
 };
+constexpr int kDefaultSamples = 8;  // of generate_augmentations, where somebody asks for it
 constexpr Need kScene = {"import_scene", "scene.json"};
 constexpr Need kKeyView = {"select_key_view", "key_view.json"};
 constexpr Need kKeyColor = {"colorize_key_view", "key_color.png"};
 constexpr Need kColorizer = {"personalize", "colorizer.c3c"};
 constexpr Need kViewsAb = {"colorize_views", "views_ab/*"};
 constexpr Need kGeometry = {"reconstruct_geometry", "geometry.c3g"};
-constexpr Need kCarried = {"carry_color", "carried/*"};
 constexpr Need kModel = {"solve_chroma", "model.c3g"};
 
 const std::vector<Need>& NeedsOf(const std::string& kind) {
@@ -44,6 +44,7 @@ const std::vector<Need>& NeedsOf(const std::string& kind) {
       {"import_scene", {}},
       {"select_key_view", {kScene}},
       {"colorize_key_view", {kScene, kKeyView}},
+      {"generate_augmentations", {kScene, kKeyView, kKeyColor}},
       {"personalize", {kScene, kKeyView, kKeyColor}},
       {"colorize_views", {kScene, kColorizer}},
       {"reconstruct_geometry", {kScene}},
@@ -56,15 +57,16 @@ const std::vector<Need>& NeedsOf(const std::string& kind) {
   return needs.at(kind);
 }
 
-// What a kind reads when it is there: planned or given.
-const std::vector<Need>& OptionalNeedsOf(const std::string& kind) {
-  static const std::map<std::string, std::vector<Need>> needs = {
-      {"personalize", {kCarried}},
-      {"colorize_views", {kCarried}},
+// Kinds whose artifacts each kind reads when they are there.
+const std::vector<std::string>& WelcomeTo(const std::string& kind) {
+  static const std::map<std::string, std::vector<std::string>> welcome = {
+      {"generate_augmentations", {"reconstruct_geometry", "carry_color"}},
+      {"personalize", {"generate_augmentations", "carry_color"}},
+      {"colorize_views", {"carry_color"}},
   };
-  static const std::vector<Need> none;
-  const auto found = needs.find(kind);
-  return found == needs.end() ? none : found->second;
+  static const std::vector<std::string> none;
+  const auto found = welcome.find(kind);
+  return found == welcome.end() ? none : found->second;
 }
 
 // These stages need no decision of the user's, so a job of their own brings what it lacks along.
@@ -93,6 +95,9 @@ void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec)
     if (s->strategy() == v1::SelectKeyViewSpec::STRATEGY_UNSPECIFIED) {
       s->set_strategy(preset.strategy);
     }
+  } else if (spec->has_generate_augmentations()) {
+    auto* s = spec->mutable_generate_augmentations();
+    if (!s->has_samples()) s->set_samples(preset.augmentation_samples);
   } else if (spec->has_personalize()) {
     auto* s = spec->mutable_personalize();
     if (s->recipe() == v1::PersonalizeSpec::RECIPE_UNSPECIFIED) s->set_recipe(preset.recipe);
@@ -151,6 +156,10 @@ class GraphBuilder {
   // then given inputs, then (when allowed) prerequisites made for it.
   void Add(v1::JobSpec spec, const std::string& skip_reason = "");
   void Provide(const Need& need, const std::string& for_kind, NewJob* job);
+  // Adds the jobs whose results `kind` reads when they are there.
+  void AddWelcome(const std::string& kind, NewJob* job) const;
+  // Why a whole scene needs no generated pictures; empty when it does.
+  std::string WhyNoAugmentations(const v1::ColorizeSceneSpec& options) const;
   void AddSceneStages(const v1::ColorizeSceneSpec& options);
   // What a colorize_scene job may be given, and that its options do not ask for something else.
   void CheckGiven(const v1::ColorizeSceneSpec& options) const;
@@ -161,6 +170,7 @@ class GraphBuilder {
   std::string submitted_kind_;
   PresetValues preset_;
   int max_side_px_ = 0;
+  int augment_files_ = 0;
   std::optional<TimeBudget> time_budget_;
   std::map<std::string, JobRecord> given_;  // by kind
   std::map<std::string, int> planned_;      // by kind
@@ -178,6 +188,7 @@ GraphBuilder::GraphBuilder(const v1::JobSpec& submitted,
   if (submitted.colorize_scene().time_budget_seconds() > 0.0) {
     time_budget_ = DivideTimeBudget(submitted.colorize_scene().time_budget_seconds(), facts);
   }
+  augment_files_ = facts.augment_files;
   graph_.scene = submitted.scene();
   for (const JobRecord& input : inputs) {
     if (input.scene != submitted.scene()) {
@@ -235,17 +246,41 @@ void GraphBuilder::Provide(const Need& need, const std::string& for_kind, NewJob
   job->inputs.push_back(planned_.at(need.provider));
 }
 
+void GraphBuilder::AddWelcome(const std::string& kind, NewJob* job) const {
+  for (const std::string& other : WelcomeTo(kind)) {
+    const auto planned = planned_.find(other);
+    const auto given = given_.find(other);
+    if (planned != planned_.end()) {
+      const int index = planned->second;
+      if (graph_.jobs[static_cast<size_t>(index)].skip_reason.empty()) job->inputs.push_back(index);
+    } else if (given != given_.end() &&
+               (!IsFinished(given->second.state) || given->second.state == JobState::kSucceeded)) {
+      job->input_jobs.push_back(given->second.name);
+    }
+  }
+}
+
+std::string GraphBuilder::WhyNoAugmentations(const v1::ColorizeSceneSpec& options) const {
+  const auto& spec = options.generate_augmentations();
+  if (augment_files_ > 0) return "";
+  if (options.has_generate_augmentations()) {
+    // Whoever writes options wants the stage, unless they say 0.
+    return spec.has_samples() && spec.samples() == 0
+               ? "no samples are asked for and augment/ holds no files"
+               : "";
+  }
+  return preset_.augmentation_samples > 0
+             ? ""
+             : "the preset learns from the key view alone, and augment/ holds no files";
+}
+
 void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   NewJob job;
   job.kind = KindOf(spec);
   if (submitted_.has_colorize_scene() && given_.contains(job.kind)) return;
   job.skip_reason = skip_reason;
   for (const Need& need : NeedsOf(job.kind)) Provide(need, job.kind, &job);
-  for (const Need& need : OptionalNeedsOf(job.kind)) {
-    if (planned_.contains(need.provider) || given_.contains(need.provider)) {
-      Provide(need, job.kind, &job);
-    }
-  }
+  AddWelcome(job.kind, &job);
   ApplyPreset(preset_, max_side_px_, &spec);
   if (time_budget_) ApplyTimeBudget(*time_budget_, &spec);
   job.spec = Serialize(spec);
@@ -268,6 +303,9 @@ void GraphBuilder::TakeEncoderOfColorizer(v1::JobSpec* spec) const {
 NewGraph GraphBuilder::BuildStage() {
   v1::JobSpec spec = submitted_;
   if (spec.seed() == 0) spec.set_seed(1);
+  if (spec.has_generate_augmentations() && !spec.generate_augmentations().has_samples()) {
+    spec.mutable_generate_augmentations()->set_samples(kDefaultSamples);
+  }
   TakeEncoderOfColorizer(&spec);
   const bool nothing_to_do = spec.has_export_() && spec.export_().has_ply() &&
                              !spec.export_().ply() && !spec.export_().splat();
@@ -304,6 +342,13 @@ void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
   spec = Common();
   *spec.mutable_carry_color() = options.carry_color();
   Add(spec, WhyNothingIsCarried(options));
+
+  spec = Common();
+  *spec.mutable_generate_augmentations() = options.generate_augmentations();
+  if (options.has_generate_augmentations() && !options.generate_augmentations().has_samples()) {
+    spec.mutable_generate_augmentations()->set_samples(kDefaultSamples);
+  }
+  Add(spec, WhyNoAugmentations(options));
 
   spec = Common();
   *spec.mutable_personalize() = options.personalize();

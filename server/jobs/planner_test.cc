@@ -11,8 +11,10 @@
 
 namespace color3d {
 namespace {
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 v1::Digest SomeDigest(const std::string& text) {
   v1::Digest digest;
@@ -102,9 +104,9 @@ TEST(Planner, RefusesABudgetThatTheSceneCannotMeetAndNamesTheLeast) {
 
 TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
   const NewGraph graph = PlanJob(SceneSpec(), {}, kTwentyPhotos);
-  ASSERT_EQ(graph.jobs.size(), 11u);
+  ASSERT_EQ(graph.jobs.size(), 12u);
   EXPECT_EQ(graph.jobs.back().kind, "colorize_scene");
-  EXPECT_EQ(graph.jobs.back().inputs.size(), 10u);
+  EXPECT_EQ(graph.jobs.back().inputs.size(), 11u);
   EXPECT_THAT(InputKinds(graph, "select_key_view"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "reconstruct_geometry"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "personalize"),
@@ -224,13 +226,57 @@ TEST(Planner, OtherStagesNameTheMissingInput) {
   EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("scenes/other"));
 }
 
+TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
+  v1::JobSpec spec = SceneSpec();
+  NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
+              HasSubstr("key view alone"));
+  EXPECT_THAT(InputKinds(graph, "personalize"), Not(Contains("generate_augmentations")));
+
+  SceneFacts with_files = kTwentyPhotos;
+  with_files.augment_files = 2;
+  graph = PlanJob(spec, {}, with_files);
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
+  EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 0)
+      << "only the user's own";
+  EXPECT_THAT(InputKinds(graph, "personalize"), Contains("generate_augmentations"));
+
+  spec.mutable_colorize_scene()->mutable_generate_augmentations();
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
+  EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
+  EXPECT_THAT(InputKinds(graph, "generate_augmentations"), Contains("reconstruct_geometry"));
+
+  spec.mutable_colorize_scene()->mutable_generate_augmentations()->set_samples(0);
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
+              HasSubstr("no samples"));
+
+  spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
+  EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
+}
+
+TEST(Planner, AugmentationOptionsAreChecked) {
+  v1::JobSpec spec = SceneSpec();
+  auto* options = spec.mutable_colorize_scene()->mutable_generate_augmentations();
+  options->add_kinds(static_cast<v1::GenerateAugmentationsSpec::Kind>(9));
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("colorize_scene.generate_augmentations.kinds[0]"));
+  options->clear_kinds();
+  options->add_kinds(v1::GenerateAugmentationsSpec::KIND_UNSPECIFIED);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("unspecified"));
+  options->clear_kinds();
+  options->set_samples(65);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("0 to 64"));
+}
+
 TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
-  spec.mutable_generate_augmentations();
-  EXPECT_EQ(PlanError(spec).code, ErrorCode::kUnimplemented);
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("generate_augmentations"));
   spec.mutable_personalize_scenes();
+  EXPECT_EQ(PlanError(spec).code, ErrorCode::kUnimplemented);
   EXPECT_THAT(PlanError(spec).message, HasSubstr("personalize_scenes"));
   spec.mutable_reconstruct_dynamic();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dynamic"));

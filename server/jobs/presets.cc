@@ -17,6 +17,7 @@ PresetValues ValuesOf(v1::Preset preset) {
       values.strategy = v1::SelectKeyViewSpec::STRATEGY_ENTROPY;
       values.recipe = v1::PersonalizeSpec::RECIPE_PAPER;
       values.personalize_iterations = 4000;
+      values.augmentation_samples = 8;
       values.geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_PAPER;
       values.geometry_iterations = 15'000;
       values.max_gaussians = 2'000'000;

@@ -10,6 +10,7 @@ struct PresetValues {
   v1::SelectKeyViewSpec::Strategy strategy = v1::SelectKeyViewSpec::STRATEGY_COVERAGE;
   v1::PersonalizeSpec::Recipe recipe = v1::PersonalizeSpec::RECIPE_COLOR3D;
   int personalize_iterations = 0;
+  int augmentation_samples = 0;  // made from the key view; files of the user's come on top
   v1::ReconstructGeometrySpec::Recipe geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_COLOR3D;
   int geometry_iterations = 0;
   int max_gaussians = 0;

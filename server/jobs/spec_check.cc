@@ -29,6 +29,7 @@ const std::map<std::string, Range>& Ranges() {
       {"SelectKeyViewSpec.temperature", {1e-3, 1e3}},
       {"ColorizeKeyViewSpec.hint_sigma", {0.1, 50}},
       {"GenerateAugmentationsSpec.samples", {0, 64}},
+      {"GenerateAugmentationsSpec.max_side_px", {64, 2048}},
       {"PersonalizeSpec.iterations", {0, 100'000}},
       {"PersonalizeSpec.time_limit_seconds", {0, 86400}},
       {"PersonalizeSpec.max_side_px", {64, 2048}},
@@ -129,6 +130,12 @@ void CheckRepeated(const Message& message, const FieldDescriptor* field, const s
     Reject(path,
            " has " + std::to_string(count) + " entries; at most " + std::to_string(kMaxRepeated) +
                " are allowed");
+  }
+  for (int i = 0; field->cpp_type() == FieldDescriptor::CPPTYPE_ENUM && i < count; ++i) {
+    const int value = reflection->GetRepeatedEnumValue(message, field, i);
+    const std::string entry = path + "[" + std::to_string(i) + "]";
+    CheckEnum(field, value, entry);
+    if (value == 0) Reject(entry, " is unspecified; name a value or leave the entry out");
   }
   if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return;
   for (int i = 0; i < count; ++i) {
@@ -324,6 +331,7 @@ const std::vector<std::string>& BuiltKinds() {
                                                  "import_scene",
                                                  "select_key_view",
                                                  "colorize_key_view",
+                                                 "generate_augmentations",
                                                  "personalize",
                                                  "carry_color",
                                                  "colorize_views",

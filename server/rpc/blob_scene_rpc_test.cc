@@ -116,6 +116,22 @@ TEST_F(BlobSceneRpcTest, ManyBadFilesFitIntoTheStatus) {
   EXPECT_THAT(status.error_message(), HasSubstr("and 297 more"));
 }
 
+TEST_F(BlobSceneRpcTest, PicturesInAugmentAreCheckedButNoPhotos) {
+  v1::Scene scene;
+  ASSERT_TRUE(
+      Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"augment/c.png", TinyPng()}}, &scene)
+          .ok());
+  EXPECT_EQ(scene.photo_count(), 2);
+  const grpc::Status status = Commit({{"a.png", TinyPng()},
+                                      {"b.png", TinyPng()},
+                                      {"augment/c.png", "no image"},
+                                      {"augment/notes.txt", "hello"}},
+                                     &scene);
+  const google::rpc::BadRequest bad = BadRequestOf(status);
+  ASSERT_EQ(bad.field_violations_size(), 2);
+  EXPECT_EQ(bad.field_violations(1).field(), "augment/notes.txt");
+}
+
 TEST_F(BlobSceneRpcTest, LayoutsAreRecognised) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}}, &scene).ok());

@@ -56,7 +56,11 @@ std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec
 SceneFacts FactsOf(const SceneRecord& scene) {
   return {.photos = scene.photo_count,
           .has_poses =
-              scene.layout == StoredLayout::kColmap || scene.layout == StoredLayout::kTransforms};
+              scene.layout == StoredLayout::kColmap || scene.layout == StoredLayout::kTransforms,
+          .augment_files = static_cast<int>(
+              std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
+                return IsAugmentFile(file.path);
+              }))};
 }
 
 JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& request) {

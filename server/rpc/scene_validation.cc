@@ -11,6 +11,7 @@
 
 #include "core/base/files.h"
 #include "core/image/probe.h"
+#include "server/jobs/time_budget.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -93,6 +94,12 @@ void CheckFile(const SceneFileRecord& file,
   }
   const bool is_photo = HasImageExtension(file.path);
   const bool is_transforms = BaseName(file.path) == "transforms.json";
+  const bool is_augmentation = IsAugmentFile(file.path);
+  if (is_augmentation && !is_photo) {
+    violations->push_back(
+        {file.path, "is no picture (JPEG, PNG or TIFF); remove it from augment/"});
+    return;
+  }
   if (!is_photo && !is_transforms) return;
   const MappedFile mapped(blobs.Fetch(file.digest.sha256), file.digest.size_bytes);
   if (is_transforms) return CheckTransforms(file.path, mapped.bytes(), violations);
@@ -101,7 +108,7 @@ void CheckFile(const SceneFileRecord& file,
     image_limits.max_pixels = limits.max_pixels_per_image;
     image_limits.max_side_px = limits.max_image_side_px;
     ProbeImage(mapped.bytes(), file.path, image_limits);
-    ++check->photo_count;
+    if (!is_augmentation) ++check->photo_count;
   } catch (const Error& e) {
     violations->push_back({file.path, e.what()});
   }

@@ -48,6 +48,22 @@ HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec) {
   return options;
 }
 
+AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec& spec) {
+  using Spec = v1::GenerateAugmentationsSpec;
+  AugmentationOptions options;
+  options.backend = spec.backend();
+  if (spec.has_samples()) options.samples = spec.samples();
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  if (spec.kinds().empty()) return options;
+  options.outpaint = options.animate = options.novel_views = false;
+  for (const int kind : spec.kinds()) {
+    options.outpaint = options.outpaint || kind == Spec::KIND_OUTPAINT;
+    options.animate = options.animate || kind == Spec::KIND_ANIMATE;
+    options.novel_views = options.novel_views || kind == Spec::KIND_NOVEL_VIEW;
+  }
+  return options;
+}
+
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed) {
   ColorizerOptions options;
   options.threads = threads;

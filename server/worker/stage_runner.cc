@@ -167,6 +167,9 @@ class CoreStageRunner : public StageRunner {
         return RunSelectKeyView(SelectOptionsFrom(spec.select_key_view()), context);
       case JobSpec::kColorizeKeyView:
         return RunColorizeKeyView(KeyColorOptions(spec.colorize_key_view(), blobs), context);
+      case JobSpec::kGenerateAugmentations:
+        return RunGenerateAugmentations(AugmentationOptionsFrom(spec.generate_augmentations()),
+                                        context);
       case JobSpec::kPersonalize:
         return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()),
                               context,

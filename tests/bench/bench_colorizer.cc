@@ -11,6 +11,8 @@
 #include "core/image/codec.h"
 #include "core/image/probe.h"
 #include "core/report/curves.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/training_pictures.h"
 #include "tests/bench/bench_encoder.h"
 #include "tests/bench/commands.h"
 
@@ -24,8 +26,29 @@ struct ColorizerArguments {
   int side_px = 400;
   bool paper = false;
   std::string encoder = "embedded";
+  std::string pictures_folder;
+  std::string kinds;
+  double picture_share = kGeneratedShare;
   ColorizerOptions options;
 };
+
+// Those of the kinds that are asked for among what color3d-bench augmentations left.
+std::vector<TrainingPicture> MorePictures(const ColorizerArguments& args) {
+  if (args.pictures_folder.empty()) return {};
+  const std::filesystem::path folder = args.pictures_folder;
+  auto facts = nlohmann::json::parse(ReadFile(folder / artifact::kAugmentationFacts));
+  auto& samples = facts.at("samples");
+  for (auto it = samples.begin(); it != samples.end();) {
+    const bool wanted = args.kinds.empty() ||
+                        args.kinds.find(it->at("kind").get<std::string>()) != std::string::npos;
+    it = wanted ? it + 1 : samples.erase(it);
+  }
+  return TrainingPicturesFrom(
+      facts.dump(),
+      [&](const std::string& name) { return ReadFile(folder / name); },
+      args.options.max_side_px,
+      args.picture_share);
+}
 
 void RunColorizer(const ColorizerArguments& args) {
   std::vector<std::string> photos;
@@ -45,13 +68,12 @@ void RunColorizer(const ColorizerArguments& args) {
   const Image key_lab = load(key);
   ColorizerOptions options = args.options;
   if (args.paper) options.recipe = ColorizerOptions::Recipe::kPaper;
-  const auto colorizer = TrainColorizer(BenchEncoder(args.encoder),
-                                        {{key, LuminanceOfLab(key_lab), ChromaOfLab(key_lab)}},
-                                        options,
-                                        recorder,
-                                        recorder,
-                                        cancel);
-  nlohmann::ordered_json result{{"key", key}, {"seconds_training", recorder.Seconds()}};
+  std::vector<TrainingPicture> pictures = {{key, LuminanceOfLab(key_lab), ChromaOfLab(key_lab)}};
+  for (TrainingPicture& picture : MorePictures(args)) pictures.push_back(std::move(picture));
+  const auto colorizer =
+      TrainColorizer(BenchEncoder(args.encoder), pictures, options, recorder, recorder, cancel);
+  nlohmann::ordered_json result{
+      {"key", key}, {"pictures", pictures.size()}, {"seconds_training", recorder.Seconds()}};
   double error = 0.0;
   double grey_error = 0.0;
   double seconds = 0.0;
@@ -103,6 +125,12 @@ void AddColorizerCommand(CLI::App& app) {
       ->add_option(
           "--encoder", args->encoder, "embedded, random, squeezenet=FILE.onnx, or a weight file")
       ->capture_default_str();
+  command->add_option("--consistency", args->options.consistency_weight);
+  command->add_option("--pictures",
+                      args->pictures_folder,
+                      "what color3d-bench augmentations left: trained on beside the key view");
+  command->add_option("--kinds", args->kinds, "only these of them, e.g. outpaint,novel_view");
+  command->add_option("--picture-share", args->picture_share, "of them all, against the key's 1");
   command->add_flag("--paper", args->paper, "the paper's recipe");
   command->callback([args] { RunColorizer(*args); });
 }

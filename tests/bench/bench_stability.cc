@@ -1,4 +1,5 @@
-// color3d-bench stability: stiff and extreme cases of the splat engine against float64.
+// color3d-bench stability: stiff and extreme cases of the splat engine against float64, and
+// of the colorizer.
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -105,7 +106,7 @@ void RunStability(const StabilityArguments& args) {
 void AddStabilityCommand(CLI::App& app) {
   auto args = std::make_shared<StabilityArguments>();
   CLI::App* command = app.add_subcommand(
-      "stability", "stiff and extreme cases of the splat engine against float64");
+      "stability", "stiff and extreme cases of the splat engine and the colorizer");
   command->add_option("--only", args->only, "cases whose \"group, name\" contains this");
   command->add_flag("--fast", args->fast, "without the slow cases");
   command->add_option("--threads", args->threads);

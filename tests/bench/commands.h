@@ -5,6 +5,7 @@
 
 namespace color3d {
 
+void AddAugmentationsCommand(CLI::App& app);
 void AddAutomaticCommand(CLI::App& app);
 void AddCarryCommand(CLI::App& app);
 void AddGoldenCommand(CLI::App& app);

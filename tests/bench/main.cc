@@ -7,6 +7,7 @@
 int main(int argc, char** argv) {
   CLI::App app("Benchmarks of Color3D");
   app.require_subcommand(1);
+  color3d::AddAugmentationsCommand(app);
   color3d::AddAutomaticCommand(app);
   color3d::AddCarryCommand(app);
   color3d::AddGoldenCommand(app);

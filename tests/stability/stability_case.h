@@ -1,5 +1,6 @@
-// The stiff and extreme cases of the splat engine (METHOD.md "Stability"), each run through the
-// real kernels and compared with float64. Used by stability_test and by color3d-bench stability.
+// The stiff and extreme cases of the splat engine and the colorizer (METHOD.md "Stability"), each
+// run through the real kernels and compared with float64. Used by stability_test and by
+// color3d-bench stability.
 //
 // Errors are relative, per buffer: max |fast - reference| / max |reference|. Buffers of values are
 // the colour channels, opacity and depth; buffers of gradients are the rows of parameters, where
@@ -46,7 +47,7 @@ struct StabilityResult {
 };
 
 struct StabilityCase {
-  std::string group;  // raster, loss, adam, geometry, chroma
+  std::string group;  // raster, loss, adam, geometry, chroma, colorizer
   std::string name;   // unique in the group
   bool slow = false;  // for the benchmark only
   std::function<StabilityResult(ThreadPool&)> run;
@@ -66,5 +67,6 @@ void AddLossCases(std::vector<StabilityCase>& cases);
 void AddAdamCases(std::vector<StabilityCase>& cases);
 void AddGeometryCases(std::vector<StabilityCase>& cases);
 void AddChromaCases(std::vector<StabilityCase>& cases);
+void AddColorizerCases(std::vector<StabilityCase>& cases);
 
 }  // namespace color3d

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """A model server for color3d in Python: wrap a colourization model of your own here.
 
-The README beside this file says how to install and run it. Replace colorize() by a call of your
-model; the rest is the protocol (proto/color3d/backend/v1/backend.proto).
+The README beside this file says how to install and run it. Replace colorize() (and outpaint(), if
+you have a generator) by calls of your models; the rest is the protocol (proto/color3d/backend/v1/backend.proto).
 """
 
 import argparse
@@ -28,6 +28,12 @@ def read_gray(png):
     return picture.astype(np.float32) / (255.0 if picture.dtype == np.uint8 else 65535.0)
 
 
+def read_rgb(png):
+    """The coloured key view as height x width x 3 floats, 0..1."""
+    picture = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+    return picture.astype(np.float32) / 255.0
+
+
 def write_rgb(rgb):
     """PNG of height x width x 3 floats, 0..1."""
     stream = io.BytesIO()
@@ -48,6 +54,20 @@ def colorize(gray, prompt, seed, report):
     return gray[..., None] * np.array(tint, np.float32)
 
 
+def outpaint(rgb, index, seed):
+    """Your generator goes here: another picture of the same scene, any size.
+
+    This one turns the picture into one corner of a canvas and mirrors it beyond its outer sides.
+    """
+    del seed  # nothing here is random
+    height, width = rgb.shape[:2]
+    part = rgb[::2, ::2]
+    above, left = index // 2 % 2, index % 2
+    rows, columns = height - part.shape[0], width - part.shape[1]
+    pad = ((rows * above, rows * (1 - above)), (columns * left, columns * (1 - left)), (0, 0))
+    return np.pad(part, pad, mode="symmetric")
+
+
 class Backend(backend_pb2_grpc.ColorBackendServicer):
     def GetInfo(self, request, context):
         return backend_pb2.BackendInfo(
@@ -58,6 +78,7 @@ class Backend(backend_pb2_grpc.ColorBackendServicer):
                 backend_pb2.CAPABILITY_AUTOMATIC,
                 backend_pb2.CAPABILITY_TEXT_PROMPT,
                 backend_pb2.CAPABILITY_SEED,
+                backend_pb2.CAPABILITY_OUTPAINT,
             ],
             max_pixels=MAX_PIXELS,
             deterministic=True,
@@ -82,6 +103,19 @@ class Backend(backend_pb2_grpc.ColorBackendServicer):
         if rgb.shape != gray.shape + (3,) or not np.isfinite(rgb).all():
             context.abort(grpc.StatusCode.INTERNAL, f"the model returned shape {rgb.shape}")
         yield backend_pb2.ColorizeUpdate(image=write_rgb(rgb))
+
+    def Generate(self, request, context):
+        if request.kind != backend_pb2.CAPABILITY_OUTPAINT:
+            context.abort(grpc.StatusCode.INVALID_ARGUMENT, "this server only outpaints")
+        try:
+            rgb = read_rgb(request.image)
+        except (ValueError, OSError) as error:
+            context.abort(grpc.StatusCode.INVALID_ARGUMENT, str(error))
+        for index in range(request.samples):
+            if not context.is_active():
+                return
+            picture = outpaint(rgb, index, request.seed)
+            yield backend_pb2.GenerateUpdate(image=write_rgb(picture))
 
 
 def main():

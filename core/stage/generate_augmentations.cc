@@ -1,0 +1,234 @@
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/color/lab.h"
+#include "core/color/lab_planes.h"
+#include "core/image/codec.h"
+#include "core/report/contact_sheet.h"
+#include "core/scene/view_images.h"
+#include "core/stage/artifacts.h"
+#include "core/stage/augmentation_sources.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+namespace {
+
+using Kind = AugmentationKind;
+using nlohmann::ordered_json;
+
+constexpr int kMaxSamples = 64;
+constexpr int kRemoteSidePx = 1024;  // what a model server is given
+constexpr int kThumbnailPx = 320;
+// The key view shows so much of the scene that there is nothing to invent around it.
+constexpr double kCovered = 0.9;
+// The paper's eight in the order in which fewer are taken.
+constexpr Kind kOrder[] = {Kind::kNovelView,
+                           Kind::kOutpaint,
+                           Kind::kNovelView,
+                           Kind::kOutpaint,
+                           Kind::kAnimate,
+                           Kind::kNovelView,
+                           Kind::kOutpaint,
+                           Kind::kOutpaint};
+
+struct Outcome {
+  std::vector<Augmentation> made;
+  ordered_json left_out = ordered_json::array();
+  void LeaveOut(const std::string& kind, const std::string& reason) {
+    left_out.push_back({{"kind", kind}, {"reason", reason}});
+  }
+};
+
+// How many of each kind; kinds that are switched off give their turns to nobody.
+std::map<Kind, int> Deal(const AugmentationOptions& options) {
+  std::map<Kind, int> counts;
+  for (int i = 0; i < options.samples; ++i) {
+    const Kind kind = kOrder[static_cast<size_t>(i) % std::size(kOrder)];
+    const bool wanted = kind == Kind::kOutpaint  ? options.outpaint
+                        : kind == Kind::kAnimate ? options.animate
+                                                 : options.novel_views;
+    if (wanted) ++counts[kind];
+  }
+  return counts;
+}
+
+// Mean share of the other views that the key view's colours reach; nothing when nobody measured it.
+std::optional<double> Coverage(const StageContext& context) {
+  if (!context.HasInput(artifact::kCarryFacts)) return std::nullopt;
+  const auto facts = ordered_json::parse(context.ReadInput(artifact::kCarryFacts), nullptr, false);
+  if (!facts.is_object() || !facts.contains("coverage") || !facts["coverage"].is_number()) {
+    return std::nullopt;
+  }
+  return facts["coverage"].get<double>();
+}
+
+KeyPicture ReadKeyPicture(const Scene& scene,
+                          int key,
+                          const AugmentationOptions& options,
+                          StageContext& context) {
+  const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+  const auto lab_at = [&](int side) {
+    const ViewImages images(scene, context.scene_folder(), side, 0);
+    const auto l = images.Luminance(key);
+    return JoinLab(*l, Resize(color.ab, l->width, l->height));
+  };
+  KeyPicture picture;
+  picture.lab = lab_at(options.max_side_px);
+  if (!options.backend.empty()) {
+    picture.srgb = SrgbFromLab(lab_at(std::max(options.max_side_px, kRemoteSidePx)));
+  }
+  picture.camera =
+      scene.views[static_cast<size_t>(key)].camera.Scaled(picture.lab.width, picture.lab.height);
+  picture.cam_from_world = scene.views[static_cast<size_t>(key)].cam_from_world;
+  return picture;
+}
+
+// Asks the backend for the kinds that it claims; what it does not is left in `counts`.
+void AskBackend(const AugmentationOptions& options,
+                const KeyPicture& key,
+                StageContext& context,
+                std::map<Kind, int>* counts,
+                Outcome* outcome) {
+  const auto remote = context.Remote(options.backend);
+  const RemoteInfo info = remote->GetInfo(context.progress(), context.cancel());
+  bool asked = false;
+  for (auto it = counts->begin(); it != counts->end();) {
+    if (!info.capabilities.contains(AugmentationKindName(it->first))) {
+      ++it;
+      continue;
+    }
+    asked = true;
+    std::vector<Augmentation> made = AugmentationsFromBackend(
+        options.backend, *remote, info, it->first, it->second, key, options.max_side_px, context);
+    std::move(made.begin(), made.end(), std::back_inserter(outcome->made));
+    it = counts->erase(it);
+  }
+  if (asked || counts->empty()) return;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "the backend '" + options.backend +
+                  "' generates none of the pictures that are asked for (outpaint, animate, "
+                  "novel_view); leave it out to use the embedded ones");
+}
+
+void MakeEmbedded(const std::map<Kind, int>& counts,
+                  const EmbeddedAugmentations& embedded,
+                  StageContext& context,
+                  Outcome* outcome) {
+  int64_t total = 0, done = 0;
+  for (const auto& [kind, count] : counts) total += count;
+  for (const auto& [kind, count] : counts) {
+    const std::string obstacle = embedded.Obstacle(kind);
+    int poor = 0;
+    for (int i = 0; obstacle.empty() && i < count; ++i) {
+      context.cancel().ThrowIfCancelled();
+      std::optional<Augmentation> made = embedded.Make(kind, i);
+      if (made) outcome->made.push_back(std::move(*made));
+      if (!made) ++poor;
+      context.progress().OnProgress(++done, total, "generating augmentations");
+    }
+    if (!obstacle.empty()) outcome->LeaveOut(AugmentationKindName(kind), obstacle);
+    if (poor > 0) {
+      outcome->LeaveOut(AugmentationKindName(kind),
+                        std::to_string(poor) + " would show hardly anything of the key view");
+    }
+  }
+}
+
+void LeaveOutNeedless(const AugmentationOptions& options,
+                      const StageContext& context,
+                      std::map<Kind, int>* counts,
+                      Outcome* outcome) {
+  if (options.samples > 0) {
+    const std::pair<Kind, bool> switches[] = {{Kind::kOutpaint, options.outpaint},
+                                              {Kind::kAnimate, options.animate},
+                                              {Kind::kNovelView, options.novel_views}};
+    for (const auto& [kind, on] : switches) {
+      if (!on) outcome->LeaveOut(AugmentationKindName(kind), "not asked for");
+    }
+  }
+  const std::optional<double> coverage = Coverage(context);
+  if (coverage && *coverage >= kCovered && counts->erase(Kind::kOutpaint) > 0) {
+    outcome->LeaveOut(AugmentationKindName(Kind::kOutpaint),
+                      "the key view covers " + std::to_string(static_cast<int>(100.0 * *coverage)) +
+                          " % of the scene: there is nothing to invent around it");
+  }
+}
+
+void WriteSheet(const KeyPicture& key, const Outcome& outcome, StageContext& context) {
+  ContactSheet sheet;
+  sheet.title = "Training pictures of the colorizer";
+  sheet.subtitle = "The key view and " + std::to_string(outcome.made.size()) +
+                   " pictures made from it or given; what carries no weight is dimmed.";
+  sheet.ranked.push_back(
+      {FitWithin(SrgbFromLab(key.lab), kThumbnailPx), "key view", "as coloured", true});
+  for (const Augmentation& a : outcome.made) {
+    Image srgb = SrgbFromLab(a.picture.lab);
+    for (int c = 0; c < 3; ++c) {
+      for (size_t i = 0; i < srgb.PlaneSize(); ++i) {
+        srgb.Plane(c)[i] *= 0.35f + 0.65f * std::min(1.0f, 2.0f * a.picture.weight.data[i]);
+      }
+    }
+    sheet.ranked.push_back({FitWithin(srgb, kThumbnailPx), a.name, a.source, false});
+  }
+  context.WriteOutput(artifact::kAugmentationSheet, EncodeJpeg(DrawContactSheet(sheet), 85));
+}
+
+void WriteResults(const KeyPicture& key, const Outcome& outcome, StageContext& context) {
+  ordered_json samples = ordered_json::array();
+  for (const Augmentation& a : outcome.made) {
+    const std::string stem = artifact::kAugmentations + a.name;
+    const Image& lab = a.picture.lab;
+    context.WriteOutput(stem + ".png", EncodePng16(SrgbFromLab(lab)));
+    context.WriteOutput(stem + ".ab.png", EncodeAbPng(ChromaOfLab(lab)));
+    context.WriteOutput(stem + ".weight.png", EncodePng8(a.picture.weight));
+    double weight = 0.0;
+    for (const float w : a.picture.weight.data) weight += w;
+    samples.push_back({{"name", a.name},
+                       {"kind", a.kind},
+                       {"source", a.source},
+                       {"width", lab.width},
+                       {"height", lab.height},
+                       {"mean_weight", weight / static_cast<double>(lab.PlaneSize())}});
+  }
+  context.WriteOutput(
+      artifact::kAugmentationFacts,
+      ordered_json{{"samples", samples}, {"left_out", outcome.left_out}}.dump(1) + "\n");
+  if (!outcome.made.empty()) WriteSheet(key, outcome, context);
+}
+
+}  // namespace
+
+void AugmentationOptions::Validate() const {
+  if (samples < 0 || samples > kMaxSamples) {
+    throw InvalidArgument("samples is " + std::to_string(samples) + "; it must be 0 to " +
+                          std::to_string(kMaxSamples));
+  }
+  CheckMaxSide(max_side_px);
+}
+
+void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context) {
+  options.Validate();
+  const Scene scene = ReadScene(context);
+  const int key_index = ReadKeyView(context, scene);
+  Outcome outcome;
+  outcome.made = AugmentationsFromFiles(options.max_side_px, context);
+  const KeyPicture key = ReadKeyPicture(scene, key_index, options, context);
+  std::map<Kind, int> counts = Deal(options);
+  LeaveOutNeedless(options, context, &counts, &outcome);
+  if (!options.backend.empty() && !counts.empty()) {
+    AskBackend(options, key, context, &counts, &outcome);
+  }
+  if (!counts.empty()) {
+    std::optional<GaussianModel> model;
+    if (context.HasInput(artifact::kGeometry)) {
+      model = ParseGaussians(context.ReadInput(artifact::kGeometry));
+    }
+    const EmbeddedAugmentations embedded(key, scene, key_index, std::move(model), context);
+    MakeEmbedded(counts, embedded, context, &outcome);
+  }
+  WriteResults(key, outcome, context);
+}
+
+}  // namespace color3d

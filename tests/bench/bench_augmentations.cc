@@ -1,0 +1,83 @@
+// color3d-bench augmentations: the extra training pictures of one colour scene, to be looked at and
+// to be trained with (color3d-bench colorizer --pictures).
+#include <cstdio>
+
+#include "core/base/files.h"
+#include "core/stage/artifacts.h"
+#include "tests/bench/commands.h"
+#include "tests/bench/local_pipeline.h"
+
+namespace color3d {
+namespace {
+
+struct AugmentationsArguments {
+  std::string scene_folder;
+  std::string out_folder;
+  std::string key_view;
+  int threads = 2;
+  uint64_t seed = 1;
+  bool no_geometry = false;
+  GeometryOptions geometry;
+  AugmentationOptions options;
+};
+
+// The middle one, as in color3d-bench colorizer.
+std::string MiddleView(const Scene& scene) {
+  for (size_t i = scene.views.size() / 2; i < scene.views.size(); ++i) {
+    if (!scene.views[i].held_out) return scene.views[i].name;
+  }
+  return scene.views.front().name;
+}
+
+void RunAugmentations(const AugmentationsArguments& args) {
+  LocalPipeline pipeline(
+      args.scene_folder, args.out_folder, args.threads, args.seed, [](const std::string& text) {
+        std::fprintf(stderr, "%s\n", text.c_str());
+      });
+  pipeline.Run("import_scene", [&](StageContext& c) {
+    ImportOptions options;
+    options.hold_out_every_eighth = true;
+    options.threads = args.threads;
+    RunImportScene(options, c);
+  });
+  const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
+  pipeline.Run("select_key_view", [&](StageContext& c) {
+    SelectKeyViewOptions options;
+    options.selection.strategy = KeyViewStrategy::kManual;
+    options.view = args.key_view.empty() ? MiddleView(scene) : args.key_view;
+    RunSelectKeyView(options, c);
+  });
+  pipeline.Run("colorize_key_view", [&](StageContext& c) {
+    ColorizeKeyViewOptions options;
+    options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
+    RunColorizeKeyView(options, c);
+  });
+  if (!args.no_geometry) {
+    pipeline.Run("reconstruct_geometry",
+                 [&](StageContext& c) { RunReconstructGeometry(args.geometry, 500, c); });
+  }
+  pipeline.Run("generate_augmentations",
+               [&](StageContext& c) { RunGenerateAugmentations(args.options, c); });
+  std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kAugmentationFacts)).c_str());
+}
+
+}  // namespace
+
+void AddAugmentationsCommand(CLI::App& app) {
+  auto args = std::make_shared<AugmentationsArguments>();
+  CLI::App* command = app.add_subcommand(
+      "augmentations", "posed photos in colour -> extra training pictures from one key view");
+  command->add_option("--scene", args->scene_folder)->required();
+  command->add_option("--out", args->out_folder, "where artifacts go")->required();
+  command->add_option("--key-view", args->key_view, "default: the middle training view");
+  command->add_option("--samples", args->options.samples);
+  command->add_option("--side", args->options.max_side_px, "px");
+  command->add_option("--threads", args->threads);
+  command->add_option("--seed", args->seed);
+  command->add_option("--geometry-iterations", args->geometry.iterations);
+  command->add_option("--max-gaussians", args->geometry.max_gaussians);
+  command->add_flag("--no-geometry", args->no_geometry, "from the key view alone");
+  command->callback([args] { RunAugmentations(*args); });
+}
+
+}  // namespace color3d
