@@ -122,7 +122,7 @@ TEST_F(EvaluateTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext) {
   AddProvenance("p1.png", Halves({0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f}));
   AddProvenance("p2.png", Halves({1.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f}));
   AddInput(artifact::kCarryFacts,
-           R"({"coverage": 0.61, "key_views": [{"name": "p1.png", "coverage": 0.61}],
+           R"({"coverage": 0.61, "key_views": ["p1.png"],
                "next_key_view": {"name": "p0.png", "coverage_now": 0.61, "coverage_with": 0.83}})");
   AddInput(artifact::kScores,
            R"({"mean": {}, "consistency": {"rendered": {"me": 0.02, "me_de00": 1.5, "tc": 0.001,

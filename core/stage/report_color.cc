@@ -77,7 +77,7 @@ void ColorFacts::ReadCarry() {
     if (carry.contains("coverage")) coverage_ = carry.at("coverage").get<double>();
     if (carry.contains("key_views")) {
       for (const auto& key : carry.at("key_views")) {
-        key_views_.emplace_back(key.at("name"), key.value("coverage", -1.0));
+        key_views_.push_back(key.get<std::string>());
       }
     }
     const auto next = carry.find("next_key_view");
@@ -141,9 +141,9 @@ std::string ColorFacts::SourceSummary() const {
               Percent(mean_.inferred) + " resemble something in it, and " + Percent(mean_.guessed) +
               " are a guess. ";
   }
-  if (coverage_) summary += "The coloured views cover " + Percent(*coverage_) + " of the scene. ";
-  for (const auto& [name, coverage] : key_views_) {
-    if (coverage >= 0.0) summary += name + " covers " + Percent(coverage) + ". ";
+  if (coverage_) {
+    summary += (key_views_.size() == 1 ? "The key view covers " : "The key views cover ") +
+               Percent(*coverage_) + " of the other views' pixels.";
   }
   return summary;
 }

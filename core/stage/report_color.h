@@ -67,7 +67,7 @@ class ColorFacts {
   std::vector<ViewFacts> views_;
   SourceShares mean_;
   std::optional<double> coverage_;
-  std::vector<std::pair<std::string, double>> key_views_;  // and how much each covers
+  std::vector<std::string> key_views_;
   std::optional<NextKeyView> next_;
   std::vector<Agreement> agreement_;
   std::map<std::string, double> errors_by_source_;

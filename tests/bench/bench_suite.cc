@@ -2,6 +2,7 @@
 // own (equal start, no memory kept, a crash costs one run), resumable, with one table at the end.
 #include <algorithm>
 #include <cstdio>
+#include <set>
 #include <sstream>
 
 #include "core/base/error.h"
@@ -42,7 +43,12 @@ std::string WithScene(std::string word, const std::string& scene_name) {
 
 std::vector<SuiteRun> PlannedRuns(const SuiteArguments& args) {
   std::vector<SuiteRun> runs;
+  std::set<std::string> names;
   for (const std::string& scene : args.scenes) {
+    if (const SuiteRun named{scene}; !names.insert(named.SceneName()).second) {
+      throw InvalidArgument("two scenes are called " + named.SceneName() +
+                            "; their results would overwrite each other");
+    }
     for (const std::string& text : args.variants) {
       SuiteRun run;
       run.scene = scene;
