@@ -91,7 +91,8 @@ class ServerProcess {
   // Those for jobs; or the inference worker, if it runs.
   std::vector<pid_t> Workers(bool inference = false) {
     std::vector<pid_t> pids;
-    for (const v1::WorkerInfo& worker : Info().workers()) {
+    const v1::ServerInfo info = Info();
+    for (const v1::WorkerInfo& worker : info.workers()) {
       if (worker.worker_id().starts_with("inference-") != inference) continue;
       pids.push_back(static_cast<pid_t>(worker.pid()));
     }

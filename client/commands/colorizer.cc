@@ -19,7 +19,7 @@ struct ColorizerOptions {
   int limit = 100;
   std::vector<std::string> photos;
   std::string out = "coloured";
-  int max_side_px = 0;
+  LiveOptions live;
 };
 
 v1::Colorizer GetColorizer(Connection& connection, const std::string& name) {
@@ -81,7 +81,7 @@ ExitCode Apply(const Context& context, const ColorizerOptions& options) {
   }
   return Conclude(
       context,
-      ColorizeToFiles(connection, source, pictures, options.max_side_px, options.out),
+      ColorizeToFiles(connection, source, pictures, options.live, options.out),
       options.out);
 }
 
@@ -117,9 +117,15 @@ void AddColorizerCommands(CLI::App& app, Context& context) {
       ->capture_default_str();
   apply
       ->add_option("--max-side",
-                   options->max_side_px,
+                   options->live.max_side_px,
                    "Longer side of the coloured pictures, px; 0: as the photos")
       ->check(CLI::Range(0, 8192))
+      ->capture_default_str();
+  apply
+      ->add_option("--in-flight",
+                   options->live.in_flight,
+                   "Photos that are sent before the first is back, at most; 0: as the server takes")
+      ->check(CLI::Range(0, 1000))
       ->capture_default_str();
 }
 

@@ -77,7 +77,7 @@ nlohmann::ordered_json LiveSummary::ToJson() const {
 LiveSummary ColorizeToFiles(Connection& connection,
                             const LiveSource& source,
                             const std::vector<LivePicture>& pictures,
-                            int max_side_px,
+                            const LiveOptions& options,
                             const fs::path& out) {
   const auto start = std::chrono::steady_clock::now();
   const std::vector<std::string> names = NamesFor(pictures);
@@ -105,7 +105,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
     summary.colorizer = answer.colorizer();
     summary.encoder_digest = answer.encoder_digest();
   };
-  ColorizeLive(connection, source, pictures, max_side_px, on_answer);
+  ColorizeLive(connection, source, pictures, options, on_answer);
   for (size_t i = 0; i < pictures.size(); ++i) {
     if (!written[i].empty()) summary.files.push_back(written[i]);
     if (!errors[i].empty()) summary.errors.push_back(errors[i]);

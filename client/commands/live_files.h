@@ -32,7 +32,7 @@ struct LiveSummary {
 LiveSummary ColorizeToFiles(Connection& connection,
                             const LiveSource& source,
                             const std::vector<LivePicture>& pictures,
-                            int max_side_px,
+                            const LiveOptions& options,
                             const std::filesystem::path& out);
 
 // Prints the summary; returns its exit code.

@@ -104,7 +104,7 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
   if (pictures.empty()) throw InvalidArgument("there is no photo besides the key view");
   return Conclude(
       context,
-      ColorizeToFiles(connection, source, pictures, options.max_side_px, options.out),
+      ColorizeToFiles(connection, source, pictures, {.max_side_px = options.max_side_px}, options.out),
       options.out);
 }
 

@@ -1,5 +1,7 @@
 #include "client/lib/live_coloring.h"
 
+#include <condition_variable>
+#include <mutex>
 #include <set>
 #include <thread>
 
@@ -20,8 +22,8 @@ using OnAnswer = std::function<void(size_t, const v1::ColorizeImagesResponse&)>;
 
 class LiveRound {
  public:
-  LiveRound(Connection& connection, const LiveSource& source, int max_side_px)
-      : connection_(connection), source_(source), max_side_px_(max_side_px) {}
+  LiveRound(Connection& connection, const LiveSource& source, const LiveOptions& options)
+      : connection_(connection), source_(source), options_(options) {}
 
   // One stream for those of `pictures` in `pending`; takes those that are answered for good out.
   grpc::Status Run(const std::vector<LivePicture>& pictures,
@@ -30,11 +32,21 @@ class LiveRound {
 
  private:
   v1::ColorizeImagesRequest RequestFor(const LivePicture& picture, size_t number);
+  void CountAnswer(bool over) {
+    const std::lock_guard lock(mutex_);
+    over_ = over;
+    --in_flight_;
+    answered_.notify_all();
+  }
   void Write(Stream& stream, const std::vector<LivePicture>& pictures, std::set<size_t> pending);
 
   Connection& connection_;
   const LiveSource& source_;
-  const int max_side_px_;
+  const LiveOptions& options_;
+  std::mutex mutex_;
+  std::condition_variable answered_;
+  int in_flight_ = 0;
+  bool over_ = false;  // nobody reads any more
   std::exception_ptr write_error_;  // the writer's, read after it has ended
 };
 
@@ -44,7 +56,7 @@ v1::ColorizeImagesRequest LiveRound::RequestFor(const LivePicture& picture, size
   request.set_colorizer(source_.colorizer);
   request.set_scene(source_.scene);
   if (source_.example) *request.mutable_example() = *source_.example;
-  request.set_max_side_px(max_side_px_);
+  request.set_max_side_px(options_.max_side_px);
   if (picture.stored) {
     *request.mutable_image_digest() = *picture.stored;
   } else if (static_cast<int64_t>(fs::file_size(picture.file)) <= kMaxInlineBytes) {
@@ -62,6 +74,14 @@ void LiveRound::Write(Stream& stream,
                       std::set<size_t> pending) {
   try {
     for (const size_t i : pending) {
+      {
+        std::unique_lock lock(mutex_);
+        answered_.wait(lock, [this] {
+          return over_ || options_.in_flight == 0 || in_flight_ < options_.in_flight;
+        });
+        if (over_) break;
+        ++in_flight_;
+      }
       if (!stream.Write(RequestFor(pictures[i], i))) break;
     }
   } catch (const std::exception&) {
@@ -80,6 +100,7 @@ grpc::Status LiveRound::Run(const std::vector<LivePicture>& pictures,
   std::exception_ptr failed;
   v1::ColorizeImagesResponse answer;
   while (stream->Read(&answer)) {
+    CountAnswer(/*over=*/false);
     try {
       connection_.cancel().ThrowIfCancelled();
       const size_t number = std::stoul(answer.request_id());
@@ -93,6 +114,7 @@ grpc::Status LiveRound::Run(const std::vector<LivePicture>& pictures,
       break;
     }
   }
+  CountAnswer(/*over=*/true);
   while (failed && stream->Read(&answer)) continue;
   writer.join();
   const grpc::Status status = stream->Finish();
@@ -116,14 +138,14 @@ void WarmUpInference(Connection& connection) {
 void ColorizeLive(Connection& connection,
                   const LiveSource& source,
                   const std::vector<LivePicture>& pictures,
-                  int max_side_px,
+                  const LiveOptions& options,
                   const OnAnswer& on_answer) {
   std::set<size_t> pending;
   for (size_t i = 0; i < pictures.size(); ++i) pending.insert(i);
   Backoff backoff;
   while (!pending.empty()) {
     const size_t before = pending.size();
-    LiveRound round(connection, source, max_side_px);
+    LiveRound round(connection, source, options);
     const grpc::Status status = round.Run(pictures, &pending, on_answer);
     if (!status.ok() && !RpcError(status).IsTransient()) throw RpcError(status);
     if (pending.size() < before) backoff.Reset();

@@ -25,6 +25,11 @@ struct LivePicture {
   std::optional<v1::Digest> stored;  // a blob that the server has
 };
 
+struct LiveOptions {
+  int max_side_px = 0;  // of the answers; 0: as the pictures
+  int in_flight = 0;    // pictures sent and not yet answered, at most; 0: as many as the server takes
+};
+
 // Opens the stream, so that the server gets its inference worker ready, and closes it again.
 void WarmUpInference(Connection& connection);
 
@@ -36,7 +41,7 @@ void WarmUpInference(Connection& connection);
 void ColorizeLive(Connection& connection,
                   const LiveSource& source,
                   const std::vector<LivePicture>& pictures,
-                  int max_side_px,
+                  const LiveOptions& options,
                   const std::function<void(size_t, const v1::ColorizeImagesResponse&)>& on_answer);
 
 }  // namespace color3d::client
