@@ -284,7 +284,22 @@ AugmentedSample Augment(const Image& luminance,
                         const Image& ab,
                         const AugmentOptions& options,
                         Random& random) {
+  return Augment(luminance, ab, Image(), options, random);
+}
+
+AugmentedSample Augment(const Image& luminance,
+                        const Image& ab,
+                        const Image& weight,
+                        const AugmentOptions& options,
+                        Random& random) {
   Check(luminance, ab, options);
+  if (!weight.Empty() && (weight.channels != 1 || weight.width != luminance.width ||
+                          weight.height != luminance.height)) {
+    throw InvalidArgument("the weights of a picture to be augmented are " +
+                          std::to_string(weight.width) + "x" + std::to_string(weight.height) +
+                          " px, the picture " + std::to_string(luminance.width) + "x" +
+                          std::to_string(luminance.height));
+  }
   const SamplingMap map(luminance.width, luminance.height, options, random);
   const float offset =
       static_cast<float>(random.NextUniform(-options.luminance_jitter, options.luminance_jitter));
@@ -305,7 +320,9 @@ AugmentedSample Augment(const Image& luminance,
               : l;
       sample.ab.At(0, y, x) = Sample(ab.Plane(0), ab.width, tap_x, tap_y);
       sample.ab.At(1, y, x) = Sample(ab.Plane(1), ab.width, tap_x, tap_y);
-      sample.valid.At(0, y, x) = source.inside ? 1.0f : 0.0f;
+      float valid = source.inside ? 1.0f : 0.0f;
+      if (!weight.Empty()) valid *= Sample(weight.Plane(0), weight.width, tap_x, tap_y);
+      sample.valid.At(0, y, x) = valid;
     }
   }
   return sample;

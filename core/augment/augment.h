@@ -32,6 +32,12 @@ struct AugmentedSample {
   Image valid;      // 1 channel: 1 where the sample lies inside the source picture
 };
 
+// `weight` (1 channel, empty: 1 everywhere) goes through the same map; `valid` is multiplied by it.
+AugmentedSample Augment(const Image& luminance,
+                        const Image& ab,
+                        const Image& weight,
+                        const AugmentOptions& options,
+                        Random& random);
 AugmentedSample Augment(const Image& luminance,
                         const Image& ab,
                         const AugmentOptions& options,

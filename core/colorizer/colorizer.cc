@@ -27,24 +27,58 @@ void CheckRange(const char* field, double value, double low, double high) {
   }
 }
 
-void CheckKeyView(const Image& luminance, const Image& ab) {
-  if (luminance.channels != 1 || ab.channels != 2 || luminance.Empty()) {
-    throw InvalidArgument("the key view needs L with 1 channel and ab with 2, got " +
-                          std::to_string(luminance.channels) + " and " +
-                          std::to_string(ab.channels));
+std::string SizeOf(const Image& image) {
+  return std::to_string(image.width) + "x" + std::to_string(image.height);
+}
+
+void CheckPicture(const TrainingPicture& picture) {
+  const std::string& name = picture.name;
+  if (picture.luminance.channels != 1 || picture.ab.channels != 2 || picture.luminance.Empty()) {
+    throw InvalidArgument(name + " needs L with 1 channel and ab with 2, got " +
+                          std::to_string(picture.luminance.channels) + " and " +
+                          std::to_string(picture.ab.channels));
   }
-  if (luminance.width != ab.width || luminance.height != ab.height) {
-    throw InvalidArgument("the key view's L is " + std::to_string(luminance.width) + "x" +
-                          std::to_string(luminance.height) + " px, its ab " +
-                          std::to_string(ab.width) + "x" + std::to_string(ab.height));
-  }
-  for (const Image* image : {&luminance, &ab}) {
-    for (float value : image->data) {
+  const bool weighted = !picture.weight.Empty();
+  for (const Image* map : {&picture.luminance, &picture.ab, &picture.weight}) {
+    if (map == &picture.weight && !weighted) continue;
+    if (SizeOf(*map) != SizeOf(picture.luminance)) {
+      throw InvalidArgument("the L of " + name + " is " + SizeOf(picture.luminance) + " px, its " +
+                            (map == &picture.ab ? "ab " : "weight ") + SizeOf(*map));
+    }
+    for (float value : map->data) {
       if (!std::isfinite(value)) {
-        throw InvalidArgument("the key view holds a value that is not finite");
+        throw InvalidArgument(name + " holds a value that is not finite");
       }
     }
   }
+  for (float value : picture.weight.data) {
+    if (value < 0.0f || value > 1.0f) {
+      throw InvalidArgument("the weights of " + name + " hold " + std::to_string(value) +
+                            ", allowed are 0 to 1");
+    }
+  }
+  if (!(picture.share >= 0.0 && picture.share <= 1e6)) {
+    throw InvalidArgument("the share of " + name + " is " + std::to_string(picture.share) +
+                          ", allowed are 0 to 1e6");
+  }
+}
+
+void CheckPictures(const std::vector<TrainingPicture>& pictures) {
+  if (pictures.empty()) throw InvalidArgument("there is no picture to personalize on");
+  double shares = 0.0;
+  for (const TrainingPicture& picture : pictures) {
+    CheckPicture(picture);
+    shares += picture.share;
+  }
+  if (!(shares > 0.0)) {
+    throw InvalidArgument("the shares of all training pictures are 0; give one a positive share");
+  }
+}
+
+void FitWithin(int max_side_px, TrainingPicture* picture) {
+  picture->luminance = FitWithin(picture->luminance, max_side_px);
+  picture->ab = FitWithin(picture->ab, max_side_px);
+  if (!picture->weight.Empty()) picture->weight = FitWithin(picture->weight, max_side_px);
 }
 
 std::shared_ptr<const TapEncoder> RequireTaps(const std::shared_ptr<const Encoder>& encoder) {
@@ -104,14 +138,13 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
 }
 
 std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
-                                                const Image& luminance,
-                                                const Image& ab,
+                                                std::vector<TrainingPicture> pictures,
                                                 const ColorizerOptions& options,
                                                 CheckpointStore& checkpoints,
                                                 ProgressObserver& progress,
                                                 const CancellationToken& cancel) {
   options.Validate();
-  CheckKeyView(luminance, ab);
+  CheckPictures(pictures);
   PersonalColorizer::Parts parts;
   parts.encoder = RequireTaps(encoder);
   parts.options = options;
@@ -119,22 +152,22 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
   CheckTaps(parts.encoder->config());
   return WithTorchErrors("personalization", [&]() -> std::shared_ptr<const Colorizer> {
     SetTorchThreads(options.threads);
-    const Image l = FitWithin(luminance, options.max_side_px);
-    const Image chroma = FitWithin(ab, options.max_side_px);
+    for (TrainingPicture& picture : pictures) FitWithin(options.max_side_px, &picture);
+    const TrainingPicture& key = pictures.front();
     if (recipe.neighbours) {
       parts.neighbours = std::make_unique<FeatureNeighbours>(*parts.encoder,
-                                                             l,
-                                                             chroma,
+                                                             key.luminance,
+                                                             key.ab,
                                                              recipe.neighbour_options,
                                                              Random(options.seed, /*stream=*/3),
                                                              cancel);
     }
     Random start(options.seed, /*stream=*/0);
     parts.model =
-        std::make_unique<PersonalModel>(*parts.encoder, recipe.model, MeanAb(chroma), start);
-    parts.model->FreezeStatistics(PadToMultiple(TensorFromImage(l), kPadMultiple));
+        std::make_unique<PersonalModel>(*parts.encoder, recipe.model, MeanAb(key.ab), start);
+    parts.model->FreezeStatistics(PadToMultiple(TensorFromImage(key.luminance), kPadMultiple));
     parts.model->RequireGradients(true);
-    Trainer trainer(l, chroma, options, recipe, *parts.model);
+    Trainer trainer(pictures, options, recipe, *parts.model);
     trainer.Run(checkpoints, progress, cancel);
     parts.curve = trainer.curve();
     return std::make_shared<const PersonalColorizer>(std::move(parts));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/base/cancellation.h"
 #include "core/base/image.h"
@@ -30,6 +31,15 @@ struct ColorizerOptions {
   void Validate() const;
 };
 
+// One picture to learn from.
+struct TrainingPicture {
+  std::string name;        // for messages
+  Image luminance;         // 1 channel, L 0..100
+  Image ab;                // 2 channels, Lab units, same size
+  Image weight = Image();  // 1 channel, 0..1: how far each pixel's colour is to be learnt; empty: 1
+  double share = 1.0;      // >= 0: relative probability of being drawn
+};
+
 // Immutable once trained; thread-safe to use.
 class Colorizer {
  public:
@@ -41,13 +51,12 @@ class Colorizer {
   virtual std::string Serialize() const = 0;
 };
 
-// `luminance`: 1 channel; `ab`: 2 channels, Lab units, same size, undistorted key view. Reports
-// "train_l1_ab" and, on views of the key that are never trained on (held-out augmentations),
-// "validation_delta_e00". Gradient clipping; a non-finite loss restores the last good state with
-// half the step and warns. Resumable.
+// `pictures`: the undistorted key view first (statistics, neighbours and held-out augmentations are
+// its), then others of the scene, of any size. Reports "train_l1_ab" and, on views of the key that
+// are never trained on (held-out augmentations), "validation_delta_e00". Gradient clipping; a
+// non-finite loss restores the last good state with half the step and warns. Resumable.
 std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
-                                                const Image& luminance,
-                                                const Image& ab,
+                                                std::vector<TrainingPicture> pictures,
                                                 const ColorizerOptions& options,
                                                 CheckpointStore& checkpoints,
                                                 ProgressObserver& progress,

@@ -58,7 +58,7 @@ Errors Measure(const fs::path& folder, int iterations) {
   NoCheckpoints checkpoints;
   NullObserver progress;
   const auto colorizer = TrainColorizer(
-      Encoder::Embedded(), key.luminance, key.ab, options, checkpoints, progress, {});
+      Encoder::Embedded(), {{"key", key.luminance, key.ab}}, options, checkpoints, progress, {});
   Errors errors;
   for (const fs::path& file : held_out) {
     const Picture view = ReadPicture(file);

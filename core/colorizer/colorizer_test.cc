@@ -54,7 +54,8 @@ const std::shared_ptr<const Encoder>& TheEncoder() {
 std::shared_ptr<const Colorizer> Train(const Key& key, const ColorizerOptions& options) {
   NoCheckpoints checkpoints;
   NullObserver progress;
-  return TrainColorizer(TheEncoder(), key.luminance, key.ab, options, checkpoints, progress, {});
+  return TrainColorizer(
+      TheEncoder(), {{"key", key.luminance, key.ab}}, options, checkpoints, progress, {});
 }
 
 double MeanError(const Image& luminance, const Image& x, const Image& y) {
@@ -182,8 +183,7 @@ TEST(ColorizerTest, AnotherEncoderIsRefused) {
   NoCheckpoints checkpoints;
   NullObserver progress;
   EXPECT_THROW(TrainColorizer(std::make_shared<OtherEncoder>(),
-                              key.luminance,
-                              key.ab,
+                              {{"key", key.luminance, key.ab}},
                               Quick(0),
                               checkpoints,
                               progress,

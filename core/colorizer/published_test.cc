@@ -51,7 +51,8 @@ std::shared_ptr<const Colorizer> Train(const std::shared_ptr<const Encoder>& enc
   options.threads = 1;
   NoCheckpoints checkpoints;
   NullObserver progress;
-  return TrainColorizer(encoder, key.luminance, key.ab, options, checkpoints, progress, {});
+  return TrainColorizer(
+      encoder, {{"key", key.luminance, key.ab}}, options, checkpoints, progress, {});
 }
 
 TEST(PublishedEncoderColorizerTest, LearnsTheKeyViewFromADdcolorEncoder) {

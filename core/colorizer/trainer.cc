@@ -28,6 +28,7 @@ constexpr int kMaxRollbacks = 16;
 constexpr double kExplosion = 8.0;  // times the running loss
 constexpr double kLossMemory = 0.95;
 constexpr int kCropMultiple = 32;
+constexpr double kLeastWeightShare = 0.25;  // of a crop's area, in the loss's denominator
 
 int CropFor(const Image& picture, int wanted) {
   const int side = std::min(wanted, std::max(picture.width, picture.height));
@@ -40,29 +41,45 @@ std::string BytesOf(const Image& image) {
 
 }  // namespace
 
-Trainer::Trainer(const Image& luminance,
-                 const Image& ab,
+Trainer::Trainer(const std::vector<TrainingPicture>& pictures,
                  const ColorizerOptions& options,
                  const TrainingRecipe& recipe,
                  PersonalModel& model)
-    : luminance_(luminance),
-      ab_(ab),
+    : pictures_(pictures),
       options_(options),
       recipe_(recipe),
       model_(model),
       adam_(model.parameters()),
       random_(options.seed, /*stream=*/1) {
-  recipe_.augment.crop_px = CropFor(luminance, options.crop_px);
+  recipe_.augment.crop_px = CropFor(pictures.front().luminance, options.crop_px);
   AugmentOptions held_out = recipe_.augment;
   held_out.luminance_jitter = 0.0;
   Random validation_random(options.seed, /*stream=*/2);
   for (int i = 0; i < kValidationSamples; ++i) {
-    validation_.push_back(Draw(held_out, validation_random));
+    validation_.push_back(Draw(pictures.front(), held_out, validation_random));
   }
 }
 
-Trainer::Sample Trainer::Draw(const AugmentOptions& options, Random& random) const {
-  const AugmentedSample augmented = Augment(luminance_, ab_, options, random);
+const TrainingPicture& Trainer::Choose(Random& random) const {
+  if (pictures_.size() == 1) return pictures_.front();
+  double shares = 0.0;
+  for (const TrainingPicture& picture : pictures_) shares += picture.share;
+  double place = random.NextUniform() * shares;
+  const TrainingPicture* chosen = nullptr;
+  for (const TrainingPicture& picture : pictures_) {
+    if (picture.share <= 0.0) continue;
+    chosen = &picture;
+    place -= picture.share;
+    if (place < 0.0) break;
+  }
+  return *chosen;
+}
+
+Trainer::Sample Trainer::Draw(const TrainingPicture& picture,
+                              const AugmentOptions& options,
+                              Random& random) const {
+  const AugmentedSample augmented =
+      Augment(picture.luminance, picture.ab, picture.weight, options, random);
   const int stride = model_.OutputStride();
   Sample sample;
   sample.luminance = TensorFromImage(augmented.luminance);
@@ -73,7 +90,9 @@ Trainer::Sample Trainer::Draw(const AugmentOptions& options, Random& random) con
 
 torch::Tensor Trainer::Loss(const Sample& sample) const {
   const torch::Tensor predicted = model_.Forward(sample.luminance);
-  const torch::Tensor total = 2.0 * sample.weight.sum() + 1e-6;
+  // A crop with little to learn from counts little, instead of shouting as loud as a full one.
+  const double area = static_cast<double>(sample.weight.numel());
+  const double total = 2.0 * std::max(sample.weight.sum().item<double>(), kLeastWeightShare * area);
   torch::Tensor loss = ((predicted - sample.ab).abs() * sample.weight).sum() / total;
   if (options_.consistency_weight > 0.0) {
     // The paper's A4: two augmentations of one picture must agree where they show the same point.
@@ -104,7 +123,7 @@ double Trainer::LearningRate() const {
 }
 
 bool Trainer::Iterate() {
-  const Sample sample = Draw(recipe_.augment, random_);
+  const Sample sample = Draw(Choose(random_), recipe_.augment, random_);
   const torch::Tensor loss = Loss(sample);
   const double value = loss.item<double>();
   if (!std::isfinite(value)) return false;
@@ -211,8 +230,12 @@ void Trainer::Run(CheckpointStore& checkpoints,
 
 std::string Trainer::Fingerprint() const {
   Sha256 hash;
-  hash.Update(BytesOf(luminance_));
-  hash.Update(BytesOf(ab_));
+  for (const TrainingPicture& picture : pictures_) {
+    hash.Update(Json{picture.luminance.width, picture.luminance.height, picture.share}.dump());
+    hash.Update(BytesOf(picture.luminance));
+    hash.Update(BytesOf(picture.ab));
+    hash.Update(BytesOf(picture.weight));
+  }
   hash.Update(Json{static_cast<int>(options_.recipe),
                    options_.iterations,
                    options_.time_limit_seconds,
@@ -253,7 +276,7 @@ void Trainer::LoadState(const std::string& state) {
   try {
     const Json header = Json::parse(archive.header);
     if (header.at("fingerprint") != Fingerprint()) {
-      throw InvalidArgument("the checkpoint belongs to other options or another key view");
+      throw InvalidArgument("the checkpoint belongs to other options or other pictures");
     }
     // TakeTensors checks each array before it copies; the fingerprint has already told us that
     // they belong to this model, so nothing is half restored.

@@ -27,9 +27,9 @@ struct TrainingPoint {
 
 class Trainer {
  public:
-  // `luminance` and `ab` at training size. `model` is changed in place.
-  Trainer(const Image& luminance,
-          const Image& ab,
+  // `pictures` at training size, the key view first; they must outlive the trainer. `model` is
+  // changed in place.
+  Trainer(const std::vector<TrainingPicture>& pictures,
           const ColorizerOptions& options,
           const TrainingRecipe& recipe,
           PersonalModel& model);
@@ -45,9 +45,10 @@ class Trainer {
   struct Sample {
     torch::Tensor luminance;  // [1,1,c,c]
     torch::Tensor ab;         // [1,2,c/s,c/s], / kAbScale
-    torch::Tensor weight;     // [1,1,c/s,c/s], share of valid pixels
+    torch::Tensor weight;     // [1,1,c/s,c/s], 0 outside the picture
   };
-  Sample Draw(const AugmentOptions& options, Random& random) const;
+  Sample Draw(const TrainingPicture& picture, const AugmentOptions& options, Random& random) const;
+  const TrainingPicture& Choose(Random& random) const;
   torch::Tensor Loss(const Sample& sample) const;
   // One iteration; false when the loss or the gradient is unusable and nothing was changed.
   bool Iterate();
@@ -61,8 +62,7 @@ class Trainer {
   void LoadState(const std::string& state);
   std::string Fingerprint() const;
 
-  const Image& luminance_;
-  const Image& ab_;
+  const std::vector<TrainingPicture>& pictures_;
   ColorizerOptions options_;
   TrainingRecipe recipe_;
   PersonalModel& model_;

@@ -16,8 +16,7 @@ void RunPersonalize(const ColorizerOptions& options,
   const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
   const Image ab = Resize(color.ab, luminance->width, luminance->height);
   const auto colorizer = TrainColorizer(context.LoadEncoder(encoder),
-                                        *luminance,
-                                        ab,
+                                        {{"the key view", *luminance, ab}},
                                         options,
                                         context.checkpoints(),
                                         context.progress(),

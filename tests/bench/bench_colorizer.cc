@@ -46,8 +46,7 @@ void RunColorizer(const ColorizerArguments& args) {
   ColorizerOptions options = args.options;
   if (args.paper) options.recipe = ColorizerOptions::Recipe::kPaper;
   const auto colorizer = TrainColorizer(BenchEncoder(args.encoder),
-                                        LuminanceOfLab(key_lab),
-                                        ChromaOfLab(key_lab),
+                                        {{key, LuminanceOfLab(key_lab), ChromaOfLab(key_lab)}},
                                         options,
                                         recorder,
                                         recorder,

@@ -111,8 +111,13 @@ class ErrorOfKeys {
     options.threads = args_.threads;
     NullObserver silent;
     NoCheckpoints none;
-    const auto colorizer = TrainColorizer(
-        encoder_, LuminanceOfLab(truth_[key]), ChromaOfLab(truth_[key]), options, none, silent, {});
+    const auto colorizer =
+        TrainColorizer(encoder_,
+                       {{"key view", LuminanceOfLab(truth_[key]), ChromaOfLab(truth_[key])}},
+                       options,
+                       none,
+                       silent,
+                       {});
     double sum = 0.0;
     int count = 0;
     for (int test : tests_) {
