@@ -30,9 +30,10 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   serve
-      ->add_option("--live-threads",
-                   options->live_threads,
-                   "Threads of the inference worker, which answers ColorizeImages; 0: the machine's")
+      ->add_option(
+          "--live-threads",
+          options->live_threads,
+          "Threads of the inference worker, which answers ColorizeImages; 0: the machine's")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "client/lib/live_stub.h"
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/live_files.h"
@@ -11,6 +12,8 @@
 #include "client/lib/text.h"
 
 namespace color3d::client {
+void AddPreviewCommand(CLI::App& app, Context& context);
+void AddColorizerCommands(CLI::App& app, Context& context);
 namespace {
 
 struct ColorizerOptions {
@@ -26,7 +29,7 @@ v1::Colorizer GetColorizer(Connection& connection, const std::string& name) {
   v1::GetColorizerRequest request;
   request.set_name(ResourceName(name, "colorizers"));
   return connection.Call(
-      &v1::ColorizerService::Stub::GetColorizer, connection.colorizers(), request);
+      &v1::ColorizerService::Stub::GetColorizer, LiveStub(connection), request);
 }
 
 ExitCode List(const Context& context, const ColorizerOptions& options) {
@@ -37,7 +40,7 @@ ExitCode List(const Context& context, const ColorizerOptions& options) {
   do {
     request.set_page_size(std::min(1000, options.limit - all.colorizers_size()));
     const auto page = connection.Call(
-        &v1::ColorizerService::Stub::ListColorizers, connection.colorizers(), request);
+        &v1::ColorizerService::Stub::ListColorizers, LiveStub(connection), request);
     all.mutable_colorizers()->MergeFrom(page.colorizers());
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty() && all.colorizers_size() < options.limit);
@@ -79,10 +82,9 @@ ExitCode Apply(const Context& context, const ColorizerOptions& options) {
   } else {
     source.colorizer = ResourceName(options.name, "colorizers");
   }
-  return Conclude(
-      context,
-      ColorizeToFiles(connection, source, pictures, options.live, options.out),
-      options.out);
+  return Conclude(context,
+                  ColorizeToFiles(connection, source, pictures, options.live, options.out),
+                  options.out);
 }
 
 }  // namespace
@@ -109,8 +111,7 @@ void AddColorizerCommands(CLI::App& app, Context& context) {
   CLI::App* show = command("show", "Scene, job, size and time", &Show);
   show->add_option("colorizer", options->name, "colorizers/SHA256")->required();
   CLI::App* apply = command("apply", "Colour photos live, without a job", &Apply);
-  apply
-      ->add_option("colorizer", options->name, "colorizers/SHA256, or scenes/ID: its newest one")
+  apply->add_option("colorizer", options->name, "colorizers/SHA256, or scenes/ID: its newest one")
       ->required();
   apply->add_option("photos", options->photos, "Photos, or folders of photos")->required();
   apply->add_option("-o,--out", options->out, "Folder for the coloured pictures")

@@ -16,12 +16,12 @@ namespace color3d::client {
 std::vector<LivePicture> CollectPictures(const std::vector<std::string>& arguments);
 
 struct LiveSummary {
-  std::vector<std::string> files;  // written, relative to OUT
+  std::vector<std::string> files;   // written, relative to OUT
   std::vector<std::string> errors;  // "LABEL: why"
   std::string colorizer;
   std::string encoder_digest;
   double seconds = 0.0;
-  double first_seconds = 0.0;  // until the first was there
+  double first_seconds = 0.0;     // until the first was there
   ExitCode code = ExitCode::kOk;  // of the first error
 
   nlohmann::ordered_json ToJson() const;

@@ -15,6 +15,8 @@
 #include "core/image/probe.h"
 
 namespace color3d::client {
+void AddPreviewCommand(CLI::App& app, Context& context);
+void AddColorizerCommands(CLI::App& app, Context& context);
 namespace fs = std::filesystem;
 namespace {
 
@@ -67,8 +69,10 @@ v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::stri
   const std::optional<v1::Job>& job = state.accepted ? state.accepted : state.colored;
   if (!job) {
     throw Error(ErrorCode::kFailedPrecondition,
-                scene + " has no coloured key view yet: give one with --key-color, or make one with "
-                        "`color3d key colour " + scene + " ...`");
+                scene +
+                    " has no coloured key view yet: give one with --key-color, or make one with "
+                    "`color3d key colour " +
+                    scene + " ...`");
   }
   *key = ReadChoice(connection, *job).view;
   return FindArtifact(*job, "key_view_coloured.png").digest();
@@ -104,7 +108,8 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
   if (pictures.empty()) throw InvalidArgument("there is no photo besides the key view");
   return Conclude(
       context,
-      ColorizeToFiles(connection, source, pictures, {.max_side_px = options.max_side_px}, options.out),
+      ColorizeToFiles(
+          connection, source, pictures, {.max_side_px = options.max_side_px}, options.out),
       options.out);
 }
 

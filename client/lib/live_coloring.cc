@@ -2,6 +2,7 @@
 
 #include <condition_variable>
 #include <mutex>
+#include "client/lib/live_stub.h"
 #include <set>
 #include <thread>
 
@@ -46,7 +47,7 @@ class LiveRound {
   std::mutex mutex_;
   std::condition_variable answered_;
   int in_flight_ = 0;
-  bool over_ = false;  // nobody reads any more
+  bool over_ = false;               // nobody reads any more
   std::exception_ptr write_error_;  // the writer's, read after it has ended
 };
 
@@ -95,7 +96,7 @@ grpc::Status LiveRound::Run(const std::vector<LivePicture>& pictures,
                             const OnAnswer& on_answer) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kStreamLimit);
-  const std::unique_ptr<Stream> stream = connection_.colorizers().ColorizeImages(&context);
+  const std::unique_ptr<Stream> stream = LiveStub(connection_).ColorizeImages(&context);
   std::thread writer([&] { Write(*stream, pictures, *pending); });
   std::exception_ptr failed;
   v1::ColorizeImagesResponse answer;
@@ -128,7 +129,7 @@ grpc::Status LiveRound::Run(const std::vector<LivePicture>& pictures,
 void WarmUpInference(Connection& connection) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
-  const auto stream = connection.colorizers().ColorizeImages(&context);
+  const auto stream = LiveStub(connection).ColorizeImages(&context);
   stream->WritesDone();
   v1::ColorizeImagesResponse none;
   while (stream->Read(&none)) continue;

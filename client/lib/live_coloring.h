@@ -20,14 +20,14 @@ struct LiveSource {
 };
 
 struct LivePicture {
-  std::string label;                // of messages and files
-  std::filesystem::path file;       // or
+  std::string label;                 // of messages and files
+  std::filesystem::path file;        // or
   std::optional<v1::Digest> stored;  // a blob that the server has
 };
 
 struct LiveOptions {
   int max_side_px = 0;  // of the answers; 0: as the pictures
-  int in_flight = 0;    // pictures sent and not yet answered, at most; 0: as many as the server takes
+  int in_flight = 0;  // pictures sent and not yet answered, at most; 0: as many as the server takes
 };
 
 // Opens the stream, so that the server gets its inference worker ready, and closes it again.

@@ -1,6 +1,6 @@
 // A private folder of Unix sockets between our own processes, and addresses in it that are short
-// however long the folder's path is: a socket's path has at most 107 bytes, so it is reached through
-// this process's own descriptor of the folder. Immutable; thread-safe.
+// however long the folder's path is: a socket's path has at most 107 bytes, so it is reached
+// through this process's own descriptor of the folder. Immutable; thread-safe.
 #pragma once
 
 #include <filesystem>

@@ -11,9 +11,9 @@
 
 namespace color3d {
 
-// One stream. What to do next is decided under the mutex and done outside it, for gRPC may call back
-// on the same thread; the flags `reading_`, `starting_read_`, `writing_` and `finished_` mark what is
-// decided.
+// One stream. What to do next is decided under the mutex and done outside it, for gRPC may call
+// back on the same thread; the flags `reading_`, `starting_read_`, `writing_` and `finished_` mark
+// what is decided.
 class ColorizeStream final
     : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>,
       public std::enable_shared_from_this<ColorizeStream> {
@@ -120,11 +120,10 @@ class ColorizeStream final
           parts_, &picture->request, &picture->call->request, &picture->response);
     });
     if (!status.ok()) return Answer(picture, status);
-    hub_.client_.Start(picture->call,
-                       deadline_,
-                       [self = shared_from_this(), picture](const grpc::Status& end) {
-                         self->Answer(picture, end);
-                       });
+    hub_.client_.Start(
+        picture->call, deadline_, [self = shared_from_this(), picture](const grpc::Status& end) {
+          self->Answer(picture, end);
+        });
   }
 
   void Answer(const std::shared_ptr<Picture>& picture, const grpc::Status& status) {
@@ -183,7 +182,7 @@ class ColorizeStream final
   bool writing_ = false;
   bool abandoned_ = false;
   bool finished_ = false;
-  grpc::Status last_status_;  // set once, when finished_ is
+  grpc::Status last_status_;         // set once, when finished_ is
   std::optional<grpc::Status> end_;  // how the stream will end; no more pictures are taken
   std::set<std::shared_ptr<Picture>> pictures_;  // under way
   std::deque<v1::ColorizeImagesResponse> replies_;

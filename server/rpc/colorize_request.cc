@@ -57,8 +57,9 @@ ColorizerRecord NewestOf(const RpcParts& parts, const std::string& scene) {
   parts.store.GetScene(scene);  // says so when there is no such scene
   throw ServiceError(ErrorCode::kNotFound,
                      "COLORIZER_NOT_FOUND",
-                     scene + " has no colorizer yet: run a personalize or a colorize_scene job of "
-                             "it first, or send a coloured picture as `example`");
+                     scene +
+                         " has no colorizer yet: run a personalize or a colorize_scene job of "
+                         "it first, or send a coloured picture as `example`");
 }
 
 ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesRequest& request) {

@@ -8,9 +8,9 @@
 
 namespace color3d {
 
-// Fills the call to the worker (taking the picture's bytes out of `request`), and in `response` what
-// is known before: request_id, colorizer, scene. Throws ServiceError: no such colorizer, a scene
-// without one, a colorizer of another scene, a missing blob, a picture of more than 3 MiB.
+// Fills the call to the worker (taking the picture's bytes out of `request`), and in `response`
+// what is known before: request_id, colorizer, scene. Throws ServiceError: no such colorizer, a
+// scene without one, a colorizer of another scene, a missing blob, a picture of more than 3 MiB.
 void ResolveColorizeRequest(const RpcParts& parts,
                             v1::ColorizeImagesRequest* request,
                             internal::v1::ColorizeImageRequest* call,

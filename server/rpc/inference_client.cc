@@ -33,9 +33,10 @@ grpc::Status Explained(const grpc::Status& status, bool our_limit) {
   const bool late = status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
   if (late && !our_limit) return status;
   const std::string what =
-      late ? "the inference worker did not answer in time (it is busy, or cannot start: see its log)"
-           : "the inference worker ended before it had coloured this picture (" +
-                 status.error_message() + ")";
+      late
+          ? "the inference worker did not answer in time (it is busy, or cannot start: see its log)"
+          : "the inference worker ended before it had coloured this picture (" +
+                status.error_message() + ")";
   return ToGrpcStatus(
       ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", what + "; send the picture again"));
 }

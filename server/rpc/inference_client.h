@@ -38,8 +38,8 @@ class InferenceClient {
   bool available() const { return stub_ != nullptr; }
   // Calls the worker to life ahead of the first picture.
   void WarmUp() const;
-  // `done` is called once, on one of gRPC's threads, with the worker's status; a worker that dies or
-  // does not answer in time gives UNAVAILABLE with RetryInfo (INFERENCE_LOST). To cancel:
+  // `done` is called once, on one of gRPC's threads, with the worker's status; a worker that dies
+  // or does not answer in time gives UNAVAILABLE with RetryInfo (INFERENCE_LOST). To cancel:
   // call->context.TryCancel().
   void Start(const std::shared_ptr<Call>& call,
              std::chrono::system_clock::time_point deadline,

@@ -17,13 +17,16 @@ namespace {
 
 // About 60 bytes of memory a pixel while it is coloured.
 constexpr ImageLimits kLimits{.max_pixels = 25'000'000, .max_side_px = 30'000};
+// Decoded pictures that wait to be coloured together.
+constexpr int64_t kMaxGroupPixels = 16'000'000;
 // A message has room for more, but other clients' gRPC takes 4 MiB at most by default.
 constexpr size_t kMaxMessageImageBytes = 3 << 20;
 constexpr int64_t kMaxFileBytes = int64_t{256} << 20;
 
 class CoreLiveEngine : public LiveEngine {
  public:
-  explicit CoreLiveEngine(const LiveEngineSetup& setup) : setup_(setup), cache_(setup.cache_bytes) {}
+  explicit CoreLiveEngine(const LiveEngineSetup& setup)
+      : setup_(setup), cache_(setup.cache_bytes) {}
 
   void WarmUp() override { embedded_ = Encoder::Embedded(); }
   void Colorize(std::vector<LiveTask>& tasks) override;
@@ -33,8 +36,11 @@ class CoreLiveEngine : public LiveEngine {
   struct Picture {
     std::shared_ptr<const LoadedColorizer> loaded;
     Image luminance;
+    LiveTask* task = nullptr;
   };
   Picture Prepare(const Request& request);
+  // Colours, answers and empties the group.
+  void Finish(std::vector<Picture>& group);
   void Answer(const Picture& picture, const Image& ab, internal::v1::ColorizeImageResponse* answer);
   std::shared_ptr<const LoadedColorizer> Find(const Request& request);
   std::shared_ptr<const Encoder> FindEncoder(const std::string& name);
@@ -59,12 +65,12 @@ std::shared_ptr<const Encoder> CoreLiveEngine::FindEncoder(const std::string& na
   }
   const auto file = setup_.models.files.find(name);
   if (file == setup_.models.files.end()) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "UNKNOWN_MODEL",
-                       "the colorizer was trained with the encoder '" + name +
-                           "', which this server does not have; it has: " +
-                           NamesOf(setup_.models.files) + "; start it with --model " + name +
-                           "=FILE");
+    throw ServiceError(
+        ErrorCode::kFailedPrecondition,
+        "UNKNOWN_MODEL",
+        "the colorizer was trained with the encoder '" + name +
+            "', which this server does not have; it has: " + NamesOf(setup_.models.files) +
+            "; start it with --model " + name + "=FILE");
   }
   std::weak_ptr<const Encoder>& known = encoders_[digests_.Of(file->second).sha256];
   std::shared_ptr<const Encoder> encoder = known.lock();
@@ -100,8 +106,7 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   NoCheckpoints checkpoints;
   NullObserver progress;
   loaded.colorizer = TrainColorizer(loaded.encoder,
-                                    LuminanceOfLab(lab),
-                                    ChromaOfLab(lab),
+                                    {{"the example", LuminanceOfLab(lab), ChromaOfLab(lab)}},
                                     options,
                                     checkpoints,
                                     progress,
@@ -122,8 +127,7 @@ std::shared_ptr<const LoadedColorizer> CoreLiveEngine::Find(const Request& reque
 }
 
 CoreLiveEngine::Picture CoreLiveEngine::Prepare(const Request& request) {
-  const std::string blob =
-      request.image_sha256().empty() ? "" : ReadBlob(request.image_sha256());
+  const std::string blob = request.image_sha256().empty() ? "" : ReadBlob(request.image_sha256());
   const std::string& bytes = request.image_sha256().empty() ? request.image() : blob;
   ProbeImage(bytes, "the picture", kLimits);
   Picture picture;
@@ -149,18 +153,37 @@ void CoreLiveEngine::Answer(const Picture& picture,
   answer->set_image_size_bytes(blob.size_bytes);
 }
 
-void CoreLiveEngine::Colorize(std::vector<LiveTask>& tasks) {
-  std::vector<Picture> pictures(tasks.size());
-  for (size_t i = 0; i < tasks.size(); ++i) {
+// Each answered picture's error is its own, also when they cannot be coloured together.
+void CoreLiveEngine::Finish(std::vector<Picture>& group) {
+  for (Picture& picture : group) {
     try {
-      pictures[i] = Prepare(*tasks[i].request);
-      const Image ab = pictures[i].loaded->colorizer->Colorize(pictures[i].luminance);
-      Answer(pictures[i], ab, tasks[i].response);
-      pictures[i].luminance = {};
+      const Image ab = picture.loaded->colorizer->Colorize(picture.luminance);
+      Answer(picture, ab, picture.task->response);
     } catch (const std::exception&) {
-      tasks[i].error = std::current_exception();
+      picture.task->error = std::current_exception();
     }
+    picture.luminance = {};
   }
+  group.clear();
+}
+
+void CoreLiveEngine::Colorize(std::vector<LiveTask>& tasks) {
+  std::vector<Picture> group;
+  int64_t pixels = 0;
+  for (LiveTask& task : tasks) {
+    try {
+      Picture picture = Prepare(*task.request);
+      picture.task = &task;
+      pixels += static_cast<int64_t>(picture.luminance.PlaneSize());
+      group.push_back(std::move(picture));
+    } catch (const std::exception&) {
+      task.error = std::current_exception();
+    }
+    if (pixels < kMaxGroupPixels) continue;
+    Finish(group);
+    pixels = 0;
+  }
+  Finish(group);
 }
 
 }  // namespace

@@ -23,10 +23,9 @@ class InferenceQueue final : public internal::v1::InferenceService::CallbackServ
   // Answers what waits with UNAVAILABLE; waits for the batch under way.
   ~InferenceQueue() override;
 
-  grpc::ServerUnaryReactor* ColorizeImage(
-      grpc::CallbackServerContext* context,
-      const internal::v1::ColorizeImageRequest* request,
-      internal::v1::ColorizeImageResponse* response) override;
+  grpc::ServerUnaryReactor* ColorizeImage(grpc::CallbackServerContext* context,
+                                          const internal::v1::ColorizeImageRequest* request,
+                                          internal::v1::ColorizeImageResponse* response) override;
 
   struct State {
     bool idle = true;

@@ -25,8 +25,8 @@ class InferenceDemand {
   // Within the last minute. A worker that ends by itself afterwards is not missed.
   bool Recent() const {
     const std::chrono::steady_clock::duration asked(asked_.load());
-    return asked.count() != 0 && std::chrono::steady_clock::now().time_since_epoch() - asked <
-                                     std::chrono::seconds(60);
+    return asked.count() != 0 &&
+           std::chrono::steady_clock::now().time_since_epoch() - asked < std::chrono::seconds(60);
   }
 
  private:

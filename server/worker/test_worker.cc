@@ -173,5 +173,6 @@ std::unique_ptr<StageRunner> MakeScriptedRunner() { return std::make_unique<Scri
 }  // namespace color3d
 
 int main(int argc, char** argv) {
-  return color3d::WorkerMain(argc, argv, {&color3d::MakeScriptedRunner, &color3d::MakeScriptedEngine});
+  return color3d::WorkerMain(
+      argc, argv, {&color3d::MakeScriptedRunner, &color3d::MakeScriptedEngine});
 }

@@ -105,10 +105,9 @@ TEST_F(LiveTest, RefusalsSayWhatToDo) {
   ExpectRefusal(
       Client({"colorizer", "apply", std::string(64, 'a'), "no photo"}), 2, {"no photo or folder"});
   ExpectRefusal(Client({"preview", room, "-o", out}), 2, {"--key-color"});
-  ExpectRefusal(
-      Client({"preview", room, "--key-color", room + "/images/view000.png", "-o", out}),
-      2,
-      {"has no colour"});
+  ExpectRefusal(Client({"preview", room, "--key-color", room + "/images/view000.png", "-o", out}),
+                2,
+                {"has no colour"});
   const std::string scene = Ask({"scene", "create", room}).at("name");
   ExpectRefusal(Client({"preview", scene, "-o", out}), 2, {"key colour"});
   ExpectRefusal(
@@ -116,8 +115,7 @@ TEST_F(LiveTest, RefusalsSayWhatToDo) {
   // One bad photo among good ones: the others are there.
   fs::create_directories(Path("mixed"));
   fs::copy_file(Path("room") / "images" / "view000.png", Path("mixed") / "good.png");
-  WriteFileAtomic(Path("mixed") / "bad.png",
-                  ReadFile(Path("mixed") / "good.png").substr(0, 1000));
+  WriteFileAtomic(Path("mixed") / "bad.png", ReadFile(Path("mixed") / "good.png").substr(0, 1000));
   const std::string key = (Path("room") / "truth" / "view003.png").string();
   ExpectRefusal(Client({"preview", Path("mixed").string(), "--key-color", key, "-o", out}),
                 2,
