@@ -7,8 +7,6 @@
 #include "client/commands/console.h"
 
 namespace color3d::client {
-void AddPreviewCommand(CLI::App& app, Context& context);
-void AddColorizerCommands(CLI::App& app, Context& context);
 namespace {
 
 // Signal handlers reach nothing but globals.

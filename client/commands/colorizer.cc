@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "client/lib/live_stub.h"
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/live_files.h"
@@ -12,8 +11,6 @@
 #include "client/lib/text.h"
 
 namespace color3d::client {
-void AddPreviewCommand(CLI::App& app, Context& context);
-void AddColorizerCommands(CLI::App& app, Context& context);
 namespace {
 
 struct ColorizerOptions {
@@ -29,7 +26,7 @@ v1::Colorizer GetColorizer(Connection& connection, const std::string& name) {
   v1::GetColorizerRequest request;
   request.set_name(ResourceName(name, "colorizers"));
   return connection.Call(
-      &v1::ColorizerService::Stub::GetColorizer, LiveStub(connection), request);
+      &v1::ColorizerService::Stub::GetColorizer, connection.colorizers(), request);
 }
 
 ExitCode List(const Context& context, const ColorizerOptions& options) {
@@ -40,7 +37,7 @@ ExitCode List(const Context& context, const ColorizerOptions& options) {
   do {
     request.set_page_size(std::min(1000, options.limit - all.colorizers_size()));
     const auto page = connection.Call(
-        &v1::ColorizerService::Stub::ListColorizers, LiveStub(connection), request);
+        &v1::ColorizerService::Stub::ListColorizers, connection.colorizers(), request);
     all.mutable_colorizers()->MergeFrom(page.colorizers());
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty() && all.colorizers_size() < options.limit);

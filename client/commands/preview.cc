@@ -15,8 +15,6 @@
 #include "core/image/probe.h"
 
 namespace color3d::client {
-void AddPreviewCommand(CLI::App& app, Context& context);
-void AddColorizerCommands(CLI::App& app, Context& context);
 namespace fs = std::filesystem;
 namespace {
 

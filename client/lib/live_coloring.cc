@@ -2,7 +2,6 @@
 
 #include <condition_variable>
 #include <mutex>
-#include "client/lib/live_stub.h"
 #include <set>
 #include <thread>
 
@@ -96,7 +95,7 @@ grpc::Status LiveRound::Run(const std::vector<LivePicture>& pictures,
                             const OnAnswer& on_answer) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kStreamLimit);
-  const std::unique_ptr<Stream> stream = LiveStub(connection_).ColorizeImages(&context);
+  const std::unique_ptr<Stream> stream = connection_.colorizers().ColorizeImages(&context);
   std::thread writer([&] { Write(*stream, pictures, *pending); });
   std::exception_ptr failed;
   v1::ColorizeImagesResponse answer;
@@ -129,7 +128,7 @@ grpc::Status LiveRound::Run(const std::vector<LivePicture>& pictures,
 void WarmUpInference(Connection& connection) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
-  const auto stream = LiveStub(connection).ColorizeImages(&context);
+  const auto stream = connection.colorizers().ColorizeImages(&context);
   stream->WritesDone();
   v1::ColorizeImagesResponse none;
   while (stream->Read(&none)) continue;
