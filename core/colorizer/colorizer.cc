@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/personal_colorizer.h"
 #include "core/colorizer/recipe.h"
-#include "core/colorizer/trainer.h"
+#include "core/colorizer/scene_batch.h"
+#include "core/colorizer/training_session.h"
 #include "core/encoder/threads.h"
 #include "core/encoder/torch_errors.h"
 #include "core/image/codec.h"
@@ -75,6 +77,15 @@ void CheckPictures(const std::vector<TrainingPicture>& pictures) {
   }
 }
 
+// Elsewhere bfloat16 is emulated, slower than float32.
+bool HasBfloat16Products() {
+#if defined(__x86_64__)
+  return __builtin_cpu_supports("avx512bf16") != 0;
+#else
+  return false;
+#endif
+}
+
 void FitWithin(int max_side_px, TrainingPicture* picture) {
   picture->luminance = FitWithin(picture->luminance, max_side_px);
   picture->ab = FitWithin(picture->ab, max_side_px);
@@ -119,6 +130,8 @@ void ColorizerOptions::Validate() const {
   CheckRange("max_side_px", max_side_px, 64, 2048);
   CheckRange("crop_px", crop_px, 64, 1024);
   CheckRange("consistency_weight", consistency_weight, 0, 1e3);
+  CheckRange("average_decay", average_decay, 0, 0.9999);
+  CheckRange("least_improvement", least_improvement, 0, 0.5);
   CheckRange("threads", threads, 0, 1024);
 }
 
@@ -134,8 +147,64 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
     recipe.warmup_iterations = 0;
     recipe.neighbours = false;
   }
+  recipe.model.half_products =
+      options.precision == ColorizerOptions::Precision::kBfloat16 ||
+      (options.precision == ColorizerOptions::Precision::kAuto && HasBfloat16Products());
   return recipe;
 }
+
+namespace {
+
+// Steps in a turn: seldom enough that handing over costs nothing.
+constexpr int kStepsPerTurn = 5;
+
+// What training starts from: neighbours and the model with the key view's statistics.
+PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
+                                 const TrainingPicture& key,
+                                 const ColorizerOptions& options,
+                                 const TrainingRecipe& recipe,
+                                 const CancellationToken& cancel) {
+  PersonalColorizer::Parts parts;
+  parts.encoder = std::move(encoder);
+  parts.options = options;
+  SetTorchThreads(1);
+  if (recipe.neighbours) {
+    parts.neighbours = std::make_unique<FeatureNeighbours>(*parts.encoder,
+                                                           key.luminance,
+                                                           key.ab,
+                                                           recipe.neighbour_options,
+                                                           Random(options.seed, /*stream=*/3),
+                                                           cancel);
+  }
+  Random start(options.seed, /*stream=*/0);
+  parts.model =
+      std::make_unique<PersonalModel>(*parts.encoder, recipe.model, MeanAb(key.ab), start);
+  parts.model->FreezeStatistics(PadToMultiple(TensorFromImage(key.luminance), kPadMultiple));
+  parts.model->RequireGradients(true);
+  return parts;
+}
+
+void Train(TrainingSession& session,
+           CheckpointStore& checkpoints,
+           ProgressObserver& progress,
+           const CancellationToken& cancel,
+           SceneBatch::Seat& seat) {
+  std::unique_ptr<ThreadPool> helpers;
+  while (!session.Finished()) {
+    cancel.ThrowIfCancelled();
+    {
+      const SceneBatch::Turn turn(seat, cancel);
+      if (turn.slots() > 1 && !helpers) helpers = std::make_unique<ThreadPool>(2);
+      for (int i = 0; i < kStepsPerTurn && !session.Finished(); ++i) {
+        cancel.ThrowIfCancelled();
+        session.Step(progress, turn.slots() > 1 ? helpers.get() : nullptr);
+      }
+    }
+    if (session.AtCheckpoint() && checkpoints.WantsSave()) checkpoints.Save(session.Checkpoint());
+  }
+}
+
+}  // namespace
 
 std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
                                                 std::vector<TrainingPicture> pictures,
@@ -143,33 +212,36 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
                                                 CheckpointStore& checkpoints,
                                                 ProgressObserver& progress,
                                                 const CancellationToken& cancel) {
+  SceneBatch alone(options.threads);
+  return TrainColorizer(
+      std::move(encoder), std::move(pictures), options, checkpoints, progress, cancel, alone, "");
+}
+
+std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
+                                                std::vector<TrainingPicture> pictures,
+                                                const ColorizerOptions& options,
+                                                CheckpointStore& checkpoints,
+                                                ProgressObserver& progress,
+                                                const CancellationToken& cancel,
+                                                SceneBatch& batch,
+                                                const std::string& project) {
   options.Validate();
   CheckPictures(pictures);
-  PersonalColorizer::Parts parts;
-  parts.encoder = RequireTaps(encoder);
-  parts.options = options;
+  auto taps = RequireTaps(encoder);
+  CheckTaps(taps->config());
   const TrainingRecipe recipe = RecipeFor(options);
-  CheckTaps(parts.encoder->config());
   return WithTorchErrors("personalization", [&]() -> std::shared_ptr<const Colorizer> {
-    SetTorchThreads(options.threads);
+    SceneBatch::Seat seat(batch, project);
+    std::optional<SceneBatch::Turn> turn(std::in_place, seat, cancel);
     for (TrainingPicture& picture : pictures) FitWithin(options.max_side_px, &picture);
-    const TrainingPicture& key = pictures.front();
-    if (recipe.neighbours) {
-      parts.neighbours = std::make_unique<FeatureNeighbours>(*parts.encoder,
-                                                             key.luminance,
-                                                             key.ab,
-                                                             recipe.neighbour_options,
-                                                             Random(options.seed, /*stream=*/3),
-                                                             cancel);
-    }
-    Random start(options.seed, /*stream=*/0);
-    parts.model =
-        std::make_unique<PersonalModel>(*parts.encoder, recipe.model, MeanAb(key.ab), start);
-    parts.model->FreezeStatistics(PadToMultiple(TensorFromImage(key.luminance), kPadMultiple));
-    parts.model->RequireGradients(true);
-    Trainer trainer(pictures, options, recipe, *parts.model);
-    trainer.Run(checkpoints, progress, cancel);
-    parts.curve = trainer.curve();
+    auto parts = Prepare(std::move(taps), pictures.front(), options, recipe, cancel);
+    TrainingSession session(pictures, options, recipe, *parts.model);
+    session.Resume(checkpoints.Load(), progress);
+    turn.reset();
+    Train(session, checkpoints, progress, cancel, seat);
+    turn.emplace(seat, cancel);
+    session.Conclude(progress);
+    parts.curve = session.curve();
     return std::make_shared<const PersonalColorizer>(std::move(parts));
   });
 }

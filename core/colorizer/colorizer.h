@@ -15,17 +15,34 @@
 
 namespace color3d {
 
+class SceneBatch;
+
 struct ColorizerOptions {
   enum class Recipe {
     kOurs,   // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
     kPaper,  // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
   };
+  // Of matrix products and convolutions while training; the rest is float32 always.
+  enum class Precision {
+    kAuto,  // bfloat16 where the processor has instructions for it
+    kFloat32,
+    kBfloat16,
+  };
   Recipe recipe = Recipe::kOurs;
-  int iterations = 800;             // 0..100000
-  double time_limit_seconds = 0.0;  // > 0: the schedule is shortened to end in time
+  Precision precision = Precision::kAuto;
+  int iterations = 800;  // 0..100000
+  // > 0: the schedule is shortened to end after so many seconds of computing (in a batch a scene
+  // also waits for its turns, which does not count).
+  double time_limit_seconds = 0.0;
   int max_side_px = 400;            // of the key view during training, 64..2048
   int crop_px = 256;                // 64..1024, clipped to the picture
   double consistency_weight = 0.0;  // the paper's A4 term; 0 = off
+  // Exponential mean of the parameters over iterations, 0..0.9999; 0 = off. The better one of mean
+  // and last is delivered.
+  double average_decay = 0.99;
+  // Training stops when the held-out error, smoothed over 3 of 20 points of the schedule, has
+  // fallen by less than this share over the last 4; 0..0.5, 0 = never.
+  double least_improvement = 0.0;
   int threads = 0;
   uint64_t seed = 1;
   void Validate() const;
@@ -61,6 +78,15 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
                                                 CheckpointStore& checkpoints,
                                                 ProgressObserver& progress,
                                                 const CancellationToken& cancel);
+// The same, bit for bit, taking turns with the other scenes of a batch (scene_batch.h).
+std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
+                                                std::vector<TrainingPicture> pictures,
+                                                const ColorizerOptions& options,
+                                                CheckpointStore& checkpoints,
+                                                ProgressObserver& progress,
+                                                const CancellationToken& cancel,
+                                                SceneBatch& batch,
+                                                const std::string& project);
 
 // Throws Error{kInvalidArgument} on a damaged file, kFailedPrecondition when it was trained on
 // another encoder (both digests are named).

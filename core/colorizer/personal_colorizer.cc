@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_archive.h"
 #include "core/encoder/threads.h"
@@ -37,33 +38,6 @@ Image CropTo(const Image& image, int width, int height) {
   return out;
 }
 
-Json JsonFromOptions(const ColorizerOptions& options) {
-  return {{"recipe", options.recipe == ColorizerOptions::Recipe::kPaper ? "paper" : "ours"},
-          {"iterations", options.iterations},
-          {"time_limit_seconds", options.time_limit_seconds},
-          {"max_side_px", options.max_side_px},
-          {"crop_px", options.crop_px},
-          {"consistency_weight", options.consistency_weight},
-          {"seed", options.seed}};
-}
-
-ColorizerOptions OptionsFromJson(const Json& json) {
-  ColorizerOptions options;
-  const std::string recipe = json.at("recipe");
-  if (recipe != "ours" && recipe != "paper") {
-    throw InvalidArgument(std::string(kWhat) + " names the unknown recipe \"" + recipe + "\"");
-  }
-  options.recipe =
-      recipe == "paper" ? ColorizerOptions::Recipe::kPaper : ColorizerOptions::Recipe::kOurs;
-  options.iterations = json.at("iterations");
-  options.time_limit_seconds = json.at("time_limit_seconds");
-  options.max_side_px = json.at("max_side_px");
-  options.crop_px = json.at("crop_px");
-  options.consistency_weight = json.at("consistency_weight");
-  options.seed = json.at("seed");
-  return options;
-}
-
 }  // namespace
 
 PersonalColorizer::PersonalColorizer(Parts parts)
@@ -74,30 +48,30 @@ PersonalColorizer::PersonalColorizer(Parts parts)
                                                    std::exp(-trained / recipe_.trust_iterations);
   torch::NoGradGuard no_grad;
   parts_.model->RequireGradients(false);
+  parts_.model->set_half_products(false);
   for (auto& [name, tensor] : parts_.model->parameters()) {
     torch::Tensor target = tensor;
     target.copy_(tensor.to(torch::kHalf).to(torch::kFloat32));
   }
 }
 
-torch::Tensor PersonalColorizer::Predict(const torch::Tensor& luminance, int picture_height) const {
+// `taps`: with adapters the adapted ones.
+torch::Tensor PersonalColorizer::Predict(std::vector<torch::Tensor> taps,
+                                         const torch::Tensor& luminance,
+                                         int picture_height) const {
   const bool decode = !parts_.neighbours || neighbour_share_ < 1.0;
   const PersonalModel& model = *parts_.model;
-  std::vector<torch::Tensor> taps;
   torch::Tensor decoded;
   if (decode) {
-    taps = model.Taps(luminance);
     decoded = model.Decode(taps, luminance) * kAbScale;
     if (recipe_.flip_average) {
       decoded = 0.5 * (decoded + kAbScale * model.Forward(luminance.flip({3})).flip({3}));
     }
+    // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
+    decoded = decoded.clamp(-kMaxAb, kMaxAb);
   }
-  // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
-  if (decode) decoded = decoded.clamp(-kMaxAb, kMaxAb);
   if (!parts_.neighbours) return decoded;
-  if (!decode || model.config().adapters) {
-    taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
-  }
+  if (model.config().adapters) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
   const NeighbourColors found = parts_.neighbours->Lookup(taps, luminance, picture_height);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
@@ -107,15 +81,7 @@ torch::Tensor PersonalColorizer::Predict(const torch::Tensor& luminance, int pic
   return torch::lerp(decoded, near, neighbour_share_);
 }
 
-Image PersonalColorizer::ColorizeAtTrainingSize(const Image& luminance) const {
-  const torch::Tensor padded = PadToMultiple(TensorFromImage(luminance), kPadMultiple);
-  const Image coarse = ImageFromTensor(Predict(padded, luminance.height));
-  const Image fine =
-      UpsampleGuided(coarse, ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
-  return CropTo(fine, luminance.width, luminance.height);
-}
-
-Image PersonalColorizer::Colorize(const Image& luminance) const {
+void PersonalColorizer::Check(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
     throw InvalidArgument("the colorizer takes a picture with 1 channel (L), this one has " +
                           std::to_string(luminance.channels));
@@ -125,13 +91,45 @@ Image PersonalColorizer::Colorize(const Image& luminance) const {
       throw InvalidArgument("the luminance to be coloured holds a value that is not finite");
     }
   }
+}
+
+std::pair<int, int> PersonalColorizer::PaddedSize(const Image& small) {
+  const auto padded = [](int side) {
+    return (side + kPadMultiple - 1) / kPadMultiple * kPadMultiple;
+  };
+  return {padded(small.width), padded(small.height)};
+}
+
+torch::Tensor PersonalColorizer::Padded(const Image& small) {
+  return PadToMultiple(TensorFromImage(small), kPadMultiple);
+}
+
+void PersonalColorizer::SetThreads() const { SetTorchThreads(parts_.options.threads); }
+
+Image PersonalColorizer::AtTrainingSize(const Image& luminance) const {
+  return FitWithin(luminance, parts_.options.max_side_px);
+}
+
+Image PersonalColorizer::ColorizeFromTaps(const std::vector<torch::Tensor>& taps,
+                                          const torch::Tensor& padded,
+                                          const Image& small,
+                                          const Image& luminance) const {
+  const Image coarse = ImageFromTensor(Predict(taps, padded, small.height));
+  const Image fine =
+      UpsampleGuided(coarse, ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
+  const Image ab = CropTo(fine, small.width, small.height);
+  if (small.width == luminance.width && small.height == luminance.height) return ab;
+  return UpsampleGuided(ab, luminance, kGuideRadius, kGuideVarianceFloor);
+}
+
+Image PersonalColorizer::Colorize(const Image& luminance) const {
+  Check(luminance);
   return WithTorchErrors("colorizer", [&] {
     torch::NoGradGuard no_grad;
-    SetTorchThreads(parts_.options.threads);
-    const Image small = FitWithin(luminance, parts_.options.max_side_px);
-    const Image ab = ColorizeAtTrainingSize(small);
-    if (small.width == luminance.width && small.height == luminance.height) return ab;
-    return UpsampleGuided(ab, luminance, kGuideRadius, kGuideVarianceFloor);
+    SetThreads();
+    const Image small = AtTrainingSize(luminance);
+    const torch::Tensor padded = Padded(small);
+    return ColorizeFromTaps(parts_.model->Taps(padded), padded, small, luminance);
   });
 }
 

@@ -4,13 +4,14 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/feature_neighbours.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
-#include "core/colorizer/trainer.h"
+#include "core/colorizer/training_session.h"
 
 namespace color3d {
 
@@ -29,14 +30,29 @@ class PersonalColorizer : public Colorizer {
   Image Colorize(const Image& luminance) const override;
   std::string Serialize() const override;
 
+  // The steps of Colorize, for whoever runs the encoder over many pictures at once: frozen taps
+  // (UsesFrozenTaps) of Padded(AtTrainingSize(luminance)).
+  static void Check(const Image& luminance);
+  static std::pair<int, int> PaddedSize(const Image& small);  // width, height
+  static torch::Tensor Padded(const Image& small);
+  bool UsesFrozenTaps() const { return !recipe_.model.adapters && !recipe_.flip_average; }
+  const TapEncoder& encoder() const { return *parts_.encoder; }
+  void SetThreads() const;
+  Image AtTrainingSize(const Image& luminance) const;
+  Image ColorizeFromTaps(const std::vector<torch::Tensor>& taps,
+                         const torch::Tensor& padded,
+                         const Image& small,
+                         const Image& luminance) const;
+
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
                                                       std::shared_ptr<const TapEncoder> encoder,
                                                       int threads);
 
  private:
   // [1,2,H/s,W/s] ab in Lab units of a padded L [1,1,H,W]; `picture_height` before padding.
-  torch::Tensor Predict(const torch::Tensor& luminance, int picture_height) const;
-  Image ColorizeAtTrainingSize(const Image& luminance) const;
+  torch::Tensor Predict(std::vector<torch::Tensor> taps,
+                        const torch::Tensor& luminance,
+                        int picture_height) const;
 
   Parts parts_;
   TrainingRecipe recipe_;

@@ -159,10 +159,32 @@ torch::Tensor PersonalModel::Normalise(const Norm& norm, const torch::Tensor& x)
   return torch::addcmul(shift.view({1, c, 1, 1}), x, scale.view({1, c, 1, 1}));
 }
 
+torch::Tensor PersonalModel::Conv(const torch::Tensor& x,
+                                  const torch::Tensor& weight,
+                                  const torch::Tensor& bias) const {
+  const int64_t border = weight.size(2) / 2;
+  if (!config_.half_products) return torch::conv2d(x, weight, bias, /*stride=*/1, border);
+  const torch::Tensor b = bias.defined() ? bias.to(torch::kBFloat16) : bias;
+  return torch::conv2d(
+      x.to(torch::kBFloat16), weight.to(torch::kBFloat16), b, /*stride=*/1, border);
+}
+
+torch::Tensor PersonalModel::NormalisedConv(const torch::Tensor& x,
+                                            const torch::Tensor& weight,
+                                            const torch::Tensor& bias,
+                                            const Norm& norm) const {
+  if (config_.instance_norm || measuring_statistics_) {
+    return Normalise(norm, Conv(x, weight, bias));
+  }
+  // Frozen statistics make the norm linear: it goes into the weights, which are a hundred times
+  // smaller than the activations.
+  const torch::Tensor scale = norm.weight * norm.inverse_deviation;
+  return Conv(x, weight * scale.view({-1, 1, 1, 1}), norm.bias + (bias - norm.mean) * scale);
+}
+
 torch::Tensor PersonalModel::RunBlock(const ResidualBlock& block, const torch::Tensor& x) const {
-  torch::Tensor y = torch::conv2d(x, block.conv1, block.bias1, /*stride=*/1, /*padding=*/1);
-  y = LeakyRelu(Normalise(block.norm, y));
-  y = LeakyRelu(torch::conv2d(y, block.conv2, block.bias2, /*stride=*/1, /*padding=*/1));
+  torch::Tensor y = LeakyRelu(NormalisedConv(x, block.conv1, block.bias1, block.norm));
+  y = LeakyRelu(Conv(y, block.conv2, block.bias2));
   return x + y;
 }
 
@@ -185,11 +207,35 @@ std::vector<torch::Tensor> PersonalModel::Taps(const torch::Tensor& luminance) c
   const torch::Tensor input = encoder_.Input(luminance);
   if (!config_.adapters) {
     torch::NoGradGuard no_grad;
-    return encoder_.Taps(input);
+    return config_.half_products ? encoder_.FastTaps(input) : encoder_.Taps(input);
   }
   return encoder_.Taps(input, [this](int stage, int block, const torch::Tensor& x) {
     return Adapt(stage, block, x);
   });
+}
+
+// A 1x1 convolution over the concatenation [tap, below upsampled, luminance], part by part: it
+// commutes with the upsampling, and concatenating channels-last maps costs more than convolving.
+torch::Tensor PersonalModel::Fuse(const Level& level,
+                                  const torch::Tensor& tap,
+                                  const torch::Tensor& below,
+                                  const torch::Tensor& luminance) const {
+  torch::Tensor weight = level.fuse;
+  torch::Tensor bias = level.fuse_bias;
+  const bool frozen = !config_.instance_norm && !measuring_statistics_;
+  if (frozen) {
+    const torch::Tensor scale = level.norm.weight * level.norm.inverse_deviation;
+    weight = weight * scale.view({-1, 1, 1, 1});
+    bias = level.norm.bias + (bias - level.norm.mean) * scale;
+  }
+  int64_t begin = tap.size(1);
+  torch::Tensor x = Conv(tap, weight.narrow(1, 0, begin), bias);
+  if (below.defined()) {
+    x = x + UpsampleTwice(Conv(below, weight.narrow(1, begin, below.size(1)), {}));
+    begin += below.size(1);
+  }
+  if (luminance.defined()) x = x + luminance * weight.narrow(1, begin, 1).view({1, -1, 1, 1});
+  return frozen ? x : Normalise(level.norm, x);
 }
 
 torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,
@@ -197,18 +243,15 @@ torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,
   torch::Tensor x;
   for (int i = static_cast<int>(levels_.size()) - 1; i >= 0; --i) {
     const Level& level = levels_[i];
-    std::vector<torch::Tensor> parts;
-    parts.push_back(taps[i]);
-    if (x.defined()) parts.push_back(UpsampleTwice(x));
+    torch::Tensor l;
     if (i == 0) {
       const int stride = encoder_.config().stem_stride;
-      parts.push_back(torch::avg_pool2d(luminance, {stride, stride}) / 50.0 - 1.0);
+      l = torch::avg_pool2d(luminance, {stride, stride}) / 50.0 - 1.0;
     }
-    x = parts.size() == 1 ? parts[0] : torch::cat(parts, 1);
-    x = LeakyRelu(Normalise(level.norm, torch::conv2d(x, level.fuse, level.fuse_bias)));
+    x = LeakyRelu(Fuse(level, taps[i], x, l));
     for (const ResidualBlock& block : level.blocks) x = RunBlock(block, x);
   }
-  return torch::conv2d(x, head_, head_bias_, /*stride=*/1, /*padding=*/1);
+  return Conv(x, head_, head_bias_).to(torch::kFloat32);
 }
 
 torch::Tensor PersonalModel::Forward(const torch::Tensor& luminance) const {

@@ -21,6 +21,9 @@ struct PersonalModelConfig {
   int first_adapter_stage = 0;
   int adapter_kernel = 7;
   int adapter_reduction = 8;  // gamma
+  // Matrix products and convolutions in bfloat16 (parameters, sums and statistics stay float32):
+  // several times faster where the processor has instructions for it. For training only.
+  bool half_products = false;
 };
 
 // Decoder channels at a tap of this stride: 32 at 2 px, 64 at 4, 96 at 8, 128 from 16 on.
@@ -60,6 +63,7 @@ class PersonalModel {
     return statistics_;
   }
   void RequireGradients(bool on);
+  void set_half_products(bool on) { config_.half_products = on; }
 
  private:
   struct Norm {
@@ -87,7 +91,19 @@ class PersonalModel {
   Norm NewNorm(const std::string& name, int64_t channels);
   void AddLevel(const std::string& name, int64_t in, int64_t out, Random& random);
   void AddAdapters(Random& random);
+  // `weight` * x + `bias`, normalised; 3x3 with a border of 1, or 1x1.
+  torch::Tensor NormalisedConv(const torch::Tensor& x,
+                               const torch::Tensor& weight,
+                               const torch::Tensor& bias,
+                               const Norm& norm) const;
+  torch::Tensor Conv(const torch::Tensor& x,
+                     const torch::Tensor& weight,
+                     const torch::Tensor& bias) const;
   torch::Tensor Normalise(const Norm& norm, const torch::Tensor& x) const;
+  torch::Tensor Fuse(const Level& level,
+                     const torch::Tensor& tap,
+                     const torch::Tensor& below,
+                     const torch::Tensor& luminance) const;
   torch::Tensor RunBlock(const ResidualBlock& block, const torch::Tensor& x) const;
   torch::Tensor Adapt(int stage, int block, const torch::Tensor& x) const;
 

@@ -13,7 +13,7 @@
 #include "core/colorizer/padding.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
-#include "core/colorizer/trainer.h"
+#include "core/colorizer/training_session.h"
 #include "core/encoder/random_features.h"
 
 namespace color3d {
@@ -54,6 +54,34 @@ class TrainingTest : public testing::Test {
     model.FreezeStatistics(KeyTensor());
     model.RequireGradients(true);
     return model;
+  }
+
+  struct Outcome {
+    std::vector<TrainingPoint> curve;
+    int rollbacks = 0;
+    int64_t iterations = 0;
+    bool stopped_early = false;
+  };
+  Outcome Train(PersonalModel& model,
+                CheckpointStore& checkpoints,
+                ProgressObserver& progress,
+                ThreadPool* helpers = nullptr) const {
+    TrainingSession session(pictures_, options_, recipe_, model);
+    session.Resume(checkpoints.Load(), progress);
+    while (!session.Finished()) {
+      session.Step(progress, helpers);
+      if (session.AtCheckpoint() && checkpoints.WantsSave()) {
+        checkpoints.Save(session.Checkpoint());
+      }
+    }
+    session.Conclude(progress);
+    return {session.curve(), session.rollbacks(), session.iteration(), session.stopped_early()};
+  }
+  static void ExpectSameParameters(const PersonalModel& x, const PersonalModel& y) {
+    for (size_t i = 0; i < x.parameters().size(); ++i) {
+      EXPECT_TRUE(torch::equal(x.parameters()[i].second, y.parameters()[i].second))
+          << x.parameters()[i].first;
+    }
   }
 
   ConvNext encoder_;
@@ -104,7 +132,7 @@ TEST_F(TrainingTest, AdaptersLearnWhileTheEncoderStaysFrozen) {
   NoCheckpoints checkpoints;
   NullObserver progress;
   options_.iterations = 3;
-  Trainer(pictures_, options_, recipe_, model).Run(checkpoints, progress, {});
+  Train(model, checkpoints, progress);
   torch::NoGradGuard no_grad;
   const auto after = encoder_.Taps(encoder_.Input(KeyTensor()));
   const auto adapted = model.Taps(KeyTensor());
@@ -135,11 +163,10 @@ TEST_F(TrainingTest, LossFalls) {
   NoCheckpoints checkpoints;
   Warnings progress;
   options_.iterations = 150;
-  Trainer trainer(pictures_, options_, recipe_, model);
-  trainer.Run(checkpoints, progress, {});
+  const Outcome trainer = Train(model, checkpoints, progress);
   ASSERT_GE(progress.validation.size(), 10u);
   EXPECT_LT(progress.validation.back(), 0.5 * progress.validation.front());
-  EXPECT_EQ(trainer.curve().back().iteration, 150);
+  EXPECT_EQ(trainer.curve.back().iteration, 150);
   EXPECT_TRUE(progress.messages.empty());
 }
 
@@ -159,18 +186,18 @@ TEST_F(TrainingTest, PicturesOfShareOrWeightZeroTeachNothing) {
   Warnings alone, shared, weighted;
   options_.iterations = 150;
   PersonalModel model = MakeModel();
-  Trainer(pictures_, options_, recipe_, model).Run(checkpoints, alone, {});
+  Train(model, checkpoints, alone);
   // Drawing among several takes a random number more: not the same bytes, but the same quality.
   TrainingPicture green = Green(pictures_[0]);
   green.share = 0.0;
   pictures_.push_back(green);
   PersonalModel second = MakeModel();
-  Trainer(pictures_, options_, recipe_, second).Run(checkpoints, shared, {});
+  Train(second, checkpoints, shared);
   EXPECT_LT(shared.validation.back(), 2.0 * alone.validation.back());
   pictures_[1].share = 1.0;
   pictures_[1].weight = Image(96, 64, 1);
   PersonalModel third = MakeModel();
-  Trainer(pictures_, options_, recipe_, third).Run(checkpoints, weighted, {});
+  Train(third, checkpoints, weighted);
   EXPECT_LT(weighted.validation.back(), 0.6 * weighted.validation.front());
 }
 
@@ -181,7 +208,7 @@ TEST_F(TrainingTest, PicturesAreDrawnByTheirShare) {
   pictures_.push_back(Green(pictures_[0]));
   pictures_[1].share = 50.0;
   PersonalModel model = MakeModel();
-  Trainer(pictures_, options_, recipe_, model).Run(checkpoints, progress, {});
+  Train(model, checkpoints, progress);
   // It has learnt green, so that the key view's own held-out views are wrong.
   EXPECT_GT(progress.validation.back(), 0.8 * progress.validation.front());
 }
@@ -195,7 +222,7 @@ TEST_F(TrainingTest, ConsistencyAndPaperRecipesTrain) {
     PersonalModel model = MakeModel();
     NoCheckpoints checkpoints;
     Warnings progress;
-    Trainer(pictures_, options_, recipe_, model).Run(checkpoints, progress, {});
+    Train(model, checkpoints, progress);
     EXPECT_FALSE(progress.train.empty());
   }
 }
@@ -204,28 +231,93 @@ TEST_F(TrainingTest, ResumedTrainingEndsAsUninterruptedTraining) {
   NullObserver progress;
   PersonalModel straight = MakeModel();
   NoCheckpoints none;
-  Trainer straight_trainer(pictures_, options_, recipe_, straight);
-  straight_trainer.Run(none, progress, {});
+  const Outcome straight_trainer = Train(straight, none, progress);
 
   OneCheckpoint checkpoints;
   checkpoints.die_after_save = true;
   PersonalModel first = MakeModel();
-  EXPECT_THROW(Trainer(pictures_, options_, recipe_, first).Run(checkpoints, progress, {}), Error);
+  EXPECT_THROW(Train(first, checkpoints, progress), Error);
   ASSERT_FALSE(checkpoints.saved.empty());
   checkpoints.loaded = checkpoints.saved;
   checkpoints.wants_save = false;
   PersonalModel second = MakeModel();
-  Trainer resumed(pictures_, options_, recipe_, second);
-  resumed.Run(checkpoints, progress, {});
-  for (size_t i = 0; i < straight.parameters().size(); ++i) {
-    EXPECT_TRUE(torch::equal(straight.parameters()[i].second, second.parameters()[i].second))
-        << straight.parameters()[i].first;
+  const Outcome resumed = Train(second, checkpoints, progress);
+  ExpectSameParameters(straight, second);
+  ASSERT_EQ(resumed.curve.size(), straight_trainer.curve.size());
+  for (size_t i = 0; i < resumed.curve.size(); ++i) {
+    EXPECT_EQ(resumed.curve[i].iteration, straight_trainer.curve[i].iteration);
+    EXPECT_EQ(resumed.curve[i].train_l1_ab, straight_trainer.curve[i].train_l1_ab);
   }
-  ASSERT_EQ(resumed.curve().size(), straight_trainer.curve().size());
-  for (size_t i = 0; i < resumed.curve().size(); ++i) {
-    EXPECT_EQ(resumed.curve()[i].iteration, straight_trainer.curve()[i].iteration);
-    EXPECT_EQ(resumed.curve()[i].train_l1_ab, straight_trainer.curve()[i].train_l1_ab);
-  }
+}
+
+TEST_F(TrainingTest, AHelpingThreadChangesNothing) {
+  options_.iterations = 30;
+  NoCheckpoints none;
+  NullObserver progress;
+  PersonalModel alone = MakeModel();
+  Train(alone, none, progress);
+  PersonalModel helped = MakeModel();
+  ThreadPool helpers(2);
+  Train(helped, none, progress, &helpers);
+  ExpectSameParameters(alone, helped);
+}
+
+TEST_F(TrainingTest, StopsEarlyWhenTheCurveIsFlatAlsoAfterResuming) {
+  options_.iterations = 400;
+  options_.least_improvement = 0.5;
+  OneCheckpoint checkpoints;
+  NullObserver progress;
+  PersonalModel model = MakeModel();
+  const Outcome outcome = Train(model, checkpoints, progress);
+  EXPECT_TRUE(outcome.stopped_early);
+  EXPECT_LT(outcome.iterations, 400);
+  EXPECT_GE(outcome.curve.size(), 7u);
+  // The last checkpoint lies a few iterations before the stop.
+  checkpoints.loaded = checkpoints.saved;
+  PersonalModel resumed = MakeModel();
+  const Outcome again = Train(resumed, checkpoints, progress);
+  EXPECT_TRUE(again.stopped_early);
+  EXPECT_EQ(again.iterations, outcome.iterations);
+  ExpectSameParameters(model, resumed);
+}
+
+TEST(EarlyStopTest, ComparesMeansOfThreeOverAWindowOfFour) {
+  EarlyStop falling({.least_improvement = 0.01});
+  double error = 10.0;
+  for (int i = 0; i < 40; ++i) EXPECT_FALSE(falling.Add(error *= 0.99)) << i;
+  EarlyStop flat({.least_improvement = 0.01});
+  for (int i = 0; i < 6; ++i) EXPECT_FALSE(flat.Add(5.0)) << i;
+  EXPECT_TRUE(flat.Add(5.0));
+  EarlyStop off({.least_improvement = 0.0});
+  for (int i = 0; i < 40; ++i) EXPECT_FALSE(off.Add(5.0 + i));
+}
+
+TEST_F(TrainingTest, TheAverageIsDeliveredWhenItIsBetter) {
+  NoCheckpoints none;
+  Warnings averaged, plain;
+  options_.iterations = 60;
+  recipe_.last_learning_rate = recipe_.first_learning_rate;  // the last step is a noisy one
+  options_.average_decay = 0.0;
+  PersonalModel last = MakeModel();
+  Train(last, none, plain);
+  options_.average_decay = 0.9;
+  PersonalModel mean = MakeModel();
+  Train(mean, none, averaged);
+  EXPECT_FALSE(torch::equal(last.parameters()[0].second, mean.parameters()[0].second));
+  EXPECT_LT(averaged.validation.back(), 1.1 * plain.validation.back());
+}
+
+TEST_F(TrainingTest, Bfloat16LearnsAsWell) {
+  NoCheckpoints none;
+  Warnings single, half;
+  options_.iterations = 100;
+  PersonalModel first = MakeModel();
+  Train(first, none, single);
+  recipe_.model.half_products = true;
+  PersonalModel second = MakeModel();
+  Train(second, none, half);
+  EXPECT_LT(half.validation.back(), 1.5 * single.validation.back() + 1.0);
+  EXPECT_EQ(second.parameters()[0].second.scalar_type(), torch::kFloat32);
 }
 
 TEST_F(TrainingTest, AForeignOrDamagedCheckpointIsReportedAndIgnored) {
@@ -233,7 +325,7 @@ TEST_F(TrainingTest, AForeignOrDamagedCheckpointIsReportedAndIgnored) {
   NullObserver quiet;
   options_.iterations = 25;
   PersonalModel first = MakeModel();
-  Trainer(pictures_, options_, recipe_, first).Run(checkpoints, quiet, {});
+  Train(first, checkpoints, quiet);
   ASSERT_FALSE(checkpoints.saved.empty());
   options_.seed = 7;
   std::string damaged = checkpoints.saved;
@@ -242,10 +334,9 @@ TEST_F(TrainingTest, AForeignOrDamagedCheckpointIsReportedAndIgnored) {
     checkpoints.loaded = state;
     Warnings progress;
     PersonalModel model = MakeModel();
-    Trainer trainer(pictures_, options_, recipe_, model);
-    trainer.Run(checkpoints, progress, {});
+    const Outcome trainer = Train(model, checkpoints, progress);
     EXPECT_EQ(progress.messages.size(), 1u);
-    EXPECT_EQ(trainer.curve().front().iteration, 1);
+    EXPECT_EQ(trainer.curve.front().iteration, 1);
   }
 }
 
@@ -256,10 +347,9 @@ TEST_F(TrainingTest, DivergenceRollsBackWarnsAndEndsFinite) {
   PersonalModel model = MakeModel();
   NoCheckpoints checkpoints;
   Warnings progress;
-  Trainer trainer(pictures_, options_, recipe_, model);
-  trainer.Run(checkpoints, progress, {});
-  EXPECT_GT(trainer.rollbacks(), 0);
-  EXPECT_EQ(progress.messages.size(), static_cast<size_t>(trainer.rollbacks()));
+  const Outcome trainer = Train(model, checkpoints, progress);
+  EXPECT_GT(trainer.rollbacks, 0);
+  EXPECT_EQ(progress.messages.size(), static_cast<size_t>(trainer.rollbacks));
   for (const auto& [name, tensor] : model.parameters()) {
     EXPECT_TRUE(tensor.isfinite().all().item<bool>()) << name;
   }
@@ -271,21 +361,10 @@ TEST_F(TrainingTest, TimeLimitShortensTheSchedule) {
   PersonalModel model = MakeModel();
   NoCheckpoints checkpoints;
   NullObserver progress;
-  Trainer trainer(pictures_, options_, recipe_, model);
-  trainer.Run(checkpoints, progress, {});
-  EXPECT_LT(trainer.curve().back().iteration, 100000);
-  EXPECT_GE(trainer.curve().back().seconds, 0.5);
-  EXPECT_LT(trainer.curve().back().seconds, 10.0);
-}
-
-TEST_F(TrainingTest, CancellationStopsTraining) {
-  PersonalModel model = MakeModel();
-  NoCheckpoints checkpoints;
-  NullObserver progress;
-  CancellationToken cancel;
-  cancel.Cancel();
-  EXPECT_THROW(Trainer(pictures_, options_, recipe_, model).Run(checkpoints, progress, cancel),
-               Error);
+  const Outcome trainer = Train(model, checkpoints, progress);
+  EXPECT_LT(trainer.curve.back().iteration, 100000);
+  EXPECT_GE(trainer.curve.back().seconds, 0.5);
+  EXPECT_LT(trainer.curve.back().seconds, 10.0);
 }
 
 TEST(AdamTest, AgreesWithTheFormulaInFloat64) {

@@ -159,6 +159,7 @@ torch::Tensor ConvNext::NormaliseInput(const torch::Tensor& rgb) {
 }
 
 torch::Tensor ConvNext::RunBlock(const Block& block,
+                                 const Products& products,
                                  const torch::Tensor& x,
                                  const torch::Tensor& adapted) const {
   const int64_t c = x.size(1);
@@ -167,9 +168,26 @@ torch::Tensor ConvNext::RunBlock(const Block& block,
   if (adapted.defined()) y = y + adapted;
   y = torch::layer_norm(
       y.permute({0, 2, 3, 1}), {c}, block.norm_weight, block.norm_bias, kNormEpsilon);
-  y = torch::gelu(torch::linear(y, block.pwconv1_weight, block.pwconv1_bias));
-  y = torch::linear(y, block.pwconv2_weight, block.pwconv2_bias) * block.gamma;
+  const auto type = products.first.scalar_type();
+  y = torch::gelu(torch::linear(y.to(type), products.first, block.pwconv1_bias.to(type)));
+  y = torch::linear(y, products.second, block.pwconv2_bias.to(type)) * block.gamma;
   return x + y.permute({0, 3, 1, 2});
+}
+
+torch::Tensor ConvNext::Downsample(int i, const torch::Tensor& x) const {
+  const Stage& stage = stages_[i];
+  if (i > 0) {
+    return torch::conv2d(ChannelNorm(x, stage.down_norm_weight, stage.down_norm_bias),
+                         stage.down_weight,
+                         stage.down_bias,
+                         /*stride=*/2);
+  }
+  const int border = (config_.stem_kernel - config_.stem_stride) / 2;
+  const torch::Tensor padded =
+      border > 0 ? torch::replication_pad2d(x, {border, border, border, border}) : x;
+  return ChannelNorm(torch::conv2d(padded, stage.down_weight, stage.down_bias, config_.stem_stride),
+                     stage.down_norm_weight,
+                     stage.down_norm_bias);
 }
 
 std::vector<torch::Tensor> ConvNext::StageOutputs(const torch::Tensor& input,
@@ -178,33 +196,51 @@ std::vector<torch::Tensor> ConvNext::StageOutputs(const torch::Tensor& input,
   std::vector<torch::Tensor> outputs;
   torch::Tensor x = input;
   for (int i = 0; i < count; ++i) {
-    const Stage& stage = stages_[i];
-    if (i == 0) {
-      const int border = (config_.stem_kernel - config_.stem_stride) / 2;
-      if (border > 0) x = torch::replication_pad2d(x, {border, border, border, border});
-      x = torch::conv2d(x, stage.down_weight, stage.down_bias, config_.stem_stride);
-      x = ChannelNorm(x, stage.down_norm_weight, stage.down_norm_bias);
-    } else {
-      x = ChannelNorm(x, stage.down_norm_weight, stage.down_norm_bias);
-      x = torch::conv2d(x, stage.down_weight, stage.down_bias, /*stride=*/2);
-    }
-    for (size_t j = 0; j < stage.blocks.size(); ++j) {
+    x = Downsample(i, x);
+    for (size_t j = 0; j < stages_[i].blocks.size(); ++j) {
+      const Block& block = stages_[i].blocks[j];
       torch::Tensor adapted;
       if (adapter) adapted = adapter(i, static_cast<int>(j), x);
-      x = RunBlock(stage.blocks[j], x, adapted);
+      x = RunBlock(block, {block.pwconv1_weight, block.pwconv2_weight}, x, adapted);
     }
     outputs.push_back(x);
   }
   return outputs;
 }
 
+std::vector<torch::Tensor> ConvNext::NormaliseTaps(std::vector<torch::Tensor> outputs) const {
+  for (size_t i = 0; i < outputs.size(); ++i) {
+    outputs[i] = ChannelNorm(outputs[i], stages_[i].norm_weight, stages_[i].norm_bias);
+  }
+  return outputs;
+}
+
 std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
                                           const BlockAdapter& adapter) const {
-  std::vector<torch::Tensor> taps = StageOutputs(input, config_.StageCount(), adapter);
-  for (size_t i = 0; i < taps.size(); ++i) {
-    taps[i] = ChannelNorm(taps[i], stages_[i].norm_weight, stages_[i].norm_bias);
+  return NormaliseTaps(StageOutputs(input, config_.StageCount(), adapter));
+}
+
+std::vector<torch::Tensor> ConvNext::FastTaps(const torch::Tensor& input) const {
+  at::NoGradGuard no_grad;
+  std::call_once(half_once_, [this] {
+    for (const Stage& stage : stages_) {
+      std::vector<Products>& products = half_products_.emplace_back();
+      for (const Block& block : stage.blocks) {
+        products.emplace_back(block.pwconv1_weight.to(torch::kBFloat16),
+                              block.pwconv2_weight.to(torch::kBFloat16));
+      }
+    }
+  });
+  std::vector<torch::Tensor> outputs;
+  torch::Tensor x = input;
+  for (size_t i = 0; i < stages_.size(); ++i) {
+    x = Downsample(static_cast<int>(i), x);
+    for (size_t j = 0; j < stages_[i].blocks.size(); ++j) {
+      x = RunBlock(stages_[i].blocks[j], half_products_[i][j], x, {});
+    }
+    outputs.push_back(x);
   }
-  return taps;
+  return NormaliseTaps(std::move(outputs));
 }
 
 torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px, int stage) const {

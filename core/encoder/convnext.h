@@ -4,6 +4,7 @@
 
 #include <torch/types.h>
 
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,6 +44,8 @@ class ConvNext : public TapEncoder {
   // multiples of the last stride. Gradients flow to the adapter, never to the frozen weights.
   std::vector<torch::Tensor> Taps(const torch::Tensor& input,
                                   const BlockAdapter& adapter = {}) const override;
+  // The first call makes bfloat16 copies of the matrices (half the weights' memory again).
+  std::vector<torch::Tensor> FastTaps(const torch::Tensor& input) const override;
   // What the stages hand on, before the taps' norms; only the first `count` stages are run.
   std::vector<torch::Tensor> StageOutputs(const torch::Tensor& input,
                                           int count,
@@ -58,15 +61,22 @@ class ConvNext : public TapEncoder {
     torch::Tensor norm_weight, norm_bias;
     std::vector<Block> blocks;
   };
+  // Weights of a block's two matrix products, in float32 or bfloat16.
+  using Products = std::pair<torch::Tensor, torch::Tensor>;
   torch::Tensor RunBlock(const Block& block,
+                         const Products& products,
                          const torch::Tensor& x,
                          const torch::Tensor& adapted) const;
+  torch::Tensor Downsample(int stage, const torch::Tensor& x) const;
+  std::vector<torch::Tensor> NormaliseTaps(std::vector<torch::Tensor> outputs) const;
   torch::Tensor DeepTap(const Image& luminance, int max_side_px, int stage) const;
 
   ConvNextConfig config_;
   std::string digest_;
   std::string description_;
   std::vector<Stage> stages_;
+  mutable std::once_flag half_once_;
+  mutable std::vector<std::vector<Products>> half_products_;  // by stage and block
 };
 
 }  // namespace color3d

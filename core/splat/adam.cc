@@ -3,7 +3,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "core/splat/flush_to_zero.h"
+#include "core/base/flush_to_zero.h"
 #include "core/splat/instruction_set.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/splat/flush_to_zero.h"
+#include "core/base/flush_to_zero.h"
 #include "core/splat/instruction_set.h"
 
 #undef HWY_TARGET_INCLUDE

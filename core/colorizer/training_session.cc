@@ -1,4 +1,4 @@
-#include "core/colorizer/trainer.h"
+#include "core/colorizer/training_session.h"
 
 #include <torch/torch.h>
 
@@ -8,10 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/base/flush_to_zero.h"
 #include "core/color/difference.h"
+#include "core/colorizer/options_json.h"
 #include "core/colorizer/tensor_archive.h"
+#include "core/encoder/convnext.h"
+#include "core/encoder/threads.h"
 
 namespace color3d {
 namespace {
@@ -20,76 +23,43 @@ using Json = nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
 constexpr char kMagic[] = "C3DCKPT1";
-constexpr uint32_t kVersion = 1;
-constexpr int kGoodStateInterval = 25;
-constexpr int kValidationSamples = 2;
+constexpr uint32_t kVersion = 2;
 constexpr int kReports = 20;  // validation points over the whole schedule
 constexpr int kMaxRollbacks = 16;
-constexpr double kExplosion = 8.0;  // times the running loss
+constexpr double kExplosion = 8.0;  // of one loss, times the running loss
+constexpr double kDrift = 3.0;      // of the running loss, times its best
+constexpr double kDriftFloor = 3.0 / kAbScale;
 constexpr double kLossMemory = 0.95;
-constexpr int kCropMultiple = 32;
 constexpr double kLeastWeightShare = 0.25;  // of a crop's area, in the loss's denominator
-
-int CropFor(const Image& picture, int wanted) {
-  const int side = std::min(wanted, std::max(picture.width, picture.height));
-  return std::max(kCropMultiple, side / kCropMultiple * kCropMultiple);
-}
-
-std::string BytesOf(const Image& image) {
-  return {reinterpret_cast<const char*>(image.data.data()), image.data.size() * sizeof(float)};
-}
+constexpr char kAverage[] = "average.";
 
 }  // namespace
 
-Trainer::Trainer(const std::vector<TrainingPicture>& pictures,
-                 const ColorizerOptions& options,
-                 const TrainingRecipe& recipe,
-                 PersonalModel& model)
-    : pictures_(pictures),
-      options_(options),
+TrainingSession::TrainingSession(const std::vector<TrainingPicture>& pictures,
+                                 const ColorizerOptions& options,
+                                 const TrainingRecipe& recipe,
+                                 PersonalModel& model)
+    : options_(options),
       recipe_(recipe),
       model_(model),
+      samples_(pictures, recipe.augment, options, model),
       adam_(model.parameters()),
-      random_(options.seed, /*stream=*/1) {
-  recipe_.augment.crop_px = CropFor(pictures.front().luminance, options.crop_px);
-  AugmentOptions held_out = recipe_.augment;
-  held_out.luminance_jitter = 0.0;
-  Random validation_random(options.seed, /*stream=*/2);
-  for (int i = 0; i < kValidationSamples; ++i) {
-    validation_.push_back(Draw(pictures.front(), held_out, validation_random));
+      early_stop_({.least_improvement = options.least_improvement}) {
+  if (options_.average_decay > 0.0) {
+    for (const auto& [name, tensor] : model_.parameters()) {
+      average_.push_back(tensor.detach().clone());
+    }
   }
+  KeepGoodState();
 }
 
-const TrainingPicture& Trainer::Choose(Random& random) const {
-  if (pictures_.size() == 1) return pictures_.front();
-  double shares = 0.0;
-  for (const TrainingPicture& picture : pictures_) shares += picture.share;
-  double place = random.NextUniform() * shares;
-  const TrainingPicture* chosen = nullptr;
-  for (const TrainingPicture& picture : pictures_) {
-    if (picture.share <= 0.0) continue;
-    chosen = &picture;
-    place -= picture.share;
-    if (place < 0.0) break;
-  }
-  return *chosen;
+torch::Tensor TrainingSession::Predict(const TrainingSample& sample) const {
+  return sample.taps.empty() ? model_.Forward(sample.luminance)
+                             : model_.Decode(sample.taps, sample.luminance);
 }
 
-Trainer::Sample Trainer::Draw(const TrainingPicture& picture,
-                              const AugmentOptions& options,
-                              Random& random) const {
-  const AugmentedSample augmented =
-      Augment(picture.luminance, picture.ab, picture.weight, options, random);
-  const int stride = model_.OutputStride();
-  Sample sample;
-  sample.luminance = TensorFromImage(augmented.luminance);
-  sample.ab = torch::avg_pool2d(TensorFromImage(augmented.ab), {stride, stride}) / kAbScale;
-  sample.weight = torch::avg_pool2d(TensorFromImage(augmented.valid), {stride, stride});
-  return sample;
-}
-
-torch::Tensor Trainer::Loss(const Sample& sample) const {
-  const torch::Tensor predicted = model_.Forward(sample.luminance);
+torch::Tensor TrainingSession::Loss(const TrainingSample& sample) const {
+  const torch::Tensor predicted = Predict(sample);
   // A crop with little to learn from counts little, instead of shouting as loud as a full one.
   const double area = static_cast<double>(sample.weight.numel());
   const double total = 2.0 * std::max(sample.weight.sum().item<double>(), kLeastWeightShare * area);
@@ -104,7 +74,7 @@ torch::Tensor Trainer::Loss(const Sample& sample) const {
   return loss;
 }
 
-double Trainer::Progress() const {
+double TrainingSession::Progress() const {
   if (options_.iterations == 0) return 1.0;
   double share = static_cast<double>(iteration_) / options_.iterations;
   if (options_.time_limit_seconds > 0.0) {
@@ -113,7 +83,7 @@ double Trainer::Progress() const {
   return std::min(share, 1.0);
 }
 
-double Trainer::LearningRate() const {
+double TrainingSession::LearningRate() const {
   const double cosine = 0.5 * (1.0 + std::cos(std::numbers::pi * Progress()));
   const double warmup = std::min(
       1.0, static_cast<double>(adam_.steps() + 1) / std::max(recipe_.warmup_iterations, 1));
@@ -122,30 +92,64 @@ double Trainer::LearningRate() const {
           (recipe_.first_learning_rate - recipe_.last_learning_rate) * cosine);
 }
 
-bool Trainer::Iterate() {
-  const Sample sample = Draw(Choose(random_), recipe_.augment, random_);
+bool TrainingSession::TrainOn(const TrainingSample& sample) {
   const torch::Tensor loss = Loss(sample);
   const double value = loss.item<double>();
   if (!std::isfinite(value)) return false;
-  if (running_loss_ > 0.0 && value > kExplosion * running_loss_) return false;
+  if (running_loss_ > 0.0 && value > kExplosion * running_loss_ + kDriftFloor) return false;
   loss.backward();
   if (!std::isfinite(adam_.Step(LearningRate(), recipe_.max_gradient_norm))) return false;
   running_loss_ =
       running_loss_ > 0.0 ? kLossMemory * running_loss_ + (1.0 - kLossMemory) * value : value;
+  if (HasDrifted()) return false;
+  if (best_running_loss_ == 0.0 || running_loss_ < best_running_loss_) {
+    best_running_loss_ = running_loss_;
+  }
+  UpdateAverage();
   return true;
 }
 
-void Trainer::KeepGoodState() {
+// Divergence without any single step that explodes.
+bool TrainingSession::HasDrifted() const {
+  return best_running_loss_ > 0.0 && running_loss_ > kDrift * best_running_loss_ + kDriftFloor;
+}
+
+// Exponential mean of the parameters; younger at the beginning, so that the random start is soon
+// forgotten.
+void TrainingSession::UpdateAverage() {
+  if (average_.empty()) return;
+  torch::NoGradGuard no_grad;
+  const double steps = static_cast<double>(adam_.steps());
+  const double decay = std::min(options_.average_decay, steps / (steps + 9.0));
+  size_t next = 0;
+  for (const auto& [name, tensor] : model_.parameters()) {
+    average_[next++].lerp_(tensor, 1.0 - decay);
+  }
+}
+
+void TrainingSession::SwapWithAverage() {
+  torch::NoGradGuard no_grad;
+  size_t next = 0;
+  for (const auto& [name, tensor] : model_.parameters()) {
+    const torch::Tensor kept = tensor.clone();
+    torch::Tensor target = tensor;
+    target.copy_(average_[next]);
+    average_[next++].copy_(kept);
+  }
+}
+
+void TrainingSession::KeepGoodState() {
   good_state_.clear();
   for (const auto& [name, tensor] : model_.parameters()) {
     good_state_.push_back(tensor.detach().clone());
   }
   for (const auto& [name, tensor] : adam_.Moments()) good_state_.push_back(tensor.clone());
+  for (const torch::Tensor& tensor : average_) good_state_.push_back(tensor.clone());
   good_steps_ = adam_.steps();
   good_running_loss_ = running_loss_;
 }
 
-void Trainer::RollBack(ProgressObserver& progress) {
+void TrainingSession::RollBack(ProgressObserver& progress) {
   if (++rollbacks_ > kMaxRollbacks) {
     throw Error(ErrorCode::kInternal,
                 "personalization diverged " + std::to_string(rollbacks_) +
@@ -162,22 +166,24 @@ void Trainer::RollBack(ProgressObserver& progress) {
   };
   restore(model_.parameters());
   restore(adam_.Moments());
+  restore(Average());
   adam_.set_steps(good_steps_);
   running_loss_ = good_running_loss_;
+  best_running_loss_ = good_running_loss_;
   learning_rate_scale_ *= 0.5;
   progress.OnWarning("personalization: the loss exploded at iteration " +
                      std::to_string(iteration_) + "; went back to the last good state with " +
                      std::to_string(learning_rate_scale_) + " of the learning rate");
 }
 
-double Trainer::ValidationDeltaE00() const {
+double TrainingSession::ValidationDeltaE00() const {
   torch::NoGradGuard no_grad;
   double sum = 0.0;
   double weight_sum = 0.0;
   const int stride = model_.OutputStride();
-  for (const Sample& sample : validation_) {
+  for (const TrainingSample& sample : samples_.held_out()) {
     const Image l = ImageFromTensor(torch::avg_pool2d(sample.luminance, {stride, stride}));
-    const Image predicted = ImageFromTensor(model_.Forward(sample.luminance) * kAbScale);
+    const Image predicted = ImageFromTensor(Predict(sample) * kAbScale);
     const Image truth = ImageFromTensor(sample.ab * kAbScale);
     const Image weight = ImageFromTensor(sample.weight);
     for (size_t i = 0; i < l.PlaneSize(); ++i) {
@@ -190,72 +196,78 @@ double Trainer::ValidationDeltaE00() const {
   return weight_sum > 0.0 ? sum / weight_sum : 0.0;
 }
 
-void Trainer::Report(ProgressObserver& progress) {
+void TrainingSession::Report(ProgressObserver& progress) {
   TrainingPoint point;
   point.iteration = iteration_;
   point.seconds = seconds_;
   point.train_l1_ab = running_loss_ * kAbScale;
+  // Of what would be delivered.
+  if (!average_.empty()) SwapWithAverage();
   point.validation_delta_e00 = ValidationDeltaE00();
+  if (!average_.empty()) SwapWithAverage();
   curve_.push_back(point);
   progress.OnError(iteration_, "train_l1_ab", point.train_l1_ab);
   progress.OnError(iteration_, "validation_delta_e00", point.validation_delta_e00);
+  stopped_early_ = early_stop_.Add(point.validation_delta_e00) && Progress() < 1.0;
 }
 
-void Trainer::Run(CheckpointStore& checkpoints,
-                  ProgressObserver& progress,
-                  const CancellationToken& cancel) {
-  if (const std::optional<std::string> state = checkpoints.Load()) {
-    try {
-      LoadState(*state);
-    } catch (const Error& error) {
-      progress.OnWarning(std::string("personalization starts afresh: ") + error.what());
-    }
-  }
-  const double seconds_before = seconds_;
+void TrainingSession::Step(ProgressObserver& progress, ThreadPool* helpers) {
   const Clock::time_point start = Clock::now();
-  KeepGoodState();
-  while (Progress() < 1.0) {
-    cancel.ThrowIfCancelled();
-    if (!Iterate()) RollBack(progress);
-    ++iteration_;  // also after a rollback: the sample is spent, the schedule goes on
-    seconds_ = seconds_before + std::chrono::duration<double>(Clock::now() - start).count();
-    progress.OnProgress(iteration_, options_.iterations, "personalizing the colorizer");
-    if (iteration_ % kGoodStateInterval == 0) {
-      KeepGoodState();
-      if (checkpoints.WantsSave()) checkpoints.Save(SaveState());
+  const TrainingSample sample = next_ ? std::move(*next_) : samples_.Draw(iteration_);
+  next_.reset();
+  bool learned = false;
+  const auto part = [&](int64_t index, int) {
+    const ScopedFlushToZero flush;
+    SetTorchThreads(1);
+    if (index == 0) {
+      learned = TrainOn(sample);
+    } else {
+      next_ = samples_.Draw(iteration_ + 1);
     }
-    if (Progress() * kReports >= static_cast<double>(curve_.size())) Report(progress);
+  };
+  if (helpers != nullptr) {
+    helpers->ForEach(2, part);
+  } else {
+    part(0, 0);
+  }
+  if (!learned) RollBack(progress);
+  ++iteration_;  // also after a rollback: the sample is spent, the schedule goes on
+  seconds_ += std::chrono::duration<double>(Clock::now() - start).count();
+  progress.OnProgress(iteration_, options_.iterations, "personalizing the colorizer");
+  if (iteration_ % kGoodStateInterval == 0) KeepGoodState();
+  if (Progress() * kReports >= static_cast<double>(curve_.size())) Report(progress);
+}
+
+void TrainingSession::Conclude(ProgressObserver& progress) {
+  if (stopped_early_) progress.OnError(iteration_, "stopped_early_iteration", iteration_);
+  if (average_.empty() || iteration_ == 0) return;
+  const double last = ValidationDeltaE00();
+  SwapWithAverage();
+  if (last < ValidationDeltaE00()) SwapWithAverage();
+}
+
+void TrainingSession::Resume(const std::optional<std::string>& state, ProgressObserver& progress) {
+  if (!state) return;
+  try {
+    LoadState(*state);
+    KeepGoodState();
+  } catch (const Error& error) {
+    progress.OnWarning(std::string("personalization starts afresh: ") + error.what());
   }
 }
 
-std::string Trainer::Fingerprint() const {
-  Sha256 hash;
-  for (const TrainingPicture& picture : pictures_) {
-    hash.Update(Json{picture.luminance.width, picture.luminance.height, picture.share}.dump());
-    hash.Update(BytesOf(picture.luminance));
-    hash.Update(BytesOf(picture.ab));
-    hash.Update(BytesOf(picture.weight));
-  }
-  hash.Update(Json{static_cast<int>(options_.recipe),
-                   options_.iterations,
-                   options_.time_limit_seconds,
-                   options_.crop_px,
-                   options_.consistency_weight,
-                   options_.seed}
-                  .dump());
-  hash.Update(model_.EncoderDigest());
-  return hash.FinishHex();
-}
-
-std::string Trainer::SaveState() const {
-  Json header{{"fingerprint", Fingerprint()},
+std::string TrainingSession::Checkpoint() const {
+  Json header{{"pictures", samples_.Digest()},
+              {"encoder", model_.EncoderDigest()},
+              {"options", JsonFromOptions(options_)},
               {"iteration", iteration_},
               {"seconds", seconds_},
               {"learning_rate_scale", learning_rate_scale_},
               {"running_loss", running_loss_},
+              {"best_running_loss", best_running_loss_},
               {"rollbacks", rollbacks_},
+              {"stopped_early", stopped_early_},
               {"steps", adam_.steps()},
-              {"random", {random_.state().state, random_.state().increment}},
               {"curve", Json::array()}};
   for (const TrainingPoint& point : curve_) {
     header["curve"].push_back(
@@ -267,31 +279,45 @@ std::string Trainer::SaveState() const {
   PutTensors(model_.parameters(), "", ArchiveArray::Type::kFloat32, archive);
   PutTensors(model_.statistics(), "", ArchiveArray::Type::kFloat32, archive);
   PutTensors(adam_.Moments(), "", ArchiveArray::Type::kFloat32, archive);
+  PutTensors(Average(), kAverage, ArchiveArray::Type::kFloat32, archive);
   return WriteArchive(archive, kMagic);
 }
 
-void Trainer::LoadState(const std::string& state) {
+NamedTensors TrainingSession::Average() const {
+  NamedTensors named;
+  for (size_t i = 0; i < average_.size(); ++i) {
+    named.emplace_back(model_.parameters()[i].first, average_[i]);
+  }
+  return named;
+}
+
+void TrainingSession::LoadState(const std::string& state) {
   const std::string what = "the checkpoint";
   Archive archive = ReadArchive(state, kMagic, kVersion, what);
   try {
     const Json header = Json::parse(archive.header);
-    if (header.at("fingerprint") != Fingerprint()) {
+    if (header.at("pictures") != samples_.Digest() ||
+        header.at("encoder") != model_.EncoderDigest() ||
+        header.at("options") != JsonFromOptions(options_)) {
       throw InvalidArgument("the checkpoint belongs to other options or other pictures");
     }
-    // TakeTensors checks each array before it copies; the fingerprint has already told us that
-    // they belong to this model, so nothing is half restored.
+    // TakeTensors checks each array before it copies; the digests have already told us that they
+    // belong to this model, so nothing is half restored.
     TakeTensors(model_.parameters(), "", what, archive);
     TakeTensors(model_.statistics(), "", what, archive);
     TakeTensors(adam_.Moments(), "", what, archive);
+    TakeTensors(Average(), kAverage, what, archive);
     iteration_ = header.at("iteration");
     seconds_ = header.at("seconds");
     learning_rate_scale_ = header.at("learning_rate_scale");
     running_loss_ = header.at("running_loss");
+    best_running_loss_ = header.at("best_running_loss");
     rollbacks_ = header.at("rollbacks");
+    stopped_early_ = header.at("stopped_early");
     adam_.set_steps(header.at("steps"));
-    random_ = Random(Random::State{header.at("random").at(0), header.at("random").at(1)});
     for (const Json& point : header.at("curve")) {
       curve_.push_back({point.at(0), point.at(1), point.at(2), point.at(3)});
+      early_stop_.Add(curve_.back().validation_delta_e00);
     }
   } catch (const Json::exception& error) {
     throw InvalidArgument(what + " has a damaged header: " + error.what());

@@ -1,0 +1,112 @@
+#include "core/colorizer/scene_batch.h"
+
+#include <algorithm>
+#include <thread>
+#include <tuple>
+
+namespace color3d {
+namespace {
+
+// How soon a waiting scene notices that it was cancelled.
+constexpr auto kCancelPoll = std::chrono::milliseconds(50);
+
+int CoresIfZero(int slots) {
+  if (slots > 0) return slots;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+}  // namespace
+
+SceneBatch::SceneBatch(int slots) : slots_(CoresIfZero(slots)), free_slots_(slots_) {}
+
+int SceneBatch::size() const {
+  std::lock_guard lock(mutex_);
+  return static_cast<int>(members_.size());
+}
+
+std::shared_ptr<const Encoder> SceneBatch::SharedEncoder(
+    const std::string& name, const std::function<std::shared_ptr<const Encoder>()>& load) {
+  std::lock_guard lock(encoder_mutex_);
+  std::shared_ptr<const Encoder> encoder = encoders_[name].lock();
+  if (!encoder) {
+    encoder = load();
+    encoders_[name] = encoder;
+  }
+  return encoder;
+}
+
+const SceneBatch::Member* SceneBatch::Next() const {
+  const Member* next = nullptr;
+  const auto key = [this](const Member& member) {
+    return std::make_tuple(project_seconds_.at(member.project), member.seconds);
+  };
+  for (const Member& member : members_) {
+    if (member.waiting && (next == nullptr || key(member) < key(*next))) next = &member;
+  }
+  return next;
+}
+
+SceneBatch::Seat::Seat(SceneBatch& batch, const std::string& project) : batch_(batch) {
+  std::lock_guard lock(batch_.mutex_);
+  Member member;
+  member.project = project;
+  // Newcomers start level with whoever is furthest behind: no right to the past, no debt either.
+  bool first = true;
+  for (const Member& other : batch_.members_) {
+    if (other.project != project) continue;
+    member.seconds = first ? other.seconds : std::min(member.seconds, other.seconds);
+    first = false;
+  }
+  if (!batch_.project_seconds_.contains(project)) {
+    double least = 0.0;
+    for (auto it = batch_.project_seconds_.begin(); it != batch_.project_seconds_.end(); ++it) {
+      least = it == batch_.project_seconds_.begin() ? it->second : std::min(least, it->second);
+    }
+    batch_.project_seconds_[project] = least;
+  }
+  member_ = batch_.members_.insert(batch_.members_.end(), member);
+}
+
+SceneBatch::Seat::~Seat() {
+  std::lock_guard lock(batch_.mutex_);
+  const std::string project = member_->project;
+  batch_.members_.erase(member_);
+  const bool last = std::none_of(batch_.members_.begin(),
+                                 batch_.members_.end(),
+                                 [&](const Member& member) { return member.project == project; });
+  if (last) batch_.project_seconds_.erase(project);
+  batch_.changed_.notify_all();
+}
+
+SceneBatch::Turn::Turn(Seat& seat, const CancellationToken& cancel) : seat_(seat) {
+  SceneBatch& batch = seat.batch_;
+  std::unique_lock lock(batch.mutex_);
+  Member& member = *seat.member_;
+  member.waiting = true;
+  while (batch.free_slots_ == 0 || batch.Next() != &member) {
+    if (cancel.IsCancelled()) {
+      member.waiting = false;
+      batch.changed_.notify_all();
+      cancel.ThrowIfCancelled();
+    }
+    batch.changed_.wait_for(lock, kCancelPoll);
+  }
+  member.waiting = false;
+  slots_ = batch.Next() == nullptr ? batch.free_slots_ : 1;
+  batch.free_slots_ -= slots_;
+  batch.changed_.notify_all();
+  start_ = std::chrono::steady_clock::now();
+}
+
+SceneBatch::Turn::~Turn() {
+  SceneBatch& batch = seat_.batch_;
+  const double seconds =
+      slots_ * std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  std::lock_guard lock(batch.mutex_);
+  batch.free_slots_ += slots_;
+  seat_.member_->seconds += seconds;
+  batch.project_seconds_[seat_.member_->project] += seconds;
+  batch.changed_.notify_all();
+}
+
+}  // namespace color3d
