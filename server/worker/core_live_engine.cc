@@ -6,6 +6,7 @@
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/colorizer/colorizer.h"
+#include "core/colorizer/scene_colorizers.h"
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
 #include "server/service_error.h"
@@ -34,15 +35,18 @@ class CoreLiveEngine : public LiveEngine {
  private:
   using Request = internal::v1::ColorizeImageRequest;
   struct Picture {
+    std::string key;  // of the colorizer in the cache
     std::shared_ptr<const LoadedColorizer> loaded;
     Image luminance;
     LiveTask* task = nullptr;
   };
   Picture Prepare(const Request& request);
+  // ab of pictures of any scenes; those of one size share a pass of the encoder.
+  static std::vector<Image> Together(const std::vector<Picture>& group);
   // Colours, answers and empties the group.
   void Finish(std::vector<Picture>& group);
   void Answer(const Picture& picture, const Image& ab, internal::v1::ColorizeImageResponse* answer);
-  std::shared_ptr<const LoadedColorizer> Find(const Request& request);
+  std::string KeyOf(const Request& request);
   std::shared_ptr<const Encoder> FindEncoder(const std::string& name);
   LoadedColorizer Load(const Request& request);
   LoadedColorizer FromExample(const Request& request);
@@ -115,15 +119,12 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   return loaded;
 }
 
-std::shared_ptr<const LoadedColorizer> CoreLiveEngine::Find(const Request& request) {
-  if (!request.example_sha256().empty()) {
-    return cache_.Get("example " + request.example_sha256(), [&] { return FromExample(request); });
-  }
+std::string CoreLiveEngine::KeyOf(const Request& request) {
+  if (!request.example_sha256().empty()) return "example " + request.example_sha256();
   // Weights may be replaced under the same name.
   const auto file = setup_.models.files.find(request.encoder());
-  const std::string weights =
-      file == setup_.models.files.end() ? request.encoder() : digests_.Of(file->second).sha256;
-  return cache_.Get(request.colorizer_sha256() + " " + weights, [&] { return Load(request); });
+  return request.colorizer_sha256() + " " +
+         (file == setup_.models.files.end() ? request.encoder() : digests_.Of(file->second).sha256);
 }
 
 CoreLiveEngine::Picture CoreLiveEngine::Prepare(const Request& request) {
@@ -131,7 +132,10 @@ CoreLiveEngine::Picture CoreLiveEngine::Prepare(const Request& request) {
   const std::string& bytes = request.image_sha256().empty() ? request.image() : blob;
   ProbeImage(bytes, "the picture", kLimits);
   Picture picture;
-  picture.loaded = Find(request);
+  picture.key = KeyOf(request);
+  picture.loaded = cache_.Get(picture.key, [&] {
+    return request.example_sha256().empty() ? Load(request) : FromExample(request);
+  });
   picture.luminance = LuminanceFromSrgb(DecodeImage(bytes, "the picture"));
   if (request.max_side_px() > 0) {
     picture.luminance = FitWithin(picture.luminance, request.max_side_px());
@@ -153,16 +157,31 @@ void CoreLiveEngine::Answer(const Picture& picture,
   answer->set_image_size_bytes(blob.size_bytes);
 }
 
-// Each answered picture's error is its own, also when they cannot be coloured together.
+std::vector<Image> CoreLiveEngine::Together(const std::vector<Picture>& group) {
+  std::vector<RoutedPicture> routed;
+  std::map<std::string, std::shared_ptr<const Colorizer>> colorizers;
+  for (const Picture& picture : group) {
+    colorizers[picture.key] = picture.loaded->colorizer;
+    routed.push_back({picture.key, &picture.luminance});
+  }
+  return ColorizeRouted(routed, [&](const std::string& key) { return colorizers.at(key); });
+}
+
 void CoreLiveEngine::Finish(std::vector<Picture>& group) {
-  for (Picture& picture : group) {
+  std::vector<Image> ab(group.size());
+  try {
+    ab = Together(group);
+  } catch (const std::exception&) {
+    // One of them is to blame: below each is tried on its own.
+  }
+  for (size_t i = 0; i < group.size(); ++i) {
+    Picture& picture = group[i];
     try {
-      const Image ab = picture.loaded->colorizer->Colorize(picture.luminance);
-      Answer(picture, ab, picture.task->response);
+      if (ab[i].Empty()) ab[i] = picture.loaded->colorizer->Colorize(picture.luminance);
+      Answer(picture, ab[i], picture.task->response);
     } catch (const std::exception&) {
       picture.task->error = std::current_exception();
     }
-    picture.luminance = {};
   }
   group.clear();
 }
