@@ -20,6 +20,9 @@ namespace {
 constexpr ImageLimits kLimits{.max_pixels = 25'000'000, .max_side_px = 30'000};
 // Decoded pictures that wait to be coloured together.
 constexpr int64_t kMaxGroupPixels = 16'000'000;
+// Examples answer in seconds: at 400 px, as colorizers are trained, each picture takes half as long
+// again.
+constexpr int kExampleSidePx = 320;
 // A message has room for more, but other clients' gRPC takes 4 MiB at most by default.
 constexpr size_t kMaxMessageImageBytes = 3 << 20;
 constexpr int64_t kMaxFileBytes = int64_t{256} << 20;
@@ -103,6 +106,7 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   }
   ColorizerOptions options;
   options.iterations = 0;
+  options.max_side_px = kExampleSidePx;
   options.threads = setup_.threads;
   const Image lab = LabFromSrgb(FitWithin(srgb, options.max_side_px));
   LoadedColorizer loaded;
