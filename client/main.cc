@@ -49,6 +49,8 @@ int Main(int argc, char** argv) {
   AddInspectCommand(app, context);
   AddSceneCommands(app, context);
   AddKeyCommands(app, context);
+  AddPreviewCommand(app, context);
+  AddColorizerCommands(app, context);
   AddJobCommands(app, context);
   AddArtifactCommands(app, context);
   AddServerCommands(app, context);

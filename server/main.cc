@@ -29,6 +29,13 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--threads", options->threads, "Threads of each worker; 0: share the machine's")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  serve
+      ->add_option(
+          "--live-threads",
+          options->live_threads,
+          "Threads of the inference worker, which answers ColorizeImages; 0: the machine's")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
   serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");
   serve->add_option("--log-level", options->log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();

@@ -17,6 +17,7 @@
 #include "server/maintenance.h"
 #include "server/ops/address.h"
 #include "server/ops/process.h"
+#include "server/ops/socket_folder.h"
 #include "server/rpc/rpc_server.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
@@ -97,6 +98,40 @@ std::map<std::string, BackendState> ProbeForInfo(BackendProber& prober) {
   return states;
 }
 
+// Started at the first ColorizeImages; without its program there is none.
+InferenceLink InferenceSetup(const ServeOptions& options,
+                             const UserModels& models,
+                             const SocketFolder& sockets,
+                             SupervisorOptions* setup) {
+  if (::access(setup->program.c_str(), X_OK) != 0) return {};
+  sockets.RemoveAll();
+  // A name of its own: a worker that has outlived its server removes its socket when it ends.
+  const std::string socket = "inference-" + std::to_string(::getpid());
+  const int machine = std::max(1u, std::thread::hardware_concurrency());
+  setup->inference_arguments = {
+      "--inference",
+      socket,
+      "--data-dir",
+      options.data_folder.string(),
+      "--threads",
+      std::to_string(options.live_threads > 0 ? options.live_threads : machine),
+      "--log-level",
+      options.log_level,
+      "--drain-grace-seconds",
+      std::to_string(options.drain_seconds * 0.5),
+      "--reserve-mib",
+      std::to_string(options.reserve_mib)};
+  const std::vector<std::string> model_flags = ToFlags(models);
+  setup->inference_arguments.insert(
+      setup->inference_arguments.end(), model_flags.begin(), model_flags.end());
+  const auto demand = std::make_shared<InferenceDemand>();
+  setup->inference_demand = demand;
+  InferenceLink link;
+  link.target = sockets.Address(socket);
+  link.demand = [demand] { demand->Ask(); };
+  return link;
+}
+
 // Blocks the stop signals for all threads that start later, and waits for them here.
 class StopSignals {
  public:
@@ -132,11 +167,12 @@ void Serve(const ServeOptions& options) {
   const UserModels models = ParseUserModels(options.models, options.backends);
   RequireReadable(models);
   for (const auto& [name, address] : models.backends) ParseBackendAddress(name, address);
-  const SupervisorOptions worker_setup = WorkerSetup(options, models);
+  SupervisorOptions worker_setup = WorkerSetup(options, models);
   const StopSignals signals;
   const DataPaths paths(options.data_folder);
   PrepareDataFolder(paths);
   const DataFolderLock lock(paths);
+  const SocketFolder sockets(paths.Sockets());
   const Clock clock = SystemClock();
   StoreOptions store_options;
   store_options.retry_backoff_ms = options.retry_backoff_ms;
@@ -152,6 +188,7 @@ void Serve(const ServeOptions& options) {
   rpc.version = COLOR3D_VERSION;
   rpc.limits.max_unfinished_jobs = options.max_unfinished_jobs;
   rpc.models = models;
+  rpc.inference = InferenceSetup(options, models, sockets, &worker_setup);
   const auto prober = std::make_shared<BackendProber>(models.backends);
   rpc.probe_backends = [prober] { return ProbeForInfo(*prober); };
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);

@@ -15,6 +15,8 @@ struct ServeOptions {
   std::filesystem::path port_file;  // empty: none
   int workers = 1;
   int threads = 0;  // of each worker; 0: the machine's, shared among the workers
+  // Of the inference worker; 0: the machine's.
+  int live_threads = 0;
   std::string log_level = "info";
   double drain_seconds = 20.0;
   int64_t reserve_mib = 256;

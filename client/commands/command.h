@@ -38,6 +38,8 @@ void AddColorizeCommand(CLI::App& app, Context& context);
 void AddInspectCommand(CLI::App& app, Context& context);
 void AddSceneCommands(CLI::App& app, Context& context);
 void AddKeyCommands(CLI::App& app, Context& context);
+void AddPreviewCommand(CLI::App& app, Context& context);
+void AddColorizerCommands(CLI::App& app, Context& context);
 void AddJobCommands(CLI::App& app, Context& context);
 void AddArtifactCommands(CLI::App& app, Context& context);
 void AddServerCommands(CLI::App& app, Context& context);

@@ -64,6 +64,7 @@ Connection::Connection(const std::string& address, const CancellationToken& canc
   jobs_ = v1::JobService::NewStub(channel_);
   blobs_ = v1::BlobService::NewStub(channel_);
   server_ = v1::ServerService::NewStub(channel_);
+  colorizers_ = v1::ColorizerService::NewStub(channel_);
   bytes_ = google::bytestream::ByteStream::NewStub(channel_);
 }
 

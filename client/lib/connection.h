@@ -11,6 +11,7 @@
 
 #include "client/lib/rpc_error.h"
 #include "color3d/v1/blob.grpc.pb.h"
+#include "color3d/v1/colorizer.grpc.pb.h"
 #include "color3d/v1/job.grpc.pb.h"
 #include "color3d/v1/scene.grpc.pb.h"
 #include "color3d/v1/server.grpc.pb.h"
@@ -50,6 +51,7 @@ class Connection {
   v1::JobService::Stub& jobs() { return *jobs_; }
   v1::BlobService::Stub& blobs() { return *blobs_; }
   v1::ServerService::Stub& server() { return *server_; }
+  v1::ColorizerService::Stub& colorizers() { return *colorizers_; }
   google::bytestream::ByteStream::Stub& bytes() { return *bytes_; }
 
   // One unary call, e.g. Call(&v1::JobService::Stub::GetJob, connection.jobs(), request). Repeated
@@ -81,6 +83,7 @@ class Connection {
   std::unique_ptr<v1::JobService::Stub> jobs_;
   std::unique_ptr<v1::BlobService::Stub> blobs_;
   std::unique_ptr<v1::ServerService::Stub> server_;
+  std::unique_ptr<v1::ColorizerService::Stub> colorizers_;
   std::unique_ptr<google::bytestream::ByteStream::Stub> bytes_;
 };
 

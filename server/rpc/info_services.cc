@@ -7,22 +7,9 @@
 #include "server/ops/process.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/utf8.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
-
-class RefuseColorizeImages final
-    : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse> {
- public:
-  RefuseColorizeImages() {
-    Finish(ToGrpcStatus(ServiceError(
-        ErrorCode::kUnimplemented,
-        "NOT_BUILT",
-        "ColorizeImages is not built yet; submit a colorize_views job for the scene instead")));
-  }
-  void OnDone() override { delete this; }
-};
 
 void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
   for (const auto& [name, file] : parts.models.files) {
@@ -92,8 +79,8 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
 }
 
 grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>*
-ColorizerServiceImpl::ColorizeImages(grpc::CallbackServerContext*) {
-  return new RefuseColorizeImages();
+ColorizerServiceImpl::ColorizeImages(grpc::CallbackServerContext* context) {
+  return hub_.Open(context);
 }
 
 grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerContext* context,

@@ -3,13 +3,14 @@
 
 #include "color3d/v1/colorizer.grpc.pb.h"
 #include "color3d/v1/server.grpc.pb.h"
+#include "server/rpc/colorize_hub.h"
 #include "server/rpc/rpc_parts.h"
 
 namespace color3d {
 
 class ColorizerServiceImpl final : public v1::ColorizerService::CallbackService {
  public:
-  explicit ColorizerServiceImpl(const RpcParts& parts) : parts_(parts) {}
+  ColorizerServiceImpl(const RpcParts& parts, ColorizeHub& hub) : parts_(parts), hub_(hub) {}
   grpc::ServerUnaryReactor* GetColorizer(grpc::CallbackServerContext* context,
                                          const v1::GetColorizerRequest* request,
                                          v1::Colorizer* response) override;
@@ -21,6 +22,7 @@ class ColorizerServiceImpl final : public v1::ColorizerService::CallbackService 
 
  private:
   const RpcParts& parts_;
+  ColorizeHub& hub_;
 };
 
 class ServerServiceImpl final : public v1::ServerService::CallbackService {

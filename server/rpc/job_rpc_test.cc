@@ -272,7 +272,7 @@ TEST_F(JobRpcTest, ColorizersAndServerInfo) {
   EXPECT_EQ(colorizer.scene(), scene);
   grpc::ClientContext context3;
   auto stream = client_->colorizers->ColorizeImages(&context3);
-  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::UNIMPLEMENTED);
+  EXPECT_EQ(ReasonOfStatus(stream->Finish()), "NO_INFERENCE_WORKER");
   v1::ServerInfo info;
   grpc::ClientContext context4;
   ASSERT_TRUE(client_->server->GetServerInfo(&context4, {}, &info).ok());

@@ -50,12 +50,12 @@ void CheckAddress(const std::string& listen) {
 }  // namespace
 
 struct RpcServer::Services {
-  Services(const RpcParts& parts, WatchHub& hub)
+  Services(const RpcParts& parts, WatchHub& hub, ColorizeHub& colorize_hub)
       : scenes(parts),
         blobs(parts),
         bytes(parts),
         jobs(parts, hub),
-        colorizers(parts),
+        colorizers(parts, colorize_hub),
         server(parts) {}
   SceneServiceImpl scenes;
   BlobServiceImpl blobs;
@@ -85,7 +85,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             *digests_,
                             options.probe_backends});
   hub_ = std::make_unique<WatchHub>(*parts_, options.watch);
-  services_ = std::make_unique<Services>(*parts_, *hub_);
+  colorize_hub_ = std::make_unique<ColorizeHub>(*parts_, options.inference, options.live);
+  services_ = std::make_unique<Services>(*parts_, *hub_, *colorize_hub_);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
@@ -120,11 +121,13 @@ void RpcServer::StartDraining() {
   draining_ = true;
   server_->GetHealthCheckService()->SetServingStatus(false);
   hub_->Drain();
+  colorize_hub_->Drain();
 }
 
 void RpcServer::Shutdown(std::chrono::milliseconds grace) {
   if (!server_) return;
   hub_->Drain();
+  colorize_hub_->Drain();
   server_->Shutdown(std::chrono::system_clock::now() + grace);
   server_->Wait();
   server_.reset();

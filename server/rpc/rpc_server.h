@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "server/rpc/colorize_hub.h"
 #include "server/rpc/rpc_parts.h"
 #include "server/rpc/watch_hub.h"
 
@@ -23,6 +24,8 @@ struct RpcServerOptions {
   std::string version = "0";
   UserModels models;
   BackendProbe probe_backends;  // may be empty: then backends are listed unprobed
+  InferenceLink inference;
+  ColorizeLimits live;
 };
 
 class RpcServer {
@@ -40,7 +43,7 @@ class RpcServer {
 
   // "127.0.0.1:50551" with the port that was bound.
   const std::string& address() const { return address_; }
-  // Health turns NOT_SERVING, new jobs are refused, watch streams end with UNAVAILABLE.
+  // Health turns NOT_SERVING, new jobs are refused, streams end with UNAVAILABLE.
   void StartDraining();
   // Waits for open RPCs at most this long, then cancels them.
   void Shutdown(std::chrono::milliseconds grace);
@@ -53,6 +56,7 @@ class RpcServer {
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<RpcParts> parts_;
   std::unique_ptr<WatchHub> hub_;
+  std::unique_ptr<ColorizeHub> colorize_hub_;
   std::unique_ptr<Services> services_;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -38,6 +38,12 @@ Supervisor::Supervisor(const SupervisorOptions& options, JobStore& store)
     slot.name = "worker-" + std::to_string(i + 1);
     slots_.push_back(slot);
   }
+  if (options_.inference_demand) {
+    Slot slot;
+    slot.name = "inference";
+    slot.on_demand = true;
+    slots_.push_back(slot);
+  }
   thread_ = std::thread([this] { Loop(); });
 }
 
@@ -56,9 +62,15 @@ void Supervisor::Wait() {
   if (thread_.joinable()) thread_.join();
 }
 
+bool Supervisor::IsWanted(const Slot& slot) const {
+  return !slot.on_demand || options_.inference_demand->Recent();
+}
+
 void Supervisor::StartWorker(Slot* slot) {
+  const std::vector<std::string>& own =
+      slot->on_demand ? options_.inference_arguments : options_.arguments;
   std::vector<std::string> arguments = {options_.program.string()};
-  arguments.insert(arguments.end(), options_.arguments.begin(), options_.arguments.end());
+  arguments.insert(arguments.end(), own.begin(), own.end());
   arguments.insert(arguments.end(),
                    {"--name", slot->name, "--parent-pid", std::to_string(::getpid())});
   std::vector<char*> argv;
@@ -128,7 +140,8 @@ void Supervisor::OnExit(Slot* slot, int status) {
 
 void Supervisor::CheckWorker(Slot* slot) {
   if (slot->pid == 0) {
-    if (!draining_.load() && SteadyClock::now() >= slot->next_start) StartWorker(slot);
+    const bool due = SteadyClock::now() >= slot->next_start;
+    if (!draining_.load() && due && IsWanted(*slot)) StartWorker(slot);
     return;
   }
   int status = 0;

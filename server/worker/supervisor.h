@@ -8,6 +8,7 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,10 +17,29 @@
 
 namespace color3d {
 
+// Asked for by RPCs, heeded by the supervisor: whether the inference worker should be running.
+// Thread-safe.
+class InferenceDemand {
+ public:
+  void Ask() { asked_ = std::chrono::steady_clock::now().time_since_epoch().count(); }
+  // Within the last minute. A worker that ends by itself afterwards is not missed.
+  bool Recent() const {
+    const std::chrono::steady_clock::duration asked(asked_.load());
+    return asked.count() != 0 &&
+           std::chrono::steady_clock::now().time_since_epoch() - asked < std::chrono::seconds(60);
+  }
+
+ private:
+  std::atomic<std::chrono::steady_clock::rep> asked_{0};
+};
+
 struct SupervisorOptions {
   std::filesystem::path program;
   std::vector<std::string> arguments;  // besides --name and --parent-pid
   int workers = 1;
+  // Arguments of the inference worker, and when it is wanted; null: there is none.
+  std::vector<std::string> inference_arguments;
+  std::shared_ptr<const InferenceDemand> inference_demand;
   std::chrono::milliseconds first_backoff{500};
   std::chrono::milliseconds max_backoff{10'000};
   // A worker that is stopped (SIGSTOP, a debugger) for this long is killed: it has lost its lease,
@@ -46,13 +66,15 @@ class Supervisor {
   using SteadyClock = std::chrono::steady_clock;
   struct Slot {
     std::string name;
-    pid_t pid = 0;  // 0: not running
+    bool on_demand = false;  // the inference worker
+    pid_t pid = 0;           // 0: not running
     SteadyClock::time_point started;
     SteadyClock::time_point next_start;
     std::chrono::milliseconds backoff{0};
     SteadyClock::time_point last_moving;  // not stopped when last seen
   };
   void Loop();
+  bool IsWanted(const Slot& slot) const;
   void StartWorker(Slot* slot);
   void CheckWorker(Slot* slot);
   void OnExit(Slot* slot, int status);

@@ -125,10 +125,46 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   output.files = ArtifactsOf(kind);
   for (const std::string& name : output.files) {
     std::filesystem::create_directories((run.output_folder / name).parent_path());
-    WriteFileAtomic(run.output_folder / name, kind + " " + name + "\n" + trace);
+    // No two scenes have equal colorizers.
+    const std::string own = kind == "personalize" ? run.job_name : "";
+    WriteFileAtomic(run.output_folder / name, kind + " " + name + own + "\n" + trace);
   }
   if (run.inputs.count("scene.ply") > 0) output.passed_on.push_back("scene.ply");
   return output;
+}
+
+// Answers "<what colours it> <the picture>", in place of a PNG. A picture may hold one of the words
+//   crash, hang (for good), slow (200 ms), damaged, big (1 MiB of answer)
+class ScriptedEngine : public LiveEngine {
+ public:
+  void WarmUp() override {}
+  void Colorize(std::vector<LiveTask>& tasks) override {
+    for (LiveTask& task : tasks) {
+      try {
+        Answer(*task.request, task.response);
+      } catch (const std::exception&) {
+        task.error = std::current_exception();
+      }
+    }
+  }
+
+ private:
+  static void Answer(const internal::v1::ColorizeImageRequest& request,
+                     internal::v1::ColorizeImageResponse* response) {
+    const std::string& picture = request.image();
+    const auto has = [&](const char* word) { return picture.find(word) != std::string::npos; };
+    if (has("crash")) std::abort();
+    while (has("hang")) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    if (has("slow")) std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    if (has("damaged")) throw InvalidArgument("the picture is truncated");
+    response->set_image(request.colorizer_sha256() + request.example_sha256() + " " + picture);
+    if (has("big")) response->mutable_image()->append(1 << 20, '.');
+    response->set_encoder_digest("scripted " + request.encoder());
+  }
+};
+
+std::unique_ptr<LiveEngine> MakeScriptedEngine(const LiveEngineSetup&) {
+  return std::make_unique<ScriptedEngine>();
 }
 
 std::unique_ptr<StageRunner> MakeScriptedRunner() { return std::make_unique<ScriptedRunner>(); }
@@ -137,5 +173,6 @@ std::unique_ptr<StageRunner> MakeScriptedRunner() { return std::make_unique<Scri
 }  // namespace color3d
 
 int main(int argc, char** argv) {
-  return color3d::WorkerMain(argc, argv, &color3d::MakeScriptedRunner);
+  return color3d::WorkerMain(
+      argc, argv, {&color3d::MakeScriptedRunner, &color3d::MakeScriptedEngine});
 }

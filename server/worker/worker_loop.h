@@ -10,6 +10,7 @@
 
 #include "server/jobs/user_models.h"
 #include "server/worker/lease_keeper.h"
+#include "server/worker/live_engine.h"
 #include "server/worker/stage_runner.h"
 
 namespace color3d {
@@ -39,7 +40,13 @@ void RunWorker(const WorkerOptions& options,
                StageRunner& runner,
                const std::atomic<bool>& draining);
 
+// What a worker program is made of, in each of its two roles.
+struct WorkerProgram {
+  std::unique_ptr<StageRunner> (*make_runner)();
+  std::unique_ptr<LiveEngine> (*make_engine)(const LiveEngineSetup&);  // --inference
+};
+
 // The whole program: command line, log, signals. Returns the exit status.
-int WorkerMain(int argc, char** argv, std::unique_ptr<StageRunner> (*make_runner)());
+int WorkerMain(int argc, char** argv, const WorkerProgram& program);
 
 }  // namespace color3d

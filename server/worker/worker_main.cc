@@ -10,6 +10,7 @@
 #include "core/base/digest.h"
 #include "server/ops/process.h"
 #include "server/storage/data_folder.h"
+#include "server/worker/inference_worker.h"
 #include "server/worker/worker_loop.h"
 
 namespace color3d {
@@ -26,6 +27,9 @@ struct WorkerArguments {
   double stop_grace_seconds = 60.0;
   std::vector<std::string> models;
   std::vector<std::string> backends;
+  std::string inference;  // socket; empty: a worker for jobs
+  int max_batch = InferenceOptions().max_batch;
+  double idle_seconds = 900.0;
 };
 
 std::chrono::milliseconds Milliseconds(double seconds) {
@@ -52,6 +56,11 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
       ->allow_extra_args(false);
   app->add_option("--backend", arguments->backends, "NAME=ADDRESS: a ColorBackend server")
       ->allow_extra_args(false);
+  app->add_option("--inference",
+                  arguments->inference,
+                  "Answer ColorizeImages on this socket of the server's, in place of running jobs");
+  app->add_option("--max-batch", arguments->max_batch)->group("");
+  app->add_option("--idle-seconds", arguments->idle_seconds)->group("");
   app->add_option("--parent-pid", options.parent)->group("");
   app->add_option("--lease-seconds", arguments->lease_seconds)->group("");
   app->add_option("--heartbeat-seconds", arguments->heartbeat_seconds)->group("");
@@ -99,9 +108,25 @@ void HandleStopSignals() {
   ::signal(SIGPIPE, SIG_IGN);
 }
 
+void ServeInference(const WorkerArguments& arguments, const WorkerProgram& program) {
+  const DataPaths paths(arguments.options.data_folder);
+  BlobStore blobs(paths.Blobs(), {arguments.options.reserve_mib << 20});
+  const std::unique_ptr<LiveEngine> engine = program.make_engine(
+      {blobs, ParseUserModels(arguments.models, arguments.backends), arguments.options.threads});
+  InferenceOptions options;
+  options.data_folder = arguments.options.data_folder;
+  options.socket = arguments.inference;
+  options.name = arguments.options.name;
+  options.parent = arguments.options.parent;
+  options.max_batch = arguments.max_batch;
+  options.idle = Milliseconds(arguments.idle_seconds);
+  options.drain_grace = Milliseconds(arguments.drain_grace_seconds);
+  RunInference(options, *engine, g_draining);
+}
+
 }  // namespace
 
-int WorkerMain(int argc, char** argv, std::unique_ptr<StageRunner> (*make_runner)()) {
+int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
   WorkerArguments arguments;
   CLI::App app("Runs the jobs of a color3d server; started by 'color3d-server serve'.");
   AddFlags(&app, &arguments);
@@ -117,9 +142,13 @@ int WorkerMain(int argc, char** argv, std::unique_ptr<StageRunner> (*make_runner
     SetUpLog(arguments.options.name,
              arguments.log_level,
              paths.Logs() / (arguments.options.name + ".log"));
-    Complete(&arguments);
-    const std::unique_ptr<StageRunner> runner = make_runner();
-    RunWorker(arguments.options, *runner, g_draining);
+    if (arguments.inference.empty()) {
+      Complete(&arguments);
+      const std::unique_ptr<StageRunner> runner = program.make_runner();
+      RunWorker(arguments.options, *runner, g_draining);
+    } else {
+      ServeInference(arguments, program);
+    }
     spdlog::shutdown();
     return 0;
   } catch (const Error& e) {

@@ -1,0 +1,130 @@
+// `color3d colorizer`: list, show and apply personalized colorizers.
+#include <algorithm>
+#include <filesystem>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/live_files.h"
+#include "client/commands/results.h"
+#include "client/lib/live_coloring.h"
+#include "client/lib/names.h"
+#include "client/lib/text.h"
+
+namespace color3d::client {
+namespace {
+
+struct ColorizerOptions {
+  std::string name;   // colorizers/... or scenes/...
+  std::string scene;  // of list
+  int limit = 100;
+  std::vector<std::string> photos;
+  std::string out = "coloured";
+  LiveOptions live;
+};
+
+v1::Colorizer GetColorizer(Connection& connection, const std::string& name) {
+  v1::GetColorizerRequest request;
+  request.set_name(ResourceName(name, "colorizers"));
+  return connection.Call(
+      &v1::ColorizerService::Stub::GetColorizer, connection.colorizers(), request);
+}
+
+ExitCode List(const Context& context, const ColorizerOptions& options) {
+  Connection connection(context.server, *context.interrupt);
+  v1::ListColorizersResponse all;
+  v1::ListColorizersRequest request;
+  if (!options.scene.empty()) request.set_scene(ResourceName(options.scene, "scenes"));
+  do {
+    request.set_page_size(std::min(1000, options.limit - all.colorizers_size()));
+    const auto page = connection.Call(
+        &v1::ColorizerService::Stub::ListColorizers, connection.colorizers(), request);
+    all.mutable_colorizers()->MergeFrom(page.colorizers());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty() && all.colorizers_size() < options.limit);
+  if (context.json) {
+    PrintJson(all);
+    return ExitCode::kOk;
+  }
+  std::vector<std::vector<std::string>> rows = {{"COLORIZER", "SCENE", "SIZE", "MADE"}};
+  for (const v1::Colorizer& colorizer : all.colorizers()) {
+    rows.push_back({colorizer.name(),
+                    colorizer.scene(),
+                    HumanBytes(colorizer.file().size_bytes()),
+                    HumanTime(colorizer.create_time())});
+  }
+  PrintText(Table(rows));
+  return ExitCode::kOk;
+}
+
+ExitCode Show(const Context& context, const ColorizerOptions& options) {
+  Connection connection(context.server, *context.interrupt);
+  const v1::Colorizer colorizer = GetColorizer(connection, options.name);
+  if (context.json) {
+    PrintJson(colorizer);
+    return ExitCode::kOk;
+  }
+  PrintText(colorizer.name() + "\nscene  " + colorizer.scene() + "\njob    " + colorizer.job() +
+            "\nsize   " + HumanBytes(colorizer.file().size_bytes()) + "\nmade   " +
+            HumanTime(colorizer.create_time()) + "\n");
+  return ExitCode::kOk;
+}
+
+ExitCode Apply(const Context& context, const ColorizerOptions& options) {
+  const std::vector<LivePicture> pictures = CollectPictures(options.photos);
+  PrepareOut(options.out);
+  Connection connection(context.server, *context.interrupt);
+  LiveSource source;
+  if (options.name.starts_with("scenes/")) {
+    source.scene = options.name;
+  } else {
+    source.colorizer = ResourceName(options.name, "colorizers");
+  }
+  return Conclude(context,
+                  ColorizeToFiles(connection, source, pictures, options.live, options.out),
+                  options.out);
+}
+
+}  // namespace
+
+void AddColorizerCommands(CLI::App& app, Context& context) {
+  CLI::App* group =
+      app.add_subcommand("colorizer", "Personalized colorizers")->require_subcommand(1);
+  group->fallthrough();
+  const auto options = std::make_shared<ColorizerOptions>();
+  const auto command = [&](const char* name,
+                           const char* help,
+                           ExitCode (*run)(const Context&, const ColorizerOptions&)) {
+    CLI::App* sub = group->add_subcommand(name, help)->fallthrough();
+    sub->callback([&context, options, run] {
+      context.action = [&context, options, run] { return run(context, *options); };
+    });
+    return sub;
+  };
+  CLI::App* list = command("list", "Newest first", &List);
+  list->add_option("--scene", options->scene, "Only of this scene");
+  list->add_option("--limit", options->limit, "At most so many")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
+  CLI::App* show = command("show", "Scene, job, size and time", &Show);
+  show->add_option("colorizer", options->name, "colorizers/SHA256")->required();
+  CLI::App* apply = command("apply", "Colour photos live, without a job", &Apply);
+  apply->add_option("colorizer", options->name, "colorizers/SHA256, or scenes/ID: its newest one")
+      ->required();
+  apply->add_option("photos", options->photos, "Photos, or folders of photos")->required();
+  apply->add_option("-o,--out", options->out, "Folder for the coloured pictures")
+      ->capture_default_str();
+  apply
+      ->add_option("--max-side",
+                   options->live.max_side_px,
+                   "Longer side of the coloured pictures, px; 0: as the photos")
+      ->check(CLI::Range(0, 8192))
+      ->capture_default_str();
+  apply
+      ->add_option("--in-flight",
+                   options->live.in_flight,
+                   "Photos that are sent before the first is back, at most; 0: as the server takes")
+      ->check(CLI::Range(0, 1000))
+      ->capture_default_str();
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,139 @@
+#include "client/commands/live_files.h"
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+
+#include "client/commands/console.h"
+#include "client/lib/blob_transfer.h"
+#include "client/lib/names.h"
+#include "client/lib/text.h"
+#include "core/base/files.h"
+#include "core/image/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kShownErrors = 5;
+
+void AddFolder(const fs::path& folder, std::vector<LivePicture>* pictures) {
+  std::error_code none;
+  const bool nested = fs::is_directory(folder / "images", none);
+  const fs::path root = nested ? folder / "images" : folder;
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(root)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.') && HasImageExtension(name)) found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  if (found.empty()) throw InvalidArgument("there are no photos in " + root.string());
+  for (const fs::path& file : found) {
+    pictures->push_back({file.filename().string(), file, std::nullopt});
+  }
+}
+
+// Distinct names for the answers.
+std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
+  std::set<std::string> taken;
+  std::vector<std::string> names;
+  for (const LivePicture& picture : pictures) {
+    const std::string stem = Stem(picture.label);
+    std::string name = stem + ".png";
+    for (int i = 2; !taken.insert(name).second; ++i) {
+      name = stem + "_" + std::to_string(i) + ".png";
+    }
+    names.push_back(name);
+  }
+  return names;
+}
+
+}  // namespace
+
+std::vector<LivePicture> CollectPictures(const std::vector<std::string>& arguments) {
+  std::vector<LivePicture> pictures;
+  for (const std::string& argument : arguments) {
+    std::error_code none;
+    if (fs::is_directory(argument, none)) {
+      AddFolder(argument, &pictures);
+    } else if (fs::is_regular_file(argument, none)) {
+      pictures.push_back({fs::path(argument).filename().string(), argument, std::nullopt});
+    } else {
+      throw Error(ErrorCode::kNotFound, "there is no photo or folder " + argument);
+    }
+  }
+  return pictures;
+}
+
+nlohmann::ordered_json LiveSummary::ToJson() const {
+  return {{"files", files},
+          {"errors", errors},
+          {"colorizer", colorizer},
+          {"encoder_digest", encoder_digest},
+          {"seconds", seconds},
+          {"first_seconds", first_seconds}};
+}
+
+LiveSummary ColorizeToFiles(Connection& connection,
+                            const LiveSource& source,
+                            const std::vector<LivePicture>& pictures,
+                            const LiveOptions& options,
+                            const fs::path& out) {
+  const auto start = std::chrono::steady_clock::now();
+  const std::vector<std::string> names = NamesFor(pictures);
+  std::vector<std::string> written(pictures.size());
+  std::vector<std::string> errors(pictures.size());
+  LiveSummary summary;
+  const auto on_answer = [&](size_t i, const v1::ColorizeImagesResponse& answer) {
+    const std::chrono::duration<double> now = std::chrono::steady_clock::now() - start;
+    if (summary.first_seconds == 0.0) summary.first_seconds = now.count();
+    if (answer.has_error()) {
+      errors[i] = pictures[i].label + ": " + answer.error().message();
+      if (summary.code == ExitCode::kOk) {
+        summary.code =
+            ExitCodeOf(ErrorCodeOf(static_cast<grpc::StatusCode>(answer.error().code())));
+      }
+      return;
+    }
+    if (answer.has_image_digest()) {
+      const FileDigest digest{answer.image_digest().sha256(), answer.image_digest().size_bytes()};
+      DownloadBlob(connection, digest, out / names[i], [](int64_t) {});
+    } else {
+      WriteFileAtomic(out / names[i], answer.image());
+    }
+    written[i] = names[i];
+    summary.colorizer = answer.colorizer();
+    summary.encoder_digest = answer.encoder_digest();
+  };
+  ColorizeLive(connection, source, pictures, options, on_answer);
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    if (!written[i].empty()) summary.files.push_back(written[i]);
+    if (!errors[i].empty()) summary.errors.push_back(errors[i]);
+  }
+  const std::chrono::duration<double> all = std::chrono::steady_clock::now() - start;
+  summary.seconds = all.count();
+  return summary;
+}
+
+ExitCode Conclude(const Context& context, const LiveSummary& summary, const fs::path& out) {
+  if (context.json) {
+    nlohmann::ordered_json json = summary.ToJson();
+    json["out"] = out.string();
+    PrintJson(json);
+  } else {
+    PrintText(std::to_string(summary.files.size()) + " pictures in " + out.string() + ", " +
+              HumanSeconds(summary.seconds) +
+              (summary.colorizer.empty() ? "" : ", by " + summary.colorizer) + "\n");
+  }
+  if (summary.errors.empty()) return ExitCode::kOk;
+  std::string text = std::to_string(summary.errors.size()) + " of " +
+                     std::to_string(summary.errors.size() + summary.files.size()) +
+                     " pictures could not be coloured: ";
+  for (size_t i = 0; i < std::min(kShownErrors, summary.errors.size()); ++i) {
+    text += (i > 0 ? "; " : "") + summary.errors[i];
+  }
+  if (!context.json) throw CommandFailure(summary.code, text);
+  return summary.code;
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,142 @@
+// `color3d preview`: what a coloured key view would do to other photos, in seconds and without a
+// job.
+#include <algorithm>
+#include <filesystem>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/key_jobs.h"
+#include "client/commands/live_files.h"
+#include "client/commands/results.h"
+#include "client/lib/blob_transfer.h"
+#include "client/lib/job_watch.h"
+#include "client/lib/live_coloring.h"
+#include "client/lib/scene_upload.h"
+#include "core/image/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+struct PreviewOptions {
+  std::string target;     // folder of photos or scenes/ID
+  std::string key_color;  // a coloured key view
+  std::string key;        // which photo that is; empty: by its file's name
+  std::string out = "preview";
+  int count = 5;
+  int max_side_px = 500;
+};
+
+// The photos of a scene that the server holds: nothing is sent.
+std::vector<LivePicture> PicturesOf(const v1::Scene& scene) {
+  std::vector<LivePicture> pictures;
+  for (const v1::SceneFile& file : scene.files()) {
+    if (!HasImageExtension(file.path())) continue;
+    pictures.push_back({fs::path(file.path()).filename().string(), {}, file.digest()});
+  }
+  return pictures;
+}
+
+// Evenly spread, without the key view.
+std::vector<LivePicture> Spread(const std::vector<LivePicture>& all,
+                                const std::string& key,
+                                int count) {
+  std::vector<LivePicture> others;
+  for (const LivePicture& picture : all) {
+    const std::string stem = fs::path(picture.label).stem().string();
+    if (picture.label != key && stem != fs::path(key).stem()) others.push_back(picture);
+  }
+  if (static_cast<int>(others.size()) <= count) return others;
+  std::vector<LivePicture> spread;
+  for (int i = 0; i < count; ++i) {
+    spread.push_back(others[(2 * static_cast<size_t>(i) + 1) * others.size() /
+                            (2 * static_cast<size_t>(count))]);
+  }
+  return spread;
+}
+
+v1::Digest UploadExample(Connection& connection, const fs::path& file) {
+  const UploadFile upload{file, DigestFile(file)};
+  UploadMissing(connection, {upload}, [](int64_t, int64_t) {});
+  return ToProto(upload.digest);
+}
+
+// The coloured key view that the scene has: the accepted one, else the newest.
+v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::string* key) {
+  const KeyState state = ReadKeyState(connection, scene);
+  const std::optional<v1::Job>& job = state.accepted ? state.accepted : state.colored;
+  if (!job) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                scene +
+                    " has no coloured key view yet: give one with --key-color, or make one with "
+                    "`color3d key colour " +
+                    scene + " ...`");
+  }
+  *key = ReadChoice(connection, *job).view;
+  return FindArtifact(*job, "key_view_coloured.png").digest();
+}
+
+ExitCode Preview(const Context& context, const PreviewOptions& options) {
+  const bool stored = options.target.starts_with("scenes/") && !fs::is_directory(options.target);
+  if (!stored && options.key_color.empty()) {
+    throw InvalidArgument("--key-color is missing: the coloured key view to take colours from");
+  }
+  std::vector<LivePicture> pictures;
+  if (!stored) pictures = CollectPictures({options.target});
+  PrepareOut(options.out);
+  Connection connection(context.server, *context.interrupt);
+  WarmUpInference(connection);
+  if (stored) {
+    v1::GetSceneRequest request;
+    request.set_name(options.target);
+    pictures = PicturesOf(
+        connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request));
+  }
+  std::string key = options.key;
+  LiveSource source;
+  if (options.key_color.empty()) {
+    std::string of_scene;
+    source.example = ExampleOf(connection, options.target, &of_scene);
+    if (key.empty()) key = of_scene;
+  } else {
+    source.example = UploadExample(connection, options.key_color);
+    if (key.empty()) key = options.key_color;
+  }
+  pictures = Spread(pictures, key, options.count);
+  if (pictures.empty()) throw InvalidArgument("there is no photo besides the key view");
+  return Conclude(
+      context,
+      ColorizeToFiles(
+          connection, source, pictures, {.max_side_px = options.max_side_px}, options.out),
+      options.out);
+}
+
+}  // namespace
+
+void AddPreviewCommand(CLI::App& app, Context& context) {
+  CLI::App* preview =
+      app.add_subcommand("preview", "Colour a handful of photos like a coloured key view, at once")
+          ->fallthrough();
+  const auto options = std::make_shared<PreviewOptions>();
+  preview->add_option("photos", options->target, "Folder of photos, or scenes/ID")->required();
+  preview->add_option("--key-color",
+                      options->key_color,
+                      "The coloured key view; a scene's own is taken when this is missing");
+  preview->add_option("--key",
+                      options->key,
+                      "Which photo the key view is: left out of the preview; default: the one of "
+                      "the same name");
+  preview->add_option("-o,--out", options->out, "Folder for the coloured pictures")
+      ->capture_default_str();
+  preview->add_option("--count", options->count, "How many photos, evenly spread")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  preview->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px")
+      ->check(CLI::Range(16, 8192))
+      ->capture_default_str();
+  preview->callback([&context, options] {
+    context.action = [&context, options] { return Preview(context, *options); };
+  });
+}
+
+}  // namespace color3d::client

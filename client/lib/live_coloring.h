@@ -1,0 +1,47 @@
+// Pictures coloured live over ColorizeImages. Not thread-safe.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/lib/connection.h"
+#include "color3d/v1/colorizer.pb.h"
+
+namespace color3d::client {
+
+// What colours the pictures: exactly one of them.
+struct LiveSource {
+  std::string colorizer;              // "colorizers/..."
+  std::string scene;                  // "scenes/...", by its newest colorizer
+  std::optional<v1::Digest> example;  // a blob: a coloured picture of the same things
+};
+
+struct LivePicture {
+  std::string label;                 // of messages and files
+  std::filesystem::path file;        // or
+  std::optional<v1::Digest> stored;  // a blob that the server has
+};
+
+struct LiveOptions {
+  int max_side_px = 0;  // of the answers; 0: as the pictures
+  int in_flight = 0;  // pictures sent and not yet answered, at most; 0: as many as the server takes
+};
+
+// Opens the stream, so that the server gets its inference worker ready, and closes it again.
+void WarmUpInference(Connection& connection);
+
+// Sends the pictures (files of more than 3 MiB as blobs) and hands each answer over as it comes,
+// with the number of its picture. Answers may carry an `error`. What the server could not do for
+// now (UNAVAILABLE, a broken stream) is sent again until 30 s pass without any answer. Throws
+// RpcError when the stream as a whole is refused, Error{kUnavailable} when patience is over, and
+// Error{kCancelled}.
+void ColorizeLive(Connection& connection,
+                  const LiveSource& source,
+                  const std::vector<LivePicture>& pictures,
+                  const LiveOptions& options,
+                  const std::function<void(size_t, const v1::ColorizeImagesResponse&)>& on_answer);
+
+}  // namespace color3d::client
