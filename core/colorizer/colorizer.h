@@ -69,8 +69,10 @@ struct TrainingPicture {
 class Colorizer {
  public:
   virtual ~Colorizer() = default;
-  // As Colorize, with how far each place is from anything that was seen.
-  virtual ColorPrediction Predict(const Image& luminance) const = 0;
+  // As Colorize, with how far each place is from anything that was seen. `known` (1 channel of the
+  // same size, or empty): places above 0 need no answer; what they get means nothing, and costs
+  // less.
+  virtual ColorPrediction Predict(const Image& luminance, const Image& known = {}) const = 0;
   // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
   // than the training size are coloured at that size and upsampled guided by L.
   virtual Image Colorize(const Image& luminance) const = 0;

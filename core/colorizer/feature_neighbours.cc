@@ -308,12 +308,25 @@ FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor
 
 NeighbourColors FeatureNeighbours::Lookup(const std::vector<torch::Tensor>& taps,
                                           const torch::Tensor& luminance,
-                                          int picture_height) const {
+                                          int picture_height,
+                                          const torch::Tensor& wanted) const {
   torch::NoGradGuard no_grad;
-  const Matches matches = LookupFeatures(Features(taps, luminance, picture_height));
   const int64_t height = luminance.size(2) / options_.stride;
   const int64_t width = luminance.size(3) / options_.stride;
-  return {matches.ab.t().reshape({2, height, width}), matches.distance.reshape({height, width})};
+  torch::Tensor queries = Features(taps, luminance, picture_height);
+  torch::Tensor rows;
+  if (wanted.defined()) {
+    rows = wanted.flatten().nonzero().squeeze(1);
+    queries = queries.index_select(0, rows);
+  }
+  torch::Tensor ab = torch::zeros({height * width, 2});
+  torch::Tensor distance = torch::zeros({height * width});
+  if (queries.size(0) > 0) {
+    const Matches matches = LookupFeatures(queries);
+    ab = rows.defined() ? ab.index_copy(0, rows, matches.ab) : matches.ab;
+    distance = rows.defined() ? distance.index_copy(0, rows, matches.distance) : matches.distance;
+  }
+  return {ab.t().reshape({2, height, width}), distance.reshape({height, width})};
 }
 
 }  // namespace color3d

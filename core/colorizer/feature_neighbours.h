@@ -60,10 +60,12 @@ class FeatureNeighbours {
                     std::map<std::string, torch::Tensor> state);
 
   // `taps` of a padded picture [1,*,*,*] and its L [1,1,H,W]; H, W multiples of the stride.
-  // `picture_height` is the height before padding.
+  // `picture_height` is the height before padding. `wanted` [h,w] (bool): cells that need an
+  // answer, the others get grey at distance 0; undefined: all.
   NeighbourColors Lookup(const std::vector<torch::Tensor>& taps,
                          const torch::Tensor& luminance,
-                         int picture_height) const;
+                         int picture_height,
+                         const torch::Tensor& wanted = {}) const;
 
   struct Matches {
     torch::Tensor ab;        // [n,2]

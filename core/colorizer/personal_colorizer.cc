@@ -58,7 +58,8 @@ PersonalColorizer::PersonalColorizer(Parts parts)
 // `taps`: with adapters the adapted ones.
 PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps,
                                                  const torch::Tensor& luminance,
-                                                 int picture_height) const {
+                                                 int picture_height,
+                                                 const torch::Tensor& wanted) const {
   const bool decode = !parts_.neighbours || neighbour_share_ < 1.0;
   const PersonalModel& model = *parts_.model;
   torch::Tensor decoded;
@@ -72,7 +73,7 @@ PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps
   }
   if (!parts_.neighbours) return {decoded, {}};
   if (model.config().adapters) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
-  const NeighbourColors found = parts_.neighbours->Lookup(taps, luminance, picture_height);
+  const NeighbourColors found = parts_.neighbours->Lookup(taps, luminance, picture_height, wanted);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
   const torch::Tensor near = TensorFromImage(UpsampleGuided(
@@ -113,8 +114,9 @@ Image PersonalColorizer::AtTrainingSize(const Image& luminance) const {
 ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tensor>& taps,
                                                    const torch::Tensor& padded,
                                                    const Image& small,
-                                                   const Image& luminance) const {
-  const Answer answer = Ask(taps, padded, small.height);
+                                                   const Image& luminance,
+                                                   const Image& known) const {
+  const Answer answer = Ask(taps, padded, small.height, WantedCells(known, small));
   const Image fine = UpsampleGuided(
       ImageFromTensor(answer.ab), ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
   ColorPrediction prediction;
@@ -132,16 +134,30 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
   return prediction;
 }
 
+torch::Tensor PersonalColorizer::WantedCells(const Image& known, const Image& small) const {
+  if (known.Empty() || !parts_.neighbours) return {};
+  Image unknown = Resize(known, small.width, small.height);
+  for (float& value : unknown.data) value = value > 0.999f ? 0.0f : 1.0f;
+  const int stride = recipe_.neighbour_options.stride;
+  const torch::Tensor cells =
+      torch::max_pool2d(Padded(unknown), {stride, stride}, {stride, stride});
+  constexpr int kMarginCells = 5;  // guided upsampling averages twice over windows of 5 cells
+  return torch::max_pool2d(cells,
+                           {2 * kMarginCells + 1, 2 * kMarginCells + 1},
+                           {1, 1},
+                           {kMarginCells, kMarginCells})[0][0] > 0.5;
+}
+
 Image PersonalColorizer::Colorize(const Image& luminance) const { return Predict(luminance).ab; }
 
-ColorPrediction PersonalColorizer::Predict(const Image& luminance) const {
+ColorPrediction PersonalColorizer::Predict(const Image& luminance, const Image& known) const {
   Check(luminance);
   return WithTorchErrors("colorizer", [&] {
     torch::NoGradGuard no_grad;
     SetThreads();
     const Image small = AtTrainingSize(luminance);
     const torch::Tensor padded = Padded(small);
-    return PredictFromTaps(parts_.model->Taps(padded), padded, small, luminance);
+    return PredictFromTaps(parts_.model->Taps(padded), padded, small, luminance, known);
   });
 }
 

@@ -28,7 +28,7 @@ class PersonalColorizer : public Colorizer {
   explicit PersonalColorizer(Parts parts);
 
   Image Colorize(const Image& luminance) const override;
-  ColorPrediction Predict(const Image& luminance) const override;
+  ColorPrediction Predict(const Image& luminance, const Image& known = {}) const override;
   std::string Serialize() const override;
 
   // The steps of Predict, for whoever runs the encoder over many pictures at once: frozen taps
@@ -43,7 +43,8 @@ class PersonalColorizer : public Colorizer {
   ColorPrediction PredictFromTaps(const std::vector<torch::Tensor>& taps,
                                   const torch::Tensor& padded,
                                   const Image& small,
-                                  const Image& luminance) const;
+                                  const Image& luminance,
+                                  const Image& known = {}) const;
 
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
                                                       std::shared_ptr<const TapEncoder> encoder,
@@ -57,7 +58,10 @@ class PersonalColorizer : public Colorizer {
   // Of a padded L [1,1,H,W]; `picture_height` before padding.
   Answer Ask(std::vector<torch::Tensor> taps,
              const torch::Tensor& luminance,
-             int picture_height) const;
+             int picture_height,
+             const torch::Tensor& wanted) const;
+  // Cells of the neighbours' grid that answers are wanted for, with a margin for interpolation.
+  torch::Tensor WantedCells(const Image& known, const Image& small) const;
 
   Parts parts_;
   TrainingRecipe recipe_;

@@ -33,8 +33,9 @@ void ColorizeStack(std::span<const Job* const> jobs) {
     for (const torch::Tensor& tap : taps) {
       own.push_back(tap.narrow(0, static_cast<int64_t>(i), 1));
     }
-    *jobs[i]->answer =
+    ColorPrediction prediction =
         jobs[i]->colorizer->PredictFromTaps(own, padded[i], jobs[i]->small, *jobs[i]->luminance);
+    *jobs[i]->answer = std::move(prediction.ab);
   }
 }
 

@@ -27,6 +27,14 @@ Image GuessIfNeeded(const Image& luminance,
              : Image();
 }
 
+// 1 where what was carried decides alone.
+Image SurelyCarried(const CarriedColor& carried) {
+  constexpr float kSure = 0.5f;
+  Image sure = carried.confidence;
+  for (float& value : sure.data) value = value > kSure ? 1.0f : 0.0f;
+  return sure;
+}
+
 }  // namespace
 
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder) {
@@ -42,8 +50,8 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[static_cast<size_t>(i)];
     const auto luminance = images.Luminance(static_cast<int>(i));
-    const ColorPrediction inferred = colorizer->Predict(*luminance);
     const CarriedColor carried = ReadCarried(context, view, luminance->width, luminance->height);
+    const ColorPrediction inferred = colorizer->Predict(*luminance, SurelyCarried(carried));
     const FusedColor fused =
         FuseColors(*luminance,
                    carried,
