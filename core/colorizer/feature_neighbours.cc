@@ -1,5 +1,6 @@
 #include "core/colorizer/feature_neighbours.h"
 
+#include <ATen/Parallel.h>
 #include <torch/torch.h>
 
 #include <algorithm>
@@ -16,7 +17,8 @@
 namespace color3d {
 namespace {
 
-constexpr int64_t kQueriesAtOnce = 1024;
+constexpr int64_t kQueriesAtOnce = 128;  // distances to the whole bank stay in the cache
+constexpr float kNegligible = 16.0f;     // exp(-16) of the best match's weight
 // Local means and deviations of L: windows in cells of the answer grid.
 constexpr int kWindows[] = {1, 3, 9};
 constexpr int64_t kStatisticsChannels = 7;  // L, and mean and deviation per window
@@ -282,28 +284,46 @@ torch::Tensor FeatureNeighbours::Features(const std::vector<torch::Tensor>& taps
 FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor& queries) const {
   torch::NoGradGuard no_grad;
   const torch::Tensor& bank = state_.at("bank");
+  const int64_t entries = bank.size(0);
   const torch::Tensor transposed = bank.t();
   const torch::Tensor bank_squares = bank.square().sum(1);
-  // A last column sums the weights in the same product.
-  const torch::Tensor weights = state_.at("weights").unsqueeze(1);
-  const torch::Tensor colors = torch::cat({state_.at("colors") * weights, weights}, 1);
-  std::vector<torch::Tensor> answers;
-  std::vector<torch::Tensor> distances;
+  const float* colors = state_.at("colors").data_ptr<float>();
+  const float* weights = state_.at("weights").data_ptr<float>();
+  Matches matches{torch::empty({queries.size(0), 2}), torch::empty({queries.size(0)})};
   for (int64_t begin = 0; begin < queries.size(0); begin += kQueriesAtOnce) {
-    const torch::Tensor q =
-        queries.slice(0, begin, std::min(begin + kQueriesAtOnce, queries.size(0)));
+    const int64_t end = std::min(begin + kQueriesAtOnce, queries.size(0));
+    const torch::Tensor q = queries.slice(0, begin, end);
+    const torch::Tensor q_squares = q.square().sum(1).contiguous();
     // |q - b|^2 without |q|^2, which is the same for all b.
-    torch::Tensor d = torch::addmm(bank_squares, q, transposed, /*beta=*/1.0, /*alpha=*/-2.0);
-    const torch::Tensor best = std::get<0>(d.min(1, /*keepdim=*/true));
-    const torch::Tensor nearest = (best + q.square().sum(1, /*keepdim=*/true)).clamp_min(0.0);
-    const torch::Tensor inverse_width =
-        1.0 / (options_.temperature * (nearest + options_.distance_floor));
-    d.sub_(best).mul_(-inverse_width).exp_();
-    const torch::Tensor sums = torch::mm(d, colors);
-    answers.push_back(sums.slice(1, 0, 2) / sums.slice(1, 2, 3));
-    distances.push_back(nearest.squeeze(1));
+    const torch::Tensor d = torch::addmm(bank_squares, q, transposed, /*beta=*/1.0, /*alpha=*/-2.0);
+    const torch::Tensor least = d.amin(1);
+    const float* distances = d.data_ptr<float>();
+    const float* smallest = least.data_ptr<float>();
+    const float* squares = q_squares.data_ptr<float>();
+    float* ab = matches.ab.data_ptr<float>() + 2 * begin;
+    float* nearest = matches.distance.data_ptr<float>() + begin;
+    at::parallel_for(0, end - begin, /*grain_size=*/16, [&](int64_t first, int64_t last) {
+      for (int64_t i = first; i < last; ++i) {
+        const float* row = distances + i * entries;
+        const float best = smallest[i];
+        nearest[i] = std::max(best + squares[i], 0.0f);
+        const auto inverse_width = static_cast<float>(
+            1.0 / (options_.temperature * (nearest[i] + options_.distance_floor)));
+        const float farthest = best + kNegligible / inverse_width;
+        double sum = 0.0, a = 0.0, b = 0.0;
+        for (int64_t j = 0; j < entries; ++j) {
+          if (row[j] > farthest) continue;
+          const double w = weights[j] * std::exp((best - row[j]) * inverse_width);
+          sum += w;
+          a += w * colors[2 * j];
+          b += w * colors[2 * j + 1];
+        }
+        ab[2 * i] = static_cast<float>(a / sum);
+        ab[2 * i + 1] = static_cast<float>(b / sum);
+      }
+    });
   }
-  return {torch::cat(answers), torch::cat(distances)};
+  return matches;
 }
 
 NeighbourColors FeatureNeighbours::Lookup(const std::vector<torch::Tensor>& taps,
