@@ -17,25 +17,6 @@ int ColoredSide(const StageContext& context, const View& view) {
   return std::max(info.width, info.height);
 }
 
-// How far a view's colour is to be believed where it was seen, inferred and guessed; views of
-// different quality meet in each Gaussian.
-constexpr float kInferredWeight = 0.3f;
-constexpr float kGuessedWeight = 0.1f;
-
-// Empty (all 1) for views without provenance.
-Image WeightOf(const StageContext& context, const View& view, int width, int height) {
-  const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
-  if (!context.HasInput(name)) return {};
-  const Image shares = Resize(DecodeImage(context.ReadInput(name), name), width, height);
-  Image weight(width, height, 1);
-  for (size_t i = 0; i < weight.data.size(); ++i) {
-    const float sum = kGuessedWeight * shares.Plane(0)[i] + shares.Plane(1)[i] +
-                      kInferredWeight * shares.Plane(2)[i];
-    weight.data[i] = std::clamp(sum, 0.0f, 1.0f);
-  }
-  return weight;
-}
-
 }  // namespace
 
 void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
@@ -57,9 +38,6 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
       // The key view's colours are the user's own; the others are the colorizer's prediction.
       made->ab = view == key ? Resize(key_color.ab, camera.width, camera.height)
                              : ReadViewAb(context, scene.views[view], camera.width, camera.height);
-      if (view != key) {
-        made->weight = WeightOf(context, scene.views[view], camera.width, camera.height);
-      }
       made->confidence =
           ReadViewConfidence(context, scene.views[view], camera.width, camera.height);
       if (made->confidence.Empty() && view == key) {

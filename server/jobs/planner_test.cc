@@ -104,14 +104,18 @@ TEST(Planner, RefusesABudgetThatTheSceneCannotMeetAndNamesTheLeast) {
 
 TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
   const NewGraph graph = PlanJob(SceneSpec(), {}, kTwentyPhotos);
-  ASSERT_EQ(graph.jobs.size(), 12u);
+  ASSERT_EQ(graph.jobs.size(), 13u);
   EXPECT_EQ(graph.jobs.back().kind, "colorize_scene");
-  EXPECT_EQ(graph.jobs.back().inputs.size(), 11u);
+  EXPECT_EQ(graph.jobs.back().inputs.size(), 12u);
   EXPECT_THAT(InputKinds(graph, "select_key_view"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "reconstruct_geometry"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "personalize"),
-              ElementsAre("import_scene", "select_key_view", "colorize_key_view"));
-  EXPECT_THAT(InputKinds(graph, "colorize_views"), ElementsAre("import_scene", "personalize"));
+              ElementsAre("import_scene", "select_key_view", "colorize_key_view", "carry_color"));
+  EXPECT_THAT(
+      InputKinds(graph, "carry_color"),
+      ElementsAre("import_scene", "select_key_view", "colorize_key_view", "reconstruct_geometry"));
+  EXPECT_THAT(InputKinds(graph, "colorize_views"),
+              ElementsAre("import_scene", "personalize", "carry_color"));
   EXPECT_THAT(InputKinds(graph, "solve_chroma"),
               ElementsAre("import_scene",
                           "select_key_view",

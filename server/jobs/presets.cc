@@ -28,7 +28,7 @@ PresetValues ValuesOf(v1::Preset preset) {
       break;
     default:
       values.max_side_px = 500;
-      values.personalize_iterations = 500;
+      values.personalize_iterations = 300;
       values.geometry_iterations = 1500;
       values.max_gaussians = 40'000;
       values.chroma_iterations = 300;

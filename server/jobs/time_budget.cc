@@ -10,7 +10,7 @@ namespace {
 
 // Measured at 500 px on two cores (README, "Performance").
 constexpr double kBaseSeconds = 6.0;
-constexpr double kSecondsPerPhoto = 0.85;        // colours one view, renders, evaluates
+constexpr double kSecondsPerPhoto = 1.7;  // carries into and colours one view, renders, evaluates
 constexpr double kPosesSecondsPerPhoto = 0.6;    // structure-from-motion
 constexpr double kLeastScheduledSeconds = 15.0;  // below this the pictures are not worth having
 

@@ -256,7 +256,7 @@ TEST_F(JobRpcTest, ColorizersAndServerInfo) {
   spec.set_scene(scene);
   *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = client_->Upload("key");
   const v1::Job root = client_->Create(spec);
-  EXPECT_EQ(Work(), 10) << "all but the evaluation";
+  EXPECT_EQ(Work(), 12) << "all but the augmentations";
   EXPECT_EQ(client_->Get(root.name()).state(), v1::Job::STATE_SUCCEEDED);
   v1::ListColorizersRequest list;
   list.set_scene(scene);
@@ -278,7 +278,7 @@ TEST_F(JobRpcTest, ColorizersAndServerInfo) {
   ASSERT_TRUE(client_->server->GetServerInfo(&context4, {}, &info).ok());
   EXPECT_GT(info.memory_bytes(), 0);
   EXPECT_EQ(info.limits().max_unfinished_jobs(), 40);
-  EXPECT_EQ(info.job_kinds_size(), 11);
+  EXPECT_EQ(info.job_kinds_size(), 14);
 }
 
 }  // namespace

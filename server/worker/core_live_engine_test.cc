@@ -167,7 +167,7 @@ TEST_F(CoreLiveEngineTest, AColorizerOfAnotherEncoderIsRefusedByDigest) {
                                            progress,
                                            CancellationToken())
                                 ->Serialize();
-  Archive archive = ReadArchive(bytes, "C3DCOLR1", 1, "it");
+  Archive archive = ReadArchive(bytes, "C3DCOLR1", 3, "it");
   const std::string digest = Encoder::Embedded()->digest(), other(64, 'f');
   archive.header.replace(archive.header.find(digest), digest.size(), other);
   Request own, foreign;

@@ -146,6 +146,10 @@ TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecon
     EXPECT_NE(curves.find(stage), std::string::npos) << stage << " left no curve";
   }
   for (const v1::Job& job : server().ListJobs()) {
+    if (job.kind() == "generate_augmentations") {
+      EXPECT_EQ(job.state(), v1::Job::STATE_SKIPPED);
+      continue;
+    }
     EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.kind();
     EXPECT_EQ(job.attempt(), 1) << job.kind();
   }

@@ -62,7 +62,7 @@ TEST_F(LiveTest, PreviewColoursAHandfulWithoutAJob) {
       Ask({"preview", Path("room").string(), "--key-color", key, "-o", Path("out").string()});
   EXPECT_EQ(answer.at("files").size(), 5u);
   EXPECT_EQ(answer.at("colorizer"), "");
-  for (const std::string& name : answer.at("files")) {
+  for (const auto& name : answer.at("files")) {
     EXPECT_NE(name, "view003.png") << "the key view itself is no news";
     const Image coloured = ReadImage(Path("out") / name);
     const Image photo = ReadImage(Path("room") / "images" / name);
@@ -91,7 +91,7 @@ TEST_F(LiveTest, APersonalizedColorizerColoursOtherPhotosOfItsScene) {
   EXPECT_EQ(by_scene.at("colorizer"), name);
   EXPECT_EQ(by_scene.at("encoder_digest").get<std::string>().size(), 64u);
   ASSERT_EQ(by_scene.at("files").size(), 8u);
-  for (const std::string& file : by_scene.at("files")) {
+  for (const auto& file : by_scene.at("files")) {
     EXPECT_EQ(ReadFile(Path("a") / file), ReadFile(Path("b") / file)) << file;
     EXPECT_FALSE(IsGray(ReadImage(Path("a") / file))) << file;
   }
