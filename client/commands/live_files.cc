@@ -15,7 +15,7 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr size_t kShownErrors = 5;
+constexpr size_t kShownErrors = 2;
 
 void AddFolder(const fs::path& folder, std::vector<LivePicture>* pictures) {
   std::error_code none;
@@ -131,6 +131,9 @@ ExitCode Conclude(const Context& context, const LiveSummary& summary, const fs::
                      " pictures could not be coloured: ";
   for (size_t i = 0; i < std::min(kShownErrors, summary.errors.size()); ++i) {
     text += (i > 0 ? "; " : "") + summary.errors[i];
+  }
+  if (summary.errors.size() > kShownErrors) {
+    text += "; and " + std::to_string(summary.errors.size() - kShownErrors) + " more";
   }
   if (!context.json) throw CommandFailure(summary.code, text);
   return summary.code;

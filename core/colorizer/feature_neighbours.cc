@@ -318,8 +318,9 @@ FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor
           a += w * colors[2 * j];
           b += w * colors[2 * j + 1];
         }
-        ab[2 * i] = static_cast<float>(a / sum);
-        ab[2 * i + 1] = static_cast<float>(b / sum);
+        // Where nothing has weight nothing is known: grey.
+        ab[2 * i] = sum > 0.0 ? static_cast<float>(a / sum) : 0.0f;
+        ab[2 * i + 1] = sum > 0.0 ? static_cast<float>(b / sum) : 0.0f;
       }
     });
   }

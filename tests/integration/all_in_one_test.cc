@@ -24,15 +24,17 @@ int SceneCount() {
 
 class AllInOneTest : public ServiceTest {
  protected:
-  // `count` scenes of the same tiny photos, each with an accepted key view.
+  // `count` scenes of tiny photos, each with an accepted key view.
   std::vector<std::string> MakeScenes(int count) {
     ProceduralSceneOptions room = SmallRoom(4);
     room.width = 64;
     room.height = 48;
-    WriteProceduralScene(Path("room"), room);
     std::vector<std::string> scenes;
     for (int i = 0; i < count; ++i) {
-      const ProcessResult created = Client({"scene", "create", Path("room").string(), "--json"});
+      room.seed = static_cast<uint64_t>(i) + 1;  // equal photos would be one scene
+      const std::string folder = Path("room" + std::to_string(i)).string();
+      WriteProceduralScene(folder, room);
+      const ProcessResult created = Client({"scene", "create", folder, "--json"});
       EXPECT_EQ(created.exit_code, 0) << created.err;
       scenes.push_back(json::parse(created.out).at("name"));
       const ProcessResult coloured =
