@@ -14,6 +14,7 @@ namespace color3d {
 namespace {
 
 constexpr double kTolerance = 1e-3;
+constexpr double kLeastPull = 1e-6;   // keeps the system definite
 constexpr double kMostStrange = 4.0;  // feature distance; beyond, all is equally strange
 
 void CheckRange(const char* field, double value, double low, double high) {
@@ -79,7 +80,8 @@ FusedColor FuseColors(const Image& luminance,
                                                                               options.guess_ends);
     const double strangeness =
         distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMostStrange);
-    const double pull = options.inferred_weight / (1.0 + strangeness * strangeness);
+    const double pull =
+        (1.0 - seen) * options.inferred_weight / (1.0 + strangeness * strangeness) + kLeastPull;
     const double total = seen + pull;
     for (int c = 0; c < 2; ++c) {
       const double guess_ab = guessed.Empty() ? 0.0 : options.guess_chroma * guessed.Plane(c)[i];

@@ -11,9 +11,9 @@
 namespace color3d {
 
 struct FusionOptions {
-  // The pull of an inferred colour against a carried one of confidence 1, over 1 + distance^2: the
-  // stranger a place, the more it takes from its surroundings. Pixels hold on to their neighbours
-  // of equal luminance with 1.
+  // The pull of an inferred colour, times 1 - confidence of the carried one and over
+  // 1 + distance^2: the stranger a place, the more it takes from its surroundings. Carried colours
+  // pull with their confidence, neighbours of equal luminance with 1.
   double inferred_weight = 0.1;
   // Carried colours below this confidence are not used, 0..1.
   double least_confidence = 0.05;
