@@ -68,7 +68,11 @@ MoreKey ParseMoreKey(const std::string& text) {
   } else {
     key.color.image = value;
   }
-  key.color.Check();
+  try {
+    key.color.Check();
+  } catch (const Error& e) {
+    throw Error(e.code(), "--more-key " + key.view + ": " + e.what());
+  }
   return key;
 }
 
