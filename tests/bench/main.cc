@@ -9,7 +9,6 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   color3d::AddAugmentationsCommand(app);
   color3d::AddAutomaticCommand(app);
-  color3d::AddCarryCommand(app);
   color3d::AddGoldenCommand(app);
   color3d::AddMakeWeightsCommand(app);
   color3d::AddNetworksCommand(app);
