@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/augment/fill_holes.h"
-#include "core/augment/plane_sampling.h"
+#include "core/image/plane_sampling.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/augment/plane_sampling.h"
+#include "core/image/plane_sampling.h"
 
 namespace color3d {
 namespace {

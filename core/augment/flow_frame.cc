@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "core/augment/elastic_field.h"
-#include "core/augment/plane_sampling.h"
+#include "core/image/plane_sampling.h"
 
 namespace color3d {
 namespace {

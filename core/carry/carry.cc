@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/image/optical_flow.h"
+#include "core/image/plane_sampling.h"
 
 namespace color3d {
 namespace {
@@ -24,15 +25,9 @@ bool Inside(double x, double y, const Image& image) {
   return x >= 0.5 && y >= 0.5 && x <= image.width - 0.5 && y <= image.height - 0.5;
 }
 
-float Bilinear(const Image& image, int c, double x, double y) {
-  const double fx = std::clamp(x - 0.5, 0.0, image.width - 1.0);
-  const double fy = std::clamp(y - 0.5, 0.0, image.height - 1.0);
-  const int x0 = static_cast<int>(fx), y0 = static_cast<int>(fy);
-  const int x1 = std::min(x0 + 1, image.width - 1), y1 = std::min(y0 + 1, image.height - 1);
-  const double tx = fx - x0, ty = fy - y0;
-  const double top = (1 - tx) * image.At(c, y0, x0) + tx * image.At(c, y0, x1);
-  const double bottom = (1 - tx) * image.At(c, y1, x0) + tx * image.At(c, y1, x1);
-  return static_cast<float>((1 - ty) * top + ty * bottom);
+// (x, y) with pixel centres at +0.5, as cameras have them.
+float Read(const Image& image, int channel, double x, double y) {
+  return SampleBilinear(image, channel, x - 0.5, y - 0.5);
 }
 
 // Least relative difference of `depth` to the four source pixels around (x, y): edges of surfaces
@@ -89,7 +84,7 @@ Image WarpedLuminance(const SurfaceView& source,
     for (int x = 0; x < warped.width; ++x) {
       if (map.visible.At(0, y, x) < kSeen) continue;
       warped.At(0, y, x) =
-          Bilinear(source.luminance, 0, map.position.At(0, y, x), map.position.At(1, y, x));
+          Read(source.luminance, 0, map.position.At(0, y, x), map.position.At(1, y, x));
     }
   }
   return warped;
@@ -199,9 +194,9 @@ CarriedColor CarryColor(const SurfaceView& source,
       const double offset = d.offset / options.luminance_tolerance;
       const double structure = d.structure / options.structure_tolerance;
       double c = visible * std::exp(-offset * offset - structure * structure);
-      if (!confidence.Empty()) c *= Bilinear(confidence, 0, sx, sy);
+      if (!confidence.Empty()) c *= Read(confidence, 0, sx, sy);
       out.confidence.At(0, y, x) = static_cast<float>(c);
-      for (int k = 0; k < 2; ++k) out.ab.At(k, y, x) = Bilinear(ab, k, sx, sy);
+      for (int k = 0; k < 2; ++k) out.ab.At(k, y, x) = Read(ab, k, sx, sy);
     }
   }
   return out;

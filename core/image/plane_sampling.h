@@ -1,4 +1,4 @@
-// Bilinear reading of a planar picture at any place. For this folder only.
+// Bilinear reading of a planar picture at any place.
 #pragma once
 
 #include <algorithm>
