@@ -279,20 +279,22 @@ TEST_F(LiveProcessTest, DrainAnswersWhatIsUnderWayAndLeavesNoProcess) {
   live.Send(example, "warm", "x");
   live.Read();
   const pid_t worker = InferenceWorker();
-  for (int i = 0; i < 4; ++i) live.Send(example, std::to_string(i), "slow");
-  SleepMs(300);
+  for (int i = 0; i < 12; ++i) live.Send(example, std::to_string(i), "slow");
+  live.Read();
   const auto start = std::chrono::steady_clock::now();
   server_->Signal(SIGTERM);
-  for (const auto& [id, response] : live.ReadAll(4)) {
+  int answered = 0;
+  for (Response response; live.stream->Read(&response); ++answered) {
     EXPECT_FALSE(response.has_error()) << response.error().message();
   }
+  EXPECT_GT(answered, 0);
   for (LiveStream* stream : {&live, &quiet}) {
     const grpc::Status status = stream->Close();
     EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
     EXPECT_EQ(testing::ReasonOfStatus(status), "DRAINING");
   }
   EXPECT_EQ(server_->Wait(), 0);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, seconds(8));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, seconds(15));
   EXPECT_FALSE(IsAlive(worker));
 }
 

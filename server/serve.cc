@@ -129,6 +129,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   InferenceLink link;
   link.target = sockets.Address(socket);
   link.demand = [demand] { demand->Ask(); };
+  link.hold = [demand] { return demand->Hold(); };
   return link;
 }
 

@@ -60,6 +60,7 @@ class ColorizeStream final
         if (!end_) end_ = grpc::Status::OK;  // the client has sent all
       } else if (!end_) {
         picture = std::make_shared<Picture>();
+        picture->hold = hub_.client_.Hold();
         picture->request.Swap(&incoming_);
         pictures_.insert(picture);
         ++hub_.pictures_;
@@ -85,6 +86,7 @@ class ColorizeStream final
  private:
   enum class Step { kNothing, kRead, kWrite, kFinish };
   struct Picture {
+    std::shared_ptr<void> hold;  // on the worker, until the picture is answered
     v1::ColorizeImagesRequest request;
     v1::ColorizeImagesResponse response;
     std::shared_ptr<InferenceClient::Call> call = std::make_shared<InferenceClient::Call>();

@@ -20,6 +20,8 @@ struct InferenceLink {
   std::string target;
   // Asks for the worker to be running soon; cheap, from any thread.
   std::function<void()> demand;
+  // While what this returns lives, a draining server leaves the worker running.
+  std::function<std::shared_ptr<void>()> hold;
   // Longest time for one picture, with the start of the worker and the wait for its turn.
   std::chrono::milliseconds limit{120'000};
 };
@@ -38,6 +40,8 @@ class InferenceClient {
   bool available() const { return stub_ != nullptr; }
   // Calls the worker to life ahead of the first picture.
   void WarmUp() const;
+  // Keeps the worker from being drained while what this returns lives.
+  std::shared_ptr<void> Hold() const { return link_.hold ? link_.hold() : nullptr; }
   // `done` is called once, on one of gRPC's threads, with the worker's status; a worker that dies
   // or does not answer in time gives UNAVAILABLE with RetryInfo (INFERENCE_LOST). To cancel:
   // call->context.TryCancel().

@@ -165,22 +165,21 @@ void Supervisor::KillIfFrozen(Slot* slot) {
 }
 
 void Supervisor::Loop() {
-  bool told = false;
   while (true) {
     for (Slot& slot : slots_) CheckWorker(&slot);
     if (draining_.load()) {
       const bool kill = SteadyClock::now() >= kill_at_.load();
       bool running = false;
-      for (const Slot& slot : slots_) {
+      for (Slot& slot : slots_) {
         if (slot.pid == 0) continue;
         running = true;
         if (kill) {
           ::kill(slot.pid, SIGKILL);
-        } else if (!told) {
+        } else if (!slot.told && !(slot.on_demand && options_.inference_demand->Held())) {
           ::kill(slot.pid, SIGTERM);
+          slot.told = true;
         }
       }
-      told = true;
       if (!running) return;
     }
     std::this_thread::sleep_for(kTick);

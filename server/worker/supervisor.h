@@ -21,6 +21,9 @@ namespace color3d {
 // Thread-safe.
 class InferenceDemand {
  public:
+  // While a copy of what this returns lives, the worker is not drained.
+  std::shared_ptr<void> Hold() const { return hold_; }
+  bool Held() const { return hold_.use_count() > 1; }
   void Ask() { asked_ = std::chrono::steady_clock::now().time_since_epoch().count(); }
   // Within the last minute. A worker that ends by itself afterwards is not missed.
   bool Recent() const {
@@ -31,6 +34,7 @@ class InferenceDemand {
 
  private:
   std::atomic<std::chrono::steady_clock::rep> asked_{0};
+  const std::shared_ptr<void> hold_ = std::make_shared<int>();
 };
 
 struct SupervisorOptions {
@@ -57,7 +61,8 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  // SIGTERM to all workers, no more restarts; SIGKILL to those that still run after `grace`.
+  // SIGTERM to all workers, to the inference worker once nobody holds it; no more restarts; SIGKILL
+  // to those that still run after `grace`.
   void Drain(std::chrono::milliseconds grace);
   // Waits until all workers have ended after Drain.
   void Wait();
@@ -67,6 +72,7 @@ class Supervisor {
   struct Slot {
     std::string name;
     bool on_demand = false;  // the inference worker
+    bool told = false;       // to end, by SIGTERM
     pid_t pid = 0;           // 0: not running
     SteadyClock::time_point started;
     SteadyClock::time_point next_start;
