@@ -73,7 +73,7 @@ FusedColor FuseColors(const Image& luminance,
   std::vector<float> target(2 * pixels);
   for (size_t i = 0; i < pixels; ++i) {
     const double confidence = carried.confidence.data[i];
-    const double seen = confidence > options.least_confidence ? confidence : 0.0;
+    const double seen = confidence > options.least_confidence ? confidence * confidence : 0.0;
     const double guess = distance.Empty() ? 0.0
                                           : options.most_guessed * SmoothStep(distance.data[i],
                                                                               options.guess_begins,

@@ -11,9 +11,10 @@
 namespace color3d {
 
 struct FusionOptions {
-  // The pull of an inferred colour, times 1 - confidence of the carried one and over
-  // 1 + distance^2: the stranger a place, the more it takes from its surroundings. Carried colours
-  // pull with their confidence, neighbours of equal luminance with 1.
+  // The pull of an inferred colour, times 1 - the pull of the carried one and over 1 + distance^2:
+  // the stranger a place, the more it takes from its surroundings. Carried colours pull with their
+  // confidence squared (measured: half as sure is more than twice as wrong), neighbours of equal
+  // luminance with 1.
   double inferred_weight = 0.1;
   // Carried colours below this confidence are not used, 0..1.
   double least_confidence = 0.05;
@@ -21,8 +22,8 @@ struct FusionOptions {
   double edge_sigma = 1.0;
   // Feature distances (ColorPrediction::distance) where the automatic guess begins to replace the
   // inferred colour and where it has its full share.
-  double guess_begins = 2.5;
-  double guess_ends = 6.0;
+  double guess_begins = 3.5;
+  double guess_ends = 7.0;
   double most_guessed = 0.6;  // that full share, 0..1
   double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
   void Validate() const;
