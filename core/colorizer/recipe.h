@@ -18,10 +18,9 @@ struct TrainingRecipe {
   double max_gradient_norm = 1.0;
   bool neighbours = true;
   FeatureNeighboursOptions neighbour_options;
-  // Share of the neighbours in the blend with a decoder trained for many iterations (on carried
-  // colours too). One trained for a few weighs less:
-  // share + (1 - share) exp(-iterations / trust_iterations).
-  double neighbour_share = 0.25;
+  // Share of the neighbours in the blend with a decoder trained for many iterations. One trained
+  // for a few weighs less: share + (1 - share) exp(-iterations / trust_iterations).
+  double neighbour_share = 0.5;
   double trust_iterations = 200.0;
   bool flip_average = false;  // mean of the picture and its mirror image: twice the time for 0.05
 };

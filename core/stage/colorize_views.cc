@@ -35,6 +35,15 @@ Image SurelyCarried(const CarriedColor& carried) {
   return sure;
 }
 
+// The colorizer is not asked about places that are known: what was carried there stands for its
+// answer, so that it does not pull towards anything else.
+void AnswerKnown(const CarriedColor& carried, const Image& known, Image* inferred_ab) {
+  for (size_t i = 0; i < known.data.size(); ++i) {
+    if (known.data[i] == 0.0f) continue;
+    for (int c = 0; c < 2; ++c) inferred_ab->Plane(c)[i] = carried.ab.Plane(c)[i];
+  }
+}
+
 }  // namespace
 
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder) {
@@ -51,7 +60,9 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     const View& view = scene.views[static_cast<size_t>(i)];
     const auto luminance = images.Luminance(static_cast<int>(i));
     const CarriedColor carried = ReadCarried(context, view, luminance->width, luminance->height);
-    const ColorPrediction inferred = colorizer->Predict(*luminance, SurelyCarried(carried));
+    const Image known = SurelyCarried(carried);
+    ColorPrediction inferred = colorizer->Predict(*luminance, known);
+    AnswerKnown(carried, known, &inferred.ab);
     const FusedColor fused =
         FuseColors(*luminance,
                    carried,
