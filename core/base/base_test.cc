@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numeric>
 
 #include "core/base/digest.h"
@@ -10,6 +12,7 @@
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/range_check.h"
 #include "core/base/subprocess.h"
 
 namespace color3d {
@@ -138,6 +141,33 @@ TEST(Subprocess, ReportsExitCodeLogTimeoutAndCancellation) {
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kFailedPrecondition);
   }
+}
+
+// What a check says about a value; empty when it accepts it.
+std::string RangeComplaint(double value, double low, double high) {
+  try {
+    RangeCheck("test option")("sigma", value, low, high);
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    return e.what();
+  }
+  return "";
+}
+
+TEST(RangeCheckTest, NamesFieldValueAndRange) {
+  EXPECT_EQ(RangeComplaint(0.25, 0.0, 1.0), "");
+  EXPECT_EQ(RangeComplaint(0.0, 0.0, 1.0), "");
+  EXPECT_EQ(RangeComplaint(1.0, 0.0, 1.0), "");
+  EXPECT_EQ(RangeComplaint(1.00001, 0.0, 1.0), "test option sigma is 1.00001; it must be 0 to 1");
+  EXPECT_EQ(RangeComplaint(0.0, 1e-6, 0.5), "test option sigma is 0; it must be 1e-06 to 0.5");
+  EXPECT_EQ(RangeComplaint(100001, 0, 100000),
+            "test option sigma is 100001; it must be 0 to 100000");
+}
+
+TEST(RangeCheckTest, NoNumberIsInNoRange) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_NE(RangeComplaint(std::nan(""), -infinity, infinity), "");
+  EXPECT_NE(RangeComplaint(infinity, 0.0, 1.0), "");
 }
 
 }  // namespace

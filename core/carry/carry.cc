@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
 
@@ -153,20 +154,14 @@ void CheckSizes(const SurfaceView& view, const char* which) {
   }
 }
 
-void CheckPositive(const char* field, double value) {
-  if (!(value > 0.0 && value <= 1e6)) {
-    throw InvalidArgument(std::string("carry option ") + field + " is " + std::to_string(value) +
-                          "; it must be above 0 and at most 1e6");
-  }
-}
-
 }  // namespace
 
 void CarryOptions::Validate() const {
-  CheckPositive("depth_tolerance", depth_tolerance);
-  CheckPositive("luminance_tolerance", luminance_tolerance);
-  CheckPositive("structure_tolerance", structure_tolerance);
-  if (flow_tolerance_px != 0.0) CheckPositive("flow_tolerance_px", flow_tolerance_px);
+  const RangeCheck check("carry option");
+  check("depth_tolerance", depth_tolerance, 1e-6, 1e6);
+  check("luminance_tolerance", luminance_tolerance, 1e-6, 1e6);
+  check("structure_tolerance", structure_tolerance, 1e-6, 1e6);
+  if (flow_tolerance_px != 0.0) check("flow_tolerance_px", flow_tolerance_px, 1e-6, 1e6);
 }
 
 CarriedColor CarryColor(const SurfaceView& source,

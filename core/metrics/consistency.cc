@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/color/difference.h"
 
 namespace color3d {
@@ -101,11 +102,7 @@ void AddPairs(int views, int gap, bool long_gap, int most, std::vector<ViewPair>
 }  // namespace
 
 void MatchOptions::Validate() const {
-  const auto check = [](const char* name, double value, double low, double high) {
-    if (value >= low && value <= high) return;
-    throw InvalidArgument(std::string(name) + " is " + std::to_string(value) + "; it must be " +
-                          std::to_string(low) + " to " + std::to_string(high));
-  };
+  const RangeCheck check("match option");
   check("max_reprojection_px", max_reprojection_px, 0.0, 100.0);
   check("depth_tolerance", depth_tolerance, 0.0, 1.0);
   check("stride_px", stride_px, 1.0, 1000.0);

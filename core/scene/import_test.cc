@@ -50,7 +50,7 @@ TEST_F(Import, BadInputsSayWhatIsWrong) {
 
 TEST_F(Import, OptionsAreChecked) {
   options_.sfm_max_features = 10;
-  EXPECT_THAT(Said(), HasSubstr("sfm_max_features is 10; it must be 512..16384"));
+  EXPECT_THAT(Said(), HasSubstr("sfm_max_features is 10; it must be 512 to 16384"));
   options_ = {};
   options_.sfm_max_image_side_px = 10000;
   EXPECT_THAT(Said(), HasSubstr("sfm_max_image_side_px"));
@@ -59,7 +59,7 @@ TEST_F(Import, OptionsAreChecked) {
   EXPECT_THAT(Said(), HasSubstr("sfm_timeout"));
   options_ = {};
   options_.sfm_neighbors = 1;
-  EXPECT_THAT(Said(), HasSubstr("sfm_neighbors is 1; it must be 2..100"));
+  EXPECT_THAT(Said(), HasSubstr("sfm_neighbors is 1; it must be 2 to 100"));
   options_ = {};
   options_.threads = -1;
   EXPECT_THAT(Said(), HasSubstr("threads"));

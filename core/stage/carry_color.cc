@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/base/range_check.h"
 #include "core/carry/stereo_views.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
@@ -195,14 +196,9 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
 
 void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
-  if (sweep_side_px < 64 || sweep_side_px > 2048) {
-    throw InvalidArgument("sweep_side_px is " + std::to_string(sweep_side_px) +
-                          "; it must be 64 to 2048");
-  }
-  if (sweep_sources < 1 || sweep_sources > 16) {
-    throw InvalidArgument("sweep_sources is " + std::to_string(sweep_sources) +
-                          "; it must be 1 to 16");
-  }
+  const RangeCheck check("carry_color option");
+  check("sweep_side_px", sweep_side_px, 64, 2048);
+  check("sweep_sources", sweep_sources, 1, 16);
   if (further.size() > 16) {
     throw InvalidArgument(std::to_string(further.size()) +
                           " further key views were given; at most 16 are taken");

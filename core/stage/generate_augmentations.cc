@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
@@ -201,10 +202,7 @@ void WriteResults(const KeyPicture& key, const Outcome& outcome, StageContext& c
 }  // namespace
 
 void AugmentationOptions::Validate() const {
-  if (samples < 0 || samples > kMaxSamples) {
-    throw InvalidArgument("samples is " + std::to_string(samples) + "; it must be 0 to " +
-                          std::to_string(kMaxSamples));
-  }
+  RangeCheck("augmentation option")("samples", samples, 0, kMaxSamples);
   CheckMaxSide(max_side_px);
 }
 

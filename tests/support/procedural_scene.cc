@@ -9,6 +9,7 @@
 #include "core/base/files.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/import.h"
@@ -35,12 +36,6 @@ Pose LookAt(const Vector3d& center, const Vector3d& target) {
   return pose;
 }
 
-void CheckRange(const char* name, int value, int low, int high) {
-  if (value >= low && value <= high) return;
-  throw InvalidArgument(std::string(name) + " is " + std::to_string(value) + "; it must be " +
-                        std::to_string(low) + ".." + std::to_string(high));
-}
-
 float GammaEncode(double linear) {
   const double v = std::clamp(linear, 0.0, 1.0);
   return static_cast<float>(v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055);
@@ -56,12 +51,13 @@ Vector3d RayDirection(const View& view, double x, double y) {
 }  // namespace
 
 void ProceduralSceneOptions::Validate() const {
-  CheckRange("views", views, 1, 1000);
-  CheckRange("width", width, 16, 8192);
-  CheckRange("height", height, 16, 8192);
-  CheckRange("supersampling", supersampling, 1, 8);
-  CheckRange("sparse_points", sparse_points, 0, 1000000);
-  CheckRange("threads", threads, 0, 1024);
+  const RangeCheck check("procedural scene option");
+  check("views", views, 1, 1000);
+  check("width", width, 16, 8192);
+  check("height", height, 16, 8192);
+  check("supersampling", supersampling, 1, 8);
+  check("sparse_points", sparse_points, 0, 1000000);
+  check("threads", threads, 0, 1024);
 }
 
 struct ProceduralScene::Impl {
