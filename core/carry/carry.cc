@@ -22,8 +22,10 @@ struct Correspondence {
   Image visible;   // 1 channel, 0..1
 };
 
-bool Inside(double x, double y, const Image& image) {
-  return x >= 0.5 && y >= 0.5 && x <= image.width - 0.5 && y <= image.height - 0.5;
+// Between pixel centres, so that nothing needs to be extrapolated.
+bool Inside(const Eigen::Vector2d& pixel, const Image& image) {
+  return pixel.x() >= 0.5 && pixel.y() >= 0.5 && pixel.x() <= image.width - 0.5 &&
+         pixel.y() <= image.height - 0.5;
 }
 
 // (x, y) with pixel centres at +0.5, as cameras have them.
@@ -58,16 +60,15 @@ Correspondence Correspond(const SurfaceView& source, const SurfaceView& target, 
     for (int x = 0; x < c.width; ++x) {
       const double depth = target.depth.At(0, y, x);
       if (!(depth > 0.0)) continue;
-      const Eigen::Vector3d ray((x + 0.5 - c.cx) / c.fx, (y + 0.5 - c.cy) / c.fy, 1.0);
-      const Eigen::Vector3d p = cam_from_world * (center + world_from_cam * (depth * ray)) +
-                                source.cam_from_world.translation;
+      const Eigen::Vector3d point = depth * c.Ray(x + 0.5, y + 0.5);
+      const Eigen::Vector3d p =
+          cam_from_world * (center + world_from_cam * point) + source.cam_from_world.translation;
       if (!(p.z() > 1e-6)) continue;
-      const double sx = source.camera.fx * p.x() / p.z() + source.camera.cx;
-      const double sy = source.camera.fy * p.y() / p.z() + source.camera.cy;
-      if (!Inside(sx, sy, source.luminance)) continue;
-      const double e = DepthDisagreement(source.depth, sx, sy, p.z()) / tolerance;
-      out.position.At(0, y, x) = static_cast<float>(sx);
-      out.position.At(1, y, x) = static_cast<float>(sy);
+      const Eigen::Vector2d pixel = source.camera.Project(p);
+      if (!Inside(pixel, source.luminance)) continue;
+      const double e = DepthDisagreement(source.depth, pixel.x(), pixel.y(), p.z()) / tolerance;
+      out.position.At(0, y, x) = static_cast<float>(pixel.x());
+      out.position.At(1, y, x) = static_cast<float>(pixel.y());
       out.visible.At(0, y, x) = static_cast<float>(std::exp(-e * e));
     }
   }

@@ -148,7 +148,7 @@ TEST_F(Import, PosesWithoutPointsGetRandomOnesThatViewsSee) {
       const View& view = result.scene.views[v];
       const Eigen::Vector3d p = view.cam_from_world.Apply(point.position);
       ASSERT_GT(p.z(), 0.0);
-      const Eigen::Vector2d pixel = ProjectPinhole(view.camera, p);
+      const Eigen::Vector2d pixel = view.camera.Project(p);
       ASSERT_TRUE(pixel.x() >= 0 && pixel.x() < view.camera.width);
     }
   }

@@ -31,11 +31,10 @@ std::vector<PosedCamera> Posed(const Scene& scene,
 bool PixelOf(const PosedCamera& view, const Eigen::Vector3d& world, int* x, int* y) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(world);
   if (!(p.z() > kNearPlane)) return false;
-  const double u = view.camera.fx * p.x() / p.z() + view.camera.cx;
-  const double v = view.camera.fy * p.y() / p.z() + view.camera.cy;
-  if (!(u >= 0.0 && v >= 0.0 && u < view.camera.width && v < view.camera.height)) return false;
-  *x = static_cast<int>(u);
-  *y = static_cast<int>(v);
+  const Eigen::Vector2d pixel = view.camera.Project(p);
+  if (!view.camera.Contains(pixel)) return false;
+  *x = static_cast<int>(pixel.x());
+  *y = static_cast<int>(pixel.y());
   return true;
 }
 

@@ -43,9 +43,7 @@ float GammaEncode(double linear) {
 
 // Direction through a pixel position, with z = 1 in the camera's frame.
 Vector3d RayDirection(const View& view, double x, double y) {
-  const Camera& c = view.camera;
-  return view.cam_from_world.rotation.conjugate() *
-         Vector3d((x - c.cx) / c.fx, (y - c.cy) / c.fy, 1.0);
+  return view.cam_from_world.rotation.conjugate() * view.camera.Ray(x, y);
 }
 
 }  // namespace
@@ -67,11 +65,11 @@ struct ProceduralScene::Impl {
   // True when nothing lies between the camera and the point.
   bool Sees(const View& view, const Vector3d& point) const {
     const Vector3d p = view.cam_from_world.Apply(point);
-    const Camera& c = view.camera;
     if (p.z() <= 0.0) return false;
-    const double x = c.fx * p.x() / p.z() + c.cx, y = c.fy * p.y() / p.z() + c.cy;
-    if (x < 0.0 || y < 0.0 || x >= c.width || y >= c.height) return false;
-    const Hit hit = room.Trace(view.cam_from_world.Center(), RayDirection(view, x, y));
+    const Eigen::Vector2d pixel = view.camera.Project(p);
+    if (!view.camera.Contains(pixel)) return false;
+    const Hit hit =
+        room.Trace(view.cam_from_world.Center(), RayDirection(view, pixel.x(), pixel.y()));
     return hit.object >= 0 && std::abs(hit.distance - p.z()) < 1e-4 * p.z();
   }
 };
