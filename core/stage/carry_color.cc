@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "core/base/range_check.h"
@@ -10,6 +9,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/render.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/carry_facts.h"
 #include "core/stage/key_color_sources.h"
 #include "core/stage/next_key_view.h"
 #include "core/stage/stages.h"
@@ -96,11 +96,8 @@ class SurfaceMaker {
       for (int x = kSurfaceGridPx / 2; x < camera.width; x += kSurfaceGridPx) {
         const double depth = rendered.depth.At(0, y, x);
         if (!(depth > 0.0)) continue;
-        const Eigen::Vector3d in_camera(depth * (x + 0.5 - camera.cx) / camera.fx,
-                                        depth * (y + 0.5 - camera.cy) / camera.fy,
-                                        depth);
-        points.push_back(rendered.cam_from_world.Center() +
-                         rendered.cam_from_world.rotation.conjugate() * in_camera);
+        points.push_back(
+            rendered.cam_from_world.WorldFromCamera(depth * camera.Ray(x + 0.5, y + 0.5)));
       }
     }
     return points;
@@ -234,23 +231,23 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   });
 
   std::vector<int> key_views;
-  for (const ColoredKeyView& key : keys) key_views.push_back(key.view);
-  nlohmann::ordered_json facts{{"key_views", nlohmann::ordered_json::array()}};
-  for (int view : key_views) facts["key_views"].push_back(scene.views[view].name);
+  CarryFacts facts;
+  for (const ColoredKeyView& key : keys) {
+    key_views.push_back(key.view);
+    facts.key_views.push_back(scene.views[key.view].name);
+  }
   double sum = 0.0;
   for (size_t i = 0; i < coverage.size(); ++i) {
-    facts["views"].push_back({{"view", scene.views[i].name}, {"coverage", coverage[i]}});
+    facts.per_view.emplace_back(scene.views[i].name, coverage[i]);
     if (std::find(key_views.begin(), key_views.end(), static_cast<int>(i)) == key_views.end()) {
       sum += coverage[i];
     }
   }
   const size_t others = scene.views.size() - key_views.size();
   const double mean = others > 0 ? sum / static_cast<double>(others) : 1.0;
-  facts["coverage"] = mean;
+  facts.coverage = mean;
   if (const auto next = NextKeyView(scene, key_views)) {
-    facts["next_key_view"] = {{"name", scene.views[next->view].name},
-                              {"coverage_now", next->covered_now},
-                              {"coverage_with", next->covered_with}};
+    facts.next = {scene.views[next->view].name, next->covered_now, next->covered_with};
   }
   context.progress().OnError(0, "coverage", mean);
   if (mean < kSmallCoverage) {
@@ -261,7 +258,7 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
         " of what the other views show; their colours are inferred from likeness. Colour a second "
         "key view, or choose another one");
   }
-  context.WriteOutput(artifact::kCarryFacts, facts.dump(1) + "\n");
+  WriteCarryFacts(facts, context);
 }
 
 }  // namespace color3d

@@ -11,6 +11,7 @@
 #include "core/scene/view_images.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/augmentation_sources.h"
+#include "core/stage/carry_facts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -53,16 +54,6 @@ std::map<Kind, int> Deal(const AugmentationOptions& options) {
     if (wanted) ++counts[kind];
   }
   return counts;
-}
-
-// Mean share of the other views that the key view's colours reach; nothing when nobody measured it.
-std::optional<double> Coverage(const StageContext& context) {
-  if (!context.HasInput(artifact::kCarryFacts)) return std::nullopt;
-  const auto facts = ordered_json::parse(context.ReadInput(artifact::kCarryFacts), nullptr, false);
-  if (!facts.is_object() || !facts.contains("coverage") || !facts["coverage"].is_number()) {
-    return std::nullopt;
-  }
-  return facts["coverage"].get<double>();
 }
 
 KeyPicture ReadKeyPicture(const Scene& scene,
@@ -149,7 +140,7 @@ void LeaveOutNeedless(const AugmentationOptions& options,
       if (!on) outcome->LeaveOut(AugmentationKindName(kind), "not asked for");
     }
   }
-  const std::optional<double> coverage = Coverage(context);
+  const std::optional<double> coverage = ReadCarryFacts(context).coverage;
   if (coverage && *coverage >= kCovered && counts->erase(Kind::kOutpaint) > 0) {
     outcome->LeaveOut(AugmentationKindName(Kind::kOutpaint),
                       "the key view covers " + std::to_string(static_cast<int>(100.0 * *coverage)) +
