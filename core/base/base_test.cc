@@ -1,10 +1,16 @@
 #include <gtest/gtest.h>
+#include <malloc.h>
 
+#include <barrier>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <numeric>
+#include <thread>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
@@ -141,6 +147,41 @@ TEST(Subprocess, ReportsExitCodeLogTimeoutAndCancellation) {
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kFailedPrecondition);
   }
+}
+
+// Pools of a process in which eight threads hold memory at the same time.
+int ArenasOfEightThreads() {
+  std::barrier all(8);
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i) {
+    threads.emplace_back([&] {
+      const std::vector<char> small(1000);
+      all.arrive_and_wait();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  char* text = nullptr;
+  size_t size = 0;
+  std::FILE* file = ::open_memstream(&text, &size);
+  ::malloc_info(0, file);
+  std::fclose(file);
+  int count = 0;
+  for (const char* at = text; (at = std::strstr(at, "<heap nr=")) != nullptr; ++at) ++count;
+  std::free(text);
+  return count;
+}
+
+// In processes of their own: the limit holds for all threads, forever.
+TEST(ShareMallocArenasDeathTest, ThreadsShareThem) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  EXPECT_EXIT(
+      {
+        ShareMallocArenas(2);
+        std::exit(ArenasOfEightThreads());
+      },
+      testing::ExitedWithCode(2),
+      "");
+  EXPECT_EXIT(std::exit(ArenasOfEightThreads() > 2 ? 0 : 1), testing::ExitedWithCode(0), "");
 }
 
 // What a check says about a value; empty when it accepts it.
