@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <mutex>
 #include <optional>
 
 #include "core/base/range_check.h"
@@ -9,6 +8,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/render.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/carried_views.h"
 #include "core/stage/carry_facts.h"
 #include "core/stage/key_color_sources.h"
 #include "core/stage/next_key_view.h"
@@ -189,47 +189,11 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
   return keys;
 }
 
-}  // namespace
-
-void CarryColorOptions::Validate() const {
-  CheckMaxSide(max_side_px);
-  const RangeCheck check("carry_color option");
-  check("sweep_side_px", sweep_side_px, 64, 2048);
-  check("sweep_sources", sweep_sources, 1, 16);
-  if (further.size() > 16) {
-    throw InvalidArgument(std::to_string(further.size()) +
-                          " further key views were given; at most 16 are taken");
-  }
-  sweep.Validate();
-  carry.Validate();
-}
-
-void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
-  options.Validate();
-  const Scene scene = ReadScene(context);
-  const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  const SurfaceMaker maker(scene, geometry, options, context);
-  const std::vector<ColoredKeyView> keys = ColorKeyViews(options, scene, maker, context);
-
-  const auto total = static_cast<int64_t>(scene.views.size());
-  std::vector<double> coverage(scene.views.size(), 1.0);
-  std::mutex mutex;
-  int64_t done = 0;
-  ThreadPool pool(context.threads());
-  pool.ForEach(total, [&](int64_t index, int) {
-    context.cancel().ThrowIfCancelled();
-    const int view = static_cast<int>(index);
-    const auto key = std::find_if(
-        keys.begin(), keys.end(), [&](const ColoredKeyView& k) { return k.view == view; });
-    const CarriedColor carried =
-        key != keys.end() ? key->color : CarryFromAll(keys, maker.Make(view), options.carry);
-    const std::string png = EncodeAbPng(carried.ab, carried.confidence);
-    const std::lock_guard lock(mutex);
-    if (key == keys.end()) coverage[index] = Coverage(carried, kCovered);
-    context.WriteOutput(ViewArtifact(artifact::kCarried, scene.views[view], ".png"), png);
-    context.progress().OnProgress(++done, total, "carrying colour into " + scene.views[view].name);
-  });
-
+// carry.json, and a warning when the key views show next to nothing of the others.
+void Conclude(const Scene& scene,
+              const std::vector<ColoredKeyView>& keys,
+              const std::vector<double>& coverage,
+              StageContext& context) {
   std::vector<int> key_views;
   CarryFacts facts;
   for (const ColoredKeyView& key : keys) {
@@ -259,6 +223,45 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
         "key view, or choose another one");
   }
   WriteCarryFacts(facts, context);
+}
+
+}  // namespace
+
+void CarryColorOptions::Validate() const {
+  CheckMaxSide(max_side_px);
+  const RangeCheck check("carry_color option");
+  check("sweep_side_px", sweep_side_px, 64, 2048);
+  check("sweep_sources", sweep_sources, 1, 16);
+  if (further.size() > 16) {
+    throw InvalidArgument(std::to_string(further.size()) +
+                          " further key views were given; at most 16 are taken");
+  }
+  sweep.Validate();
+  carry.Validate();
+}
+
+void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
+  options.Validate();
+  const Scene scene = ReadScene(context);
+  const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
+  const SurfaceMaker maker(scene, geometry, options, context);
+  const std::vector<ColoredKeyView> keys = ColorKeyViews(options, scene, maker, context);
+
+  CarriedViews done(scene, context);
+  ThreadPool pool(context.threads());
+  pool.ForEach(static_cast<int64_t>(scene.views.size()), [&](int64_t index, int) {
+    context.cancel().ThrowIfCancelled();
+    const int view = static_cast<int>(index);
+    if (done.WasDone(view)) return;
+    const auto key = std::find_if(
+        keys.begin(), keys.end(), [&](const ColoredKeyView& k) { return k.view == view; });
+    const CarriedColor carried =
+        key != keys.end() ? key->color : CarryFromAll(keys, maker.Make(view), options.carry);
+    done.Add(view,
+             key != keys.end() ? 1.0 : Coverage(carried, kCovered),
+             EncodeAbPng(carried.ab, carried.confidence));
+  });
+  Conclude(scene, keys, done.coverage(), context);
 }
 
 }  // namespace color3d
