@@ -80,14 +80,11 @@ class ForwardWarp {
       for (int x = 0; x < key_.depth.width; ++x) {
         const double depth = key_.depth.At(0, y, x);
         if (!(depth > 0.0) || !std::isfinite(depth)) continue;
-        const Eigen::Vector3d point((x + 0.5 - camera.cx) / camera.fx * depth,
-                                    (y + 0.5 - camera.cy) / camera.fy * depth,
-                                    depth);
+        const Eigen::Vector3d point = depth * camera.Ray(x + 0.5, y + 0.5);
         const Eigen::Vector3d moved = rotation * point + translation;
         if (!(moved.z() > kMinDepthShare * depth)) continue;
-        vertices_[Index(x, y)] = {camera.fx * moved.x() / moved.z() + camera.cx - 0.5,
-                                  camera.fy * moved.y() / moved.z() + camera.cy - 0.5,
-                                  moved.z()};
+        const Eigen::Vector2d pixel = camera.Project(moved);
+        vertices_[Index(x, y)] = {pixel.x() - 0.5, pixel.y() - 0.5, moved.z()};
       }
     }
   }

@@ -1,8 +1,16 @@
 #include <gtest/gtest.h>
+#include <malloc.h>
 
+#include <barrier>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numeric>
+#include <thread>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
@@ -10,6 +18,7 @@
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/range_check.h"
 #include "core/base/subprocess.h"
 
 namespace color3d {
@@ -138,6 +147,68 @@ TEST(Subprocess, ReportsExitCodeLogTimeoutAndCancellation) {
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kFailedPrecondition);
   }
+}
+
+// Pools of a process in which eight threads hold memory at the same time.
+int ArenasOfEightThreads() {
+  std::barrier all(8);
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i) {
+    threads.emplace_back([&] {
+      const std::vector<char> small(1000);
+      all.arrive_and_wait();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  char* text = nullptr;
+  size_t size = 0;
+  std::FILE* file = ::open_memstream(&text, &size);
+  ::malloc_info(0, file);
+  std::fclose(file);
+  int count = 0;
+  for (const char* at = text; (at = std::strstr(at, "<heap nr=")) != nullptr; ++at) ++count;
+  std::free(text);
+  return count;
+}
+
+// In processes of their own: the limit holds for all threads, forever.
+TEST(ShareMallocArenasDeathTest, ThreadsShareThem) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  EXPECT_EXIT(
+      {
+        ShareMallocArenas(2);
+        std::exit(ArenasOfEightThreads());
+      },
+      testing::ExitedWithCode(2),
+      "");
+  EXPECT_EXIT(std::exit(ArenasOfEightThreads() > 2 ? 0 : 1), testing::ExitedWithCode(0), "");
+}
+
+// What a check says about a value; empty when it accepts it.
+std::string RangeComplaint(double value, double low, double high) {
+  try {
+    RangeCheck("test option")("sigma", value, low, high);
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    return e.what();
+  }
+  return "";
+}
+
+TEST(RangeCheckTest, NamesFieldValueAndRange) {
+  EXPECT_EQ(RangeComplaint(0.25, 0.0, 1.0), "");
+  EXPECT_EQ(RangeComplaint(0.0, 0.0, 1.0), "");
+  EXPECT_EQ(RangeComplaint(1.0, 0.0, 1.0), "");
+  EXPECT_EQ(RangeComplaint(1.00001, 0.0, 1.0), "test option sigma is 1.00001; it must be 0 to 1");
+  EXPECT_EQ(RangeComplaint(0.0, 1e-6, 0.5), "test option sigma is 0; it must be 1e-06 to 0.5");
+  EXPECT_EQ(RangeComplaint(100001, 0, 100000),
+            "test option sigma is 100001; it must be 0 to 100000");
+}
+
+TEST(RangeCheckTest, NoNumberIsInNoRange) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_NE(RangeComplaint(std::nan(""), -infinity, infinity), "");
+  EXPECT_NE(RangeComplaint(infinity, 0.0, 1.0), "");
 }
 
 }  // namespace

@@ -6,6 +6,10 @@
 #include <optional>
 #include <string>
 
+#ifdef __GLIBC__  // known only after a standard header
+#include <malloc.h>
+#endif
+
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
@@ -84,6 +88,12 @@ int64_t PeakMemoryBytes() { return StatusBytes("VmHWM:"); }
 void ResetPeakMemory() {
   std::ofstream clear("/proc/self/clear_refs");
   clear << "5";
+}
+
+void ShareMallocArenas([[maybe_unused]] int arenas) {
+#ifdef __GLIBC__
+  ::mallopt(M_ARENA_MAX, std::max(1, arenas));
+#endif
 }
 
 }  // namespace color3d

@@ -17,4 +17,9 @@ int64_t ResidentMemoryBytes();
 int64_t PeakMemoryBytes();
 void ResetPeakMemory();
 
+// Lets all threads allocate from at most `arenas` (>= 1) pools. glibc gives each thread one of its
+// own, which keeps what was freed in it: threads that take turns would keep a turn's memory each.
+// To be called before threads are started; no effect without glibc.
+void ShareMallocArenas(int arenas);
+
 }  // namespace color3d

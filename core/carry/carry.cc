@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
 
@@ -21,8 +22,10 @@ struct Correspondence {
   Image visible;   // 1 channel, 0..1
 };
 
-bool Inside(double x, double y, const Image& image) {
-  return x >= 0.5 && y >= 0.5 && x <= image.width - 0.5 && y <= image.height - 0.5;
+// Between pixel centres, so that nothing needs to be extrapolated.
+bool Inside(const Eigen::Vector2d& pixel, const Image& image) {
+  return pixel.x() >= 0.5 && pixel.y() >= 0.5 && pixel.x() <= image.width - 0.5 &&
+         pixel.y() <= image.height - 0.5;
 }
 
 // (x, y) with pixel centres at +0.5, as cameras have them.
@@ -57,16 +60,15 @@ Correspondence Correspond(const SurfaceView& source, const SurfaceView& target, 
     for (int x = 0; x < c.width; ++x) {
       const double depth = target.depth.At(0, y, x);
       if (!(depth > 0.0)) continue;
-      const Eigen::Vector3d ray((x + 0.5 - c.cx) / c.fx, (y + 0.5 - c.cy) / c.fy, 1.0);
-      const Eigen::Vector3d p = cam_from_world * (center + world_from_cam * (depth * ray)) +
-                                source.cam_from_world.translation;
+      const Eigen::Vector3d point = depth * c.Ray(x + 0.5, y + 0.5);
+      const Eigen::Vector3d p =
+          cam_from_world * (center + world_from_cam * point) + source.cam_from_world.translation;
       if (!(p.z() > 1e-6)) continue;
-      const double sx = source.camera.fx * p.x() / p.z() + source.camera.cx;
-      const double sy = source.camera.fy * p.y() / p.z() + source.camera.cy;
-      if (!Inside(sx, sy, source.luminance)) continue;
-      const double e = DepthDisagreement(source.depth, sx, sy, p.z()) / tolerance;
-      out.position.At(0, y, x) = static_cast<float>(sx);
-      out.position.At(1, y, x) = static_cast<float>(sy);
+      const Eigen::Vector2d pixel = source.camera.Project(p);
+      if (!Inside(pixel, source.luminance)) continue;
+      const double e = DepthDisagreement(source.depth, pixel.x(), pixel.y(), p.z()) / tolerance;
+      out.position.At(0, y, x) = static_cast<float>(pixel.x());
+      out.position.At(1, y, x) = static_cast<float>(pixel.y());
       out.visible.At(0, y, x) = static_cast<float>(std::exp(-e * e));
     }
   }
@@ -153,20 +155,14 @@ void CheckSizes(const SurfaceView& view, const char* which) {
   }
 }
 
-void CheckPositive(const char* field, double value) {
-  if (!(value > 0.0 && value <= 1e6)) {
-    throw InvalidArgument(std::string("carry option ") + field + " is " + std::to_string(value) +
-                          "; it must be above 0 and at most 1e6");
-  }
-}
-
 }  // namespace
 
 void CarryOptions::Validate() const {
-  CheckPositive("depth_tolerance", depth_tolerance);
-  CheckPositive("luminance_tolerance", luminance_tolerance);
-  CheckPositive("structure_tolerance", structure_tolerance);
-  if (flow_tolerance_px != 0.0) CheckPositive("flow_tolerance_px", flow_tolerance_px);
+  const RangeCheck check("carry option");
+  check("depth_tolerance", depth_tolerance, 1e-6, 1e6);
+  check("luminance_tolerance", luminance_tolerance, 1e-6, 1e6);
+  check("structure_tolerance", structure_tolerance, 1e-6, 1e6);
+  if (flow_tolerance_px != 0.0) check("flow_tolerance_px", flow_tolerance_px, 1e-6, 1e6);
 }
 
 CarriedColor CarryColor(const SurfaceView& source,

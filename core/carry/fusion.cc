@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/keycolor/edge_weights.h"
 #include "core/keycolor/grid_solver.h"
 
@@ -16,13 +17,6 @@ namespace {
 constexpr double kTolerance = 1e-3;
 constexpr double kLeastPull = 1e-6;   // keeps the system definite
 constexpr double kMostStrange = 4.0;  // feature distance; beyond, all is equally strange
-
-void CheckRange(const char* field, double value, double low, double high) {
-  if (!(value >= low && value <= high)) {
-    throw InvalidArgument(std::string("fusion option ") + field + " is " + std::to_string(value) +
-                          ", allowed are " + std::to_string(low) + " to " + std::to_string(high));
-  }
-}
 
 void CheckSize(const char* what, const Image& image, int channels, const Image& luminance) {
   if (image.width != luminance.width || image.height != luminance.height ||
@@ -43,13 +37,14 @@ double SmoothStep(double x, double begin, double end) {
 }  // namespace
 
 void FusionOptions::Validate() const {
-  CheckRange("inferred_weight", inferred_weight, 1e-6, 1e3);
-  CheckRange("least_confidence", least_confidence, 0, 1);
-  CheckRange("edge_sigma", edge_sigma, 0.01, 100);
-  CheckRange("guess_begins", guess_begins, 0, 1e6);
-  CheckRange("guess_ends", guess_ends, guess_begins + 1e-6, 2e6);
-  CheckRange("most_guessed", most_guessed, 0, 1);
-  CheckRange("guess_chroma", guess_chroma, 0, 1);
+  const RangeCheck check("fusion option");
+  check("inferred_weight", inferred_weight, 1e-6, 1e3);
+  check("least_confidence", least_confidence, 0, 1);
+  check("edge_sigma", edge_sigma, 0.01, 100);
+  check("guess_begins", guess_begins, 0, 1e6);
+  check("guess_ends", guess_ends, guess_begins + 1e-6, 2e6);
+  check("most_guessed", most_guessed, 0, 1);
+  check("guess_chroma", guess_chroma, 0, 1);
 }
 
 FusedColor FuseColors(const Image& luminance,

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 
 namespace color3d {
 namespace {
@@ -265,9 +266,7 @@ void PickPlane(const int16_t* sum, int planes, double* plane, double* margin) {
 }  // namespace
 
 void PlaneSweepOptions::Validate() const {
-  if (planes < 8 || planes > 512) {
-    throw InvalidArgument("plane sweep takes 8 to 512 planes, not " + std::to_string(planes));
-  }
+  RangeCheck("plane sweep option")("planes", planes, 8, 512);
 }
 
 DepthMap SweepPlanes(const PosedLuminance& reference,

@@ -17,10 +17,7 @@ constexpr double kNearMargin = 0.75, kFarMargin = 1.6;
 
 bool Sees(const View& view, const Eigen::Vector3d& point) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(point);
-  if (!(p.z() > 1e-6)) return false;
-  const double x = view.camera.fx * p.x() / p.z() + view.camera.cx;
-  const double y = view.camera.fy * p.y() / p.z() + view.camera.cy;
-  return x >= 0 && y >= 0 && x < view.camera.width && y < view.camera.height;
+  return p.z() > 1e-6 && view.camera.Contains(view.camera.Project(p));
 }
 
 // How useful parallax under this angle is, 0..1.

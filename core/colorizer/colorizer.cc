@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/personal_colorizer.h"
 #include "core/colorizer/recipe.h"
@@ -22,14 +23,6 @@ namespace color3d {
 namespace {
 
 constexpr float kMaxGivenAb = 256.0f;
-
-void CheckRange(const char* field, double value, double low, double high) {
-  if (!(value >= low && value <= high)) {
-    throw InvalidArgument(std::string("colorizer option ") + field + " is " +
-                          std::to_string(value) + ", allowed are " + std::to_string(low) + " to " +
-                          std::to_string(high));
-  }
-}
 
 std::string SizeOf(const Image& image) {
   return std::to_string(image.width) + "x" + std::to_string(image.height);
@@ -134,15 +127,16 @@ std::array<float, 2> MeanAb(const Image& ab) {
 }  // namespace
 
 void ColorizerOptions::Validate() const {
-  CheckRange("iterations", iterations, 0, 100000);
-  CheckRange("time_limit_seconds", time_limit_seconds, 0, 1e7);
-  CheckRange("max_side_px", max_side_px, 64, 2048);
-  CheckRange("crop_px", crop_px, 64, 1024);
-  CheckRange("learning_rate", learning_rate, 0, 1);
-  CheckRange("consistency_weight", consistency_weight, 0, 1e3);
-  CheckRange("average_decay", average_decay, 0, 0.9999);
-  CheckRange("least_improvement", least_improvement, 0, 0.5);
-  CheckRange("threads", threads, 0, 1024);
+  const RangeCheck check("colorizer option");
+  check("iterations", iterations, 0, 100000);
+  check("time_limit_seconds", time_limit_seconds, 0, 1e7);
+  check("max_side_px", max_side_px, 64, 2048);
+  check("crop_px", crop_px, 64, 1024);
+  check("learning_rate", learning_rate, 0, 1);
+  check("consistency_weight", consistency_weight, 0, 1e3);
+  check("average_decay", average_decay, 0, 0.9999);
+  check("least_improvement", least_improvement, 0, 0.5);
+  check("threads", threads, 0, 1024);
 }
 
 TrainingRecipe RecipeFor(const ColorizerOptions& options) {

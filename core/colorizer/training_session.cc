@@ -138,13 +138,17 @@ void TrainingSession::SwapWithAverage() {
   }
 }
 
+// In 16 bits, as it would otherwise be half of what a waiting scene keeps in memory: parameters
+// with the precision in which they are delivered, moments with float32's range.
 void TrainingSession::KeepGoodState() {
+  torch::NoGradGuard no_grad;
   good_state_.clear();
-  for (const auto& [name, tensor] : model_.parameters()) {
-    good_state_.push_back(tensor.detach().clone());
-  }
-  for (const auto& [name, tensor] : adam_.Moments()) good_state_.push_back(tensor.clone());
-  for (const torch::Tensor& tensor : average_) good_state_.push_back(tensor.clone());
+  const auto keep = [this](const NamedTensors& tensors, torch::ScalarType type) {
+    for (const auto& [name, tensor] : tensors) good_state_.push_back(tensor.to(type));
+  };
+  keep(model_.parameters(), torch::kHalf);
+  keep(adam_.Moments(), torch::kBFloat16);
+  keep(Average(), torch::kHalf);
   good_steps_ = adam_.steps();
   good_running_loss_ = running_loss_;
 }

@@ -91,8 +91,8 @@ class TrainingSession {
   double best_running_loss_ = 0.0;  // since the last rollback; 0: none yet
   int rollbacks_ = 0;
   bool stopped_early_ = false;
-  std::vector<torch::Tensor> average_;  // of the parameters; empty: off
-  std::vector<torch::Tensor> good_state_;
+  std::vector<torch::Tensor> average_;     // of the parameters; empty: off
+  std::vector<torch::Tensor> good_state_;  // 16 bits per value
   int64_t good_steps_ = 0;
   double good_running_loss_ = 0.0;
   std::vector<TrainingPoint> curve_;

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/base/range_check.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/edge_weights.h"
@@ -17,13 +18,6 @@ namespace {
 
 constexpr int kGuideRadius = 2;
 constexpr float kGuideVarianceFloor = 20.0f;
-
-void CheckRange(const char* field, double value, double low, double high) {
-  if (!(value >= low && value <= high)) {
-    throw InvalidArgument(std::string("hint option ") + field + " is " + std::to_string(value) +
-                          ", allowed are " + std::to_string(low) + " to " + std::to_string(high));
-  }
-}
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -120,11 +114,12 @@ HintSolution Solve(const Image& luminance,
 }  // namespace
 
 void HintOptions::Validate() const {
-  CheckRange("sigma", sigma, 1e-3, 1e3);
-  CheckRange("max_side_px", max_side_px, 64, 16384);
-  CheckRange("tolerance", tolerance, 1e-6, 0.1);
-  CheckRange("max_iterations", max_iterations, 1, 1000000);
-  CheckRange("threads", threads, 0, 1024);
+  const RangeCheck check("hint option");
+  check("sigma", sigma, 1e-3, 1e3);
+  check("max_side_px", max_side_px, 64, 16384);
+  check("tolerance", tolerance, 1e-6, 0.1);
+  check("max_iterations", max_iterations, 1, 1000000);
+  check("threads", threads, 0, 1024);
 }
 
 HintSolution KeyColorFromStrokes(const Image& luminance,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
@@ -19,13 +20,6 @@ constexpr int kLargestPictureSidePx = 1536;  // what the finest windows are cut 
 constexpr int kHintsPerSide = 64;
 constexpr int kGuideRadius = 3;
 constexpr float kGuideVarianceFloor = 30.0f;
-
-void CheckRange(const char* field, double value, double low, double high) {
-  if (!(value >= low && value <= high)) {
-    throw InvalidArgument(std::string("prompt option ") + field + " is " + std::to_string(value) +
-                          ", allowed are " + std::to_string(low) + " to " + std::to_string(high));
-  }
-}
 
 void CheckPictures(const Image& luminance, const Image& rest) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -231,12 +225,13 @@ Error NothingFound(const std::vector<PromptRegion>& regions) {
 }  // namespace
 
 void PromptOptions::Validate() const {
+  const RangeCheck check("prompt option");
   if (windows_per_side.empty()) throw InvalidArgument("prompt option windows_per_side is empty");
-  for (const int count : windows_per_side) CheckRange("windows_per_side", count, 1, 8);
-  CheckRange("temperature", temperature, 1e-4, 10.0);
-  CheckRange("seed_confidence", seed_confidence, 0.0, 1.0);
-  CheckRange("least_share", least_share, 0.0, 1.0);
-  CheckRange("map_side_px", map_side_px, 32, 1024);
+  for (const int count : windows_per_side) check("windows_per_side", count, 1, 8);
+  check("temperature", temperature, 1e-4, 10.0);
+  check("seed_confidence", seed_confidence, 0.0, 1.0);
+  check("least_share", least_share, 0.0, 1.0);
+  check("map_side_px", map_side_px, 32, 1024);
   hints.Validate();
 }
 

@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
@@ -32,12 +33,6 @@ constexpr int kLevels = 1024;  // of the histograms of L
 constexpr float kLeastConfidence = 1e-4f;
 constexpr int kGuideRadius = 2;
 constexpr float kGuideVarianceFloor = 20.0f;
-
-void CheckRange(const char* field, double value, double low, double high) {
-  if (value >= low && value <= high) return;
-  throw InvalidArgument(std::string("reference option ") + field + " is " + std::to_string(value) +
-                        ", allowed are " + std::to_string(low) + " to " + std::to_string(high));
-}
 
 void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -240,14 +235,15 @@ void Judge(const CellMatches& matches,
 }  // namespace
 
 void ReferenceOptions::Validate() const {
-  CheckRange("match_side_px", match_side_px, 64, 1024);
-  CheckRange("spread_side_px", spread_side_px, 64, 8192);
-  CheckRange("bank_size", bank_size, 100, 100000);
-  CheckRange("neighbours", neighbours, 1, 64);
-  CheckRange("sigma", sigma, 1e-3, 1e3);
-  CheckRange("match_weight", match_weight, 1e-6, 1e3);
-  CheckRange("low_confidence", low_confidence, 1e-6, 1.0);
-  CheckRange("threads", threads, 0, 1024);
+  const RangeCheck check("reference option");
+  check("match_side_px", match_side_px, 64, 1024);
+  check("spread_side_px", spread_side_px, 64, 8192);
+  check("bank_size", bank_size, 100, 100000);
+  check("neighbours", neighbours, 1, 64);
+  check("sigma", sigma, 1e-3, 1e3);
+  check("match_weight", match_weight, 1e-6, 1e3);
+  check("low_confidence", low_confidence, 1e-6, 1.0);
+  check("threads", threads, 0, 1024);
 }
 
 ReferenceSolution KeyColorFromReferences(const Image& luminance,

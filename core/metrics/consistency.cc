@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/color/difference.h"
 
 namespace color3d {
@@ -62,10 +63,6 @@ double DepthAt(const Image& depth, const Corners& c) {
   return c.Mix(depth, 0);
 }
 
-Eigen::Vector3d Ray(const Camera& camera, double u, double v) {
-  return {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0};
-}
-
 // x_to = rotation x_from + translation.
 struct Motion {
   Eigen::Matrix3d rotation;
@@ -101,11 +98,7 @@ void AddPairs(int views, int gap, bool long_gap, int most, std::vector<ViewPair>
 }  // namespace
 
 void MatchOptions::Validate() const {
-  const auto check = [](const char* name, double value, double low, double high) {
-    if (value >= low && value <= high) return;
-    throw InvalidArgument(std::string(name) + " is " + std::to_string(value) + "; it must be " +
-                          std::to_string(low) + " to " + std::to_string(high));
-  };
+  const RangeCheck check("match option");
   check("max_reprojection_px", max_reprojection_px, 0.0, 100.0);
   check("depth_tolerance", depth_tolerance, 0.0, 1.0);
   check("stride_px", stride_px, 1.0, 1000.0);
@@ -125,19 +118,18 @@ std::vector<PixelMatch> MatchByGeometry(const PosedDepth& from,
     for (int x = 0; x < from.camera.width; x += options.stride_px) {
       const double depth = from.depth.At(0, y, x);
       if (!(depth > 0.0) || !std::isfinite(depth)) continue;
-      const Eigen::Vector3d there = forth.Apply(depth * Ray(from.camera, x + 0.5, y + 0.5));
+      const Eigen::Vector3d there = forth.Apply(depth * from.camera.Ray(x + 0.5, y + 0.5));
       if (!(there.z() > 0.0)) continue;
-      const double u = to.camera.fx * there.x() / there.z() + to.camera.cx;
-      const double v = to.camera.fy * there.y() / there.z() + to.camera.cy;
+      const Eigen::Vector2d pixel = to.camera.Project(there);
+      const double u = pixel.x(), v = pixel.y();
       const auto corners = CornersAt(u, v, to.camera.width, to.camera.height);
       if (!corners) continue;
       const double seen = DepthAt(to.depth, *corners);
       if (!(std::abs(seen - there.z()) <= options.depth_tolerance * there.z())) continue;
-      const Eigen::Vector3d again = back.Apply(seen * Ray(to.camera, u, v));
+      const Eigen::Vector3d again = back.Apply(seen * to.camera.Ray(u, v));
       if (!(again.z() > 0.0)) continue;
-      const double dx = from.camera.fx * again.x() / again.z() + from.camera.cx - (x + 0.5);
-      const double dy = from.camera.fy * again.y() / again.z() + from.camera.cy - (y + 0.5);
-      if (!(dx * dx + dy * dy < max_distance2)) continue;
+      const Eigen::Vector2d off = from.camera.Project(again) - Eigen::Vector2d(x + 0.5, y + 0.5);
+      if (!(off.squaredNorm() < max_distance2)) continue;
       matches.push_back({x, y, static_cast<float>(u), static_cast<float>(v)});
     }
   }

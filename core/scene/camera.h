@@ -21,6 +21,21 @@ struct Camera {
   Camera Scaled(int new_width, int new_height) const;
   // Scaled so that the longer side is at most max_side_px; unchanged when it is, or for <= 0.
   Camera FitWithin(int max_side_px) const;
+
+  // Pixel at which the picture shows a point of the camera's frame with z > 0. It may lie outside
+  // of the picture: see Contains.
+  Eigen::Vector2d Project(const Eigen::Vector3d& in_camera) const {
+    return {fx * in_camera.x() / in_camera.z() + cx, fy * in_camera.y() / in_camera.z() + cy};
+  }
+  // The inverse: the point of the camera's frame at z = 1 that this pixel shows. Times a depth, the
+  // point at that depth.
+  Eigen::Vector3d Ray(double x_px, double y_px) const {
+    return {(x_px - cx) / fx, (y_px - cy) / fy, 1.0};
+  }
+  // 0 <= x < width and 0 <= y < height; false for NaN.
+  bool Contains(const Eigen::Vector2d& pixel) const {
+    return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < width && pixel.y() < height;
+  }
 };
 
 // Brown-Conrady (OpenCV order k1 k2 p1 p2 k3 k4 k5 k6) or Kannala-Brandt fisheye (k1..k4).
@@ -38,6 +53,10 @@ struct Pose {
   Eigen::Vector3d Center() const { return -(rotation.conjugate() * translation); }
   Eigen::Vector3d Apply(const Eigen::Vector3d& world) const {
     return rotation * world + translation;
+  }
+  // The inverse of Apply.
+  Eigen::Vector3d WorldFromCamera(const Eigen::Vector3d& in_camera) const {
+    return Center() + rotation.conjugate() * in_camera;
   }
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/scene/colmap_model.h"
 #include "core/scene/lens.h"
 #include "core/scene/normalise.h"
@@ -21,13 +22,6 @@ constexpr int kRandomPoints = 20'000;
 constexpr uint64_t kRandomPointSeed = 1;
 constexpr int kHoldOutEvery = 8;
 constexpr size_t kMinTrainingViews = 2;
-
-void CheckRange(const char* field, int64_t value, int64_t low, int64_t high) {
-  if (value < low || value > high) {
-    throw InvalidArgument(std::string("import option ") + field + " is " + std::to_string(value) +
-                          "; it must be " + std::to_string(low) + ".." + std::to_string(high));
-  }
-}
 
 // The folder of the COLMAP model, or an empty path.
 fs::path FindColmapFolder(const fs::path& scene_folder) {
@@ -143,11 +137,12 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
 }  // namespace
 
 void ImportOptions::Validate() const {
-  CheckRange("sfm_max_image_side_px", sfm_max_image_side_px, 256, 4096);
-  CheckRange("sfm_max_features", sfm_max_features, 512, 16384);
-  CheckRange("sfm_neighbors", sfm_neighbors, 2, 100);
-  CheckRange("sfm_timeout", sfm_timeout.count(), 1, 7 * 24 * 3600);
-  CheckRange("threads", threads, 0, 1024);
+  const RangeCheck check("import option");
+  check("sfm_max_image_side_px", sfm_max_image_side_px, 256, 4096);
+  check("sfm_max_features", sfm_max_features, 512, 16384);
+  check("sfm_neighbors", sfm_neighbors, 2, 100);
+  check("sfm_timeout", sfm_timeout.count(), 1, 7 * 24 * 3600);
+  check("threads", threads, 0, 1024);
 }
 
 ImportResult ImportScene(const fs::path& scene_folder,

@@ -50,7 +50,7 @@ TEST_F(Import, BadInputsSayWhatIsWrong) {
 
 TEST_F(Import, OptionsAreChecked) {
   options_.sfm_max_features = 10;
-  EXPECT_THAT(Said(), HasSubstr("sfm_max_features is 10; it must be 512..16384"));
+  EXPECT_THAT(Said(), HasSubstr("sfm_max_features is 10; it must be 512 to 16384"));
   options_ = {};
   options_.sfm_max_image_side_px = 10000;
   EXPECT_THAT(Said(), HasSubstr("sfm_max_image_side_px"));
@@ -59,7 +59,7 @@ TEST_F(Import, OptionsAreChecked) {
   EXPECT_THAT(Said(), HasSubstr("sfm_timeout"));
   options_ = {};
   options_.sfm_neighbors = 1;
-  EXPECT_THAT(Said(), HasSubstr("sfm_neighbors is 1; it must be 2..100"));
+  EXPECT_THAT(Said(), HasSubstr("sfm_neighbors is 1; it must be 2 to 100"));
   options_ = {};
   options_.threads = -1;
   EXPECT_THAT(Said(), HasSubstr("threads"));
@@ -148,7 +148,7 @@ TEST_F(Import, PosesWithoutPointsGetRandomOnesThatViewsSee) {
       const View& view = result.scene.views[v];
       const Eigen::Vector3d p = view.cam_from_world.Apply(point.position);
       ASSERT_GT(p.z(), 0.0);
-      const Eigen::Vector2d pixel = ProjectPinhole(view.camera, p);
+      const Eigen::Vector2d pixel = view.camera.Project(p);
       ASSERT_TRUE(pixel.x() >= 0 && pixel.x() < view.camera.width);
     }
   }

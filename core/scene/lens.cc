@@ -53,12 +53,10 @@ bool OutlineIsInside(const Camera& camera,
                                          Eigen::Vector2d(t * w, h),
                                          Eigen::Vector2d(0.0, t * h),
                                          Eigen::Vector2d(w, t * h)}) {
-      const Eigen::Vector2d ray((pixel.x() - camera.cx) / camera.fx,
-                                (pixel.y() - camera.cy) / camera.fy);
-      if (ray.norm() > max_radius) return false;
-      const Eigen::Vector2d d = Distort(distortion, ray);
-      const double u = captured.fx * d.x() + captured.cx;
-      const double v = captured.fy * d.y() + captured.cy;
+      const Eigen::Vector3d ray = camera.Ray(pixel.x(), pixel.y());
+      if (ray.head<2>().norm() > max_radius) return false;
+      const Eigen::Vector2d seen = ProjectCaptured(captured, distortion, ray);
+      const double u = seen.x(), v = seen.y();
       if (!(u >= -kSlackPx && u <= w + kSlackPx && v >= -kSlackPx && v <= h + kSlackPx)) {
         return false;
       }
@@ -104,12 +102,7 @@ Eigen::Vector2d ProjectCaptured(const Camera& captured,
                                 const Distortion& distortion,
                                 const Eigen::Vector3d& in_camera) {
   const Eigen::Vector2d d = Distort(distortion, in_camera.head<2>() / in_camera.z());
-  return {captured.fx * d.x() + captured.cx, captured.fy * d.y() + captured.cy};
-}
-
-Eigen::Vector2d ProjectPinhole(const Camera& camera, const Eigen::Vector3d& in_camera) {
-  return {camera.fx * in_camera.x() / in_camera.z() + camera.cx,
-          camera.fy * in_camera.y() / in_camera.z() + camera.cy};
+  return captured.Project(d.homogeneous());
 }
 
 Camera UndistortedCamera(const Camera& captured, const Distortion& distortion) {

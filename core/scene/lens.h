@@ -16,8 +16,6 @@ Eigen::Vector2d Distort(const Distortion& distortion, const Eigen::Vector2d& nor
 Eigen::Vector2d ProjectCaptured(const Camera& captured,
                                 const Distortion& distortion,
                                 const Eigen::Vector3d& in_camera);
-// Pixel of the undistorted picture.
-Eigen::Vector2d ProjectPinhole(const Camera& camera, const Eigen::Vector3d& in_camera);
 
 // The camera of the undistorted picture: size and principal point as captured, both focal lengths
 // times one factor in 0.5..8, the smallest for which every pixel of the undistorted picture lies in

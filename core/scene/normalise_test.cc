@@ -53,9 +53,9 @@ TEST(NormaliseScene, VerySmallLargeAndFarScenesComeToTheSameAndGoBack) {
         for (const View& view : scene.views) {
           const size_t v = static_cast<size_t>(&view - scene.views.data());
           const Eigen::Vector2d pixel =
-              ProjectPinhole(view.camera, view.cam_from_world.Apply(scene.points[i].position));
-          const Eigen::Vector2d expected = ProjectPinhole(
-              view.camera, original.views[v].cam_from_world.Apply(original.points[i].position));
+              view.camera.Project(view.cam_from_world.Apply(scene.points[i].position));
+          const Eigen::Vector2d expected = view.camera.Project(
+              original.views[v].cam_from_world.Apply(original.points[i].position));
           EXPECT_LT((pixel - expected).norm(), 1e-5);
         }
       }

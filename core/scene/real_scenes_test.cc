@@ -57,12 +57,11 @@ TEST_P(RealScenes, PointsReprojectToTheStoredObservations) {
       point_sum += best;
       // Undistorting the pixel that the photo shows must give the pinhole projection: invert the
       // lens numerically and project again.
-      const Eigen::Vector2d target((pixel.x() - view.captured_camera.cx) / view.captured_camera.fx,
-                                   (pixel.y() - view.captured_camera.cy) / view.captured_camera.fy);
+      const Eigen::Vector2d target = view.captured_camera.Ray(pixel.x(), pixel.y()).head<2>();
       Eigen::Vector2d ray = target;
       for (int k = 0; k < 50; ++k) ray += target - Distort(view.distortion, ray);
-      const Eigen::Vector2d pinhole = ProjectPinhole(view.camera, p);
-      const Eigen::Vector2d undistorted = ProjectPinhole(view.camera, {ray.x(), ray.y(), 1.0});
+      const Eigen::Vector2d pinhole = view.camera.Project(p);
+      const Eigen::Vector2d undistorted = view.camera.Project(ray.homogeneous());
       worst_undistorted = std::max(worst_undistorted, (pinhole - undistorted).norm());
     }
     sum += point_sum;

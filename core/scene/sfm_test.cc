@@ -70,9 +70,7 @@ Image RenderRoom(const Camera& camera, const Pose& pose) {
     for (int x = 0; x < camera.width; ++x) {
       float sum = 0.0f;
       for (int s = 0; s < 4; ++s) {
-        const Eigen::Vector3d ray((x + 0.25 + 0.5 * (s % 2) - camera.cx) / camera.fx,
-                                  (y + 0.25 + 0.5 * (s / 2) - camera.cy) / camera.fy,
-                                  1.0);
+        const Eigen::Vector3d ray = camera.Ray(x + 0.25 + 0.5 * (s % 2), y + 0.25 + 0.5 * (s / 2));
         sum += 0.25f * Shade(origin, pose.rotation.conjugate() * ray);
       }
       image.At(0, y, x) = sum;

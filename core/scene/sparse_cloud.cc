@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/base/random.h"
-#include "core/scene/lens.h"
 
 namespace color3d {
 namespace {
@@ -32,9 +31,7 @@ double Baseline(const Scene& scene, const Eigen::Vector3d& mean) {
 bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(world);
   if (p.z() < near) return false;
-  const Eigen::Vector2d pixel = ProjectPinhole(view.camera, p);
-  return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < view.camera.width &&
-         pixel.y() < view.camera.height;
+  return view.camera.Contains(view.camera.Project(p));
 }
 
 bool MostLookAt(const Scene& scene, const Eigen::Vector3d& world) {
@@ -108,11 +105,8 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     const double z = 1.0 / random.NextUniform(1.0 / range.far, 1.0 / range.near);
     const double u = random.NextUniform(0.0, view.camera.width);
     const double v = random.NextUniform(0.0, view.camera.height);
-    const Eigen::Vector3d in_camera(
-        (u - view.camera.cx) / view.camera.fx * z, (v - view.camera.cy) / view.camera.fy * z, z);
     SparsePoint point;
-    point.position =
-        view.cam_from_world.Center() + view.cam_from_world.rotation.conjugate() * in_camera;
+    point.position = view.cam_from_world.WorldFromCamera(z * view.camera.Ray(u, v));
     for (size_t i = 0; i < scene.views.size(); ++i) {
       if (Sees(scene.views[i], point.position, near)) point.views.push_back(static_cast<int>(i));
     }

@@ -35,11 +35,10 @@ RemapTable MakeRemap(const Camera& captured, const Distortion& distortion, const
   table.y.reserve(table.x.capacity());
   for (int row = 0; row < camera.height; ++row) {
     for (int column = 0; column < camera.width; ++column) {
-      const Eigen::Vector2d ray((column + 0.5 - camera.cx) / camera.fx,
-                                (row + 0.5 - camera.cy) / camera.fy);
-      const Eigen::Vector2d d = Distort(distortion, ray);
-      table.x.push_back(static_cast<float>(captured.fx * d.x() + captured.cx - 0.5));
-      table.y.push_back(static_cast<float>(captured.fy * d.y() + captured.cy - 0.5));
+      const Eigen::Vector2d seen =
+          ProjectCaptured(captured, distortion, camera.Ray(column + 0.5, row + 0.5));
+      table.x.push_back(static_cast<float>(seen.x() - 0.5));
+      table.y.push_back(static_cast<float>(seen.y() - 0.5));
     }
   }
   return table;

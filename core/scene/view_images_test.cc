@@ -50,7 +50,7 @@ TEST(ViewImages, UndistortionMatchesThePinholeProjection) {
       int checked = 0;
       for (const SparsePoint& point : scene.points) {
         const Eigen::Vector3d p = scene.views[0].cam_from_world.Apply(point.position);
-        const Eigen::Vector2d pixel = ProjectPinhole(working, p);
+        const Eigen::Vector2d pixel = working.Project(p);
         const Eigen::Vector2d seen = ProjectCaptured(scene.views[0].captured_camera, distortion, p);
         const int x = static_cast<int>(std::floor(pixel.x() - 0.5));
         const int y = static_cast<int>(std::floor(pixel.y() - 0.5));

@@ -58,9 +58,7 @@ Image CastRays(const View& view) {
   const Eigen::Vector3d origin = view.cam_from_world.Center();
   for (int y = 0; y < lab.height; ++y) {
     for (int x = 0; x < lab.width; ++x) {
-      const Eigen::Vector3d ray((x + 0.5 - view.camera.cx) / view.camera.fx,
-                                (y + 0.5 - view.camera.cy) / view.camera.fy,
-                                1.0);
+      const Eigen::Vector3d ray = view.camera.Ray(x + 0.5, y + 0.5);
       Eigen::Vector3d hit;
       const int wall = HitWall(origin, view.cam_from_world.rotation.conjugate() * ray, &hit);
       float value[3];

@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/splat/adam.h"
 #include "core/splat/model_parameters.h"
@@ -187,13 +188,9 @@ class Refiner {
 }  // namespace
 
 void RgbRefineOptions::Validate() const {
-  if (epochs < 0 || epochs > 1000) {
-    throw InvalidArgument("epochs is " + std::to_string(epochs) + "; it must be 0 to 1000");
-  }
-  if (!(learning_rate >= 1e-6 && learning_rate <= 1.0)) {
-    throw InvalidArgument("learning_rate is " + std::to_string(learning_rate) +
-                          "; it must be 1e-6 to 1");
-  }
+  const RangeCheck check("colour refinement option");
+  check("epochs", epochs, 0, 1000);
+  check("learning_rate", learning_rate, 1e-6, 1.0);
 }
 
 RgbRefinement RefineRgbHarmonics(const GaussianModel& model,

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/splat/chroma_fit.h"
 #include "core/splat/geometry_trainer.h"
 #include "core/splat/projection.h"
@@ -15,13 +16,6 @@ namespace {
 
 constexpr int kMaxSampledViews = 8;  // per sparse point
 constexpr float kShDc = 0.28209479177387814f;
-
-// Also refuses NaN.
-void CheckRange(const char* name, double value, double low, double high) {
-  if (value >= low && value <= high) return;
-  throw InvalidArgument(std::string(name) + " = " + std::to_string(value) + " is not in " +
-                        std::to_string(low) + " .. " + std::to_string(high));
-}
 
 std::vector<PosedCamera> Posed(const Scene& scene,
                                const ViewImages& images,
@@ -37,11 +31,10 @@ std::vector<PosedCamera> Posed(const Scene& scene,
 bool PixelOf(const PosedCamera& view, const Eigen::Vector3d& world, int* x, int* y) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(world);
   if (!(p.z() > kNearPlane)) return false;
-  const double u = view.camera.fx * p.x() / p.z() + view.camera.cx;
-  const double v = view.camera.fy * p.y() / p.z() + view.camera.cy;
-  if (!(u >= 0.0 && v >= 0.0 && u < view.camera.width && v < view.camera.height)) return false;
-  *x = static_cast<int>(u);
-  *y = static_cast<int>(v);
+  const Eigen::Vector2d pixel = view.camera.Project(p);
+  if (!view.camera.Contains(pixel)) return false;
+  *x = static_cast<int>(pixel.x());
+  *y = static_cast<int>(pixel.y());
   return true;
 }
 
@@ -89,29 +82,31 @@ size_t SampleInitialColours(const Scene& scene,
 }  // namespace
 
 void GeometryOptions::Validate() const {
-  CheckRange("iterations", iterations, 0, 100'000);
-  CheckRange("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
-  CheckRange("max_gaussians", max_gaussians, 1, 10'000'000);
-  CheckRange("sh_degree", sh_degree, 0, 3);
-  CheckRange("ssim_weight", ssim_weight, 0.0, 1.0);
-  CheckRange("edge_weight", edge_weight, 0.0, 10.0);
-  CheckRange("densify_gradient", densify_gradient, 1e-9, 1e9);
-  CheckRange("learning_rate_scale", learning_rate_scale, 1e-3, 1e3);
+  const RangeCheck check("geometry option");
+  check("iterations", iterations, 0, 100'000);
+  check("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
+  check("max_gaussians", max_gaussians, 1, 10'000'000);
+  check("sh_degree", sh_degree, 0, 3);
+  check("ssim_weight", ssim_weight, 0.0, 1.0);
+  check("edge_weight", edge_weight, 0.0, 10.0);
+  check("densify_gradient", densify_gradient, 1e-9, 1e9);
+  check("learning_rate_scale", learning_rate_scale, 1e-3, 1e3);
 }
 
 void ChromaOptions::Validate() const {
-  CheckRange("iterations", iterations, 0, 100'000);
-  CheckRange("chroma_sh_degree", chroma_sh_degree, 0, 1);
-  CheckRange("ssim_weight", ssim_weight, 0.0, 1.0);
-  CheckRange("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
-  CheckRange("sweeps", sweeps, 0, 1000);
-  CheckRange("rounds", rounds, 0, 1000);
-  CheckRange("steps_per_round", steps_per_round, 1, 1000);
-  CheckRange("residual_tolerance", residual_tolerance, 0.0, 1.0);
-  CheckRange("objective_tolerance", objective_tolerance, 0.0, 1.0);
-  CheckRange("tikhonov", tikhonov, 1e-6, 1e6);
-  CheckRange("tikhonov_rest", tikhonov_rest, 1.0, 1e6);
-  CheckRange("memory_budget_bytes", static_cast<double>(memory_budget_bytes), 0.0, 1e15);
+  const RangeCheck check("chroma option");
+  check("iterations", iterations, 0, 100'000);
+  check("chroma_sh_degree", chroma_sh_degree, 0, 1);
+  check("ssim_weight", ssim_weight, 0.0, 1.0);
+  check("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
+  check("sweeps", sweeps, 0, 1000);
+  check("rounds", rounds, 0, 1000);
+  check("steps_per_round", steps_per_round, 1, 1000);
+  check("residual_tolerance", residual_tolerance, 0.0, 1.0);
+  check("objective_tolerance", objective_tolerance, 0.0, 1.0);
+  check("tikhonov", tikhonov, 1e-6, 1e6);
+  check("tikhonov_rest", tikhonov_rest, 1.0, 1e6);
+  check("memory_budget_bytes", static_cast<double>(memory_budget_bytes), 0.0, 1e15);
 }
 
 GaussianModel TrainGeometry(const Scene& scene,

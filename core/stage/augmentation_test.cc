@@ -209,6 +209,11 @@ TEST_F(AugmentationStageTest, NothingIsInventedAroundAKeyViewThatCoversTheScene)
   EXPECT_THAT(facts.at("left_out").dump(), AllOf(HasSubstr("95 %"), HasSubstr("not asked for")));
 }
 
+TEST_F(AugmentationStageTest, DamagedFactsOfTheCarryAreRefused) {
+  AddInput(artifact::kCarryFacts, R"({"coverage": "most"})");
+  EXPECT_THAT(Complaint(), HasSubstr("carry.json is damaged"));
+}
+
 TEST_F(AugmentationStageTest, NoSamplesAndNoFilesLeaveNothing) {
   options_.samples = 0;
   EXPECT_THAT(Names(Run()), IsEmpty());

@@ -1,14 +1,15 @@
 #include <algorithm>
-#include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/base/range_check.h"
 #include "core/carry/stereo_views.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/render.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/carried_views.h"
+#include "core/stage/carry_facts.h"
 #include "core/stage/key_color_sources.h"
 #include "core/stage/next_key_view.h"
 #include "core/stage/stages.h"
@@ -95,11 +96,8 @@ class SurfaceMaker {
       for (int x = kSurfaceGridPx / 2; x < camera.width; x += kSurfaceGridPx) {
         const double depth = rendered.depth.At(0, y, x);
         if (!(depth > 0.0)) continue;
-        const Eigen::Vector3d in_camera(depth * (x + 0.5 - camera.cx) / camera.fx,
-                                        depth * (y + 0.5 - camera.cy) / camera.fy,
-                                        depth);
-        points.push_back(rendered.cam_from_world.Center() +
-                         rendered.cam_from_world.rotation.conjugate() * in_camera);
+        points.push_back(
+            rendered.cam_from_world.WorldFromCamera(depth * camera.Ray(x + 0.5, y + 0.5)));
       }
     }
     return points;
@@ -191,18 +189,49 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
   return keys;
 }
 
+// carry.json, and a warning when the key views show next to nothing of the others.
+void Conclude(const Scene& scene,
+              const std::vector<ColoredKeyView>& keys,
+              const std::vector<double>& coverage,
+              StageContext& context) {
+  std::vector<int> key_views;
+  CarryFacts facts;
+  for (const ColoredKeyView& key : keys) {
+    key_views.push_back(key.view);
+    facts.key_views.push_back(scene.views[key.view].name);
+  }
+  double sum = 0.0;
+  for (size_t i = 0; i < coverage.size(); ++i) {
+    facts.per_view.emplace_back(scene.views[i].name, coverage[i]);
+    if (std::find(key_views.begin(), key_views.end(), static_cast<int>(i)) == key_views.end()) {
+      sum += coverage[i];
+    }
+  }
+  const size_t others = scene.views.size() - key_views.size();
+  const double mean = others > 0 ? sum / static_cast<double>(others) : 1.0;
+  facts.coverage = mean;
+  if (const auto next = NextKeyView(scene, key_views)) {
+    facts.next = {scene.views[next->view].name, next->covered_now, next->covered_with};
+  }
+  context.progress().OnError(0, "coverage", mean);
+  if (mean < kSmallCoverage) {
+    char percent[32];
+    std::snprintf(percent, sizeof(percent), "%.1f %%", 100.0 * mean);
+    context.progress().OnWarning(
+        "the key view shows only " + std::string(percent) +
+        " of what the other views show; their colours are inferred from likeness. Colour a second "
+        "key view, or choose another one");
+  }
+  WriteCarryFacts(facts, context);
+}
+
 }  // namespace
 
 void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
-  if (sweep_side_px < 64 || sweep_side_px > 2048) {
-    throw InvalidArgument("sweep_side_px is " + std::to_string(sweep_side_px) +
-                          "; it must be 64 to 2048");
-  }
-  if (sweep_sources < 1 || sweep_sources > 16) {
-    throw InvalidArgument("sweep_sources is " + std::to_string(sweep_sources) +
-                          "; it must be 1 to 16");
-  }
+  const RangeCheck check("carry_color option");
+  check("sweep_side_px", sweep_side_px, 64, 2048);
+  check("sweep_sources", sweep_sources, 1, 16);
   if (further.size() > 16) {
     throw InvalidArgument(std::to_string(further.size()) +
                           " further key views were given; at most 16 are taken");
@@ -218,54 +247,21 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   const SurfaceMaker maker(scene, geometry, options, context);
   const std::vector<ColoredKeyView> keys = ColorKeyViews(options, scene, maker, context);
 
-  const auto total = static_cast<int64_t>(scene.views.size());
-  std::vector<double> coverage(scene.views.size(), 1.0);
-  std::mutex mutex;
-  int64_t done = 0;
+  CarriedViews done(scene, context);
   ThreadPool pool(context.threads());
-  pool.ForEach(total, [&](int64_t index, int) {
+  pool.ForEach(static_cast<int64_t>(scene.views.size()), [&](int64_t index, int) {
     context.cancel().ThrowIfCancelled();
     const int view = static_cast<int>(index);
+    if (done.WasDone(view)) return;
     const auto key = std::find_if(
         keys.begin(), keys.end(), [&](const ColoredKeyView& k) { return k.view == view; });
     const CarriedColor carried =
         key != keys.end() ? key->color : CarryFromAll(keys, maker.Make(view), options.carry);
-    const std::string png = EncodeAbPng(carried.ab, carried.confidence);
-    const std::lock_guard lock(mutex);
-    if (key == keys.end()) coverage[index] = Coverage(carried, kCovered);
-    context.WriteOutput(ViewArtifact(artifact::kCarried, scene.views[view], ".png"), png);
-    context.progress().OnProgress(++done, total, "carrying colour into " + scene.views[view].name);
+    done.Add(view,
+             key != keys.end() ? 1.0 : Coverage(carried, kCovered),
+             EncodeAbPng(carried.ab, carried.confidence));
   });
-
-  std::vector<int> key_views;
-  for (const ColoredKeyView& key : keys) key_views.push_back(key.view);
-  nlohmann::ordered_json facts{{"key_views", nlohmann::ordered_json::array()}};
-  for (int view : key_views) facts["key_views"].push_back(scene.views[view].name);
-  double sum = 0.0;
-  for (size_t i = 0; i < coverage.size(); ++i) {
-    facts["views"].push_back({{"view", scene.views[i].name}, {"coverage", coverage[i]}});
-    if (std::find(key_views.begin(), key_views.end(), static_cast<int>(i)) == key_views.end()) {
-      sum += coverage[i];
-    }
-  }
-  const size_t others = scene.views.size() - key_views.size();
-  const double mean = others > 0 ? sum / static_cast<double>(others) : 1.0;
-  facts["coverage"] = mean;
-  if (const auto next = NextKeyView(scene, key_views)) {
-    facts["next_key_view"] = {{"name", scene.views[next->view].name},
-                              {"coverage_now", next->covered_now},
-                              {"coverage_with", next->covered_with}};
-  }
-  context.progress().OnError(0, "coverage", mean);
-  if (mean < kSmallCoverage) {
-    char percent[32];
-    std::snprintf(percent, sizeof(percent), "%.1f %%", 100.0 * mean);
-    context.progress().OnWarning(
-        "the key view shows only " + std::string(percent) +
-        " of what the other views show; their colours are inferred from likeness. Colour a second "
-        "key view, or choose another one");
-  }
-  context.WriteOutput(artifact::kCarryFacts, facts.dump(1) + "\n");
+  Conclude(scene, keys, done.coverage(), context);
 }
 
 }  // namespace color3d

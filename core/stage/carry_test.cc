@@ -168,6 +168,51 @@ TEST_F(CarryStageTest, TheSameBytesAgain) {
   EXPECT_EQ(first, ReadFile(scratch_.path() / "out" / "carried/p2.png"));
 }
 
+// Keeps every state that it is given; the worker loses its lease at the third.
+class Dying : public CheckpointStore {
+ public:
+  std::optional<std::string> Load() override {
+    return states.empty() ? std::nullopt : std::optional(states.back());
+  }
+  bool WantsSave() override { return true; }
+  void Save(const std::string& state) override {
+    states.push_back(state);
+    if (states.size() == 3) throw Error(ErrorCode::kAborted, "the lease is lost");
+  }
+  std::vector<std::string> states;
+};
+
+TEST_F(CarryStageTest, AnotherWorkerGoesOnAndGivesTheSame) {
+  const nlohmann::json facts = Run();
+  std::vector<std::string> files;
+  const auto file = [&](int i) {
+    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[i], ".png");
+  };
+  for (int i = 0; i < 5; ++i) {
+    files.push_back(ReadFile(file(i)));
+    std::filesystem::remove(file(i));
+  }
+  Dying store;
+  checkpoints_ = &store;
+  EXPECT_THAT(Complaint(), HasSubstr("lease"));
+  EXPECT_EQ(Run(), facts);
+  EXPECT_EQ(store.states.size(), 5u) << "three views before, two after";
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(ReadFile(file(i)), files[i]) << i;
+}
+
+TEST_F(CarryStageTest, ADamagedCheckpointIsSaidAndIgnored) {
+  const nlohmann::json facts = Run();
+  // No CBOR; a view whose value is a number; nothing at all.
+  for (const char* state : {"nonsense", "\xa1\x66p2.png\x01", ""}) {
+    Dying store;
+    store.states = {"", "", "", state};
+    checkpoints_ = &store;
+    observer_.text.clear();
+    EXPECT_EQ(Run(), facts);
+    EXPECT_THAT(observer_.text, HasSubstr("starts afresh"));
+  }
+}
+
 TEST(NextKeyView, AddsTheMostOfWhatIsNotShown) {
   Scene scene;
   scene.views.resize(4);

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
@@ -10,6 +11,7 @@
 #include "core/scene/view_images.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/augmentation_sources.h"
+#include "core/stage/carry_facts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -52,16 +54,6 @@ std::map<Kind, int> Deal(const AugmentationOptions& options) {
     if (wanted) ++counts[kind];
   }
   return counts;
-}
-
-// Mean share of the other views that the key view's colours reach; nothing when nobody measured it.
-std::optional<double> Coverage(const StageContext& context) {
-  if (!context.HasInput(artifact::kCarryFacts)) return std::nullopt;
-  const auto facts = ordered_json::parse(context.ReadInput(artifact::kCarryFacts), nullptr, false);
-  if (!facts.is_object() || !facts.contains("coverage") || !facts["coverage"].is_number()) {
-    return std::nullopt;
-  }
-  return facts["coverage"].get<double>();
 }
 
 KeyPicture ReadKeyPicture(const Scene& scene,
@@ -148,7 +140,7 @@ void LeaveOutNeedless(const AugmentationOptions& options,
       if (!on) outcome->LeaveOut(AugmentationKindName(kind), "not asked for");
     }
   }
-  const std::optional<double> coverage = Coverage(context);
+  const std::optional<double> coverage = ReadCarryFacts(context).coverage;
   if (coverage && *coverage >= kCovered && counts->erase(Kind::kOutpaint) > 0) {
     outcome->LeaveOut(AugmentationKindName(Kind::kOutpaint),
                       "the key view covers " + std::to_string(static_cast<int>(100.0 * *coverage)) +
@@ -201,10 +193,7 @@ void WriteResults(const KeyPicture& key, const Outcome& outcome, StageContext& c
 }  // namespace
 
 void AugmentationOptions::Validate() const {
-  if (samples < 0 || samples > kMaxSamples) {
-    throw InvalidArgument("samples is " + std::to_string(samples) + "; it must be 0 to " +
-                          std::to_string(kMaxSamples));
-  }
+  RangeCheck("augmentation option")("samples", samples, 0, kMaxSamples);
   CheckMaxSide(max_side_px);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/artifacts.h"
@@ -28,9 +29,7 @@ std::vector<int> ViewsToRender(const RenderOptions& options, const Scene& scene)
 }  // namespace
 
 void RenderOptions::Validate() const {
-  if (max_views < 1 || max_views > 1000) {
-    throw InvalidArgument("max_views is " + std::to_string(max_views) + "; it must be 1 to 1000");
-  }
+  RangeCheck("render option")("max_views", max_views, 1, 1000);
   CheckMaxSide(max_side_px);
 }
 

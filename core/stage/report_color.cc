@@ -49,9 +49,8 @@ ReportPicture SmallPicture(const Image& image, std::string caption) {
 }  // namespace
 
 ColorFacts::ColorFacts(const Scene& scene, const StageContext& context)
-    : scene_(scene), context_(context) {
+    : scene_(scene), context_(context), carry_(ReadCarryFacts(context)) {
   ReadProvenance();
-  if (context.HasInput(artifact::kCarryFacts)) ReadCarry();
   if (context.HasInput(artifact::kScores)) ReadScores();
 }
 
@@ -68,24 +67,6 @@ void ColorFacts::ReadProvenance() {
     mean_.guessed += part * view.shares.guessed;
     mean_.seen += part * view.shares.seen;
     mean_.inferred += part * view.shares.inferred;
-  }
-}
-
-void ColorFacts::ReadCarry() {
-  const ordered_json carry = ParseInput(context_, artifact::kCarryFacts);
-  try {
-    if (carry.contains("coverage")) coverage_ = carry.at("coverage").get<double>();
-    if (carry.contains("key_views")) {
-      for (const auto& key : carry.at("key_views")) {
-        key_views_.push_back(key.get<std::string>());
-      }
-    }
-    const auto next = carry.find("next_key_view");
-    if (next != carry.end() && next->is_object()) {
-      next_ = {next->at("name"), next->at("coverage_now"), next->at("coverage_with")};
-    }
-  } catch (const ordered_json::exception& e) {
-    throw InvalidArgument(std::string(artifact::kCarryFacts) + " is damaged: " + e.what());
   }
 }
 
@@ -116,7 +97,7 @@ void ColorFacts::ReadScores() {
 
 std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
   std::vector<std::pair<std::string, double>> metrics;
-  if (coverage_) metrics.emplace_back("coverage", *coverage_);
+  if (carry_.coverage) metrics.emplace_back("coverage", *carry_.coverage);
   if (!views_.empty()) {
     metrics.emplace_back("share_seen", mean_.seen);
     metrics.emplace_back("share_inferred", mean_.inferred);
@@ -141,9 +122,9 @@ std::string ColorFacts::SourceSummary() const {
               Percent(mean_.inferred) + " resemble something in it, and " + Percent(mean_.guessed) +
               " are a guess. ";
   }
-  if (coverage_) {
-    summary += (key_views_.size() == 1 ? "The key view covers " : "The key views cover ") +
-               Percent(*coverage_) + " of the other views' pixels.";
+  if (carry_.coverage) {
+    summary += (carry_.key_views.size() == 1 ? "The key view covers " : "The key views cover ") +
+               Percent(*carry_.coverage) + " of the other views' pixels.";
   }
   return summary;
 }
@@ -210,10 +191,11 @@ ReportSection ColorFacts::SourceSection() const {
   section.title = "Where the colour comes from";
   const std::string summary = SourceSummary();
   if (!summary.empty()) section.notes.push_back(summary);
-  if (next_) {
-    section.notes.push_back("To see more of it in its own colours, colour " + next_->name +
-                            " next: that raises the coverage from " + Percent(next_->coverage_now) +
-                            " to " + Percent(next_->coverage_with) + ".");
+  if (carry_.next) {
+    section.notes.push_back("To see more of it in its own colours, colour " + carry_.next->name +
+                            " next: that raises the coverage from " +
+                            Percent(carry_.next->coverage_now) + " to " +
+                            Percent(carry_.next->coverage_with) + ".");
   }
   if (!views_.empty()) section.tables.push_back(ShareTable());
   if (!errors_by_source_.empty()) section.tables.push_back(ErrorTable());

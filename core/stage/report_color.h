@@ -10,6 +10,7 @@
 
 #include "core/report/report_page.h"
 #include "core/scene/scene.h"
+#include "core/stage/carry_facts.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -39,11 +40,6 @@ class ColorFacts {
     int view = 0;
     SourceShares shares;
   };
-  struct NextKeyView {
-    std::string name;
-    double coverage_now = 0.0;
-    double coverage_with = 0.0;
-  };
   // A row of the table: "me", "me_de00", "tc_short", "tc_long", "tc".
   struct Agreement {
     std::string what;
@@ -51,7 +47,6 @@ class ColorFacts {
   };
 
   void ReadProvenance();
-  void ReadCarry();
   void ReadScores();
   std::string SourceSummary() const;
   std::vector<ViewFacts> LeastCertainFirst() const;
@@ -66,9 +61,7 @@ class ColorFacts {
   const StageContext& context_;
   std::vector<ViewFacts> views_;
   SourceShares mean_;
-  std::optional<double> coverage_;
-  std::vector<std::string> key_views_;
-  std::optional<NextKeyView> next_;
+  CarryFacts carry_;
   std::vector<Agreement> agreement_;
   std::map<std::string, double> errors_by_source_;
 };

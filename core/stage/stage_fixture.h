@@ -32,7 +32,7 @@ class StageTest : public ::testing::Test {
                          memory_bytes_,
                          models_,
                          remote_},
-                        none_,
+                        *checkpoints_,
                         observer_,
                         cancel_);
   }
@@ -45,6 +45,7 @@ class StageTest : public ::testing::Test {
   ScratchFolder scratch_;
   std::map<std::string, std::filesystem::path> inputs_;
   NoCheckpoints none_;
+  CheckpointStore* checkpoints_ = &none_;
   Warnings observer_;
   CancellationToken cancel_;
   int64_t memory_bytes_ = 0;

@@ -102,6 +102,7 @@ void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec)
     auto* s = spec->mutable_personalize();
     if (s->recipe() == v1::PersonalizeSpec::RECIPE_UNSPECIFIED) s->set_recipe(preset.recipe);
     if (!s->has_iterations()) s->set_iterations(preset.personalize_iterations);
+    if (!s->has_least_improvement()) s->set_least_improvement(preset.least_improvement);
   } else if (spec->has_colorize_views()) {
     auto* s = spec->mutable_colorize_views();
     if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);

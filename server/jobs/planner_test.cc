@@ -142,11 +142,17 @@ TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
   const PresetValues paper = ValuesOf(v1::PRESET_PAPER);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().iterations(), 7);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().recipe(), v1::PersonalizeSpec::RECIPE_PAPER);
+  EXPECT_TRUE(SpecOf(graph, "personalize").personalize().has_least_improvement());
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.0)
+      << "the paper's schedule runs to its end";
   EXPECT_EQ(SpecOf(graph, "select_key_view").select_key_view().strategy(),
             v1::SelectKeyViewSpec::STRATEGY_ENTROPY);
   EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_gaussians(),
             paper.max_gaussians);
   EXPECT_EQ(SpecOf(graph, "render").render().max_side_px(), paper.max_side_px);
+  spec.mutable_colorize_scene()->mutable_personalize()->set_least_improvement(0.25);
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.25);
   spec.mutable_colorize_scene()->set_max_side_px(333);
   graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_side_px(), 333);
@@ -309,6 +315,16 @@ TEST(Planner, BadOptionsNameFieldValueAndRange) {
             "colorize_scene.max_side_px is -5; the range is 64 to 4096");
   EXPECT_THAT(message([](auto* s) { s->mutable_reconstruct_geometry()->set_ssim_weight(1.5); }),
               HasSubstr("colorize_scene.reconstruct_geometry.ssim_weight is 1.5"));
+  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_average_decay(1.0); }),
+            "colorize_scene.personalize.average_decay is 1; the range is 0 to 0.9999");
+  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_least_improvement(0.6); }),
+            "colorize_scene.personalize.least_improvement is 0.6; the range is 0 to 0.5");
+  EXPECT_EQ(
+      message([](auto* s) {
+        s->mutable_personalize()->set_precision(static_cast<v1::PersonalizeSpec::Precision>(7));
+      }),
+      "colorize_scene.personalize.precision is 7, which is none of PRECISION_AUTO, "
+      "PRECISION_FLOAT32, PRECISION_BFLOAT16");
   EXPECT_THAT(
       message([](auto* s) {
         s->mutable_select_key_view()->set_temperature(std::numeric_limits<double>::quiet_NaN());

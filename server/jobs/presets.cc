@@ -1,6 +1,14 @@
 #include "server/jobs/presets.h"
 
 namespace color3d {
+namespace {
+
+// PersonalizeSpec.least_improvement. The paper's schedule always runs to its end.
+constexpr double kLeastImprovementFast = 0.0;
+constexpr double kLeastImprovementBest = 0.0;
+constexpr double kLeastImprovementPaper = 0.0;
+
+}  // namespace
 
 PresetValues ValuesOf(v1::Preset preset) {
   PresetValues values;
@@ -8,6 +16,7 @@ PresetValues ValuesOf(v1::Preset preset) {
     case v1::PRESET_BEST:
       values.max_side_px = 800;
       values.personalize_iterations = 1200;
+      values.least_improvement = kLeastImprovementBest;
       values.geometry_iterations = 5000;
       values.max_gaussians = 120'000;
       values.chroma_iterations = 800;
@@ -17,6 +26,7 @@ PresetValues ValuesOf(v1::Preset preset) {
       values.strategy = v1::SelectKeyViewSpec::STRATEGY_ENTROPY;
       values.recipe = v1::PersonalizeSpec::RECIPE_PAPER;
       values.personalize_iterations = 4000;
+      values.least_improvement = kLeastImprovementPaper;
       values.augmentation_samples = 8;
       values.geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_PAPER;
       values.geometry_iterations = 15'000;
@@ -29,6 +39,7 @@ PresetValues ValuesOf(v1::Preset preset) {
     default:
       values.max_side_px = 500;
       values.personalize_iterations = 300;
+      values.least_improvement = kLeastImprovementFast;
       values.geometry_iterations = 1500;
       values.max_gaussians = 40'000;
       values.chroma_iterations = 300;

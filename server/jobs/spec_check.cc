@@ -36,6 +36,8 @@ const std::map<std::string, Range>& Ranges() {
       {"PersonalizeSpec.max_side_px", {64, 2048}},
       {"PersonalizeSpec.crop_px", {64, 1024}},
       {"PersonalizeSpec.consistency_weight", {0, 10}},
+      {"PersonalizeSpec.average_decay", {0, 0.9999}},
+      {"PersonalizeSpec.least_improvement", {0, 0.5}},
       {"ColorizeViewsSpec.max_side_px", {64, 4096}},
       {"CarryColorSpec.max_reprojection_px", {0.1, 10}},
       {"CarryColorSpec.max_side_px", {64, 4096}},

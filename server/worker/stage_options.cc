@@ -1,6 +1,20 @@
 #include "server/worker/stage_options.h"
 
 namespace color3d {
+namespace {
+
+ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precision) {
+  switch (precision) {
+    case v1::PersonalizeSpec::PRECISION_FLOAT32:
+      return ColorizerOptions::Precision::kFloat32;
+    case v1::PersonalizeSpec::PRECISION_BFLOAT16:
+      return ColorizerOptions::Precision::kBfloat16;
+    default:
+      return ColorizerOptions::Precision::kAuto;
+  }
+}
+
+}  // namespace
 
 ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
   ImportOptions options;
@@ -76,6 +90,9 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threa
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
   if (spec.has_crop_px()) options.crop_px = spec.crop_px();
   if (spec.has_consistency_weight()) options.consistency_weight = spec.consistency_weight();
+  options.precision = PrecisionFrom(spec.precision());
+  if (spec.has_average_decay()) options.average_decay = spec.average_decay();
+  if (spec.has_least_improvement()) options.least_improvement = spec.least_improvement();
   return options;
 }
 

@@ -8,6 +8,7 @@
 #include <atomic>
 
 #include "core/base/digest.h"
+#include "core/base/memory.h"
 #include "server/ops/process.h"
 #include "server/storage/data_folder.h"
 #include "server/worker/inference_worker.h"
@@ -132,6 +133,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
   AddFlags(&app, &arguments);
   CLI11_PARSE(app, argc, argv);
   HandleStopSignals();
+  ShareMallocArenas(arguments.options.threads);
   if (arguments.options.parent != 0) {
     // When the server dies, however it dies, this worker drains.
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);

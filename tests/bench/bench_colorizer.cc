@@ -19,6 +19,7 @@
 #include "core/stage/artifacts.h"
 #include "core/stage/training_pictures.h"
 #include "tests/bench/bench_encoder.h"
+#include "tests/bench/colorizer_memory.h"
 #include "tests/bench/commands.h"
 
 namespace color3d {
@@ -36,6 +37,7 @@ struct ColorizerArguments {
   int side_px = 400;
   bool paper = false;
   bool one_after_another = true;
+  bool memory = false;
   std::string encoder = "embedded";
   std::string precision = "auto";
   std::string pictures_folder;
@@ -218,8 +220,30 @@ Json RunAllInOne(const ColorizerArguments& args) {
   return result;
 }
 
+// Where the memory of a batch goes: the encoder, and what each scene adds.
+Json RunMemory(const ColorizerArguments& args) {
+  MemorySubject subject;
+  subject.options = OptionsFrom(args);
+  for (const std::string& folder : args.all_in_one) {
+    subject.keys.push_back(Photos(folder, "", args.side_px).Key());
+  }
+  const int64_t before = ResidentMemoryBytes();
+  subject.encoder = BenchEncoder(args.encoder);
+  const int64_t loaded = ResidentMemoryBytes();
+  subject.encoder->DeepFeatures(subject.keys.front().luminance);
+  Json result{{"mib_before", before >> 20},
+              {"mib_encoder_loaded", (loaded - before) >> 20},
+              {"mib_encoder_used", (ResidentMemoryBytes() - before) >> 20}};
+  result.update(PeakMemoryBySceneCount(subject, before));
+  result["bytes_of_one_scene"] = TensorBytes(subject);
+  return result;
+}
+
 void RunColorizer(const ColorizerArguments& args) {
-  const Json result = args.all_in_one.empty() ? RunOne(args) : RunAllInOne(args);
+  ShareMallocArenas(args.options.threads > 0 ? args.options.threads : 2);  // as the worker does
+  const Json result = args.all_in_one.empty() ? RunOne(args)
+                      : args.memory           ? RunMemory(args)
+                                              : RunAllInOne(args);
   if (args.json_file.empty()) {
     std::printf("%s\n", result.dump(1).c_str());
   } else {
@@ -239,6 +263,9 @@ void AddColorizerCommand(CLI::App& app) {
   command->add_flag("!--no-one-after-another",
                     args->one_after_another,
                     "with --all-in-one: leave the comparison out");
+  command->add_flag("--memory",
+                    args->memory,
+                    "with --all-in-one: peak memory of 1, 2, 4, ... scenes, and its parts");
   command->add_option("--json", args->json_file, "write the result here");
   command->add_option("--key", args->key, "file name; default: the middle one");
   command->add_option("--out", args->out_folder, "where coloured views are written");

@@ -70,14 +70,7 @@ class AllInOneTest : public ServiceTest {
 };
 
 TEST_F(AllInOneTest, ScenesTrainTogetherAndSurviveTheirWorker) {
-  StartServer({"--lease-seconds",
-               "4",
-               "--heartbeat-seconds",
-               "0.3",
-               "--checkpoint-seconds",
-               "0.5",
-               "--retry-backoff-ms",
-               "200"});
+  StartServer(QuickRecovery());
   const std::vector<std::string> scenes = MakeScenes(3);
   const std::string parent = Submit(scenes, 400);
   ASSERT_TRUE(WaitUntil([&] { return CountIn(parent, v1::Job::STATE_RUNNING) == 3; }, seconds(60)))

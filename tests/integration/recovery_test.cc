@@ -20,19 +20,8 @@ constexpr int kIterations = 1500;
 class RecoveryTest : public ServiceTest {
  protected:
   void SetUp() override {
-    StartServer(ShortTimes());
+    StartServer(QuickRecovery());
     WriteProceduralScene(Path("room"), SmallRoom(8));
-  }
-
-  static std::vector<std::string> ShortTimes() {
-    return {"--lease-seconds",
-            "4",
-            "--heartbeat-seconds",
-            "0.3",
-            "--checkpoint-seconds",
-            "0.5",
-            "--retry-backoff-ms",
-            "200"};
   }
 
   std::unique_ptr<Process> StartColorize() {
@@ -164,7 +153,7 @@ TEST_F(RecoveryTest, JobOfAKilledServerGoesOnWhenItIsBack) {
     kill(worker, SIGKILL);
   }
   // The same address, so that the client that waits finds it again.
-  StartServer(ShortTimes(), address);
+  StartServer(QuickRecovery(), address);
   EXPECT_GT(FirstStepOfAttempt(1), step / 4);
   ExpectFinished(*client);
 }
@@ -176,7 +165,7 @@ TEST_F(RecoveryTest, DrainedServerReleasesItsJobWithoutCountingAnAttempt) {
   EXPECT_EQ(server().Stop(), 0);
   EXPECT_EQ(server().Log().find("was killed by signal"), std::string::npos)
       << "a worker did not drain";
-  StartServer(ShortTimes());
+  StartServer(QuickRecovery());
   EXPECT_GT(FirstStepOfAttempt(1), step / 2);
   EXPECT_EQ(Geometry().attempt(), 1);
 }

@@ -193,6 +193,17 @@ ProceduralSceneOptions SmallRoom(int views, bool gray) {
   return options;
 }
 
+std::vector<std::string> QuickRecovery() {
+  return {"--lease-seconds",
+          "4",
+          "--heartbeat-seconds",
+          "0.3",
+          "--checkpoint-seconds",
+          "0.5",
+          "--retry-backoff-ms",
+          "200"};
+}
+
 std::vector<std::string> QuickOptions() {
   return {"--max-side",
           "240",

@@ -89,6 +89,9 @@ class ServiceTest : public testing::Test {
 // A small room in a folder of its own. `gray`: monochrome photos, colour ones in truth/.
 ProceduralSceneOptions SmallRoom(int views = 10, bool gray = false);
 
+// Flags of a server that notices within seconds that a worker has died, and loses little by it.
+std::vector<std::string> QuickRecovery();
+
 // Options that make `color3d colorize` as quick as it can be.
 std::vector<std::string> QuickOptions();
 

@@ -9,6 +9,7 @@
 #include "core/base/files.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/import.h"
@@ -35,12 +36,6 @@ Pose LookAt(const Vector3d& center, const Vector3d& target) {
   return pose;
 }
 
-void CheckRange(const char* name, int value, int low, int high) {
-  if (value >= low && value <= high) return;
-  throw InvalidArgument(std::string(name) + " is " + std::to_string(value) + "; it must be " +
-                        std::to_string(low) + ".." + std::to_string(high));
-}
-
 float GammaEncode(double linear) {
   const double v = std::clamp(linear, 0.0, 1.0);
   return static_cast<float>(v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055);
@@ -48,20 +43,19 @@ float GammaEncode(double linear) {
 
 // Direction through a pixel position, with z = 1 in the camera's frame.
 Vector3d RayDirection(const View& view, double x, double y) {
-  const Camera& c = view.camera;
-  return view.cam_from_world.rotation.conjugate() *
-         Vector3d((x - c.cx) / c.fx, (y - c.cy) / c.fy, 1.0);
+  return view.cam_from_world.rotation.conjugate() * view.camera.Ray(x, y);
 }
 
 }  // namespace
 
 void ProceduralSceneOptions::Validate() const {
-  CheckRange("views", views, 1, 1000);
-  CheckRange("width", width, 16, 8192);
-  CheckRange("height", height, 16, 8192);
-  CheckRange("supersampling", supersampling, 1, 8);
-  CheckRange("sparse_points", sparse_points, 0, 1000000);
-  CheckRange("threads", threads, 0, 1024);
+  const RangeCheck check("procedural scene option");
+  check("views", views, 1, 1000);
+  check("width", width, 16, 8192);
+  check("height", height, 16, 8192);
+  check("supersampling", supersampling, 1, 8);
+  check("sparse_points", sparse_points, 0, 1000000);
+  check("threads", threads, 0, 1024);
 }
 
 struct ProceduralScene::Impl {
@@ -71,11 +65,11 @@ struct ProceduralScene::Impl {
   // True when nothing lies between the camera and the point.
   bool Sees(const View& view, const Vector3d& point) const {
     const Vector3d p = view.cam_from_world.Apply(point);
-    const Camera& c = view.camera;
     if (p.z() <= 0.0) return false;
-    const double x = c.fx * p.x() / p.z() + c.cx, y = c.fy * p.y() / p.z() + c.cy;
-    if (x < 0.0 || y < 0.0 || x >= c.width || y >= c.height) return false;
-    const Hit hit = room.Trace(view.cam_from_world.Center(), RayDirection(view, x, y));
+    const Eigen::Vector2d pixel = view.camera.Project(p);
+    if (!view.camera.Contains(pixel)) return false;
+    const Hit hit =
+        room.Trace(view.cam_from_world.Center(), RayDirection(view, pixel.x(), pixel.y()));
     return hit.object >= 0 && std::abs(hit.distance - p.z()) < 1e-4 * p.z();
   }
 };

@@ -26,9 +26,7 @@ ProceduralSceneOptions Small() {
 }
 
 Eigen::Vector2d Project(const View& view, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d p = view.cam_from_world.Apply(point);
-  return {view.camera.fx * p.x() / p.z() + view.camera.cx,
-          view.camera.fy * p.y() / p.z() + view.camera.cy};
+  return view.camera.Project(view.cam_from_world.Apply(point));
 }
 
 double StandardDeviation(const Image& plane) {

@@ -1,0 +1,47 @@
+#include "core/stage/carry_facts.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/stage/artifacts.h"
+
+namespace color3d {
+
+using nlohmann::ordered_json;
+
+CarryFacts ReadCarryFacts(const StageContext& context) {
+  CarryFacts facts;
+  if (!context.HasInput(artifact::kCarryFacts)) return facts;
+  try {
+    const auto json = ordered_json::parse(context.ReadInput(artifact::kCarryFacts));
+    if (json.contains("coverage")) facts.coverage = json.at("coverage").get<double>();
+    if (json.contains("key_views")) json.at("key_views").get_to(facts.key_views);
+    for (const auto& view : json.value("views", ordered_json::array())) {
+      facts.per_view.emplace_back(view.at("view"), view.at("coverage"));
+    }
+    const auto next = json.find("next_key_view");
+    if (next != json.end() && next->is_object()) {
+      facts.next = {next->at("name"), next->at("coverage_now"), next->at("coverage_with")};
+    }
+  } catch (const ordered_json::exception& e) {
+    throw InvalidArgument(std::string(artifact::kCarryFacts) + " is damaged: " + e.what() +
+                          "; run carry_color again");
+  }
+  return facts;
+}
+
+void WriteCarryFacts(const CarryFacts& facts, StageContext& context) {
+  ordered_json json{{"key_views", facts.key_views}};
+  for (const auto& [name, coverage] : facts.per_view) {
+    json["views"].push_back({{"view", name}, {"coverage", coverage}});
+  }
+  if (facts.coverage) json["coverage"] = *facts.coverage;
+  if (facts.next) {
+    json["next_key_view"] = {{"name", facts.next->name},
+                             {"coverage_now", facts.next->coverage_now},
+                             {"coverage_with", facts.next->coverage_with}};
+  }
+  context.WriteOutput(artifact::kCarryFacts, json.dump(1) + "\n");
+}
+
+}  // namespace color3d
