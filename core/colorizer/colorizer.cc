@@ -22,6 +22,7 @@ namespace color3d {
 namespace {
 
 constexpr float kMaxGivenAb = 256.0f;
+constexpr int kMostAdapterStages = 4;  // a ConvNeXt's
 
 void CheckRange(const char* field, double value, double low, double high) {
   if (!(value >= low && value <= high)) {
@@ -142,6 +143,8 @@ void ColorizerOptions::Validate() const {
   CheckRange("consistency_weight", consistency_weight, 0, 1e3);
   CheckRange("average_decay", average_decay, 0, 0.9999);
   CheckRange("least_improvement", least_improvement, 0, 0.5);
+  CheckRange("adapter_stages", adapter_stages, -1, kMostAdapterStages);
+  CheckRange("decoder_width", decoder_width, 0.25, 4);
   CheckRange("threads", threads, 0, 1024);
 }
 
@@ -151,12 +154,14 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
   TrainingRecipe recipe;
   if (options.recipe == ColorizerOptions::Recipe::kPaper) {
     recipe.model.instance_norm = true;
-    recipe.model.adapters = true;
+    recipe.model.adapter_stages = kMostAdapterStages;
     recipe.augment = AugmentOptions::Paper();
     recipe.first_learning_rate = 1e-4;
     recipe.warmup_iterations = 0;
     recipe.neighbours = false;
   }
+  if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
+  recipe.model.decoder_width = options.decoder_width;
   if (options.learning_rate > 0.0) recipe.first_learning_rate = options.learning_rate;
   recipe.model.half_products =
       options.precision == ColorizerOptions::Precision::kBfloat16 ||
