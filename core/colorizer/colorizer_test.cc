@@ -107,9 +107,9 @@ TEST(ColorizerTest, FileGivesBackTheSameColorizer) {
 TEST(ColorizerTest, FileKeepsTheSizeOfTheNetwork) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(3);
+  options.adapter_stages = 1;
   const size_t usual = Train(key, options)->Serialize().size();
   options.decoder_width = 0.5;
-  options.adapter_stages = 1;
   const auto trained = Train(key, options);
   const std::string bytes = trained->Serialize();
   EXPECT_LT(bytes.size(), usual);

@@ -42,6 +42,7 @@ struct ChoicesArguments {
   uint64_t seed = 1;
   double stop_after_seconds = 1e9;
   bool keep_network = false;
+  bool carry = true;
   std::vector<std::string> table_folders;
 };
 
@@ -119,6 +120,7 @@ Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
   choice.options.max_side_px = args.max_side_px;
   choice.options.threads = args.threads;
   choice.options.seed = args.seed;
+  choice.carry = args.carry;
   if (text == kDefaultChoice) return choice;
   const size_t equals = text.find('=');
   choice.name = text.substr(0, equals);
@@ -373,6 +375,10 @@ void AddChoicesCommand(CLI::App& app) {
   command->add_option("--seed", args->seed);
   command->add_option(
       "--stop-after", args->stop_after_seconds, "begin no point later than this, s");
+  command->add_flag("--carry,!--no-carry",
+                    args->carry,
+                    "the default has carried colours; without, it is what a scene gets in which "
+                    "nothing could be carried (an --out of its own)");
   command->add_flag("--keep-network",
                     args->keep_network,
                     "also leave the default's network after the last --iterations (a multiple of "
