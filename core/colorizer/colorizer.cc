@@ -22,7 +22,7 @@ namespace color3d {
 namespace {
 
 constexpr float kMaxGivenAb = 256.0f;
-constexpr int kMostAdapterStages = 4;  // a ConvNeXt's
+constexpr int kMostAdapterStages = 8;  // more than any encoder has: all
 
 void CheckRange(const char* field, double value, double low, double high) {
   if (!(value >= low && value <= high)) {

@@ -113,17 +113,17 @@ TEST(ColorizerTest, FileKeepsTheSizeOfTheNetwork) {
   const auto trained = Train(key, options);
   const std::string bytes = trained->Serialize();
   EXPECT_LT(bytes.size(), usual);
-  EXPECT_NE(bytes.find("adapters.3."), std::string::npos);
-  EXPECT_EQ(bytes.find("adapters.2."), std::string::npos) << "only the deepest stage has them";
+  EXPECT_NE(bytes.find("adapters.4."), std::string::npos);
+  EXPECT_EQ(bytes.find("adapters.3."), std::string::npos) << "only the deepest stage has them";
   EXPECT_EQ(LoadColorizer(bytes, TheEncoder(), 1)->Colorize(key.luminance).data,
             trained->Colorize(key.luminance).data);
 }
 
 TEST(ColorizerTest, RefusesASizeOfTheNetworkThatIsOutOfRange) {
   ColorizerOptions options;
-  options.adapter_stages = 5;
+  options.adapter_stages = 9;
   EXPECT_THROW(options.Validate(), Error);
-  options.adapter_stages = 4;
+  options.adapter_stages = 8;
   options.decoder_width = 0.1;
   EXPECT_THROW(options.Validate(), Error);
 }
