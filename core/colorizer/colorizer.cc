@@ -23,6 +23,7 @@ namespace color3d {
 namespace {
 
 constexpr float kMaxGivenAb = 256.0f;
+constexpr int kMostAdapterStages = 8;  // more than any encoder has: all
 
 std::string SizeOf(const Image& image) {
   return std::to_string(image.width) + "x" + std::to_string(image.height);
@@ -136,6 +137,8 @@ void ColorizerOptions::Validate() const {
   check("consistency_weight", consistency_weight, 0, 1e3);
   check("average_decay", average_decay, 0, 0.9999);
   check("least_improvement", least_improvement, 0, 0.5);
+  check("adapter_stages", adapter_stages, -1, kMostAdapterStages);
+  check("decoder_width", decoder_width, 0.25, 4);
   check("threads", threads, 0, 1024);
 }
 
@@ -145,12 +148,14 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
   TrainingRecipe recipe;
   if (options.recipe == ColorizerOptions::Recipe::kPaper) {
     recipe.model.instance_norm = true;
-    recipe.model.adapters = true;
+    recipe.model.adapter_stages = kMostAdapterStages;
     recipe.augment = AugmentOptions::Paper();
     recipe.first_learning_rate = 1e-4;
     recipe.warmup_iterations = 0;
     recipe.neighbours = false;
   }
+  if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
+  recipe.model.decoder_width = options.decoder_width;
   if (options.learning_rate > 0.0) recipe.first_learning_rate = options.learning_rate;
   recipe.model.half_products =
       options.precision == ColorizerOptions::Precision::kBfloat16 ||

@@ -44,6 +44,9 @@ struct ColorizerOptions {
   // Training stops when the held-out error, smoothed over 3 of 20 points of the schedule, has
   // fallen by less than this share over the last 4; 0..0.5, 0 = never.
   double least_improvement = 0.0;
+  // How many of the encoder's deepest stages get Conv-Adapters, 0..8; -1: ours none, the paper all.
+  int adapter_stages = -1;
+  double decoder_width = 1.0;  // factor on the decoder's channels, 0.25..4
   int threads = 0;
   uint64_t seed = 1;
   void Validate() const;

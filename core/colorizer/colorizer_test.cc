@@ -104,6 +104,30 @@ TEST(ColorizerTest, FileGivesBackTheSameColorizer) {
   }
 }
 
+TEST(ColorizerTest, FileKeepsTheSizeOfTheNetwork) {
+  const Key key = MakeKey(96, 80);
+  ColorizerOptions options = Quick(3);
+  options.adapter_stages = 1;
+  const size_t usual = Train(key, options)->Serialize().size();
+  options.decoder_width = 0.5;
+  const auto trained = Train(key, options);
+  const std::string bytes = trained->Serialize();
+  EXPECT_LT(bytes.size(), usual);
+  EXPECT_NE(bytes.find("adapters.4."), std::string::npos);
+  EXPECT_EQ(bytes.find("adapters.3."), std::string::npos) << "only the deepest stage has them";
+  EXPECT_EQ(LoadColorizer(bytes, TheEncoder(), 1)->Colorize(key.luminance).data,
+            trained->Colorize(key.luminance).data);
+}
+
+TEST(ColorizerTest, RefusesASizeOfTheNetworkThatIsOutOfRange) {
+  ColorizerOptions options;
+  options.adapter_stages = 9;
+  EXPECT_THROW(options.Validate(), Error);
+  options.adapter_stages = 8;
+  options.decoder_width = 0.1;
+  EXPECT_THROW(options.Validate(), Error);
+}
+
 TEST(ColorizerTest, SameSeedSameColorizer) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(5);

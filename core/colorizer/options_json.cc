@@ -50,6 +50,8 @@ nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
           {"consistency_weight", options.consistency_weight},
           {"average_decay", options.average_decay},
           {"least_improvement", options.least_improvement},
+          {"adapter_stages", options.adapter_stages},
+          {"decoder_width", options.decoder_width},
           {"seed", options.seed}};
 }
 
@@ -66,6 +68,8 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
   options.consistency_weight = json.at("consistency_weight");
   options.average_decay = json.value("average_decay", options.average_decay);
   options.least_improvement = json.value("least_improvement", options.least_improvement);
+  options.adapter_stages = json.value("adapter_stages", options.adapter_stages);
+  options.decoder_width = json.value("decoder_width", options.decoder_width);
   options.seed = json.at("seed");
   return options;
 }

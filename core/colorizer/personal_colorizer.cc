@@ -72,7 +72,7 @@ PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps
     decoded = decoded.clamp(-kMaxAb, kMaxAb);
   }
   if (!parts_.neighbours) return {decoded, {}};
-  if (model.config().adapters) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
+  if (model.config().HasAdapters()) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
   const NeighbourColors found = parts_.neighbours->Lookup(taps, luminance, picture_height, wanted);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});

@@ -36,7 +36,7 @@ class PersonalColorizer : public Colorizer {
   static void Check(const Image& luminance);
   static std::pair<int, int> PaddedSize(const Image& small);  // width, height
   static torch::Tensor Padded(const Image& small);
-  bool UsesFrozenTaps() const { return !recipe_.model.adapters && !recipe_.flip_average; }
+  bool UsesFrozenTaps() const { return !recipe_.model.HasAdapters() && !recipe_.flip_average; }
   const TapEncoder& encoder() const { return *parts_.encoder; }
   void SetThreads() const;
   Image AtTrainingSize(const Image& luminance) const;

@@ -2,6 +2,7 @@
 
 #include <torch/torch.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/error.h"
@@ -41,7 +42,11 @@ PersonalModel::PersonalModel(const TapEncoder& encoder,
     : encoder_(encoder), config_(config) {
   const std::vector<int>& dims = encoder.config().dims;
   const int count = static_cast<int>(dims.size());
-  const auto width = [&](int level) { return DecoderWidth(encoder.config().Stride(level)); };
+  const auto width = [&](int level) {
+    constexpr double kMultiple = 8.0;  // what vector units like
+    const double channels = config.decoder_width * DecoderWidth(encoder.config().Stride(level));
+    return static_cast<int>(kMultiple * std::max(1.0, std::round(channels / kMultiple)));
+  };
   for (int i = 0; i < count; ++i) {
     // The finest level also sees L itself; all but the coarsest see the level below.
     const int64_t in = dims[i] + (i == 0 ? 1 : 0) + (i + 1 < count ? width(i + 1) : 0);
@@ -52,7 +57,7 @@ PersonalModel::PersonalModel(const TapEncoder& encoder,
   head_bias_ = NewConstant("head.bias", {2}, 0.0f);
   head_bias_[0] = mean_ab[0];
   head_bias_[1] = mean_ab[1];
-  if (config.adapters) AddAdapters(random);
+  if (config.HasAdapters()) AddAdapters(random);
 }
 
 torch::Tensor PersonalModel::NewParameter(const std::string& name,
@@ -113,7 +118,8 @@ void PersonalModel::AddLevel(const std::string& name, int64_t in, int64_t out, R
 void PersonalModel::AddAdapters(Random& random) {
   const ConvNextConfig& encoder = encoder_.config();
   adapters_.resize(encoder.StageCount());
-  for (int stage = config_.first_adapter_stage; stage < encoder.StageCount(); ++stage) {
+  const int first_stage = std::max(0, encoder.StageCount() - config_.adapter_stages);
+  for (int stage = first_stage; stage < encoder.StageCount(); ++stage) {
     const int64_t c = encoder.dims[stage];
     const int64_t reduced = c / config_.adapter_reduction;
     const int64_t k = config_.adapter_kernel;
@@ -205,7 +211,7 @@ torch::Tensor PersonalModel::Adapt(int stage, int block, const torch::Tensor& x)
 
 std::vector<torch::Tensor> PersonalModel::Taps(const torch::Tensor& luminance) const {
   const torch::Tensor input = encoder_.Input(luminance);
-  if (!config_.adapters) {
+  if (!config_.HasAdapters()) {
     torch::NoGradGuard no_grad;
     return config_.half_products ? encoder_.FastTaps(input) : encoder_.Taps(input);
   }

@@ -17,13 +17,15 @@ namespace color3d {
 
 struct PersonalModelConfig {
   bool instance_norm = false;  // per picture (paper); otherwise statistics frozen from the key view
-  bool adapters = false;       // Conv-Adapters in every block of the stages >= first_adapter_stage
-  int first_adapter_stage = 0;
+  int adapter_stages = 0;      // the deepest ones that have Conv-Adapters in every block
   int adapter_kernel = 7;
-  int adapter_reduction = 8;  // gamma
+  int adapter_reduction = 8;   // gamma
+  double decoder_width = 1.0;  // factor on DecoderWidth()
   // Matrix products and convolutions in bfloat16 (parameters, sums and statistics stay float32):
   // several times faster where the processor has instructions for it. For training only.
   bool half_products = false;
+
+  bool HasAdapters() const { return adapter_stages > 0; }
 };
 
 // Decoder channels at a tap of this stride: 32 at 2 px, 64 at 4, 96 at 8, 128 from 16 on.

@@ -73,7 +73,7 @@ TrainingSample TrainingSamples::Make(const TrainingPicture& picture,
   sample.luminance = TensorFromImage(augmented.luminance);
   sample.ab = torch::avg_pool2d(TensorFromImage(augmented.ab), {stride, stride}) / kAbScale;
   sample.weight = torch::avg_pool2d(TensorFromImage(augmented.valid), {stride, stride});
-  if (!model_.config().adapters) sample.taps = model_.Taps(sample.luminance);
+  if (!model_.config().HasAdapters()) sample.taps = model_.Taps(sample.luminance);
   return sample;
 }
 

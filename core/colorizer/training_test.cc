@@ -117,7 +117,7 @@ struct OneCheckpoint : CheckpointStore {
 };
 
 TEST_F(TrainingTest, AdaptersStartAsTheFrozenEncoderExactly) {
-  recipe_.model.adapters = true;
+  recipe_.model.adapter_stages = 8;
   PersonalModel model = MakeModel();
   torch::NoGradGuard no_grad;
   const auto adapted = model.Taps(KeyTensor());
@@ -126,7 +126,7 @@ TEST_F(TrainingTest, AdaptersStartAsTheFrozenEncoderExactly) {
 }
 
 TEST_F(TrainingTest, AdaptersLearnWhileTheEncoderStaysFrozen) {
-  recipe_.model.adapters = true;
+  recipe_.model.adapter_stages = 8;
   PersonalModel model = MakeModel();
   const auto before = encoder_.Taps(encoder_.Input(KeyTensor()));
   NoCheckpoints checkpoints;

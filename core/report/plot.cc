@@ -15,6 +15,7 @@ constexpr double kRight = 12.0;
 constexpr double kTop = 28.0;
 constexpr double kBottom = 34.0;
 constexpr int kColors = 6;
+constexpr size_t kColumns = 4;  // of a figure
 
 std::string Format(const char* format, double value) {
   char buffer[64];
@@ -218,8 +219,11 @@ std::string PlotsSvg(const std::vector<CurvePoint>& points) {
 }
 
 std::string FigureSvg(const std::vector<Plot>& plots) {
-  const double width = kWidth * static_cast<double>(std::max<size_t>(1, plots.size()));
-  std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" " + ViewBox(width, kHeight) +
+  const size_t columns = std::clamp<size_t>(plots.size(), 1, kColumns);
+  const size_t rows = std::max<size_t>(1, (plots.size() + columns - 1) / columns);
+  const double width = kWidth * static_cast<double>(columns);
+  const double height = kHeight * static_cast<double>(rows);
+  std::string svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" " + ViewBox(width, height) +
                     " font-family=\"sans-serif\"><style>"
                     ".t{font-size:13px;font-weight:600}.n{font-size:10px;fill:#555}"
                     ".g{stroke:#ddd}.c{fill:none;stroke-width:1.6}"
@@ -227,7 +231,8 @@ std::string FigureSvg(const std::vector<Plot>& plots) {
                     ".c3{stroke:#b9770e}.c4{stroke:#6c3483}.c5{stroke:#333}"
                     "</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>";
   for (size_t i = 0; i < plots.size(); ++i) {
-    svg += "<g transform=\"translate(" + Format("%.0f", kWidth * static_cast<double>(i)) + ")\">" +
+    svg += "<g transform=\"translate(" + Format("%.0f", kWidth * static_cast<double>(i % columns)) +
+           "," + Format("%.0f", kHeight * static_cast<double>(i / columns)) + ")\">" +
            PlotElements(plots[i]) + "</g>";
   }
   return svg + "</svg>\n";

@@ -20,7 +20,7 @@ struct Plot {
   bool log_values = false;         // unless a value is not positive
 };
 
-// A file of its own: the plots side by side, with their styles.
+// A file of its own: the plots in rows of four, with their styles.
 std::string FigureSvg(const std::vector<Plot>& plots);
 
 // For a page that brings the styles: one plot for each (stage, error_name) among `points`, in order

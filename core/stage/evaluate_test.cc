@@ -139,7 +139,9 @@ TEST_F(EvaluateTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext) {
   EXPECT_EQ(metrics.at("me"), 0.02);
   EXPECT_EQ(metrics.at("tc"), 0.001);
   EXPECT_EQ(metrics.at("confidence_rank_correlation"), -0.5);
-  const auto sections = facts.Sections({{"personalize", 1.0, 1, "heldout_l1", 2.0}});
+  const auto sections = facts.Sections({{"personalize", 1.0, 1, "validation_delta_e00", 9.0},
+                                        {"personalize", 4.0, 60, "validation_delta_e00", 2.5},
+                                        {"personalize", 4.0, 60, "stopped_early_iteration", 60.0}});
   ASSERT_EQ(sections.size(), 3u);
   EXPECT_THAT(sections[0].notes.back(), testing::HasSubstr("colour p0.png next"));
   EXPECT_THAT(sections[0].notes.back(), testing::HasSubstr("from 61 % to 83 %"));
@@ -147,7 +149,9 @@ TEST_F(EvaluateTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext) {
   EXPECT_EQ(sections[0].tables[0].rows[0][0], "p2.png") << "least certain first";
   EXPECT_EQ(sections[0].rows.size(), 2u);
   EXPECT_EQ(sections[1].tables[0].rows[0][1], "0.0200");
-  EXPECT_EQ(sections[2].curves.size(), 1u);
+  EXPECT_EQ(sections[2].curves.size(), 3u);
+  EXPECT_THAT(sections[2].notes.front(), testing::HasSubstr("from 9.0 after 1 s to 2.5 after 4 s"));
+  EXPECT_THAT(sections[2].notes.front(), testing::HasSubstr("ended at iteration 60"));
 }
 
 TEST_F(EvaluateTest, OldJobsHaveNoChaptersAndDamagedFactsAreRefused) {

@@ -226,9 +226,34 @@ ReportSection ColorFacts::AgreementSection() const {
   return section;
 }
 
+namespace {
+
+// What the curves of personalization say, in words; nothing without two points of held-out error.
+std::vector<std::string> NotesOnPersonalization(const std::vector<CurvePoint>& curves) {
+  std::vector<CurvePoint> errors;
+  std::string stopped;
+  for (const CurvePoint& point : curves) {
+    if (point.error_name == "validation_delta_e00") errors.push_back(point);
+    if (point.error_name == "stopped_early_iteration") {
+      stopped = " Training ended at iteration " + std::to_string(point.iteration) +
+                " because it hardly fell any more.";
+    }
+  }
+  if (errors.size() < 2) return {};
+  const CurvePoint &first = errors.front(), &last = errors.back();
+  return {
+      "Augmentations of the key view are kept from training; their colour error (CIEDE2000) "
+      "went from " +
+      Text("%.1f", first.value) + " after " + Text("%.0f s", first.seconds) + " to " +
+      Text("%.1f", last.value) + " after " + Text("%.0f s", last.seconds) + "." + stopped};
+}
+
+}  // namespace
+
 ReportSection ColorFacts::PersonalizationSection(std::vector<CurvePoint> curves) const {
   ReportSection section;
   section.title = "The personalized colorizer";
+  section.notes = NotesOnPersonalization(curves);
   section.curves = std::move(curves);
   if (context_.HasInput(artifact::kAugmentationSheet)) {
     section.wide = {"what it learnt from besides the key view",

@@ -1,6 +1,7 @@
 // color3d-bench plot: error against seconds of several results as one figure, a panel per scene. Of
 // `reconstruct`: a line per label. Of `suite`: a line per variant from its curves, or, with
-// --metric, through the variants whose names agree up to '@' (fast@100, fast@300, ...).
+// --metric, through the variants whose names agree up to '@' (fast@100, fast@300, ...). Of
+// `choices`: a panel for each choice, means over the scenes.
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include "core/base/files.h"
 #include "core/report/plot.h"
 #include "core/stage/artifacts.h"
+#include "tests/bench/choice_results.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/suite_results.h"
 
@@ -24,6 +26,8 @@ struct PlotArguments {
   std::string curve;   // STAGE:ERROR_NAME
   std::string metric;  // of metrics.json
   std::string seconds = "seconds_total";
+  std::vector<std::string> choices_folders;
+  bool delivered = false;
   bool linear = false;
 };
 
@@ -100,11 +104,20 @@ void AddSuite(const PlotArguments& args, std::vector<Plot>& plots) {
   if (plots.empty()) throw InvalidArgument(jsonl.string() + " has no finished runs");
 }
 
+void AddChoices(const PlotArguments& args, std::vector<Plot>& plots) {
+  const auto points = ReadChoiceFolders(args.choices_folders);
+  for (Plot& plot : ChoicePlots(points, args.delivered)) {
+    plot.log_seconds = !args.linear;
+    plots.push_back(std::move(plot));
+  }
+}
+
 void RunPlot(const PlotArguments& args) {
   std::vector<Plot> plots;
   std::string file = args.suite_folder;
   try {
     if (!args.suite_folder.empty()) AddSuite(args, plots);
+    AddChoices(args, plots);
     for (const std::string& result : args.json_files) {
       file = result;
       AddResult(file, args, plots);
@@ -112,7 +125,7 @@ void RunPlot(const PlotArguments& args) {
   } catch (const nlohmann::json::exception& e) {
     throw InvalidArgument(file + " is no result that has these figures: " + e.what());
   }
-  if (plots.empty()) throw InvalidArgument("give results of reconstruct, or --suite");
+  if (plots.empty()) throw InvalidArgument("give results of reconstruct, --suite or --choices");
   WriteFileAtomic(args.svg_file, FigureSvg(plots));
 }
 
@@ -130,6 +143,10 @@ void AddPlotCommand(CLI::App& app) {
   command->add_option("--curve", args->curve, "STAGE:ERROR_NAME of its curves.csv");
   command->add_option("--metric", args->metric, "of its metrics.json, e.g. delta_e00_chroma_2d");
   command->add_option("--seconds", args->seconds, "that go with --metric")->capture_default_str();
+  command->add_option("--choices", args->choices_folders, "the --out folders of `choices`");
+  command->add_flag("--delivered",
+                    args->delivered,
+                    "with --choices: the error after fusion with carried colours");
   command->add_flag("--linear", args->linear, "seconds on a linear axis");
   command->callback([args] { RunPlot(*args); });
 }

@@ -7,6 +7,7 @@ namespace color3d {
 
 void AddAugmentationsCommand(CLI::App& app);
 void AddAutomaticCommand(CLI::App& app);
+void AddChoicesCommand(CLI::App& app);
 void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
 void AddNetworksCommand(CLI::App& app);

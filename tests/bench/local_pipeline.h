@@ -29,6 +29,7 @@ class LocalPipeline {
   void TakeAll();
 
   std::filesystem::path ArtifactPath(const std::string& name) const { return artifacts_.at(name); }
+  const std::map<std::string, std::filesystem::path>& artifacts() const { return artifacts_; }
   const std::vector<StageSummary>& summaries() const { return summaries_; }
 
  private:

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   color3d::AddAugmentationsCommand(app);
   color3d::AddAutomaticCommand(app);
+  color3d::AddChoicesCommand(app);
   color3d::AddGoldenCommand(app);
   color3d::AddMakeWeightsCommand(app);
   color3d::AddNetworksCommand(app);
