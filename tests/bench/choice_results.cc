@@ -198,14 +198,19 @@ std::vector<Plot> ChoicePlots(const std::vector<ChoicePoint>& points, bool deliv
     Plot plot;
     plot.title = choice;
     plot.log_seconds = true;
-    for (const Row& row : results.RowsBesideDefault(choice)) {
+    const std::vector<Row> rows = results.RowsOf(choice);
+    if (rows.empty()) continue;
+    std::vector<Row> shown = results.RowsOf(kDefaultChoice);
+    for (Row& row : shown) row.value = kDefaultChoice;
+    if (choice != kDefaultChoice) shown.insert(shown.end(), rows.begin(), rows.end());
+    for (const Row& row : shown) {
       if (plot.series.empty() || plot.series.back().name != row.value) {
         plot.series.push_back({row.value, {}});
       }
       plot.series.back().points.push_back(
           {"", row.Mean(&ChoicePoint::seconds), row.iterations, "", row.Mean(figure)});
     }
-    if (!plot.series.empty()) plots.push_back(std::move(plot));
+    plots.push_back(std::move(plot));
   }
   return plots;
 }

@@ -42,8 +42,8 @@ void AppendChoicePoint(const std::filesystem::path& jsonl, const ChoicePoint& po
 // of iterations that all scenes have, the default's rows first.
 std::string ChoiceTables(const std::vector<ChoicePoint>& points);
 
-// Error against seconds, a plot for each choice beside the default: means over the scenes, of the
-// rows of ChoiceTables. `delivered`: that error instead of the colorizer's own.
+// Error against seconds, a plot for each choice beside the whole curve of the default: means over
+// the scenes. `delivered`: that error instead of the colorizer's own.
 std::vector<Plot> ChoicePlots(const std::vector<ChoicePoint>& points, bool delivered);
 
 }  // namespace color3d

@@ -66,6 +66,7 @@ TEST(ChoicePlots, AreMeansOverScenes) {
   EXPECT_EQ(plots[0].series[0].points[1].seconds, 6.0);
   EXPECT_EQ(plots[0].series[0].points[1].value, 2.0);
   ASSERT_EQ(plots[1].series.size(), 2u);
+  EXPECT_EQ(plots[1].series[0].points.size(), 2u) << "the default's curve is whole";
   EXPECT_EQ(plots[1].series[1].name, "128");
   EXPECT_EQ(plots[1].series[1].points[0].value, 2.25);
 }
