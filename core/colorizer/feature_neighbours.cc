@@ -289,7 +289,9 @@ FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor
   const torch::Tensor bank_squares = bank.square().sum(1);
   const float* colors = state_.at("colors").data_ptr<float>();
   const float* weights = state_.at("weights").data_ptr<float>();
-  Matches matches{torch::empty({queries.size(0), 2}), torch::empty({queries.size(0)})};
+  Matches matches{torch::empty({queries.size(0), 2}),
+                  torch::empty({queries.size(0)}),
+                  torch::empty({queries.size(0)})};
   for (int64_t begin = 0; begin < queries.size(0); begin += kQueriesAtOnce) {
     const int64_t end = std::min(begin + kQueriesAtOnce, queries.size(0));
     const torch::Tensor q = queries.slice(0, begin, end);
@@ -302,6 +304,7 @@ FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor
     const float* squares = q_squares.data_ptr<float>();
     float* ab = matches.ab.data_ptr<float>() + 2 * begin;
     float* nearest = matches.distance.data_ptr<float>() + begin;
+    float* variance = matches.variance.data_ptr<float>() + begin;
     at::parallel_for(0, end - begin, /*grain_size=*/16, [&](int64_t first, int64_t last) {
       for (int64_t i = first; i < last; ++i) {
         const float* row = distances + i * entries;
@@ -310,17 +313,23 @@ FeatureNeighbours::Matches FeatureNeighbours::LookupFeatures(const torch::Tensor
         const auto inverse_width = static_cast<float>(
             1.0 / (options_.temperature * (nearest[i] + options_.distance_floor)));
         const float farthest = best + kNegligible / inverse_width;
-        double sum = 0.0, a = 0.0, b = 0.0;
+        double sum = 0.0, a = 0.0, b = 0.0, squares_of_ab = 0.0;
         for (int64_t j = 0; j < entries; ++j) {
           if (row[j] > farthest) continue;
           const double w = weights[j] * std::exp((best - row[j]) * inverse_width);
           sum += w;
-          a += w * colors[2 * j];
-          b += w * colors[2 * j + 1];
+          const double ca = colors[2 * j], cb = colors[2 * j + 1];
+          a += w * ca;
+          b += w * cb;
+          squares_of_ab += w * (ca * ca + cb * cb);
         }
         // Where nothing has weight nothing is known: grey.
-        ab[2 * i] = sum > 0.0 ? static_cast<float>(a / sum) : 0.0f;
-        ab[2 * i + 1] = sum > 0.0 ? static_cast<float>(b / sum) : 0.0f;
+        const double scale = sum > 0.0 ? 1.0 / sum : 0.0;
+        a *= scale;
+        b *= scale;
+        ab[2 * i] = static_cast<float>(a);
+        ab[2 * i + 1] = static_cast<float>(b);
+        variance[i] = static_cast<float>(std::max(squares_of_ab * scale - a * a - b * b, 0.0));
       }
     });
   }
@@ -342,12 +351,16 @@ NeighbourColors FeatureNeighbours::Lookup(const std::vector<torch::Tensor>& taps
   }
   torch::Tensor ab = torch::zeros({height * width, 2});
   torch::Tensor distance = torch::zeros({height * width});
+  torch::Tensor variance = torch::zeros({height * width});
   if (queries.size(0) > 0) {
     const Matches matches = LookupFeatures(queries);
     ab = rows.defined() ? ab.index_copy(0, rows, matches.ab) : matches.ab;
     distance = rows.defined() ? distance.index_copy(0, rows, matches.distance) : matches.distance;
+    variance = rows.defined() ? variance.index_copy(0, rows, matches.variance) : matches.variance;
   }
-  return {ab.t().reshape({2, height, width}), distance.reshape({height, width})};
+  return {ab.t().reshape({2, height, width}),
+          distance.reshape({height, width}),
+          variance.reshape({height, width})};
 }
 
 }  // namespace color3d

@@ -44,6 +44,7 @@ struct FeatureNeighboursOptions {
 struct NeighbourColors {
   torch::Tensor ab;        // [2,h,w], Lab units, h = H / stride
   torch::Tensor distance;  // [h,w], mean squared distance per dimension of the best match
+  torch::Tensor variance;  // [h,w], of the matches' ab, Lab units squared: how far they disagree
 };
 
 class FeatureNeighbours {
@@ -70,6 +71,7 @@ class FeatureNeighbours {
   struct Matches {
     torch::Tensor ab;        // [n,2]
     torch::Tensor distance;  // [n]
+    torch::Tensor variance;  // [n]
   };
   // The softmax of squared distances on its own: `queries` [n, D] in the bank's feature space.
   Matches LookupFeatures(const torch::Tensor& queries) const;

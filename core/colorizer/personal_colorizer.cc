@@ -44,8 +44,7 @@ PersonalColorizer::PersonalColorizer(Parts parts)
     : parts_(std::move(parts)), recipe_(RecipeFor(parts_.options)) {
   const double trained =
       parts_.curve.empty() ? 0.0 : static_cast<double>(parts_.curve.back().iteration);
-  neighbour_share_ = recipe_.neighbour_share + (1.0 - recipe_.neighbour_share) *
-                                                   std::exp(-trained / recipe_.trust_iterations);
+  trust_ = 1.0 - std::exp(-trained / recipe_.trust_iterations);
   torch::NoGradGuard no_grad;
   parts_.model->RequireGradients(false);
   parts_.model->set_half_products(false);
@@ -55,12 +54,22 @@ PersonalColorizer::PersonalColorizer(Parts parts)
   }
 }
 
+// Of the blend, [1,1,H/s,W/s]: large where the neighbours contradict each other.
+torch::Tensor PersonalColorizer::DecoderShare(const torch::Tensor& neighbour_variance,
+                                              const torch::Tensor& decoded) const {
+  const double doubt = recipe_.neighbour_doubt * recipe_.neighbour_doubt;
+  const torch::Tensor share = trust_ * neighbour_variance / (doubt + neighbour_variance);
+  return torch::upsample_bilinear2d(share.unsqueeze(0).unsqueeze(0),
+                                    {decoded.size(2), decoded.size(3)},
+                                    /*align_corners=*/false);
+}
+
 // `taps`: with adapters the adapted ones.
 PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps,
                                                  const torch::Tensor& luminance,
                                                  int picture_height,
                                                  const torch::Tensor& wanted) const {
-  const bool decode = !parts_.neighbours || neighbour_share_ < 1.0;
+  const bool decode = !parts_.neighbours || trust_ > 0.0;
   const PersonalModel& model = *parts_.model;
   torch::Tensor decoded;
   if (decode) {
@@ -79,7 +88,7 @@ PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps
   const torch::Tensor near = TensorFromImage(UpsampleGuided(
       ImageFromTensor(found.ab), ImageFromTensor(guide), kGuideRadius, kGuideVarianceFloor));
   if (!decode) return {near, found.distance};
-  return {torch::lerp(decoded, near, neighbour_share_), found.distance};
+  return {torch::lerp(near, decoded, DecoderShare(found.variance, decoded)), found.distance};
 }
 
 void PersonalColorizer::Check(const Image& luminance) {

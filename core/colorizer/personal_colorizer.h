@@ -60,12 +60,14 @@ class PersonalColorizer : public Colorizer {
              const torch::Tensor& luminance,
              int picture_height,
              const torch::Tensor& wanted) const;
+  torch::Tensor DecoderShare(const torch::Tensor& neighbour_variance,
+                             const torch::Tensor& decoded) const;
   // Cells of the neighbours' grid that answers are wanted for, with a margin for interpolation.
   torch::Tensor WantedCells(const Image& known, const Image& small) const;
 
   Parts parts_;
   TrainingRecipe recipe_;
-  double neighbour_share_ = 1.0;
+  double trust_ = 0.0;  // in the decoder, 0..1: the share that it has at most
 };
 
 }  // namespace color3d

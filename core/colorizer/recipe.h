@@ -18,10 +18,11 @@ struct TrainingRecipe {
   double max_gradient_norm = 1.0;
   bool neighbours = true;
   FeatureNeighboursOptions neighbour_options;
-  // Share of the neighbours in the blend with a decoder trained for many iterations. One trained
-  // for a few weighs less: share + (1 - share) exp(-iterations / trust_iterations).
-  double neighbour_share = 0.5;
-  double trust_iterations = 200.0;
+  // Share of the neighbours in the blend with the decoder, by how well they agree on a colour:
+  // certainty = doubt^2 / (doubt^2 + variance of the matches' ab). A decoder trained for a few
+  // iterations is trusted less: share = 1 - (1 - certainty) (1 - exp(-iterations / trust)).
+  double neighbour_doubt = 10.0;  // Lab units
+  double trust_iterations = 100.0;
   bool flip_average = false;  // mean of the picture and its mirror image: twice the time for 0.05
 };
 

@@ -417,8 +417,9 @@ TEST_F(TrainingTest, NeighboursAgreeWithTheDefinitionInFloat64) {
   const FeatureNeighbours neighbours(encoder_, pictures_, options, Random(1), {});
   const torch::Tensor bank = neighbours.State().at("bank").to(torch::kFloat64);
   const torch::Tensor colors = neighbours.State().at("colors").to(torch::kFloat64);
-  const torch::Tensor answer =
-      neighbours.LookupFeatures(neighbours.State().at("bank") + 0.05f).ab.to(torch::kFloat64);
+  const FeatureNeighbours::Matches matches =
+      neighbours.LookupFeatures(neighbours.State().at("bank") + 0.05f);
+  const torch::Tensor answer = matches.ab.to(torch::kFloat64);
   for (int64_t q = 0; q < 5; ++q) {
     const torch::Tensor d = (bank - (bank[q] + 0.05)).square().sum(1);
     const torch::Tensor best = d.min();
@@ -426,6 +427,9 @@ TEST_F(TrainingTest, NeighboursAgreeWithTheDefinitionInFloat64) {
         torch::exp(-(d - best) / (options.temperature * (best + options.distance_floor)));
     const torch::Tensor expected = torch::mv(colors.t(), weight) / weight.sum();
     EXPECT_LT((answer[q] - expected).abs().max().item<double>(), 1e-2);
+    const double variance =
+        (torch::mv((colors - expected).square().t(), weight) / weight.sum()).sum().item<double>();
+    EXPECT_NEAR(matches.variance[q].item<double>(), variance, 1e-2 * (1.0 + variance));
   }
 }
 
