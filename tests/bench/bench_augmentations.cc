@@ -34,12 +34,7 @@ void RunAugmentations(const AugmentationsArguments& args) {
       args.scene_folder, args.out_folder, args.threads, args.seed, [](const std::string& text) {
         std::fprintf(stderr, "%s\n", text.c_str());
       });
-  pipeline.Run("import_scene", [&](StageContext& c) {
-    ImportOptions options;
-    options.hold_out_every_eighth = true;
-    options.threads = args.threads;
-    RunImportScene(options, c);
-  });
+  pipeline.ImportScene();
   const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
   pipeline.Run("select_key_view", [&](StageContext& c) {
     SelectKeyViewOptions options;

@@ -138,12 +138,7 @@ Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
 // Everything before personalization.
 void Prepare(const ChoicesArguments& args, LocalPipeline& pipeline) {
   if (fs::exists(fs::path(args.out_folder) / kPrepared)) return pipeline.TakeAll();
-  pipeline.Run("import_scene", [&](StageContext& c) {
-    ImportOptions options;
-    options.hold_out_every_eighth = true;
-    options.threads = args.threads;
-    RunImportScene(options, c);
-  });
+  pipeline.ImportScene();
   const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
   pipeline.Run("select_key_view", [](StageContext& c) { RunSelectKeyView({}, c); });
   pipeline.Run("colorize_key_view", [&](StageContext& c) {

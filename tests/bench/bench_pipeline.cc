@@ -50,12 +50,7 @@ void RunPipeline(const PipelineArguments& args) {
     std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kScores)).c_str());
     return;
   }
-  pipeline.Run("import_scene", [&](StageContext& c) {
-    ImportOptions options;
-    options.hold_out_every_eighth = true;
-    options.threads = args.threads;
-    RunImportScene(options, c);
-  });
+  pipeline.ImportScene();
   pipeline.Run("select_key_view", [&](StageContext& c) {
     SelectKeyViewOptions options;
     options.view = args.key_view;

@@ -10,6 +10,7 @@
 #include "core/base/memory.h"
 #include "core/colorizer/archive.h"
 #include "core/colorizer/scene_batch.h"
+#include "tests/bench/warm_start.h"
 
 namespace color3d {
 namespace {
@@ -19,17 +20,6 @@ using Json = nlohmann::ordered_json;
 constexpr double kMib = 1 << 20;
 constexpr size_t kMagicBytes = 8;
 constexpr int kCheckpointIterations = 25;  // the first checkpoint
-
-class LastCheckpoint : public CheckpointStore {
- public:
-  std::optional<std::string> Load() override { return std::nullopt; }
-  bool WantsSave() override { return true; }
-  void Save(const std::string& state) override { state_ = state; }
-  const std::string& state() const { return state_; }
-
- private:
-  std::string state_;
-};
 
 struct Line {
   double at_zero = 0.0;

@@ -47,6 +47,15 @@ LocalPipeline::LocalPipeline(std::filesystem::path scene_folder,
   std::filesystem::create_directories(out_folder_);
 }
 
+void LocalPipeline::ImportScene() {
+  Run("import_scene", [&](StageContext& context) {
+    ImportOptions options;
+    options.hold_out_every_eighth = true;
+    options.threads = threads_;
+    RunImportScene(options, context);
+  });
+}
+
 void LocalPipeline::TakeAll() {
   for (const std::string& name : ListFiles(out_folder_)) Take(name, out_folder_ / name);
 }

@@ -21,6 +21,8 @@ class LocalPipeline {
                 uint64_t seed,
                 std::function<void(const std::string&)> say);
 
+  // The first stage, with every eighth view held out.
+  void ImportScene();
   // Runs `stage` as job kind `kind` with all artifacts made so far as inputs.
   void Run(const std::string& kind, const std::function<void(StageContext&)>& stage);
 
