@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
@@ -64,8 +65,9 @@ class HeldOutScores {
     Scores scores =
         ScoreView(true_srgb, RenderView(model_, camera, view.cam_from_world, pool_).lab, ab);
     if (bound_) {
-      scores["delta_e00_chroma_bound"] =
-          ChromaError(true_srgb, RenderView(*bound_, camera, view.cam_from_world, pool_).lab);
+      const Image lab = RenderView(*bound_, camera, view.cam_from_world, pool_).lab;
+      scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab);
+      scores["colourfulness_bound"] = Colourfulness(SrgbFromLab(lab));
     }
     const std::string provenance = ViewArtifact(artifact::kProvenance, view, ".png");
     if (context_.HasInput(provenance)) {
@@ -91,6 +93,7 @@ class HeldOutScores {
     if (truth > 0.0) {
       mean["colourfulness_ratio"] = mean["colourfulness"] / truth;
       mean["colourfulness_ratio_2d"] = mean["colourfulness_2d"] / truth;
+      if (bound_) mean["colourfulness_ratio_bound"] = mean["colourfulness_bound"] / truth;
     }
     return mean;
   }

@@ -86,6 +86,7 @@ TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
   EXPECT_NEAR(mean.at("delta_e00_chroma_2d").get<double>(), 0.0, 0.05);
   EXPECT_NEAR(mean.at("colourfulness_ratio_2d").get<double>(), 1.0, 0.01);
   EXPECT_LT(mean.at("delta_e00_chroma_bound"), mean.at("delta_e00_chroma"));
+  EXPECT_NEAR(mean.at("colourfulness_ratio_bound").get<double>(), 1.0, 0.2);
   EXPECT_LT(scores.at("consistency").at("truth").at("me_de00"),
             scores.at("consistency").at("coloured_views").at("me_de00"));
   EXPECT_FALSE(scores.contains("sources"));

@@ -44,7 +44,8 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                              "colourfulness",
                              "colourfulness_truth",
                              "colourfulness_ratio",
-                             "colourfulness_ratio_2d"}) {
+                             "colourfulness_ratio_2d",
+                             "colourfulness_ratio_bound"}) {
       if (mean.contains(name)) metrics[name] = mean.at(name);
     }
   }
