@@ -13,8 +13,8 @@ namespace color3d {
 struct FusionOptions {
   // The pull of an inferred colour, times 1 - the pull of the carried one and over 1 + distance^2:
   // the stranger a place, the more it takes from its surroundings. Carried colours pull with their
-  // confidence squared (measured: half as sure is more than twice as wrong), neighbours of equal
-  // luminance with 1.
+  // confidence squared (less error on three of four scenes than with the confidence itself),
+  // neighbours of equal luminance with 1.
   double inferred_weight = 0.1;
   // Carried colours below this confidence are not used, 0..1.
   double least_confidence = 0.05;

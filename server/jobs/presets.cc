@@ -3,8 +3,8 @@
 namespace color3d {
 namespace {
 
-// PersonalizeSpec.least_improvement (docs/colorizer_choices.md). Short schedules gain nothing by
-// stopping early; the paper's always runs to its end.
+// PersonalizeSpec.least_improvement (tests/bench/colorizer_choices.md). Short schedules gain
+// nothing by stopping early; the paper's always runs to its end.
 constexpr double kLeastImprovementFast = 0.0;
 constexpr double kLeastImprovementBest = 0.1;
 constexpr double kLeastImprovementPaper = 0.0;

@@ -11,7 +11,7 @@ struct PresetValues {
   v1::PersonalizeSpec::Recipe recipe = v1::PersonalizeSpec::RECIPE_COLOR3D;
   int personalize_iterations = 0;
   double least_improvement = 0.0;  // below, personalization stops early; 0: never
-  int augmentation_samples = 0;  // made from the key view; files of the user's come on top
+  int augmentation_samples = 0;    // made from the key view; files of the user's come on top
   v1::ReconstructGeometrySpec::Recipe geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_COLOR3D;
   int geometry_iterations = 0;
   int max_gaussians = 0;
