@@ -7,10 +7,10 @@
 #include <mutex>
 #include <thread>
 
-#include "server/jobs/job_store.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/upload_store.h"
+#include "server/store/job_store.h"
 
 namespace color3d {
 

@@ -14,9 +14,9 @@
 #include "core/base/digest.h"
 #include "core/base/files.h"
 #include "core/base/random.h"
-#include "server/jobs/sqlite_db.h"
-#include "server/rpc/rpc_test_support.h"
-#include "server/test_server_process.h"
+#include "server/store/sqlite_db.h"
+#include "tests/support/rpc_support.h"
+#include "tests/support/server_process.h"
 
 namespace color3d {
 namespace {

@@ -13,7 +13,6 @@
 #include "core/base/files.h"
 #include "server/backends/backend_address.h"
 #include "server/backends/backend_prober.h"
-#include "server/jobs/sqlite_job_store.h"
 #include "server/maintenance.h"
 #include "server/ops/address.h"
 #include "server/ops/process.h"
@@ -22,6 +21,7 @@
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/upload_store.h"
+#include "server/store/sqlite_job_store.h"
 #include "server/worker/supervisor.h"
 
 namespace color3d {

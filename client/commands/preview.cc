@@ -12,7 +12,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/live_coloring.h"
 #include "client/lib/scene_upload.h"
-#include "core/image/probe.h"
+#include "core/image/probe/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;

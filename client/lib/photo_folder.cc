@@ -7,7 +7,7 @@
 #include "client/lib/names.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/image/probe.h"
+#include "core/image/probe/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;

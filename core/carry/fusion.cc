@@ -8,8 +8,8 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
-#include "core/keycolor/edge_weights.h"
-#include "core/keycolor/grid_solver.h"
+#include "core/grid/edge_weights.h"
+#include "core/grid/grid_solver.h"
 
 namespace color3d {
 namespace {

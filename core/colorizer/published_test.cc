@@ -9,8 +9,8 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/colorizer/colorizer.h"
-#include "core/encoder/synthetic_networks.h"
 #include "core/weights/safetensors.h"
+#include "tests/support/synthetic_networks.h"
 
 namespace color3d {
 namespace {

@@ -1,8 +1,8 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/encoder/clip.h"
-#include "core/encoder/clip_weights.h"
+#include "core/encoder/clip/clip.h"
+#include "core/encoder/clip/clip_weights.h"
 #include "core/encoder/convnext.h"
 #include "core/encoder/convnext_weights.h"
 #include "core/encoder/encoder.h"

@@ -8,11 +8,11 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/encoder/clip.h"
+#include "core/encoder/clip/clip.h"
 #include "core/encoder/encoder.h"
 #include "core/encoder/random_features.h"
-#include "core/encoder/synthetic_networks.h"
 #include "core/weights/weight_file.h"
+#include "tests/support/synthetic_networks.h"
 
 namespace color3d {
 namespace {

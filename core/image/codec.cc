@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/image/orientation.h"
+#include "core/image/probe/orientation.h"
 #include "core/image/reduced.h"
 
 namespace color3d {

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "core/base/image.h"
-#include "core/image/probe.h"
+#include "core/image/probe/probe.h"
 
 namespace color3d {
 

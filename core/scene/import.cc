@@ -5,13 +5,13 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
-#include "core/scene/colmap_model.h"
+#include "core/scene/formats/colmap_model.h"
+#include "core/scene/formats/transforms_json.h"
 #include "core/scene/lens.h"
 #include "core/scene/normalise.h"
 #include "core/scene/photos.h"
-#include "core/scene/sfm.h"
+#include "core/scene/sfm/sfm.h"
 #include "core/scene/sparse_cloud.h"
-#include "core/scene/transforms_json.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
-#include "core/image/test_exif.h"
-#include "core/scene/sfm_photos.h"
+#include "core/scene/sfm/sfm_photos.h"
 #include "core/scene/sparse_cloud.h"
-#include "core/scene/test_scenes.h"
+#include "tests/support/test_exif.h"
+#include "tests/support/test_scenes.h"
 
 namespace color3d {
 namespace {

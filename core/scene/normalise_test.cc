@@ -7,7 +7,7 @@
 
 #include "core/scene/import.h"
 #include "core/scene/reprojection.h"
-#include "core/scene/test_scenes.h"
+#include "tests/support/test_scenes.h"
 
 namespace color3d {
 namespace {

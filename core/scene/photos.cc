@@ -5,9 +5,9 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/image/focal_length.h"
-#include "core/image/orientation.h"
-#include "core/image/probe.h"
+#include "core/image/probe/focal_length.h"
+#include "core/image/probe/orientation.h"
+#include "core/image/probe/probe.h"
 #include "core/scene/lens.h"
 
 namespace color3d {

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <map>
 
-#include "core/scene/colmap_model.h"
+#include "core/scene/formats/colmap_model.h"
 #include "core/scene/import.h"
 #include "core/scene/lens.h"
-#include "core/scene/test_scenes.h"
 #include "core/scene/view_images.h"
+#include "tests/support/test_scenes.h"
 
 namespace color3d {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/scene/colmap_model.h"
+#include "core/scene/formats/colmap_model.h"
 
 namespace color3d {
 

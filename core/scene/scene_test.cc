@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "core/scene/test_scenes.h"
+#include "tests/support/test_scenes.h"
 
 namespace color3d {
 namespace {

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "core/color/lab.h"
-#include "core/scene/test_scenes.h"
+#include "tests/support/test_scenes.h"
 
 namespace color3d {
 namespace {

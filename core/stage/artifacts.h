@@ -29,7 +29,7 @@ inline constexpr char kAugmentationFacts[] = "augmentations.json";   // what was
 inline constexpr char kAugmentations[] = "augmentations/";
 inline constexpr char kAugmentationSheet[] = "augmentations.jpg";  // contact sheet
 inline constexpr char kColorizer[] = "colorizer.c3c";
-inline constexpr char kCarried[] = "carried/";      // + view's stem + ".png": ab and confidence
+inline constexpr char kCarried[] = "carried/";   // + view's stem + ".png": ab and confidence
 inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
 // + view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255).
 inline constexpr char kProvenance[] = "provenance/";

@@ -11,7 +11,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
-#include "core/splat/render.h"
+#include "core/splat/raster/render.h"
 
 namespace color3d {
 namespace {

@@ -8,8 +8,8 @@
 #include "core/color/lab.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/next_key_view.h"
-#include "core/stage/stage_fixture.h"
 #include "core/stage/stages.h"
+#include "tests/support/stage_fixture.h"
 
 namespace color3d {
 namespace {

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "core/base/parallel.h"
-#include "core/splat/trainer.h"
+#include "core/splat/training/trainer.h"
 #include "core/stage/stage.h"
 
 namespace color3d {

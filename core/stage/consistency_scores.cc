@@ -6,7 +6,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
-#include "core/splat/render.h"
+#include "core/splat/raster/render.h"
 #include "core/stage/artifacts.h"
 
 namespace color3d {

@@ -8,7 +8,7 @@
 #include "core/base/parallel.h"
 #include "core/metrics/consistency.h"
 #include "core/scene/scene.h"
-#include "core/splat/gaussian_model.h"
+#include "core/splat/model/gaussian_model.h"
 #include "core/stage/stage.h"
 
 namespace color3d {

@@ -8,7 +8,7 @@
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
-#include "core/splat/render.h"
+#include "core/splat/raster/render.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/chroma_bound.h"
 #include "core/stage/consistency_scores.h"

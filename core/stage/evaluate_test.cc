@@ -6,9 +6,9 @@
 #include "core/color/lab.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/report_color.h"
-#include "core/stage/stage_fixture.h"
 #include "core/stage/stages.h"
 #include "core/stage/view_scores.h"
+#include "tests/support/stage_fixture.h"
 
 namespace color3d {
 namespace {

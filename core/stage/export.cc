@@ -1,9 +1,9 @@
-#include "core/splat/export.h"
+#include "core/splat/export/export.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "core/splat/rgb_refine.h"
+#include "core/splat/export/rgb_refine.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 

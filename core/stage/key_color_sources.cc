@@ -4,15 +4,15 @@
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
-#include "core/encoder/clip.h"
+#include "core/encoder/clip/clip.h"
 #include "core/encoder/threads.h"
 #include "core/image/codec.h"
-#include "core/keycolor/automatic.h"
-#include "core/keycolor/prompt.h"
+#include "core/keycolor/automatic/automatic.h"
+#include "core/keycolor/external/remote.h"
+#include "core/keycolor/external/script.h"
 #include "core/keycolor/recolor.h"
-#include "core/keycolor/reference.h"
-#include "core/keycolor/remote.h"
-#include "core/keycolor/script.h"
+#include "core/keycolor/references/reference.h"
+#include "core/keycolor/words/prompt.h"
 
 namespace color3d {
 namespace {

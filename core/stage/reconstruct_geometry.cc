@@ -2,7 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/scene/view_images.h"
-#include "core/splat/memory_plan.h"
+#include "core/splat/model/memory_plan.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 

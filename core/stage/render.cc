@@ -1,4 +1,4 @@
-#include "core/splat/render.h"
+#include "core/splat/raster/render.h"
 
 #include <algorithm>
 

@@ -13,7 +13,7 @@
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
 #include "core/encoder/encoder.h"
-#include "core/keycolor/remote.h"
+#include "core/keycolor/external/remote.h"
 
 namespace color3d {
 

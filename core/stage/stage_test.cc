@@ -9,8 +9,8 @@
 #include "core/image/codec.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/key_color_sources.h"
-#include "core/stage/stage_fixture.h"
 #include "core/stage/stages.h"
+#include "tests/support/stage_fixture.h"
 
 namespace color3d {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/keycolor/keycolor.h"
 #include "core/keyview/select.h"
 #include "core/scene/import.h"
-#include "core/splat/trainer.h"
+#include "core/splat/training/trainer.h"
 #include "core/stage/stage.h"
 
 namespace color3d {

@@ -1,6 +1,6 @@
 #include "core/stage/view_color.h"
 
-#include "core/keycolor/automatic.h"
+#include "core/keycolor/automatic/automatic.h"
 
 namespace color3d {
 namespace {

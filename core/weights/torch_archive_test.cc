@@ -9,8 +9,8 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/weights/test_weight_files.h"
 #include "core/weights/weight_file.h"
+#include "tests/support/weight_files.h"
 
 namespace color3d {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "color3d/backend/v1/backend.pb.h"
-#include "core/keycolor/remote.h"
+#include "core/keycolor/external/remote.h"
 
 namespace color3d {
 

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <string>
 
-#include "core/keycolor/remote.h"
+#include "core/keycolor/external/remote.h"
 
 namespace grpc {
 class Channel;

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "core/keycolor/remote.h"
+#include "core/keycolor/external/remote.h"
 #include "server/backends/backend_address.h"
 
 namespace color3d {

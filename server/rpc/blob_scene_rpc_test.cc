@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "server/ops/address.h"
-#include "server/rpc/rpc_test_fixture.h"
+#include "tests/support/rpc_fixture.h"
 
 namespace color3d::testing {
 namespace {

@@ -7,7 +7,7 @@
 #include "color3d/v1/colorizer.pb.h"
 #include "color3d/v1/job.pb.h"
 #include "color3d/v1/scene.pb.h"
-#include "server/jobs/job_store.h"
+#include "server/store/job_store.h"
 
 namespace color3d {
 

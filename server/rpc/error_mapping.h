@@ -9,7 +9,7 @@
 
 #include "core/base/error.h"
 #include "google/rpc/status.pb.h"
-#include "server/jobs/job.h"
+#include "server/store/job.h"
 
 namespace color3d {
 

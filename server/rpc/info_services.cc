@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "core/base/memory.h"
-#include "server/jobs/spec_check.h"
 #include "server/ops/process.h"
+#include "server/planning/spec_check.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/utf8.h"
 

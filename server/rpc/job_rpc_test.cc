@@ -4,7 +4,7 @@
 #include <set>
 #include <thread>
 
-#include "server/rpc/rpc_test_fixture.h"
+#include "tests/support/rpc_fixture.h"
 
 namespace color3d::testing {
 namespace {

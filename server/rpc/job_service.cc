@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "server/jobs/plan_scenes.h"
-#include "server/jobs/planner.h"
-#include "server/jobs/spec_check.h"
-#include "server/jobs/spec_names.h"
+#include "server/planning/plan_scenes.h"
+#include "server/planning/planner.h"
+#include "server/planning/spec_check.h"
+#include "server/planning/spec_names.h"
 #include "server/rpc/convert.h"
 #include "server/service_error.h"
 

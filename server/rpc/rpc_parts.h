@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "server/jobs/job_store.h"
-#include "server/jobs/user_models.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/executor.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/upload_store.h"
+#include "server/store/job_store.h"
+#include "server/store/user_models.h"
 
 namespace color3d {
 

@@ -10,8 +10,8 @@
 #include <set>
 
 #include "core/base/files.h"
-#include "core/image/probe.h"
-#include "server/jobs/time_budget.h"
+#include "core/image/probe/probe.h"
+#include "server/planning/time_budget.h"
 #include "server/service_error.h"
 
 namespace color3d {

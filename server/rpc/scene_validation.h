@@ -2,9 +2,9 @@
 // claims to be, enough photographs, a layout we know.
 #pragma once
 
-#include "server/jobs/job.h"
 #include "server/rpc/rpc_parts.h"
 #include "server/storage/blob_store.h"
+#include "server/store/job.h"
 
 namespace color3d {
 

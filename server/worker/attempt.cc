@@ -11,8 +11,8 @@
 
 #include "core/base/files.h"
 #include "core/base/memory.h"
-#include "server/jobs/planner.h"
 #include "server/ops/process.h"
+#include "server/planning/planner.h"
 #include "server/service_error.h"
 #include "server/worker/blob_checkpoints.h"
 

@@ -7,10 +7,10 @@
 #include <functional>
 #include <string>
 
-#include "server/jobs/job_store.h"
-#include "server/jobs/user_models.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
+#include "server/store/job_store.h"
+#include "server/store/user_models.h"
 #include "server/worker/lease_keeper.h"
 #include "server/worker/stage_runner.h"
 

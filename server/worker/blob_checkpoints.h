@@ -7,8 +7,8 @@
 #include <string>
 
 #include "core/base/progress.h"
-#include "server/jobs/job_store.h"
 #include "server/storage/blob_store.h"
+#include "server/store/job_store.h"
 
 namespace color3d {
 

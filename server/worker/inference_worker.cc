@@ -10,9 +10,9 @@
 #include <thread>
 
 #include "core/base/memory.h"
-#include "server/jobs/sqlite_job_store.h"
 #include "server/ops/socket_folder.h"
 #include "server/storage/data_folder.h"
+#include "server/store/sqlite_job_store.h"
 #include "server/worker/inference_queue.h"
 
 namespace color3d {

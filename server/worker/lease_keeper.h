@@ -13,7 +13,7 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
-#include "server/jobs/job_store.h"
+#include "server/store/job_store.h"
 
 namespace color3d {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "color3d/internal/v1/inference.pb.h"
-#include "server/jobs/user_models.h"
 #include "server/storage/blob_store.h"
+#include "server/store/user_models.h"
 
 namespace color3d {
 

@@ -11,7 +11,7 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
-#include "server/jobs/user_models.h"
+#include "server/store/user_models.h"
 
 namespace color3d {
 

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/jobs/job_store.h"
+#include "server/store/job_store.h"
 
 namespace color3d {
 

@@ -12,8 +12,8 @@
 
 #include "color3d/v1/job.pb.h"
 #include "core/base/files.h"
-#include "server/jobs/sqlite_job_store.h"
 #include "server/storage/data_folder.h"
+#include "server/store/sqlite_job_store.h"
 #include "server/worker/worker_loop.h"
 
 namespace color3d {

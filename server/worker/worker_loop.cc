@@ -7,8 +7,8 @@
 
 #include "color3d/v1/job.pb.h"
 #include "core/base/memory.h"
-#include "server/jobs/sqlite_job_store.h"
 #include "server/ops/process.h"
+#include "server/store/sqlite_job_store.h"
 #include "server/worker/attempt.h"
 #include "server/worker/attempt_batch.h"
 

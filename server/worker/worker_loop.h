@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "server/jobs/user_models.h"
+#include "server/store/user_models.h"
 #include "server/worker/lease_keeper.h"
 #include "server/worker/live_engine.h"
 #include "server/worker/stage_runner.h"

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/encoder/clip.h"
-#include "core/encoder/clip_weights.h"
+#include "core/encoder/clip/clip.h"
+#include "core/encoder/clip/clip_weights.h"
 #include "core/encoder/convnext.h"
-#include "core/keycolor/ddcolor.h"
+#include "core/keycolor/automatic/ddcolor.h"
 #include "core/weights/weight_file.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"

@@ -5,9 +5,9 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/encoder/synthetic_networks.h"
 #include "core/weights/safetensors.h"
 #include "tests/bench/commands.h"
+#include "tests/support/synthetic_networks.h"
 
 namespace color3d {
 namespace {

@@ -10,11 +10,11 @@
 
 #include "core/base/memory.h"
 #include "core/encoder/encoder.h"
-#include "core/encoder/synthetic_networks.h"
-#include "core/keycolor/automatic.h"
-#include "core/keycolor/ddcolor.h"
+#include "core/keycolor/automatic/automatic.h"
+#include "core/keycolor/automatic/ddcolor.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
+#include "tests/support/synthetic_networks.h"
 
 namespace color3d {
 namespace {

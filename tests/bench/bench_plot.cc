@@ -10,7 +10,7 @@
 #include "core/base/files.h"
 #include "core/report/plot.h"
 #include "core/stage/artifacts.h"
-#include "tests/bench/choice_results.h"
+#include "tests/bench/colorizer/choice_results.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/suite_results.h"
 

@@ -7,10 +7,10 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/encoder/threads.h"
-#include "core/keycolor/automatic.h"
+#include "core/keycolor/automatic/automatic.h"
 #include "core/weights/safetensors.h"
-#include "tests/bench/automatic_scores.h"
 #include "tests/bench/commands.h"
+#include "tests/bench/keyview/automatic_scores.h"
 #include "tests/bench/pretrain/pretrainer.h"
 
 namespace color3d {

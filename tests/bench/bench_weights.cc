@@ -13,10 +13,10 @@
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "core/base/random.h"
-#include "core/weights/test_weight_files.h"
 #include "core/weights/weight_file.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
+#include "tests/support/weight_files.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "core/encoder/clip_tokenizer.h"
+#include "core/encoder/clip/clip_tokenizer.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace {

@@ -2,10 +2,10 @@
 // archive with one storage; an odd first byte makes it TorchScript.
 #include <string_view>
 
-#include "core/weights/test_weight_files.h"
 #include "core/weights/weight_file.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/weight_checks.h"
+#include "tests/support/weight_files.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (size == 0) return 0;

@@ -1,10 +1,10 @@
 // Fuzz target: a whole PyTorch archive, from the zip directory to the tensors.
 #include <string_view>
 
-#include "core/weights/test_weight_files.h"
 #include "core/weights/weight_file.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/weight_checks.h"
+#include "tests/support/weight_files.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   return color3d::ReadOrRefuse([&] {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/splat/adam.h"
+#include "core/splat/training/adam.h"
 #include "tests/stability/stability_case.h"
 
 namespace color3d {

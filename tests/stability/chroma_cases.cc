@@ -5,9 +5,9 @@
 #include <cmath>
 #include <memory>
 
-#include "core/splat/chroma_fit.h"
-#include "core/splat/model_parameters.h"
-#include "core/splat/pipeline.h"
+#include "core/splat/chroma/chroma_fit.h"
+#include "core/splat/model/model_parameters.h"
+#include "core/splat/raster/pipeline.h"
 #include "tests/stability/tiny_problem.h"
 
 namespace color3d {

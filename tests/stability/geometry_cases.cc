@@ -6,7 +6,7 @@
 
 #include "core/base/files.h"
 #include "core/scene/view_images.h"
-#include "core/splat/trainer.h"
+#include "core/splat/training/trainer.h"
 #include "tests/stability/tiny_problem.h"
 #include "tests/support/procedural_scene.h"
 

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "core/base/random.h"
-#include "core/splat/loss.h"
-#include "core/splat/reference.h"
+#include "core/splat/training/loss.h"
+#include "tests/reference/splat.h"
 #include "tests/stability/stability_case.h"
 
 namespace color3d {

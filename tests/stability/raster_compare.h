@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "core/splat/pipeline.h"
-#include "core/splat/reference.h"
+#include "core/splat/raster/pipeline.h"
+#include "tests/reference/splat.h"
 #include "tests/stability/stability_case.h"
 
 namespace color3d {

@@ -7,7 +7,7 @@
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
-#include "core/image/probe.h"
+#include "core/image/probe/probe.h"
 
 namespace color3d {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "core/base/random.h"
 #include "core/encoder/convnext.h"
-#include "core/keycolor/color_bins.h"
-#include "core/keycolor/color_head.h"
+#include "core/keycolor/automatic/color_bins.h"
+#include "core/keycolor/automatic/color_head.h"
 #include "tests/bench/pretrain/photo_set.h"
 #include "tests/bench/pretrain/squeezenet.h"
 

@@ -8,7 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/image/codec.h"
-#include "core/keycolor/automatic.h"
+#include "core/keycolor/automatic/automatic.h"
 
 namespace color3d {
 namespace {

@@ -1,0 +1,87 @@
+#include "core/catalogue/stages.h"
+
+#include "core/base/error.h"
+#include "core/catalogue/artifacts.h"
+
+namespace color3d {
+
+const std::vector<Stage>& StageCatalogue() {
+  using namespace artifact;
+  static const std::vector<Stage> catalogue = {
+      {.kind = kind::kImportScene, .leaves = {kScene, kImportFacts, kSfmLog}},
+      {.kind = kind::kSelectKeyView,
+       .needs = {kScene},
+       .reads = {kImportFacts},
+       .leaves = {kKeyView, kKeyViewGray, kKeyViewRanking},
+       .brings_prerequisites = true},
+      {.kind = kind::kColorizeKeyView,
+       .needs = {kScene, kKeyView},
+       .leaves = {kKeyColor, kKeyColorFacts, kKeyColorRegions, kKeyViewColored},
+       .brings_prerequisites = true},
+      {.kind = kind::kReconstructGeometry,
+       .needs = {kScene},
+       .leaves = {kGeometry, kMemoryPlan},
+       .brings_prerequisites = true,
+       .resumes = true,
+       .keeps_time_limit = true},
+      {.kind = kind::kCarryColor,
+       .needs = {kScene, kKeyView, kKeyColor, kGeometry},
+       .leaves = {kCarried, kCarryFacts},
+       .resumes = true},
+      {.kind = kind::kGenerateAugmentations,
+       .needs = {kScene, kKeyView, kKeyColor},
+       .reads = {kGeometry, kCarryFacts},
+       .leaves = {kAugmentationFacts, kAugmentations, kAugmentationSheet}},
+      {.kind = kind::kPersonalize,
+       .needs = {kScene, kKeyView, kKeyColor},
+       .reads = {kAugmentations, kCarried},
+       .leaves = {kColorizer},
+       .runs_in_batch = true,
+       .resumes = true,
+       .keeps_time_limit = true},
+      {.kind = kind::kColorizeViews,
+       .needs = {kScene, kColorizer},
+       .reads = {kCarried},
+       .leaves = {kViewsAb, kProvenance}},
+      {.kind = kind::kSolveChroma,
+       .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry},
+       .leaves = {kModel},
+       .resumes = true,
+       .keeps_time_limit = true},
+      {.kind = kind::kExport, .needs = {kScene, kModel}, .leaves = {kPly, kSplat, kExportScores}},
+      {.kind = kind::kRender, .needs = {kScene, kModel}, .leaves = {kRenders}},
+      {.kind = kind::kEvaluate,
+       .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kModel},
+       .leaves = {kScores, kTruths, kColored2d}},
+      {.kind = kind::kColorizeScene, .leaves = {kReport, kMetrics, kAllCurves, kPlan}},
+      {.kind = kind::kPersonalizeScenes},
+  };
+  return catalogue;
+}
+
+const Stage* FindStage(std::string_view kind) {
+  for (const Stage& stage : StageCatalogue()) {
+    if (kind == stage.kind) return &stage;
+  }
+  return nullptr;
+}
+
+const Stage& StageOf(std::string_view kind) {
+  const Stage* stage = FindStage(kind);
+  if (stage == nullptr) {
+    throw Error(ErrorCode::kInternal, "there is no stage '" + std::string(kind) + "'");
+  }
+  return *stage;
+}
+
+const Stage* StageThatLeaves(std::string_view artifact) {
+  for (const Stage& stage : StageCatalogue()) {
+    for (const std::string_view made : stage.leaves) {
+      const bool below = made.ends_with('/') && artifact.starts_with(made);
+      if (artifact == made || below) return &stage;
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace color3d

@@ -1,0 +1,48 @@
+#include "core/catalogue/stages.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/catalogue/artifacts.h"
+
+namespace color3d {
+namespace {
+
+TEST(StageCatalogueTest, WhatAStageReadsIsMadeByOneBeforeIt) {
+  std::set<std::string_view> made;
+  for (const Stage& stage : StageCatalogue()) {
+    for (const auto* list : {&stage.needs, &stage.reads}) {
+      for (const char* name : *list) {
+        EXPECT_TRUE(made.contains(name)) << stage.kind << " reads " << name;
+      }
+    }
+    made.insert(stage.leaves.begin(), stage.leaves.end());
+  }
+}
+
+TEST(StageCatalogueTest, EveryArtifactHasOneMaker) {
+  std::set<std::string_view> made;
+  for (const Stage& stage : StageCatalogue()) {
+    for (const char* name : stage.leaves) EXPECT_TRUE(made.insert(name).second) << name;
+  }
+}
+
+TEST(StageCatalogueTest, FindsMakersByNameAndByFolder) {
+  EXPECT_STREQ(StageThatLeaves(artifact::kModel)->kind, kind::kSolveChroma);
+  EXPECT_STREQ(StageThatLeaves(std::string(artifact::kViewsAb) + "0001.png")->kind,
+               kind::kColorizeViews);
+  EXPECT_STREQ(StageThatLeaves(artifact::kKeyViewColored)->kind, kind::kColorizeKeyView);
+  EXPECT_EQ(StageThatLeaves("nothing.txt"), nullptr);
+}
+
+TEST(StageCatalogueTest, KindsAreFoundOrRefused) {
+  EXPECT_STREQ(StageOf(kind::kPersonalize).kind, kind::kPersonalize);
+  EXPECT_EQ(FindStage("colour"), nullptr);
+  EXPECT_THROW(StageOf("colour"), Error);
+}
+
+}  // namespace
+}  // namespace color3d

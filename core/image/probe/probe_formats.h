@@ -1,0 +1,43 @@
+// The three formats behind ProbeImage, for probe*.cc and orientation.cc only.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/image/probe/byte_reader.h"
+#include "core/image/probe/probe.h"
+
+namespace color3d::probe_internal {
+
+struct ProbeContext {
+  std::string_view bytes;
+  const std::string& file_name;
+  const ImageLimits& limits;
+
+  // "a.jpg is truncated: ..." and "a.jpg is damaged: ...".
+  Error Truncated(const std::string& what) const;
+  Error Damaged(const std::string& what) const;
+  // Refuses sizes of zero or above the limits.
+  void CheckSize(int64_t width, int64_t height) const;
+};
+
+ImageInfo ProbeJpeg(const ProbeContext& context);
+ImageInfo ProbePng(const ProbeContext& context);
+ImageInfo ProbeTiff(const ProbeContext& context);
+
+bool IsJpeg(std::string_view bytes);
+bool IsPng(std::string_view bytes);
+bool IsTiff(std::string_view bytes);
+
+// A TIFF file or an EXIF block, which has the same form.
+struct TiffHeader {
+  bool big_endian = false;
+  size_t first_directory = 0;
+};
+// False when the bytes do not start as TIFF.
+bool ReadTiffHeader(std::string_view bytes, TiffHeader* header);
+
+}  // namespace color3d::probe_internal

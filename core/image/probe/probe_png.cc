@@ -1,0 +1,121 @@
+#include <algorithm>
+#include <array>
+
+#include "core/image/probe/probe_formats.h"
+
+namespace color3d::probe_internal {
+namespace {
+
+constexpr std::string_view kSignature("\x89PNG\r\n\x1A\n", 8);
+
+constexpr std::array<uint32_t, 256> CrcTable() {
+  std::array<uint32_t, 256> table{};
+  for (uint32_t i = 0; i < 256; ++i) {
+    uint32_t c = i;
+    for (int k = 0; k < 8; ++k) c = (c & 1u) != 0 ? 0xEDB88320u ^ (c >> 1) : c >> 1;
+    table[i] = c;
+  }
+  return table;
+}
+constexpr std::array<uint32_t, 256> kCrcTable = CrcTable();
+
+uint32_t Crc32(std::string_view bytes) {
+  uint32_t c = 0xFFFFFFFFu;
+  for (char byte : bytes) c = kCrcTable[(c ^ static_cast<unsigned char>(byte)) & 0xFFu] ^ (c >> 8);
+  return c ^ 0xFFFFFFFFu;
+}
+
+int ChannelsOfColourType(uint32_t type) {
+  switch (type) {
+    case 0:
+      return 1;
+    case 2:
+      return 3;
+    case 3:
+      return 3;  // palette
+    case 4:
+      return 2;
+    case 6:
+      return 4;
+    default:
+      return 0;
+  }
+}
+
+bool IsAllowedDepth(uint32_t type, uint32_t depth) {
+  if (depth == 8) return true;
+  if (depth == 16) return type != 3;
+  return (depth == 1 || depth == 2 || depth == 4) && (type == 0 || type == 3);
+}
+
+void ReadHeader(const ProbeContext& context,
+                const ByteReader& reader,
+                size_t body,
+                size_t length,
+                ImageInfo* info) {
+  if (length != 13) throw context.Damaged("its header chunk has a wrong length");
+  const int64_t width = reader.U32(body);
+  const int64_t height = reader.U32(body + 4);
+  context.CheckSize(width, height);
+  const uint32_t depth = reader.U8(body + 8);
+  const uint32_t type = reader.U8(body + 9);
+  info->width = static_cast<int>(width);
+  info->height = static_cast<int>(height);
+  info->bits_per_channel = static_cast<int>(depth);
+  info->channels = ChannelsOfColourType(type);
+  if (info->channels == 0 || !IsAllowedDepth(type, depth)) {
+    throw context.Damaged("colour type " + std::to_string(type) + " with " + std::to_string(depth) +
+                          " bits does not exist");
+  }
+}
+
+// Deflate shrinks at most 1032-fold: less data than that cannot hold the image that is claimed.
+void CheckDataSize(const ProbeContext& context, const ImageInfo& info, int64_t data_bytes) {
+  const int64_t pixels = static_cast<int64_t>(info.width) * info.height;
+  const int64_t bits = pixels * info.bits_per_channel;  // of at least one channel
+  if (data_bytes < bits / 8 / 1032) {
+    throw context.Truncated("it holds " + std::to_string(data_bytes) + " bytes of data for " +
+                            std::to_string(pixels) + " px");
+  }
+}
+
+}  // namespace
+
+bool IsPng(std::string_view bytes) {
+  // Four bytes are enough to be sure that it was meant to be one.
+  const size_t n = std::min(bytes.size(), kSignature.size());
+  return n >= 4 && bytes.substr(0, n) == kSignature.substr(0, n);
+}
+
+ImageInfo ProbePng(const ProbeContext& context) {
+  const ByteReader reader(context.bytes);
+  ImageInfo info;
+  info.format = ImageFormat::kPng;
+  size_t at = kSignature.size();
+  int64_t data_bytes = 0;
+  bool first = true;
+  while (true) {
+    if (!reader.Has(at, 12)) throw context.Truncated("it ends before its IEND chunk");
+    const size_t length = reader.U32(at);
+    const std::string_view type = reader.Slice(at + 4, 4);
+    if (first != (type == "IHDR"))
+      throw context.Damaged("its header chunk is not where it belongs");
+    if (!reader.Has(at + 8, length) || !reader.Has(at + 8 + length, 4)) {
+      throw context.Truncated("it ends inside a chunk");
+    }
+    if (Crc32(reader.Slice(at + 4, length + 4)) != reader.U32(at + 8 + length)) {
+      throw context.Damaged("the checksum of a chunk at byte " + std::to_string(at) +
+                            " does not match");
+    }
+    if (first) ReadHeader(context, reader, at + 8, length, &info);
+    first = false;
+    if (type == "IDAT") data_bytes += static_cast<int64_t>(length);
+    if (type == "IEND") break;
+    at += 12 + length;
+  }
+  if (data_bytes == 0) throw context.Damaged("it holds no image data");
+  CheckDataSize(context, info, data_bytes);
+  return info;
+}
+
+}  // namespace color3d::probe_internal

@@ -1,0 +1,109 @@
+#include "core/keycolor/automatic/ddcolor.h"
+
+#include <torch/types.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/encoder/convnext.h"
+#include "core/encoder/convnext_weights.h"
+#include "core/encoder/torch_errors.h"
+#include "core/encoder/weight_digest.h"
+#include "core/image/codec.h"
+#include "core/image/guided_upsample.h"
+#include "core/keycolor/automatic/ddcolor_decoder.h"
+#include "core/weights/weight_file.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kNetworkSidePx = 512;
+constexpr int kGuideRadius = 2;
+constexpr float kGuideVarianceFloor = 20.0f;
+
+void CheckLuminance(const Image& luminance) {
+  if (luminance.channels != 1 || luminance.Empty()) {
+    throw InvalidArgument("the automatic colourizer takes a picture with 1 channel (L), this one " +
+                          std::string("has ") + std::to_string(luminance.channels));
+  }
+  const bool finite = std::all_of(luminance.data.begin(), luminance.data.end(), [](float value) {
+    return std::isfinite(value);
+  });
+  if (!finite) {
+    throw InvalidArgument("the luminance to be coloured holds a value that is not finite");
+  }
+}
+
+}  // namespace
+
+bool Ddcolor::Recognises(const WeightMap& weights) {
+  return weights.count("decoder.color_decoder.query_feat.weight") > 0 ||
+         weights.count("refine_net.0.0.weight_orig") > 0;
+}
+
+Ddcolor::Ddcolor(WeightMap weights) : digest_(DigestOfWeights("DDColor", weights)) {
+  WithTorchErrors("DDColor", [&] {
+    at::NoGradGuard no_grad;
+    ConvNextWeights encoder = TakeConvNextWeights(weights);
+    encoder_ = std::make_unique<const ConvNext>(
+        encoder.config, std::move(encoder.weights), encoder.description);
+    if (encoder.config.StageCount() != 4 || encoder.config.stem_stride != 4) {
+      throw InvalidArgument("the DDColor weights have an encoder of another kind: " +
+                            encoder.config.ToString());
+    }
+    WeightReader reader(std::move(weights), "the DDColor weights");
+    reader.IgnorePrefix("mean");  // ImageNet's statistics, which Input() has
+    reader.IgnorePrefix("std");
+    decoder_ = std::make_unique<const DdcolorDecoder>(encoder.config.dims, reader);
+  });
+  description_ = "DDColor, " + encoder_->config().ToString() + ", " +
+                 std::to_string(decoder_->query_count()) + " colour queries";
+}
+
+Ddcolor::~Ddcolor() = default;
+
+Image Ddcolor::Predict(const Image& gray_rgb) const {
+  if (gray_rgb.channels != 3 || gray_rgb.Empty() || gray_rgb.width % 32 != 0 ||
+      gray_rgb.height % 32 != 0) {
+    throw InvalidArgument("DDColor takes 3 channels and sides that are multiples of 32 px, not " +
+                          std::to_string(gray_rgb.width) + "x" + std::to_string(gray_rgb.height) +
+                          " with " + std::to_string(gray_rgb.channels));
+  }
+  return WithTorchErrors("DDColor", [&] {
+    at::NoGradGuard no_grad;
+    const torch::Tensor input = ConvNext::NormaliseInput(TensorFromImage(gray_rgb));
+    return ImageFromTensor(decoder_->Forward(encoder_->Taps(input), input));
+  });
+}
+
+AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
+  CheckLuminance(luminance);
+  const Image coarse = WithTorchErrors("DDColor", [&] {
+    at::NoGradGuard no_grad;
+    const Image square = Resize(luminance, kNetworkSidePx, kNetworkSidePx);
+    const torch::Tensor input = encoder_->Input(TensorFromImage(square));
+    return ImageFromTensor(decoder_->Forward(encoder_->Taps(input), input));
+  });
+  const bool enlarges = luminance.width > coarse.width || luminance.height > coarse.height;
+  AutomaticColor color;
+  color.ab = enlarges ? UpsampleGuided(coarse, luminance, kGuideRadius, kGuideVarianceFloor)
+                      : Resize(coarse, luminance.width, luminance.height);
+  color.confidence = Image(luminance.width, luminance.height, 1, 1.0f);
+  return color;
+}
+
+std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromWeightFile(
+    const std::filesystem::path& ddcolor_weights) {
+  WeightMap weights = ReadWeightFile(ddcolor_weights);
+  if (!Ddcolor::Recognises(weights)) {
+    throw InvalidArgument(ddcolor_weights.string() + " holds no DDColor (it has " +
+                          std::to_string(weights.size()) +
+                          " arrays, none called refine_net.0.0.weight_orig); give a published "
+                          "DDColor file");
+  }
+  return std::make_shared<const Ddcolor>(std::move(weights));
+}
+
+}  // namespace color3d

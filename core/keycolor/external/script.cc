@@ -1,0 +1,158 @@
+#include "core/keycolor/external/script.h"
+
+#include <torch/script.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <sstream>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/image/guided_upsample.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kMaxSidePx = 1024;
+constexpr int kMultiple = 32;
+constexpr int kMaxAnswerSidePx = 16384;
+constexpr float kMaxChroma = 150.0f;
+constexpr float kRgbMargin = 0.1f;
+constexpr int kGuideRadius = 2;
+constexpr float kGuideVarianceFloor = 20.0f;
+
+Error Refused(const std::filesystem::path& file, const std::string& why) {
+  return InvalidArgument("the TorchScript file " + file.filename().string() + " " + why);
+}
+
+// First line of what torch or the script says, without the backtrace.
+std::string FirstLine(const std::exception& error) {
+  const std::string text = error.what();
+  const size_t begin = text.find_first_not_of(" \n");
+  if (begin == std::string::npos) return "no message";
+  // TorchScript puts what was raised last: "AssertionError: ...".
+  const size_t raised = text.rfind("Error: ");
+  const size_t from = raised == std::string::npos ? begin : text.rfind('\n', raised) + 1;
+  return text.substr(from, std::min<size_t>(text.find('\n', from) - from, 200));
+}
+
+torch::Tensor PaddedInput(const Image& luminance) {
+  const int width = (luminance.width + kMultiple - 1) / kMultiple * kMultiple;
+  const int height = (luminance.height + kMultiple - 1) / kMultiple * kMultiple;
+  torch::Tensor input = torch::empty({1, 1, height, width}, torch::kFloat32);
+  float* values = input.data_ptr<float>();
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      values[static_cast<size_t>(y) * width + x] =
+          luminance.At(0, std::min(y, luminance.height - 1), std::min(x, luminance.width - 1));
+    }
+  }
+  return input;
+}
+
+torch::Tensor FirstTensor(const torch::IValue& answer, const std::filesystem::path& file) {
+  if (answer.isTensor()) return answer.toTensor();
+  if (answer.isTensorList() && answer.toTensorList().size() > 0)
+    return answer.toTensorList().get(0);
+  if (answer.isTuple() && !answer.toTuple()->elements().empty() &&
+      answer.toTuple()->elements()[0].isTensor()) {
+    return answer.toTuple()->elements()[0].toTensor();
+  }
+  throw Refused(file, "returned a " + answer.tagKind() + ", it must return a tensor");
+}
+
+Image CheckedAnswer(const torch::Tensor& answer, const std::filesystem::path& file) {
+  std::ostringstream shape;
+  shape << answer.sizes();
+  const bool fits = answer.dim() == 4 && answer.size(0) == 1 &&
+                    (answer.size(1) == 2 || answer.size(1) == 3) && answer.size(2) >= 1 &&
+                    answer.size(3) >= 1 && answer.size(2) <= kMaxAnswerSidePx &&
+                    answer.size(3) <= kMaxAnswerSidePx;
+  if (!fits || !answer.is_floating_point()) {
+    throw Refused(file,
+                  "returned a tensor of shape " + shape.str() + " and type " +
+                      std::string(answer.dtype().name()) +
+                      ", it must be [1,2,h,w] (ab) or [1,3,h,w] (sRGB) of floats");
+  }
+  const torch::Tensor planar = answer[0].detach().to(torch::kCPU, torch::kFloat32).contiguous();
+  Image image(static_cast<int>(planar.size(2)),
+              static_cast<int>(planar.size(1)),
+              static_cast<int>(planar.size(0)));
+  std::memcpy(image.data.data(), planar.data_ptr<float>(), image.data.size() * sizeof(float));
+  const float low = image.channels == 2 ? -kMaxChroma : -kRgbMargin;
+  const float high = image.channels == 2 ? kMaxChroma : 1.0f + kRgbMargin;
+  for (float value : image.data) {
+    if (value >= low && value <= high) continue;
+    throw Refused(file,
+                  "returned the value " + std::to_string(value) + ", allowed are " +
+                      std::to_string(low) + " to " + std::to_string(high));
+  }
+  return image;
+}
+
+Image Run(const Image& luminance, const std::filesystem::path& file) {
+  torch::NoGradGuard no_grad;
+  torch::jit::Module module;
+  try {
+    module = torch::jit::load(file.string(), torch::kCPU);
+    module.eval();
+  } catch (const std::exception& error) {
+    throw Refused(file, "cannot be loaded: " + FirstLine(error));
+  }
+  torch::IValue answer;
+  try {
+    answer = module.forward({PaddedInput(luminance)});
+  } catch (const std::exception& error) {
+    throw Refused(file, "failed: " + FirstLine(error));
+  }
+  return CheckedAnswer(FirstTensor(answer, file), file);
+}
+
+// Without the padding: the answer covers the padded input.
+Image Cropped(const Image& answer, const Image& luminance) {
+  const auto part = [](int answer_px, int px) {
+    const int padded = (px + kMultiple - 1) / kMultiple * kMultiple;
+    return std::max(1, static_cast<int>(std::lround(static_cast<double>(answer_px) * px / padded)));
+  };
+  Image cropped(
+      part(answer.width, luminance.width), part(answer.height, luminance.height), answer.channels);
+  for (int c = 0; c < answer.channels; ++c) {
+    for (int y = 0; y < cropped.height; ++y) {
+      for (int x = 0; x < cropped.width; ++x) cropped.At(c, y, x) = answer.At(c, y, x);
+    }
+  }
+  return cropped;
+}
+
+}  // namespace
+
+ScriptColor KeyColorFromScript(const Image& luminance, const std::filesystem::path& torchscript) {
+  if (luminance.channels != 1 || luminance.Empty()) {
+    throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
+                          std::to_string(luminance.channels));
+  }
+  const Image small = FitWithin(luminance, kMaxSidePx);
+  Image answer = Cropped(Run(small, torchscript), small);
+  ScriptColor color;
+  if (answer.channels == 3) {
+    for (float& value : answer.data) value = std::clamp(value, 0.0f, 1.0f);
+    const Image lab = LabFromSrgb(answer);
+    const Image expected = Resize(luminance, lab.width, lab.height);
+    for (size_t i = 0; i < lab.PlaneSize(); ++i) {
+      color.luminance_deviation +=
+          std::abs(lab.data[i] - expected.data[i]) / static_cast<double>(lab.PlaneSize());
+    }
+    answer = Image(lab.width, lab.height, 2);
+    std::copy_n(lab.Plane(1), answer.data.size(), answer.data.begin());
+  }
+  const bool fits = answer.width == luminance.width && answer.height == luminance.height;
+  color.ab = fits ? std::move(answer)
+                  : UpsampleGuided(answer, luminance, kGuideRadius, kGuideVarianceFloor);
+  return color;
+}
+
+}  // namespace color3d

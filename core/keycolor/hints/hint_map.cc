@@ -1,0 +1,257 @@
+#include "core/keycolor/hints/hint_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+constexpr float kAlphaOfHint = 0.5f;
+constexpr float kChromaOfHint = 6.0f;
+// Colours of overlapping hints that are further apart (Lab units) contradict each other.
+constexpr float kSameColor = 3.0f;
+
+using Point = std::array<double, 2>;
+
+// Squared distance of a point to the segment p q.
+double SquaredDistance(double x, double y, const Point& p, const Point& q) {
+  const double dx = q[0] - p[0], dy = q[1] - p[1];
+  const double length = dx * dx + dy * dy;
+  double t = length > 0.0 ? ((x - p[0]) * dx + (y - p[1]) * dy) / length : 0.0;
+  t = std::clamp(t, 0.0, 1.0);
+  const double ex = x - p[0] - t * dx, ey = y - p[1] - t * dy;
+  return ex * ex + ey * ey;
+}
+
+class HintDrawer {
+ public:
+  HintDrawer(const HintPictures& pictures, int width, int height)
+      : pictures_(pictures), width_(width), height_(height) {
+    map_.hinted.assign(static_cast<size_t>(width) * height, 0);
+    map_.ab = Image(width, height, 2);
+    entry_of_.assign(map_.hinted.size(), -1);
+  }
+
+  void Draw(int64_t entry, const ColorHint& hint) {
+    entry_ = entry;
+    hint_ = &hint;
+    drawn_ = 0;
+    CheckColor();
+    switch (hint.shape) {
+      case ColorHint::Shape::kDisc:
+        DrawDisc();
+        break;
+      case ColorHint::Shape::kLine:
+        DrawLine();
+        break;
+      case ColorHint::Shape::kRegion:
+        DrawRegion();
+        break;
+      case ColorHint::Shape::kLabel:
+        DrawLabel();
+        break;
+    }
+    if (drawn_ == 0) throw InvalidArgument(Name() + " holds no pixel of the key view");
+  }
+
+  void WarnOfContradictions(ProgressObserver& progress) const {
+    if (contradictions_ == 0) return;
+    progress.OnWarning("colour hints: " + std::to_string(contradictions_) +
+                       " pixels are given two different colours, the later entry wins (first by " +
+                       std::to_string(first_pair_[0]) + " and " + std::to_string(first_pair_[1]) +
+                       ")");
+  }
+  HintMap Take() { return std::move(map_); }
+
+ private:
+  std::string Name() const { return "colour hint " + std::to_string(entry_); }
+
+  void CheckColor() const {
+    if (!(std::abs(hint_->a) <= 128.0) || !(std::abs(hint_->b) <= 128.0)) {
+      throw InvalidArgument(Name() + " has a colour outside of -128..128 Lab units");
+    }
+    if (hint_->fill == ColorHint::Fill::kAutomatic && pictures_.automatic_ab == nullptr) {
+      throw InvalidArgument(Name() +
+                            " keeps the automatic colours, but no automatic colourizer was run");
+    }
+  }
+
+  void CheckPoint(double x, double y, bool border_is_inside) const {
+    const bool inside = border_is_inside ? x >= 0.0 && x <= width_ && y >= 0.0 && y <= height_
+                                         : x >= 0.0 && x < width_ && y >= 0.0 && y < height_;
+    if (inside) return;
+    throw InvalidArgument(Name() + " at (" + std::to_string(x) + ", " + std::to_string(y) +
+                          ") lies outside of the key view of " + std::to_string(width_) + "x" +
+                          std::to_string(height_) + " px");
+  }
+
+  void CheckRadius() const {
+    if (!(hint_->radius_px >= 0.0) || !std::isfinite(hint_->radius_px)) {
+      throw InvalidArgument(Name() + " has the radius " + std::to_string(hint_->radius_px) +
+                            " px, it must be >= 0");
+    }
+  }
+
+  void Set(int x, int y) {
+    const size_t i = static_cast<size_t>(y) * width_ + x;
+    float a = static_cast<float>(hint_->a), b = static_cast<float>(hint_->b);
+    if (hint_->fill == ColorHint::Fill::kNeutral) a = b = 0.0f;
+    if (hint_->fill == ColorHint::Fill::kAutomatic) {
+      a = pictures_.automatic_ab->Plane(0)[i];
+      b = pictures_.automatic_ab->Plane(1)[i];
+    }
+    float* as = map_.ab.Plane(0);
+    float* bs = map_.ab.Plane(1);
+    if (map_.hinted[i] && entry_of_[i] != entry_ && std::hypot(as[i] - a, bs[i] - b) > kSameColor) {
+      if (contradictions_++ == 0) first_pair_ = {entry_of_[i], entry_};
+    }
+    map_.hinted[i] = 1;
+    entry_of_[i] = static_cast<int32_t>(entry_);
+    as[i] = a;
+    bs[i] = b;
+    ++drawn_;
+  }
+
+  // The capsule around a segment, and at least the pixels under its ends.
+  void DrawSegment(const Point& p, const Point& q) {
+    const double radius = hint_->radius_px;
+    const auto low = [&](double v, int side) {
+      return static_cast<int>(std::clamp(std::floor(v - radius), 0.0, side - 1.0));
+    };
+    const auto high = [&](double v, int side) {
+      return static_cast<int>(std::clamp(std::floor(v + radius), 0.0, side - 1.0));
+    };
+    const auto under = [&](const Point& end, int x, int y) {
+      return x == std::min(static_cast<int>(end[0]), width_ - 1) &&
+             y == std::min(static_cast<int>(end[1]), height_ - 1);
+    };
+    for (int y = low(std::min(p[1], q[1]), height_); y <= high(std::max(p[1], q[1]), height_);
+         ++y) {
+      for (int x = low(std::min(p[0], q[0]), width_); x <= high(std::max(p[0], q[0]), width_);
+           ++x) {
+        const bool inside = SquaredDistance(x + 0.5, y + 0.5, p, q) <= radius * radius;
+        if (inside || under(p, x, y) || under(q, x, y)) Set(x, y);
+      }
+    }
+  }
+
+  void DrawDisc() {
+    CheckPoint(hint_->x_px, hint_->y_px, /*border_is_inside=*/false);
+    CheckRadius();
+    const Point center{hint_->x_px, hint_->y_px};
+    DrawSegment(center, center);
+  }
+
+  void DrawLine() {
+    CheckRadius();
+    const std::vector<Point>& points = hint_->points_px;
+    if (points.empty()) throw InvalidArgument(Name() + " is a line without points");
+    for (const Point& point : points) CheckPoint(point[0], point[1], /*border_is_inside=*/true);
+    for (size_t k = 0; k + 1 < points.size(); ++k) DrawSegment(points[k], points[k + 1]);
+    if (points.size() == 1) DrawSegment(points[0], points[0]);
+  }
+
+  // Pixels whose centres lie inside, by the even-odd rule.
+  void DrawRegion() {
+    const std::vector<Point>& points = hint_->points_px;
+    if (points.size() < 3) {
+      throw InvalidArgument(Name() + " is a region of " + std::to_string(points.size()) +
+                            " points, it needs 3 at least");
+    }
+    for (const Point& point : points) CheckPoint(point[0], point[1], /*border_is_inside=*/true);
+    std::vector<double> crossings;
+    for (int y = 0; y < height_; ++y) {
+      const double middle = y + 0.5;
+      crossings.clear();
+      for (size_t k = 0; k < points.size(); ++k) {
+        const Point& p = points[k];
+        const Point& q = points[(k + 1) % points.size()];
+        if ((p[1] <= middle) == (q[1] <= middle)) continue;
+        crossings.push_back(p[0] + (middle - p[1]) / (q[1] - p[1]) * (q[0] - p[0]));
+      }
+      std::sort(crossings.begin(), crossings.end());
+      for (size_t k = 0; k + 1 < crossings.size(); k += 2) {
+        const int first = std::max(0, static_cast<int>(std::ceil(crossings[k] - 0.5)));
+        const int end = std::min(width_, static_cast<int>(std::ceil(crossings[k + 1] - 0.5)));
+        for (int x = first; x < end; ++x) Set(x, y);
+      }
+    }
+  }
+
+  void DrawLabel() {
+    if (pictures_.labels == nullptr) {
+      throw InvalidArgument(Name() + " names the label " + std::to_string(hint_->label) +
+                            ", but there is no label picture");
+    }
+    for (int y = 0; y < height_; ++y) {
+      for (int x = 0; x < width_; ++x) {
+        const float value = pictures_.labels->At(0, y, x) * 255.0f;
+        if (std::abs(value - static_cast<float>(hint_->label)) < 0.5f) Set(x, y);
+      }
+    }
+  }
+
+  const HintPictures& pictures_;
+  int width_, height_;
+  HintMap map_;
+  std::vector<int32_t> entry_of_;
+  int64_t entry_ = 0;
+  const ColorHint* hint_ = nullptr;
+  int64_t drawn_ = 0;
+  int64_t contradictions_ = 0;
+  std::array<int64_t, 2> first_pair_{};
+};
+
+void CheckPicture(const Image* picture, const char* what, int channels, int width, int height) {
+  if (picture == nullptr) return;
+  if (picture->width == width && picture->height == height && picture->channels == channels) return;
+  throw InvalidArgument(std::string(what) + " is " + std::to_string(picture->width) + "x" +
+                        std::to_string(picture->height) + " px with " +
+                        std::to_string(picture->channels) + " channels, the key view needs " +
+                        std::to_string(width) + "x" + std::to_string(height) + " px with " +
+                        std::to_string(channels));
+}
+
+}  // namespace
+
+HintMap DrawHints(const std::vector<ColorHint>& hints,
+                  const HintPictures& pictures,
+                  int width,
+                  int height,
+                  ProgressObserver& progress,
+                  const CancellationToken& cancel) {
+  if (hints.empty()) throw InvalidArgument("there is no colour hint; give at least one");
+  CheckPicture(pictures.labels, "the label picture", 1, width, height);
+  CheckPicture(pictures.automatic_ab, "the automatic colouring", 2, width, height);
+  HintDrawer drawer(pictures, width, height);
+  for (size_t i = 0; i < hints.size(); ++i) {
+    cancel.ThrowIfCancelled();
+    drawer.Draw(static_cast<int64_t>(i), hints[i]);
+  }
+  drawer.WarnOfContradictions(progress);
+  return drawer.Take();
+}
+
+HintMap HintsOfStrokes(const Image& strokes) {
+  Image rgb(strokes.width, strokes.height, 3);
+  std::copy_n(strokes.data.begin(), rgb.data.size(), rgb.data.begin());
+  for (float& value : rgb.data) value = std::isfinite(value) ? value : 0.0f;
+  const Image lab = LabFromSrgb(rgb);
+  HintMap map;
+  map.hinted.assign(lab.PlaneSize(), 0);
+  map.ab = Image(lab.width, lab.height, 2);
+  std::copy_n(lab.Plane(1), map.ab.data.size(), map.ab.data.begin());
+  for (size_t i = 0; i < lab.PlaneSize(); ++i) {
+    map.hinted[i] = strokes.channels == 4
+                        ? strokes.Plane(3)[i] > kAlphaOfHint
+                        : std::hypot(lab.Plane(1)[i], lab.Plane(2)[i]) > kChromaOfHint;
+  }
+  return map;
+}
+
+}  // namespace color3d

@@ -1,0 +1,166 @@
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/parallel.h"
+#include "core/base/range_check.h"
+#include "core/grid/edge_weights.h"
+#include "core/grid/grid_solver.h"
+#include "core/image/codec.h"
+#include "core/image/guided_upsample.h"
+#include "core/keycolor/hints/hint_map.h"
+#include "core/keycolor/keycolor.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kGuideRadius = 2;
+constexpr float kGuideVarianceFloor = 20.0f;
+
+void CheckLuminance(const Image& luminance) {
+  if (luminance.channels != 1 || luminance.Empty()) {
+    throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
+                          std::to_string(luminance.channels));
+  }
+  for (float value : luminance.data) {
+    if (!std::isfinite(value)) {
+      throw InvalidArgument("the key view's luminance holds a value that is not finite");
+    }
+  }
+}
+
+// The hints on a smaller grid: mean colour of the hinted pixels in a cell; a cell with any is
+// hinted, so that thin strokes survive.
+HintMap Reduce(const HintMap& full, int width, int height) {
+  Image weighted(full.ab.width, full.ab.height, 3);
+  for (size_t i = 0; i < full.hinted.size(); ++i) {
+    if (!full.hinted[i]) continue;
+    weighted.Plane(0)[i] = full.ab.Plane(0)[i];
+    weighted.Plane(1)[i] = full.ab.Plane(1)[i];
+    weighted.Plane(2)[i] = 1.0f;
+  }
+  weighted = Resize(weighted, width, height);
+  HintMap small{std::vector<uint8_t>(weighted.PlaneSize(), 0), Image(width, height, 2)};
+  for (size_t i = 0; i < small.hinted.size(); ++i) {
+    const float share = weighted.Plane(2)[i];
+    if (share < 1e-4f) continue;
+    small.hinted[i] = 1;
+    small.ab.Plane(0)[i] = weighted.Plane(0)[i] / share;
+    small.ab.Plane(1)[i] = weighted.Plane(1)[i] / share;
+  }
+  return small;
+}
+
+// Spreads hints over a picture of the same size; fills all of the solution but hinted_pixels.
+HintSolution SolveAtSize(const Image& luminance,
+                         HintMap hints,
+                         const HintOptions& options,
+                         ProgressObserver& progress,
+                         const CancellationToken& cancel) {
+  ThreadPool pool(options.threads);
+  GridSystem system = SystemOfLuminance(luminance, options.sigma, pool);
+  system.pinned = std::move(hints.hinted);
+  GridSolution solved = SolveGridSystem(
+      std::move(system),
+      hints.ab.data,
+      {options.tolerance, options.max_iterations},
+      pool,
+      [&](int iteration, double residual) {
+        progress.OnError(iteration, "relative_residual", residual);
+        progress.OnProgress(iteration, 0, "spreading the colour hints");
+      },
+      cancel);
+  if (!solved.converged) {
+    progress.OnWarning(
+        "colour hints: the solver stopped after " + std::to_string(solved.iterations) +
+        " iterations at a relative residual of " + std::to_string(solved.relative_residual));
+  }
+  HintSolution solution;
+  solution.iterations = solved.iterations;
+  solution.relative_residual = solved.relative_residual;
+  solution.ab.width = luminance.width;
+  solution.ab.height = luminance.height;
+  solution.ab.channels = 2;
+  solution.ab.data = std::move(solved.u);
+  return solution;
+}
+
+HintSolution Solve(const Image& luminance,
+                   HintMap hints,
+                   const HintOptions& options,
+                   ProgressObserver& progress,
+                   const CancellationToken& cancel) {
+  const int64_t hinted = std::count(hints.hinted.begin(), hints.hinted.end(), 1);
+  HintSolution solution;
+  if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
+    solution = SolveAtSize(luminance, std::move(hints), options, progress, cancel);
+  } else {
+    const Image small = FitWithin(luminance, options.max_side_px);
+    solution =
+        SolveAtSize(small, Reduce(hints, small.width, small.height), options, progress, cancel);
+    solution.ab = UpsampleGuided(solution.ab, luminance, kGuideRadius, kGuideVarianceFloor);
+    for (size_t i = 0; i < hints.hinted.size(); ++i) {
+      if (!hints.hinted[i]) continue;
+      solution.ab.Plane(0)[i] = hints.ab.Plane(0)[i];
+      solution.ab.Plane(1)[i] = hints.ab.Plane(1)[i];
+    }
+  }
+  solution.hinted_pixels = hinted;
+  return solution;
+}
+
+}  // namespace
+
+void HintOptions::Validate() const {
+  const RangeCheck check("hint option");
+  check("sigma", sigma, 1e-3, 1e3);
+  check("max_side_px", max_side_px, 64, 16384);
+  check("tolerance", tolerance, 1e-6, 0.1);
+  check("max_iterations", max_iterations, 1, 1000000);
+  check("threads", threads, 0, 1024);
+}
+
+HintSolution KeyColorFromStrokes(const Image& luminance,
+                                 const Image& strokes,
+                                 const HintOptions& options,
+                                 ProgressObserver& progress,
+                                 const CancellationToken& cancel) {
+  options.Validate();
+  CheckLuminance(luminance);
+  if (strokes.width != luminance.width || strokes.height != luminance.height) {
+    throw InvalidArgument("the strokes picture is " + std::to_string(strokes.width) + "x" +
+                          std::to_string(strokes.height) + " px, the key view " +
+                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height));
+  }
+  if (strokes.channels != 3 && strokes.channels != 4) {
+    throw InvalidArgument("the strokes picture has " + std::to_string(strokes.channels) +
+                          " channels, it must have 3 (RGB) or 4 (RGBA)");
+  }
+  HintMap hints = HintsOfStrokes(strokes);
+  if (std::find(hints.hinted.begin(), hints.hinted.end(), 1) == hints.hinted.end()) {
+    throw InvalidArgument(
+        strokes.channels == 4
+            ? "the strokes picture hints no pixel (nowhere is alpha above 0.5)"
+            : "the strokes picture hints no pixel (nowhere does chroma exceed 6 Lab units)");
+  }
+  return Solve(luminance, std::move(hints), options, progress, cancel);
+}
+
+HintSolution KeyColorFromHints(const Image& luminance,
+                               const std::vector<ColorHint>& hints,
+                               const HintOptions& options,
+                               ProgressObserver& progress,
+                               const CancellationToken& cancel,
+                               const HintPictures& pictures) {
+  options.Validate();
+  CheckLuminance(luminance);
+  return Solve(luminance,
+               DrawHints(hints, pictures, luminance.width, luminance.height, progress, cancel),
+               options,
+               progress,
+               cancel);
+}
+
+}  // namespace color3d

@@ -1,0 +1,156 @@
+#include "core/scene/formats/colmap_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+// COLMAP 3.8, src/base/camera_models.h documents the order of the parameters.
+struct ModelInfo {
+  const char* name;
+  int parameter_count;
+  bool supported;
+};
+constexpr std::array<ModelInfo, 11> kModels = {{{"SIMPLE_PINHOLE", 3, true},
+                                                {"PINHOLE", 4, true},
+                                                {"SIMPLE_RADIAL", 4, true},
+                                                {"RADIAL", 5, true},
+                                                {"OPENCV", 8, true},
+                                                {"OPENCV_FISHEYE", 8, true},
+                                                {"FULL_OPENCV", 12, true},
+                                                {"FOV", 5, false},
+                                                {"SIMPLE_RADIAL_FISHEYE", 4, true},
+                                                {"RADIAL_FISHEYE", 5, true},
+                                                {"THIN_PRISM_FISHEYE", 12, false}}};
+
+bool HasOneFocalLength(const std::string& model) {
+  return model == "SIMPLE_PINHOLE" || model == "SIMPLE_RADIAL" || model == "RADIAL" ||
+         model == "SIMPLE_RADIAL_FISHEYE" || model == "RADIAL_FISHEYE";
+}
+
+bool IsFisheye(const std::string& model) { return model.find("FISHEYE") != std::string::npos; }
+
+}  // namespace
+
+int ColmapParameterCount(const std::string& model, const std::string& place) {
+  for (const ModelInfo& info : kModels) {
+    if (model != info.name) continue;
+    if (!info.supported) {
+      throw InvalidArgument(place + " has the camera model " + model +
+                            ", which is not supported; run colmap image_undistorter first");
+    }
+    return info.parameter_count;
+  }
+  throw InvalidArgument(place + " has the unknown camera model " + model);
+}
+
+std::string ColmapModelName(int model_id, const std::string& place) {
+  if (model_id < 0 || model_id >= static_cast<int>(kModels.size())) {
+    throw InvalidArgument(place + " has the unknown camera model number " +
+                          std::to_string(model_id));
+  }
+  return kModels[static_cast<size_t>(model_id)].name;
+}
+
+ColmapCamera MakeColmapCamera(const std::string& model,
+                              uint64_t width,
+                              uint64_t height,
+                              const std::vector<double>& parameters,
+                              const std::string& place) {
+  constexpr uint64_t kMaxSidePx = 1'000'000;
+  if (width < 1 || height < 1 || width > kMaxSidePx || height > kMaxSidePx) {
+    throw InvalidArgument(place + " is " + std::to_string(width) + " x " + std::to_string(height) +
+                          " px");
+  }
+  if (static_cast<int>(parameters.size()) != ColmapParameterCount(model, place)) {
+    throw InvalidArgument(place + " has " + std::to_string(parameters.size()) + " parameters; " +
+                          model + " has " + std::to_string(ColmapParameterCount(model, place)));
+  }
+  for (double p : parameters) {
+    if (!std::isfinite(p)) throw InvalidArgument(place + " has a parameter that is not finite");
+  }
+  ColmapCamera out;
+  Camera& c = out.camera;
+  c.width = static_cast<int>(width);
+  c.height = static_cast<int>(height);
+  size_t next = HasOneFocalLength(model) ? 1 : 2;
+  c.fx = parameters[0];
+  c.fy = parameters[next - 1];
+  c.cx = parameters[next++];
+  c.cy = parameters[next++];
+  if (!(c.fx > 0.0 && c.fy > 0.0)) {
+    throw InvalidArgument(place + " has a focal length of " + std::to_string(std::min(c.fx, c.fy)) +
+                          " px; it must be positive");
+  }
+  // What is left is in OpenCV's order: RADIAL has k1 k2, OPENCV k1 k2 p1 p2, FULL_OPENCV goes on
+  // with k3..k6, the fisheyes have k1..k4.
+  const size_t first = next;
+  for (; next < parameters.size(); ++next) out.distortion.k[next - first] = parameters[next];
+  if (IsFisheye(model)) {
+    out.distortion.model = Distortion::Model::kFisheye;
+  } else if (parameters.size() > first) {
+    out.distortion.model = Distortion::Model::kBrown;
+  }
+  return out;
+}
+
+Pose MakeColmapPose(const double (&q)[4], const double (&t)[3], const std::string& place) {
+  const Eigen::Quaterniond rotation(q[0], q[1], q[2], q[3]);
+  const Eigen::Vector3d translation(t[0], t[1], t[2]);
+  const double norm = rotation.norm();
+  if (!std::isfinite(norm) || !translation.allFinite()) {
+    throw InvalidArgument(place + " has a pose that is not finite");
+  }
+  if (norm < 1e-6) throw InvalidArgument(place + " has a zero rotation quaternion");
+  Pose pose;
+  pose.rotation = rotation.normalized();
+  pose.translation = translation;
+  return pose;
+}
+
+void CheckColmapPoint(const ColmapPoint& point, const std::string& place) {
+  for (int i = 0; i < 3; ++i) {
+    const double v = point.position[i];
+    if (std::isnan(v)) throw InvalidArgument(place + " has a NaN coordinate");
+    if (std::isinf(v)) throw InvalidArgument(place + " has an infinite coordinate");
+  }
+  if (!std::isfinite(point.error_px)) {
+    throw InvalidArgument(place + " has an error that is not finite");
+  }
+}
+
+bool IsColmapFolder(const fs::path& folder) {
+  std::error_code error;
+  return fs::is_regular_file(folder / "cameras.bin", error) ||
+         fs::is_regular_file(folder / "cameras.txt", error);
+}
+
+ColmapModel LoadColmapModel(const fs::path& folder) {
+  std::error_code error;
+  const bool binary = fs::is_regular_file(folder / "cameras.bin", error);
+  if (!binary && !fs::is_regular_file(folder / "cameras.txt", error)) {
+    throw Error(ErrorCode::kNotFound,
+                folder.string() + " holds no COLMAP model (cameras.bin or cameras.txt)");
+  }
+  for (const char* part : {"images", "points3D"}) {
+    const std::string file = std::string(part) + (binary ? ".bin" : ".txt");
+    if (!fs::is_regular_file(folder / file, error)) {
+      throw InvalidArgument("the COLMAP model in " + folder.string() + " has no " + file);
+    }
+  }
+  ColmapModel model = binary ? LoadColmapBinary(folder) : LoadColmapText(folder);
+  for (const auto& [id, image] : model.images) {
+    if (model.cameras.count(image.camera_id) == 0) {
+      throw InvalidArgument("image " + image.name + " refers to camera " +
+                            std::to_string(image.camera_id) + ", which the model does not have");
+    }
+  }
+  return model;
+}
+
+}  // namespace color3d

@@ -1,0 +1,159 @@
+#include <algorithm>
+#include <charconv>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/scene/formats/colmap_model.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r";
+
+// The lines of a file, and the words of the current line.
+class Lines {
+ public:
+  explicit Lines(const fs::path& path) : name_(path.filename().string()), text_(ReadFile(path)) {}
+
+  // False at the end of the file.
+  bool NextLine() {
+    if (at_ >= text_.size()) return false;
+    size_t end = text_.find('\n', at_);
+    if (end == std::string::npos) end = text_.size();
+    line_ = std::string_view(text_).substr(at_, end - at_);
+    at_ = end + 1;
+    ++number_;
+    SkipBlanks();
+    return true;
+  }
+  // Skips empty lines and comments.
+  bool NextRecord() {
+    while (NextLine()) {
+      if (!line_.empty() && line_[0] != '#') return true;
+    }
+    return false;
+  }
+  std::string Place() const { return name_ + " line " + std::to_string(number_); }
+  bool AtEndOfLine() const { return line_.empty(); }
+
+  std::string_view Word() {
+    const size_t end = std::min(line_.find_first_of(kBlanks), line_.size());
+    if (end == 0) throw InvalidArgument(Place() + " ends too early; is the file truncated?");
+    const std::string_view word = line_.substr(0, end);
+    line_.remove_prefix(end);
+    SkipBlanks();
+    return word;
+  }
+  // Independent of the locale. Accepts "nan" and "inf", which the caller's checks refuse by name.
+  template <typename T>
+  T Number() {
+    std::string_view word = Word();
+    const std::string_view shown = word;
+    if (word.size() > 1 && word[0] == '+') word.remove_prefix(1);
+    T value{};
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size()) {
+      throw InvalidArgument(Place() + ": \"" + std::string(shown.substr(0, 40)) +
+                            "\" is not a number that fits here");
+    }
+    return value;
+  }
+  // The rest of the line: file names may hold blanks.
+  std::string Rest() {
+    std::string rest(line_);
+    rest.erase(rest.find_last_not_of(kBlanks) + 1);
+    line_ = {};
+    return rest;
+  }
+
+ private:
+  void SkipBlanks() {
+    line_.remove_prefix(std::min(line_.find_first_not_of(kBlanks), line_.size()));
+  }
+
+  std::string name_;
+  std::string text_;
+  std::string_view line_;
+  size_t at_ = 0;
+  int number_ = 0;
+};
+
+std::map<uint32_t, ColmapCamera> ReadCameras(const fs::path& path) {
+  Lines lines(path);
+  std::map<uint32_t, ColmapCamera> cameras;
+  while (lines.NextRecord()) {
+    const uint32_t id = lines.Number<uint32_t>();
+    const std::string place = lines.Place() + ": camera " + std::to_string(id);
+    const std::string model(lines.Word());
+    const uint64_t width = lines.Number<uint64_t>();
+    const uint64_t height = lines.Number<uint64_t>();
+    std::vector<double> parameters;
+    while (!lines.AtEndOfLine()) parameters.push_back(lines.Number<double>());
+    if (!cameras.emplace(id, MakeColmapCamera(model, width, height, parameters, place)).second) {
+      throw InvalidArgument(place + " appears twice");
+    }
+  }
+  return cameras;
+}
+
+std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
+  Lines lines(path);
+  std::map<uint32_t, ColmapImage> images;
+  while (lines.NextRecord()) {
+    const uint32_t id = lines.Number<uint32_t>();
+    double qvec[4];
+    double tvec[3];
+    for (double& v : qvec) v = lines.Number<double>();
+    for (double& v : tvec) v = lines.Number<double>();
+    ColmapImage image;
+    image.camera_id = lines.Number<uint32_t>();
+    image.name = lines.Rest();
+    const std::string place = lines.Place() + ": image " + image.name;
+    image.cam_from_world = MakeColmapPose(qvec, tvec, place);
+    // The second line of an image may be empty, and missing at the end of the file.
+    if (lines.NextLine()) {
+      while (!lines.AtEndOfLine()) {
+        ColmapObservation observation;
+        observation.pixel.x() = lines.Number<double>();
+        observation.pixel.y() = lines.Number<double>();
+        observation.point_id = lines.Number<int64_t>();
+        image.observations.push_back(observation);
+      }
+    }
+    if (!images.emplace(id, std::move(image)).second) {
+      throw InvalidArgument(place + " has the number of another one");
+    }
+  }
+  return images;
+}
+
+std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
+  Lines lines(path);
+  std::vector<ColmapPoint> points;
+  while (lines.NextRecord()) {
+    const uint64_t id = lines.Number<uint64_t>();
+    ColmapPoint point;
+    point.id = id;
+    for (int i = 0; i < 3; ++i) point.position[i] = lines.Number<double>();
+    for (int i = 0; i < 3; ++i) lines.Number<int>();  // colour
+    point.error_px = lines.Number<double>();
+    CheckColmapPoint(point, lines.Place() + ": point " + std::to_string(id));
+    while (!lines.AtEndOfLine()) {
+      point.image_ids.push_back(lines.Number<uint32_t>());
+      lines.Number<uint32_t>();  // index of the observation
+    }
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
+}  // namespace
+
+ColmapModel LoadColmapText(const fs::path& folder) {
+  return {ReadCameras(folder / "cameras.txt"),
+          ReadImages(folder / "images.txt"),
+          ReadPoints(folder / "points3D.txt")};
+}
+
+}  // namespace color3d

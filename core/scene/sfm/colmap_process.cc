@@ -1,0 +1,125 @@
+#include "core/scene/sfm/colmap_process.h"
+
+#include <algorithm>
+#include <fstream>
+#include <future>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/subprocess.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Counts new lines that hold `mark` in a growing log.
+class LogCounter {
+ public:
+  LogCounter(const fs::path& log, std::string mark) : log_(log), mark_(std::move(mark)) {
+    std::error_code error;
+    const auto size = fs::file_size(log, error);
+    at_ = error ? 0 : static_cast<std::streamoff>(size);
+  }
+  int64_t Count() {
+    std::ifstream in(log_, std::ios::binary);
+    in.seekg(at_);
+    std::string line;
+    // A line without an end is not finished and is read again next time.
+    while (std::getline(in, line) && !in.eof()) {
+      if (line.find(mark_) != std::string::npos) ++count_;
+      at_ = in.tellg();
+    }
+    return count_;
+  }
+
+ private:
+  fs::path log_;
+  std::string mark_;
+  std::streamoff at_ = 0;
+  int64_t count_ = 0;
+};
+
+}  // namespace
+
+ColmapProcess::ColmapProcess(fs::path log,
+                             const ImportOptions& options,
+                             ProgressObserver& progress,
+                             const CancellationToken& cancel)
+    : log_(std::move(log)),
+      options_(options),
+      progress_(progress),
+      cancel_(cancel),
+      deadline_(Clock::now() + options.sfm_timeout) {}
+
+void ColmapProcess::Note(const std::string& line) const {
+  std::ofstream(log_, std::ios::app) << "color3d: " << line << "\n";
+}
+
+std::string ColmapProcess::Threads() const {
+  return std::to_string(options_.threads > 0 ? options_.threads : -1);
+}
+
+int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPhase& phase) {
+  SubprocessOptions child;
+  child.arguments = {"colmap"};
+  child.arguments.insert(child.arguments.end(), arguments.begin(), arguments.end());
+  child.environment = {"QT_QPA_PLATFORM=offscreen"};
+  child.log_path = log_;
+  child.timeout = std::chrono::duration_cast<std::chrono::seconds>(deadline_ - Clock::now());
+  if (child.timeout.count() <= 0) ThrowTooSlow();
+  LogCounter counter(log_, phase.mark);
+  progress_.OnProgress(0, phase.total, phase.message);
+  // The child runs on a thread of its own, so that progress is reported from ours, and with a token
+  // of its own, so that it stops as well when an observer throws.
+  CancellationToken stop;
+  auto running =
+      std::async(std::launch::async, [&child, &stop] { return RunSubprocess(child, stop); });
+  int64_t reported = 0;
+  try {
+    while (running.wait_for(std::chrono::milliseconds(200)) != std::future_status::ready) {
+      cancel_.ThrowIfCancelled();
+      const int64_t done = std::min(counter.Count(), phase.total);
+      if (done == reported) continue;
+      reported = done;
+      progress_.OnProgress(
+          done,
+          phase.total,
+          phase.message + " " + std::to_string(done) + "/" + std::to_string(phase.total));
+    }
+  } catch (...) {
+    stop.Cancel();  // the future's destructor waits for the child to be gone
+    throw;
+  }
+  const SubprocessResult result = running.get();
+  if (result.timed_out) ThrowTooSlow();
+  return result.exit_code;
+}
+
+void ColmapProcess::RunOrThrow(const std::vector<std::string>& arguments,
+                               const ColmapPhase& phase) {
+  const int code = Run(arguments, phase);
+  if (code == 0) return;
+  throw Error(ErrorCode::kInternal,
+              "colmap " + arguments.at(0) + " failed with exit code " + std::to_string(code) +
+                  ": " + LastLogLine() + "; log: " + log_.filename().string());
+}
+
+void ColmapProcess::ThrowTooSlow() const {
+  throw Error(ErrorCode::kDeadlineExceeded,
+              "finding camera positions took longer than " +
+                  std::to_string(options_.sfm_timeout.count()) +
+                  " s; use fewer photos, fewer features or a longer time limit");
+}
+
+std::string ColmapProcess::LastLogLine() const {
+  std::ifstream in(log_);
+  std::string line, last;
+  while (std::getline(in, line)) {
+    if (!line.empty()) last = line.substr(0, 200);
+  }
+  return last;
+}
+
+}  // namespace color3d

@@ -1,0 +1,145 @@
+#include "core/scene/sfm/pair_planner.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <numeric>
+#include <set>
+
+namespace color3d {
+namespace {
+
+constexpr int kSequenceOverlap = 2;
+constexpr int kSpanningTrees = 2;
+// Fewer common features than this occur by chance.
+constexpr float kClearlySimilar = 8.0f;
+
+PhotoPair Sorted(int i, int j) { return {std::min(i, j), std::max(i, j)}; }
+
+void AddNeighbors(const SimilarityTable& similarity, int neighbors, std::set<PhotoPair>* pairs) {
+  const int count = similarity.count();
+  for (int i = 0; i < count; ++i) {
+    std::vector<int> others;
+    for (int j = 0; j < count; ++j) {
+      if (j != i) others.push_back(j);
+    }
+    std::sort(others.begin(), others.end(), [&](int a, int b) {
+      const float of_a = similarity.At(i, a), of_b = similarity.At(i, b);
+      if (of_a != of_b) return of_a > of_b;
+      const int near_a = std::abs(a - i), near_b = std::abs(b - i);
+      return near_a != near_b ? near_a < near_b : a < b;
+    });
+    const bool unsure = !others.empty() && similarity.At(i, others[0]) < kClearlySimilar;
+    const int take = std::min<int>(unsure ? 2 * neighbors : neighbors, others.size());
+    for (int k = 0; k < take; ++k) pairs->insert(Sorted(i, others[k]));
+  }
+}
+
+void AddSequence(const std::vector<int>& sequence, std::set<PhotoPair>* pairs) {
+  for (int step = 1; step <= kSequenceOverlap; ++step) {
+    for (size_t i = step; i < sequence.size(); ++i) {
+      pairs->insert(Sorted(sequence[i - step], sequence[i]));
+    }
+  }
+}
+
+// Kruskal's maximum spanning tree, again and again without the pairs that are taken.
+void AddSpanningTrees(const SimilarityTable& similarity, std::set<PhotoPair>* pairs) {
+  std::vector<PhotoPair> edges = AllPairs(similarity.count());
+  std::sort(edges.begin(), edges.end(), [&](const PhotoPair& a, const PhotoPair& b) {
+    const float of_a = similarity.At(a.first, a.second), of_b = similarity.At(b.first, b.second);
+    if (of_a != of_b) return of_a > of_b;
+    const int apart_a = a.second - a.first, apart_b = b.second - b.first;
+    return apart_a != apart_b ? apart_a < apart_b : a < b;
+  });
+  std::set<PhotoPair> taken;
+  for (int tree = 0; tree < kSpanningTrees; ++tree) {
+    std::vector<int> parent(similarity.count());
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](int i) {
+      while (parent[i] != i) i = parent[i] = parent[parent[i]];
+      return i;
+    };
+    for (const PhotoPair& edge : edges) {
+      const int a = root(edge.first), b = root(edge.second);
+      if (a == b || taken.count(edge) > 0) continue;
+      parent[a] = b;
+      taken.insert(edge);
+    }
+  }
+  pairs->insert(taken.begin(), taken.end());
+}
+
+// Begin and end of the last number in a name.
+std::pair<size_t, size_t> LastNumber(const std::string& name) {
+  const auto digit = [&](size_t i) { return std::isdigit(static_cast<unsigned char>(name[i])); };
+  size_t end = name.size();
+  while (end > 0 && !digit(end - 1)) --end;
+  size_t begin = end;
+  while (begin > 0 && digit(begin - 1)) --begin;
+  return {begin, end};
+}
+
+}  // namespace
+
+std::optional<std::vector<int>> SequenceOrder(const std::vector<std::string>& names) {
+  constexpr size_t kMaxDigits = 18;  // what 64 bits hold
+  std::vector<std::pair<int64_t, int>> numbered;
+  std::string frame;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const auto [begin, end] = LastNumber(names[i]);
+    if (begin == end || end - begin > kMaxDigits) return std::nullopt;
+    const std::string rest = names[i].substr(0, begin) + "#" + names[i].substr(end);
+    if (i > 0 && rest != frame) return std::nullopt;
+    frame = rest;
+    numbered.emplace_back(std::stoll(names[i].substr(begin, end - begin)), static_cast<int>(i));
+  }
+  std::sort(numbered.begin(), numbered.end());
+  std::vector<int> order;
+  for (size_t i = 0; i < numbered.size(); ++i) {
+    if (i > 0 && numbered[i].first == numbered[i - 1].first) return std::nullopt;
+    order.push_back(numbered[i].second);
+  }
+  return order;
+}
+
+std::vector<PhotoPair> AllPairs(int count) {
+  std::vector<PhotoPair> pairs;
+  for (int i = 0; i < count; ++i) {
+    for (int j = i + 1; j < count; ++j) pairs.emplace_back(i, j);
+  }
+  return pairs;
+}
+
+PairPlan PlanPairs(const SimilarityTable& similarity,
+                   const std::vector<int>& sequence,
+                   int neighbors) {
+  std::set<PhotoPair> pairs;
+  AddNeighbors(similarity, neighbors, &pairs);
+  AddSequence(sequence, &pairs);
+  AddSpanningTrees(similarity, &pairs);
+  const size_t count = similarity.count();
+  const size_t all = count * (count - 1) / 2;
+  constexpr double kMost = 0.7;
+  if (static_cast<double>(pairs.size()) >= kMost * static_cast<double>(all)) {
+    return {AllPairs(similarity.count()), "all " + std::to_string(all) + " pairs: few photos"};
+  }
+  return {{pairs.begin(), pairs.end()},
+          std::to_string(pairs.size()) + " of " + std::to_string(all) + " pairs: the " +
+              std::to_string(neighbors) + " most similar photos of each, " +
+              (sequence.empty() ? "" : "neighbours in the sequence of names, ") +
+              "two spanning trees"};
+}
+
+std::vector<PhotoPair> PairsOfUnplaced(const std::vector<bool>& placed,
+                                       const std::vector<PhotoPair>& tried) {
+  const std::set<PhotoPair> known(tried.begin(), tried.end());
+  std::vector<PhotoPair> pairs;
+  for (const PhotoPair& pair : AllPairs(static_cast<int>(placed.size()))) {
+    if (placed[pair.first] && placed[pair.second]) continue;
+    if (known.count(pair) == 0) pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+}  // namespace color3d

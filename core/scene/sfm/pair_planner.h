@@ -1,0 +1,42 @@
+// Which pairs of photos are worth matching for structure-from-motion, when matching all of them
+// takes too long. Pure functions, thread-safe. For this folder only.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/scene/sfm/photo_similarity.h"
+
+namespace color3d {
+
+// Indices of two photos, the smaller first.
+using PhotoPair = std::pair<int, int>;
+
+// The photos in the order in which they were taken, judged by their names: all alike but for the
+// last number in them, which differs ("DSC_0107.jpg", "frame_9.png", "frame_10.png"). nullopt when
+// the names do not tell.
+std::optional<std::vector<int>> SequenceOrder(const std::vector<std::string>& names);
+
+struct PairPlan {
+  std::vector<PhotoPair> pairs;  // sorted, no repetitions
+  std::string reason;            // one line: what was chosen and why
+};
+
+// All n (n - 1) / 2 pairs.
+std::vector<PhotoPair> AllPairs(int count);
+
+// Every photo with the `neighbors` most similar ones (twice as many when none of them is clearly
+// similar), with the next two of its sequence, if `sequence` is not empty (a permutation of the
+// photos), and two spanning trees without a common pair, so that the photos hang together even when
+// one link fails. All pairs when these are most of them anyway.
+PairPlan PlanPairs(const SimilarityTable& similarity,
+                   const std::vector<int>& sequence,
+                   int neighbors);
+
+// The pairs that `tried` lacks with a photo that found no place. `placed` has one entry per photo.
+std::vector<PhotoPair> PairsOfUnplaced(const std::vector<bool>& placed,
+                                       const std::vector<PhotoPair>& tried);
+
+}  // namespace color3d

@@ -1,0 +1,158 @@
+#include "core/scene/sfm/pair_planner.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/base/random.h"
+
+namespace color3d {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Optional;
+
+// Photos on a closed ring that have the more in common the nearer they are.
+SimilarityTable Ring(int count) {
+  SimilarityTable table(count);
+  for (int i = 0; i < count; ++i) {
+    for (int j = i + 1; j < count; ++j) {
+      const int apart = std::min(j - i, count - (j - i));
+      table.Set(i, j, 200.0f / apart);
+    }
+  }
+  return table;
+}
+
+bool Connected(int count, const std::vector<PhotoPair>& pairs) {
+  std::set<int> reached = {0};
+  for (int round = 0; round < count; ++round) {
+    for (const auto& [a, b] : pairs) {
+      if (reached.count(a) + reached.count(b) == 1) reached.insert({a, b});
+    }
+  }
+  return static_cast<int>(reached.size()) == count;
+}
+
+bool Has(const PairPlan& plan, int a, int b) {
+  return std::binary_search(
+      plan.pairs.begin(), plan.pairs.end(), PhotoPair{std::min(a, b), std::max(a, b)});
+}
+
+TEST(PairPlanner, SimilarPhotosAcrossTheRingsSeam) {
+  const PairPlan plan = PlanPairs(Ring(40), {}, 6);
+  for (int i = 0; i < 40; ++i) {
+    for (int apart = 1; apart <= 3; ++apart) EXPECT_TRUE(Has(plan, i, (i + apart) % 40));
+  }
+  EXPECT_LE(plan.pairs.size(), 170u);
+  EXPECT_THAT(plan.reason, HasSubstr("of 780 pairs"));
+  EXPECT_TRUE(std::is_sorted(plan.pairs.begin(), plan.pairs.end()));
+  EXPECT_EQ(std::adjacent_find(plan.pairs.begin(), plan.pairs.end()), plan.pairs.end());
+}
+
+// Nearest neighbours alone would leave two islands.
+TEST(PairPlanner, IslandsAreJoinedByTwoBridges) {
+  SimilarityTable table(40);
+  for (int i = 0; i < 40; ++i) {
+    for (int j = i + 1; j < 40; ++j) table.Set(i, j, i / 20 == j / 20 ? 100.0f : 0.0f);
+  }
+  table.Set(3, 33, 9.0f);
+  table.Set(7, 25, 8.0f);
+  const PairPlan plan = PlanPairs(table, {}, 4);
+  EXPECT_TRUE(Connected(40, plan.pairs));
+  EXPECT_TRUE(Has(plan, 3, 33));
+  EXPECT_TRUE(Has(plan, 7, 25));
+}
+
+TEST(PairPlanner, ConnectedWithoutAnyEvidence) {
+  const PairPlan plan = PlanPairs(SimilarityTable(60), {}, 2);
+  EXPECT_TRUE(Connected(60, plan.pairs));
+}
+
+TEST(PairPlanner, SequenceNeighboursAreAlwaysIn) {
+  std::vector<int> sequence;  // 0 17 34 11 28 5 ...
+  for (int i = 0; i < 40; ++i) sequence.push_back(i * 17 % 40);
+  const PairPlan plan = PlanPairs(Ring(40), sequence, 4);
+  for (int i = 0; i + 2 < 40; ++i) {
+    EXPECT_TRUE(Has(plan, sequence[i], sequence[i + 1]));
+    EXPECT_TRUE(Has(plan, sequence[i], sequence[i + 2]));
+  }
+  EXPECT_THAT(plan.reason, HasSubstr("sequence"));
+}
+
+TEST(PairPlanner, GrowsLinearlyAndFewPhotosAreMatchedCompletely) {
+  EXPECT_EQ(PlanPairs(Ring(8), {}, 8).pairs.size(), 28u);
+  EXPECT_EQ(PlanPairs(Ring(2), {}, 8).pairs.size(), 1u);
+  EXPECT_EQ(PlanPairs(Ring(1), {}, 8).pairs.size(), 0u);
+  const double small = static_cast<double>(PlanPairs(Ring(50), {}, 8).pairs.size());
+  EXPECT_LT(static_cast<double>(PlanPairs(Ring(200), {}, 8).pairs.size()), 4.5 * small);
+}
+
+TEST(PairPlanner, SequenceOrderFromNames) {
+  EXPECT_THAT(SequenceOrder({"a/f10.png", "a/f9.png", "a/f8.png"}), Optional(ElementsAre(2, 1, 0)));
+  EXPECT_THAT(SequenceOrder({"0001.jpg", "0003.jpg"}), Optional(ElementsAre(0, 1)));
+  EXPECT_EQ(SequenceOrder({"left.jpg", "right.jpg"}), std::nullopt);
+  EXPECT_EQ(SequenceOrder({"a1.jpg", "b2.jpg"}), std::nullopt);
+  EXPECT_EQ(SequenceOrder({"f1.jpg", "f01.jpg"}), std::nullopt);  // which one is first?
+  EXPECT_EQ(SequenceOrder({"f99999999999999999999.jpg"}), std::nullopt);
+}
+
+TEST(PairPlanner, PairsOfUnplacedPhotos) {
+  EXPECT_THAT(PairsOfUnplaced({true, true, false, true}, {{0, 2}}),
+              ElementsAre(PhotoPair{1, 2}, PhotoPair{2, 3}));
+  EXPECT_TRUE(PairsOfUnplaced({true, true}, {}).empty());
+}
+
+LocalFeatures RandomFeatures(int count, uint64_t seed) {
+  Random random(seed);
+  LocalFeatures features;
+  for (int i = 0; i < count; ++i) {
+    std::vector<float> row(LocalFeatures::kDimensions);
+    double sum = 0.0;
+    for (float& v : row) sum += std::pow(v = static_cast<float>(random.NextNormal()), 2);
+    for (float v : row) features.descriptors.push_back(static_cast<float>(v / std::sqrt(sum)));
+  }
+  return features;
+}
+
+TEST(PhotoSimilarity, CountsWhatPhotosShare) {
+  const LocalFeatures a = RandomFeatures(40, 1);
+  LocalFeatures b = RandomFeatures(30, 2);
+  EXPECT_LE(CountMutualMatches(a, b), 2);
+  b.descriptors.insert(b.descriptors.end(),
+                       a.descriptors.begin(),
+                       a.descriptors.begin() + 12 * LocalFeatures::kDimensions);
+  EXPECT_NEAR(CountMutualMatches(a, b), 12, 2);
+  EXPECT_EQ(CountMutualMatches(a, b), CountMutualMatches(b, a));
+  EXPECT_EQ(CountMutualMatches(a, a), 40);
+  EXPECT_EQ(CountMutualMatches(a, {}), 0);
+}
+
+// Repeated structure says nothing: of two equal features none is clearly the nearest.
+TEST(PhotoSimilarity, AmbiguousFeaturesDoNotCount) {
+  const LocalFeatures a = RandomFeatures(10, 1);
+  LocalFeatures twice = a;
+  twice.descriptors.insert(twice.descriptors.end(), a.descriptors.begin(), a.descriptors.end());
+  EXPECT_EQ(CountMutualMatches(a, twice), 0);
+}
+
+TEST(PhotoSimilarity, TableIsSymmetricAndStopsWhenCancelled) {
+  const std::vector<LocalFeatures> photos = {
+      RandomFeatures(20, 1), RandomFeatures(20, 2), RandomFeatures(20, 1)};
+  ThreadPool pool(2);
+  const SimilarityTable table = CompareAll(photos, pool, {});
+  EXPECT_EQ(table.At(0, 2), 20.0f);
+  EXPECT_EQ(table.At(2, 0), 20.0f);
+  EXPECT_EQ(table.At(1, 1), 0.0f);
+  CancellationToken cancel;
+  cancel.Cancel();
+  EXPECT_THROW(CompareAll(photos, pool, cancel), Error);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,287 @@
+#include "core/scene/sfm/sfm.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/scene/formats/colmap_model.h"
+#include "core/scene/lens.h"
+#include "core/scene/sfm/colmap_process.h"
+#include "core/scene/sfm/pair_planner.h"
+#include "core/scene/sfm/sfm_mapper.h"
+#include "core/scene/sfm/sfm_matching.h"
+#include "core/scene/sfm/sfm_photos.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+// Up to here matching all pairs is the answer to every doubt; beyond it takes hours.
+constexpr size_t kExhaustiveLimit = 60;
+// Enough to tell photos apart; fewer where the number of pairs makes up for it.
+constexpr int kMaxLocalFeatures = 300;
+constexpr int kMinLocalFeatures = 100;
+
+int LocalFeatureCount(const ImportOptions& options, size_t photos) {
+  if (options.sfm_pairs == SfmPairs::kExhaustive) return 0;
+  return std::clamp(
+      static_cast<int>(100 * kMaxLocalFeatures / photos), kMinLocalFeatures, kMaxLocalFeatures);
+}
+
+class Stopwatch {
+ public:
+  explicit Stopwatch(double* seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    *seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double* seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// The stages of one run, the best model so far, and what was done for it.
+class Solver {
+ public:
+  Solver(ColmapProcess& colmap,
+         const SfmWorkspace& work,
+         const FeatureImages& copies,
+         const ImportOptions& options,
+         ProgressObserver& progress,
+         SfmReport* report)
+      : colmap_(colmap),
+        work_(work),
+        copies_(copies),
+        options_(options),
+        progress_(progress),
+        report_(report) {}
+
+  // An empty model when nothing was placed.
+  ColmapModel Solve(const PairPlan& plan) {
+    const bool planned = plan.pairs.size() < AllPairs(Count()).size();
+    if (planned) {
+      SolvePlanned(plan);
+      if (PlannedIsEnough()) return std::move(*best_);
+      Say(std::to_string(Placed()) + " of " + std::to_string(Count()) +
+          " photos hang together by the planned pairs; comparing all pairs, which takes longer");
+    }
+    SolveExhaustively(planned);
+    return best_ ? std::move(*best_) : ColmapModel{};
+  }
+
+ private:
+  int Count() const { return static_cast<int>(copies_.names.size()); }
+  size_t Placed() const { return best_ ? best_->images.size() : 0; }
+  bool IsHalfPlaced() const {
+    return 2 * Placed() >= copies_.names.size() && Placed() >= kMinPlaced;
+  }
+  bool AreNearlyAllPlaced() const {
+    return IsHalfPlaced() && 10 * Placed() >= 9 * copies_.names.size();
+  }
+  // What is left are pairs between placed photos, and finer features if there are any.
+  bool PlannedIsEnough() const {
+    return AreNearlyAllPlaced() ||
+           (IsHalfPlaced() && (!has_coarse_features_ || copies_.names.size() > kExhaustiveLimit));
+  }
+
+  void Say(const std::string& warning) {
+    colmap_.Note(warning);
+    progress_.OnWarning(warning);
+  }
+
+  void Extract(FeatureDetail detail) {
+    const Stopwatch watch(&report_->features_seconds);
+    has_coarse_features_ = ExtractFeatures(colmap_, work_, copies_, options_, detail);
+  }
+
+  void Match(const std::vector<PhotoPair>& pairs) {
+    const Stopwatch watch(&report_->matching_seconds);
+    MatchPairs(colmap_, work_, copies_, pairs);
+    report_->pairs_tried += static_cast<int64_t>(pairs.size());
+  }
+
+  void Attempt(const char* name, Strictness strictness) {
+    const Stopwatch watch(&report_->mapping_seconds);
+    std::optional<ColmapModel> model =
+        MapPhotos(colmap_, work_, copies_.names.size(), name, strictness);
+    if (!model || model->images.size() <= Placed()) return;
+    best_ = std::move(model);
+    is_loose_ = strictness == Strictness::kLoose;
+  }
+
+  void SolvePlanned(const PairPlan& plan) {
+    Extract(FeatureDetail::kCoarse);
+    Match(plan.pairs);
+    Attempt("planned", Strictness::kDefault);
+    if (Placed() == copies_.names.size()) return;
+    const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
+    if (AreWorthMatching(more)) {
+      colmap_.Note(std::to_string(Placed()) + " photos found a place; matching the others with " +
+                   "all: " + std::to_string(more.size()) + " more pairs");
+      Match(more);
+      Attempt("widened", Strictness::kDefault);
+    }
+    if (!AreNearlyAllPlaced()) Attempt("straight", Strictness::kStraight);
+  }
+
+  // Not when finer features of all photos come next anyway.
+  bool AreWorthMatching(const std::vector<PhotoPair>& pairs) const {
+    return !pairs.empty() && (IsHalfPlaced() || !has_coarse_features_);
+  }
+
+  void SolveExhaustively(bool has_features) {
+    if (!has_features || has_coarse_features_) Extract(FeatureDetail::kFine);
+    report_->exhaustive = true;
+    report_->pairs_tried = static_cast<int64_t>(AllPairs(Count()).size());
+    {
+      const Stopwatch watch(&report_->matching_seconds);
+      MatchAllPairs(colmap_, work_, copies_.names.size());
+    }
+    Attempt("exhaustive", Strictness::kDefault);
+    if (!AreNearlyAllPlaced()) Attempt("exhaustive_straight", Strictness::kStraight);
+    if (!IsHalfPlaced()) Attempt("exhaustive_loose", Strictness::kLoose);
+    if (is_loose_) Say("camera positions were found with loose thresholds only; check them");
+  }
+
+  std::vector<bool> PlacedPhotos() const {
+    std::set<std::string> names;
+    if (best_) {
+      for (const auto& [id, image] : best_->images) names.insert(image.name);
+    }
+    std::vector<bool> placed;
+    for (const std::string& name : copies_.names) placed.push_back(names.count(name) > 0);
+    return placed;
+  }
+
+  ColmapProcess& colmap_;
+  const SfmWorkspace& work_;
+  const FeatureImages& copies_;
+  const ImportOptions& options_;
+  ProgressObserver& progress_;
+  SfmReport* report_;
+  std::optional<ColmapModel> best_;
+  bool has_coarse_features_ = false;
+  bool is_loose_ = false;
+};
+
+PairPlan Plan(const std::vector<Photo>& photos,
+              const FeatureImages& copies,
+              const ImportOptions& options,
+              ThreadPool& pool,
+              const CancellationToken& cancel) {
+  const int count = static_cast<int>(photos.size());
+  if (copies.features.empty()) return {AllPairs(count), "all pairs, as asked for"};
+  std::vector<std::string> names;
+  for (const Photo& photo : photos) names.push_back(photo.name);
+  return PlanPairs(CompareAll(copies.features, pool, cancel),
+                   SequenceOrder(names).value_or(std::vector<int>()),
+                   options.sfm_neighbors);
+}
+
+void RequirePlaced(size_t placed, size_t count, const fs::path& log) {
+  if (placed >= kMinPlaced) return;
+  throw InvalidArgument(
+      (placed == 0 ? "none" : "only " + std::to_string(placed)) + " of " + std::to_string(count) +
+      " photos could be placed: the others share too few features with them; take at least 3 sharp "
+      "photos from different places that overlap by 60 %; log: " +
+      log.filename().string());
+}
+
+// From COLMAP's cameras for the copies to cameras for the photos, and from its numbers to views.
+SfmResult SceneOfModel(const ColmapModel& model,
+                       const std::vector<Photo>& photos,
+                       const std::vector<std::string>& copies) {
+  std::map<std::string, uint32_t> image_of_copy;
+  for (const auto& [id, image] : model.images) image_of_copy[image.name] = id;
+  SfmResult result;
+  std::map<uint32_t, int> view_of_image;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const auto it = image_of_copy.find(copies[i]);
+    if (it == image_of_copy.end()) {
+      result.unplaced.push_back(photos[i].name);
+      continue;
+    }
+    const ColmapImage& image = model.images.at(it->second);
+    const ColmapCamera& camera = model.cameras.at(image.camera_id);
+    View view;
+    view.name = photos[i].name;
+    view.image_file = photos[i].file;
+    // The copies are turned upright already, so no more turning.
+    view.captured_camera = camera.camera.Scaled(photos[i].width, photos[i].height);
+    view.distortion = camera.distortion;
+    view.camera = UndistortedCamera(view.captured_camera, view.distortion);
+    view.cam_from_world = image.cam_from_world;
+    view_of_image[it->second] = static_cast<int>(result.scene.views.size());
+    result.scene.views.push_back(std::move(view));
+  }
+  for (const ColmapPoint& from : model.points) {
+    SparsePoint point;
+    point.position = from.position;
+    point.reprojection_error_px = from.error_px;
+    std::set<int> views;
+    for (uint32_t id : from.image_ids) {
+      const auto it = view_of_image.find(id);
+      if (it != view_of_image.end()) views.insert(it->second);
+    }
+    point.views.assign(views.begin(), views.end());
+    result.scene.points.push_back(std::move(point));
+  }
+  return result;
+}
+
+// What an earlier, interrupted run left would be mixed with ours.
+void RemoveEarlierRun(const fs::path& scratch_folder) {
+  std::error_code error;
+  fs::create_directories(scratch_folder, error);
+  fs::remove_all(scratch_folder / "photos", error);
+  std::vector<fs::path> models;
+  for (const auto& entry : fs::directory_iterator(scratch_folder)) {
+    if (entry.path().filename().string().rfind("models_", 0) == 0) models.push_back(entry.path());
+  }
+  for (const fs::path& folder : models) fs::remove_all(folder, error);
+}
+
+}  // namespace
+
+SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
+                                 const fs::path& scene_folder,
+                                 const fs::path& scratch_folder,
+                                 const ImportOptions& options,
+                                 ProgressObserver& progress,
+                                 const CancellationToken& cancel) {
+  RemoveEarlierRun(scratch_folder);
+  const SfmWorkspace work{scratch_folder};
+  ColmapProcess colmap(scratch_folder / "sfm.log", options, progress, cancel);
+  ThreadPool pool(options.threads);
+  SfmReport report;
+  FeatureImages copies;
+  PairPlan plan;
+  {
+    const Stopwatch watch(&report.photos_seconds);
+    copies = WriteFeatureImages(photos,
+                                scene_folder,
+                                work.images(),
+                                options.sfm_max_image_side_px,
+                                LocalFeatureCount(options, photos.size()),
+                                pool,
+                                progress,
+                                cancel);
+    plan = Plan(photos, copies, options, pool, cancel);
+  }
+  report.plan = plan.reason;
+  colmap.Note("planned " + plan.reason);
+  const ColmapModel model = Solver(colmap, work, copies, options, progress, &report).Solve(plan);
+  RequirePlaced(model.images.size(), photos.size(), colmap.log());
+  SfmResult result = SceneOfModel(model, photos, copies.names);
+  result.report = std::move(report);
+  return result;
+}
+
+}  // namespace color3d

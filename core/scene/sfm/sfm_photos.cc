@@ -1,0 +1,111 @@
+#include "core/scene/sfm/sfm_photos.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "core/base/files.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+// Small enough to be cheap, large enough that photos of the same things have features in common.
+constexpr int kSimilaritySidePx = 384;
+constexpr int kMaxPhotosInMemory = 4;
+
+// Range between the 0.5 % and the 99.5 % quantile, from a histogram of 4096 steps.
+std::pair<float, float> UsedRange(const Image& image) {
+  constexpr int kBins = 4096;
+  std::vector<size_t> histogram(kBins, 0);
+  for (float v : image.data) ++histogram[std::clamp(static_cast<int>(v * kBins), 0, kBins - 1)];
+  const size_t tail = image.data.size() / 200;
+  int low = 0;
+  int high = kBins - 1;
+  for (size_t sum = histogram[low]; sum <= tail && low < high; sum += histogram[++low]) {
+  }
+  for (size_t sum = histogram[high]; sum <= tail && high > low; sum += histogram[--high]) {
+  }
+  return {static_cast<float>(low) / kBins, static_cast<float>(high + 1) / kBins};
+}
+
+// Equal for photos of one camera and zoom.
+std::string GroupFolder(const FeatureImages::Group& group) {
+  std::string name = std::to_string(group.width) + "x" + std::to_string(group.height);
+  if (group.focal_px > 0.0) name += "_f" + std::to_string(std::lround(group.focal_px));
+  return name;
+}
+
+}  // namespace
+
+Image FeatureImage(const Image& photo, int max_side_px) {
+  const Image small = FitWithin(photo, max_side_px);
+  Image gray(small.width, small.height, 1);
+  const size_t n = small.PlaneSize();
+  if (small.channels >= 3) {
+    const float* r = small.Plane(0);
+    const float* g = small.Plane(1);
+    const float* b = small.Plane(2);
+    for (size_t i = 0; i < n; ++i) gray.data[i] = 0.299f * r[i] + 0.587f * g[i] + 0.114f * b[i];
+  } else {
+    std::copy_n(small.data.begin(), n, gray.data.begin());
+  }
+  const auto [low, high] = UsedRange(gray);
+  if (high - low < 0.5f) {
+    // A flat picture stays flat: noise is not stretched more than 16-fold.
+    const float scale = 1.0f / std::max(high - low, 1.0f / 16.0f);
+    for (float& v : gray.data) v = (v - low) * scale;
+  }
+  return gray;
+}
+
+FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
+                                 const fs::path& scene_folder,
+                                 const fs::path& folder,
+                                 int max_side_px,
+                                 int local_features,
+                                 ThreadPool& pool,
+                                 ProgressObserver& progress,
+                                 const CancellationToken& cancel) {
+  FeatureImages written;
+  const int64_t count = static_cast<int64_t>(photos.size());
+  written.names.resize(photos.size());
+  if (local_features > 0) written.features.resize(photos.size());
+  std::vector<std::string> folders(photos.size());
+  std::vector<FeatureImages::Group> seen(photos.size());
+  const auto write = [&](int64_t i) {
+    cancel.ThrowIfCancelled();
+    const Photo& photo = photos[i];
+    const Image image = FeatureImage(ReadImage(scene_folder / photo.file), max_side_px);
+    const double focal_px = photo.focal_px * image.width / photo.width;
+    seen[i] = {image.width, image.height, focal_px, {}};
+    folders[i] = GroupFolder(seen[i]);
+    char number[32];
+    std::snprintf(number, sizeof(number), "%06d.png", static_cast<int>(i + 1));
+    written.names[i] = folders[i] + "/" + number;
+    fs::create_directories(folder / folders[i]);
+    WriteFileAtomic(folder / written.names[i], EncodePng8(image));
+    if (local_features > 0) {
+      written.features[i] =
+          DetectLocalFeatures(FitWithin(image, kSimilaritySidePx), local_features);
+    }
+  };
+  // Observers are called from one thread; large photos take memory, hence not too many at a time.
+  const int64_t batch = std::min(pool.thread_count(), kMaxPhotosInMemory);
+  for (int64_t begin = 0; begin < count; begin += batch) {
+    progress.OnProgress(
+        begin, count, "reading photos " + std::to_string(begin + 1) + "/" + std::to_string(count));
+    pool.ForEach(std::min(batch, count - begin), [&](int64_t i, int) { write(begin + i); });
+  }
+  std::map<std::string, size_t> group_of_folder;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const auto [it, is_new] = group_of_folder.emplace(folders[i], written.groups.size());
+    if (is_new) written.groups.push_back(seen[i]);
+    written.groups[it->second].names.push_back(written.names[i]);
+  }
+  return written;
+}
+
+}  // namespace color3d

@@ -1,0 +1,236 @@
+// Structure-from-motion for real: COLMAP on rendered photos of a textured room corner whose camera
+// positions are known, and on a real photo series when it is there.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <thread>
+
+#include "core/scene/import.h"
+#include "tests/support/test_exif.h"
+#include "tests/support/test_scenes.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+bool HasColmap() { return fs::exists("/usr/bin/colmap") || fs::exists("/usr/local/bin/colmap"); }
+
+// Noise of many scales on a plane, 0..1: something for SIFT to hold on to.
+float Texture(double u, double v, uint32_t plane) {
+  const auto lattice = [plane](int64_t x, int64_t y, int octave) {
+    uint64_t h = static_cast<uint64_t>(x) * 0x9E3779B97F4A7C15ULL ^
+                 static_cast<uint64_t>(y) * 0xC2B2AE3D27D4EB4FULL ^ (plane * 977u + octave * 131u);
+    h ^= h >> 29;
+    h *= 0xBF58476D1CE4E5B9ULL;
+    h ^= h >> 32;
+    return static_cast<double>(h & 0xFFFFu) / 65535.0;
+  };
+  double sum = 0.0;
+  double weight = 0.3;
+  double scale = 2.0;
+  for (int octave = 0; octave < 5; ++octave, scale *= 2.1, weight *= 0.85) {
+    const double x = u * scale;
+    const double y = v * scale;
+    const int64_t ix = static_cast<int64_t>(std::floor(x));
+    const int64_t iy = static_cast<int64_t>(std::floor(y));
+    const double fx = x - ix;
+    const double fy = y - iy;
+    sum += weight *
+           ((1 - fy) * ((1 - fx) * lattice(ix, iy, octave) + fx * lattice(ix + 1, iy, octave)) +
+            fy * ((1 - fx) * lattice(ix, iy + 1, octave) + fx * lattice(ix + 1, iy + 1, octave)));
+  }
+  return static_cast<float>(std::clamp(1.4 * sum - 0.25, 0.0, 1.0));
+}
+
+// What a ray sees: floor y = 1, wall z = 2, wall x = -1.5.
+float Shade(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
+  double nearest = 1e9;
+  float value = 0.0f;
+  const double walls[3] = {-1.5, 1.0, 2.0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double t = (walls[axis] - origin[axis]) / direction[axis];
+    if (!(t > 1e-6 && t < nearest)) continue;
+    nearest = t;
+    const Eigen::Vector3d hit = origin + t * direction;
+    value = Texture(hit[(axis + 1) % 3], hit[(axis + 2) % 3], static_cast<uint32_t>(axis));
+  }
+  return value;
+}
+
+Image RenderRoom(const Camera& camera, const Pose& pose) {
+  Image image(camera.width, camera.height, 1);
+  const Eigen::Vector3d origin = pose.Center();
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      float sum = 0.0f;
+      for (int s = 0; s < 4; ++s) {
+        const Eigen::Vector3d ray = camera.Ray(x + 0.25 + 0.5 * (s % 2), y + 0.25 + 0.5 * (s / 2));
+        sum += 0.25f * Shade(origin, pose.rotation.conjugate() * ray);
+      }
+      image.At(0, y, x) = sum;
+    }
+  }
+  return image;
+}
+
+const Camera kRoomCamera{400, 300, 420.0, 420.0, 200.0, 150.0};
+
+std::vector<Pose> RoomPoses(int count) {
+  std::vector<Pose> poses;
+  for (int i = 0; i < count; ++i) {
+    const double t = static_cast<double>(i) / std::max(1, count - 1) - 0.5;
+    poses.push_back(
+        LookAt({2.0 * t + 0.6, -0.2 + 0.3 * std::sin(5.0 * t), -1.2 + 0.4 * t}, {-0.3, 0.4, 1.5}));
+  }
+  return poses;
+}
+
+std::string PhotoName(int i) { return "p" + std::to_string(100 + i) + ".png"; }
+
+class Sfm : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!HasColmap()) GTEST_SKIP() << "colmap is not installed";
+  }
+  ImportResult Run() {
+    return ImportScene(folder_.path(), scratch_.path(), options_, progress_, cancel_);
+  }
+  ScratchFolder folder_;
+  ScratchFolder scratch_;
+  ImportOptions options_;
+  RecordingObserver progress_;
+  CancellationToken cancel_;
+};
+
+TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
+  const std::vector<Pose> truth = RoomPoses(7);
+  for (int i = 0; i < 7; ++i) {
+    Image photo = RenderRoom(kRoomCamera, truth[i]);
+    if (i == 2) {  // a dull 16-bit scan
+      for (float& v : photo.data) v = 0.1f + 0.15f * v;
+      WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng16(photo));
+    } else {
+      WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(photo));
+    }
+  }
+  const ImportResult result = Run();
+  EXPECT_EQ(result.layout, SceneLayout::kPhotos);
+  EXPECT_TRUE(result.ran_structure_from_motion);
+  EXPECT_EQ(result.photos_found, 7);
+  ASSERT_EQ(result.photos_registered, 7);
+  EXPECT_GT(result.scene.points.size(), 200u);
+  EXPECT_THAT(progress_.messages, HasSubstr("finding features"));
+  EXPECT_THAT(progress_.messages, HasSubstr("placing cameras"));
+  EXPECT_TRUE(fs::exists(scratch_.path() / "sfm.log"));
+
+  // Centres up to a similarity, then directions in the aligned world.
+  Eigen::Matrix<double, 3, 7> found, expected;
+  for (int i = 0; i < 7; ++i) {
+    const View& view = result.scene.views[i];
+    EXPECT_EQ(view.name, PhotoName(i));
+    found.col(i) = view.cam_from_world.Center();
+    expected.col(i) = truth[i].Center();
+    EXPECT_NEAR(view.captured_camera.fx, 420.0, 25.0);
+    EXPECT_EQ(view.captured_camera.width, 400);
+  }
+  const Eigen::Matrix4d align = Eigen::umeyama(found, expected);
+  const double scale = std::cbrt(align.topLeftCorner<3, 3>().determinant());
+  const Eigen::Matrix3d rotation = align.topLeftCorner<3, 3>() / scale;
+  for (int i = 0; i < 7; ++i) {
+    const Eigen::Vector3d aligned = (align * found.col(i).homogeneous()).head<3>();
+    EXPECT_LT((aligned - expected.col(i)).norm(), 0.05) << i;  // the path is 2 long
+    const Eigen::Vector3d looks =
+        rotation *
+        (result.scene.views[i].cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ());
+    const Eigen::Vector3d should = truth[i].rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    EXPECT_LT(std::acos(std::min(1.0, looks.dot(should))) * 180.0 / M_PI, 2.0) << i;
+  }
+}
+
+// Enough photos that most pairs are left out, from a camera that says its focal length.
+TEST_F(Sfm, PlannedPairsOfPhotosWithAFocalLength) {
+  constexpr int kCount = 14;
+  const Camera camera = kRoomCamera.Scaled(320, 240);
+  const std::vector<Pose> poses = RoomPoses(kCount);
+  const auto film_mm =
+      static_cast<uint32_t>(std::lround(camera.fx * 43.2666 / std::hypot(320, 240)));
+  for (int i = 0; i < kCount; ++i) {
+    const std::string jpeg = EncodeJpeg(RenderRoom(camera, poses[i]));
+    WriteFileAtomic(folder_.path() / ("p" + std::to_string(i) + ".jpg"),
+                    WithExif(jpeg, {{41989, 3, film_mm}}));
+  }
+  options_.sfm_neighbors = 3;
+  const ImportResult result = Run();
+  EXPECT_EQ(result.photos_registered, kCount);
+  EXPECT_FALSE(result.sfm.exhaustive);
+  EXPECT_LT(result.sfm.pairs_tried, kCount * (kCount - 1) / 2);
+  EXPECT_NEAR(result.scene.views[0].captured_camera.fx, camera.fx, 0.03 * camera.fx);
+  const std::string log = ReadFile(scratch_.path() / "sfm.log");
+  EXPECT_THAT(log, HasSubstr("color3d: planned " + result.sfm.plan));
+  EXPECT_THAT(log, HasSubstr("(Prior)"));
+}
+
+TEST_F(Sfm, PhotosThatShareNothingAreRefusedInOneLine) {
+  Random random(1);
+  for (int i = 0; i < 4; ++i) {
+    Image photo(200, 150, 1);
+    for (float& v : photo.data) v = static_cast<float>(random.NextUniform());
+    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(photo));
+  }
+  const std::string said = Refusal([&] { Run(); });
+  EXPECT_THAT(said, HasSubstr("none of 4 photos could be placed"));
+  EXPECT_THAT(said, HasSubstr("overlap by 60 %"));
+  EXPECT_THAT(said, HasSubstr("sfm.log"));
+  EXPECT_EQ(said.find('\n'), std::string::npos);
+}
+
+TEST_F(Sfm, FlatPhotosAndTwoPhotosAreRefused) {
+  for (int i = 0; i < 2; ++i) {
+    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(Image(64, 48, 1, 0.5f)));
+  }
+  EXPECT_THAT(Refusal([&] { Run(); }), HasSubstr("2 photos could be placed"));
+}
+
+TEST_F(Sfm, CancellationStopsTheChild) {
+  const std::vector<Pose> poses = RoomPoses(6);
+  for (int i = 0; i < 6; ++i) {
+    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(RenderRoom(kRoomCamera, poses[i])));
+  }
+  std::thread canceller([this] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    cancel_.Cancel();
+  });
+  EXPECT_THAT(Refusal([&] { Run(); }), HasSubstr("cancelled"));
+  canceller.join();
+}
+
+TEST_F(Sfm, RealPhotosAgreeWithTheirModel) {
+  const fs::path sceaux = fs::path(COLOR3D_SHARED_DATA) / "scenes/sceaux";
+  if (!fs::exists(sceaux / "sparse/0")) GTEST_SKIP() << "no " << sceaux;
+  for (const auto& entry : fs::directory_iterator(sceaux / "images")) {
+    fs::copy(entry.path(), folder_.path() / entry.path().filename());
+  }
+  const Scene reference = ReadColmapModel(sceaux / "sparse/0", sceaux);
+  const ImportResult result = Run();
+  EXPECT_EQ(result.photos_registered, 11);
+  double worst_deg = 0.0;
+  const Eigen::Quaterniond first = result.scene.views[0].cam_from_world.rotation;
+  const Eigen::Quaterniond reference_first =
+      reference.views[reference.FindView(result.scene.views[0].name)].cam_from_world.rotation;
+  for (const View& view : result.scene.views) {
+    const Pose& pose = reference.views[reference.FindView(view.name)].cam_from_world;
+    const Eigen::Quaterniond got = view.cam_from_world.rotation * first.conjugate();
+    const Eigen::Quaterniond expected = pose.rotation * reference_first.conjugate();
+    worst_deg = std::max(worst_deg, got.angularDistance(expected) * 180.0 / M_PI);
+  }
+  EXPECT_LT(worst_deg, 1.0);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,173 @@
+#include "core/splat/chroma/chroma_adam.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "core/color/lab.h"
+#include "core/splat/chroma/chroma_targets.h"
+#include "core/splat/model/model_parameters.h"
+#include "core/splat/raster/pipeline.h"
+#include "core/splat/training/loss.h"
+#include "core/splat/training/training_guard.h"
+#include "core/splat/training/training_state.h"
+
+namespace color3d {
+namespace {
+
+constexpr double kDcRate = 2.5e-3;  // as 3DGS; a' and b' have range 1
+constexpr double kRestDivisor = 20.0;
+constexpr double kLastRate = 0.1;  // of the first, at the end (log-linear)
+constexpr int kErrorReports = 50;
+
+class ChromaTrainer {
+ public:
+  ChromaTrainer(const ChromaRun& run, const std::vector<int>& colored, ChromaParameters& parameters)
+      : run_(run), colored_(colored), parameters_(parameters) {
+    state_.parameters = parameters.block;
+    const int rows = state_.parameters.rows();
+    const int64_t count = state_.parameters.count();
+    state_.moments = {ParameterBlock(rows, count), ParameterBlock(rows, count)};
+    state_.random = Random(run.options.seed, 1);
+  }
+
+  void Train() {
+    TrainingGuard guard(run_.progress);
+    Resume();
+    const double earlier = state_.elapsed_seconds;
+    guard.Keep(state_);
+    while (state_.iteration < run_.options.iterations && !run_.OutOfTime(state_.elapsed_seconds)) {
+      run_.cancel.ThrowIfCancelled();
+      if (!Step()) {
+        guard.Restore("chroma", state_);
+        continue;
+      }
+      ++state_.iteration;
+      state_.elapsed_seconds = earlier + run_.clock.Seconds();
+      if (guard.IsDue(state_.iteration)) guard.Keep(state_);
+      Report();
+      if (run_.checkpoints.WantsSave()) {
+        run_.checkpoints.Save(SerializeTrainingState(state_, Fingerprint()));
+      }
+    }
+    parameters_.block = state_.parameters;
+  }
+
+ private:
+  std::string Fingerprint() const {
+    char text[128];
+    std::snprintf(text,
+                  sizeof(text),
+                  "chroma adam %d %d %g %llu %zu %lld",
+                  run_.options.iterations,
+                  run_.options.chroma_sh_degree,
+                  run_.options.ssim_weight,
+                  static_cast<unsigned long long>(run_.options.seed),
+                  run_.problem.training.size(),
+                  static_cast<long long>(state_.parameters.count()));
+    return text;
+  }
+
+  void Resume() {
+    const std::optional<std::string> saved = run_.checkpoints.Load();
+    if (saved && !ParseTrainingState(*saved, Fingerprint(), state_)) {
+      run_.progress.OnWarning(
+          "chroma: the checkpoint belongs to other options or is damaged; fitting starts afresh");
+    }
+  }
+
+  // Share of the schedule that is over, by iterations or by time.
+  double Done() const {
+    const double by_count =
+        static_cast<double>(state_.iteration) / std::max(1, run_.options.iterations);
+    const double limit = run_.options.time_limit_seconds;
+    return limit > 0.0 ? std::min(1.0, std::max(by_count, state_.elapsed_seconds / limit))
+                       : by_count;
+  }
+
+  std::vector<float> LearningRates() const {
+    std::vector<float> rates(state_.parameters.rows(), 0.0f);
+    const double rate = kDcRate * std::pow(kLastRate, Done()) * state_.rate_scale;
+    for (const ColorChannel& channel :
+         {parameters_.color.channel[0], parameters_.color.channel[1]}) {
+      for (int k = 0; k < channel.coefficients; ++k) {
+        rates[channel.row + k] = static_cast<float>(k == 0 ? rate : rate / kRestDivisor);
+      }
+    }
+    return rates;
+  }
+
+  bool Step() {
+    const PosedCamera& view = run_.problem.training[static_cast<size_t>(
+        colored_[state_.NextView(static_cast<int>(colored_.size()))])];
+    ChromaPlanes target;
+    if (!LoadChromaPlanes(run_.problem, view, &target)) return true;
+    for (float& value : target.ab.data) value += kNeutralChroma;
+    const RasterCamera camera = MakeRasterCamera(view.camera, view.cam_from_world);
+    const float background[2] = {kNeutralChroma, kNeutralChroma};
+    const ColorSpec& color = parameters_.color;
+    ThreadPool& pool = run_.pool;
+    pipeline_.Forward(state_.parameters, color, camera, background, false, pool);
+    LossWeights weights;
+    weights.ssim = static_cast<float>(run_.options.ssim_weight);
+    weights.l1 = 1.0f - weights.ssim;
+    weights.edge = 0.0f;
+    const LossValue loss =
+        loss_.Evaluate(pipeline_.color(), target.ab, &target.weight, weights, pool, d_color_);
+    if (!std::isfinite(loss.total)) return false;
+    pipeline_.Backward(
+        state_.parameters, color, camera, d_color_, GradientScope::kColorOnly, pool, gradient_);
+    if (!AdamStep(gradient_,
+                  LearningRates(),
+                  state_.iteration + 1,
+                  pool,
+                  state_.parameters,
+                  state_.moments)) {
+      return false;
+    }
+    state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
+    return true;
+  }
+
+  void Report() {
+    const int64_t n = run_.options.iterations;
+    const double now = run_.clock.Seconds();
+    if (now - last_progress_ > 0.25 || state_.iteration == n) {
+      last_progress_ = now;
+      run_.progress.OnProgress(
+          state_.iteration,
+          n,
+          "chroma on " + std::to_string(state_.parameters.count()) + " Gaussians");
+    }
+    if (state_.iteration % std::max<int64_t>(1, n / kErrorReports) == 0 || state_.iteration == n) {
+      run_.progress.OnError(state_.iteration, "train_l1_ab", 255.0 * state_.mean_error);
+    }
+    if (run_.problem.snapshot && (state_.iteration >= next_snapshot_ || state_.iteration == n)) {
+      next_snapshot_ = state_.iteration * 3 / 2 + 5;
+      parameters_.block = state_.parameters;
+      run_.Snapshot(state_.iteration, parameters_);
+    }
+  }
+
+  const ChromaRun& run_;
+  const std::vector<int>& colored_;
+  ChromaParameters& parameters_;
+  TrainingState state_;
+  SplatPipeline pipeline_;
+  ImageLoss loss_;
+  PlaneBuffer d_color_;
+  ParameterBlock gradient_;
+  double last_progress_ = 0.0;
+  int64_t next_snapshot_ = 10;
+};
+
+}  // namespace
+
+void TrainChromaWithAdam(const ChromaRun& run,
+                         const std::vector<int>& colored,
+                         ChromaParameters& parameters) {
+  ChromaTrainer(run, colored, parameters).Train();
+}
+
+}  // namespace color3d

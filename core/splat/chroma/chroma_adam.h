@@ -1,0 +1,17 @@
+// The paper's second half on fixed geometry: Adam on 0.8 L1 + 0.2 (1 - SSIM) of a', b', one view
+// per iteration. Internal to the splat module.
+#pragma once
+
+#include <vector>
+
+#include "core/splat/chroma/chroma_run.h"
+
+namespace color3d {
+
+// Improves `parameters` in place; `colored` are the positions in run.problem.training that have
+// colours.
+void TrainChromaWithAdam(const ChromaRun& run,
+                         const std::vector<int>& colored,
+                         ChromaParameters& parameters);
+
+}  // namespace color3d

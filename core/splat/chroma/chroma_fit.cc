@@ -1,0 +1,61 @@
+#include "core/splat/chroma/chroma_fit.h"
+
+#include "core/base/error.h"
+#include "core/splat/chroma/chroma_adam.h"
+#include "core/splat/chroma/chroma_solver.h"
+#include "core/splat/chroma/chroma_start.h"
+#include "core/splat/chroma/chroma_targets.h"
+#include "core/splat/model/model_parameters.h"
+
+namespace color3d {
+
+GaussianModel FitChromaOn(const GaussianModel& geometry,
+                          const ChromaProblem& problem,
+                          const ChromaOptions& options,
+                          ThreadPool& pool,
+                          CheckpointStore& checkpoints,
+                          ProgressObserver& progress,
+                          const CancellationToken& cancel) {
+  options.Validate();
+  if (problem.training.empty()) {
+    throw InvalidArgument("the scene has no training views; give at least one posed photo");
+  }
+  const ChromaClock clock;
+  ChromaParameters parameters = ChromaParameters::From(geometry, options.chroma_sh_degree);
+  const bool solve =
+      options.solver == ChromaOptions::Solver::kConjugateGradients && options.iterations > 0;
+  ChromaSystem system(parameters.block, parameters.color, options.memory_budget_bytes, pool);
+  std::vector<int> colored;  // positions in problem.training
+  bool all_confident = true;
+  for (size_t k = 0; k < problem.training.size(); ++k) {
+    cancel.ThrowIfCancelled();
+    const PosedCamera& view = problem.training[k];
+    ChromaPlanes planes;
+    if (!LoadChromaPlanes(problem, view, &planes)) continue;
+    colored.push_back(static_cast<int>(k));
+    all_confident = all_confident && planes.has_confidence;
+    system.AddView(MakeRasterCamera(view.camera, view.cam_from_world),
+                   planes.ab,
+                   planes.weight,
+                   planes.confidence,
+                   solve);
+    progress.OnProgress(static_cast<int64_t>(k), 0, "chroma: reading the coloured views");
+  }
+  const std::vector<char> seen = SetClosedForm(system, pool, parameters);
+  const ChromaRun run{geometry, problem, options, pool, checkpoints, progress, cancel, clock};
+  run.Snapshot(0, parameters);
+  if (options.iterations > 0 && !colored.empty()) {
+    if (solve) {
+      SolveChroma(run, seen, system, parameters);
+    } else {
+      TrainChromaWithAdam(run, colored, parameters);
+    }
+    FillUnseen(seen, pool, parameters);
+  }
+  GaussianModel model = parameters.ToModel(geometry);
+  model.confidence.clear();  // of an earlier chroma
+  if (all_confident && !colored.empty()) model.confidence = MeanConfidence(system, seen);
+  return model;
+}
+
+}  // namespace color3d

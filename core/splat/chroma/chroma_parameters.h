@@ -1,0 +1,28 @@
+// Geometry and chroma coefficients in the kernels' form, as both chroma solvers work on them.
+// Internal to the splat module. A plain value.
+#pragma once
+
+#include <vector>
+
+#include "core/splat/model/gaussian_model.h"
+#include "core/splat/model/parameter_block.h"
+
+namespace color3d {
+
+inline constexpr float kShDc = 0.28209479177387814f;
+
+struct ChromaParameters {
+  // Geometry rows, then the coefficients of a' and of b' where luminance stands in a full model.
+  ParameterBlock block;
+  ColorSpec color;  // two channels, neutral when all coefficients are zero
+
+  static ChromaParameters From(const GaussianModel& geometry, int chroma_sh_degree);
+  // `geometry` with these chroma coefficients.
+  GaussianModel ToModel(const GaussianModel& geometry) const;
+
+  int coefficients() const { return color.channel[0].coefficients; }
+  float* Row(int channel, int k) { return block.Row(color.channel[channel].row + k); }
+  const float* Row(int channel, int k) const { return block.Row(color.channel[channel].row + k); }
+};
+
+}  // namespace color3d

@@ -1,0 +1,22 @@
+// Least absolute residuals of chroma (chroma_system.h): a few ordered-subsets sweeps, which take a
+// step per view and so are quick at first, then rounds of reweighting with block-Jacobi
+// preconditioned conjugate gradients on the normal equations of all views. A pull to the closed
+// form keeps Gaussians that few pixels see well-posed. Internal to the splat module.
+#pragma once
+
+#include <vector>
+
+#include "core/splat/chroma/chroma_run.h"
+#include "core/splat/chroma/chroma_system.h"
+
+namespace color3d {
+
+// Improves `parameters` (the closed form) in place; Gaussians that are not `seen` are left alone.
+// Reports the curves "train_l1_ab" (Lab units, of single pixels) and "chroma_residual" (norm of the
+// gradient by that of the right side, in the preconditioner's metric).
+void SolveChroma(const ChromaRun& run,
+                 const std::vector<char>& seen,
+                 ChromaSystem& system,
+                 ChromaParameters& parameters);
+
+}  // namespace color3d

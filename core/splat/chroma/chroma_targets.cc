@@ -1,0 +1,73 @@
+#include "core/splat/chroma/chroma_targets.h"
+
+#include <cmath>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/splat/training/training_targets.h"
+
+namespace color3d {
+namespace {
+
+constexpr float kMaxChroma = 1000.0f;  // Lab units; real colours stay below 130
+constexpr float kWeightSlack = 1e-3f;
+
+std::string SizeOf(const Image& image) {
+  return std::to_string(image.width) + "x" + std::to_string(image.height) + "x" +
+         std::to_string(image.channels);
+}
+
+void CheckSizes(const ChromaTarget& target, const PosedCamera& view) {
+  const auto fits = [&](const Image& image, int channels) {
+    return image.channels == channels && image.width == view.camera.width &&
+           image.height == view.camera.height;
+  };
+  if (fits(target.ab, 2) && (target.weight.Empty() || fits(target.weight, 1)) &&
+      (target.confidence.Empty() || fits(target.confidence, 1))) {
+    return;
+  }
+  throw InvalidArgument(
+      "chroma target of view " + std::to_string(view.view) + " is " + SizeOf(target.ab) +
+      ", its weight " + SizeOf(target.weight) + ", its confidence " + SizeOf(target.confidence) +
+      "; " + std::to_string(view.camera.width) + "x" + std::to_string(view.camera.height) +
+      "x2 and the same size with one channel are needed");
+}
+
+// Comparisons that NaN fails.
+void CheckValues(const Image& image, float low, float high, const char* what, int view) {
+  for (int c = 0; c < image.channels; ++c) {
+    const float* plane = image.Plane(c);
+    for (size_t i = 0; i < image.PlaneSize(); ++i) {
+      if (plane[i] >= low && plane[i] <= high) continue;
+      throw InvalidArgument("chroma target of view " + std::to_string(view) + ": " + what +
+                            " at pixel (" + std::to_string(i % image.width) + ", " +
+                            std::to_string(i / image.width) + ") is " + std::to_string(plane[i]) +
+                            "; give a number from " + std::to_string(std::lround(low)) + " to " +
+                            std::to_string(std::lround(high)));
+    }
+  }
+}
+
+}  // namespace
+
+bool LoadChromaPlanes(const ChromaProblem& problem, const PosedCamera& view, ChromaPlanes* planes) {
+  const std::shared_ptr<const ChromaTarget> given = problem.targets(view.view);
+  if (given == nullptr) return false;
+  CheckSizes(*given, view);
+  CheckValues(given->ab, -kMaxChroma, kMaxChroma, "chroma", view.view);
+  CheckValues(given->weight, -kWeightSlack, 1.0f + kWeightSlack, "weight", view.view);
+  CheckValues(given->confidence, 0.0f, 1.0f, "confidence", view.view);
+  planes->ab = PlanesFromImage(given->ab, 0.0f, 1.0f / 255.0f);
+  planes->weight =
+      given->weight.Empty()
+          ? PlanesFromImage(Image(given->ab.width, given->ab.height, 1, 1.0f), 0.0f, 1.0f)
+          : PlanesFromImage(given->weight, 0.0f, 1.0f);
+  planes->has_confidence = !given->confidence.Empty();
+  planes->confidence = PlanesFromImage(
+      planes->has_confidence ? given->confidence : Image(given->ab.width, given->ab.height, 1),
+      0.0f,
+      1.0f);
+  return true;
+}
+
+}  // namespace color3d

@@ -1,0 +1,156 @@
+#include "core/splat/geometry/training_schedule.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/splat/model/parameter_block.h"
+#include "core/splat/model/spherical_harmonics.h"
+
+namespace color3d {
+namespace {
+
+// An iteration's time at one level against the next coarser one: 4 times the pixels, the same
+// number of Gaussians.
+constexpr double kCostPerLevel = 2.5;
+constexpr int kMinTrainingSidePx = 64;  // coarser levels are not used below this
+
+// How many whole steps of `step`, counted from `from`, lie before `fraction`.
+double StepsDone(double fraction, double from, double step) {
+  return std::floor((fraction - from) / step);
+}
+
+// The schedule of Kerbl et al. 2023, whose times are iterations.
+GeometryTuning PaperTuning(int iterations) {
+  const double n = std::max(1, iterations);
+  GeometryTuning tuning;
+  tuning.half_size_until = 0.0;
+  tuning.densify_from = std::min(500.0 / n, 0.5);
+  tuning.densify_until = 0.5;
+  tuning.densify_rounds = std::max(1, static_cast<int>((0.5 * n - 500.0) / 100.0));
+  tuning.opacity_reset_every = 3000.0 / n;
+  tuning.prune_scale = 0.1;
+  tuning.max_needle_ratio = 0.0;
+  tuning.opacity_penalty = 0.0;
+  tuning.scale_penalty = 0.0;
+  tuning.position_rate_first = 1.6e-4;
+  tuning.position_rate_last = 1.6e-6;
+  tuning.dc_rate = 2.5e-3;
+  tuning.rest_divisor = 20.0;
+  tuning.opacity_rate = 0.05;
+  tuning.last_rate = 1.0;
+  tuning.scale_rate = 5e-3;
+  tuning.rotation_rate = 1e-3;
+  tuning.sh_from = 1000.0 / n;
+  tuning.sh_step = 1000.0 / n;
+  return tuning;
+}
+
+}  // namespace
+
+GeometryTuning TuningOf(const GeometryOptions& options) {
+  return options.recipe == GeometryOptions::Recipe::kPaper ? PaperTuning(options.iterations)
+                                                           : GeometryTuning();
+}
+
+double TrainingSchedule::Fraction(int64_t iteration, double elapsed_seconds) const {
+  double fraction = options_.iterations > 0
+                        ? static_cast<double>(iteration) / static_cast<double>(options_.iterations)
+                        : 1.0;
+  if (options_.time_limit_seconds > 0.0) {
+    fraction = std::max(fraction, elapsed_seconds / options_.time_limit_seconds);
+  }
+  return std::min(1.0, fraction);
+}
+
+int TrainingSchedule::Level(double fraction, const Camera& camera) const {
+  int level = fraction < tuning_.quarter_size_until ? 2
+              : fraction < tuning_.half_size_until  ? 1
+                                                    : 0;
+  const int side = std::min(camera.width, camera.height);
+  while (level > 0 && side >> level < kMinTrainingSidePx) --level;
+  return level;
+}
+
+int TrainingSchedule::ActiveDegree(double fraction) const {
+  const double since = fraction - tuning_.sh_from;
+  if (since < 0.0) return 0;
+  return static_cast<int>(std::min<double>(options_.sh_degree, 1.0 + since / tuning_.sh_step));
+}
+
+double TrainingSchedule::PositionRate(double fraction) const {
+  return extent_ * std::exp((1.0 - fraction) * std::log(tuning_.position_rate_first) +
+                            fraction * std::log(tuning_.position_rate_last));
+}
+
+std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels) const {
+  const int coefficients = ShCoefficients(options_.sh_degree);
+  const int active = ShCoefficients(ActiveDegree(fraction));
+  std::vector<float> rates(kColorRow + channels * coefficients, 0.0f);
+  const double scale = options_.learning_rate_scale;
+  // Settles once nothing is added any more.
+  const double settling =
+      std::max(0.0, fraction - tuning_.densify_until) / std::max(1e-9, 1.0 - tuning_.densify_until);
+  const double fade = scale * std::pow(tuning_.last_rate, settling);
+  const auto set = [&](int row, int count, double rate) {
+    std::fill_n(rates.begin() + row, count, static_cast<float>(rate));
+  };
+  set(kPositionRow, 3, scale * PositionRate(fraction));
+  set(kLogScaleRow, 3, fade * tuning_.scale_rate);
+  set(kRotationRow, 4, fade * tuning_.rotation_rate);
+  set(kOpacityRow, 1, fade * tuning_.opacity_rate);
+  for (int c = 0; c < channels; ++c) {
+    const int row = kColorRow + c * coefficients;
+    set(row, 1, fade * tuning_.dc_rate);
+    set(row + 1, active - 1, fade * tuning_.dc_rate / tuning_.rest_divisor);
+  }
+  return rates;
+}
+
+bool TrainingSchedule::DensifyDue(double before, double now) const {
+  if (now < tuning_.densify_from || before >= tuning_.densify_until) return false;
+  const double step =
+      (tuning_.densify_until - tuning_.densify_from) / std::max(1, tuning_.densify_rounds);
+  if (!(step > 0.0)) return false;
+  return StepsDone(now, tuning_.densify_from, step) > StepsDone(before, tuning_.densify_from, step);
+}
+
+bool TrainingSchedule::OpacityResetDue(double before, double now) const {
+  const double every = tuning_.opacity_reset_every;
+  return every > 0.0 && now < tuning_.densify_until &&
+         StepsDone(now, 0.0, every) > StepsDone(before, 0.0, every);
+}
+
+bool TrainingSchedule::HasReset(double fraction) const {
+  return tuning_.opacity_reset_every > 0.0 && fraction > tuning_.opacity_reset_every;
+}
+
+int64_t TrainingSchedule::AffordableCount(double fraction,
+                                          int64_t iteration,
+                                          double seconds_per_iteration,
+                                          int level,
+                                          int64_t count) const {
+  if (!(options_.time_limit_seconds > 0.0) || !(seconds_per_iteration > 0.0)) {
+    return options_.max_gaussians;
+  }
+  const double cost = seconds_per_iteration * std::pow(kCostPerLevel, level);
+  const double possible = (1.0 - fraction) * options_.time_limit_seconds / cost;
+  const double wanted = std::max(1.0,
+                                 std::min<double>(tuning_.wanted_iterations, options_.iterations) -
+                                     static_cast<double>(iteration));
+  const double affordable = static_cast<double>(count) * possible / wanted;
+  return std::max(count,
+                  static_cast<int64_t>(std::min<double>(affordable, options_.max_gaussians)));
+}
+
+int64_t TrainingSchedule::TargetCount(double fraction, int64_t initial_count) const {
+  const double progress =
+      std::clamp((fraction - tuning_.densify_from) /
+                     std::max(1e-9, tuning_.growth_until - tuning_.densify_from),
+                 0.0,
+                 1.0);
+  const double first = static_cast<double>(std::max<int64_t>(1, initial_count));
+  const double last = std::max<double>(first, options_.max_gaussians);
+  return static_cast<int64_t>(std::llround(first * std::pow(last / first, progress)));
+}
+
+}  // namespace color3d

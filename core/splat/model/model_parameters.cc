@@ -1,0 +1,138 @@
+#include "core/splat/model/model_parameters.h"
+
+#include <cmath>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/color/lab.h"
+#include "core/splat/model/spherical_harmonics.h"
+
+namespace color3d {
+namespace {
+
+void CheckSize(const std::vector<float>& buffer, size_t rows, int width, const char* name) {
+  if (buffer.size() == rows * static_cast<size_t>(width)) return;
+  throw InvalidArgument("Gaussian model: " + std::string(name) + " has " +
+                        std::to_string(buffer.size()) + " numbers, " +
+                        std::to_string(rows * static_cast<size_t>(width)) + " are needed");
+}
+
+void ToPlanar(const std::vector<float>& from, int width, int row, ParameterBlock& to) {
+  for (int k = 0; k < width; ++k) {
+    float* out = to.Row(row + k);
+    for (int64_t i = 0; i < to.count(); ++i) out[i] = from[i * width + k];
+  }
+}
+
+std::vector<float> FromPlanar(const ParameterBlock& from, int row, int width) {
+  std::vector<float> to(static_cast<size_t>(from.count()) * width);
+  for (int k = 0; k < width; ++k) {
+    const float* in = from.Row(row + k);
+    for (int64_t i = 0; i < from.count(); ++i) to[i * width + k] = in[i];
+  }
+  return to;
+}
+
+}  // namespace
+
+void CheckModel(const GaussianModel& model) {
+  if (model.channels != 1 && model.channels != 3) {
+    throw InvalidArgument("Gaussian model: " + std::to_string(model.channels) +
+                          " channels; 1 or 3 are possible");
+  }
+  if (model.sh_degree < 0 || model.sh_degree > 3 || model.chroma_sh_degree < 0 ||
+      model.chroma_sh_degree > 3) {
+    throw InvalidArgument("Gaussian model: spherical harmonics of degree " +
+                          std::to_string(model.sh_degree) + " and " +
+                          std::to_string(model.chroma_sh_degree) + "; 0 to 3 are possible");
+  }
+  const size_t n = model.size();
+  CheckSize(model.position, n, 3, "position");
+  CheckSize(model.log_scale, n, 3, "log_scale");
+  CheckSize(model.rotation, n, 4, "rotation");
+  CheckSize(model.sh_l, n, ShCoefficients(model.sh_degree), "sh_l");
+  const int chroma = model.channels == 3 ? ShCoefficients(model.chroma_sh_degree) : 0;
+  CheckSize(model.sh_a, n, chroma, "sh_a");
+  CheckSize(model.sh_b, n, chroma, "sh_b");
+  if (!model.confidence.empty()) CheckSize(model.confidence, n, 1, "confidence");
+  for (size_t i = 0; i < model.confidence.size(); ++i) {
+    if (model.confidence[i] >= 0.0f && model.confidence[i] <= 1.0f) continue;
+    throw InvalidArgument("Gaussian model: confidence of Gaussian " + std::to_string(i) + " is " +
+                          std::to_string(model.confidence[i]) + "; it must be 0 to 1");
+  }
+}
+
+ParameterBlock ParametersFromModel(const GaussianModel& model) {
+  CheckModel(model);
+  const int luminance = ShCoefficients(model.sh_degree);
+  const int chroma = model.channels == 3 ? ShCoefficients(model.chroma_sh_degree) : 0;
+  ParameterBlock p(kColorRow + luminance + 2 * chroma, static_cast<int64_t>(model.size()));
+  ToPlanar(model.position, 3, kPositionRow, p);
+  ToPlanar(model.log_scale, 3, kLogScaleRow, p);
+  ToPlanar(model.rotation, 4, kRotationRow, p);
+  ToPlanar(model.opacity_logit, 1, kOpacityRow, p);
+  ToPlanar(model.sh_l, luminance, kColorRow, p);
+  ToPlanar(model.sh_a, chroma, kColorRow + luminance, p);
+  ToPlanar(model.sh_b, chroma, kColorRow + luminance + chroma, p);
+  return p;
+}
+
+GaussianModel ModelFromParameters(const ParameterBlock& parameters,
+                                  int channels,
+                                  int sh_degree,
+                                  int chroma_sh_degree) {
+  const int luminance = ShCoefficients(sh_degree);
+  const int chroma = channels == 3 ? ShCoefficients(chroma_sh_degree) : 0;
+  GaussianModel model;
+  model.channels = channels;
+  model.sh_degree = sh_degree;
+  model.chroma_sh_degree = chroma_sh_degree;
+  model.position = FromPlanar(parameters, kPositionRow, 3);
+  model.log_scale = FromPlanar(parameters, kLogScaleRow, 3);
+  model.rotation = FromPlanar(parameters, kRotationRow, 4);
+  model.opacity_logit = FromPlanar(parameters, kOpacityRow, 1);
+  model.sh_l = FromPlanar(parameters, kColorRow, luminance);
+  model.sh_a = FromPlanar(parameters, kColorRow + luminance, chroma);
+  model.sh_b = FromPlanar(parameters, kColorRow + luminance + chroma, chroma);
+  return model;
+}
+
+ColorSpec ColorSpecOf(int channels, int sh_degree, int chroma_sh_degree) {
+  const int luminance = ShCoefficients(sh_degree), chroma = ShCoefficients(chroma_sh_degree);
+  ColorSpec color;
+  color.channels = channels;
+  color.channel[0] = {kColorRow, luminance, 0.5f, true};
+  color.channel[1] = {kColorRow + luminance, chroma, kNeutralChroma, false};
+  color.channel[2] = {kColorRow + luminance + chroma, chroma, kNeutralChroma, false};
+  return color;
+}
+
+RasterCamera MakeRasterCamera(const Camera& camera, const Pose& cam_from_world) {
+  RasterCamera c;
+  c.width = camera.width;
+  c.height = camera.height;
+  c.fx = static_cast<float>(camera.fx);
+  c.fy = static_cast<float>(camera.fy);
+  c.cx = static_cast<float>(camera.cx);
+  c.cy = static_cast<float>(camera.cy);
+  if (c.width < 1 || c.height < 1 || !(c.fx > 0.0f) || !(c.fy > 0.0f) || !std::isfinite(c.fx) ||
+      !std::isfinite(c.fy) || !std::isfinite(c.cx) || !std::isfinite(c.cy)) {
+    throw InvalidArgument("camera of " + std::to_string(camera.width) + "x" +
+                          std::to_string(camera.height) + " px with focal lengths " +
+                          std::to_string(camera.fx) + ", " + std::to_string(camera.fy) +
+                          " px cannot be rendered; sizes and focal lengths must be positive");
+  }
+  const Eigen::Matrix3d rotation = cam_from_world.rotation.normalized().toRotationMatrix();
+  const Eigen::Vector3d center = -(rotation.transpose() * cam_from_world.translation);
+  if (!rotation.allFinite() || !center.allFinite()) {
+    throw InvalidArgument("camera pose is not finite; check the poses of the scene");
+  }
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) c.rotation[3 * a + b] = static_cast<float>(rotation(a, b));
+    c.translation[a] = static_cast<float>(cam_from_world.translation[a]);
+    c.center[a] = static_cast<float>(center[a]);
+  }
+  return c;
+}
+
+}  // namespace color3d

@@ -1,0 +1,29 @@
+// Between GaussianModel (files, interfaces) and the kernels' planar form. Internal to the splat
+// module. Stateless.
+#pragma once
+
+#include "core/scene/camera.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/splat/model/parameter_block.h"
+#include "core/splat/raster/projection.h"
+
+namespace color3d {
+
+// Throws Error{kInvalidArgument} unless channels, degrees and buffer sizes fit together.
+void CheckModel(const GaussianModel& model);
+
+// Rows: position, log scale, rotation, opacity, then sh_l, sh_a, sh_b.
+ParameterBlock ParametersFromModel(const GaussianModel& model);
+
+// The inverse. `channels` 1 or 3; degrees as in GaussianModel.
+GaussianModel ModelFromParameters(const ParameterBlock& parameters,
+                                  int channels,
+                                  int sh_degree,
+                                  int chroma_sh_degree);
+
+// L' alone (channels 1) or L', a', b' of ParametersFromModel's layout.
+ColorSpec ColorSpecOf(int channels, int sh_degree, int chroma_sh_degree);
+
+RasterCamera MakeRasterCamera(const Camera& camera, const Pose& cam_from_world);
+
+}  // namespace color3d

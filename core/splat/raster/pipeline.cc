@@ -1,0 +1,49 @@
+#include "core/splat/raster/pipeline.h"
+
+namespace color3d {
+
+void SplatPipeline::Forward(const ParameterBlock& parameters,
+                            const ColorSpec& color,
+                            const RasterCamera& camera,
+                            const float* background,
+                            bool depth_channel,
+                            ThreadPool& pool) {
+  Enter(Phase::kProjection);
+  ProjectSplats(parameters, color, depth_channel, camera, pool, splats_);
+  Enter(Phase::kBinning);
+  binner_.Bin(splats_, camera.width, camera.height, pool, lists_);
+  Enter(Phase::kForward);
+  color_.Reset(camera.width, camera.height, splats_.channels);
+  transmittance_.Reset(camera.width, camera.height, 1);
+  float behind[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+  for (int c = 0; c < color.channels; ++c) behind[c] = background[c];
+  RasterizeForward(splats_, lists_, behind, pool, color_, &transmittance_, block_masks_);
+  Enter(Phase::kOther);
+}
+
+void SplatPipeline::Backward(const ParameterBlock& parameters,
+                             const ColorSpec& color,
+                             const RasterCamera& camera,
+                             const PlaneBuffer& d_color,
+                             GradientScope scope,
+                             ThreadPool& pool,
+                             ParameterBlock& gradient,
+                             DensifyStatistics* statistics) {
+  const bool absolute = statistics != nullptr && statistics->absolute;
+  Enter(Phase::kBackward);
+  RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, absolute, pool, pair_gradient_);
+  Enter(Phase::kProjectionBackward);
+  ProjectSplatsBackward(parameters,
+                        color,
+                        camera,
+                        splats_,
+                        pair_gradient_,
+                        lists_.first_pair,
+                        scope,
+                        pool,
+                        gradient,
+                        statistics);
+  Enter(Phase::kOther);
+}
+
+}  // namespace color3d

@@ -1,0 +1,61 @@
+// Forward and backward pass of one picture, with buffers that are kept between pictures. Internal
+// to the splat module. Not thread-safe; uses the pool's threads.
+#pragma once
+
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/splat/model/parameter_block.h"
+#include "core/splat/raster/binning.h"
+#include "core/splat/raster/phase_clock.h"
+#include "core/splat/raster/projection.h"
+#include "core/splat/raster/rasterizer.h"
+
+namespace color3d {
+
+class SplatPipeline {
+ public:
+  // Passes book their time on `clock` (may be null), which must outlive the pipeline's use; they
+  // leave it in Phase::kOther.
+  void set_clock(PhaseClock* clock) { clock_ = clock; }
+
+  // Draws `parameters`; `background` has one number per channel. With `depth_channel` a last
+  // channel holds sum(alpha T depth).
+  void Forward(const ParameterBlock& parameters,
+               const ColorSpec& color,
+               const RasterCamera& camera,
+               const float* background,
+               bool depth_channel,
+               ThreadPool& pool);
+  const PlaneBuffer& color() const { return color_; }
+  const PlaneBuffer& transmittance() const { return transmittance_; }
+  size_t pair_count() const { return lists_.pair_count(); }
+  // Per Gaussian, 0 where the last Forward did not draw it.
+  const std::vector<uint32_t>& depth_keys() const { return splats_.depth_key; }
+
+  // Gradient by the parameters of the last Forward (same arguments, no depth channel).
+  void Backward(const ParameterBlock& parameters,
+                const ColorSpec& color,
+                const RasterCamera& camera,
+                const PlaneBuffer& d_color,
+                GradientScope scope,
+                ThreadPool& pool,
+                ParameterBlock& gradient,
+                DensifyStatistics* statistics = nullptr);
+
+ private:
+  void Enter(Phase phase) {
+    if (clock_ != nullptr) clock_->Enter(phase);
+  }
+
+  PhaseClock* clock_ = nullptr;
+  SplatBuffer splats_;
+  TileBinner binner_;
+  TileLists lists_;
+  std::vector<uint16_t> block_masks_;
+  AlignedFloats pair_gradient_;
+  PlaneBuffer color_;
+  PlaneBuffer transmittance_;
+};
+
+}  // namespace color3d

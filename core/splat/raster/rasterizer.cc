@@ -1,0 +1,432 @@
+#include "core/splat/raster/rasterizer.h"
+
+#include <algorithm>
+
+#include "core/base/flush_to_zero.h"
+#include "core/simd/instruction_set.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/splat/raster/rasterizer.cc"
+#include <hwy/foreach_target.h>
+
+#include "core/splat/raster/ellipse-inl.h"
+
+#ifndef COLOR3D_SPLAT_RASTERIZER_ONCE
+#define COLOR3D_SPLAT_RASTERIZER_ONCE
+namespace color3d {
+namespace {
+
+constexpr int kBlocks = 16;  // of 4x4 pixels in a tile: block b is at column b % 4, row b / 4
+constexpr float kLog2MinAlpha = -7.9943534f;
+constexpr float kLog2MaxAlpha = -0.014499569f;  // log2(0.99)
+
+alignas(64) constexpr float kLaneX[16] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+alignas(64) constexpr float kLaneY[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+
+struct Tile {
+  int index;
+  int x0, y0;  // first pixel
+  uint32_t begin, end;
+};
+
+Tile TileAt(const TileLists& lists, int64_t index) {
+  Tile t;
+  t.index = static_cast<int>(index);
+  t.x0 = t.index % lists.tiles_x * kTileSide;
+  t.y0 = t.index / lists.tiles_x * kTileSide;
+  t.begin = lists.tile_begin[index];
+  t.end = lists.tile_begin[index + 1];
+  return t;
+}
+
+struct ForwardJob {
+  const SplatBuffer& splats;
+  const TileLists& lists;
+  const float* background;
+  PlaneBuffer& color;
+  PlaneBuffer* transmittance;
+  uint16_t* block_masks;
+};
+
+struct BackwardJob {
+  const SplatBuffer& splats;
+  const TileLists& lists;
+  const uint16_t* block_masks;
+  const PlaneBuffer& color;
+  const PlaneBuffer& d_color;
+  bool absolute;
+  float* pair_gradient;
+};
+
+}  // namespace
+}  // namespace color3d
+#endif  // COLOR3D_SPLAT_RASTERIZER_ONCE
+
+HWY_BEFORE_NAMESPACE();
+namespace color3d {
+namespace HWY_NAMESPACE {
+namespace {
+
+using simd::Broadcast;
+using simd::I32;
+using simd::Mask;
+
+HWY_INLINE F32 LaneX() { return simd::Load(kLaneX); }
+HWY_INLINE F32 LaneY() { return simd::Load(kLaneY); }
+
+F32 LoadBlock(const PlaneBuffer& image, int channel, const Tile& tile, int block) {
+  alignas(64) float values[16];
+  const int x = tile.x0 + block % 4 * 4, y = tile.y0 + block / 4 * 4;
+  for (int r = 0; r < 4; ++r) std::copy_n(image.Row(channel, y + r) + x, 4, values + 4 * r);
+  return simd::Load(values);
+}
+
+void StoreBlock(PlaneBuffer& image, int channel, const Tile& tile, int block, F32 value) {
+  alignas(64) float values[16];
+  simd::Store(values, value);
+  const int x = tile.x0 + block % 4 * 4, y = tile.y0 + block / 4 * 4;
+  for (int r = 0; r < 4; ++r) std::copy_n(values + 4 * r, 4, image.Row(channel, y + r) + x);
+}
+
+// 1 inside the picture, 0 outside: pixels outside are finished before they begin.
+F32 InitialTransmittance(int width, int height, const Tile& tile, int block) {
+  const F32 x = LaneX() + static_cast<float>(tile.x0 + block % 4 * 4);
+  const F32 y = LaneY() + static_cast<float>(tile.y0 + block / 4 * 4);
+  const Mask inside = simd::And(simd::Less(x, Broadcast(static_cast<float>(width))),
+                                simd::Less(y, Broadcast(static_cast<float>(height))));
+  return simd::SelectOrZero(inside, Broadcast(1.0f));
+}
+
+// Sixteen list entries, planar.
+struct Chunk {
+  alignas(64) float column[kSplatColor + 4][16];
+  int count;
+};
+
+template <int kChannels>
+void LoadChunk(const SplatBuffer& splats, const uint32_t* gaussian, int count, Chunk& chunk) {
+  constexpr int kRow = SplatRowFloats(kChannels);
+  chunk.count = count;
+  for (int j = 0; j < count; ++j) {
+    const float* row = splats.rows.data() + static_cast<size_t>(gaussian[j]) * kRow;
+    for (int k = 0; k < kSplatColor + kChannels; ++k) chunk.column[k][j] = row[k];
+  }
+  for (int j = count; j < 16; ++j) {
+    for (int k = 0; k < kSplatColor; ++k) chunk.column[k][j] = 1.0f;
+  }
+}
+
+// Bit b of masks[j]: the ellipse of entry j touches pixel centres of block b.
+void BlockMasks(const Chunk& chunk, const Tile& tile, uint16_t* masks) {
+  const F32 u = simd::Load(chunk.column[kU]), v = simd::Load(chunk.column[kV]);
+  const Ellipse e = MakeEllipse(simd::Load(chunk.column[kInvX]),
+                                simd::Load(chunk.column[kSlope]),
+                                simd::Load(chunk.column[kInvY]),
+                                simd::Load(chunk.column[kLog2Opacity]));
+  const F32 reach = e.y_reach + kBoundSlackPx, zero = simd::Zero(), four = Broadcast(4.0f);
+  const I32 one = Broadcast(int32_t{1});
+  I32 bits = Broadcast(int32_t{0});
+  for (int row = 3; row >= 0; --row) {
+    const F32 low = (static_cast<float>(tile.y0 + 4 * row) + 0.5f) - v;
+    const F32 high = low + 3.0f;
+    F32 left, right;
+    BandExtent(e, low, high, &left, &right);
+    const F32 origin = u - (static_cast<float>(tile.x0) + 0.5f);
+    const F32 begin = simd::Clamp((origin + left + 0.999f) * 0.25f, zero, four);
+    const F32 end = simd::Clamp((origin + right + 4.0f) * 0.25f, zero, four);
+    const I32 first = simd::Truncate(begin);
+    const I32 last = simd::Max(simd::Truncate(end), first);  // one past
+    const I32 span = simd::ShiftLeft(one, last) - simd::ShiftLeft(one, first);
+    const Mask meets = simd::And(simd::Less(low, reach), simd::Less(-reach, high));
+    bits = simd::ShiftLeft<4>(bits) | simd::SelectOrZero(meets, span);
+  }
+  alignas(64) int32_t lanes[16];
+  simd::Store(lanes, bits);
+  for (int j = 0; j < chunk.count; ++j) masks[j] = static_cast<uint16_t>(lanes[j]);
+}
+
+uint32_t AliveBlocks(const F32* transmittance) {
+  uint32_t alive = 0;
+  for (int b = 0; b < kBlocks; ++b) {
+    const Mask m = simd::GreaterEqual(transmittance[b], Broadcast(kMinTransmittance));
+    alive |= (simd::Any(m) ? 1u : 0u) << b;
+  }
+  return alive;
+}
+
+// The blocks to visit, entry after entry, as 16 * entry + block. One flat list instead of nested
+// loops over rows and columns: mispredicted loop exits cost as much as the arithmetic.
+struct WorkList {
+  int32_t item[16 * kBlocks + 16];
+  int begin[17];  // of each entry's items
+};
+
+void BuildWorkList(const Chunk& chunk, const uint16_t* masks, uint32_t alive, WorkList& work) {
+  int count = 0;
+  for (int j = 0; j < chunk.count; ++j) {
+    work.begin[j] = count;
+    const uint32_t mask = masks[j] & alive;
+#if HWY_TARGET == HWY_AVX3
+    const __m512i first = _mm512_set1_epi32(16 * j);
+    const __m512i blocks = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    _mm512_storeu_si512(
+        work.item + count,
+        _mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), _mm512_add_epi32(first, blocks)));
+    count += __builtin_popcount(mask);
+#else
+    for (uint32_t bits = mask; bits != 0; bits &= bits - 1) {
+      work.item[count++] = 16 * j + __builtin_ctz(bits);
+    }
+#endif
+  }
+  work.begin[chunk.count] = count;
+}
+
+// What the exponent of entry j in block b is made of: e = e_lane[j] + e_block[j][b],
+// dy = LaneY() + dy_block[j][b].
+struct Offsets {
+  F32 e_lane[16];
+  alignas(64) float e_block[16][kBlocks];
+  alignas(64) float dy_block[16][kBlocks];
+};
+
+void ComputeOffsets(const Chunk& chunk, const Tile& tile, Offsets& o) {
+  const F32 block_x = LaneX() * 4.0f, block_y = LaneY() * 4.0f;
+  for (int j = 0; j < chunk.count; ++j) {
+    const F32 slope = Broadcast(chunk.column[kSlope][j]);
+    const F32 dy = block_y + ((static_cast<float>(tile.y0) + 0.5f) - chunk.column[kV][j]);
+    const F32 dx = block_x + ((static_cast<float>(tile.x0) + 0.5f) - chunk.column[kU][j]);
+    o.e_lane[j] = LaneX() - slope * LaneY();
+    simd::Store(o.e_block[j], dx - slope * dy);
+    simd::Store(o.dy_block[j], dy);
+  }
+}
+
+template <int kChannels>
+void ForwardTile(const ForwardJob& job, const Tile& tile) {
+  F32 t[kBlocks], sum[kChannels][kBlocks];
+  for (int b = 0; b < kBlocks; ++b) {
+    t[b] = InitialTransmittance(job.color.width, job.color.height, tile, b);
+    for (int c = 0; c < kChannels; ++c) sum[c][b] = Broadcast(0.0f);
+  }
+  Chunk chunk;
+  WorkList work;
+  Offsets offsets;
+  for (uint32_t begin = tile.begin; begin < tile.end; begin += 16) {
+    const int count = static_cast<int>(std::min<uint32_t>(16, tile.end - begin));
+    const uint32_t alive = AliveBlocks(t);
+    if (alive == 0) break;
+    LoadChunk<kChannels>(job.splats, job.lists.gaussian.data() + begin, count, chunk);
+    BlockMasks(chunk, tile, job.block_masks + begin);
+    BuildWorkList(chunk, job.block_masks + begin, alive, work);
+    ComputeOffsets(chunk, tile, offsets);
+    for (int k = 0; k < work.begin[count]; ++k) {
+      const int j = work.item[k] >> 4, b = work.item[k] & 15;
+      const F32 e = offsets.e_lane[j] + offsets.e_block[j][b];
+      const F32 dy = LaneY() + offsets.dy_block[j][b];
+      const F32 exponent = chunk.column[kLog2Opacity][j] - chunk.column[kInvY][j] * (dy * dy) -
+                           chunk.column[kInvX][j] * (e * e);
+      const Mask live = simd::And(simd::GreaterEqual(exponent, Broadcast(kLog2MinAlpha)),
+                                  simd::GreaterEqual(t[b], Broadcast(kMinTransmittance)));
+      const F32 alpha =
+          simd::SelectOrZero(live, simd::Min(simd::Exp2(exponent), Broadcast(kMaxAlpha)));
+      const F32 weight = alpha * t[b];
+      t[b] = t[b] - weight;
+      for (int c = 0; c < kChannels; ++c) {
+        sum[c][b] = sum[c][b] + weight * chunk.column[kSplatColor + c][j];
+      }
+    }
+  }
+  for (int b = 0; b < kBlocks; ++b) {
+    for (int c = 0; c < kChannels; ++c) {
+      StoreBlock(job.color, c, tile, b, sum[c][b] + t[b] * job.background[c]);
+    }
+    if (job.transmittance != nullptr) StoreBlock(*job.transmittance, 0, tile, b, t[b]);
+  }
+}
+
+// A tile's pixels on the way front to back.
+template <int kChannels>
+struct BackwardPixels {
+  F32 t[kBlocks];             // transmittance before the next entry
+  F32 rest[kBlocks];          // dL/dC . (colour still to come)
+  F32 d[kChannels][kBlocks];  // dL/dC
+
+  BackwardPixels(const PlaneBuffer& color, const PlaneBuffer& d_color, const Tile& tile) {
+    for (int b = 0; b < kBlocks; ++b) {
+      t[b] = InitialTransmittance(color.width, color.height, tile, b);
+      rest[b] = Broadcast(0.0f);
+      for (int c = 0; c < kChannels; ++c) {
+        d[c][b] = LoadBlock(d_color, c, tile, b);
+        rest[b] = rest[b] + d[c][b] * LoadBlock(color, c, tile, b);
+      }
+    }
+  }
+};
+
+// One entry: its gradient row to `out`, and the pixels moved behind it.
+template <int kChannels, bool kAbsolute>
+HWY_INLINE void BackwardEntry(const Chunk& chunk,
+                              const Offsets& offsets,
+                              const WorkList& work,
+                              int j,
+                              BackwardPixels<kChannels>& pixels,
+                              float* out) {
+  constexpr int kColumns = kGradientColor + kChannels + (kAbsolute ? 2 : 0);
+  F32 absolute_u = simd::Zero(), absolute_v = simd::Zero();
+  F32 w0 = simd::Zero(), we1 = w0, wy1 = w0, wee = w0, wey = w0, wyy = w0, wc[kChannels];
+  for (int c = 0; c < kChannels; ++c) wc[c] = simd::Zero();
+  const F32 inv_x = Broadcast(chunk.column[kInvX][j]), inv_y = Broadcast(chunk.column[kInvY][j]);
+  for (int k = work.begin[j]; k < work.begin[j + 1]; ++k) {
+    const int b = work.item[k] & 15;
+    const F32 e = offsets.e_lane[j] + offsets.e_block[j][b];
+    const F32 dy = LaneY() + offsets.dy_block[j][b];
+    const F32 exponent = chunk.column[kLog2Opacity][j] - inv_y * (dy * dy) - inv_x * (e * e);
+    const F32 t_before = pixels.t[b];
+    const Mask live = simd::And(simd::GreaterEqual(exponent, Broadcast(kLog2MinAlpha)),
+                                simd::GreaterEqual(t_before, Broadcast(kMinTransmittance)));
+    const F32 alpha =
+        simd::SelectOrZero(live, simd::Min(simd::Exp2(exponent), Broadcast(kMaxAlpha)));
+    const F32 weight = alpha * t_before;
+    F32 dc = pixels.d[0][b] * chunk.column[kSplatColor][j];
+    wc[0] = wc[0] + weight * pixels.d[0][b];
+    for (int c = 1; c < kChannels; ++c) {
+      dc = dc + pixels.d[c][b] * chunk.column[kSplatColor + c][j];
+      wc[c] = wc[c] + weight * pixels.d[c][b];
+    }
+    const F32 gain = dc * weight;
+    const F32 left = pixels.rest[b] - gain;
+    pixels.rest[b] = left;
+    pixels.t[b] = t_before - weight;
+    // alpha dL/d(alpha) = alpha (T dc - rest / (1 - alpha)); zero where alpha is capped.
+    F32 w = gain - left * alpha * simd::Reciprocal(1.0f - alpha);
+    w = simd::SelectOrZero(simd::Less(exponent, Broadcast(kLog2MaxAlpha)), w);
+    const F32 we = w * e, wy = w * dy;
+    w0 = w0 + w;
+    we1 = we1 + we;
+    wy1 = wy1 + wy;
+    wee = wee + we * e;
+    wey = wey + we * dy;
+    wyy = wyy + wy * dy;
+    if constexpr (kAbsolute) {
+      const F32 du = inv_x * we;
+      absolute_u = absolute_u + simd::Abs(du);
+      absolute_v = absolute_v + simd::Abs(inv_y * wy - chunk.column[kSlope][j] * du);
+    }
+  }
+  F32 sums[kColumns] = {w0, we1, wy1, wee, wey, wyy};
+  for (int c = 0; c < kChannels; ++c) sums[kGradientColor + c] = wc[c];
+  if constexpr (kAbsolute) {
+    sums[AbsoluteColumn(kChannels)] = absolute_u;
+    sums[AbsoluteColumn(kChannels) + 1] = absolute_v;
+  }
+  simd::HorizontalSums<kColumns>(sums, out);
+}
+
+template <int kChannels, bool kAbsolute>
+void BackwardTile(const BackwardJob& job, const Tile& tile) {
+  constexpr int kRow = GradientRowFloats(kChannels, kAbsolute);
+  BackwardPixels<kChannels> pixels(job.color, job.d_color, tile);
+  Chunk chunk;
+  WorkList work;
+  Offsets offsets;
+  uint32_t begin = tile.begin;
+  for (; begin < tile.end; begin += 16) {
+    const int count = static_cast<int>(std::min<uint32_t>(16, tile.end - begin));
+    const uint32_t alive = AliveBlocks(pixels.t);
+    if (alive == 0) break;
+    LoadChunk<kChannels>(job.splats, job.lists.gaussian.data() + begin, count, chunk);
+    BuildWorkList(chunk, job.block_masks + begin, alive, work);
+    ComputeOffsets(chunk, tile, offsets);
+    for (int j = 0; j < count; ++j) {
+      BackwardEntry<kChannels, kAbsolute>(
+          chunk,
+          offsets,
+          work,
+          j,
+          pixels,
+          job.pair_gradient + static_cast<size_t>(job.lists.pair[begin + j]) * kRow);
+    }
+  }
+  // Entries behind the last visible surface.
+  for (; begin < tile.end; ++begin) {
+    std::fill_n(job.pair_gradient + static_cast<size_t>(job.lists.pair[begin]) * kRow, kRow, 0.0f);
+  }
+}
+
+void ForwardTileAt(const ForwardJob& job, int64_t index) {
+  const Tile tile = TileAt(job.lists, index);
+  switch (job.splats.channels) {
+    case 1:
+      return ForwardTile<1>(job, tile);
+    case 2:
+      return ForwardTile<2>(job, tile);
+    case 3:
+      return ForwardTile<3>(job, tile);
+    default:
+      return ForwardTile<4>(job, tile);
+  }
+}
+
+template <bool kAbsolute>
+void BackwardTileOf(const BackwardJob& job, const Tile& tile) {
+  switch (job.splats.channels) {
+    case 1:
+      return BackwardTile<1, kAbsolute>(job, tile);
+    case 2:
+      return BackwardTile<2, kAbsolute>(job, tile);
+    default:
+      return BackwardTile<3, kAbsolute>(job, tile);
+  }
+}
+
+void BackwardTileAt(const BackwardJob& job, int64_t index) {
+  const Tile tile = TileAt(job.lists, index);
+  return job.absolute ? BackwardTileOf<true>(job, tile) : BackwardTileOf<false>(job, tile);
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace color3d
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace color3d {
+namespace {
+HWY_EXPORT(ForwardTileAt);
+HWY_EXPORT(BackwardTileAt);
+}  // namespace
+
+void RasterizeForward(const SplatBuffer& splats,
+                      const TileLists& lists,
+                      const float* background,
+                      ThreadPool& pool,
+                      PlaneBuffer& color,
+                      PlaneBuffer* transmittance,
+                      std::vector<uint16_t>& block_masks) {
+  block_masks.resize(lists.pair_count() + 16);
+  const ForwardJob job{splats, lists, background, color, transmittance, block_masks.data()};
+  const auto forward_tile = &COLOR3D_KERNEL(ForwardTileAt);
+  pool.ForEach(lists.tile_count(), [&](int64_t index, int) { forward_tile(job, index); });
+}
+
+void RasterizeBackward(const SplatBuffer& splats,
+                       const TileLists& lists,
+                       const std::vector<uint16_t>& block_masks,
+                       const PlaneBuffer& color,
+                       const PlaneBuffer& d_color,
+                       bool absolute,
+                       ThreadPool& pool,
+                       AlignedFloats& pair_gradient) {
+  pair_gradient.resize(lists.pair_count() * GradientRowFloats(splats.channels, absolute));
+  const BackwardJob job{
+      splats, lists, block_masks.data(), color, d_color, absolute, pair_gradient.data()};
+  const auto backward_tile = &COLOR3D_KERNEL(BackwardTileAt);
+  pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
+    const ScopedFlushToZero flush;
+    backward_tile(job, index);
+  });
+}
+
+}  // namespace color3d
+#endif  // HWY_ONCE

@@ -1,0 +1,35 @@
+// Adam (Kingma & Ba 2015) over planar parameters, one learning rate per row. Internal to the splat
+// module; deterministic whatever the thread count.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/splat/model/parameter_block.h"
+
+namespace color3d {
+
+inline constexpr float kAdamBeta1 = 0.9f;
+inline constexpr float kAdamBeta2 = 0.999f;
+inline constexpr float kAdamEpsilon = 1e-15f;
+
+struct AdamMoments {
+  ParameterBlock first;
+  ParameterBlock second;
+};
+
+// One step; `step` counts from 1. Rows with learning rate 0 are left alone, and so are their
+// moments. With `depth_keys` (one per Gaussian, SplatPipeline::depth_keys()) only Gaussians whose
+// key is not 0 take part: the others keep parameters and moments, which then decay more slowly than
+// Adam's (sparse Adam: the usual step would still move them by their old moments). Returns false
+// when a gradient or a new parameter is not finite (the parameters are then spoilt: restore them).
+bool AdamStep(const ParameterBlock& gradient,
+              const std::vector<float>& learning_rates,
+              int64_t step,
+              ThreadPool& pool,
+              ParameterBlock& parameters,
+              AdamMoments& moments,
+              const std::vector<uint32_t>* depth_keys = nullptr);
+
+}  // namespace color3d

@@ -1,0 +1,25 @@
+// How good a drawn picture is. Internal to the splat module.
+#pragma once
+
+#include "core/base/image.h"
+#include "core/base/parallel.h"
+#include "core/simd/plane_buffer.h"
+#include "core/splat/training/loss.h"
+
+namespace color3d {
+
+struct PictureQuality {
+  double psnr_db = 0.0;  // at most 99; peak 1, squared error over all channels
+  double ssim = 0.0;
+  double l1 = 0.0;
+};
+
+// `drawn` is clamped to 0..1 first, in place.
+PictureQuality CompareClamped(const PlaneBuffer& truth,
+                              ImageLoss& loss,
+                              ThreadPool& pool,
+                              PlaneBuffer& drawn);
+
+Image ImageFromPlanes(const PlaneBuffer& planes);
+
+}  // namespace color3d

@@ -1,0 +1,71 @@
+#include "core/splat/training/training_targets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/base/error.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+
+PlaneBuffer PlanesFromImage(const Image& image, float offset, float scale) {
+  PlaneBuffer planes(image.width, image.height, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (int y = 0; y < image.height; ++y) {
+      const float* in = image.Plane(c) + static_cast<size_t>(y) * image.width;
+      float* out = planes.Row(c, y);
+      for (int x = 0; x < image.width; ++x) out[x] = (in[x] + offset) * scale;
+    }
+  }
+  return planes;
+}
+
+namespace {
+
+// Throws Error{kInvalidArgument} naming the first value that is not finite.
+void CheckFinite(const Image& image, int view) {
+  for (size_t i = 0; i < image.data.size(); ++i) {
+    if (std::isfinite(image.data[i])) continue;
+    const size_t pixel = i % (static_cast<size_t>(image.width) * image.height);
+    throw InvalidArgument("view " + std::to_string(view) + ": the pixel at " +
+                          std::to_string(pixel % image.width) + ", " +
+                          std::to_string(pixel / image.width) +
+                          " is not a finite number; mend or leave out the photo");
+  }
+}
+
+}  // namespace
+
+int SizeAtLevel(int size_px, int level) {
+  return std::max(1, (size_px + (1 << level) / 2) >> level);
+}
+
+std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view, int level) {
+  const auto found = kept_.find({view.view, level});
+  if (found != kept_.end()) return found->second;
+  const std::shared_ptr<const Image> image = source_(view.view);
+  if (image->channels != channels_ || image->width != view.camera.width ||
+      image->height != view.camera.height) {
+    throw InvalidArgument(
+        "view " + std::to_string(view.view) + ": the picture is " + std::to_string(image->width) +
+        "x" + std::to_string(image->height) + "x" + std::to_string(image->channels) +
+        ", its camera " + std::to_string(view.camera.width) + "x" +
+        std::to_string(view.camera.height) + " px of " + std::to_string(channels_) + " channels");
+  }
+  CheckFinite(*image, view.view);
+  auto planes = std::make_shared<const PlaneBuffer>(PlanesFromImage(
+      level == 0
+          ? *image
+          : Resize(*image, SizeAtLevel(image->width, level), SizeAtLevel(image->height, level)),
+      0.0f,
+      scale_));
+  const int64_t bytes = static_cast<int64_t>(planes->data.size() * sizeof(float));
+  if (used_bytes_ + bytes <= budget_bytes_) {
+    used_bytes_ += bytes;
+    kept_[{view.view, level}] = planes;
+  }
+  return planes;
+}
+
+}  // namespace color3d

@@ -1,0 +1,40 @@
+// Pictures to train on, in the kernels' form, kept in memory within a budget. Internal to the splat
+// module. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "core/simd/plane_buffer.h"
+#include "core/splat/geometry/geometry_trainer.h"
+
+namespace color3d {
+
+// Planes with value = (sample + offset) * scale.
+PlaneBuffer PlanesFromImage(const Image& image, float offset, float scale);
+
+// Size at a level: 2^-level of the full size, at least 1 px.
+int SizeAtLevel(int size_px, int level);
+
+class TrainingTargets {
+ public:
+  // `source` gives `channels` channels, must outlive this object, and is multiplied by `scale`.
+  TrainingTargets(const PictureSource& source, int channels, float scale, int64_t budget_bytes)
+      : source_(source), channels_(channels), scale_(scale), budget_bytes_(budget_bytes) {}
+
+  // Picture of a view at a level. Throws Error{kInvalidArgument} when the picture does not have the
+  // camera's size.
+  std::shared_ptr<const PlaneBuffer> Get(const PosedCamera& view, int level);
+
+ private:
+  const PictureSource& source_;
+  int channels_;
+  float scale_;
+  int64_t budget_bytes_;
+  int64_t used_bytes_ = 0;
+  std::map<std::pair<int, int>, std::shared_ptr<const PlaneBuffer>> kept_;
+};
+
+}  // namespace color3d

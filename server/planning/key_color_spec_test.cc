@@ -1,0 +1,171 @@
+// What the door says to sources of key colour, and how names of models enter plans and cache keys.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "server/planning/planner.h"
+#include "server/planning/spec_check.h"
+#include "server/planning/spec_names.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+v1::Digest SomeDigest(const std::string& text) {
+  v1::Digest digest;
+  digest.set_sha256(Sha256Hex(text));
+  digest.set_size_bytes(10);
+  return digest;
+}
+
+template <typename Change>
+std::string CheckMessage(Change change) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  change(spec.mutable_colorize_scene()->mutable_key_color());
+  try {
+    CheckSpec(spec);
+  } catch (const ServiceError& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_EQ(e.reason(), "BAD_OPTION");
+    return e.what();
+  }
+  return "accepted";
+}
+
+TEST(KeyColorSpec, EverySourceIsAccepted) {
+  EXPECT_EQ(CheckMessage([](auto* s) { *s->mutable_reference() = SomeDigest("r"); }), "accepted");
+  EXPECT_EQ(CheckMessage([](auto* s) {
+              *s->mutable_references()->add_images() = SomeDigest("r");
+              s->set_model("tiny");
+            }),
+            "accepted");
+  EXPECT_EQ(CheckMessage([](auto* s) {
+              s->set_prompt("red brick");
+              s->set_model("clip");
+            }),
+            "accepted");
+  EXPECT_EQ(CheckMessage([](auto* s) { s->set_automatic(true); }), "accepted");
+  EXPECT_EQ(CheckMessage([](auto* s) {
+              s->set_backend("b");
+              s->mutable_backend_input()->set_prompt("red brick");
+            }),
+            "accepted");
+  EXPECT_EQ(CheckMessage([](auto* s) { s->set_script("mine"); }), "accepted");
+  EXPECT_EQ(CheckMessage([](auto* s) { *s->mutable_edit()->mutable_image() = SomeDigest("e"); }),
+            "accepted");
+}
+
+TEST(KeyColorSpec, WhatASourceLacksIsNamedWithTheRemedy) {
+  EXPECT_THAT(CheckMessage([](auto* s) { s->set_prompt("red brick"); }),
+              AllOf(HasSubstr("key_color.model is required"), HasSubstr("--model NAME=FILE")));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                s->set_prompt(" \n");
+                s->set_model("clip");
+              }),
+              HasSubstr("key_color.prompt is empty"));
+  EXPECT_THAT(CheckMessage([](auto* s) { s->set_automatic(false); }), HasSubstr("set it to true"));
+  EXPECT_THAT(CheckMessage([](auto* s) { s->set_backend(""); }), HasSubstr("name a backend"));
+  EXPECT_THAT(CheckMessage([](auto* s) { s->set_script(""); }), HasSubstr("name a model"));
+  EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_references(); }), HasSubstr("0 pictures"));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                for (int i = 0; i < 17; ++i) {
+                  *s->mutable_references()->add_images() = SomeDigest(std::to_string(i));
+                }
+              }),
+              HasSubstr("17 pictures; 1 to 16"));
+  EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_edit(); }), HasSubstr("key_color.edit.image"));
+}
+
+TEST(KeyColorSpec, OptionsOfAnotherSourceAreRefused) {
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                s->set_script("mine");
+                s->set_model("clip");
+              }),
+              HasSubstr("key_color.model is 'clip'"));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                s->set_automatic(true);
+                s->mutable_backend_input();
+              }),
+              HasSubstr("key_color.backend_input"));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                *s->mutable_strokes() = SomeDigest("s");
+                *s->mutable_labels() = SomeDigest("l");
+              }),
+              HasSubstr("key_color.labels"));
+}
+
+v1::JobSpec SpecWithNames() {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
+  scene->mutable_key_color()->set_backend("uni");
+  scene->mutable_select_key_view()->set_features("clip");
+  scene->mutable_personalize()->set_encoder("tiny");
+  return spec;
+}
+
+std::string NameError(const v1::JobSpec& spec, const UserModels& models) {
+  try {
+    CheckNames(spec, models);
+  } catch (const ServiceError& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    return e.reason() + ": " + e.what();
+  }
+  return "";
+}
+
+TEST(SpecNames, UnknownNamesAreRefusedWithThoseThatThereAre) {
+  UserModels models{{{"clip", "/m/clip"}, {"tiny", "/m/tiny"}}, {{"uni", "127.0.0.1:1"}}};
+  EXPECT_EQ(NameError(SpecWithNames(), models), "");
+  models.files.erase("tiny");
+  EXPECT_THAT(NameError(SpecWithNames(), models),
+              AllOf(HasSubstr("UNKNOWN_MODEL"),
+                    HasSubstr("colorize_scene.personalize.encoder"),
+                    HasSubstr("'tiny'"),
+                    HasSubstr("it has: clip"),
+                    HasSubstr("--model NAME=FILE")));
+  models.backends.clear();
+  models.files["tiny"] = "/m/tiny";
+  EXPECT_THAT(NameError(SpecWithNames(), models),
+              AllOf(HasSubstr("UNKNOWN_BACKEND"), HasSubstr("it has: none")));
+}
+
+// The files' digests are added to the key by whoever knows the files.
+TEST(SpecNames, CacheKeysTellWhichFilesTheyDependOn) {
+  const NewGraph graph = PlanJob(SpecWithNames(), {}, {.photos = 20, .has_poses = true});
+  std::map<std::string, StageKeyPart> parts;
+  for (const NewJob& job : graph.jobs) parts[job.kind] = KeyPartOf(job.spec);
+  EXPECT_THAT(parts["select_key_view"].models, ElementsAre("clip"));
+  EXPECT_THAT(parts["personalize"].models, ElementsAre("tiny"));
+  EXPECT_THAT(parts["colorize_views"].models, ElementsAre("tiny"));
+  EXPECT_THAT(parts["colorize_key_view"].backends, ElementsAre("uni"));
+  EXPECT_TRUE(parts["solve_chroma"].models.empty());
+}
+
+TEST(SpecNames, AColorizerIsAppliedWithTheEncoderThatItWasTrainedWith) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_colorize_views();
+  JobRecord import;
+  import.name = "jobs/i";
+  import.kind = "import_scene";
+  import.scene = "scenes/test";
+  v1::JobSpec trained;
+  trained.mutable_personalize()->set_encoder("tiny");
+  JobRecord personalize = import;
+  personalize.name = "jobs/p";
+  personalize.kind = "personalize";
+  personalize.spec = trained.SerializeAsString();
+  const NewGraph graph = PlanJob(spec, {import, personalize}, {.photos = 20, .has_poses = true});
+  v1::JobSpec planned;
+  ASSERT_TRUE(planned.ParseFromString(graph.jobs.back().spec));
+  EXPECT_EQ(planned.colorize_views().encoder(), "tiny");
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,424 @@
+#include "server/planning/planner.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "server/planning/presets.h"
+#include "server/planning/spec_check.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+v1::Digest SomeDigest(const std::string& text) {
+  v1::Digest digest;
+  digest.set_sha256(Sha256Hex(text));
+  digest.set_size_bytes(10);
+  return digest;
+}
+
+constexpr SceneFacts kTwentyPhotos = {.photos = 20, .has_poses = true};
+
+v1::JobSpec SceneSpec() {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = SomeDigest("key");
+  return spec;
+}
+
+int IndexOf(const NewGraph& graph, const std::string& kind) {
+  for (size_t i = 0; i < graph.jobs.size(); ++i) {
+    if (graph.jobs[i].kind == kind) return static_cast<int>(i);
+  }
+  ADD_FAILURE() << "no " << kind;
+  return 0;
+}
+
+v1::JobSpec SpecOf(const NewGraph& graph, const std::string& kind) {
+  v1::JobSpec spec;
+  EXPECT_TRUE(spec.ParseFromString(graph.jobs[IndexOf(graph, kind)].spec));
+  return spec;
+}
+
+std::vector<std::string> InputKinds(const NewGraph& graph, const std::string& kind) {
+  std::vector<std::string> kinds;
+  for (const int input : graph.jobs[IndexOf(graph, kind)].inputs) {
+    kinds.push_back(graph.jobs[input].kind);
+  }
+  return kinds;
+}
+
+struct Thrown {
+  std::string reason = "nothing";
+  std::string message;
+  ErrorCode code = ErrorCode::kInternal;
+};
+Thrown PlanError(const v1::JobSpec& spec, const std::vector<JobRecord>& inputs = {}) {
+  try {
+    PlanJob(spec, inputs, kTwentyPhotos);
+  } catch (const Error& e) {
+    return {ReasonOf(e), e.what(), e.code()};
+  }
+  return {};
+}
+
+TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  const double geometry =
+      SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().time_limit_seconds();
+  const double personalize = SpecOf(graph, "personalize").personalize().time_limit_seconds();
+  const double chroma = SpecOf(graph, "solve_chroma").solve_chroma().time_limit_seconds();
+  EXPECT_GT(geometry, 5.0);
+  EXPECT_GT(personalize, geometry);
+  EXPECT_GT(chroma, 1.0);
+  EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
+}
+
+TEST(Planner, AStagesOwnTimeLimitWinsOverTheBudget) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  spec.mutable_colorize_scene()->mutable_reconstruct_geometry()->set_time_limit_seconds(3);
+  EXPECT_EQ(SpecOf(PlanJob(spec, {}, kTwentyPhotos), "reconstruct_geometry")
+                .reconstruct_geometry()
+                .time_limit_seconds(),
+            3.0);
+}
+
+TEST(Planner, RefusesABudgetThatTheSceneCannotMeetAndNamesTheLeast) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(20);
+  const Thrown thrown = PlanError(spec);
+  EXPECT_EQ(thrown.code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(thrown.reason, "BAD_OPTION");
+  EXPECT_THAT(thrown.message, HasSubstr("20 photos"));
+  EXPECT_THAT(thrown.message, HasSubstr("at least"));
+}
+
+TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
+  const NewGraph graph = PlanJob(SceneSpec(), {}, kTwentyPhotos);
+  ASSERT_EQ(graph.jobs.size(), 13u);
+  EXPECT_EQ(graph.jobs.back().kind, "colorize_scene");
+  EXPECT_EQ(graph.jobs.back().inputs.size(), 12u);
+  EXPECT_THAT(InputKinds(graph, "select_key_view"), ElementsAre("import_scene"));
+  EXPECT_THAT(InputKinds(graph, "reconstruct_geometry"), ElementsAre("import_scene"));
+  EXPECT_THAT(InputKinds(graph, "personalize"),
+              ElementsAre("import_scene", "select_key_view", "colorize_key_view", "carry_color"));
+  EXPECT_THAT(
+      InputKinds(graph, "carry_color"),
+      ElementsAre("import_scene", "select_key_view", "colorize_key_view", "reconstruct_geometry"));
+  EXPECT_THAT(InputKinds(graph, "colorize_views"),
+              ElementsAre("import_scene", "personalize", "carry_color"));
+  EXPECT_THAT(InputKinds(graph, "solve_chroma"),
+              ElementsAre("import_scene",
+                          "select_key_view",
+                          "colorize_key_view",
+                          "colorize_views",
+                          "reconstruct_geometry"));
+  EXPECT_THAT(InputKinds(graph, "export"), ElementsAre("import_scene", "solve_chroma"));
+  for (const NewJob& job : graph.jobs) {
+    const int index = IndexOf(graph, job.kind);
+    for (const int input : job.inputs) EXPECT_LT(input, index);
+  }
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "evaluate")].skip_reason, "") << "views are compared anyway";
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "render")].skip_reason, "");
+  EXPECT_THAT(graph.jobs.back().blobs, ElementsAre(Sha256Hex("key")));
+  EXPECT_EQ(SpecOf(graph, "colorize_key_view").colorize_key_view().source().image().sha256(),
+            Sha256Hex("key"));
+}
+
+TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
+  spec.mutable_colorize_scene()->mutable_personalize()->set_iterations(7);
+  NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  const PresetValues paper = ValuesOf(v1::PRESET_PAPER);
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().iterations(), 7);
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().recipe(), v1::PersonalizeSpec::RECIPE_PAPER);
+  EXPECT_TRUE(SpecOf(graph, "personalize").personalize().has_least_improvement());
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.0)
+      << "the paper's schedule runs to its end";
+  EXPECT_EQ(SpecOf(graph, "select_key_view").select_key_view().strategy(),
+            v1::SelectKeyViewSpec::STRATEGY_ENTROPY);
+  EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_gaussians(),
+            paper.max_gaussians);
+  EXPECT_EQ(SpecOf(graph, "render").render().max_side_px(), paper.max_side_px);
+  spec.mutable_colorize_scene()->mutable_personalize()->set_least_improvement(0.25);
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.25);
+  spec.mutable_colorize_scene()->set_max_side_px(333);
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_side_px(), 333);
+  EXPECT_EQ(SpecOf(graph, "colorize_views").colorize_views().max_side_px(), 333);
+  EXPECT_EQ(SpecOf(graph, "colorize_views").seed(), 1u);
+}
+
+TEST(Planner, KeyViewMakesTheSelectionManual) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_key_view("a.jpg");
+  const v1::JobSpec select = SpecOf(PlanJob(spec, {}, kTwentyPhotos), "select_key_view");
+  EXPECT_EQ(select.select_key_view().strategy(), v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+  EXPECT_EQ(select.select_key_view().view(), "a.jpg");
+}
+
+TEST(Planner, TruthGoesToEvaluation) {
+  v1::JobSpec spec = SceneSpec();
+  v1::TruthImage* truth = spec.mutable_colorize_scene()->add_truth();
+  truth->set_view("b.jpg");
+  *truth->mutable_image() = SomeDigest("truth");
+  truth = spec.mutable_colorize_scene()->add_training_truth();
+  truth->set_view("c.jpg");
+  *truth->mutable_image() = SomeDigest("training truth");
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(SpecOf(graph, "evaluate").evaluate().truth(0).view(), "b.jpg");
+  EXPECT_EQ(SpecOf(graph, "evaluate").evaluate().training_truth(0).view(), "c.jpg");
+  EXPECT_EQ(graph.jobs.back().blobs.size(), 3u);
+}
+
+TEST(Planner, SingleStagesBringSimplePrerequisites) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  *spec.mutable_colorize_key_view()->mutable_source()->mutable_image() = SomeDigest("key");
+  NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  ASSERT_EQ(graph.jobs.size(), 3u);
+  EXPECT_EQ(graph.jobs.back().kind, "colorize_key_view");
+  EXPECT_EQ(graph.jobs.back().inputs.size(), 2u);
+  JobRecord import;
+  import.name = "jobs/i";
+  import.kind = "import_scene";
+  import.scene = "scenes/test";
+  import.state = JobState::kRunning;
+  graph = PlanJob(spec, {import}, kTwentyPhotos);
+  ASSERT_EQ(graph.jobs.size(), 2u);
+  EXPECT_THAT(graph.jobs[0].input_jobs, ElementsAre("jobs/i"));
+  EXPECT_THAT(graph.jobs[1].input_jobs, ElementsAre("jobs/i"));
+}
+
+TEST(Planner, OtherStagesNameTheMissingInput) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_solve_chroma();
+  std::vector<JobRecord> inputs;
+  for (const char* kind :
+       {"import_scene", "select_key_view", "colorize_key_view", "colorize_views"}) {
+    JobRecord input;
+    input.name = std::string("jobs/") + kind;
+    input.kind = kind;
+    input.scene = "scenes/test";
+    input.state = JobState::kSucceeded;
+    inputs.push_back(input);
+  }
+  Thrown error = PlanError(spec, inputs);
+  EXPECT_EQ(error.code, ErrorCode::kFailedPrecondition);
+  EXPECT_THAT(error.message, HasSubstr("geometry.c3g"));
+  EXPECT_THAT(error.message, HasSubstr("reconstruct_geometry"));
+  inputs.push_back(inputs[0]);
+  inputs.back().kind = "reconstruct_geometry";
+  inputs.back().name = "jobs/g";
+  const NewGraph graph = PlanJob(spec, inputs, kTwentyPhotos);
+  ASSERT_EQ(graph.jobs.size(), 1u);
+  EXPECT_EQ(graph.jobs[0].input_jobs.size(), 5u);
+  inputs.back().state = JobState::kFailed;
+  EXPECT_EQ(PlanError(spec, inputs).reason, "INPUT_MISSING");
+  inputs.back().state = JobState::kSucceeded;
+  inputs.push_back(inputs.back());
+  inputs.back().name = "jobs/g2";
+  EXPECT_EQ(PlanError(spec, inputs).code, ErrorCode::kInvalidArgument) << "two geometries";
+  inputs.pop_back();
+  inputs[0].scene = "scenes/other";
+  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("scenes/other"));
+}
+
+TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
+  v1::JobSpec spec = SceneSpec();
+  NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
+              HasSubstr("key view alone"));
+  EXPECT_THAT(InputKinds(graph, "personalize"), Not(Contains("generate_augmentations")));
+
+  SceneFacts with_files = kTwentyPhotos;
+  with_files.augment_files = 2;
+  graph = PlanJob(spec, {}, with_files);
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
+  EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 0)
+      << "only the user's own";
+  EXPECT_THAT(InputKinds(graph, "personalize"), Contains("generate_augmentations"));
+
+  spec.mutable_colorize_scene()->mutable_generate_augmentations();
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
+  EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
+  EXPECT_THAT(InputKinds(graph, "generate_augmentations"), Contains("reconstruct_geometry"));
+
+  spec.mutable_colorize_scene()->mutable_generate_augmentations()->set_samples(0);
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
+              HasSubstr("no samples"));
+
+  spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
+  graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
+  EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
+}
+
+TEST(Planner, AugmentationOptionsAreChecked) {
+  v1::JobSpec spec = SceneSpec();
+  auto* options = spec.mutable_colorize_scene()->mutable_generate_augmentations();
+  options->add_kinds(static_cast<v1::GenerateAugmentationsSpec::Kind>(9));
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("colorize_scene.generate_augmentations.kinds[0]"));
+  options->clear_kinds();
+  options->add_kinds(v1::GenerateAugmentationsSpec::KIND_UNSPECIFIED);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("unspecified"));
+  options->clear_kinds();
+  options->set_samples(65);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("0 to 64"));
+}
+
+TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_reconstruct_dynamic();
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dynamic"));
+  spec.mutable_reconstruct_dense();
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dense"));
+}
+
+TEST(Planner, KeyColorIsRequired) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_colorize_scene();
+  EXPECT_EQ(PlanError(spec).code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("key_color is required"));
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("select_key_view"));
+  EXPECT_THAT(PlanError(v1::JobSpec()).message, HasSubstr("no stage"));
+}
+
+TEST(Planner, BadOptionsNameFieldValueAndRange) {
+  const auto message = [](auto&& change) {
+    v1::JobSpec spec = SceneSpec();
+    change(spec.mutable_colorize_scene());
+    const Thrown error = PlanError(spec);
+    EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
+    return error.message;
+  };
+  EXPECT_EQ(message([](auto* s) { s->set_preset(static_cast<v1::Preset>(99)); }),
+            "colorize_scene.preset is 99, which is none of PRESET_FAST, PRESET_BEST, PRESET_PAPER");
+  EXPECT_EQ(message([](auto* s) { s->set_max_side_px(-5); }),
+            "colorize_scene.max_side_px is -5; the range is 64 to 4096");
+  EXPECT_THAT(message([](auto* s) { s->mutable_reconstruct_geometry()->set_ssim_weight(1.5); }),
+              HasSubstr("colorize_scene.reconstruct_geometry.ssim_weight is 1.5"));
+  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_average_decay(1.0); }),
+            "colorize_scene.personalize.average_decay is 1; the range is 0 to 0.9999");
+  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_least_improvement(0.6); }),
+            "colorize_scene.personalize.least_improvement is 0.6; the range is 0 to 0.5");
+  EXPECT_EQ(
+      message([](auto* s) {
+        s->mutable_personalize()->set_precision(static_cast<v1::PersonalizeSpec::Precision>(7));
+      }),
+      "colorize_scene.personalize.precision is 7, which is none of PRECISION_AUTO, "
+      "PRECISION_FLOAT32, PRECISION_BFLOAT16");
+  EXPECT_THAT(
+      message([](auto* s) {
+        s->mutable_select_key_view()->set_temperature(std::numeric_limits<double>::quiet_NaN());
+      }),
+      HasSubstr("not a finite number"));
+  EXPECT_THAT(message([](auto* s) {
+                s->mutable_key_color()->mutable_image()->set_sha256("../../etc/passwd");
+              }),
+              HasSubstr("64 lower-case hexadecimal digits"));
+  EXPECT_THAT(message([](auto* s) { s->add_truth()->set_view("x"); }), HasSubstr("truth[0]"));
+  EXPECT_THAT(message([](auto* s) {
+                s->mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+              }),
+              HasSubstr("view is required"));
+}
+
+TEST(Planner, ExportOfNothingIsSkipped) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_export_()->set_ply(false);
+  JobRecord import;
+  import.name = "jobs/i";
+  import.kind = "import_scene";
+  import.scene = "scenes/test";
+  JobRecord model = import;
+  model.name = "jobs/m";
+  model.kind = "solve_chroma";
+  EXPECT_THAT(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason,
+              HasSubstr("ply"));
+  spec.mutable_export_()->set_splat(true);
+  EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
+}
+
+JobRecord Done(const std::string& kind) {
+  JobRecord job;
+  job.name = "jobs/" + kind;
+  job.kind = kind;
+  job.scene = "scenes/test";
+  job.state = JobState::kSucceeded;
+  return job;
+}
+
+TEST(PlanColorizeScene, TakesAnAcceptedKeyViewInPlaceOfMakingItsOwn) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_colorize_scene();
+  spec.add_inputs("jobs/colorize_key_view");
+  std::vector<JobRecord> inputs{
+      Done("import_scene"), Done("select_key_view"), Done("colorize_key_view")};
+  const NewGraph graph = PlanJob(spec, inputs, kTwentyPhotos);
+  for (const NewJob& job : graph.jobs) {
+    EXPECT_NE(job.kind, "import_scene");
+    EXPECT_NE(job.kind, "select_key_view");
+    EXPECT_NE(job.kind, "colorize_key_view");
+  }
+  const NewJob& personalize = graph.jobs[IndexOf(graph, "personalize")];
+  EXPECT_THAT(personalize.input_jobs,
+              ElementsAre("jobs/import_scene", "jobs/select_key_view", "jobs/colorize_key_view"));
+  EXPECT_EQ(graph.jobs.back().kind, "colorize_scene");
+  EXPECT_EQ(graph.jobs.back().input_jobs.size(), 3u) << "the report shows them, too";
+
+  spec.mutable_colorize_scene()->set_key_view("a.jpg");
+  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("jobs/select_key_view"));
+  spec.mutable_colorize_scene()->clear_key_view();
+  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = SomeDigest("key");
+  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("jobs/colorize_key_view"));
+  spec.mutable_colorize_scene()->clear_key_color();
+  inputs[2].state = JobState::kRunning;
+  EXPECT_EQ(PlanError(spec, inputs).reason, "INPUT_MISSING");
+  inputs[2].state = JobState::kSucceeded;
+  inputs.erase(inputs.begin() + 1);
+  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("without the select_key_view"));
+  EXPECT_THAT(PlanError(spec, {Done("import_scene")}).message, HasSubstr("key_color is required"));
+  EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
+}
+
+TEST(StageKey, DependsOnOptionsAndSeedOnly) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/a");
+  spec.mutable_reconstruct_geometry()->set_iterations(10);
+  const std::string key = KeyPartOf(spec.SerializeAsString()).bytes;
+  v1::JobSpec other = spec;
+  other.set_scene("scenes/b");
+  other.add_inputs("jobs/x");
+  other.set_skip_cache(true);
+  EXPECT_EQ(KeyPartOf(other.SerializeAsString()).bytes, key);
+  EXPECT_TRUE(KeyPartOf(other.SerializeAsString()).skip_cache);
+  other.mutable_reconstruct_geometry()->set_iterations(11);
+  EXPECT_NE(KeyPartOf(other.SerializeAsString()).bytes, key);
+  other = spec;
+  other.set_seed(2);
+  EXPECT_NE(KeyPartOf(other.SerializeAsString()).bytes, key);
+  EXPECT_EQ(KeyPartOf(SceneSpec().SerializeAsString()).bytes, "") << "reports are never cached";
+}
+
+}  // namespace
+}  // namespace color3d

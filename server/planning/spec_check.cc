@@ -1,0 +1,417 @@
+#include "server/planning/spec_check.h"
+
+#include <google/protobuf/message.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+struct Range {
+  double low;
+  double high;
+};
+
+// Ranges as documented in stage.proto, by message and field.
+const std::map<std::string, Range>& Ranges() {
+  static const std::map<std::string, Range> ranges = {
+      {"ImportSceneSpec.sfm_max_image_side_px", {256, 4096}},
+      {"ImportSceneSpec.sfm_max_features", {512, 16384}},
+      {"ImportSceneSpec.sfm_timeout_seconds", {10, 86400}},
+      {"SelectKeyViewSpec.temperature", {1e-3, 1e3}},
+      {"ColorizeKeyViewSpec.hint_sigma", {0.1, 50}},
+      {"GenerateAugmentationsSpec.samples", {0, 64}},
+      {"GenerateAugmentationsSpec.max_side_px", {64, 2048}},
+      {"PersonalizeSpec.iterations", {0, 100'000}},
+      {"PersonalizeSpec.time_limit_seconds", {0, 86400}},
+      {"PersonalizeSpec.max_side_px", {64, 2048}},
+      {"PersonalizeSpec.crop_px", {64, 1024}},
+      {"PersonalizeSpec.consistency_weight", {0, 10}},
+      {"PersonalizeSpec.average_decay", {0, 0.9999}},
+      {"PersonalizeSpec.least_improvement", {0, 0.5}},
+      {"ColorizeViewsSpec.max_side_px", {64, 4096}},
+      {"CarryColorSpec.max_reprojection_px", {0.1, 10}},
+      {"CarryColorSpec.max_side_px", {64, 4096}},
+      {"CarryColorSpec.depth_tolerance", {1e-4, 1}},
+      {"CarryColorSpec.depth_side_px", {64, 2048}},
+      {"CarryColorSpec.depth_sources", {1, 16}},
+      {"ReconstructGeometrySpec.iterations", {0, 100'000}},
+      {"ReconstructGeometrySpec.max_side_px", {64, 4096}},
+      {"ReconstructGeometrySpec.max_gaussians", {1, 10'000'000}},
+      {"ReconstructGeometrySpec.sh_degree", {0, 3}},
+      {"ReconstructGeometrySpec.ssim_weight", {0, 1}},
+      {"ReconstructGeometrySpec.edge_weight", {0, 10}},
+      {"ReconstructGeometrySpec.time_limit_seconds", {0, 86400}},
+      {"ReconstructGeometrySpec.densify_gradient", {1e-9, 1}},
+      {"SolveChromaSpec.iterations", {0, 100'000}},
+      {"SolveChromaSpec.chroma_sh_degree", {0, 1}},
+      {"SolveChromaSpec.ssim_weight", {0, 1}},
+      {"SolveChromaSpec.time_limit_seconds", {0, 86400}},
+      {"ReconstructDynamicSpec.frames_per_second", {0.1, 1000}},
+      {"ReconstructDynamicSpec.coarse_iterations", {0, 100'000}},
+      {"ReconstructDynamicSpec.fine_iterations", {0, 100'000}},
+      {"ReconstructDenseSpec.max_side_px", {64, 4096}},
+      {"RenderSpec.max_views", {1, 1000}},
+      {"RenderSpec.max_side_px", {64, 4096}},
+      {"ColorizeSceneSpec.max_side_px", {64, 4096}},
+      {"ColorizeSceneSpec.time_budget_seconds", {0, 604'800}},
+  };
+  return ranges;
+}
+
+constexpr int kMaxRepeated = 10'000;
+constexpr size_t kMaxTextBytes = 4096;
+
+std::string Text(double value) {
+  std::ostringstream out;
+  out.precision(12);
+  out << value;
+  return out.str();
+}
+
+[[noreturn]] void Reject(const std::string& path, const std::string& why) {
+  throw ServiceError(ErrorCode::kInvalidArgument, "BAD_OPTION", path + why, {{path, path + why}});
+}
+
+void CheckNumber(const FieldDescriptor* field, double value, const std::string& path) {
+  if (!std::isfinite(value)) Reject(path, " is not a finite number");
+  const std::string key = field->containing_type()->name() + "." + field->name();
+  const auto range = Ranges().find(key);
+  if (range == Ranges().end()) return;
+  if (value < range->second.low || value > range->second.high) {
+    Reject(path,
+           " is " + Text(value) + "; the range is " + Text(range->second.low) + " to " +
+               Text(range->second.high));
+  }
+}
+
+void CheckEnum(const FieldDescriptor* field, int value, const std::string& path) {
+  if (field->enum_type()->FindValueByNumber(value) != nullptr) return;
+  std::string known;
+  for (int i = 1; i < field->enum_type()->value_count(); ++i) {
+    known += (i > 1 ? ", " : "") + field->enum_type()->value(i)->name();
+  }
+  Reject(path, " is " + std::to_string(value) + ", which is none of " + known);
+}
+
+void CheckMessage(const Message& message, const std::string& path);
+
+void CheckSingular(const Message& message, const FieldDescriptor* field, const std::string& path) {
+  const Reflection* reflection = message.GetReflection();
+  switch (field->cpp_type()) {
+    case FieldDescriptor::CPPTYPE_MESSAGE:
+      return CheckMessage(reflection->GetMessage(message, field), path);
+    case FieldDescriptor::CPPTYPE_ENUM:
+      return CheckEnum(field, reflection->GetEnumValue(message, field), path);
+    case FieldDescriptor::CPPTYPE_INT32:
+      return CheckNumber(field, reflection->GetInt32(message, field), path);
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      return CheckNumber(field, reflection->GetDouble(message, field), path);
+    case FieldDescriptor::CPPTYPE_STRING:
+      if (reflection->GetString(message, field).size() > kMaxTextBytes) {
+        Reject(path, " is longer than " + std::to_string(kMaxTextBytes) + " bytes");
+      }
+      return;
+    default:
+      return;
+  }
+}
+
+void CheckRepeated(const Message& message, const FieldDescriptor* field, const std::string& path) {
+  const Reflection* reflection = message.GetReflection();
+  const int count = reflection->FieldSize(message, field);
+  if (count > kMaxRepeated) {
+    Reject(path,
+           " has " + std::to_string(count) + " entries; at most " + std::to_string(kMaxRepeated) +
+               " are allowed");
+  }
+  for (int i = 0; field->cpp_type() == FieldDescriptor::CPPTYPE_ENUM && i < count; ++i) {
+    const int value = reflection->GetRepeatedEnumValue(message, field, i);
+    const std::string entry = path + "[" + std::to_string(i) + "]";
+    CheckEnum(field, value, entry);
+    if (value == 0) Reject(entry, " is unspecified; name a value or leave the entry out");
+  }
+  if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return;
+  for (int i = 0; i < count; ++i) {
+    CheckMessage(reflection->GetRepeatedMessage(message, field, i),
+                 path + "[" + std::to_string(i) + "]");
+  }
+}
+
+void CheckDigest(const v1::Digest& digest, const std::string& path) {
+  if (!IsSha256Hex(digest.sha256())) {
+    Reject(path, ".sha256 must be 64 lower-case hexadecimal digits");
+  }
+  if (digest.size_bytes() < 1) {
+    Reject(path, ".size_bytes is " + std::to_string(digest.size_bytes()) + "; it must be positive");
+  }
+}
+
+// Field by field, in depth; `path` is how the client would write the field.
+void CheckMessage(const Message& message, const std::string& path) {
+  if (const auto* digest = dynamic_cast<const v1::Digest*>(&message)) {
+    return CheckDigest(*digest, path);
+  }
+  std::vector<const FieldDescriptor*> fields;
+  message.GetReflection()->ListFields(message, &fields);
+  for (const FieldDescriptor* field : fields) {
+    const std::string field_path = path.empty() ? field->name() : path + "." + field->name();
+    if (field->is_repeated()) {
+      CheckRepeated(message, field, field_path);
+    } else {
+      CheckSingular(message, field, field_path);
+    }
+  }
+}
+
+[[noreturn]] void NotBuilt(const std::string& what, const std::string& remedy) {
+  throw ServiceError(ErrorCode::kUnimplemented, "NOT_BUILT", what + " is not built yet; " + remedy);
+}
+
+constexpr int kMaxReferences = 16;
+constexpr int kMaxFurtherKeyViews = 16;
+constexpr size_t kMaxPromptBytes = 1000;
+
+bool TakesModel(v1::KeyColorSource::SourceCase source) {
+  return source == v1::KeyColorSource::kPrompt || source == v1::KeyColorSource::kAutomatic ||
+         source == v1::KeyColorSource::kReference || source == v1::KeyColorSource::kReferences;
+}
+
+void CheckPrompt(const std::string& prompt, const std::string& path) {
+  if (prompt.find_first_not_of(" \t\r\n") == std::string::npos) {
+    Reject(path, " is empty; say what has which colour, e.g. \"red brick, green lawn\"");
+  }
+  if (prompt.size() > kMaxPromptBytes) {
+    Reject(path,
+           " has " + std::to_string(prompt.size()) + " bytes; at most " +
+               std::to_string(kMaxPromptBytes) + " are allowed");
+  }
+}
+
+void CheckReferences(const v1::References& references, const std::string& path) {
+  const int count = references.images_size();
+  if (count < 1 || count > kMaxReferences) {
+    Reject(path,
+           ".images has " + std::to_string(count) + " pictures; 1 to " +
+               std::to_string(kMaxReferences) + " are allowed");
+  }
+}
+
+// What only some sources take.
+void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& path) {
+  if (!source.model().empty() && !TakesModel(source.source_case())) {
+    Reject(path + ".model",
+           " is '" + source.model() +
+               "', but only prompt, automatic and references work with a model; leave it out");
+  }
+  if (source.has_backend_input() && source.source_case() != v1::KeyColorSource::kBackend) {
+    Reject(path + ".backend_input", " is set, but the source is no backend; leave it out");
+  }
+  if (source.has_labels() && source.source_case() != v1::KeyColorSource::kPoints) {
+    Reject(path + ".labels", " is set, but only points refer to labels; leave it out");
+  }
+  if (source.has_backend_input() && !source.backend_input().prompt().empty()) {
+    CheckPrompt(source.backend_input().prompt(), path + ".backend_input.prompt");
+  }
+}
+
+void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
+  CheckKeyColorExtras(source, path);
+  switch (source.source_case()) {
+    case v1::KeyColorSource::kImage:
+    case v1::KeyColorSource::kStrokes:
+    case v1::KeyColorSource::kPoints:
+    case v1::KeyColorSource::kReference:
+      return;
+    case v1::KeyColorSource::kReferences:
+      return CheckReferences(source.references(), path + ".references");
+    case v1::KeyColorSource::kPrompt:
+      CheckPrompt(source.prompt(), path + ".prompt");
+      if (source.model().empty()) {
+        Reject(path + ".model",
+               " is required with a prompt: the name of CLIP weights that the server was started "
+               "with (--model NAME=FILE)");
+      }
+      return;
+    case v1::KeyColorSource::kAutomatic:
+      if (!source.automatic()) Reject(path + ".automatic", " is false; set it to true");
+      return;
+    case v1::KeyColorSource::kBackend:
+      if (source.backend().empty()) Reject(path + ".backend", " is empty; name a backend");
+      return;
+    case v1::KeyColorSource::kScript:
+      if (source.script().empty()) Reject(path + ".script", " is empty; name a model");
+      return;
+    case v1::KeyColorSource::kEdit:
+      if (!source.edit().has_image()) {
+        Reject(path + ".edit.image", " is required: the edited key photo");
+      }
+      return;
+    case v1::KeyColorSource::SOURCE_NOT_SET:
+      break;
+  }
+  Reject(path,
+         " is required: where the key view's colour comes from (image, strokes, points, automatic, "
+         "...). To learn which photo is the key view, first run select_key_view and read its "
+         "artifact key_view.json; `automatic` needs nothing of the user");
+}
+
+void CheckTruth(const google::protobuf::RepeatedPtrField<v1::TruthImage>& truth,
+                const std::string& path) {
+  for (int i = 0; i < truth.size(); ++i) {
+    const std::string entry = path + "[" + std::to_string(i) + "]";
+    if (truth[i].view().empty()) Reject(entry, ".view is empty; name the view");
+    if (!truth[i].has_image()) Reject(entry, ".image is missing");
+  }
+}
+
+void CheckTraining(const google::protobuf::RepeatedPtrField<v1::TruthImage>& training,
+                   bool has_truth,
+                   const std::string& path) {
+  CheckTruth(training, path);
+  if (!training.empty() && !has_truth) {
+    Reject(path, " is given without the truth of held-out views; there is nothing to score");
+  }
+}
+
+void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
+  if (spec.strategy() == v1::SelectKeyViewSpec::STRATEGY_MANUAL && spec.view().empty()) {
+    Reject(path, ".view is required with STRATEGY_MANUAL: the name of a photo");
+  }
+}
+
+void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
+  const int count = spec.further_key_views_size();
+  if (count > kMaxFurtherKeyViews) {
+    Reject(path + ".further_key_views",
+           " has " + std::to_string(count) + " entries; at most " +
+               std::to_string(kMaxFurtherKeyViews) + " are allowed");
+  }
+  if (count > 0 && spec.skip()) {
+    Reject(path + ".skip", " is set, but further_key_views need the stage; leave one of them out");
+  }
+  for (int i = 0; i < count; ++i) {
+    const std::string entry = path + ".further_key_views[" + std::to_string(i) + "]";
+    if (spec.further_key_views(i).view().empty()) Reject(entry + ".view", " is empty; name a view");
+    CheckKeyColor(spec.further_key_views(i).color(), entry + ".color");
+  }
+}
+
+void CheckRoutes(const v1::PersonalizeScenesSpec& spec) {
+  if (spec.routes().empty()) Reject("personalize_scenes.routes", " is empty; name a scene");
+  std::set<std::string> scenes;
+  for (int i = 0; i < spec.routes_size(); ++i) {
+    const std::string path = "personalize_scenes.routes[" + std::to_string(i) + "].scene";
+    const std::string& scene = spec.routes(i).scene();
+    if (scene.empty()) Reject(path, " is empty; name a scene");
+    if (!scenes.insert(scene).second) {
+      Reject(path, " is '" + scene + "', which is there already; name each scene once");
+    }
+  }
+}
+
+// `has_inputs`: the colour may come from a job among them; the planner sees to that.
+void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
+  const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
+  if (!has_inputs || spec.has_key_color() || in_options) {
+    CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
+  }
+  if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  CheckCarryColor(spec.carry_color(), "carry_color");
+  CheckTruth(spec.truth(), "truth");
+  CheckTraining(spec.training_truth(), !spec.truth().empty(), "training_truth");
+}
+
+}  // namespace
+
+std::string KindOf(const v1::JobSpec& spec) {
+  const google::protobuf::OneofDescriptor* stage = spec.GetDescriptor()->FindOneofByName("stage");
+  const FieldDescriptor* field = spec.GetReflection()->GetOneofFieldDescriptor(spec, stage);
+  if (field == nullptr) {
+    throw InvalidArgument("spec has no stage; set one, e.g. spec.colorize_scene");
+  }
+  return field->name();
+}
+
+const std::vector<std::string>& BuiltKinds() {
+  static const std::vector<std::string> kinds = {"colorize_scene",
+                                                 "import_scene",
+                                                 "select_key_view",
+                                                 "colorize_key_view",
+                                                 "generate_augmentations",
+                                                 "personalize",
+                                                 "carry_color",
+                                                 "personalize_scenes",
+                                                 "colorize_views",
+                                                 "reconstruct_geometry",
+                                                 "solve_chroma",
+                                                 "export",
+                                                 "render",
+                                                 "evaluate"};
+  return kinds;
+}
+
+void CheckSpec(const v1::JobSpec& spec) {
+  const std::string kind = KindOf(spec);
+  const auto& kinds = BuiltKinds();
+  if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) {
+    NotBuilt(kind, "GetServerInfo lists the job kinds that are");
+  }
+  CheckMessage(spec, "");
+  if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene(), spec.inputs_size() > 0);
+  if (spec.has_colorize_key_view()) {
+    CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
+  }
+  if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), "carry_color");
+  if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
+  if (spec.has_evaluate()) {
+    CheckTruth(spec.evaluate().truth(), "evaluate.truth");
+    CheckTraining(spec.evaluate().training_truth(),
+                  !spec.evaluate().truth().empty(),
+                  "evaluate.training_truth");
+  }
+}
+
+namespace {
+
+void CollectDigests(const Message& message, std::map<std::string, FileDigest>* digests) {
+  if (const auto* digest = dynamic_cast<const v1::Digest*>(&message)) {
+    (*digests)[digest->sha256()] = {digest->sha256(), digest->size_bytes()};
+    return;
+  }
+  const Reflection* reflection = message.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const FieldDescriptor* field : fields) {
+    if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
+    if (!field->is_repeated()) {
+      CollectDigests(reflection->GetMessage(message, field), digests);
+      continue;
+    }
+    for (int i = 0; i < reflection->FieldSize(message, field); ++i) {
+      CollectDigests(reflection->GetRepeatedMessage(message, field, i), digests);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<FileDigest> SpecBlobs(const v1::JobSpec& spec) {
+  std::map<std::string, FileDigest> digests;
+  CollectDigests(spec, &digests);
+  std::vector<FileDigest> result;
+  for (const auto& [sha256, digest] : digests) result.push_back(digest);
+  return result;
+}
+
+}  // namespace color3d

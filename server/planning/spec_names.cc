@@ -1,0 +1,85 @@
+#include "server/planning/spec_names.h"
+
+#include <set>
+
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+// Fields of stage.proto that hold names of the server's configuration, by message and field.
+const std::set<std::string>& ModelFields() {
+  static const std::set<std::string> fields = {"KeyColorSource.model",
+                                               "KeyColorSource.script",
+                                               "SelectKeyViewSpec.encoder",
+                                               "SelectKeyViewSpec.features",
+                                               "PersonalizeSpec.encoder",
+                                               "ColorizeViewsSpec.encoder"};
+  return fields;
+}
+const std::set<std::string>& BackendFields() {
+  static const std::set<std::string> fields = {"KeyColorSource.backend",
+                                               "GenerateAugmentationsSpec.backend"};
+  return fields;
+}
+
+void Collect(const Message& message, const std::string& path, SpecNames* names) {
+  const Reflection* reflection = message.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const FieldDescriptor* field : fields) {
+    const std::string here = path.empty() ? field->name() : path + "." + field->name();
+    if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+      if (!field->is_repeated()) {
+        Collect(reflection->GetMessage(message, field), here, names);
+        continue;
+      }
+      for (int i = 0; i < reflection->FieldSize(message, field); ++i) {
+        Collect(reflection->GetRepeatedMessage(message, field, i),
+                here + "[" + std::to_string(i) + "]",
+                names);
+      }
+      continue;
+    }
+    const std::string key = field->containing_type()->name() + "." + field->name();
+    const bool model = ModelFields().contains(key);
+    if (!model && !BackendFields().contains(key)) continue;
+    const std::string name = reflection->GetString(message, field);
+    if (!name.empty()) (model ? names->models : names->backends).push_back({here, name});
+  }
+}
+
+template <typename Value>
+void Require(const std::vector<NameUse>& uses,
+             const std::map<std::string, Value>& known,
+             const std::string& what,
+             const std::string& reason,
+             const std::string& remedy) {
+  for (const NameUse& use : uses) {
+    if (known.contains(use.name)) continue;
+    const std::string why = " names the " + what + " '" + use.name +
+                            "', which this server does not have (it has: " + NamesOf(known) +
+                            "); start it with " + remedy;
+    throw ServiceError(
+        ErrorCode::kInvalidArgument, reason, use.field + why, {{use.field, use.field + why}});
+  }
+}
+
+}  // namespace
+
+SpecNames NamesIn(const v1::JobSpec& spec) {
+  SpecNames names;
+  Collect(spec, "", &names);
+  return names;
+}
+
+void CheckNames(const v1::JobSpec& spec, const UserModels& models) {
+  const SpecNames names = NamesIn(spec);
+  Require(names.models, models.files, "model", "UNKNOWN_MODEL", "--model NAME=FILE");
+  Require(names.backends, models.backends, "backend", "UNKNOWN_BACKEND", "--backend NAME=ADDRESS");
+}
+
+}  // namespace color3d

@@ -1,0 +1,50 @@
+#include "server/store/job.h"
+
+#include <sys/random.h>
+
+#include <array>
+#include <chrono>
+
+namespace color3d {
+
+Clock SystemClock() {
+  return [] {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(
+               std::chrono::system_clock::now().time_since_epoch())
+        .count();
+  };
+}
+
+namespace {
+constexpr std::array<const char*, 7> kStateNames = {
+    "BLOCKED", "QUEUED", "RUNNING", "SUCCEEDED", "FAILED", "CANCELLED", "SKIPPED"};
+}  // namespace
+
+const char* JobStateName(JobState state) { return kStateNames[static_cast<size_t>(state)]; }
+
+JobState JobStateFromName(std::string_view name) {
+  for (size_t i = 0; i < kStateNames.size(); ++i) {
+    if (name == kStateNames[i]) return static_cast<JobState>(i);
+  }
+  throw Error(ErrorCode::kDataLoss,
+              "the job store holds the unknown state '" + std::string(name) +
+                  "'; it may come from a newer version");
+}
+
+std::string NewId() {
+  unsigned char bytes[8];
+  size_t have = 0;
+  while (have < sizeof(bytes)) {
+    const ssize_t got = ::getrandom(bytes + have, sizeof(bytes) - have, 0);
+    if (got > 0) have += static_cast<size_t>(got);
+  }
+  std::string id;
+  for (const unsigned char b : bytes) {
+    constexpr char kDigits[] = "0123456789abcdef";
+    id += kDigits[b >> 4];
+    id += kDigits[b & 15];
+  }
+  return id;
+}
+
+}  // namespace color3d

@@ -1,0 +1,142 @@
+#include "server/store/sqlite_db.h"
+
+#include <sqlite3.h>
+
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+[[noreturn]] void ThrowSqlite(sqlite3* db, int code, const std::string& what) {
+  const std::string detail = db != nullptr ? sqlite3_errmsg(db) : sqlite3_errstr(code);
+  const std::string text = "job store: " + what + ": " + detail;
+  switch (code & 0xff) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      throw ServiceError(ErrorCode::kUnavailable, "STORE_BUSY", text + "; try again");
+    case SQLITE_FULL:
+      throw ServiceError(
+          ErrorCode::kResourceExhausted, "STORAGE_FULL", text + "; free some disk space");
+    case SQLITE_READONLY:
+    case SQLITE_CANTOPEN:
+    case SQLITE_PERM:
+      throw ServiceError(ErrorCode::kFailedPrecondition,
+                         "STORE_NOT_WRITABLE",
+                         text + "; check the permissions of the data directory");
+    case SQLITE_CORRUPT:
+    case SQLITE_NOTADB:
+      throw ServiceError(ErrorCode::kDataLoss,
+                         "STORE_CORRUPT",
+                         text + "; restore jobs.db from a backup or start with a fresh --data-dir");
+    default:
+      throw ServiceError(ErrorCode::kInternal, "STORE_ERROR", text);
+  }
+}
+
+}  // namespace
+
+SqliteStatement::SqliteStatement(sqlite3* db, std::string_view sql) : db_(db) {
+  const int code =
+      sqlite3_prepare_v2(db, sql.data(), static_cast<int>(sql.size()), &statement_, nullptr);
+  if (code != SQLITE_OK) ThrowSqlite(db, code, "cannot prepare a statement");
+}
+
+SqliteStatement::~SqliteStatement() { sqlite3_finalize(statement_); }
+
+void SqliteStatement::BindOne(int64_t value) {
+  const int code = sqlite3_bind_int64(statement_, next_parameter_++, value);
+  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot bind a number");
+}
+
+void SqliteStatement::BindOne(double value) {
+  const int code = sqlite3_bind_double(statement_, next_parameter_++, value);
+  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot bind a number");
+}
+
+void SqliteStatement::BindOne(std::string_view text) {
+  const char* data = text.data() != nullptr ? text.data() : "";
+  const int code = sqlite3_bind_text64(
+      statement_, next_parameter_++, data, text.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
+  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot bind text");
+}
+
+bool SqliteStatement::Step() {
+  const int code = sqlite3_step(statement_);
+  if (code == SQLITE_ROW) return true;
+  if (code == SQLITE_DONE) return false;
+  ThrowSqlite(db_, code, "cannot run a statement");
+}
+
+void SqliteStatement::Run() {
+  while (Step()) {
+  }
+}
+
+int64_t SqliteStatement::Int(int column) const { return sqlite3_column_int64(statement_, column); }
+
+double SqliteStatement::Double(int column) const {
+  return sqlite3_column_double(statement_, column);
+}
+
+std::string SqliteStatement::Text(int column) const {
+  const void* data = sqlite3_column_blob(statement_, column);
+  const int size = sqlite3_column_bytes(statement_, column);
+  return data != nullptr ? std::string(static_cast<const char*>(data), size) : std::string();
+}
+
+SqliteDatabase::SqliteDatabase(const std::filesystem::path& path) {
+  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
+  const int code = sqlite3_open_v2(path.c_str(), &db_, flags, nullptr);
+  try {
+    if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot open " + path.string());
+    sqlite3_extended_result_codes(db_, 1);
+    sqlite3_busy_timeout(db_, 10'000);
+    Exec("pragma journal_mode=WAL");
+    Exec("pragma synchronous=FULL");
+    Exec("pragma foreign_keys=ON");
+  } catch (...) {
+    sqlite3_close(db_);
+    throw;
+  }
+}
+
+SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
+
+void SqliteDatabase::Exec(const char* sql) {
+  const int code = sqlite3_exec(db_, sql, nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) ThrowSqlite(db_, code, std::string("cannot run '") + sql + "'");
+}
+
+int64_t SqliteDatabase::LastInsertId() const { return sqlite3_last_insert_rowid(db_); }
+int64_t SqliteDatabase::Changes() const { return sqlite3_changes64(db_); }
+
+SqliteTransaction::SqliteTransaction(SqliteDatabase& db, bool durable)
+    : db_(db), durable_(durable) {
+  if (!durable_) db_.Exec("pragma synchronous=NORMAL");
+  try {
+    db_.Exec("begin immediate");
+  } catch (...) {
+    if (!durable_) db_.Exec("pragma synchronous=FULL");
+    throw;
+  }
+}
+
+SqliteTransaction::~SqliteTransaction() {
+  try {
+    if (open_) db_.Exec("rollback");
+  } catch (const Error&) {
+    // SQLite has already rolled back by itself (disk full, I/O error).
+  }
+  try {
+    if (!durable_) db_.Exec("pragma synchronous=FULL");
+  } catch (const Error&) {
+    // Cannot happen outside a transaction; the next commit would merely be less durable.
+  }
+}
+
+void SqliteTransaction::Commit() {
+  db_.Exec("commit");
+  open_ = false;
+}
+
+}  // namespace color3d

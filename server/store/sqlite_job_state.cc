@@ -1,0 +1,314 @@
+// The job state machine: creation, cancelling, retrying, and what the end of one job means for
+// those that depend on it.
+#include <deque>
+
+#include "server/service_error.h"
+#include "server/store/sqlite_db.h"
+#include "server/store/sqlite_job_store.h"
+#include "server/store/sqlite_rows.h"
+
+namespace color3d {
+namespace {
+
+ServiceError WrongState(const JobRecord& job, const std::string& remedy) {
+  return ServiceError(ErrorCode::kFailedPrecondition,
+                      "WRONG_STATE",
+                      job.name + " is " + JobStateName(job.state) + "; " + remedy);
+}
+
+bool CanBeRetried(const JobRecord& job) {
+  return job.state == JobState::kFailed || job.state == JobState::kCancelled ||
+         (job.state == JobState::kSkipped && !job.skipped_by_plan);
+}
+
+}  // namespace
+
+void SqliteJobStore::AddEvent(int64_t job_id, bool progress) {
+  // Progress is coalesced: a job has at most one progress event, its newest.
+  db_->Run("delete from job_event where job_id=? and progress=1", job_id);
+  db_->Run(
+      "insert into job_event(job_id, progress, state, attempt, at_ms) "
+      "select job_id, ?, state, attempt, ? from job where job_id=?",
+      progress,
+      Now(),
+      job_id);
+  db_->Run("update job set revision=? where job_id=?", db_->LastInsertId(), job_id);
+}
+
+void SqliteJobStore::SetState(int64_t job_id, JobState state) {
+  db_->Run(
+      "update job set state=?, end_ms=?, "
+      "lease_expires_ms=case when ?='RUNNING' then lease_expires_ms else null end where job_id=?",
+      JobStateName(state),
+      IsFinished(state) ? Now() : int64_t{0},
+      JobStateName(state),
+      job_id);
+  AddEvent(job_id, /*progress=*/false);
+}
+
+bool SqliteJobStore::InputsAreReady(int64_t job_id) {
+  SqliteStatement waiting(
+      db_->handle(),
+      "select 1 from job_dependency d join job i on i.job_id=d.input_id where d.job_id=? and "
+      "not (i.state='SUCCEEDED' or (i.state='SKIPPED' and i.skipped_by_plan=1)) limit 1");
+  waiting.Bind(job_id);
+  return !waiting.Step();
+}
+
+void SqliteJobStore::QueueReadyDependants(int64_t job_id) {
+  std::vector<int64_t> dependants;
+  {
+    SqliteStatement select(db_->handle(),
+                           "select d.job_id from job_dependency d join job j on j.job_id=d.job_id "
+                           "where d.input_id=? and j.state='BLOCKED' order by d.job_id");
+    select.Bind(job_id);
+    while (select.Step()) dependants.push_back(select.Int(0));
+  }
+  for (const int64_t dependant : dependants) {
+    if (InputsAreReady(dependant)) SetState(dependant, JobState::kQueued);
+  }
+}
+
+void SqliteJobStore::EndFailed(int64_t job_id, const JobError& error) {
+  db_->Run("update job set error_code=?, error_reason=?, error_message=? where job_id=?",
+           static_cast<int>(error.code),
+           error.reason.empty() ? std::string(ErrorCodeName(error.code)) : error.reason,
+           error.message,
+           job_id);
+  SetState(job_id, JobState::kFailed);
+  PropagateEnd(JobById(job_id));
+}
+
+void SqliteJobStore::EndCancelled(int64_t job_id) {
+  SetState(job_id, JobState::kCancelled);
+  PropagateEnd(JobById(job_id));
+}
+
+// Everything that waits for `cause`, directly or not, can never run: the submitted job of the same
+// graph ends as `cause` did, all others are skipped.
+void SqliteJobStore::PropagateEnd(const JobRecord& cause) {
+  const bool failed = cause.state == JobState::kFailed;
+  const std::string why =
+      failed ? " failed: " + cause.error->message : std::string(" was cancelled");
+  std::deque<JobRecord> ended = {cause};
+  while (!ended.empty()) {
+    const JobRecord from = ended.front();
+    ended.pop_front();
+    std::vector<JobRecord> waiting;
+    {
+      SqliteStatement select(
+          db_->handle(),
+          SelectJob("where state='BLOCKED' and job_id in "
+                    "(select job_id from job_dependency where input_id=?) order by job_id"));
+      select.Bind(from.id);
+      while (select.Step()) waiting.push_back(JobFromRow(select));
+    }
+    for (const JobRecord& job : waiting) {
+      if (job.name != from.parent) {
+        db_->Run(
+            "update job set skip_reason=? where job_id=?", "input " + cause.name + why, job.id);
+        SetState(job.id, JobState::kSkipped);
+      } else if (failed) {
+        db_->Run("update job set error_code=?, error_reason=?, error_message=? where job_id=?",
+                 static_cast<int>(cause.error->code),
+                 cause.error->reason,
+                 cause.kind + " (" + cause.name + ")" + why,
+                 job.id);
+        SetState(job.id, JobState::kFailed);
+      } else {
+        SetState(job.id, JobState::kCancelled);
+      }
+      ended.push_back(job);
+    }
+  }
+}
+
+namespace {
+
+void RequireActive(const SceneRecord& scene) {
+  if (scene.state == SceneState::kActive) return;
+  throw ServiceError(ErrorCode::kFailedPrecondition,
+                     "SCENE_NOT_ACTIVE",
+                     "the scene '" + scene.name +
+                         "' is not committed; upload its files and call CommitScene first");
+}
+
+}  // namespace
+
+void SqliteJobStore::InsertJob(const NewGraph& graph,
+                               size_t index,
+                               const std::vector<std::string>& names,
+                               std::vector<int64_t>* ids) {
+  const NewJob& job = graph.jobs[index];
+  const bool is_root = index + 1 == graph.jobs.size();
+  const bool skipped = !job.skip_reason.empty();
+  const int64_t now = Now();
+  db_->Run(
+      "insert into job(name, parent, kind, scene, spec, state, priority, max_attempts, "
+      "skip_reason, skipped_by_plan, create_ms, end_ms) values(?,?,?,?,?,?,?,?,?,?,?,?)",
+      names[index],
+      is_root ? std::string() : names.back(),
+      job.kind,
+      job.scene.empty() ? graph.scene : job.scene,
+      job.spec,
+      JobStateName(skipped ? JobState::kSkipped : JobState::kBlocked),
+      graph.priority,
+      options_.max_attempts,
+      job.skip_reason,
+      skipped,
+      now,
+      skipped ? now : int64_t{0});
+  const int64_t id = db_->LastInsertId();
+  ids->push_back(id);
+  std::set<int64_t> inputs;
+  for (const int input : job.inputs) inputs.insert(ids->at(static_cast<size_t>(input)));
+  for (const std::string& name : job.input_jobs) {
+    const JobRecord input = RequireJob(name);
+    if (CanBeRetried(input)) throw WrongState(input, "it cannot be an input; retry it first");
+    inputs.insert(input.id);
+  }
+  for (const int64_t input : inputs) db_->Run("insert into job_dependency values(?,?)", input, id);
+  const std::set<std::string> blobs(job.blobs.begin(), job.blobs.end());
+  for (const std::string& blob : blobs) db_->Run("insert into job_blob values(?,?)", id, blob);
+  if (!skipped && InputsAreReady(id)) {
+    SetState(id, JobState::kQueued);
+  } else {
+    AddEvent(id, /*progress=*/false);
+  }
+}
+
+JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
+                                      const RequestKey& request,
+                                      int64_t max_unfinished) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (const auto resource = CheckRequest(request)) return RequireJob(*resource);
+  std::set<std::string> scenes = {graph.scene};
+  for (const NewJob& job : graph.jobs) {
+    if (!job.scene.empty()) scenes.insert(job.scene);
+  }
+  for (const std::string& name : scenes) RequireActive(RequireScene(name, false));
+  SqliteStatement unfinished(db_->handle(), "select count(*) from job where end_ms=0");
+  unfinished.Step();
+  if (unfinished.Int(0) + static_cast<int64_t>(graph.jobs.size()) > max_unfinished) {
+    throw ServiceError(ErrorCode::kResourceExhausted,
+                       "QUEUE_FULL",
+                       std::to_string(unfinished.Int(0)) + " jobs wait or run, at most " +
+                           std::to_string(max_unfinished) + " are allowed; try again later");
+  }
+  std::vector<std::string> names;
+  for (size_t i = 0; i < graph.jobs.size(); ++i) names.push_back("jobs/" + NewId());
+  std::vector<int64_t> ids;
+  for (size_t i = 0; i < graph.jobs.size(); ++i) InsertJob(graph, i, names, &ids);
+  RecordRequest(request, names.back());
+  JobRecord root = RequireJob(names.back());
+  transaction.Commit();
+  return root;
+}
+
+JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (const auto resource = CheckRequest(request)) return RequireJob(*resource);
+  // The submitted job first: its children then find it finished and leave it alone.
+  const std::vector<JobRecord> graph = GraphOf(RequireJob(name));
+  for (auto it = graph.rbegin(); it != graph.rend(); ++it) {
+    const JobRecord job = JobById(it->id);
+    if (IsFinished(job.state) || job.cancel_requested) continue;
+    db_->Run("update job set cancel_requested=1 where job_id=?", job.id);
+    if (job.state == JobState::kRunning) {
+      AddEvent(job.id, /*progress=*/false);
+    } else {
+      SetState(job.id, JobState::kCancelled);
+    }
+  }
+  for (const JobRecord& job : graph) {
+    const JobRecord now = JobById(job.id);
+    if (now.state == JobState::kCancelled && job.state != JobState::kCancelled) PropagateEnd(now);
+  }
+  RecordRequest(request, name);
+  JobRecord result = RequireJob(name);
+  transaction.Commit();
+  return result;
+}
+
+void SqliteJobStore::ResetForRetry(const JobRecord& job, bool from_scratch) {
+  SqliteStatement bad(
+      db_->handle(),
+      SelectJob("where job_id in (select input_id from job_dependency where job_id=?) and "
+                "(state in('FAILED','CANCELLED') or (state='SKIPPED' and skipped_by_plan=0)) "
+                "limit 1"));
+  bad.Bind(job.id);
+  if (bad.Step()) {
+    throw WrongState(JobFromRow(bad), "retry it before " + job.name + ", which reads its results");
+  }
+  db_->Run(
+      "update job set attempt=0, lost_attempts=0, cancel_requested=0, run_after_ms=0, "
+      "error_code=null, error_reason='', error_message='', skip_reason='', warnings='' "
+      "where job_id=?",
+      job.id);
+  if (from_scratch) {
+    db_->Run(
+        "update job set checkpoint_sha256='', checkpoint_bytes=0, progress_step=0, seconds=0 "
+        "where job_id=?",
+        job.id);
+  }
+  const bool ready = InputsAreReady(job.id);
+  SetState(job.id, ready ? JobState::kQueued : JobState::kBlocked);
+}
+
+JobRecord SqliteJobStore::Retry(const std::string& name,
+                                bool from_scratch,
+                                const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (const auto resource = CheckRequest(request)) return RequireJob(*resource);
+  const JobRecord job = RequireJob(name);
+  if (!CanBeRetried(job)) throw WrongState(job, "only failed or cancelled jobs can be retried");
+  RequireScene(job.scene, false);
+  const JobRecord root = job.parent.empty() ? job : RequireJob(job.parent);
+  const std::vector<JobRecord> graph = GraphOf(root);
+  for (const JobRecord& member : graph) {
+    if (member.state == JobState::kRunning && member.cancel_requested) {
+      throw WrongState(member, "it is about to stop; retry when it is cancelled");
+    }
+  }
+  // In order of creation, so that inputs are reset before those that read them.
+  for (const JobRecord& member : graph) {
+    if (CanBeRetried(member)) ResetForRetry(member, from_scratch);
+  }
+  RecordRequest(request, name);
+  JobRecord result = RequireJob(name);
+  transaction.Commit();
+  return result;
+}
+
+void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (CheckRequest(request)) return;
+  const JobRecord root = RequireJob(name);
+  std::vector<int64_t> ids;
+  for (const JobRecord& job : GraphOf(root)) {
+    if (!IsFinished(job.state)) throw WrongState(job, "cancel it or wait for it before deleting");
+    ids.push_back(job.id);
+  }
+  const std::string list = JoinIds(ids);
+  SqliteStatement reader(
+      db_->handle(),
+      SelectJob("where end_ms=0 and job_id in (select job_id from job_dependency where input_id in "
+                "(" +
+                list + ")) limit 1"));
+  if (reader.Step()) {
+    throw WrongState(JobFromRow(reader), "it reads results of " + name + ", which must stay");
+  }
+  db_->Run(
+      "update scene set key_color_job='' where key_color_job in (select name from job where job_id "
+      "in (" +
+      list + "))");
+  db_->Run("delete from job where job_id in (" + list + ")");
+  RecordRequest(request, name);
+  transaction.Commit();
+}
+
+}  // namespace color3d

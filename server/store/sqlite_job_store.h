@@ -1,0 +1,138 @@
+// The job store in one SQLite file (WAL). One connection behind a mutex; open several stores on the
+// same file for more concurrency (threads or processes on one host).
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/store/job_store.h"
+
+namespace color3d {
+
+class SqliteDatabase;
+class SqliteStatement;
+
+struct StoreOptions {
+  int max_attempts = 3;
+  // First delay before a failed or lost attempt is tried again; doubles with each attempt.
+  int64_t retry_backoff_ms = 2'000;
+};
+
+class SqliteJobStore : public JobStore {
+ public:
+  // Creates the tables in a fresh file. Throws Error{kFailedPrecondition} for a file of a newer
+  // version.
+  SqliteJobStore(const std::filesystem::path& file, Clock clock, StoreOptions options = {});
+  ~SqliteJobStore() override;
+
+  SceneRecord CreateScene(const SceneRecord& record, const RequestKey& request) override;
+  SceneRecord GetScene(const std::string& name) override;
+  std::vector<SceneRecord> ListScenes(int64_t before_id, int limit) override;
+  SceneRecord ActivateScene(const std::string& name,
+                            StoredLayout layout,
+                            int photo_count,
+                            const RequestKey& request) override;
+  SceneRecord AcceptKeyColor(const std::string& name,
+                             const std::string& job,
+                             const RequestKey& request) override;
+  void DeleteScene(const std::string& name, const RequestKey& request) override;
+
+  JobRecord CreateGraph(const NewGraph& graph,
+                        const RequestKey& request,
+                        int64_t max_unfinished) override;
+  std::optional<std::string> FindRequest(const RequestKey& request) override;
+  JobRecord GetJob(const std::string& name) override;
+  std::vector<JobRecord> ListJobs(const JobFilter& filter, int64_t before_id, int limit) override;
+  std::vector<JobRecord> ListChildren(const std::string& name) override;
+  JobRecord Cancel(const std::string& name, const RequestKey& request) override;
+  JobRecord Retry(const std::string& name, bool from_scratch, const RequestKey& request) override;
+  void Delete(const std::string& name, const RequestKey& request) override;
+
+  std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
+  std::optional<JobRecord> ClaimCompanion(
+      const std::string& worker,
+      int64_t lease_ms,
+      const std::string& kind,
+      const std::function<bool(const JobRecord&)>& accept) override;
+  std::vector<JobRecord> GetInputs(int64_t job_id) override;
+  HeartbeatReply Heartbeat(const Lease& lease,
+                           const ProgressRecord& progress,
+                           const std::vector<std::string>& warnings,
+                           int64_t lease_ms) override;
+  HeartbeatReply Peek(const Lease& lease) override;
+  std::optional<FileDigest> SetCheckpoint(const Lease& lease, const FileDigest& blob) override;
+  void Publish(const Lease& lease, const Publication& publication) override;
+  void Fail(const Lease& lease, const JobError& error, const AttemptUsage& usage) override;
+  void Release(const Lease& lease, const AttemptUsage& usage) override;
+  std::optional<JobRecord> FindStage(const std::string& stage_key) override;
+
+  int ReapExpired() override;
+  std::vector<std::string> ExpireLeasesOf(const std::string& worker) override;
+  void UpdateWorker(const WorkerRecord& worker) override;
+  void RemoveWorker(const std::string& worker_id) override;
+  std::vector<WorkerRecord> ListWorkers() override;
+
+  int64_t NewestRevision() override;
+  std::vector<EventRecord> EventsSince(int64_t revision, int limit) override;
+  std::vector<EventRecord> EventsSince(int64_t revision,
+                                       const std::vector<int64_t>& job_ids,
+                                       int limit) override;
+  bool AllFinished(const std::vector<int64_t>& job_ids) override;
+  JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) override;
+  std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) override;
+
+  JobCounts CountJobs() override;
+  std::vector<ColorizerRecord> ListColorizers(const std::string& scene,
+                                              int64_t before_id,
+                                              int limit) override;
+  ColorizerRecord GetColorizer(const std::string& sha256) override;
+  void Compact(int64_t events_before_ms, int64_t requests_before_ms) override;
+  std::set<std::string> ReferencedBlobs() override;
+  bool IsReferenced(const std::string& sha256) override;
+  int64_t RunningEpoch(const std::string& job_name) override;
+
+ private:
+  // Reading (sqlite_job_store.cc). All private methods expect the mutex to be held.
+  void OpenSchema();
+  std::optional<JobRecord> FindJob(const std::string& name);
+  JobRecord RequireJob(const std::string& name);
+  JobRecord JobById(int64_t job_id);
+  std::vector<ArtifactRecord> LoadArtifacts(int64_t job_id);
+  std::vector<JobRecord> GraphOf(const JobRecord& root);
+  SceneRecord RequireScene(const std::string& name, bool with_files);
+
+  // Idempotency: the resource of an earlier equal request. Throws REQUEST_ID_REUSED.
+  std::optional<std::string> CheckRequest(const RequestKey& request);
+  void RecordRequest(const RequestKey& request, const std::string& resource);
+
+  // State machine (sqlite_job_state.cc).
+  void AddEvent(int64_t job_id, bool progress);
+  void SetState(int64_t job_id, JobState state);
+  JobRecord BeginAttempt(int64_t job_id, const std::string& worker, int64_t lease_ms);
+  void FinishAttempt(const Lease& lease, const char* outcome);
+  JobRecord RequireLease(const Lease& lease);
+  bool InputsAreReady(int64_t job_id);
+  void QueueReadyDependants(int64_t job_id);
+  void EndFailed(int64_t job_id, const JobError& error);
+  void EndCancelled(int64_t job_id);
+  void PropagateEnd(const JobRecord& cause);
+  void Requeue(const JobRecord& job, bool count_as_lost);
+  void InsertJob(const NewGraph& graph,
+                 size_t index,
+                 const std::vector<std::string>& names,
+                 std::vector<int64_t>* ids);
+  void ResetForRetry(const JobRecord& job, bool from_scratch);
+  void StoreUsage(int64_t job_id, const AttemptUsage& usage);
+  int64_t Now() const { return clock_(); }
+
+  std::mutex mutex_;
+  std::unique_ptr<SqliteDatabase> db_;
+  Clock clock_;
+  StoreOptions options_;
+};
+
+}  // namespace color3d

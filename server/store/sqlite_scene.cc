@@ -1,0 +1,200 @@
+// Scenes and colorizers of the SQLite store.
+#include "server/service_error.h"
+#include "server/store/sqlite_db.h"
+#include "server/store/sqlite_job_store.h"
+
+namespace color3d {
+namespace {
+
+SceneRecord SceneFromRow(const SqliteStatement& row) {
+  SceneRecord scene;
+  scene.id = row.Int(0);
+  scene.name = row.Text(1);
+  scene.display_name = row.Text(2);
+  scene.state = row.Int(3) != 0 ? SceneState::kActive : SceneState::kUploading;
+  scene.layout = static_cast<StoredLayout>(row.Int(4));
+  scene.photo_count = static_cast<int>(row.Int(5));
+  scene.create_ms = row.Int(6);
+  scene.commit_ms = row.Int(7);
+  scene.key_color_job = row.Text(8);
+  return scene;
+}
+
+constexpr char kSelectScene[] =
+    "select scene_id, name, display_name, active, layout, photo_count, create_ms, commit_ms, "
+    "key_color_job from scene ";
+
+}  // namespace
+
+SceneRecord SqliteJobStore::RequireScene(const std::string& name, bool with_files) {
+  SqliteStatement select(db_->handle(), std::string(kSelectScene) + "where name=?");
+  select.Bind(name);
+  if (!select.Step()) {
+    throw ServiceError(ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '" + name + "'");
+  }
+  SceneRecord scene = SceneFromRow(select);
+  if (!with_files) return scene;
+  SqliteStatement files(
+      db_->handle(),
+      "select path, sha256, size_bytes from scene_file where scene_id=? order by path");
+  files.Bind(scene.id);
+  while (files.Step()) {
+    scene.files.push_back({files.Text(0), {files.Text(1), files.Int(2)}});
+  }
+  return scene;
+}
+
+SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record, const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (const auto resource = CheckRequest(request)) return RequireScene(*resource, true);
+  SqliteStatement existing(db_->handle(), "select 1 from scene where name=?");
+  existing.Bind(record.name);
+  if (existing.Step()) {
+    throw ServiceError(ErrorCode::kAlreadyExists,
+                       "SCENE_EXISTS",
+                       "the scene '" + record.name + "' exists; choose another scene_id");
+  }
+  db_->Run("insert into scene(name, display_name, create_ms) values(?,?,?)",
+           record.name,
+           record.display_name,
+           Now());
+  const int64_t scene_id = db_->LastInsertId();
+  for (const SceneFileRecord& file : record.files) {
+    db_->Run("insert into scene_file values(?,?,?,?)",
+             scene_id,
+             file.path,
+             file.digest.sha256,
+             file.digest.size_bytes);
+  }
+  RecordRequest(request, record.name);
+  SceneRecord scene = RequireScene(record.name, true);
+  transaction.Commit();
+  return scene;
+}
+
+SceneRecord SqliteJobStore::GetScene(const std::string& name) {
+  std::lock_guard lock(mutex_);
+  return RequireScene(name, true);
+}
+
+std::vector<SceneRecord> SqliteJobStore::ListScenes(int64_t before_id, int limit) {
+  std::lock_guard lock(mutex_);
+  SqliteStatement select(
+      db_->handle(),
+      std::string(kSelectScene) + "where scene_id < ? order by scene_id desc limit ?");
+  select.Bind(before_id > 0 ? before_id : INT64_MAX, limit);
+  std::vector<SceneRecord> scenes;
+  while (select.Step()) scenes.push_back(SceneFromRow(select));
+  return scenes;
+}
+
+SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
+                                          StoredLayout layout,
+                                          int photo_count,
+                                          const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (const auto resource = CheckRequest(request)) return RequireScene(*resource, true);
+  RequireScene(name, false);
+  // Activating twice changes nothing: the scene is immutable.
+  db_->Run(
+      "update scene set active=1, layout=?, photo_count=?, commit_ms=? where name=? and "
+      "active=0",
+      static_cast<int>(layout),
+      photo_count,
+      Now(),
+      name);
+  RecordRequest(request, name);
+  SceneRecord scene = RequireScene(name, true);
+  transaction.Commit();
+  return scene;
+}
+
+SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
+                                           const std::string& job,
+                                           const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (const auto resource = CheckRequest(request)) return RequireScene(*resource, true);
+  RequireScene(name, false);
+  if (!job.empty()) {
+    const JobRecord record = RequireJob(job);
+    if (record.kind != "colorize_key_view" || record.scene != name) {
+      throw InvalidArgument(job + " is a " + record.kind + " job of " + record.scene +
+                            "; give a colorize_key_view job of " + name);
+    }
+    if (record.state != JobState::kSucceeded) {
+      throw ServiceError(ErrorCode::kFailedPrecondition,
+                         "WRONG_STATE",
+                         job + " is " + JobStateName(record.state) +
+                             "; only a key view that has been coloured can be accepted");
+    }
+  }
+  db_->Run("update scene set key_color_job=? where name=?", job, name);
+  RecordRequest(request, name);
+  SceneRecord scene = RequireScene(name, true);
+  transaction.Commit();
+  return scene;
+}
+
+void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& request) {
+  std::lock_guard lock(mutex_);
+  SqliteTransaction transaction(*db_);
+  if (CheckRequest(request)) return;
+  const SceneRecord scene = RequireScene(name, false);
+  SqliteStatement busy(db_->handle(), "select name from job where scene=? and end_ms=0 limit 1");
+  busy.Bind(name);
+  if (busy.Step()) {
+    throw ServiceError(
+        ErrorCode::kFailedPrecondition,
+        "SCENE_IN_USE",
+        busy.Text(0) + " of the scene '" + name + "' is not finished; cancel it or wait for it");
+  }
+  db_->Run("delete from scene where scene_id=?", scene.id);
+  RecordRequest(request, name);
+  transaction.Commit();
+}
+
+namespace {
+
+// Equal files made by several jobs (cached runs) are one colorizer: that of the oldest job.
+constexpr char kSelectColorizer[] =
+    "select min(j.job_id), j.name, j.scene, a.sha256, a.size_bytes, j.end_ms from artifact a "
+    "join job j on j.job_id=a.job_id where a.name='colorizer.c3c' and j.kind='personalize' and "
+    "j.state='SUCCEEDED' ";
+
+ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
+  return {row.Int(0), row.Text(1), row.Text(2), {row.Text(3), row.Int(4)}, row.Int(5)};
+}
+
+}  // namespace
+
+std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(const std::string& scene,
+                                                            int64_t before_id,
+                                                            int limit) {
+  std::lock_guard lock(mutex_);
+  SqliteStatement select(db_->handle(),
+                         std::string(kSelectColorizer) +
+                             "and (?1='' or j.scene=?1) group by a.sha256 having "
+                             "min(j.job_id) < ?2 order by min(j.job_id) desc limit ?3");
+  select.Bind(scene, before_id > 0 ? before_id : INT64_MAX, limit);
+  std::vector<ColorizerRecord> colorizers;
+  while (select.Step()) colorizers.push_back(ColorizerFromRow(select));
+  return colorizers;
+}
+
+ColorizerRecord SqliteJobStore::GetColorizer(const std::string& sha256) {
+  std::lock_guard lock(mutex_);
+  SqliteStatement select(db_->handle(),
+                         std::string(kSelectColorizer) + "and a.sha256=? group by a.sha256");
+  select.Bind(sha256);
+  if (!select.Step()) {
+    throw ServiceError(ErrorCode::kNotFound,
+                       "COLORIZER_NOT_FOUND",
+                       "there is no colorizer 'colorizers/" + sha256 + "'");
+  }
+  return ColorizerFromRow(select);
+}
+
+}  // namespace color3d

@@ -1,0 +1,235 @@
+// color3d-bench reconstruct: geometry alone, on true colours or on luminance; quality of held-out
+// views against seconds of training, and where the seconds go.
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/image/codec.h"
+#include "core/report/curves.h"
+#include "core/simd/instruction_set.h"
+#include "core/splat/geometry/geometry_trainer.h"
+#include "core/stage/stages.h"
+#include "server/planning/presets.h"
+#include "tests/bench/commands.h"
+#include "tests/bench/result_file.h"
+
+namespace color3d {
+namespace {
+
+struct ReconstructArguments {
+  std::string scene_folder;
+  std::string json_file;
+  std::string pictures_folder;
+  std::string strategy;
+  std::vector<std::string> settings;  // name=value of GeometryTuning
+  bool absolute_gradient = false;
+  bool sparse_adam = false;
+  std::string preset = "none";
+  int max_side_px = 500;
+  int threads = 2;
+  TrainingColours colours = TrainingColours::kSrgb;
+  GeometryOptions geometry;
+};
+
+// The geometry values of a preset of the service.
+void UsePreset(const std::string& name, ReconstructArguments& args) {
+  const PresetValues values = ValuesOf(name == "best"    ? v1::PRESET_BEST
+                                       : name == "paper" ? v1::PRESET_PAPER
+                                                         : v1::PRESET_FAST);
+  args.preset = name;
+  args.max_side_px = values.max_side_px;
+  args.geometry.iterations = values.geometry_iterations;
+  args.geometry.max_gaussians = values.max_gaussians;
+  args.geometry.sh_degree = values.sh_degree;
+  args.geometry.densify_gradient = values.densify_gradient;
+  if (values.geometry_recipe == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
+    args.geometry.recipe = GeometryOptions::Recipe::kPaper;
+  }
+}
+
+// "name=value", for measuring other schedules than the defaults.
+void Apply(const std::string& setting, GeometryTuning& t) {
+  const std::map<std::string, double*> fields{{"quarter_size_until", &t.quarter_size_until},
+                                              {"half_size_until", &t.half_size_until},
+                                              {"densify_from", &t.densify_from},
+                                              {"densify_until", &t.densify_until},
+                                              {"gradient_preference", &t.gradient_preference},
+                                              {"growth_until", &t.growth_until},
+                                              {"opacity_reset_every", &t.opacity_reset_every},
+                                              {"opacity_penalty", &t.opacity_penalty},
+                                              {"scale_penalty", &t.scale_penalty},
+                                              {"noise", &t.noise},
+                                              {"sh_from", &t.sh_from},
+                                              {"sh_step", &t.sh_step},
+                                              {"position_rate_first", &t.position_rate_first},
+                                              {"position_rate_last", &t.position_rate_last},
+                                              {"dc_rate", &t.dc_rate},
+                                              {"rest_divisor", &t.rest_divisor},
+                                              {"opacity_rate", &t.opacity_rate},
+                                              {"scale_rate", &t.scale_rate},
+                                              {"rotation_rate", &t.rotation_rate},
+                                              {"max_needle_ratio", &t.max_needle_ratio},
+                                              {"wanted_iterations", &t.wanted_iterations},
+                                              {"last_rate", &t.last_rate}};
+  const size_t equals = setting.find('=');
+  const std::string name = setting.substr(0, equals);
+  char* end = nullptr;
+  const double value =
+      equals == std::string::npos ? 0.0 : std::strtod(setting.c_str() + equals + 1, &end);
+  const bool number = end != nullptr && *end == '\0' && end != setting.c_str() + equals + 1;
+  if (number && name == "densify_rounds") {
+    t.densify_rounds = static_cast<int>(value);
+  } else if (number && name == "scheduled_cap") {
+    t.scheduled_cap = value != 0.0;
+  } else if (number && fields.count(name) != 0) {
+    *fields.at(name) = value;
+  } else {
+    throw InvalidArgument("--set " + setting + ": give name=value with a field of GeometryTuning");
+  }
+}
+
+GeometryTuning TuningFrom(const ReconstructArguments& args) {
+  GeometryTuning tuning = TuningOf(args.geometry);
+  if (args.strategy == "adaptive") tuning.strategy = GeometryTuning::Strategy::kAdaptive;
+  tuning.absolute_gradient = args.absolute_gradient;
+  tuning.sparse_adam = args.sparse_adam;
+  if (args.strategy == "relocate") tuning.strategy = GeometryTuning::Strategy::kRelocate;
+  for (const std::string& setting : args.settings) Apply(setting, tuning);
+  return tuning;
+}
+
+// The truth on the left, what was drawn on the right.
+Image SideBySide(const Image& left, const Image& right) {
+  Image both(left.width + right.width, left.height, left.channels);
+  for (int c = 0; c < both.channels; ++c) {
+    for (int y = 0; y < both.height; ++y) {
+      for (int x = 0; x < both.width; ++x) {
+        both.At(c, y, x) = x < left.width ? left.At(c, y, x) : right.At(c, y, x - left.width);
+      }
+    }
+  }
+  return both;
+}
+
+// 3 channels of sRGB, or L' 0..1 as grey of that lightness.
+Image Truth(const ViewImages& images, int view, TrainingColours colours) {
+  if (colours == TrainingColours::kSrgb) return images.Srgb(view);
+  Image luminance = *images.Luminance(view);
+  for (float& v : luminance.data) v *= 0.01f;
+  return luminance;
+}
+
+nlohmann::ordered_json ToJson(const ReconstructArguments& args, const TrainingTrace& trace) {
+  const double n = static_cast<double>(std::max<int64_t>(1, trace.iterations));
+  nlohmann::ordered_json result{
+      {"scene", args.scene_folder},
+      {"preset", args.preset},
+      {"max_side_px", args.max_side_px},
+      {"colours", args.colours == TrainingColours::kSrgb ? "truth" : "luminance"},
+      {"threads", args.threads},
+      {"instruction_set", std::string(ActiveInstructionSet())},
+      {"seconds", trace.seconds},
+      {"iterations", trace.iterations},
+      {"gaussians", trace.gaussians},
+      {"ms_per_iteration", 1000.0 * trace.seconds / n}};
+  for (int p = 0; p < kPhaseCount; ++p) {
+    if (static_cast<Phase>(p) == Phase::kEvaluation) continue;
+    result["ms_per_iteration_by_phase"][kPhaseNames[p]] = 1000.0 * trace.phases[p] / n;
+  }
+  for (const HeldOutPoint& p : trace.held_out) {
+    result["held_out"].push_back({{"seconds", p.seconds},
+                                  {"iteration", p.iteration},
+                                  {"gaussians", p.gaussians},
+                                  {"psnr_db", p.psnr_db},
+                                  {"ssim", p.ssim},
+                                  {"l1", p.l1}});
+  }
+  return result;
+}
+
+void RunReconstruct(ReconstructArguments args) {
+  NullObserver silent;
+  NoCheckpoints none;
+  CancellationToken cancel;
+  const ScratchFolder scratch;
+  ImportOptions import_options;
+  import_options.hold_out_every_eighth = true;
+  const ImportResult imported =
+      ImportScene(args.scene_folder, scratch.path(), import_options, silent, cancel);
+  const ViewImages images(imported.scene, args.scene_folder, args.max_side_px);
+  ThreadPool pool(args.threads);
+  CurveRecorder recorder("reconstruct_geometry", silent, none);
+  TrainingTrace trace;
+  if (!args.pictures_folder.empty()) {
+    std::filesystem::create_directories(args.pictures_folder);
+    trace.on_held_out_picture = [&](int view, const Image& drawn) {
+      WriteFileAtomic(
+          std::filesystem::path(args.pictures_folder) / (imported.scene.views[view].name + ".png"),
+          EncodePng8(SideBySide(Truth(images, view, args.colours), drawn)));
+    };
+  }
+  TrainGeometryTuned(imported.scene,
+                     images,
+                     args.geometry,
+                     TuningFrom(args),
+                     args.colours,
+                     pool,
+                     recorder,
+                     recorder,
+                     cancel,
+                     &trace);
+  nlohmann::ordered_json result = ToJson(args, trace);
+  for (const CurvePoint& p : recorder.points()) {
+    if (p.error_name == "restored_non_finite") result["restored_at"].push_back(p.iteration);
+  }
+  WriteResult(result, args.json_file);
+}
+
+}  // namespace
+
+void AddReconstructCommand(CLI::App& app) {
+  auto args = std::make_shared<ReconstructArguments>();
+  CLI::App* command = app.add_subcommand(
+      "reconstruct", "geometry of a posed scene: quality of every eighth view against seconds");
+  command->add_option("--scene", args->scene_folder)->required();
+  command->add_option("--max-side", args->max_side_px, "px");
+  command
+      ->add_option_function<std::string>(
+          "--preset",
+          [args](const std::string& name) { UsePreset(name, *args); },
+          "fast, best or paper; options that follow it override its values")
+      ->check(CLI::IsMember({"fast", "best", "paper"}))
+      ->trigger_on_parse();
+  command->add_option("--threads", args->threads);
+  command->add_option("--colours", args->colours, "truth (RGB, the default) or luminance")
+      ->transform(CLI::Transformer(std::map<std::string, TrainingColours>{
+          {"truth", TrainingColours::kSrgb}, {"luminance", TrainingColours::kLuminance}}));
+  CLI::Option* iterations = command->add_option("--iterations", args->geometry.iterations);
+  command
+      ->add_option("--seconds",
+                   args->geometry.time_limit_seconds,
+                   "of training; the schedule is planned to fit")
+      ->check(CLI::Range(0.0, 86'400.0));
+  command->add_option("--max-gaussians", args->geometry.max_gaussians);
+  command->add_option("--sh-degree", args->geometry.sh_degree);
+  command->add_option("--densify-gradient", args->geometry.densify_gradient, "NDC units");
+  command->add_option("--edge-weight", args->geometry.edge_weight);
+  command->add_option("--ssim-weight", args->geometry.ssim_weight);
+  command->add_option("--seed", args->geometry.seed);
+  command->add_option("--strategy", args->strategy, "adaptive or relocate (3DGS-MCMC)")
+      ->check(CLI::IsMember({"adaptive", "relocate"}));
+  command->add_flag("--absolute-gradient", args->absolute_gradient, "densify as AbsGS");
+  command->add_flag("--sparse-adam", args->sparse_adam, "step only what the picture shows");
+  command->add_option("--set", args->settings, "name=value of the schedule (GeometryTuning)");
+  command->add_option("--pictures", args->pictures_folder, "held-out views: truth, drawn");
+  command->add_option("--json", args->json_file, "default: standard output");
+  command->callback([args, iterations] {
+    if (args->geometry.time_limit_seconds > 0.0 && iterations->count() == 0) {
+      args->geometry.iterations = 100'000;  // the most: time alone drives the schedule
+    }
+    RunReconstruct(*args);
+  });
+}
+
+}  // namespace color3d

@@ -1,0 +1,97 @@
+// Fixture of the job store tests: a store in a scratch folder, a clock that the test moves, and one
+// active scene.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/files.h"
+#include "server/service_error.h"
+#include "server/store/sqlite_job_store.h"
+
+namespace color3d {
+
+inline constexpr int64_t kLease = 1000;
+inline constexpr int64_t kNoLimit = 1'000'000;
+
+class JobStoreTest : public ::testing::Test {
+ protected:
+  JobStoreTest() {
+    Open();
+    SceneRecord scene;
+    scene.name = "scenes/test";
+    scene.files = {{"a.jpg", {Sha256Hex("a"), 1}}};
+    store_->CreateScene(scene, {});
+    store_->ActivateScene("scenes/test", StoredLayout::kPhotos, 1, {});
+  }
+  void Open() {
+    StoreOptions options;
+    options.retry_backoff_ms = 100;
+    store_ = std::make_unique<SqliteJobStore>(
+        scratch_.path() / "jobs.db", [this] { return now_.load(); }, options);
+  }
+  static NewJob Job(const std::string& kind, std::vector<int> inputs = {}) {
+    NewJob job;
+    job.kind = kind;
+    job.spec = "spec of " + kind;
+    job.inputs = std::move(inputs);
+    return job;
+  }
+  // import -> {left, right} -> root
+  JobRecord CreateDiamond(const RequestKey& request = {}) {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    graph.jobs = {Job("import"), Job("left", {0}), Job("right", {0}), Job("root", {0, 1, 2})};
+    return store_->CreateGraph(graph, request, kNoLimit);
+  }
+  JobRecord CreateSingle() {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    graph.jobs = {Job("single")};
+    return store_->CreateGraph(graph, {}, kNoLimit);
+  }
+  JobRecord ClaimOne(const std::string& worker = "w") {
+    std::optional<JobRecord> job = store_->Claim(worker, kLease);
+    EXPECT_TRUE(job.has_value());
+    return job.value_or(JobRecord{});
+  }
+  static Lease LeaseOf(const JobRecord& job) { return {job.id, job.lease_epoch}; }
+  void Succeed(const JobRecord& job, const std::string& artifact = "result") {
+    Publication publication;
+    publication.artifacts = {{artifact, {Sha256Hex(artifact + job.kind), 3}, "text/plain"}};
+    store_->Publish(LeaseOf(job), publication);
+  }
+  void FailWith(const JobRecord& job, ErrorCode code) {
+    store_->Fail(LeaseOf(job), {code, "TEST", "it broke"}, {});
+  }
+  JobState StateOf(const std::string& name) { return store_->GetJob(name).state; }
+  JobRecord Child(const JobRecord& root, const std::string& kind) {
+    for (const JobRecord& child : store_->ListChildren(root.name)) {
+      if (child.kind == kind) return child;
+    }
+    ADD_FAILURE() << "no child " << kind;
+    return {};
+  }
+
+  ScratchFolder scratch_;
+  std::atomic<int64_t> now_{1'000'000};
+  std::unique_ptr<SqliteJobStore> store_;
+};
+
+template <typename Body>
+std::string ReasonThrown(const Body& body) {
+  try {
+    body();
+  } catch (const Error& e) {
+    return ReasonOf(e);
+  }
+  return "nothing";
+}
+
+}  // namespace color3d

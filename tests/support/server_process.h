@@ -1,0 +1,108 @@
+// One `color3d-server serve` with scripted workers, for the process tests. Dies with the test.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/support/rpc_support.h"
+
+namespace color3d::testing {
+
+inline void SleepMs(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
+
+// One `color3d-server serve` on a data folder.
+class ServerProcess {
+ public:
+  ServerProcess(const std::filesystem::path& folder,
+                std::vector<std::string> extra,
+                int workers = 1) {
+    const std::filesystem::path port_file = folder / "port";
+    std::filesystem::remove(port_file);
+    std::vector<std::string> arguments = {COLOR3D_SERVER,
+                                          "serve",
+                                          "--listen",
+                                          "127.0.0.1:0",
+                                          "--port-file",
+                                          port_file,
+                                          "--data-dir",
+                                          folder / "data",
+                                          "--worker-program",
+                                          COLOR3D_TEST_WORKER,
+                                          "--workers",
+                                          std::to_string(workers),
+                                          "--threads",
+                                          "1",
+                                          "--lease-seconds",
+                                          "1",
+                                          "--heartbeat-seconds",
+                                          "0.2",
+                                          "--checkpoint-seconds",
+                                          "0",
+                                          "--retry-backoff-ms",
+                                          "50",
+                                          "--worker-backoff-ms",
+                                          "100",
+                                          "--reserve-mib",
+                                          "0",
+                                          "--log-level",
+                                          "warn"};
+    arguments.insert(arguments.end(), extra.begin(), extra.end());
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::execv(COLOR3D_SERVER, argv.data());
+      ::_exit(127);
+    }
+    for (int i = 0; i < 200 && !std::filesystem::exists(port_file); ++i) SleepMs(50);
+    std::ifstream(port_file) >> address_;
+    client_ = std::make_unique<TestClient>(address_);
+  }
+  ~ServerProcess() {
+    if (pid_ != 0) Signal(SIGKILL), Wait();
+  }
+  TestClient& client() { return *client_; }
+  pid_t pid() const { return pid_; }
+  void Signal(int signal) { ::kill(pid_, signal); }
+  // Exit status, or 128 + signal.
+  int Wait() {
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    pid_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  v1::ServerInfo Info() {
+    v1::ServerInfo info;
+    grpc::ClientContext context;
+    client_->server->GetServerInfo(&context, {}, &info);
+    return info;
+  }
+  // Those for jobs; or the inference worker, if it runs.
+  std::vector<pid_t> Workers(bool inference = false) {
+    std::vector<pid_t> pids;
+    const v1::ServerInfo info = Info();
+    for (const v1::WorkerInfo& worker : info.workers()) {
+      if (worker.worker_id().starts_with("inference-") != inference) continue;
+      pids.push_back(static_cast<pid_t>(worker.pid()));
+    }
+    return pids;
+  }
+
+ private:
+  pid_t pid_ = 0;
+  std::string address_;
+  std::unique_ptr<TestClient> client_;
+};
+
+}  // namespace color3d::testing

@@ -1,0 +1,95 @@
+// What tests of stages share: a context on a scratch folder, and a tiny scene.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+
+#include "core/base/files.h"
+#include "core/image/codec.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+class Warnings : public NullObserver {
+ public:
+  void OnWarning(const std::string& message) override { text += message + "\n"; }
+  std::string text;
+};
+
+class StageTest : public ::testing::Test {
+ protected:
+  StageContext MakeContext() {
+    std::filesystem::create_directories(scratch_.path() / "out");
+    return StageContext({scratch_.path(),
+                         inputs_,
+                         scratch_.path() / "out",
+                         scratch_.path(),
+                         1,
+                         1,
+                         memory_bytes_,
+                         models_,
+                         remote_},
+                        *checkpoints_,
+                        observer_,
+                        cancel_);
+  }
+  void AddInput(const std::string& name, const std::string& bytes) {
+    const auto path = scratch_.path() / ("in" + std::to_string(inputs_.size()));
+    WriteFileAtomic(path, bytes);
+    inputs_[name] = path;
+  }
+
+  ScratchFolder scratch_;
+  std::map<std::string, std::filesystem::path> inputs_;
+  NoCheckpoints none_;
+  CheckpointStore* checkpoints_ = &none_;
+  Warnings observer_;
+  CancellationToken cancel_;
+  int64_t memory_bytes_ = 0;
+  std::map<std::string, std::filesystem::path> models_;
+  RemoteColorizerFactory remote_;
+};
+
+// Three photos of a ramp, with made-up poses, as an imported scene.
+inline Scene RampScene(const std::filesystem::path& folder, int width, int height) {
+  Scene scene;
+  for (int i = 0; i < 3; ++i) {
+    Image gray(width, height, 1);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        gray.At(0, y, x) = static_cast<float>(x + y + i) / (width + height + 3);
+      }
+    }
+    View view;
+    view.name = "p" + std::to_string(i) + ".png";
+    view.image_file = view.name;
+    view.camera = {width, height, 50.0, 50.0, width / 2.0, height / 2.0};
+    view.captured_camera = view.camera;
+    view.cam_from_world.translation = {0.1 * i, 0.0, 0.0};
+    view.held_out = i == 0;
+    WriteFileAtomic(folder / view.image_file, EncodePng8(gray));
+    scene.views.push_back(view);
+  }
+  return scene;
+}
+
+// A few Gaussians in front of RampScene's cameras.
+inline GaussianModel SmallModel() {
+  GaussianModel model;
+  model.channels = 3;
+  for (int i = 0; i < 9; ++i) {
+    model.position.insert(model.position.end(), {0.3f * (i % 3) - 0.3f, 0.2f * (i / 3), 2.0f});
+    model.log_scale.insert(model.log_scale.end(), {-1.5f, -1.5f, -1.5f});
+    model.rotation.insert(model.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
+    model.opacity_logit.push_back(1.0f);
+    model.sh_l.push_back(0.1f * i);
+    model.sh_a.push_back(0.1f * (i % 2));
+    model.sh_b.push_back(-0.1f * (i % 3));
+  }
+  return model;
+}
+
+}  // namespace color3d
