@@ -2,6 +2,8 @@
 // Thrown by value, caught by const reference; immutable, so safe to share between threads.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -28,6 +30,11 @@ enum class ErrorCode {
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  // The message as fmt::format puts it together.
+  template <typename First, typename... Rest>
+  Error(ErrorCode code, fmt::format_string<First, Rest...> message, First&& first, Rest&&... rest)
+      : Error(code, fmt::format(message, std::forward<First>(first), std::forward<Rest>(rest)...)) {
+  }
   ErrorCode code() const { return code_; }
 
  private:
@@ -66,6 +73,12 @@ inline const char* ErrorCodeName(ErrorCode code) {
 
 inline Error InvalidArgument(const std::string& message) {
   return Error(ErrorCode::kInvalidArgument, message);
+}
+// With the parts of the message put in as fmt does: numbers appear as people write them.
+template <typename First, typename... Rest>
+Error InvalidArgument(fmt::format_string<First, Rest...> message, First&& first, Rest&&... rest) {
+  return Error(ErrorCode::kInvalidArgument,
+               fmt::format(message, std::forward<First>(first), std::forward<Rest>(rest)...));
 }
 
 }  // namespace color3d
