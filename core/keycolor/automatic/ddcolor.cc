@@ -20,8 +20,6 @@ namespace color3d {
 namespace {
 
 constexpr int kNetworkSidePx = 512;
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -88,7 +86,7 @@ AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
   });
   const bool enlarges = luminance.width > coarse.width || luminance.height > coarse.height;
   AutomaticColor color;
-  color.ab = enlarges ? UpsampleGuided(coarse, luminance, kGuideRadius, kGuideVarianceFloor)
+  color.ab = enlarges ? UpsampleGuided(coarse, luminance)
                       : Resize(coarse, luminance.width, luminance.height);
   color.confidence = Image(luminance.width, luminance.height, 1, 1.0f);
   return color;
