@@ -10,8 +10,9 @@
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_archive.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 

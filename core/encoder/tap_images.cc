@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 
 namespace color3d {

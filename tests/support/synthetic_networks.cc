@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/base/random.h"
-#include "core/encoder/random_features.h"
+#include "tests/support/random_features.h"
 
 namespace color3d {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/color/lab.h"
 #include "core/encoder/clip/clip_network.h"
 #include "core/encoder/clip/clip_weights.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/weights/weight_file.h"
@@ -114,24 +114,21 @@ void ClipModel::LoadVocabulary(const std::filesystem::path& path) {
   tokenizer_ = ClipTokenizer::FromFile(path, network_->vocabulary_size());
 }
 
-std::shared_ptr<const ClipModel> ClipModel::FromWeightFile(const std::filesystem::path& path,
-                                                           const ClipOptions& options) {
+std::shared_ptr<const ClipModel> ClipModel::FromWeightFile(const std::filesystem::path& path) {
   WeightMap weights = ReadWeightFile(path);
   if (!HoldsClip(weights)) {
     throw InvalidArgument(path.string() + " holds no CLIP with a ViT (it has " +
                           std::to_string(weights.size()) +
                           " arrays, none called visual.class_embedding)");
   }
-  const bool quick_gelu = options.activation == ClipOptions::Activation::kFromConfig
-                              ? QuickGeluOf(path)
-                              : options.activation == ClipOptions::Activation::kQuickGelu;
-  const auto model = std::make_shared<ClipModel>(std::move(weights), quick_gelu);
-  std::filesystem::path vocabulary = options.vocabulary;
+  const auto model = std::make_shared<ClipModel>(std::move(weights), QuickGeluOf(path));
+  if (!model->network_->HasText()) return model;
   for (const char* name : kVocabularyNames) {
-    const std::filesystem::path beside = path.parent_path() / name;
-    if (vocabulary.empty() && std::filesystem::is_regular_file(beside)) vocabulary = beside;
+    const std::filesystem::path vocabulary = path.parent_path() / name;
+    if (!std::filesystem::is_regular_file(vocabulary)) continue;
+    model->LoadVocabulary(vocabulary);
+    break;
   }
-  if (!vocabulary.empty() && model->network_->HasText()) model->LoadVocabulary(vocabulary);
   return model;
 }
 

@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/encoder/convnext.h"
-#include "core/encoder/convnext_weights.h"
+#include "core/encoder/convnext/convnext.h"
+#include "core/encoder/convnext/convnext_weights.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/image/codec.h"

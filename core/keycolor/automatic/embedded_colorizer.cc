@@ -6,8 +6,9 @@
 #include <cmath>
 
 #include "core/base/error.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 #include "core/encoder/embedded/embedded_weights.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/encoder/weight_tensors.h"

@@ -1,13 +1,13 @@
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 
 #include <torch/types.h>
 
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/encoder/embedded/embedded_weights.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/encoder/weight_tensors.h"
@@ -55,23 +55,6 @@ std::string ConvNextConfig::ToString() const {
   text += " depths";
   for (int depth : depths) text += " " + std::to_string(depth);
   return text;
-}
-
-torch::Tensor TensorFromImage(const Image& image) {
-  torch::Tensor tensor =
-      torch::empty({1, image.channels, image.height, image.width}, torch::kFloat32);
-  std::memcpy(tensor.data_ptr<float>(), image.data.data(), image.data.size() * sizeof(float));
-  return tensor;
-}
-
-Image ImageFromTensor(const torch::Tensor& tensor) {
-  const torch::Tensor planar =
-      (tensor.dim() == 4 ? tensor[0] : tensor).to(torch::kFloat32).contiguous();
-  Image image(static_cast<int>(planar.size(2)),
-              static_cast<int>(planar.size(1)),
-              static_cast<int>(planar.size(0)));
-  std::memcpy(image.data.data(), planar.data_ptr<float>(), image.data.size() * sizeof(float));
-  return image;
 }
 
 ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description)

@@ -1,4 +1,4 @@
-#include "core/encoder/convnext_weights.h"
+#include "core/encoder/convnext/convnext_weights.h"
 
 #include <utility>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "core/encoder/random_features.h"
+#include "tests/support/random_features.h"
 
 #include <algorithm>
 #include <cmath>
