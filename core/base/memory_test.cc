@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(AvailableMemory, IsTheLeastOfWhatTheSystemAndTheGroupsLeave) {
+TEST(AvailableMemory, IsTheMinimumOfWhatTheSystemAndTheGroupsLeave) {
   const ScratchFolder root;
   const auto put = [&](const std::string& file, const std::string& text) {
     fs::create_directories((root.path() / file).parent_path());

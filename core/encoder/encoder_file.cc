@@ -25,10 +25,11 @@ std::shared_ptr<const Encoder> Encoder::FromWeightFile(const std::filesystem::pa
     weights.clear();
     return ClipModel::FromWeightFile(path);
   }
-  throw InvalidArgument(path.string() + " holds no known encoder (" +
-                        std::to_string(weights.size()) +
-                        " arrays): known are DDColor, ConvNeXt with its authors' names, and CLIP "
-                        "with a ViT");
+  throw InvalidArgument(
+      "{} holds no known encoder ({} arrays): known are DDColor, ConvNeXt with its authors' names, "
+      "and CLIP with a ViT",
+      path.string(),
+      weights.size());
 }
 
 }  // namespace color3d

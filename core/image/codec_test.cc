@@ -106,7 +106,7 @@ TEST(Codec, PngRoundTripsKeepPrecisionAndChannels) {
   EXPECT_EQ(DecodeImage(EncodePng8(Noise(5, 4, 4)), "a.png").channels, 3);
 }
 
-TEST(Codec, ColoursAreInTheRightOrder) {
+TEST(Codec, ColorsAreInTheRightOrder) {
   Image image(16, 16, 3);
   std::fill_n(image.Plane(0), 256, 0.9f);
   std::fill_n(image.Plane(1), 256, 0.5f);

@@ -53,8 +53,7 @@ void ReadHeader(const ProbeContext& context,
   info->bits_per_channel = static_cast<int>(depth);
   info->channels = ChannelsOfColorType(type);
   if (info->channels == 0 || !IsAllowedDepth(type, depth)) {
-    throw context.Damaged("colour type " + std::to_string(type) + " with " + std::to_string(depth) +
-                          " bits does not exist");
+    throw context.Damaged("colour type {} with {} bits does not exist", type, depth);
   }
 }
 
@@ -63,8 +62,7 @@ void CheckDataSize(const ProbeContext& context, const ImageInfo& info, int64_t d
   const int64_t pixels = static_cast<int64_t>(info.width) * info.height;
   const int64_t bits = pixels * info.bits_per_channel;  // of at least one channel
   if (data_bytes < bits / 8 / 1032) {
-    throw context.Truncated("it holds " + std::to_string(data_bytes) + " bytes of data for " +
-                            std::to_string(pixels) + " px");
+    throw context.Truncated("it holds {} bytes of data for {} px", data_bytes, pixels);
   }
 }
 
@@ -93,8 +91,7 @@ ImageInfo ProbePng(const ProbeContext& context) {
       throw context.Truncated("it ends inside a chunk");
     }
     if (Crc32(reader.Slice(at + 4, length + 4)) != reader.U32(at + 8 + length)) {
-      throw context.Damaged("the checksum of a chunk at byte " + std::to_string(at) +
-                            " does not match");
+      throw context.Damaged("the checksum of a chunk at byte {} does not match", at);
     }
     if (first) ReadHeader(context, reader, at + 8, length, &info);
     first = false;
