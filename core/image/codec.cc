@@ -85,7 +85,7 @@ Image SelectChannels(Image image, const ImageInfo& info, bool keep_alpha) {
   if (image.channels == color_channels + (alpha ? 1 : 0)) return image;
   Image out(image.width, image.height, color_channels + (alpha ? 1 : 0));
   const size_t n = image.PlaneSize();
-  std::copy_n(image.data.begin(), n * colours, out.data.begin());
+  std::copy_n(image.data.begin(), n * color_channels, out.data.begin());
   if (alpha) std::copy_n(image.Plane(3), n, out.Plane(color_channels));
   return out;
 }
