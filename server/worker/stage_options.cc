@@ -16,9 +16,8 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
 
 }  // namespace
 
-ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
+ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec) {
   ImportOptions options;
-  options.threads = threads;
   options.hold_out_every_eighth = spec.hold_out_every_eighth();
   if (spec.has_sfm_max_image_side_px())
     options.sfm_max_image_side_px = spec.sfm_max_image_side_px();

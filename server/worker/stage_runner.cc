@@ -174,7 +174,7 @@ class CoreStageRunner : public StageRunner {
                        StageContext& context) {
     switch (spec.stage_case()) {
       case JobSpec::kImportScene:
-        return RunImportScene(ImportOptionsFrom(spec.import_scene(), run.threads), context);
+        return RunImportScene(ImportOptionsFrom(spec.import_scene()), context);
       case JobSpec::kSelectKeyView:
         return RunSelectKeyView(SelectOptionsFrom(spec.select_key_view()), context);
       case JobSpec::kColorizeKeyView:

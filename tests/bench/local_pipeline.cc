@@ -51,7 +51,6 @@ void LocalPipeline::ImportScene() {
   Run("import_scene", [&](StageContext& context) {
     ImportOptions options;
     options.hold_out_every_eighth = true;
-    options.threads = threads_;
     RunImportScene(options, context);
   });
 }

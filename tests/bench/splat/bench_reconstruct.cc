@@ -155,10 +155,10 @@ void RunReconstruct(ReconstructArguments args) {
   const ScratchFolder scratch;
   ImportOptions import_options;
   import_options.hold_out_every_eighth = true;
-  const ImportResult imported =
-      ImportScene(args.scene_folder, scratch.path(), import_options, silent, cancel);
-  const ViewImages images(imported.scene, args.scene_folder, args.max_side_px);
   ThreadPool pool(args.threads);
+  const ImportResult imported =
+      ImportScene(args.scene_folder, scratch.path(), import_options, {pool, none, silent, cancel});
+  const ViewImages images(imported.scene, args.scene_folder, args.max_side_px);
   CurveRecorder recorder("reconstruct_geometry", silent, none);
   TrainingTrace trace;
   if (!args.pictures_folder.empty()) {
