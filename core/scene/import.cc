@@ -8,7 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/scene/formats/colmap_model.h"
-#include "core/scene/formats/transforms_json.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/lens.h"
 #include "core/scene/normalise.h"
 #include "core/scene/photos.h"
@@ -167,7 +167,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;
     result.scene =
-        LoadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
+        ReadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
     WarnOfUnposedPhotos(scene_folder, &result);
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);

@@ -67,15 +67,4 @@ ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const ImportOptions& options,
                          const RunControl& run);
 
-// Readers on their own. The returned views have `image_file` relative to `scene_folder`. `warnings`
-// (may be null) receives what is wrong with cameras whose intrinsics do not fit their observations.
-Scene ReadColmapModel(const std::filesystem::path& model_folder,
-                      const std::filesystem::path& scene_folder,
-                      std::vector<std::string>* warnings = nullptr);
-Scene ReadTransformsJson(const std::filesystem::path& json_file,
-                         const std::filesystem::path& scene_folder);
-// Writers for round trips and for users who want to look at the poses elsewhere.
-void WriteColmapText(const Scene& scene, const std::filesystem::path& model_folder);
-void WriteTransformsJson(const Scene& scene, const std::filesystem::path& json_file);
-
 }  // namespace color3d

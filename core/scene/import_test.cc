@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "tests/support/quiet_run.h"
+#include "tests/support/scene_writers.h"
 #include "tests/support/test_exif.h"
 #include "tests/support/test_scenes.h"
 

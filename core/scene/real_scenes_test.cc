@@ -8,6 +8,7 @@
 #include <map>
 
 #include "core/scene/formats/colmap_model.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "core/scene/lens.h"
 #include "core/scene/view_images.h"

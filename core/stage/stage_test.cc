@@ -10,6 +10,7 @@
 #include "core/stage/artifacts.h"
 #include "core/stage/key_color_sources.h"
 #include "core/stage/stages.h"
+#include "tests/support/scene_writers.h"
 #include "tests/support/stage_fixture.h"
 
 namespace color3d {

@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "tests/support/quiet_run.h"
 #include "tests/support/test_exif.h"

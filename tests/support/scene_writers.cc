@@ -1,3 +1,5 @@
+#include "tests/support/scene_writers.h"
+
 #include <fmt/core.h>
 
 #include <charconv>
@@ -7,7 +9,6 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/scene/import.h"
 #include "core/scene/lens.h"
 
 namespace color3d {
