@@ -77,9 +77,9 @@ AutomaticScore MeanScore(const std::vector<AutomaticScore>& scores) {
   const double n = static_cast<double>(scores.size());
   for (const AutomaticScore& score : scores) {
     mean.delta_e00 += score.delta_e00 / n;
-    mean.delta_e00_grey += score.delta_e00_grey / n;
-    mean.colourfulness += score.colourfulness / n;
-    mean.true_colourfulness += score.true_colourfulness / n;
+    mean.delta_e00_gray += score.delta_e00_gray / n;
+    mean.colorfulness += score.colorfulness / n;
+    mean.true_colorfulness += score.true_colorfulness / n;
   }
   return mean;
 }
