@@ -1,4 +1,5 @@
-// Scenes written in the formats that core/scene/formats reads, for round trips and made-up captures.
+// Scenes written in the formats that core/scene/formats reads, for round trips and made-up
+// captures.
 #pragma once
 
 #include <filesystem>
