@@ -1,3 +1,5 @@
+#include "core/encoder/encoder.h"
+
 #include <utility>
 
 #include "core/base/error.h"
@@ -5,11 +7,19 @@
 #include "core/encoder/clip/clip_weights.h"
 #include "core/encoder/convnext/convnext.h"
 #include "core/encoder/convnext/convnext_weights.h"
-#include "core/encoder/encoder.h"
+#include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/torch_errors.h"
 #include "core/weights/weight_file.h"
 
 namespace color3d {
+
+std::shared_ptr<const Encoder> Encoder::Embedded() {
+  // Built anew for each caller: unpacking 4 M weights takes some milliseconds, and nothing global
+  // outlives the caller.
+  const ConvNextConfig config;
+  return std::make_shared<const ConvNext>(
+      config, EmbeddedWeights("encoder."), "embedded ConvNeXt, " + config.ToString());
+}
 
 std::shared_ptr<const Encoder> Encoder::FromWeightFile(const std::filesystem::path& path) {
   WeightMap weights = ReadWeightFile(path);
