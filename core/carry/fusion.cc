@@ -21,11 +21,14 @@ constexpr double kMostStrange = 4.0;  // feature distance; beyond, all is equall
 void CheckSize(const char* what, const Image& image, int channels, const Image& luminance) {
   if (image.width != luminance.width || image.height != luminance.height ||
       image.channels != channels) {
-    throw InvalidArgument(std::string("fusion: the ") + what + " picture is " +
-                          std::to_string(image.width) + "x" + std::to_string(image.height) + "x" +
-                          std::to_string(image.channels) + ", wanted " +
-                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
-                          "x" + std::to_string(channels));
+    throw InvalidArgument("fusion: the {} picture is {}x{}x{}, wanted {}x{}x{}",
+                          what,
+                          image.width,
+                          image.height,
+                          image.channels,
+                          luminance.width,
+                          luminance.height,
+                          channels);
   }
 }
 

@@ -277,12 +277,12 @@ DepthMap SweepPlanes(const PosedLuminance& reference,
                      const CancellationToken& cancel) {
   options.Validate();
   if (sources.empty() || sources.size() > kMostSources) {
-    throw InvalidArgument("plane sweep compares a view with 1 to " + std::to_string(kMostSources) +
-                          " others, not " + std::to_string(sources.size()));
+    throw InvalidArgument(
+        "plane sweep compares a view with 1 to {} others, not {}", kMostSources, sources.size());
   }
   if (!(nearest > 0.0 && farthest > nearest && std::isfinite(farthest))) {
-    throw InvalidArgument("plane sweep between depths " + std::to_string(nearest) + " and " +
-                          std::to_string(farthest) + ": nothing lies between them");
+    throw InvalidArgument(
+        "plane sweep between depths {} and {}: nothing lies between them", nearest, farthest);
   }
   std::vector<double> depths(options.planes);
   for (int d = 0; d < options.planes; ++d) {

@@ -91,8 +91,8 @@ double MedianOf(const std::vector<FrameContent>& frames, Field field) {
 
 FrameContent MeasureFrameContent(const Image& luminance) {
   if (luminance.Empty() || luminance.channels != 1) {
-    throw InvalidArgument("a frame must be a picture of 1 channel, this one has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("a frame must be a picture of 1 channel, this one has {}",
+                          luminance.channels);
   }
   Image finite = luminance;
   for (float& value : finite.data) value = std::isfinite(value) ? value : 0.0f;

@@ -51,7 +51,6 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
-  ThreadPool pool(context.threads());
   const bool with_confidence = options.confidence && !model.confidence.empty();
   if (options.confidence && !with_confidence) {
     context.progress().OnWarning(
@@ -70,18 +69,24 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   RgbRefineOptions refine;
   refine.seed = context.seed();
   const auto refined = [&](RgbHarmonics start) {
-    return RefineRgbHarmonics(
-        model, std::move(start), views, refine, pool, context.progress(), context.cancel());
+    return RefineRgbHarmonics(model,
+                              std::move(start),
+                              views,
+                              refine,
+                              context.pool(),
+                              context.progress(),
+                              context.cancel());
   };
-  const RgbHarmonics fitted = FitRgbHarmonics(model, pool);
+  const RgbHarmonics fitted = FitRgbHarmonics(model, context.pool());
   nlohmann::ordered_json scores;
   if (options.ply) {
     const RgbRefinement rgb = refined(fitted);
     context.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
     context.progress().OnError(refine.epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
     scores["ply"] = ScoresOf(rgb, names);
-    context.WriteOutput(artifact::kPly,
-                        EncodeGaussianPly(model, rgb.harmonics, frame, pool, with_confidence));
+    context.WriteOutput(
+        artifact::kPly,
+        EncodeGaussianPly(model, rgb.harmonics, frame, context.pool(), with_confidence));
   }
   if (options.splat) {
     const RgbRefinement rgb = refined(DegreeZero(fitted));

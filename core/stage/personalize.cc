@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -7,8 +9,8 @@
 #include "core/keycolor/picture_checks.h"
 #include "core/scene/view_images.h"
 #include "core/stage/artifacts.h"
+#include "core/stage/formats/training_pictures.h"
 #include "core/stage/stages.h"
-#include "core/stage/training_pictures.h"
 
 namespace color3d {
 namespace {
@@ -28,10 +30,10 @@ Image KeyAb(const Image& luminance, StageContext& context) {
   Image ab = Resize(color.ab, luminance.width, luminance.height);
   const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, ab));
   if (chroma.IsGray()) {
-    context.progress().OnWarning("the coloured key view has hardly any colour (mean chroma " +
-                                 std::to_string(chroma.mean) +
-                                 " Lab units), so the scene will stay grey; colour it by another "
-                                 "means, e.g. hints or a picture");
+    context.progress().OnWarning(fmt::format(
+        "the coloured key view has hardly any colour (mean chroma {:.2f} Lab units), so "
+        "the scene will stay grey; colour it by another means, e.g. hints or a picture",
+        chroma.mean));
   }
   return ab;
 }

@@ -9,6 +9,7 @@
 
 #include "core/carry/carry.h"
 #include "core/carry/plane_sweep.h"
+#include "core/carry/view_color.h"
 #include "core/catalogue/stage_summary.h"
 #include "core/colorizer/colorizer.h"
 #include "core/keycolor/keycolor.h"
@@ -102,6 +103,9 @@ void RunPersonalize(const ColorizerOptions& options,
 // scene.json, colorizer.c3c (carried/*) -> views_ab/*.png and provenance/*.png for every view at
 // max_side_px (64..4096). `encoder`: the one that the colorizer was trained with.
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
+// Whom it asks for colours: the scene's colorizer, which must outlive the answer, and the embedded
+// automatic one.
+ColorSources SourcesOf(const Colorizer& colorizer);
 
 // scene.json -> geometry.c3g, trained at max_side_px (64..4096), and memory_plan.json: with little
 // memory the size and the number of Gaussians are smaller, and a warning says so.
