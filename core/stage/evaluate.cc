@@ -124,7 +124,7 @@ class HeldOutScores {
     if (bound_) {
       const Image lab = RenderView(*bound_, camera, view.cam_from_world, context_.pool()).lab;
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab);
-      scores["colorfulness_bound"] = Colourfulness(SrgbFromLab(lab));
+      scores["colorfulness_bound"] = Colorfulness(SrgbFromLab(lab));
     }
     const std::string provenance = ViewArtifact(artifact::kProvenance, view, ".png");
     if (context_.HasInput(provenance)) {

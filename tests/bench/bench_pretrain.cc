@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/weights/safetensors.h"
 #include "tests/bench/commands.h"

@@ -67,8 +67,8 @@ AutomaticScore ScoreAutomatic(const AutomaticColorizer& colorizer,
   return {photo.filename().string(),
           MeanDeltaE00(predicted, truth),
           MeanDeltaE00(grey, truth),
-          Colourfulness(srgb),
-          Colourfulness(true_srgb)};
+          Colorfulness(srgb),
+          Colorfulness(true_srgb)};
 }
 
 AutomaticScore MeanScore(const std::vector<AutomaticScore>& scores) {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/encoder/embedded/embedded_weights.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 #include "core/weights/weight_file.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/keyview/automatic_scores.h"
