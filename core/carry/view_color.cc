@@ -10,7 +10,7 @@ bool WantsGuess(const CarriedColor& carried, const Image& distance, const Fusion
   size_t strange = 0;
   for (size_t i = 0; i < distance.data.size(); ++i) {
     strange += distance.data[i] > options.guess_begins &&
-                       carried.confidence.data[i] <= options.least_confidence
+                       carried.confidence.data[i] <= options.min_confidence
                    ? 1
                    : 0;
   }

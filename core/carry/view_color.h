@@ -14,7 +14,7 @@ struct InferredColor {
   Image distance;  // 1 channel: how far from everything that was learnt from; may be empty
 };
 
-// Whoever can be asked for colours beside what was carried.
+// Where colours come from beside what was carried.
 struct ColorSources {
   // The personalized colorizer. `known`: 1 channel, 1 where the colour is known already.
   std::function<InferredColor(const Image& luminance, const Image& known)> infer;

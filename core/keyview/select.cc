@@ -182,7 +182,7 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
   options.Validate();
   CheckLengths(descriptors);
   if (!unfit.empty() && unfit.size() != descriptors.size()) {
-    throw InvalidArgument("frames were judged for {} views, descriptors are there for {}",
+    throw InvalidArgument("frames were examined for {} views, descriptors are there for {}",
                           unfit.size(),
                           descriptors.size());
   }

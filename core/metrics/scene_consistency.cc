@@ -9,9 +9,9 @@
 namespace color3d {
 namespace {
 
-constexpr int kMostPairs = 24;  // of each gap; with more views they are spread evenly
-constexpr int kStridePx = 3;    // some 20 000 matches a pair; the paper's protocol takes 5 000
-constexpr size_t kBatch = 8;    // pairs at once: bounds the pictures in memory
+constexpr int kMaxPairs = 24;  // of each gap; with more views they are spread evenly
+constexpr int kStridePx = 3;   // some 20 000 matches a pair; the paper's protocol takes 5 000
+constexpr size_t kBatch = 8;   // pairs at once: bounds the pictures in memory
 
 struct ViewPictures {
   PosedDepth geometry;
@@ -37,7 +37,7 @@ class Scorer {
   }
 
   SceneConsistency Score() {
-    const auto pairs = ConsistencyPairs(source_.views, kMostPairs);
+    const auto pairs = ConsistencyPairs(source_.views, kMaxPairs);
     with_truth_ = std::all_of(pairs.begin(), pairs.end(), [&](const ViewPair& pair) {
       return source_.has_truth(pair.first) && source_.has_truth(pair.second);
     });

@@ -4,9 +4,9 @@
 
 #include "core/base/range_check.h"
 #include "core/carry/carry_views.h"
-#include "core/carry/next_key_view.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/keyview/next_key_view.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/artifacts.h"

@@ -12,13 +12,13 @@
 namespace color3d {
 namespace {
 
-constexpr int kSidePx = 500;       // of the pictures that colours are refined on
-constexpr size_t kMostViews = 32;  // of them, spread evenly
+constexpr int kSidePx = 500;      // of the pictures that colours are refined on
+constexpr size_t kMaxViews = 32;  // of them, spread evenly
 
 std::vector<RgbView> ViewsToCompare(const Scene& scene, std::vector<std::string>* names) {
   std::vector<RgbView> views;
   const size_t count = scene.views.size();
-  const size_t wanted = std::min(count, kMostViews);
+  const size_t wanted = std::min(count, kMaxViews);
   for (size_t i = 0; i < wanted; ++i) {
     const View& view = scene.views[i * count / wanted];
     views.push_back({view.camera.FitWithin(kSidePx), view.cam_from_world, !view.held_out});

@@ -79,12 +79,12 @@ KeyPicture ReadKeyPicture(const Scene& scene,
   return picture;
 }
 
-// Asks the backend for the kinds that it claims; what it does not is left in `counts`.
-void AskBackend(const AugmentationOptions& options,
-                const Image& key_srgb,
-                StageContext& context,
-                std::map<Kind, int>* counts,
-                Outcome* outcome) {
+// Pictures of the kinds that the backend claims; those of the others stay in `counts`.
+void TakeFromBackend(const AugmentationOptions& options,
+                     const Image& key_srgb,
+                     StageContext& context,
+                     std::map<Kind, int>* counts,
+                     Outcome* outcome) {
   const auto remote = context.Remote(options.backend);
   const RemoteInfo info = remote->GetInfo(context.progress(), context.cancel());
   bool asked = false;
@@ -235,7 +235,7 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
   if (!options.backend.empty() && !counts.empty()) {
     const int side = std::max(options.max_side_px, kRemoteSidePx);
     const Image key_srgb = SrgbFromLab(KeyLab(scene, key_index, side, context));
-    AskBackend(options, key_srgb, context, &counts, &outcome);
+    TakeFromBackend(options, key_srgb, context, &counts, &outcome);
   }
   if (!counts.empty()) {
     const Surrogates surrogates(

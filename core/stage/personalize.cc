@@ -39,9 +39,9 @@ Image KeyAb(const Image& luminance, StageContext& context) {
 }
 
 // Views that carried colours are learnt from: the best covered ones that are not the key view.
-constexpr int kMostCarriedViews = 12;
-constexpr double kLeastCoverage = 0.05;
-constexpr float kLeastConfidence = 0.3f;
+constexpr int kMaxCarriedViews = 12;
+constexpr double kMinCoverage = 0.05;
+constexpr float kMinConfidence = 0.3f;
 constexpr double kCarriedShare = 0.5;  // of the samples
 
 std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
@@ -55,10 +55,10 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
     const auto luminance = images.Luminance(view);
     CarriedColor carried =
         ReadCarried(context, scene.views[view], luminance->width, luminance->height);
-    const double coverage = Coverage(carried, kLeastConfidence);
-    if (coverage < kLeastCoverage) continue;
+    const double coverage = Coverage(carried, kMinConfidence);
+    if (coverage < kMinCoverage) continue;
     for (float& value : carried.confidence.data) {
-      if (value < kLeastConfidence) value = 0.0f;
+      if (value < kMinConfidence) value = 0.0f;
     }
     found.push_back({-coverage,
                      {scene.views[view].name,
@@ -68,7 +68,7 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
   }
   std::stable_sort(
       found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
-  if (found.size() > kMostCarriedViews) found.resize(kMostCarriedViews);
+  if (found.size() > kMaxCarriedViews) found.resize(kMaxCarriedViews);
   std::vector<TrainingPicture> pictures;
   for (auto& [coverage, picture] : found) {
     picture.share = kCarriedShare / (1.0 - kCarriedShare) / static_cast<double>(found.size());

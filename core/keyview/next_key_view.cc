@@ -1,4 +1,4 @@
-#include "core/carry/next_key_view.h"
+#include "core/keyview/next_key_view.h"
 
 #include <algorithm>
 
