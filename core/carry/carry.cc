@@ -147,10 +147,12 @@ void CheckSizes(const SurfaceView& view, const char* which) {
   for (const Image* image : {&view.luminance, &view.depth}) {
     if (image->channels != 1 || image->width != view.camera.width ||
         image->height != view.camera.height) {
-      throw InvalidArgument(std::string("the ") + which + " view's camera is " +
-                            std::to_string(view.camera.width) + "x" +
-                            std::to_string(view.camera.height) + " px, a picture of it " +
-                            std::to_string(image->width) + "x" + std::to_string(image->height));
+      throw InvalidArgument("the {} view's camera is {}x{} px, a picture of it {}x{}",
+                            which,
+                            view.camera.width,
+                            view.camera.height,
+                            image->width,
+                            image->height);
     }
   }
 }

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/parallel.h"
+
 namespace color3d {
 
 enum class KeyViewStrategy { kEntropy, kCoverage, kTracks, kManual };
@@ -48,7 +50,8 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
 // with views^2: 32 MB for 2000.
 std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& descriptors,
                                      const std::vector<bool>& kept,
-                                     const KeyViewOptions& options);
+                                     const KeyViewOptions& options,
+                                     ThreadPool& pool);
 
 struct KeyViewSelection {
   int index = 0;
