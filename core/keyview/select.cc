@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/base/range_check.h"
 #include "core/base/parallel.h"
 #include "core/keyview/median.h"
 
@@ -164,9 +165,7 @@ void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
 }  // namespace
 
 void KeyViewOptions::Validate() const {
-  if (temperature > 0.0 && std::isfinite(temperature)) return;
-  throw InvalidArgument("key view option temperature is " + std::to_string(temperature) +
-                        ", it must be > 0");
+  RangeCheck("key view option")("temperature", temperature, 1e-6, 1e6);
 }
 
 std::vector<bool> GuardedViews::Kept() const {

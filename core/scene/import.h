@@ -30,6 +30,7 @@ struct ImportOptions {
   std::chrono::seconds sfm_timeout{3600};
   int threads = 0;        // 0: all
   void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const ImportOptions&) const = default;
 };
 
 // What structure-from-motion did.

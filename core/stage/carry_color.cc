@@ -41,7 +41,7 @@ class SurfaceMaker {
         options_(options),
         cancel_(context.cancel()),
         images_(scene, context.scene_folder(), options.max_side_px),
-        small_(scene, context.scene_folder(), options.sweep_side_px),
+        small_(scene, context.scene_folder(), options.depth_side_px),
         training_(scene.TrainingViews()),
         tracked_(scene.views.size()) {
     for (const SparsePoint& point : scene.points) {
@@ -70,7 +70,7 @@ class SurfaceMaker {
  private:
   std::optional<SurfaceView> Sweep(int view, const SurfaceView& rendered) const {
     const StereoPlan plan =
-        PlanStereo(scene_, view, SurfaceOf(view, rendered), training_, options_.sweep_sources);
+        PlanStereo(scene_, view, SurfaceOf(view, rendered), training_, options_.depth_sources);
     if (plan.sources.empty()) return std::nullopt;
     std::vector<std::shared_ptr<const Image>> pictures;  // keeps them alive
     const auto posed = [&](int index) {
@@ -230,8 +230,8 @@ void Conclude(const Scene& scene,
 void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
   const RangeCheck check("carry_color option");
-  check("sweep_side_px", sweep_side_px, 64, 2048);
-  check("sweep_sources", sweep_sources, 1, 16);
+  check("depth_side_px", depth_side_px, 64, 2048);
+  check("depth_sources", depth_sources, 1, 16);
   if (further.size() > 16) {
     throw InvalidArgument(std::to_string(further.size()) +
                           " further key views were given; at most 16 are taken");

@@ -53,6 +53,7 @@ struct ColorizeKeyViewOptions {
   std::string prompt;                             // prompt; backend, may be empty
   std::string name;  // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
+  bool operator==(const ColorizeKeyViewOptions&) const = default;
 };
 // scene.json, key_view.json -> key_color.png, key_view_coloured.png, key_color.json.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
@@ -62,16 +63,18 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
 struct FurtherKeyView {
   std::string view;  // name or unique file stem
   ColorizeKeyViewOptions color;
+  bool operator==(const FurtherKeyView&) const = default;
 };
 
 struct CarryColorOptions {
   int max_side_px = 500;    // of the carried maps, 64..4096
-  int sweep_side_px = 300;  // at which depth is measured, 64..2048
-  int sweep_sources = 4;    // views that each view is compared with, 1..16
+  int depth_side_px = 300;  // at which depth is measured, 64..2048
+  int depth_sources = 4;    // views that each view is compared with, 1..16
   PlaneSweepOptions sweep;
   CarryOptions carry;
   std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
   void Validate() const;
+  bool operator==(const CarryColorOptions&) const = default;
 };
 // scene.json, key_view.json, key_color.png, geometry.c3g -> carried/*.png for every view,
 // carry.json (coverage of each, and the view that would add most).
@@ -85,6 +88,7 @@ struct AugmentationOptions {
   std::string backend;    // a generator by name; empty: the embedded surrogates
   int max_side_px = 400;  // of the pictures, 64..4096
   void Validate() const;
+  bool operator==(const AugmentationOptions&) const = default;
 };
 // scene.json, key_view.json, key_color.png (geometry.c3g for novel views, carry.json) and the
 // files below augment/ of the scene's folder -> augmentations.json, augmentations/*,
@@ -115,6 +119,7 @@ struct ExportOptions {
   // PLY with a property "confidence", which strict viewers may refuse; needs a model that has it.
   bool confidence = false;
   void Validate() const;
+  bool operator==(const ExportOptions&) const = default;
 };
 // scene.json, model.c3g -> scene.ply, scene.splat, export.json (what RGB loses against our
 // renders).
@@ -125,6 +130,7 @@ struct RenderOptions {
   int max_views = 12;              // 1..1000, for the empty list
   int max_side_px = 500;           // 64..4096
   void Validate() const;
+  bool operator==(const RenderOptions&) const = default;
 };
 // scene.json, model.c3g -> renders/*.png.
 void RunRender(const RenderOptions& options, StageContext& context);

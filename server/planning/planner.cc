@@ -3,10 +3,12 @@
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "proto/option_text.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
@@ -74,10 +76,13 @@ bool CreatesPrerequisites(const std::string& kind) {
   return kind == "select_key_view" || kind == "reconstruct_geometry" || kind == "colorize_key_view";
 }
 
-// Writes a stage's share of the time budget into its options, unless they say otherwise.
+// Writes a stage's share of the time budget, as far as its limit goes, into its options, unless
+// they say otherwise.
 void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec) {
   const auto limit = [](auto* options, double seconds) {
-    if (!options->has_time_limit_seconds()) options->set_time_limit_seconds(seconds);
+    if (options->has_time_limit_seconds()) return;
+    const auto* field = options->GetDescriptor()->FindFieldByName("time_limit_seconds");
+    options->set_time_limit_seconds(std::min(seconds, InfoOf(field).max()));
   };
   if (spec->has_personalize()) {
     limit(spec->mutable_personalize(), budget.personalize_seconds);
@@ -88,57 +93,12 @@ void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec) {
   }
 }
 
-// Writes the preset's values into the unset fields of a stage's options.
-void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec) {
-  if (spec->has_select_key_view()) {
-    auto* s = spec->mutable_select_key_view();
-    if (s->strategy() == v1::SelectKeyViewSpec::STRATEGY_UNSPECIFIED) {
-      s->set_strategy(preset.strategy);
-    }
-  } else if (spec->has_generate_augmentations()) {
-    auto* s = spec->mutable_generate_augmentations();
-    if (!s->has_samples()) s->set_samples(preset.augmentation_samples);
-  } else if (spec->has_personalize()) {
-    auto* s = spec->mutable_personalize();
-    if (s->recipe() == v1::PersonalizeSpec::RECIPE_UNSPECIFIED) s->set_recipe(preset.recipe);
-    if (!s->has_iterations()) s->set_iterations(preset.personalize_iterations);
-    if (!s->has_least_improvement()) s->set_least_improvement(preset.least_improvement);
-  } else if (spec->has_colorize_views()) {
-    auto* s = spec->mutable_colorize_views();
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-  } else if (spec->has_carry_color()) {
-    auto* s = spec->mutable_carry_color();
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-  } else if (spec->has_reconstruct_geometry()) {
-    auto* s = spec->mutable_reconstruct_geometry();
-    if (!s->has_iterations()) s->set_iterations(preset.geometry_iterations);
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-    if (!s->has_max_gaussians()) s->set_max_gaussians(preset.max_gaussians);
-    if (!s->has_sh_degree()) s->set_sh_degree(preset.sh_degree);
-    if (!s->has_densify_gradient()) s->set_densify_gradient(preset.densify_gradient);
-    if (s->recipe() == v1::ReconstructGeometrySpec::RECIPE_UNSPECIFIED) {
-      s->set_recipe(preset.geometry_recipe);
-    }
-  } else if (spec->has_solve_chroma()) {
-    auto* s = spec->mutable_solve_chroma();
-    if (!s->has_iterations()) s->set_iterations(preset.chroma_iterations);
-    if (s->solver() == v1::SolveChromaSpec::SOLVER_UNSPECIFIED) {
-      s->set_solver(preset.chroma_solver);
-    }
-  } else if (spec->has_render()) {
-    auto* s = spec->mutable_render();
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-  }
-}
-
-// Why a ColorizeScene graph carries no colour; empty when it does.
-std::string WhyNothingIsCarried(const v1::ColorizeSceneSpec& options) {
-  const v1::CarryColorSpec& carry = options.carry_color();
-  if (carry.has_skip()) return carry.skip() ? "carry_color.skip is set" : "";
-  if (options.preset() == v1::PRESET_PAPER && carry.further_key_views().empty()) {
-    return "the paper's recipe carries no colour through geometry";
-  }
-  return "";
+// Why a ColorizeScene graph carries no colour; empty when it does. `scene`: `given` over its preset.
+std::string WhyNothingIsCarried(const v1::ColorizeSceneSpec& given,
+                                const v1::ColorizeSceneSpec& scene) {
+  if (!scene.carry_color().skip()) return "";
+  return given.carry_color().has_skip() ? "carry_color.skip is set"
+                                        : "the preset carries no colour through geometry";
 }
 
 class GraphBuilder {
@@ -160,8 +120,8 @@ class GraphBuilder {
   // Adds the jobs whose results `kind` reads when they are there.
   void AddWelcome(const std::string& kind, NewJob* job) const;
   // Why a whole scene needs no generated pictures; empty when it does.
-  std::string WhyNoAugmentations(const v1::ColorizeSceneSpec& options) const;
-  void AddSceneStages(const v1::ColorizeSceneSpec& options);
+  std::string WhyNoAugmentations() const;
+  void AddSceneStages();
   // What a colorize_scene job may be given, and that its options do not ask for something else.
   void CheckGiven(const v1::ColorizeSceneSpec& options) const;
   // A colorize_views job that names no encoder works with that of the given personalize job.
@@ -169,8 +129,7 @@ class GraphBuilder {
 
   const v1::JobSpec& submitted_;
   std::string submitted_kind_;
-  PresetValues preset_;
-  int max_side_px_ = 0;
+  const v1::ColorizeSceneSpec scene_;  // what was submitted, over its preset
   int augment_files_ = 0;
   std::optional<TimeBudget> time_budget_;
   std::map<std::string, JobRecord> given_;  // by kind
@@ -181,13 +140,11 @@ class GraphBuilder {
 GraphBuilder::GraphBuilder(const v1::JobSpec& submitted,
                            const std::vector<JobRecord>& inputs,
                            const SceneFacts& facts)
-    : submitted_(submitted), submitted_kind_(KindOf(submitted)) {
-  preset_ = ValuesOf(submitted.colorize_scene().preset());
-  max_side_px_ = submitted.colorize_scene().has_max_side_px()
-                     ? submitted.colorize_scene().max_side_px()
-                     : preset_.max_side_px;
-  if (submitted.colorize_scene().time_budget_seconds() > 0.0) {
-    time_budget_ = DivideTimeBudget(submitted.colorize_scene().time_budget_seconds(), facts);
+    : submitted_(submitted),
+      submitted_kind_(KindOf(submitted)),
+      scene_(WithPreset(submitted.colorize_scene())) {
+  if (scene_.time_budget_seconds() > 0.0) {
+    time_budget_ = DivideTimeBudget(scene_.time_budget_seconds(), facts);
   }
   augment_files_ = facts.augment_files;
   graph_.scene = submitted.scene();
@@ -261,18 +218,16 @@ void GraphBuilder::AddWelcome(const std::string& kind, NewJob* job) const {
   }
 }
 
-std::string GraphBuilder::WhyNoAugmentations(const v1::ColorizeSceneSpec& options) const {
-  const auto& spec = options.generate_augmentations();
+std::string GraphBuilder::WhyNoAugmentations() const {
   if (augment_files_ > 0) return "";
-  if (options.has_generate_augmentations()) {
-    // Whoever writes options wants the stage, unless they say 0.
-    return spec.has_samples() && spec.samples() == 0
-               ? "no samples are asked for and augment/ holds no files"
-               : "";
+  if (!scene_.has_generate_augmentations()) {
+    return "the preset learns from the key view alone, and augment/ holds no files";
   }
-  return preset_.augmentation_samples > 0
-             ? ""
-             : "the preset learns from the key view alone, and augment/ holds no files";
+  // Whoever writes options wants the stage, unless they say 0.
+  const auto& spec = scene_.generate_augmentations();
+  return spec.has_samples() && spec.samples() == 0
+             ? "no samples are asked for and augment/ holds no files"
+             : "";
 }
 
 void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
@@ -282,7 +237,7 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   job.skip_reason = skip_reason;
   for (const Need& need : NeedsOf(job.kind)) Provide(need, job.kind, &job);
   AddWelcome(job.kind, &job);
-  ApplyPreset(preset_, max_side_px_, &spec);
+  FillStage(scene_, &spec);
   if (time_budget_) ApplyTimeBudget(*time_budget_, &spec);
   job.spec = Serialize(spec);
   for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
@@ -316,52 +271,54 @@ NewGraph GraphBuilder::BuildStage() {
   return std::move(graph_);
 }
 
-void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
+void GraphBuilder::AddSceneStages() {
   v1::JobSpec spec = Common();
-  *spec.mutable_import_scene() = options.import_scene();
+  spec.mutable_import_scene();
   Add(spec);
 
   spec = Common();
-  *spec.mutable_select_key_view() = options.select_key_view();
-  if (!options.key_view().empty()) {
+  spec.mutable_select_key_view();
+  if (!scene_.key_view().empty()) {
     spec.mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
-    spec.mutable_select_key_view()->set_view(options.key_view());
+    spec.mutable_select_key_view()->set_view(scene_.key_view());
   }
   Add(spec);
 
   spec = Common();
-  *spec.mutable_colorize_key_view() = options.colorize_key_view();
-  if (options.has_key_color()) {
-    *spec.mutable_colorize_key_view()->mutable_source() = options.key_color();
+  spec.mutable_colorize_key_view();
+  if (scene_.has_key_color()) {
+    *spec.mutable_colorize_key_view()->mutable_source() = scene_.key_color();
   }
   Add(spec);
 
   spec = Common();
-  *spec.mutable_reconstruct_geometry() = options.reconstruct_geometry();
+  spec.mutable_reconstruct_geometry();
   Add(spec);
 
   spec = Common();
-  *spec.mutable_carry_color() = options.carry_color();
-  Add(spec, WhyNothingIsCarried(options));
+  spec.mutable_carry_color();
+  Add(spec, WhyNothingIsCarried(submitted_.colorize_scene(), scene_));
 
   spec = Common();
-  *spec.mutable_generate_augmentations() = options.generate_augmentations();
-  if (options.has_generate_augmentations() && !options.generate_augmentations().has_samples()) {
-    spec.mutable_generate_augmentations()->set_samples(kDefaultSamples);
+  auto* augmentations = spec.mutable_generate_augmentations();
+  if (!scene_.has_generate_augmentations()) {
+    augmentations->set_samples(0);  // the user's own files at most
+  } else if (!scene_.generate_augmentations().has_samples()) {
+    augmentations->set_samples(kDefaultSamples);
   }
-  Add(spec, WhyNoAugmentations(options));
+  Add(spec, WhyNoAugmentations());
 
   spec = Common();
-  *spec.mutable_personalize() = options.personalize();
+  spec.mutable_personalize();
   Add(spec);
 
   spec = Common();
   // The colorizer runs on the encoder that it was trained with.
-  spec.mutable_colorize_views()->set_encoder(options.personalize().encoder());
+  spec.mutable_colorize_views()->set_encoder(scene_.personalize().encoder());
   Add(spec);
 
   spec = Common();
-  *spec.mutable_solve_chroma() = options.solve_chroma();
+  spec.mutable_solve_chroma();
   Add(spec);
 
   spec = Common();
@@ -369,12 +326,12 @@ void GraphBuilder::AddSceneStages(const v1::ColorizeSceneSpec& options) {
   Add(spec);
 
   spec = Common();
-  *spec.mutable_render() = options.render();
+  spec.mutable_render();
   Add(spec);
 
   spec = Common();
-  *spec.mutable_evaluate()->mutable_truth() = options.truth();
-  *spec.mutable_evaluate()->mutable_training_truth() = options.training_truth();
+  *spec.mutable_evaluate()->mutable_truth() = scene_.truth();
+  *spec.mutable_evaluate()->mutable_training_truth() = scene_.training_truth();
   Add(spec);
 }
 
@@ -424,7 +381,7 @@ void GraphBuilder::CheckGiven(const v1::ColorizeSceneSpec& options) const {
 
 NewGraph GraphBuilder::BuildColorizeScene() {
   if (submitted_.inputs_size() > 0) CheckGiven(submitted_.colorize_scene());
-  AddSceneStages(submitted_.colorize_scene());
+  AddSceneStages();
   NewJob root;
   root.kind = "colorize_scene";
   v1::JobSpec spec = submitted_;

@@ -4,6 +4,7 @@
 
 #include "core/base/memory.h"
 #include "server/ops/process.h"
+#include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/utf8.h"
@@ -23,6 +24,14 @@ void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
     } catch (const Error& e) {
       model->set_problem(CleanUtf8(e.what()));
     }
+  }
+}
+
+void ListPresets(v1::ServerInfo* info) {
+  for (const Preset& preset : Presets()) {
+    v1::PresetInfo* entry = info->add_presets();
+    entry->set_name(preset.name);
+    *entry->mutable_options() = preset.options;
   }
 }
 
@@ -104,6 +113,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
       entry->set_memory_bytes(worker.memory_bytes);
       entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
     }
+    ListPresets(out);
     ListModels(parts_, out);
     ListBackends(parts_, out);
     out->set_draining(parts_.draining.load());
