@@ -20,8 +20,8 @@ class SceneBatch;
 // The defaults are those of the service's preset "fast".
 struct ColorizerOptions {
   enum class Recipe {
-    kColor3d,   // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
-    kPaper,  // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
+    kColor3d,  // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
+    kPaper,    // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
   };
   // Of matrix products and convolutions while training; the rest is float32 always.
   enum class Precision {

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "core/base/error.h"
-#include "core/base/range_check.h"
 #include "core/base/parallel.h"
+#include "core/base/range_check.h"
 #include "core/keyview/median.h"
 
 namespace color3d {

@@ -71,7 +71,8 @@ TEST(KeyColorSpec, WhatASourceLacksIsNamedWithTheRemedy) {
   EXPECT_THAT(CheckMessage([](auto* s) { s->set_automatic(false); }), HasSubstr("set it to true"));
   EXPECT_THAT(CheckMessage([](auto* s) { s->set_backend(""); }), HasSubstr("name a backend"));
   EXPECT_THAT(CheckMessage([](auto* s) { s->set_script(""); }), HasSubstr("name a model"));
-  EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_references(); }), HasSubstr("references.images is empty"));
+  EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_references(); }),
+              HasSubstr("references.images is empty"));
   EXPECT_THAT(CheckMessage([](auto* s) {
                 for (int i = 0; i < 17; ++i) {
                   *s->mutable_references()->add_images() = SomeDigest(std::to_string(i));

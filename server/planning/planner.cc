@@ -93,7 +93,8 @@ void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec) {
   }
 }
 
-// Why a ColorizeScene graph carries no colour; empty when it does. `scene`: `given` over its preset.
+// Why a ColorizeScene graph carries no colour; empty when it does. `scene`: `given` over its
+// preset.
 std::string WhyNothingIsCarried(const v1::ColorizeSceneSpec& given,
                                 const v1::ColorizeSceneSpec& scene) {
   if (!scene.carry_color().skip()) return "";

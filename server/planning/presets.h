@@ -22,8 +22,8 @@ const std::vector<Preset>& Presets();
 const v1::ColorizeSceneSpec& OptionsOf(v1::Preset preset);
 
 // What was given, over its preset; stages without a size of their own take the scene's. Whatever
-// has a value in `given` keeps it, but for enums that are set to "unspecified"; lists and sources of
-// colour are taken whole.
+// has a value in `given` keeps it, but for enums that are set to "unspecified"; lists and sources
+// of colour are taken whole.
 v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given);
 
 // The same for the options of one stage: `spec`'s, over those that `scene` (as WithPreset returns

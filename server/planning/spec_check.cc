@@ -76,8 +76,7 @@ void CheckRepeated(const Message& message, const FieldDescriptor* field, const s
   }
   if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return;
   for (int i = 0; i < count; ++i) {
-    CheckMessage(reflection->GetRepeatedMessage(message, field, i),
-                 fmt::format("{}[{}]", path, i));
+    CheckMessage(reflection->GetRepeatedMessage(message, field, i), fmt::format("{}[{}]", path, i));
   }
 }
 
@@ -121,10 +120,11 @@ void CheckPrompt(const std::string& prompt, const std::string& path) {
 // What only some sources take.
 void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& path) {
   if (!source.model().empty() && !TakesModel(source.source_case())) {
-    Reject(path + ".model",
-           fmt::format(
-               " is '{}', but only prompt, automatic and references work with a model; leave it out",
-               source.model()));
+    Reject(
+        path + ".model",
+        fmt::format(
+            " is '{}', but only prompt, automatic and references work with a model; leave it out",
+            source.model()));
   }
   if (source.has_backend_input() && source.source_case() != v1::KeyColorSource::kBackend) {
     Reject(path + ".backend_input", " is set, but the source is no backend; leave it out");

@@ -83,23 +83,22 @@ const std::map<std::string, Method>& Methods() {
   static const std::map<std::string, Method> methods = {
       {"import_scene",
        MakeMethod<v1::ImportSceneSpec>([](const auto& s) { return ImportOptionsFrom(s, 1); })},
-      {"select_key_view",
-       MakeMethod<v1::SelectKeyViewSpec>(
-           [](const auto& s) { return SelectOptionsFrom(s).selection; })},
+      {"select_key_view", MakeMethod<v1::SelectKeyViewSpec>([](const auto& s) {
+         return SelectOptionsFrom(s).selection;
+       })},
       {"colorize_key_view",
        MakeMethod<v1::ColorizeKeyViewSpec>([](const auto& s) { return HintOptionsFrom(s); })},
-      {"generate_augmentations",
-       MakeMethod<v1::GenerateAugmentationsSpec>(
-           [](const auto& s) { return AugmentationOptionsFrom(s); })},
-      {"personalize",
-       MakeMethod<v1::PersonalizeSpec>(
-           [](const auto& s) { return ColorizerOptionsFrom(s, 1, 1); })},
+      {"generate_augmentations", MakeMethod<v1::GenerateAugmentationsSpec>([](const auto& s) {
+         return AugmentationOptionsFrom(s);
+       })},
+      {"personalize", MakeMethod<v1::PersonalizeSpec>([](const auto& s) {
+         return ColorizerOptionsFrom(s, 1, 1);
+       })},
       {"colorize_views",
        MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) { return MaxSideFrom(s); })},
       {"carry_color",
        MakeMethod<v1::CarryColorSpec>([](const auto& s) { return CarryOptionsFrom(s); })},
-      {"reconstruct_geometry",
-       MakeMethod<v1::ReconstructGeometrySpec>([](const auto& s) {
+      {"reconstruct_geometry", MakeMethod<v1::ReconstructGeometrySpec>([](const auto& s) {
          return SizedGeometry{GeometryOptionsFrom(s, 1), MaxSideFrom(s)};
        })},
       {"solve_chroma",
@@ -165,46 +164,45 @@ Verdict Try(const FieldDescriptor& stage,
 // Every number has a range, and the method's own Validate draws it where the proto does.
 TEST(OptionRanges, TheMethodTakesWhatTheServerTakesAndNothingElse) {
   int ranges = 0;
-  ForEachOption([&](const FieldDescriptor& stage,
-                    const FieldDescriptor& field,
-                    const Method& method) {
-    const bool is_integer = field.cpp_type() == FieldDescriptor::CPPTYPE_INT32;
-    if (!is_integer && field.cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) return;
-    SCOPED_TRACE(field.full_name());
-    const v1::OptionInfo& info = InfoOf(&field);
-    ASSERT_TRUE(info.has_min() && info.has_max());
-    ++ranges;
-    for (const double inside : {info.min(), info.max()}) {
-      const Verdict verdict = Try(stage, field, method, inside);
-      EXPECT_TRUE(verdict.server) << inside;
-      EXPECT_TRUE(verdict.method) << inside;
-    }
-    const double infinity = std::numeric_limits<double>::infinity();
-    const double below = is_integer ? info.min() - 1.0 : std::nextafter(info.min(), -infinity);
-    const double above = is_integer ? info.max() + 1.0 : std::nextafter(info.max(), infinity);
-    for (const double outside : {below, above}) {
-      const Verdict verdict = Try(stage, field, method, outside);
-      EXPECT_FALSE(verdict.server) << outside;
-      EXPECT_FALSE(verdict.method) << outside;
-    }
-  });
+  ForEachOption(
+      [&](const FieldDescriptor& stage, const FieldDescriptor& field, const Method& method) {
+        const bool is_integer = field.cpp_type() == FieldDescriptor::CPPTYPE_INT32;
+        if (!is_integer && field.cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) return;
+        SCOPED_TRACE(field.full_name());
+        const v1::OptionInfo& info = InfoOf(&field);
+        ASSERT_TRUE(info.has_min() && info.has_max());
+        ++ranges;
+        for (const double inside : {info.min(), info.max()}) {
+          const Verdict verdict = Try(stage, field, method, inside);
+          EXPECT_TRUE(verdict.server) << inside;
+          EXPECT_TRUE(verdict.method) << inside;
+        }
+        const double infinity = std::numeric_limits<double>::infinity();
+        const double below = is_integer ? info.min() - 1.0 : std::nextafter(info.min(), -infinity);
+        const double above = is_integer ? info.max() + 1.0 : std::nextafter(info.max(), infinity);
+        for (const double outside : {below, above}) {
+          const Verdict verdict = Try(stage, field, method, outside);
+          EXPECT_FALSE(verdict.server) << outside;
+          EXPECT_FALSE(verdict.method) << outside;
+        }
+      });
   EXPECT_GT(ranges, 30);
 }
 
 TEST(OptionDefaults, TheProtoTellsTheMethodsOwn) {
-  ForEachOption([&](const FieldDescriptor& stage,
-                    const FieldDescriptor& field,
-                    const Method& method) {
-    const std::string& value = InfoOf(&field).default_value();
-    if (value.empty() || field.name() == "skip") return;  // skip: the planner's, not the method's
-    SCOPED_TRACE(field.full_name());
-    const Message& unset =
-        *google::protobuf::MessageFactory::generated_factory()->GetPrototype(stage.message_type());
-    const std::unique_ptr<Message> told(unset.New());
-    ASSERT_TRUE(google::protobuf::TextFormat::ParseFromString(field.name() + ": " + value,
-                                                              told.get()));
-    EXPECT_TRUE(method.same(*told, unset)) << value;
-  });
+  ForEachOption(
+      [&](const FieldDescriptor& stage, const FieldDescriptor& field, const Method& method) {
+        const std::string& value = InfoOf(&field).default_value();
+        if (value.empty() || field.name() == "skip")
+          return;  // skip: the planner's, not the method's
+        SCOPED_TRACE(field.full_name());
+        const Message& unset = *google::protobuf::MessageFactory::generated_factory()->GetPrototype(
+            stage.message_type());
+        const std::unique_ptr<Message> told(unset.New());
+        ASSERT_TRUE(
+            google::protobuf::TextFormat::ParseFromString(field.name() + ": " + value, told.get()));
+        EXPECT_TRUE(method.same(*told, unset)) << value;
+      });
 }
 
 // A user of the library gets what a user of the service gets.
