@@ -101,6 +101,8 @@ CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
   if (spec.has_flow_tolerance_px()) options.carry.flow_tolerance_px = spec.flow_tolerance_px();
   if (spec.has_depth_tolerance()) options.carry.depth_tolerance = spec.depth_tolerance();
+  if (spec.has_luminance_tolerance())
+    options.carry.luminance_tolerance = spec.luminance_tolerance();
   if (spec.has_depth_side_px()) options.depth_side_px = spec.depth_side_px();
   if (spec.has_depth_sources()) options.depth_sources = spec.depth_sources();
   return options;
