@@ -5,8 +5,12 @@
 
 #include <limits>
 
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
+#include "server/planning/stage_key.h"
+#include "server/planning/time_budget.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -80,6 +84,20 @@ TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
   EXPECT_GT(personalize, geometry);
   EXPECT_GT(chroma, 1.0);
   EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
+}
+
+TEST(Planner, ExactlyTheStagesThatKeepATimeLimitGetAShareOfTheBudget) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  for (const Stage& stage : StageCatalogue()) {
+    if (std::string_view(stage.kind) == kind::kPersonalizeScenes) continue;
+    v1::JobSpec planned = SpecOf(graph, stage.kind);
+    const google::protobuf::Message* options = MutableStage(&planned, stage.kind);
+    const auto* limit = options->GetDescriptor()->FindFieldByName("time_limit_seconds");
+    const bool limited = limit != nullptr && options->GetReflection()->HasField(*options, limit);
+    EXPECT_EQ(limited, stage.keeps_time_limit) << stage.kind;
+  }
 }
 
 TEST(Planner, AStagesOwnTimeLimitWinsOverTheBudget) {
@@ -405,19 +423,18 @@ TEST(StageKey, DependsOnOptionsAndSeedOnly) {
   v1::JobSpec spec;
   spec.set_scene("scenes/a");
   spec.mutable_reconstruct_geometry()->set_iterations(10);
-  const std::string key = KeyPartOf(spec.SerializeAsString()).bytes;
+  const std::string key = KeyPartOf(spec).bytes;
   v1::JobSpec other = spec;
   other.set_scene("scenes/b");
   other.add_inputs("jobs/x");
   other.set_skip_cache(true);
-  EXPECT_EQ(KeyPartOf(other.SerializeAsString()).bytes, key);
-  EXPECT_TRUE(KeyPartOf(other.SerializeAsString()).skip_cache);
+  EXPECT_EQ(KeyPartOf(other).bytes, key);
   other.mutable_reconstruct_geometry()->set_iterations(11);
-  EXPECT_NE(KeyPartOf(other.SerializeAsString()).bytes, key);
+  EXPECT_NE(KeyPartOf(other).bytes, key);
   other = spec;
   other.set_seed(2);
-  EXPECT_NE(KeyPartOf(other.SerializeAsString()).bytes, key);
-  EXPECT_EQ(KeyPartOf(SceneSpec().SerializeAsString()).bytes, "") << "reports are never cached";
+  EXPECT_NE(KeyPartOf(other).bytes, key);
+  EXPECT_EQ(KeyPartOf(SceneSpec()).bytes, "") << "reports are never cached";
 }
 
 }  // namespace

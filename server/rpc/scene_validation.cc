@@ -11,7 +11,7 @@
 
 #include "core/base/files.h"
 #include "core/image/probe/probe.h"
-#include "server/planning/time_budget.h"
+#include "server/planning/scene_facts.h"
 #include "server/service_error.h"
 
 namespace color3d {
