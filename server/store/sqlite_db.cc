@@ -13,21 +13,23 @@ namespace {
   switch (code & 0xff) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      throw ServiceError(ErrorCode::kUnavailable, "STORE_BUSY", text + "; try again");
+      throw ServiceError(ErrorCode::kUnavailable, "STORE_BUSY", "{}; try again", text);
     case SQLITE_FULL:
       throw ServiceError(
-          ErrorCode::kResourceExhausted, "STORAGE_FULL", text + "; free some disk space");
+          ErrorCode::kResourceExhausted, "STORAGE_FULL", "{}; free some disk space", text);
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
     case SQLITE_PERM:
       throw ServiceError(ErrorCode::kFailedPrecondition,
                          "STORE_NOT_WRITABLE",
-                         text + "; check the permissions of the data directory");
+                         "{}; check the permissions of the data directory",
+                         text);
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
       throw ServiceError(ErrorCode::kDataLoss,
                          "STORE_CORRUPT",
-                         text + "; restore jobs.db from a backup or start with a fresh --data-dir");
+                         "{}; restore jobs.db from a backup or start with a fresh --data-dir",
+                         text);
     default:
       throw ServiceError(ErrorCode::kInternal, "STORE_ERROR", text);
   }

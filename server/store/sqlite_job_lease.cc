@@ -1,4 +1,6 @@
 // What workers and the reaper call. Every write of a worker is fenced by its lease epoch.
+#include <fmt/core.h>
+
 #include <algorithm>
 
 #include "server/service_error.h"
@@ -12,8 +14,9 @@ namespace {
 ServiceError LeaseLost(const Lease& lease) {
   return ServiceError(ErrorCode::kAborted,
                       "LEASE_LOST",
-                      "this worker no longer holds job " + std::to_string(lease.job_id) +
-                          " (epoch " + std::to_string(lease.epoch) + ")");
+                      "this worker no longer holds job {} (epoch {})",
+                      lease.job_id,
+                      lease.epoch);
 }
 
 bool IsRetryable(ErrorCode code) {
@@ -282,10 +285,10 @@ int SqliteJobStore::ReapExpired() {
       EndFailed(job.id,
                 {ErrorCode::kInternal,
                  "WORKER_LOST",
-                 "the worker died or hung in each of " + std::to_string(job.attempt) +
-                     " attempts (last: " + job.worker +
-                     "); see its log, and how much memory "
-                     "the job needs"});
+                 fmt::format("the worker died or hung in each of {} attempts (last: {}); see its "
+                             "log, and how much memory the job needs",
+                             job.attempt,
+                             job.worker)});
     }
   }
   transaction.Commit();
