@@ -35,10 +35,11 @@ std::chrono::milliseconds Milliseconds(double seconds) {
 void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   if (!IsLoopback(options.listen) && !options.insecure_any_address) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "refusing to listen on " + options.listen +
-                    ": there is no authentication yet, anybody who reaches the port could use it; "
-                    "listen on 127.0.0.1, or say --insecure-any-address in a network you trust");
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "refusing to listen on {}: there is no authentication yet, anybody who reaches the port "
+        "could use it; listen on 127.0.0.1, or say --insecure-any-address in a network you trust",
+        options.listen);
   }
 }
 
@@ -48,8 +49,9 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
       options.worker_program.empty() ? ProgramFolder() / "color3d-worker" : options.worker_program;
   if (options.workers > 0 && ::access(setup.program.c_str(), X_OK) != 0) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot find the worker program " + setup.program.string() +
-                    "; install color3d-worker beside color3d-server, or say --workers 0");
+                "cannot find the worker program {}; install color3d-worker beside color3d-server, "
+                "or say --workers 0",
+                setup.program.string());
   }
   setup.workers = options.workers;
   const int machine = std::max(1u, std::thread::hardware_concurrency());

@@ -74,7 +74,7 @@ backend::v1::Capability KindFromName(const std::string& name) {
                                              backend::v1::CAPABILITY_NOVEL_VIEW}) {
     if (name == CapabilityName(kind)) return kind;
   }
-  throw InvalidArgument("no backend generates pictures of kind '" + name + "'");
+  throw InvalidArgument("no backend generates pictures of kind '{}'", name);
 }
 
 class GrpcColorizer : public RemoteColorizer {
@@ -111,7 +111,7 @@ class GrpcColorizer : public RemoteColorizer {
   void ReportShare(double share, int64_t* step, ProgressObserver& progress) const;
   void RequireSendable(const google::protobuf::Message& request) const;
   [[noreturn]] void BadStream(const std::string& why) const {
-    throw Error(ErrorCode::kFailedPrecondition, "the backend '" + name_ + "' " + why);
+    throw Error(ErrorCode::kFailedPrecondition, "the backend '{}' {}", name_, why);
   }
 
   const std::string name_;
@@ -154,9 +154,10 @@ RemoteInfo GrpcColorizer::GetInfo(ProgressObserver& progress, const Cancellation
     if (info.ready()) return InfoFromProto(info);
     if (std::chrono::steady_clock::now() >= end) {
       throw Error(ErrorCode::kUnavailable,
-                  "the backend '" + name_ + "' (" + address_.target +
-                      ") is still loading its model; retry the job when it is ready (`color3d "
-                      "server info` tells)");
+                  "the backend '{}' ({}) is still loading its model; retry the job when it is "
+                  "ready (`color3d server info` tells)",
+                  name_,
+                  address_.target);
     }
     progress.OnProgress(0, 0, "waiting for the backend " + name_ + " to load its model");
     SleepUnlessCancelled(options_.ready_poll, cancel);
@@ -172,10 +173,11 @@ void GrpcColorizer::ReportShare(double share, int64_t* step, ProgressObserver& p
 
 void GrpcColorizer::RequireSendable(const google::protobuf::Message& request) const {
   if (request.ByteSizeLong() <= static_cast<size_t>(options_.max_message_bytes)) return;
-  throw InvalidArgument("the photo and what belongs to it take " +
-                        std::to_string(request.ByteSizeLong()) + " bytes; at most " +
-                        std::to_string(options_.max_message_bytes) +
-                        " are sent to a backend: use smaller photos");
+  throw InvalidArgument(
+      "the photo and what belongs to it take {} bytes; at most {} are sent to a backend: use "
+      "smaller photos",
+      request.ByteSizeLong(),
+      options_.max_message_bytes);
 }
 
 grpc::Status GrpcColorizer::ColorizeOnce(const backend::v1::ColorizeRequest& request,
@@ -294,9 +296,11 @@ std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(
   std::string known;
   for (const auto& [other, address] : backends) known += (known.empty() ? "" : ", ") + other;
   throw Error(ErrorCode::kFailedPrecondition,
-              "this server has no backend '" + name +
-                  "' (it has: " + (known.empty() ? "none" : known) + "); start it with --backend " +
-                  name + "=ADDRESS and retry the job");
+              "this server has no backend '{}' (it has: {}); start it with --backend {}=ADDRESS "
+              "and retry the job",
+              name,
+              known.empty() ? "none" : known,
+              name);
 }
 
 }  // namespace color3d

@@ -2,8 +2,8 @@
 
 #include <charconv>
 
+#include "core/base/utf8.h"
 #include "server/rpc/error_mapping.h"
-#include "server/rpc/utf8.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -63,7 +63,7 @@ v1::Job ToProgressProto(const JobRecord& job) {
 v1::Job ToProto(const JobRecord& job) {
   v1::Job proto = ToProgressProto(job);
   if (!proto.mutable_spec()->ParseFromString(job.spec)) {
-    throw Error(ErrorCode::kDataLoss, "the stored spec of " + job.name + " cannot be read");
+    throw Error(ErrorCode::kDataLoss, "the stored spec of {} cannot be read", job.name);
   }
   proto.set_cancel_requested(job.cancel_requested);
   proto.set_max_attempts(job.max_attempts);
@@ -102,19 +102,19 @@ void CheckName(std::string_view name, std::string_view collection) {
                         name[collection.size()] == '/';
   const std::string_view id = prefixed ? name.substr(collection.size() + 1) : "";
   if (id.empty() || id.size() > 64 || id.find_first_not_of(kAllowed) != std::string_view::npos) {
-    throw InvalidArgument("the name '" + std::string(name.substr(0, 100)) + "' must be '" +
-                          std::string(collection) + "/{id}'");
+    throw InvalidArgument("the name '{}' must be '{}/{{id}}'", name.substr(0, 100), collection);
   }
 }
 
 FileDigest FromProto(const v1::Digest& digest) {
   if (!IsSha256Hex(digest.sha256())) {
-    throw InvalidArgument("'" + digest.sha256().substr(0, 80) +
-                          "' is not a SHA-256 digest: 64 lower-case hexadecimal digits");
+    throw InvalidArgument("'{}' is not a SHA-256 digest: 64 lower-case hexadecimal digits",
+                          digest.sha256().substr(0, 80));
   }
   if (digest.size_bytes() < 0) {
-    throw InvalidArgument("the digest " + digest.sha256() + " has the size " +
-                          std::to_string(digest.size_bytes()) + "; it must not be negative");
+    throw InvalidArgument("the digest {} has the size {}; it must not be negative",
+                          digest.sha256(),
+                          digest.size_bytes());
   }
   return {digest.sha256(), digest.size_bytes()};
 }
@@ -128,16 +128,15 @@ int64_t ParsePageToken(const std::string& token, const std::string& listing) {
   int64_t id = 0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), id);
   if (error != std::errc() || id < 1 || token != MakePageToken(id, listing)) {
-    throw InvalidArgument("page_token '" + token.substr(0, 80) +
-                          "' does not belong to this listing; start without one");
+    throw InvalidArgument("page_token '{}' does not belong to this listing; start without one",
+                          token.substr(0, 80));
   }
   return id;
 }
 
 int PageSize(int requested) {
   if (requested < 0 || requested > 1000) {
-    throw InvalidArgument("page_size is " + std::to_string(requested) +
-                          "; the range is 1 to 1000, 0 means 50");
+    throw InvalidArgument("page_size is {}; the range is 1 to 1000, 0 means 50", requested);
   }
   return requested == 0 ? 50 : requested;
 }

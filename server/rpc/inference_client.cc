@@ -38,7 +38,7 @@ grpc::Status Explained(const grpc::Status& status, bool our_limit) {
           : "the inference worker ended before it had coloured this picture (" +
                 status.error_message() + ")";
   return ToGrpcStatus(
-      ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", what + "; send the picture again"));
+      ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", "{}; send the picture again", what));
 }
 
 }  // namespace

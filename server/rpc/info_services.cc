@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "core/base/memory.h"
+#include "core/base/utf8.h"
 #include "server/ops/process.h"
 #include "server/planning/spec_check.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/utf8.h"
 
 namespace color3d {
 namespace {

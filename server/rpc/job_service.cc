@@ -1,5 +1,6 @@
 #include "server/rpc/job_service.h"
 
+#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -31,19 +32,21 @@ void CheckBlobs(const RpcParts& parts, const v1::JobSpec& spec) {
     }
   }
   if (missing.empty()) return;
-  throw ServiceError(ErrorCode::kFailedPrecondition,
-                     "BLOB_MISSING",
-                     "the spec names " + std::to_string(missing.size()) +
-                         " blobs that are not uploaded, first " + missing[0].field +
-                         "; upload them and try again",
-                     missing);
+  throw ServiceError(
+      ErrorCode::kFailedPrecondition,
+      "BLOB_MISSING",
+      fmt::format(
+          "the spec names {} blobs that are not uploaded, first {}; upload them and try again",
+          missing.size(),
+          missing[0].field),
+      missing);
 }
 
 // The jobs that spec.inputs names, with their children.
 std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec) {
   if (spec.inputs_size() > 100) {
-    throw InvalidArgument("spec.inputs has " + std::to_string(spec.inputs_size()) +
-                          " entries; at most 100 are allowed");
+    throw InvalidArgument("spec.inputs has {} entries; at most 100 are allowed",
+                          spec.inputs_size());
   }
   std::vector<JobRecord> inputs;
   for (const std::string& name : spec.inputs()) {
@@ -75,15 +78,17 @@ SceneRouteInputs LoadRoute(const RpcParts& parts,
   if (name.empty()) {
     throw ServiceError(ErrorCode::kFailedPrecondition,
                        "INPUT_MISSING",
-                       "the scene " + scene.name +
-                           " has no accepted key view; accept one, or name its "
-                           "colorize_key_view job in the route's key_color_job");
+                       "the scene {} has no accepted key view; accept one, or name its "
+                       "colorize_key_view job in the route's key_color_job",
+                       scene.name);
   }
   CheckName(name, "jobs");
   const JobRecord key_color = parts.store.GetJob(name);
   if (key_color.kind != "colorize_key_view") {
-    throw InvalidArgument("the key_color_job " + name + " of " + scene.name + " is a " +
-                          key_color.kind + " job; name a colorize_key_view job");
+    throw InvalidArgument("the key_color_job {} of {} is a {} job; name a colorize_key_view job",
+                          name,
+                          scene.name,
+                          key_color.kind);
   }
   SceneRouteInputs inputs{parts.store.GetInputs(key_color.id), FactsOf(scene)};
   inputs.jobs.push_back(key_color);
@@ -113,7 +118,7 @@ JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& req
   CheckName(spec.scene(), "scenes");
   const int priority = request.has_priority() ? request.priority() : 100;
   if (priority < 0 || priority > 1000) {
-    throw InvalidArgument("priority is " + std::to_string(priority) + "; the range is 0 to 1000");
+    throw InvalidArgument("priority is {}; the range is 0 to 1000", priority);
   }
   CheckSpec(spec);
   CheckNames(spec, parts.models);

@@ -18,8 +18,9 @@ void CheckRequestId(const std::string& request_id) {
         dash ? request_id[i] == '-' : std::isxdigit(static_cast<unsigned char>(request_id[i])) != 0;
   }
   if (!good) {
-    throw InvalidArgument("request_id '" + request_id.substr(0, 80) +
-                          "' is not a UUID, e.g. 3f0c9a52-7e4b-4c1d-9b1e-2f6d8a7c5b40");
+    throw InvalidArgument(
+        "request_id '{}' is not a UUID, e.g. 3f0c9a52-7e4b-4c1d-9b1e-2f6d8a7c5b40",
+        request_id.substr(0, 80));
   }
 }
 

@@ -48,8 +48,8 @@ BlobStore::BlobStore(const fs::path& folder, BlobStoreOptions options)
 
 fs::path BlobStore::PathOf(const std::string& sha256) const {
   if (!IsSha256Hex(sha256)) {
-    throw InvalidArgument("'" + sha256.substr(0, 80) +
-                          "' is not a SHA-256 digest: 64 lower-case hexadecimal digits");
+    throw InvalidArgument("'{}' is not a SHA-256 digest: 64 lower-case hexadecimal digits",
+                          sha256.substr(0, 80));
   }
   return folder_ / sha256.substr(0, 2) / sha256.substr(2, 2) / sha256;
 }
@@ -69,7 +69,7 @@ fs::path BlobStore::Fetch(const std::string& sha256) const {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
     throw ServiceError(
-        ErrorCode::kNotFound, "BLOB_MISSING", "the blob " + sha256 + " is not stored; upload it");
+        ErrorCode::kNotFound, "BLOB_MISSING", "the blob {} is not stored; upload it", sha256);
   }
   return path;
 }

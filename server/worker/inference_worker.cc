@@ -59,10 +59,11 @@ void InferenceWorker::Listen() {
   builder.RegisterService(&queue_);
   server_ = builder.BuildAndStart();
   if (server_) return;
-  throw Error(ErrorCode::kFailedPrecondition,
-              "cannot listen on the socket " + options_.socket + " in " +
-                  DataPaths(options_.data_folder).Sockets().string() +
-                  "; the file system of --data-dir must allow sockets");
+  throw Error(
+      ErrorCode::kFailedPrecondition,
+      "cannot listen on the socket {} in {}; the file system of --data-dir must allow sockets",
+      options_.socket,
+      DataPaths(options_.data_folder).Sockets().string());
 }
 
 bool InferenceWorker::ShouldEnd() const {
