@@ -1,5 +1,7 @@
 #include "server/backends/backend_call.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 
 namespace color3d {
@@ -47,7 +49,7 @@ void SleepUnlessCancelled(std::chrono::milliseconds time, const CancellationToke
 }
 
 Error BackendError(const std::string& name, const std::string& target, const grpc::Status& status) {
-  const std::string who = "the backend '" + name + "' (" + target + ")";
+  const std::string who = fmt::format("the backend '{}' ({})", name, target);
   const std::string said = Quoted(status.error_message());
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:

@@ -1,5 +1,6 @@
 #include "server/backends/grpc_colorizer.h"
 
+#include <fmt/core.h>
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -237,9 +238,9 @@ grpc::Status GrpcColorizer::GenerateOnce(const backend::v1::GenerateRequest& req
     if (update.image().empty()) {
       fault = "answered with an empty picture";
     } else if (images->size() >= static_cast<size_t>(request.samples())) {
-      fault = "sent more pictures than the " + std::to_string(request.samples()) + " asked for";
+      fault = fmt::format("sent more pictures than the {} asked for", request.samples());
     } else if (bytes > static_cast<size_t>(options_.max_message_bytes)) {
-      fault = "sent more than " + std::to_string(options_.max_message_bytes) + " bytes of pictures";
+      fault = fmt::format("sent more than {} bytes of pictures", options_.max_message_bytes);
     } else {
       images->push_back(std::move(*update.mutable_image()));
     }

@@ -1,7 +1,8 @@
 #include "server/rpc/colorize_request.h"
 
-#include "color3d/v1/job.pb.h"
 #include "core/base/utf8.h"
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
 #include "server/rpc/convert.h"
 #include "server/service_error.h"
 
@@ -58,11 +59,14 @@ ColorizerRecord NewestOf(const RpcParts& parts, const std::string& scene) {
   const auto newest = parts.store.ListColorizers(scene, 0, 1);
   if (!newest.empty()) return newest[0];
   parts.store.GetScene(scene);  // says so when there is no such scene
-  throw ServiceError(ErrorCode::kNotFound,
-                     "COLORIZER_NOT_FOUND",
-                     "{} has no colorizer yet: run a personalize or a colorize_scene job of it "
-                     "first, or send a coloured picture as `example`",
-                     scene);
+  throw ServiceError(
+      ErrorCode::kNotFound,
+      "COLORIZER_NOT_FOUND",
+      "{} has no colorizer yet: run a {} or a {} job of it first, or send a coloured "
+      "picture as `example`",
+      scene,
+      kind::kPersonalize,
+      kind::kColorizeScene);
 }
 
 ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesRequest& request) {
@@ -83,11 +87,7 @@ ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesReq
 
 // Which weights it was trained with. They may have changed since: the worker compares digests.
 std::string EncoderOf(const RpcParts& parts, const ColorizerRecord& record) {
-  v1::JobSpec spec;
-  if (!spec.ParseFromString(parts.store.GetJob(record.job).spec)) {
-    throw Error(ErrorCode::kDataLoss, "the stored spec of {} is damaged", record.job);
-  }
-  return spec.personalize().encoder();
+  return ParseSpec(parts.store.GetJob(record.job).spec, record.job).personalize().encoder();
 }
 
 }  // namespace

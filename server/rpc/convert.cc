@@ -1,8 +1,11 @@
 #include "server/rpc/convert.h"
 
+#include <fmt/core.h>
+
 #include <charconv>
 
 #include "core/base/utf8.h"
+#include "server/planning/job_spec.h"
 #include "server/rpc/error_mapping.h"
 #include "server/service_error.h"
 
@@ -62,9 +65,7 @@ v1::Job ToProgressProto(const JobRecord& job) {
 
 v1::Job ToProto(const JobRecord& job) {
   v1::Job proto = ToProgressProto(job);
-  if (!proto.mutable_spec()->ParseFromString(job.spec)) {
-    throw Error(ErrorCode::kDataLoss, "the stored spec of {} cannot be read", job.name);
-  }
+  *proto.mutable_spec() = ParseSpec(job.spec, job.name);
   proto.set_cancel_requested(job.cancel_requested);
   proto.set_max_attempts(job.max_attempts);
   for (const ArtifactRecord& artifact : job.artifacts) {
@@ -120,7 +121,7 @@ FileDigest FromProto(const v1::Digest& digest) {
 }
 
 std::string MakePageToken(int64_t last_id, const std::string& listing) {
-  return std::to_string(last_id) + "." + Sha256Hex(listing).substr(0, 8);
+  return fmt::format("{}.{}", last_id, Sha256Hex(listing).substr(0, 8));
 }
 
 int64_t ParsePageToken(const std::string& token, const std::string& listing) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/catalogue/stages.h"
 #include "server/planning/plan_scenes.h"
 #include "server/planning/planner.h"
 #include "server/planning/spec_check.h"
@@ -28,7 +29,7 @@ void CheckBlobs(const RpcParts& parts, const v1::JobSpec& spec) {
   for (const FileDigest& digest : SpecBlobs(spec)) {
     if (!parts.blobs.Touch(digest)) {
       missing.push_back(
-          {digest.sha256, "is not stored with " + std::to_string(digest.size_bytes) + " bytes"});
+          {digest.sha256, fmt::format("is not stored with {} bytes", digest.size_bytes)});
     }
   }
   if (missing.empty()) return;
@@ -76,19 +77,22 @@ SceneRouteInputs LoadRoute(const RpcParts& parts,
   const std::string name =
       route.key_color_job().empty() ? scene.key_color_job : route.key_color_job();
   if (name.empty()) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "INPUT_MISSING",
-                       "the scene {} has no accepted key view; accept one, or name its "
-                       "colorize_key_view job in the route's key_color_job",
-                       scene.name);
+    throw ServiceError(
+        ErrorCode::kFailedPrecondition,
+        "INPUT_MISSING",
+        "the scene {} has no accepted key view; accept one, or name its {} job in the "
+        "route's key_color_job",
+        scene.name,
+        kind::kColorizeKeyView);
   }
   CheckName(name, "jobs");
   const JobRecord key_color = parts.store.GetJob(name);
-  if (key_color.kind != "colorize_key_view") {
-    throw InvalidArgument("the key_color_job {} of {} is a {} job; name a colorize_key_view job",
+  if (key_color.kind != kind::kColorizeKeyView) {
+    throw InvalidArgument("the key_color_job {} of {} is a {} job; name a {} job",
                           name,
                           scene.name,
-                          key_color.kind);
+                          key_color.kind,
+                          kind::kColorizeKeyView);
   }
   SceneRouteInputs inputs{parts.store.GetInputs(key_color.id), FactsOf(scene)};
   inputs.jobs.push_back(key_color);

@@ -1,11 +1,9 @@
 #include "server/rpc/rpc_parts.h"
 
-#include <google/protobuf/io/coded_stream.h>
-#include <google/protobuf/io/zero_copy_stream_impl_lite.h>
-
 #include <cctype>
 
 #include "core/base/digest.h"
+#include "server/planning/job_spec.h"
 
 namespace color3d {
 
@@ -25,14 +23,7 @@ void CheckRequestId(const std::string& request_id) {
 }
 
 std::string DigestOfMessage(const google::protobuf::Message& message) {
-  std::string bytes;
-  {
-    google::protobuf::io::StringOutputStream stream(&bytes);
-    google::protobuf::io::CodedOutputStream coded(&stream);
-    coded.SetSerializationDeterministic(true);
-    message.SerializeToCodedStream(&coded);
-  }
-  return Sha256Hex(bytes);
+  return Sha256Hex(DeterministicBytes(message));
 }
 
 }  // namespace color3d

@@ -1,5 +1,6 @@
 #include "server/store/sqlite_db.h"
 
+#include <fmt/core.h>
 #include <sqlite3.h>
 
 #include "server/service_error.h"
@@ -9,7 +10,7 @@ namespace {
 
 [[noreturn]] void ThrowSqlite(sqlite3* db, int code, const std::string& what) {
   const std::string detail = db != nullptr ? sqlite3_errmsg(db) : sqlite3_errstr(code);
-  const std::string text = "job store: " + what + ": " + detail;
+  const std::string text = fmt::format("job store: {}: {}", what, detail);
   switch (code & 0xff) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
@@ -106,7 +107,7 @@ SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
 
 void SqliteDatabase::Exec(const char* sql) {
   const int code = sqlite3_exec(db_, sql, nullptr, nullptr, nullptr);
-  if (code != SQLITE_OK) ThrowSqlite(db_, code, std::string("cannot run '") + sql + "'");
+  if (code != SQLITE_OK) ThrowSqlite(db_, code, fmt::format("cannot run '{}'", sql));
 }
 
 int64_t SqliteDatabase::LastInsertId() const { return sqlite3_last_insert_rowid(db_); }
