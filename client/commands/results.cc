@@ -29,7 +29,7 @@ constexpr MetricLine kMetricLines[] = {
     {"psnr_l", "PSNR of luminance", 2, " dB"},
     {"delta_e00_chroma", "chroma error (CIEDE2000)", 2, ""},
     {"delta_e00_chroma_bound", "  with all true colours", 2, ""},
-    {"delta_e00_grey", "  for comparison, grey", 2, ""},
+    {"delta_e00_gray", "  for comparison, grey", 2, ""},
     {"share_seen", "share seen in a key view", 2, ""},
     {"gaussians", "Gaussians", 0, ""},
 };

@@ -12,7 +12,8 @@
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "server/ops/process.h"
-#include "server/planning/planner.h"
+#include "server/planning/job_spec.h"
+#include "server/planning/stage_key.h"
 #include "server/service_error.h"
 #include "server/worker/blob_checkpoints.h"
 
@@ -144,7 +145,7 @@ void Attempt::Prepare() {
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
   run_.project = job_.parent.empty() ? job_.name : job_.parent;
-  run_.spec = job_.spec;
+  run_.spec = ParseSpec(job_.spec, job_.name);
   run_.threads = context_.threads;
   run_.attempt = job_.attempt;
   run_.models = context_.models;
@@ -170,15 +171,14 @@ void Attempt::Prepare() {
     }
   }
   for (const JobRecord& child : context_.store.ListChildren(job_.name)) {
-    run_.graph.push_back({child.kind,
-                          JobStateName(child.state),
-                          child.skip_reason,
-                          child.progress.seconds,
-                          child.cached,
-                          child.peak_memory_bytes,
-                          child.warnings});
+    run_.graph.push_back({.kind = child.kind,
+                          .state = JobStateName(child.state),
+                          .skip_reason = child.skip_reason,
+                          .seconds = child.progress.seconds,
+                          .peak_memory_bytes = child.peak_memory_bytes,
+                          .warnings = child.warnings});
   }
-  const StageKeyPart part = KeyPartOf(job_.spec);
+  const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;
   std::string material = context_.code_version + '\n' + Sha256Hex(manifest) + '\n';
@@ -231,7 +231,7 @@ void Attempt::RequireModelsUnchanged() const {
 }
 
 bool Attempt::ServeFromCache() {
-  if (KeyPartOf(job_.spec).skip_cache) return false;
+  if (run_.spec.skip_cache()) return false;
   const std::optional<JobRecord> earlier = context_.store.FindStage(stage_key_);
   if (!earlier) return false;
   for (const ArtifactRecord& artifact : earlier->artifacts) {
