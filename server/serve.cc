@@ -131,7 +131,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   setup->inference_demand = demand;
   InferenceLink link;
   link.target = sockets.Address(socket);
-  link.demand = [demand] { demand->Ask(); };
+  link.demand = [demand] { demand->Request(); };
   link.hold = [demand] { return demand->Hold(); };
   return link;
 }

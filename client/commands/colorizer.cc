@@ -20,7 +20,7 @@ struct ColorizerOptions {
   std::string scene;  // of list
   int limit = 100;
   std::vector<std::string> photos;
-  std::string out = "coloured";
+  std::string out = "colored";
   LiveOptions live;
 };
 

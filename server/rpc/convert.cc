@@ -58,7 +58,7 @@ v1::Job ToProgressProto(const JobRecord& job) {
   progress->set_message(CleanUtf8(job.progress.message));
   progress->set_error_name(CleanUtf8(job.progress.error_name));
   progress->set_error_value(job.progress.error_value);
-  progress->set_seconds(job.progress.seconds);
+  progress->set_seconds(job.usage.seconds);
   progress->set_eta_seconds(job.progress.eta_seconds);
   return proto;
 }
@@ -77,12 +77,12 @@ v1::Job ToProto(const JobRecord& job) {
   if (job.error) *proto.mutable_error() = ToRpcStatus(*job.error);
   proto.set_skip_reason(CleanUtf8(job.skip_reason));
   proto.set_cached(job.cached);
-  for (const std::string& warning : job.warnings) proto.add_warnings(CleanUtf8(warning));
+  for (const std::string& warning : job.usage.warnings) proto.add_warnings(CleanUtf8(warning));
   *proto.mutable_create_time() = ToTimestamp(job.create_ms);
   if (job.start_ms != 0) *proto.mutable_start_time() = ToTimestamp(job.start_ms);
   if (job.end_ms != 0) *proto.mutable_end_time() = ToTimestamp(job.end_ms);
   proto.set_worker(job.worker);
-  proto.set_peak_memory_bytes(job.peak_memory_bytes);
+  proto.set_peak_memory_bytes(job.usage.peak_memory_bytes);
   return proto;
 }
 

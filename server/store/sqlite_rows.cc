@@ -32,10 +32,10 @@ void VisitColumns(JobRecord& job, Visit&& visit) {
   visit("progress_message", job.progress.message);
   visit("progress_error_name", job.progress.error_name);
   visit("progress_error_value", job.progress.error_value);
-  visit("seconds", job.progress.seconds);
   visit("eta_seconds", job.progress.eta_seconds);
-  visit("peak_memory_bytes", job.peak_memory_bytes);
-  visit("warnings", job.warnings);
+  visit("seconds", job.usage.seconds);
+  visit("peak_memory_bytes", job.usage.peak_memory_bytes);
+  visit("warnings", job.usage.warnings);
   visit("error_code", error.code);
   visit("error_reason", error.reason);
   visit("error_message", error.message);

@@ -68,7 +68,7 @@ void InferenceWorker::Listen() {
 
 bool InferenceWorker::ShouldEnd() const {
   if (draining_.load() || (options_.parent != 0 && ::getppid() != options_.parent)) return true;
-  const InferenceQueue::State state = queue_.Look();
+  const InferenceQueue::State state = queue_.state();
   if (!state.idle) return false;
   if (state.since > options_.idle) {
     spdlog::info("{} ends: there was nothing to colour", id_);
@@ -81,7 +81,7 @@ bool InferenceWorker::ShouldEnd() const {
 }
 
 void InferenceWorker::GiveUpIfStuck() const {
-  if (queue_.Look().batch < options_.stuck) return;
+  if (queue_.state().batch < options_.stuck) return;
   spdlog::critical("{}: a batch does not end; giving up", id_);
   spdlog::shutdown();
   ::_exit(1);
