@@ -7,6 +7,7 @@
 #include "server/planning/planner.h"
 #include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
+#include "server/planning/stage_key.h"
 #include "server/service_error.h"
 
 namespace color3d {

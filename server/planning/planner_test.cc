@@ -5,8 +5,12 @@
 
 #include <limits>
 
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
+#include "server/planning/stage_key.h"
+#include "server/planning/time_budget.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -88,6 +92,20 @@ TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
   const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
   for (const char* kind : {"reconstruct_geometry", "personalize", "solve_chroma"}) {
     EXPECT_NO_THROW(CheckSpec(SpecOf(graph, kind))) << kind;
+  }
+}
+
+TEST(Planner, ExactlyTheStagesThatKeepATimeLimitGetAShareOfTheBudget) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  for (const Stage& stage : StageCatalogue()) {
+    if (std::string_view(stage.kind) == kind::kPersonalizeScenes) continue;
+    v1::JobSpec planned = SpecOf(graph, stage.kind);
+    const google::protobuf::Message* options = MutableStage(&planned, stage.kind);
+    const auto* limit = options->GetDescriptor()->FindFieldByName("time_limit_seconds");
+    const bool limited = limit != nullptr && options->GetReflection()->HasField(*options, limit);
+    EXPECT_EQ(limited, stage.keeps_time_limit) << stage.kind;
   }
 }
 

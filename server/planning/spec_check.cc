@@ -253,12 +253,6 @@ std::string KindOf(const v1::JobSpec& spec) {
   return field->name();
 }
 
-std::vector<std::string> BuiltKinds() {
-  std::vector<std::string> kinds;
-  for (const Stage& stage : StageCatalogue()) kinds.push_back(stage.kind);
-  return kinds;
-}
-
 void CheckSpec(const v1::JobSpec& spec) {
   const std::string kind = KindOf(spec);
   if (FindStage(kind) == nullptr) {

@@ -15,9 +15,6 @@ namespace color3d {
 // spec has no stage.
 std::string KindOf(const v1::JobSpec& spec);
 
-// Kinds that can run, in the order of the pipeline.
-std::vector<std::string> BuiltKinds();
-
 // Throws Error: kInvalidArgument naming field, value and range; kUnimplemented naming the kind.
 // Names of models and backends are checked by CheckNames (spec_names.h), where the configuration
 // is.

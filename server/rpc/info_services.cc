@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "core/base/memory.h"
+#include "core/base/utf8.h"
+#include "core/catalogue/stages.h"
 #include "server/ops/process.h"
 #include "server/planning/presets.h"
-#include "server/planning/spec_check.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/utf8.h"
 
 namespace color3d {
 namespace {
@@ -97,7 +97,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
                                                            v1::ServerInfo* response) {
   return AnswerUnary(parts_, context, request, response, [this](const auto&, v1::ServerInfo* out) {
     out->set_version(parts_.version);
-    for (const std::string& kind : BuiltKinds()) out->add_job_kinds(kind);
+    for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
     v1::Limits* limits = out->mutable_limits();
     limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
     limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);

@@ -167,7 +167,7 @@ TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecon
   EXPECT_EQ(ReadFile(Path("second") / "scene.ply"), ReadFile(Path("first") / "scene.ply"));
 }
 
-TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColourItThenTheScene) {
+TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColorItThenTheScene) {
   WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));
   const std::string room = Path("room").string(), out = Path("out").string();
   const ProcessResult select = Client({"colorize", room, "-o", out});
@@ -196,7 +196,7 @@ TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColourItThenTheScene) {
   EXPECT_EQ(KeyView(Path("out")), name);
 }
 
-TEST_F(ColorizeTest, HintsAsJsonColourTheKeyView) {
+TEST_F(ColorizeTest, HintsAsJsonColorTheKeyView) {
   WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
   WriteFileAtomic(Path("hints.json"),
                   R"([{"x": 60, "y": 30, "radius": 4, "color": "#2f6f7f"},
