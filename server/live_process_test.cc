@@ -105,7 +105,7 @@ class LiveProcessTest : public ::testing::Test {
   std::unique_ptr<ServerProcess> server_;
 };
 
-TEST_F(LiveProcessTest, MixedScenesInOneStreamGetTheirOwnColours) {
+TEST_F(LiveProcessTest, MixedScenesInOneStreamGetTheirOwnColors) {
   Start();
   const v1::Colorizer first = MakeColorizer(), second = MakeColorizer();
   ASSERT_NE(first.scene(), second.scene());
@@ -184,7 +184,7 @@ TEST_F(LiveProcessTest, WhatIsWrongWithOnePictureIsToldAndTheStreamGoesOn) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, PicturesOfAKilledWorkerFailAtOnceAndTheNextIsColoured) {
+TEST_F(LiveProcessTest, PicturesOfAKilledWorkerFailAtOnceAndTheNextIsColored) {
   Start();
   LiveStream live(client());
   const Request example = Example();

@@ -1,5 +1,7 @@
 #include "client/commands/benchmark.h"
 
+#include <fmt/core.h>
+
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +12,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/scene_upload.h"
 #include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
 namespace {
@@ -32,8 +35,8 @@ std::vector<BenchmarkView> ParseViews(const std::string& scene_json) {
     }
     return views;
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ErrorCode::kDataLoss,
-                std::string("scene.json from the server cannot be read: ") + e.what());
+    throw Error(
+        ErrorCode::kDataLoss, "{} from the server cannot be read: {}", artifact::kScene, e.what());
   }
 }
 
@@ -42,7 +45,9 @@ std::string ParseKeyView(const std::string& key_view_json) {
     return nlohmann::json::parse(key_view_json).at("view");
   } catch (const nlohmann::json::exception& e) {
     throw Error(ErrorCode::kDataLoss,
-                std::string("key_view.json from the server cannot be read: ") + e.what());
+                "{} from the server cannot be read: {}",
+                artifact::kKeyView,
+                e.what());
   }
 }
 
@@ -57,7 +62,7 @@ Selection SelectKeyView(Connection& connection,
                         const std::string& scene,
                         ProgressDisplay& display) {
   const v1::Job import_job = SubmitJob(connection, ImportSpec(options, scene));
-  v1::JobSpec spec = SelectSpec(options, scene);
+  v1::JobSpec spec = SelectSpec(connection, options, scene);
   spec.add_inputs(import_job.name());
   const v1::Job select_job = SubmitJob(connection, spec);
   if (!Follow(connection, {import_job.name(), select_job.name()}, context, display)) {
@@ -69,8 +74,8 @@ Selection SelectKeyView(Connection& connection,
   RequireSuccess(connection, context, imported);
   const v1::Job selected = GetJob(connection, select_job.name());
   RequireSuccess(connection, context, selected);
-  return {ParseViews(ReadArtifact(connection, imported, "scene.json")),
-          ParseKeyView(ReadArtifact(connection, selected, "key_view.json"))};
+  return {ParseViews(ReadArtifact(connection, imported, artifact::kScene)),
+          ParseKeyView(ReadArtifact(connection, selected, artifact::kKeyView))};
 }
 
 }  // namespace
@@ -78,16 +83,19 @@ Selection SelectKeyView(Connection& connection,
 void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& cancel) {
   const std::string root = folder.root.string();
   if (folder.photos.size() < kMinPhotos) {
-    throw InvalidArgument(root + " contains " + std::to_string(folder.photos.size()) +
-                          " photographs; --benchmark needs at least " + std::to_string(kMinPhotos));
+    throw InvalidArgument("{} contains {} photographs; --benchmark needs at least {}",
+                          root,
+                          folder.photos.size(),
+                          kMinPhotos);
   }
   const ColorCount count = CountColorPhotos(folder, kPhotosToLookAt, cancel);
   if (count.MostlyColor()) return;
-  throw InvalidArgument("the photographs in " + root + " are monochrome (" +
-                        std::to_string(count.looked_at - count.in_color) + " of " +
-                        std::to_string(count.looked_at) +
-                        " looked at); --benchmark drops the colour of colour photos and scores "
-                        "against it: leave it out");
+  throw InvalidArgument(
+      "the photographs in {} are monochrome ({} of {} looked at); --benchmark drops the colour of "
+      "colour photos and scores against it: leave it out",
+      root,
+      count.looked_at - count.in_color,
+      count.looked_at);
 }
 
 v1::JobSpec PrepareBenchmark(Connection& connection,
@@ -141,8 +149,8 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);
   });
-  display.Say("key view " + selection.key_view + "; " + std::to_string(colorize->truth_size()) +
-              " views are held out and scored");
+  display.Say(fmt::format(
+      "key view {}; {} views are held out and scored", selection.key_view, colorize->truth_size()));
   return spec;
 }
 

@@ -50,7 +50,9 @@ nlohmann::ordered_json ToJson(const google::protobuf::Message& message) {
   const auto status = google::protobuf::util::MessageToJsonString(message, &text, options);
   if (!status.ok()) {
     throw Error(ErrorCode::kInternal,
-                "cannot write " + message.GetTypeName() + " as JSON: " + status.ToString());
+                "cannot write {} as JSON: {}",
+                message.GetTypeName(),
+                status.ToString());
   }
   return nlohmann::ordered_json::parse(text);
 }

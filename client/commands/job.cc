@@ -1,3 +1,4 @@
+#include <fmt/core.h>
 #include <google/protobuf/util/json_util.h>
 
 #include <iostream>
@@ -37,7 +38,7 @@ void PrintJob(const Context& context, const v1::Job& job) {
   if (context.json) {
     PrintJson(job);
   } else {
-    PrintText(job.name() + "  " + job.kind() + "  " + StateName(job.state()) + "\n");
+    PrintText(fmt::format("{}  {}  {}\n", job.name(), job.kind(), StateName(job.state())));
   }
 }
 
@@ -47,7 +48,7 @@ ExitCode RunSubmit(const Context& context, const std::string& file) {
   v1::JobSpec spec;
   const auto status = google::protobuf::util::JsonStringToMessage(text, &spec);
   if (!status.ok()) {
-    throw InvalidArgument(file + " is not a JobSpec in JSON: " + std::string(status.message()));
+    throw InvalidArgument("{} is not a JobSpec in JSON: {}", file, std::string(status.message()));
   }
   Connection connection(context.server, *context.interrupt);
   PrintJob(context, SubmitJob(connection, spec));
@@ -132,8 +133,9 @@ ExitCode RunWatch(const Context& context, const std::string& text) {
   const std::string name = ResourceName(text, "jobs");
   ProgressDisplay display(context.json);
   if (!Follow(connection, {name}, context, display)) {
-    throw CommandFailure(ExitCode::kDetached,
-                         "detached; " + name + " goes on; " + ReattachHint(context, name, ""));
+    throw CommandFailure(
+        ExitCode::kDetached,
+        fmt::format("detached; {} goes on; {}", name, ReattachHint(context, name, "")));
   }
   const v1::Job job = GetJob(connection, name);
   RequireSuccess(connection, context, job);

@@ -1,5 +1,6 @@
 #include "client/commands/progress_display.h"
 
+#include <fmt/core.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -8,6 +9,7 @@
 
 #include "client/lib/job_watch.h"
 #include "client/lib/text.h"
+#include "core/catalogue/stages.h"
 
 namespace color3d::client {
 namespace {
@@ -42,7 +44,7 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
     bool& ended = ended_[job.name()];
     // The last stage's failure only repeats the one that has been told.
     const bool failed = job.state() == v1::Job::STATE_FAILED;
-    const bool repeated = failed && failure_told_ && job.kind() == "colorize_scene";
+    const bool repeated = failed && failure_told_ && job.kind() == kind::kColorizeScene;
     if (!ended && !repeated) Say(EndLine(job));
     failure_told_ = failure_told_ || failed;
     ended = true;
@@ -66,7 +68,7 @@ void ProgressDisplay::OnTick() {
 }
 
 void ProgressDisplay::OnTransfer(const std::string& what, int64_t done, int64_t total) {
-  if (total > 0) Draw(what + " " + HumanBytes(done) + " of " + HumanBytes(total));
+  if (total > 0) Draw(fmt::format("{} {} of {}", what, HumanBytes(done), HumanBytes(total)));
 }
 
 void ProgressDisplay::Say(const std::string& line) {

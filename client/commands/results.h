@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -36,7 +37,10 @@ std::vector<std::string> DownloadResults(Connection& connection,
                                          const std::filesystem::path& out,
                                          ProgressDisplay& display);
 
-// A few lines about out/metrics.json and what lies in `out`, for people.
+// A JSON artifact that was downloaded into `out`; null when there is none or it cannot be read.
+nlohmann::ordered_json ReadResult(const std::filesystem::path& out, const std::string& name);
+
+// A few lines about the metrics and what else lies in `out`, for people.
 std::string Summary(const std::filesystem::path& out);
 
 }  // namespace color3d::client

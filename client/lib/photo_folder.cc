@@ -7,6 +7,7 @@
 #include "client/lib/names.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/utf8.h"
 #include "core/image/probe/probe.h"
 
 namespace color3d::client {
@@ -33,9 +34,10 @@ void RequireFolder(const fs::path& root) {
   if (IsFolder(root)) return;
   if (!fs::exists(fs::status(root))) {
     throw Error(ErrorCode::kNotFound,
-                "there is no folder " + root.string() + "; give the folder of the photographs");
+                "there is no folder {}; give the folder of the photographs",
+                root.string());
   }
-  throw InvalidArgument(root.string() + " is not a folder; give the folder of the photographs");
+  throw InvalidArgument("{} is not a folder; give the folder of the photographs", root.string());
 }
 
 // Adds `root`/`folder`'s photos, without going into its subfolders.
@@ -48,7 +50,9 @@ void AddDirectPhotos(const fs::path& root, const std::string& folder, PhotoFolde
   }
   if (error) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot read the folder " + (root / folder).string() + ": " + error.message());
+                "cannot read the folder {}: {}",
+                (root / folder).string(),
+                error.message());
   }
 }
 
@@ -66,11 +70,11 @@ std::set<std::string> NamedFolders(const fs::path& transforms) {
   try {
     root = nlohmann::json::parse(ReadFile(transforms));
   } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument(transforms.string() + " is not JSON: " + e.what());
+    throw InvalidArgument("{} is not JSON: {}", transforms.string(), e.what());
   }
   std::set<std::string> folders;
   if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
-    throw InvalidArgument(transforms.string() + " has no \"frames\"");
+    throw InvalidArgument("{} has no \"frames\"", transforms.string());
   }
   for (const nlohmann::json& frame : root["frames"]) {
     if (!frame.is_object() || !frame.contains("file_path")) continue;
@@ -127,9 +131,10 @@ void CollectAugmentFiles(const fs::path& root, PhotoFolder* result) {
   for (const std::string& file : ListFiles(root / kAugment)) {
     const fs::path path = root / kAugment / file;
     if (!HasImageExtension(file)) {
-      throw InvalidArgument(path.string() +
-                            " is no picture (JPEG, PNG or TIFF); augment/ is for pictures in "
-                            "colour that the colorizer learns from: move it elsewhere");
+      throw InvalidArgument(
+          "{} is no picture (JPEG, PNG or TIFF); augment/ is for pictures in colour that the "
+          "colorizer learns from: move it elsewhere",
+          path.string());
     }
     result->augment_files.push_back({std::string(kAugment) + "/" + file, path});
   }
@@ -154,27 +159,30 @@ void CheckCounts(const PhotoFolder& folder) {
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPhotos(folder.root);
     throw InvalidArgument(
-        root + " contains no photographs (JPEG, PNG or TIFF)" +
-        (sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?"));
+        "{} contains no photographs (JPEG, PNG or TIFF){}",
+        root,
+        sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?");
   }
   if (folder.photos.size() == 1) {
-    throw InvalidArgument(root + " contains one photograph (" + folder.photos[0].path +
-                          "); at least 3 that overlap are needed");
+    throw InvalidArgument("{} contains one photograph ({}); at least 3 that overlap are needed",
+                          root,
+                          folder.photos[0].path);
   }
   const size_t files = folder.AllFiles().size();
   if (files > kMaxFiles) {
-    throw InvalidArgument(root + " contains " + std::to_string(files) + " files; at most " +
-                          std::to_string(kMaxFiles) + " make up a scene");
+    throw InvalidArgument(
+        "{} contains {} files; at most {} make up a scene", root, files, kMaxFiles);
   }
 }
 
 void CheckName(const LocalFile& file) {
   if (!IsUtf8(file.path)) {
-    throw InvalidArgument("the name of " + file.file.string() + " is not UTF-8; rename it");
+    throw InvalidArgument("the name of {} is not UTF-8; rename it", file.file.string());
   }
   if (!IsSafeRelativePath(file.path) || file.path.size() > kMaxPathBytes) {
-    throw InvalidArgument("the name of " + file.file.string() +
-                          " is too long or has a backslash or a control character; rename it");
+    throw InvalidArgument(
+        "the name of {} is too long or has a backslash or a control character; rename it",
+        file.file.string());
   }
 }
 
@@ -231,8 +239,11 @@ void RequirePhoto(const PhotoFolder& folder, const std::string& name) {
     if (i < 3) known += (i == 0 ? "" : ", ") + fs::path(path).filename().string();
   }
   throw Error(ErrorCode::kNotFound,
-              "no photo in " + folder.root.string() + " is called '" + name + "'; there are " +
-                  known + (folder.photos.size() > 3 ? ", ..." : ""));
+              "no photo in {} is called '{}'; there are {}{}",
+              folder.root.string(),
+              name,
+              known,
+              folder.photos.size() > 3 ? ", ..." : "");
 }
 
 }  // namespace color3d::client

@@ -161,10 +161,10 @@ void CheckSizes(const SurfaceView& view, const char* which) {
 
 void CarryOptions::Validate() const {
   const RangeCheck check("carry option");
-  check("depth_tolerance", depth_tolerance, 1e-6, 1e6);
-  check("luminance_tolerance", luminance_tolerance, 1e-6, 1e6);
+  check("depth_tolerance", depth_tolerance, 1e-4, 1.0);
+  check("luminance_tolerance", luminance_tolerance, 1.0, 100.0);
   check("structure_tolerance", structure_tolerance, 1e-6, 1e6);
-  if (flow_tolerance_px != 0.0) check("flow_tolerance_px", flow_tolerance_px, 1e-6, 1e6);
+  if (flow_tolerance_px != 0.0) check("flow_tolerance_px", flow_tolerance_px, 0.1, 10.0);
 }
 
 CarriedColor CarryColor(const SurfaceView& source,

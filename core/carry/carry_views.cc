@@ -18,14 +18,14 @@ SurfaceMaker::SurfaceMaker(const Scene& scene,
                            const ViewImages& images,
                            const ViewImages& sweep_images,
                            SurfaceRenderer render,
-                           int sweep_sources,
+                           int depth_sources,
                            const PlaneSweepOptions& sweep,
                            const CancellationToken& cancel)
     : scene_(scene),
       images_(images),
       sweep_images_(sweep_images),
       render_(std::move(render)),
-      sweep_sources_(sweep_sources),
+      depth_sources_(depth_sources),
       sweep_(sweep),
       cancel_(cancel),
       training_(scene.TrainingViews()),
@@ -50,7 +50,7 @@ ViewSurfaces SurfaceMaker::Make(int view) const {
 
 std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rendered) const {
   const StereoPlan plan =
-      PlanStereo(scene_, view, PointsOf(view, rendered), training_, sweep_sources_);
+      PlanStereo(scene_, view, PointsOf(view, rendered), training_, depth_sources_);
   if (plan.sources.empty()) return std::nullopt;
   std::vector<std::shared_ptr<const Image>> pictures;  // keeps them alive
   const auto posed = [&](int index) {

@@ -31,12 +31,12 @@ using SurfaceRenderer = std::function<RenderedSurface(const Camera&, const Pose&
 class SurfaceMaker {
  public:
   // Surfaces have the size of `images`; planes are swept at the size of `sweep_images` with at most
-  // `sweep_sources` training views each. The references must outlive the object.
+  // `depth_sources` training views each. The references must outlive the object.
   SurfaceMaker(const Scene& scene,
                const ViewImages& images,
                const ViewImages& sweep_images,
                SurfaceRenderer render,
-               int sweep_sources,
+               int depth_sources,
                const PlaneSweepOptions& sweep,
                const CancellationToken& cancel);
 
@@ -50,7 +50,7 @@ class SurfaceMaker {
   const ViewImages& images_;
   const ViewImages& sweep_images_;
   const SurfaceRenderer render_;
-  const int sweep_sources_;
+  const int depth_sources_;
   const PlaneSweepOptions sweep_;
   const CancellationToken& cancel_;
   const std::vector<int> training_;

@@ -8,6 +8,8 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
+#include "core/base/range_check.h"
 #include "core/keyview/median.h"
 
 namespace color3d {
@@ -166,8 +168,7 @@ void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
 }  // namespace
 
 void KeyViewOptions::Validate() const {
-  if (temperature > 0.0 && std::isfinite(temperature)) return;
-  throw InvalidArgument("key view option temperature is {}, it must be > 0", temperature);
+  RangeCheck("key view option")("temperature", temperature, 1e-6, 1e6);
 }
 
 std::vector<bool> GuardedViews::Kept() const {

@@ -14,12 +14,13 @@ enum class KeyViewStrategy { kEntropy, kCoverage, kTracks, kManual };
 
 struct KeyViewOptions {
   KeyViewStrategy strategy = KeyViewStrategy::kCoverage;
-  double temperature = 1.0;   // of the softmax, > 0
+  double temperature = 1.0;   // of the softmax, 1e-6..1e6
   bool exclude_self = false;  // leave the view's similarity to itself out of the softmax
   // Set aside frames that show nothing (UnfitFrames) and, among 5 views or more, those with mean
   // similarity < median - 2 MAD.
   bool outlier_guard = true;
   void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const KeyViewOptions&) const = default;
 };
 
 struct RankedView {

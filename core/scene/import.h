@@ -28,6 +28,7 @@ struct ImportOptions {
   int sfm_neighbors = 8;  // 2..100, similar photos that each photo is matched with
   std::chrono::seconds sfm_timeout{3600};
   void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const ImportOptions&) const = default;
 };
 
 // What structure-from-motion did.

@@ -116,8 +116,8 @@ void Conclude(const Scene& scene,
 void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
   const RangeCheck check("carry_color option");
-  check("sweep_side_px", sweep_side_px, 64, 2048);
-  check("sweep_sources", sweep_sources, 1, 16);
+  check("depth_side_px", depth_side_px, 64, 2048);
+  check("depth_sources", depth_sources, 1, 16);
   if (further.size() > 16) {
     throw InvalidArgument("{} further key views were given; at most 16 are taken", further.size());
   }
@@ -130,14 +130,14 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const ViewImages images(scene, context.scene_folder(), options.max_side_px);
-  const ViewImages sweep_images(scene, context.scene_folder(), options.sweep_side_px);
+  const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);
   const SurfaceRenderer render = [&](const Camera& camera, const Pose& pose) {
     ThreadPool one(1);
     RenderedView view = RenderView(geometry, camera, pose, one);
     return RenderedSurface{std::move(view.depth), std::move(view.opacity)};
   };
   const SurfaceMaker maker(
-      scene, images, sweep_images, render, options.sweep_sources, options.sweep, context.cancel());
+      scene, images, sweep_images, render, options.depth_sources, options.sweep, context.cancel());
   const std::vector<ColoredKeyView> keys = ColorKeyViews(options, scene, images, maker, context);
 
   CarryCheckpoint done(scene, context);

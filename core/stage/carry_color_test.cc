@@ -65,7 +65,7 @@ class CarryStageTest : public StageTest {
     std::copy_n(truth_[1].Plane(1), ab.data.size(), ab.data.begin());
     AddInput(artifact::kKeyColor, EncodeAbPng(ab));
     AddInput(artifact::kGeometry, SerializeGaussians(model));
-    options_.sweep_side_px = kWidth;
+    options_.depth_side_px = kWidth;
   }
 
   nlohmann::json Run() {

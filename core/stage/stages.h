@@ -55,6 +55,7 @@ struct ColorizeKeyViewOptions {
   std::string prompt;                             // prompt; backend, may be empty
   std::string name;  // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
+  bool operator==(const ColorizeKeyViewOptions&) const = default;
 };
 // The key view in colour, and what its source tells of that.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
@@ -64,16 +65,18 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
 struct FurtherKeyView {
   std::string view;  // name or unique file stem
   ColorizeKeyViewOptions color;
+  bool operator==(const FurtherKeyView&) const = default;
 };
 
 struct CarryColorOptions {
   int max_side_px = 500;    // of the carried maps, 64..4096
-  int sweep_side_px = 300;  // at which depth is measured, 64..2048
-  int sweep_sources = 4;    // views that each view is compared with, 1..16
+  int depth_side_px = 300;  // at which depth is measured, 64..2048
+  int depth_sources = 4;    // views that each view is compared with, 1..16
   PlaneSweepOptions sweep;
   CarryOptions carry;
   std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
   void Validate() const;
+  bool operator==(const CarryColorOptions&) const = default;
 };
 // The key views' own colours in every view, as far as it shows the same; how much that is, and the
 // view to colour next.
@@ -87,6 +90,7 @@ struct AugmentationOptions {
   std::string backend;    // a generator by name; empty: the embedded surrogates
   int max_side_px = 400;  // of the pictures, 64..4096
   void Validate() const;
+  bool operator==(const AugmentationOptions&) const = default;
 };
 // Training pictures beside the key view: the files below augment/ of the scene's folder, a
 // generator's, and ours. Novel views need the geometry among the inputs.
@@ -118,6 +122,7 @@ struct ExportOptions {
   // PLY with a property "confidence", which strict viewers may refuse; needs a model that has it.
   bool confidence = false;
   void Validate() const;
+  bool operator==(const ExportOptions&) const = default;
 };
 // The model for viewers in RGB, and what that loses against our renders.
 void RunExport(const ExportOptions& options, StageContext& context);
@@ -127,6 +132,7 @@ struct RenderOptions {
   int max_views = 12;              // 1..1000, for the empty list
   int max_side_px = 500;           // 64..4096
   void Validate() const;
+  bool operator==(const RenderOptions&) const = default;
 };
 // Pictures of the model.
 void RunRender(const RenderOptions& options, StageContext& context);

@@ -1,8 +1,9 @@
 #include "server/rpc/colorize_request.h"
 
-#include "color3d/v1/job.pb.h"
+#include "core/base/utf8.h"
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/utf8.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -16,10 +17,13 @@ constexpr int kMaxSidePx = 8192;
 std::string RequireBlob(const RpcParts& parts, const v1::Digest& digest, const std::string& field) {
   const FileDigest blob = FromProto(digest);
   if (!parts.blobs.Touch(blob)) {
-    throw ServiceError(ErrorCode::kNotFound,
-                       "BLOB_MISSING",
-                       field + " names the blob " + blob.sha256 + ", which is not stored with " +
-                           std::to_string(blob.size_bytes) + " bytes; upload it and try again");
+    throw ServiceError(
+        ErrorCode::kNotFound,
+        "BLOB_MISSING",
+        "{} names the blob {}, which is not stored with {} bytes; upload it and try again",
+        field,
+        blob.sha256,
+        blob.size_bytes);
   }
   return blob.sha256;
 }
@@ -33,9 +37,9 @@ void TakePicture(const RpcParts& parts,
   if (request->image().size() > kMaxImageBytes) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "IMAGE_TOO_LARGE",
-                       "image has " + std::to_string(request->image().size()) +
-                           " bytes, at most 3 MiB are allowed; upload it as a blob and send its "
-                           "image_digest");
+                       "image has {} bytes, at most 3 MiB are allowed; upload it as a blob and "
+                       "send its image_digest",
+                       request->image().size());
   }
   if (request->has_image_digest()) {
     call->set_image_sha256(RequireBlob(parts, request->image_digest(), "image_digest"));
@@ -44,8 +48,8 @@ void TakePicture(const RpcParts& parts,
   }
   const int side = request->max_side_px();
   if (side != 0 && (side < kMinSidePx || side > kMaxSidePx)) {
-    throw InvalidArgument("max_side_px is " + std::to_string(side) +
-                          "; the range is 16 to 8192, or 0 for the picture's own size");
+    throw InvalidArgument(
+        "max_side_px is {}; the range is 16 to 8192, or 0 for the picture's own size", side);
   }
   call->set_max_side_px(side);
 }
@@ -55,11 +59,14 @@ ColorizerRecord NewestOf(const RpcParts& parts, const std::string& scene) {
   const auto newest = parts.store.ListColorizers(scene, 0, 1);
   if (!newest.empty()) return newest[0];
   parts.store.GetScene(scene);  // says so when there is no such scene
-  throw ServiceError(ErrorCode::kNotFound,
-                     "COLORIZER_NOT_FOUND",
-                     scene +
-                         " has no colorizer yet: run a personalize or a colorize_scene job of "
-                         "it first, or send a coloured picture as `example`");
+  throw ServiceError(
+      ErrorCode::kNotFound,
+      "COLORIZER_NOT_FOUND",
+      "{} has no colorizer yet: run a {} or a {} job of it first, or send a coloured "
+      "picture as `example`",
+      scene,
+      kind::kPersonalize,
+      kind::kColorizeScene);
 }
 
 ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesRequest& request) {
@@ -70,19 +77,17 @@ ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesReq
   if (!request.scene().empty() && request.scene() != record.scene) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "OTHER_SCENE",
-                       request.colorizer() + " was made for " + record.scene + ", not for " +
-                           CleanUtf8(request.scene(), 200) + "; leave out one of the two");
+                       "{} was made for {}, not for {}; leave out one of the two",
+                       request.colorizer(),
+                       record.scene,
+                       CleanUtf8(request.scene(), 200));
   }
   return record;
 }
 
 // Which weights it was trained with. They may have changed since: the worker compares digests.
 std::string EncoderOf(const RpcParts& parts, const ColorizerRecord& record) {
-  v1::JobSpec spec;
-  if (!spec.ParseFromString(parts.store.GetJob(record.job).spec)) {
-    throw Error(ErrorCode::kDataLoss, "the stored spec of " + record.job + " is damaged");
-  }
-  return spec.personalize().encoder();
+  return ParseSpec(parts.store.GetJob(record.job).spec, record.job).personalize().encoder();
 }
 
 }  // namespace
@@ -92,8 +97,8 @@ void ResolveColorizeRequest(const RpcParts& parts,
                             internal::v1::ColorizeImageRequest* call,
                             v1::ColorizeImagesResponse* response) {
   if (request->request_id().size() > kMaxRequestIdBytes) {
-    throw InvalidArgument("request_id has " + std::to_string(request->request_id().size()) +
-                          " bytes; at most 128 are allowed");
+    throw InvalidArgument("request_id has {} bytes; at most 128 are allowed",
+                          request->request_id().size());
   }
   response->set_request_id(request->request_id());
   const bool trained = !request->colorizer().empty() || !request->scene().empty();

@@ -1,5 +1,6 @@
 #include "server/rpc/inference_client.h"
 
+#include <fmt/core.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 
@@ -35,10 +36,10 @@ grpc::Status Explained(const grpc::Status& status, bool our_limit) {
   const std::string what =
       late
           ? "the inference worker did not answer in time (it is busy, or cannot start: see its log)"
-          : "the inference worker ended before it had coloured this picture (" +
-                status.error_message() + ")";
+          : fmt::format("the inference worker ended before it had coloured this picture ({})",
+                        status.error_message());
   return ToGrpcStatus(
-      ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", what + "; send the picture again"));
+      ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", "{}; send the picture again", what));
 }
 
 }  // namespace

@@ -3,10 +3,11 @@
 #include <algorithm>
 
 #include "core/base/memory.h"
+#include "core/base/utf8.h"
+#include "core/catalogue/stages.h"
 #include "server/ops/process.h"
-#include "server/planning/spec_check.h"
+#include "server/planning/presets.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/utf8.h"
 
 namespace color3d {
 namespace {
@@ -23,6 +24,14 @@ void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
     } catch (const Error& e) {
       model->set_problem(CleanUtf8(e.what()));
     }
+  }
+}
+
+void ListPresets(v1::ServerInfo* info) {
+  for (const Preset& preset : Presets()) {
+    v1::PresetInfo* entry = info->add_presets();
+    entry->set_name(preset.name);
+    *entry->mutable_options() = preset.options;
   }
 }
 
@@ -88,7 +97,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
                                                            v1::ServerInfo* response) {
   return AnswerUnary(parts_, context, request, response, [this](const auto&, v1::ServerInfo* out) {
     out->set_version(parts_.version);
-    for (const std::string& kind : BuiltKinds()) out->add_job_kinds(kind);
+    for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
     v1::Limits* limits = out->mutable_limits();
     limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
     limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);
@@ -104,6 +113,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
       entry->set_memory_bytes(worker.memory_bytes);
       entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
     }
+    ListPresets(out);
     ListModels(parts_, out);
     ListBackends(parts_, out);
     out->set_draining(parts_.draining.load());

@@ -82,7 +82,7 @@ TEST_F(JobRecordsTest, StoreOfVersion1IsBroughtUpToDate) {
   EXPECT_EQ(store_->ListScenes(0, 10).size(), 1u);
 }
 
-TEST_F(JobRecordsTest, OnlyAColouredKeyViewOfTheSceneIsAccepted) {
+TEST_F(JobRecordsTest, OnlyAColoredKeyViewOfTheSceneIsAccepted) {
   SceneRecord other;
   other.name = "scenes/other";
   store_->CreateScene(other, {});

@@ -104,12 +104,12 @@ TEST_F(JobStateTest, HeartbeatKeepsTheLease) {
     now_ += kLease - 100;
     ProgressRecord progress;
     progress.step = i;
-    store_->Heartbeat(LeaseOf(job), progress, {"warned"}, kLease);
+    store_->Heartbeat(LeaseOf(job), progress, {.warnings = {"warned"}}, kLease);
     EXPECT_EQ(store_->ReapExpired(), 0);
   }
   const JobRecord running = store_->GetJob(job.name);
   EXPECT_EQ(running.progress.step, 4);
-  EXPECT_EQ(running.warnings, std::vector<std::string>{"warned"});
+  EXPECT_EQ(running.usage.warnings, std::vector<std::string>{"warned"});
 }
 
 TEST_F(JobStateTest, PoisonJobStopsAfterItsAttempts) {
@@ -268,7 +268,7 @@ TEST_F(JobStateTest, PriorityThenAge) {
   EXPECT_EQ(ClaimOne().name, first.name);
 }
 
-NewGraph Companions(int count) {
+NewGraph PersonalizeJobs(int count) {
   NewGraph graph;
   graph.scene = "scenes/test";
   for (int i = 0; i < count; ++i) {
@@ -286,38 +286,38 @@ NewGraph Companions(int count) {
 
 const auto kAnyJob = [](const JobRecord&) { return true; };
 
-TEST_F(JobStateTest, CompanionsTakeTurnsBetweenSubmittedJobs) {
-  const JobRecord many = store_->CreateGraph(Companions(5), {}, kNoLimit);
-  const JobRecord few = store_->CreateGraph(Companions(1), {}, kNoLimit);
+TEST_F(JobStateTest, JobsOfABatchTakeTurnsBetweenSubmittedJobs) {
+  const JobRecord many = store_->CreateGraph(PersonalizeJobs(5), {}, kNoLimit);
+  const JobRecord few = store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
   EXPECT_EQ(ClaimOne().parent, many.name);
-  const auto next = [&] { return store_->ClaimCompanion("w", kLease, "personalize", kAnyJob); };
+  const auto next = [&] { return store_->ClaimForBatch("w", kLease, "personalize", kAnyJob); };
   EXPECT_EQ(next()->parent, few.name) << "it has none running yet";
   const auto third = next();
   EXPECT_EQ(third->parent, many.name);
   EXPECT_EQ(third->state, JobState::kRunning);
   EXPECT_EQ(third->attempt, 1);
   EXPECT_FALSE(
-      store_->ClaimCompanion("w", kLease, "personalize", [](const JobRecord&) { return false; }));
+      store_->ClaimForBatch("w", kLease, "personalize", [](const JobRecord&) { return false; }));
 }
 
-TEST_F(JobStateTest, CompanionsDoNotOvertakeOtherKinds) {
-  store_->CreateGraph(Companions(2), {}, kNoLimit);
+TEST_F(JobStateTest, JobsOfABatchDoNotOvertakeOtherKinds) {
+  store_->CreateGraph(PersonalizeJobs(2), {}, kNoLimit);
   ClaimOne();
   const JobRecord other = CreateSingle();
-  EXPECT_TRUE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob)) << "it came before";
-  store_->CreateGraph(Companions(1), {}, kNoLimit);
-  EXPECT_FALSE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob));
+  EXPECT_TRUE(store_->ClaimForBatch("w", kLease, "personalize", kAnyJob)) << "it came before";
+  store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
+  EXPECT_FALSE(store_->ClaimForBatch("w", kLease, "personalize", kAnyJob));
   EXPECT_EQ(ClaimOne().name, other.name);
-  EXPECT_TRUE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob));
+  EXPECT_TRUE(store_->ClaimForBatch("w", kLease, "personalize", kAnyJob));
 }
 
 TEST_F(JobStateTest, AJobThatAWorkerWasLostWithGetsNoCompany) {
-  store_->CreateGraph(Companions(1), {}, kNoLimit);
+  store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
   ClaimOne();
   now_ += kLease + 1;
   EXPECT_EQ(store_->ReapExpired(), 1);
   now_ += 1'000'000;
-  EXPECT_FALSE(store_->ClaimCompanion("w", kLease, "personalize", kAnyJob));
+  EXPECT_FALSE(store_->ClaimForBatch("w", kLease, "personalize", kAnyJob));
   EXPECT_EQ(ClaimOne().attempt, 2);
 }
 
@@ -325,7 +325,7 @@ TEST_F(JobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   SceneRecord scene;
   scene.name = "scenes/other";
   store_->CreateScene(scene, {});
-  NewGraph graph = Companions(2);
+  NewGraph graph = PersonalizeJobs(2);
   graph.jobs[1].scene = "scenes/other";
   EXPECT_EQ(ReasonThrown([&] { store_->CreateGraph(graph, {}, kNoLimit); }), "SCENE_NOT_ACTIVE");
   store_->ActivateScene("scenes/other", StoredLayout::kPhotos, 1, {});

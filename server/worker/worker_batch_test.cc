@@ -142,7 +142,7 @@ TEST_F(WorkerBatchTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
     EXPECT_EQ(job.state, JobState::kSucceeded);
     ASSERT_EQ(job.artifacts.size(), 1u);
     EXPECT_EQ(job.artifacts[0].digest.sha256, Sha256Hex("of " + job.name)) << "another's result";
-    EXPECT_GT(job.peak_memory_bytes, 0);
+    EXPECT_GT(job.usage.peak_memory_bytes, 0);
   }
   EXPECT_EQ(succeeded, 2);
 }

@@ -17,9 +17,9 @@ struct PipelineArguments {
   int threads = 2;
   uint64_t seed = 1;
   std::string key_view;
-  GeometryOptions geometry;
-  ColorizerOptions colorizer;
-  ChromaOptions chroma;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
+  ColorizerOptions colorizer{.iterations = 800};
+  ChromaOptions chroma{.iterations = 600};
   bool paper = false;
   bool carry = true;
   bool bound = false;

@@ -38,8 +38,8 @@ struct ChromaArguments {
   int memory_budget_mib = 2048;
   std::string runs = "closed,cg,adam-preset,adam";
   std::vector<int> degrees = {0, 1};
-  GeometryOptions geometry;
-  ChromaOptions chroma;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
+  ChromaOptions chroma{.iterations = 600};
 };
 
 // Of all threads: what is left of a timing on a machine that others use too.

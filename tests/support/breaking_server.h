@@ -1,5 +1,7 @@
-// The client library against a server that breaks connections on purpose.
-#include <gmock/gmock.h>
+// A server that breaks connections on purpose, and the fixture of the client library's tests
+// against it.
+#pragma once
+
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
@@ -11,16 +13,15 @@
 #include "core/base/files.h"
 
 namespace color3d::client {
-namespace {
 
 namespace bs = google::bytestream;
-namespace fs = std::filesystem;
-using ::testing::ElementsAre;
 
-std::string Digits(const std::string& resource) { return resource.substr(resource.find("blobs/")); }
+inline std::string Digits(const std::string& resource) {
+  return resource.substr(resource.find("blobs/"));
+}
 
 // Holds blobs by "blobs/{sha}/{size}"; drops every stream but the last after `limit` bytes.
-class FakeBlobs final : public bs::ByteStream::Service, public v1::BlobService::Service {
+class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobService::Service {
  public:
   std::map<std::string, std::string> blobs;
   std::map<std::string, std::string> uploads;
@@ -94,7 +95,7 @@ class FakeBlobs final : public bs::ByteStream::Service, public v1::BlobService::
 };
 
 // Streams scripted one after the other: revisions to send, then a status.
-class FakeJobs final : public v1::JobService::Service {
+class BreakingJobs final : public v1::JobService::Service {
  public:
   struct Stream {
     std::vector<int64_t> revisions;
@@ -124,9 +125,9 @@ class FakeJobs final : public v1::JobService::Service {
   }
 };
 
-class FakeServerTest : public ::testing::Test {
+class BreakingServerTest : public ::testing::Test {
  protected:
-  FakeServerTest() {
+  BreakingServerTest() {
     grpc::ServerBuilder builder;
     int port = 0;
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
@@ -151,142 +152,17 @@ class FakeServerTest : public ::testing::Test {
   }
 
   CancellationToken cancel_;
-  FakeBlobs blobs_;
-  FakeJobs jobs_;
+  BreakingBlobs blobs_;
+  BreakingJobs jobs_;
   std::unique_ptr<grpc::Server> server_;
   std::unique_ptr<Connection> connection_;
   ScratchFolder scratch_;
-  fs::path file_ = scratch_.path() / "file";
-  fs::path target_ = scratch_.path() / "out/deep/result.bin";
+  std::filesystem::path file_ = scratch_.path() / "file";
+  std::filesystem::path target_ = scratch_.path() / "out/deep/result.bin";
   std::string bytes_;
   FileDigest digest_;
   std::string name_;
   int64_t last_done_ = -1;
 };
 
-TEST_F(FakeServerTest, UploadGoesOnWhereTheConnectionBroke) {
-  blobs_.drops = 2;
-  blobs_.limit = 1'000'000;
-  Upload(bytes_);
-  EXPECT_EQ(blobs_.blobs[name_], bytes_);
-  EXPECT_EQ(blobs_.writes, 3);
-  EXPECT_EQ(blobs_.uploads.size(), 1u);
-  EXPECT_EQ(last_done_, digest_.size_bytes);
-  Upload(bytes_);  // it is there: nothing is sent
-  EXPECT_EQ(blobs_.writes, 3);
-}
-
-TEST_F(FakeServerTest, EmptyFilesTravelToo) {
-  bytes_.clear();
-  digest_ = {Sha256Hex(""), 0};
-  name_ = "blobs/" + digest_.sha256 + "/0";
-  Upload("");
-  ASSERT_TRUE(blobs_.blobs.contains(name_));
-  Download();
-  EXPECT_EQ(ReadFile(target_), "");
-}
-
-TEST_F(FakeServerTest, FileThatBecameShorterIsNamed) {
-  try {
-    Upload(bytes_.substr(0, 1000));
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
-    EXPECT_THAT(e.what(), ::testing::HasSubstr("changed while it was read"));
-  }
-}
-
-TEST_F(FakeServerTest, CancelEndsAnUpload) {
-  cancel_.Cancel();
-  EXPECT_THROW(Upload(bytes_), Error);
-}
-
-TEST_F(FakeServerTest, DownloadResumesAndLeavesNothingElseBehind) {
-  blobs_.blobs[name_] = bytes_;
-  blobs_.drops = 2;
-  blobs_.limit = 700'000;
-  Download();
-  EXPECT_EQ(ReadFile(target_), bytes_);
-  EXPECT_EQ(std::distance(fs::directory_iterator(target_.parent_path()), {}), 1);
-  blobs_.blobs.clear();
-  EXPECT_NO_THROW(Download());  // it is there already
-}
-
-TEST_F(FakeServerTest, DownloadRefusesOtherBytes) {
-  blobs_.blobs[name_] = bytes_;
-  blobs_.corrupt = true;
-  try {
-    Download();
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ErrorCode::kDataLoss);
-  }
-  EXPECT_FALSE(fs::exists(target_));
-}
-
-TEST_F(FakeServerTest, DownloadOfAMissingBlobIsNotFound) {
-  try {
-    Download();
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ErrorCode::kNotFound);
-  }
-}
-
-TEST_F(FakeServerTest, WatchResumesAtTheLastRevision) {
-  const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
-  jobs_.script = {{{3, 5}, broken, 2200}, {{8}, broken}, {{9}, grpc::Status::OK}};
-  std::vector<int64_t> seen;
-  const WatchEnd end = WatchJobs(
-      *connection_,
-      {"jobs/1"},
-      [&](const v1::JobEvent& event) { seen.push_back(event.revision()); },
-      [] { return true; });
-  EXPECT_EQ(end, WatchEnd::kFinished);
-  EXPECT_THAT(seen, ElementsAre(3, 5, 8, 9));
-  EXPECT_THAT(jobs_.asked, ElementsAre(0, 5, 8));
-}
-
-TEST_F(FakeServerTest, WatchTakesTheWholeStateAgainWhenTheFirstStreamBroke) {
-  const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
-  jobs_.script = {{{7}, broken}, {{7}, grpc::Status::OK}};
-  WatchJobs(
-      *connection_, {"jobs/1"}, [](const v1::JobEvent&) {}, [] { return true; });
-  EXPECT_THAT(jobs_.asked, ElementsAre(0, 0));
-}
-
-TEST_F(FakeServerTest, WatchStartsAnewWhenItsRevisionIsGone) {
-  const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
-  const grpc::Status gone(grpc::StatusCode::OUT_OF_RANGE, "compacted");
-  jobs_.script = {{{4}, broken, 2200}, {{}, gone}, {{6}, grpc::Status::OK}};
-  WatchJobs(
-      *connection_, {"jobs/1"}, [](const v1::JobEvent&) {}, [] { return true; });
-  EXPECT_THAT(jobs_.asked, ElementsAre(0, 4, 0));
-}
-
-TEST_F(FakeServerTest, WatchStopsWhenAskedAndThrowsWhatTheServerSays) {
-  jobs_.script = {{{1}, grpc::Status::OK, 5000},
-                  {{}, grpc::Status(grpc::StatusCode::NOT_FOUND, "no such job")}};
-  int events = 0;
-  const auto count = [&](const v1::JobEvent&) { ++events; };
-  EXPECT_EQ(WatchJobs(*connection_, {"jobs/1"}, count, [&] { return events == 0; }),
-            WatchEnd::kStopped);
-  EXPECT_THROW(WatchJobs(*connection_, {"jobs/1"}, count, [] { return true; }), RpcError);
-}
-
-TEST(Connection, SaysHowToStartAServer) {
-  const CancellationToken cancel;
-  const auto begun = std::chrono::steady_clock::now();
-  try {
-    Connection("127.0.0.1:1", cancel);
-    FAIL();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ErrorCode::kUnavailable);
-    EXPECT_THAT(e.what(), ::testing::HasSubstr("cannot reach a server at 127.0.0.1:1"));
-    EXPECT_THAT(e.what(), ::testing::HasSubstr("color3d-server serve"));
-  }
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
-}
-
-}  // namespace
 }  // namespace color3d::client

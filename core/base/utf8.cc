@@ -1,11 +1,11 @@
-#include "server/rpc/utf8.h"
+#include "core/base/utf8.h"
 
 #include <cstdint>
 
 namespace color3d {
 namespace {
 
-// Length of the valid UTF-8 character at the start of `text`; 0 when there is none (RFC 3629).
+// Length of the valid character at the start of `text`; 0 when there is none.
 size_t CharacterLength(std::string_view text) {
   const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
   if (byte(0) < 0x80) return 1;
@@ -32,6 +32,15 @@ size_t CharacterLength(std::string_view text) {
 }
 
 }  // namespace
+
+bool IsUtf8(std::string_view text) {
+  while (!text.empty()) {
+    const size_t length = CharacterLength(text);
+    if (length == 0) return false;
+    text.remove_prefix(length);
+  }
+  return true;
+}
 
 std::string CleanUtf8(std::string_view text, size_t max_bytes) {
   std::string clean;

@@ -120,7 +120,7 @@ TEST_F(PhotoFolderTest, RefusesNamesThatAreNotText) {
   EXPECT_THAT(ErrorOf(root()), HasSubstr("not UTF-8"));
 }
 
-TEST_F(PhotoFolderTest, FindsThePhotoOfAColouredCopy) {
+TEST_F(PhotoFolderTest, FindsThePhotoOfAColoredCopy) {
   for (const char* name : {"images/a.jpg", "images/b.jpg", "images/x/b.jpg"}) Write(name);
   const PhotoFolder folder = CollectPhotos(root());
   EXPECT_EQ(PhotoOfSameStem(folder, "/elsewhere/a.png"), "a.jpg");

@@ -37,19 +37,5 @@ TEST(Names, ByteStreamResources) {
   EXPECT_EQ(UploadResource("u-1", digest), "uploads/u-1/blobs/" + std::string(64, 'a') + "/12");
 }
 
-TEST(Names, Utf8) {
-  EXPECT_TRUE(IsUtf8(""));
-  EXPECT_TRUE(IsUtf8("photo.jpg"));
-  EXPECT_TRUE(IsUtf8("\xc3\xa9t\xc3\xa9.jpg"));
-  EXPECT_TRUE(IsUtf8("\xe2\x82\xac"));
-  EXPECT_TRUE(IsUtf8("\xf0\x9f\x93\xb7"));
-  EXPECT_FALSE(IsUtf8("\xe9t\xe9.jpg"));     // Latin-1
-  EXPECT_FALSE(IsUtf8("\xc0\xaf"));          // overlong
-  EXPECT_FALSE(IsUtf8("\xe0\x80\xaf"));      // overlong
-  EXPECT_FALSE(IsUtf8("\xed\xa0\x80"));      // surrogate
-  EXPECT_FALSE(IsUtf8("\xf4\x90\x80\x80"));  // beyond U+10FFFF
-  EXPECT_FALSE(IsUtf8("\xe2\x82"));          // cut short
-}
-
 }  // namespace
 }  // namespace color3d::client

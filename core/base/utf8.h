@@ -1,5 +1,5 @@
-// Protobuf strings must be valid UTF-8, or clients cannot parse the message; texts of ours may
-// quote bytes of files and third-party programs.
+// UTF-8 by RFC 3629. Protobuf strings must be valid, or nobody can parse the message; file names
+// and the output of other programs need not be.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +7,8 @@
 #include <string_view>
 
 namespace color3d {
+
+bool IsUtf8(std::string_view text);
 
 // `text` with every byte that is no part of valid UTF-8 replaced by '?', cut to at most `max_bytes`
 // without splitting a character.
