@@ -3,6 +3,7 @@
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
+#include "core/splat/chroma/chroma_fit.h"
 
 namespace color3d {
 namespace {
@@ -43,8 +44,10 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   };
   WithoutCurves progress(context.progress());
   NoCheckpoints none;
-  return FitChroma(
-      geometry, scene, images, targets, options, pool, none, progress, context.cancel());
+  return FitChroma(geometry,
+                   ChromaProblemOf(scene, images, targets),
+                   options,
+                   {pool, none, progress, context.cancel()});
 }
 
 }  // namespace color3d

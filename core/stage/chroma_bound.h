@@ -6,7 +6,8 @@
 #include <map>
 
 #include "core/base/parallel.h"
-#include "core/splat/training/trainer.h"
+#include "core/splat/chroma/chroma_options.h"
+#include "core/splat/model/gaussian_model.h"
 #include "core/stage/stage.h"
 
 namespace color3d {

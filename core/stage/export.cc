@@ -66,8 +66,11 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   RgbRefineOptions refine;
   refine.seed = context.seed();
   const auto refined = [&](RgbHarmonics start) {
-    return RefineRgbHarmonics(
-        model, std::move(start), views, refine, pool, context.progress(), context.cancel());
+    return RefineRgbHarmonics(model,
+                              std::move(start),
+                              views,
+                              refine,
+                              {pool, context.checkpoints(), context.progress(), context.cancel()});
   };
   const RgbHarmonics fitted = FitRgbHarmonics(model, pool);
   nlohmann::ordered_json scores;

@@ -4,6 +4,7 @@
 
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
+#include "core/splat/chroma/chroma_fit.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -48,15 +49,11 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     return target;
   };
   ThreadPool pool(context.threads());
-  const GaussianModel model = FitChroma(geometry,
-                                        scene,
-                                        images,
-                                        targets,
-                                        options,
-                                        pool,
-                                        context.checkpoints(),
-                                        context.progress(),
-                                        context.cancel());
+  const GaussianModel model =
+      FitChroma(geometry,
+                ChromaProblemOf(scene, images, targets),
+                options,
+                {pool, context.checkpoints(), context.progress(), context.cancel()});
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }
 

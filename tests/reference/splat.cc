@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/raster/raster_constants.h"
 #include "tests/reference/jet.h"
 
 namespace color3d {

@@ -7,7 +7,9 @@
 
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/model/model_parameters.h"
+#include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/pipeline.h"
+#include "core/splat/raster/raster_camera.h"
 #include "tests/stability/tiny_problem.h"
 
 namespace color3d {
@@ -78,7 +80,7 @@ double NormalMatrixCondition(const Fit& f, ThreadPool& pool) {
 
 // Largest chroma among the Gaussians, Lab units; spherical harmonics' constant term only.
 double LargestChroma(const GaussianModel& model) {
-  const double scale = 255.0 * 0.28209479177387814;
+  const double scale = 255.0 * kShDc;
   const size_t stride = model.sh_a.size() / std::max<size_t>(1, model.size());
   double largest = 0.0;
   for (size_t i = 0; i < model.size(); ++i) {
@@ -95,7 +97,7 @@ StabilityResult Run(const Fit& f, ThreadPool& pool) {
   TrainingWitness witness;
   NoCheckpoints none;
   const GaussianModel model =
-      FitChromaOn(f.geometry, problem, f.options, pool, none, witness, CancellationToken());
+      FitChroma(f.geometry, problem, f.options, {pool, none, witness, CancellationToken()});
   StabilityResult result;
   result.condition =
       f.singular ? std::numeric_limits<double>::infinity() : NormalMatrixCondition(f, pool);

@@ -1,4 +1,5 @@
-// What training geometry takes in memory, and how to stay within what there is. Pure functions.
+// How many Gaussians a scene is worth, what training them takes in memory, and how to stay within
+// what there is. Pure functions.
 //
 // Per Gaussian, in floats, with R = 11 + (degree + 1)^2 parameters: parameters and two Adam moments
 // (3R), the last good state (3R), the gradient (R), one copy while densifying (R), a checkpoint
@@ -35,6 +36,10 @@ struct MemoryPlan {
   int64_t budget_bytes = 0;
   std::string note;  // what was reduced and why; empty when nothing was
 };
+
+// `wanted`, or fewer when the training views, at their working size, are small: more Gaussians than
+// one in fifty of their pixels cost time and fit noise. Not below 5000 for that reason.
+int GaussianCap(int wanted, const std::vector<Camera>& training);
 
 int64_t BytesPerGaussian(int sh_degree);
 
