@@ -26,7 +26,7 @@ struct Fit {
   bool singular = false;  // beyond what NormalMatrixCondition sees
 };
 
-std::shared_ptr<ChromaTarget> OneColour(float a, float b, float weight) {
+std::shared_ptr<ChromaTarget> OneColor(float a, float b, float weight) {
   auto target = std::make_shared<ChromaTarget>();
   target->ab = Image(kSide, kSide, 2, a);
   std::fill_n(target->ab.Plane(1), target->ab.PlaneSize(), b);
@@ -37,7 +37,7 @@ std::shared_ptr<ChromaTarget> OneColour(float a, float b, float weight) {
 Fit Ordinary() {
   Fit f;
   for (int i = 0; i < 3; ++i) f.cameras.push_back(OrbitCamera(i, kSide, kSide, 0.2 * i));
-  f.target = [](int) { return OneColour(kA, kB, 1.0f); };
+  f.target = [](int) { return OneColor(kA, kB, 1.0f); };
   f.options.iterations = 40;
   return f;
 }
@@ -172,12 +172,12 @@ void AddChromaCases(std::vector<StabilityCase>& cases) {
   add("opacities and sizes badly scaled", BadlyScaled);
   add("all weights zero", [] {
     Fit f = Singular();
-    f.target = [](int) { return OneColour(kA, kB, 0.0f); };
+    f.target = [](int) { return OneColor(kA, kB, 0.0f); };
     return f;
   });
   add("weights of 1e-30", [] {
     Fit f = Singular();
-    f.target = [](int) { return OneColour(kA, kB, 1e-30f); };
+    f.target = [](int) { return OneColor(kA, kB, 1e-30f); };
     return f;
   });
   add("no view has colours", [] {
@@ -193,12 +193,12 @@ void AddChromaCases(std::vector<StabilityCase>& cases) {
   });
   add("neutral targets", [] {
     Fit f = Ordinary();
-    f.target = [](int) { return OneColour(0.0f, 0.0f, 1.0f); };
+    f.target = [](int) { return OneColor(0.0f, 0.0f, 1.0f); };
     return f;
   });
   add("a saturated colour", [] {
     Fit f = Ordinary();
-    f.target = [](int) { return OneColour(98.0f, -108.0f, 1.0f); };
+    f.target = [](int) { return OneColor(98.0f, -108.0f, 1.0f); };
     return f;
   });
   add("one Gaussian", [] {

@@ -95,7 +95,7 @@ TEST(FitChromaTest, ClosedFormIsCloseAndAdamGetsCloser) {
   EXPECT_LT(errors[1], 0.7 * errors[0]);
 }
 
-TEST(FitChromaTest, UnseenGaussiansTakeTheirNeighboursColours) {
+TEST(FitChromaTest, UnseenGaussiansTakeTheirNeighborsColors) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 48, 1500);
   GaussianModel geometry = GreyRoom(s);
   // One far behind all cameras, and one on the floor before them but transparent.
@@ -206,19 +206,19 @@ TEST(FitChromaTest, NoWeightAnywhereLeavesNeutralChroma) {
   ExpectFiniteAndBelow(Fit(RandomGaussians(30, 4), problem, {}), 0.0);
 }
 
-TEST(FitChromaTest, NoViewHasColours) {
+TEST(FitChromaTest, NoViewHasColors) {
   ChromaProblem problem = RandomProblem(2, 6);
   problem.targets = [](int) { return nullptr; };
   ExpectFiniteAndBelow(Fit(RandomGaussians(30, 4), problem, {}), 0.0);
 }
 
-TEST(FitChromaTest, OnePixelColoursAllGaussiansAlike) {
+TEST(FitChromaTest, OnePixelColorsAllGaussiansAlike) {
   const GaussianModel model =
       Fit(RandomGaussians(30, 4), ConstantProblem(1, 40.0f, -20.0f, 1, 1), {});
   ExpectFiniteAndBelow(model, 100.0);  // the pixel is half transparent
 }
 
-TEST(FitChromaTest, AConstantTargetGivesItsColourWhereTheSceneIsSolid) {
+TEST(FitChromaTest, AConstantTargetGivesItsColorWhereTheSceneIsSolid) {
   for (const int degree : {0, 1}) {
     ChromaOptions options;
     options.chroma_sh_degree = degree;
@@ -235,7 +235,7 @@ TEST(FitChromaTest, AConstantTargetGivesItsColourWhereTheSceneIsSolid) {
   }
 }
 
-TEST(FitChromaTest, CopiesOfOneGaussianShareItsColour) {
+TEST(FitChromaTest, CopiesOfOneGaussianShareItsColor) {
   GaussianModel copies;
   for (int i = 0; i < 20; ++i) {
     copies.position.insert(copies.position.end(), {0.0f, 0.0f, 3.0f});

@@ -205,11 +205,12 @@ class GeometryTrainer {
 
   // Parameters from the gradient. False when something was not finite.
   bool Update() {
+    const GeometryTuning& tuning = schedule_.tuning();
     clock_.Enter(Phase::kAdam);
-    if (schedule_.tuning().opacity_penalty > 0.0 || schedule_.tuning().scale_penalty > 0.0) {
+    if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
       AddPenaltyGradients(state_.parameters,
-                          static_cast<float>(schedule_.tuning().opacity_penalty),
-                          static_cast<float>(schedule_.tuning().scale_penalty / problem_.extent),
+                          static_cast<float>(tuning.opacity_penalty),
+                          static_cast<float>(tuning.scale_penalty / problem_.extent),
                           run_.pool,
                           gradient_);
     }
@@ -219,10 +220,9 @@ class GeometryTrainer {
             gradient_, rates, state_.iteration + 1, run_.pool, state_.parameters, state_.moments)) {
       return false;
     }
-    if (schedule_.tuning().max_needle_ratio > 0.0) {
-      LimitNeedles(static_cast<float>(std::log(schedule_.tuning().max_needle_ratio)),
-                   run_.pool,
-                   state_.parameters);
+    if (tuning.max_needle_ratio > 0.0) {
+      LimitNeedles(
+          static_cast<float>(std::log(tuning.max_needle_ratio)), run_.pool, state_.parameters);
     }
     clock_.Enter(Phase::kOther);
     return true;
@@ -249,8 +249,9 @@ class GeometryTrainer {
       densify.gradient_threshold = options_.densify_gradient;
       densify.clone_below_scale = 0.01 * problem_.extent;
       densify.max_gaussians = CountAllowed();
-      if (schedule_.tuning().prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
-        densify.prune_scale = schedule_.tuning().prune_scale * problem_.extent;
+      const double prune_scale = schedule_.tuning().prune_scale;
+      if (prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
+        densify.prune_scale = prune_scale * problem_.extent;
       }
       DensifyByGradient(densify, target);
     }
