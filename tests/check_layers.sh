@@ -57,7 +57,7 @@ for part in model raster training geometry chroma export; do
   lower="$lower${lower:+|}$part"
   allow "core/splat/$part" "core/(base|simd|color|image|scene|splat/($lower))"
 done
-allow core/report 'core/(base|image|report)'
+allow core/report 'core/(base|catalogue|image|report)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
 allow server/store 'core/(base|catalogue)|server/store'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'

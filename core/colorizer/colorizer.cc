@@ -15,8 +15,9 @@
 #include "core/colorizer/recipe.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/colorizer/training_session.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 
 namespace color3d {

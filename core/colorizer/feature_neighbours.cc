@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_archive.h"
+#include "core/encoder/image_tensors.h"
 #include "core/image/codec.h"
 
 namespace color3d {

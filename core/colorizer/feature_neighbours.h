@@ -17,7 +17,7 @@
 #include "core/base/random.h"
 #include "core/colorizer/archive.h"
 #include "core/colorizer/colorizer.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 
 namespace color3d {
 

@@ -10,8 +10,9 @@
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_archive.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 
@@ -23,9 +24,6 @@ using Json = nlohmann::json;
 constexpr char kMagic[] = "C3DCOLR1";
 constexpr uint32_t kVersion = 3;  // 3: weights of the neighbours
 constexpr char kWhat[] = "the colorizer file";
-// Guided upsampling: windows of 5x5 cells; contrasts of L below about 4 units are no edges.
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
 constexpr double kMaxAb = 128.0;  // Lab units; sRGB spans about -108..98
 
 Image CropTo(const Image& image, int width, int height) {
@@ -85,8 +83,8 @@ PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps
   const NeighbourColors found = parts_.neighbours->Lookup(taps, luminance, picture_height, wanted);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
-  const torch::Tensor near = TensorFromImage(UpsampleGuided(
-      ImageFromTensor(found.ab), ImageFromTensor(guide), kGuideRadius, kGuideVarianceFloor));
+  const torch::Tensor near =
+      TensorFromImage(UpsampleGuided(ImageFromTensor(found.ab), ImageFromTensor(guide)));
   if (!decode) return {near, found.distance};
   return {torch::lerp(near, decoded, DecoderShare(found.variance, decoded)), found.distance};
 }
@@ -126,8 +124,7 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
                                                    const Image& luminance,
                                                    const Image& known) const {
   const Answer answer = Ask(taps, padded, small.height, WantedCells(known, small));
-  const Image fine = UpsampleGuided(
-      ImageFromTensor(answer.ab), ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
+  const Image fine = UpsampleGuided(ImageFromTensor(answer.ab), ImageFromTensor(padded));
   ColorPrediction prediction;
   prediction.ab = CropTo(fine, small.width, small.height);
   if (answer.distance.defined()) {
@@ -136,7 +133,7 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
         CropTo(Resize(coarse, fine.width, fine.height), small.width, small.height);
   }
   if (small.width == luminance.width && small.height == luminance.height) return prediction;
-  prediction.ab = UpsampleGuided(prediction.ab, luminance, kGuideRadius, kGuideVarianceFloor);
+  prediction.ab = UpsampleGuided(prediction.ab, luminance);
   if (!prediction.distance.Empty()) {
     prediction.distance = Resize(prediction.distance, luminance.width, luminance.height);
   }

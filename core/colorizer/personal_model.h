@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 
 namespace color3d {
 

@@ -13,8 +13,8 @@
 #include "core/color/difference.h"
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/tensor_archive.h"
-#include "core/encoder/convnext.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
+#include "core/encoder/torch_threads.h"
 
 namespace color3d {
 namespace {

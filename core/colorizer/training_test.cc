@@ -14,7 +14,8 @@
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
 #include "core/colorizer/training_session.h"
-#include "core/encoder/random_features.h"
+#include "core/encoder/image_tensors.h"
+#include "tests/support/random_features.h"
 
 namespace color3d {
 namespace {

@@ -5,7 +5,8 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 
 namespace color3d {
@@ -13,8 +14,9 @@ namespace color3d {
 std::vector<TapImage> TapImages(const Encoder& encoder, const Image& luminance) {
   const auto* network = dynamic_cast<const ConvNext*>(&encoder);
   if (network == nullptr) {
-    throw InvalidArgument("the encoder (" + encoder.description() +
-                          ") has no feature maps; use a ConvNeXt or the embedded one");
+    throw InvalidArgument(
+        "the encoder ({}) has no feature maps; use a ConvNeXt or the embedded one",
+        encoder.description());
   }
   const ConvNextConfig& config = network->config();
   const int multiple = config.Stride(config.StageCount() - 1);

@@ -5,7 +5,7 @@
 #include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/encoder/clip/clip.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/keycolor/external/remote.h"

@@ -16,9 +16,6 @@
 namespace color3d {
 namespace {
 
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
-
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
     throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
@@ -100,7 +97,7 @@ HintSolution Solve(const Image& luminance,
     const Image small = FitWithin(luminance, options.max_side_px);
     solution =
         SolveAtSize(small, Reduce(hints, small.width, small.height), options, progress, cancel);
-    solution.ab = UpsampleGuided(solution.ab, luminance, kGuideRadius, kGuideVarianceFloor);
+    solution.ab = UpsampleGuided(solution.ab, luminance);
     for (size_t i = 0; i < hints.hinted.size(); ++i) {
       if (!hints.hinted[i]) continue;
       solution.ab.Plane(0)[i] = hints.ab.Plane(0)[i];

@@ -31,8 +31,6 @@ constexpr Eigen::Index kScaleSample = 500;
 constexpr int kLevels = 1024;  // of the histograms of L
 // Smallest weight of a match: regions without any get their neighbours' colour.
 constexpr float kLeastConfidence = 1e-4f;
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
 
 void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -203,8 +201,7 @@ void Spread(const Image& luminance,
   Image spread(small.width, small.height, 2);
   spread.data = std::move(solved.u);
   const bool same = small.width == luminance.width && small.height == luminance.height;
-  solution.ab = same ? std::move(spread)
-                     : UpsampleGuided(spread, luminance, kGuideRadius, kGuideVarianceFloor);
+  solution.ab = same ? std::move(spread) : UpsampleGuided(spread, luminance);
   solution.confidence = Resize(cell_confidence, luminance.width, luminance.height);
 }
 

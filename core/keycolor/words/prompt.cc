@@ -18,8 +18,10 @@ namespace {
 constexpr const char* kBackgrounds[] = {"the background", "something else", "an empty surface"};
 constexpr int kLargestPictureSidePx = 1536;  // what the finest windows are cut from
 constexpr int kHintsPerSide = 64;
-constexpr int kGuideRadius = 3;
-constexpr float kGuideVarianceFloor = 30.0f;
+// Above the guided filter's defaults: one of CLIP's patches covers several cells, so the borders
+// lie further from the edges of L that they belong to. Not measured against the defaults.
+constexpr int kPatchGuideRadius = 3;
+constexpr float kPatchGuideVarianceFloor = 30.0f;
 
 void CheckPictures(const Image& luminance, const Image& rest) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -81,8 +83,8 @@ Image Probabilities(const Image& luminance,
   probabilities = UpsampleGuided(
       Resize(probabilities, std::max(1, planes.width / 4), std::max(1, planes.height / 4)),
       guide,
-      kGuideRadius,
-      kGuideVarianceFloor);
+      kPatchGuideRadius,
+      kPatchGuideVarianceFloor);
   for (float& value : probabilities.data) value = std::clamp(value, 0.0f, 1.0f);
   return probabilities;
 }

@@ -109,7 +109,7 @@ void Score(const Photos& photos,
   }
   (*result)["views"] = count;
   (*result)["delta_e00_chroma_2d"] = error / count;
-  (*result)["delta_e00_grey"] = grey_error / count;
+  (*result)["delta_e00_gray"] = grey_error / count;
   (*result)["seconds_per_view"] = seconds / count;
 }
 

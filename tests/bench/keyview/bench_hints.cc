@@ -239,7 +239,7 @@ Json RunQuality(const HintsArguments& args) {
       results.push_back({{"photo", photo},
                          {"points", count},
                          {"delta_e00", MeanDeltaE00(colored, problem.lab)},
-                         {"delta_e00_of_grey", MeanDeltaE00(gray, problem.lab)}});
+                         {"delta_e00_of_gray", MeanDeltaE00(gray, problem.lab)}});
       if (args.pictures_folder.empty()) continue;
       const std::filesystem::path file = photo;
       WriteFileAtomic(std::filesystem::path(args.pictures_folder) /

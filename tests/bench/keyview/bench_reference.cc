@@ -45,7 +45,7 @@ void RunReference(const ReferenceArguments& args) {
                {"mean_confidence", solution.mean_confidence},
                {"explained", solution.explained},
                {"delta_e00", MeanDeltaE00(colored, truth)},
-               {"delta_e00_of_grey", MeanDeltaE00(gray, truth)}},
+               {"delta_e00_of_gray", MeanDeltaE00(gray, truth)}},
               args.json_file);
   if (args.picture_file.empty()) return;
   WriteFileAtomic(args.picture_file, EncodePng8(SrgbFromLab(colored)));

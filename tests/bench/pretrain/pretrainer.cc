@@ -8,7 +8,8 @@
 
 #include "core/base/error.h"
 #include "core/colorizer/tensor_archive.h"
-#include "core/encoder/random_features.h"
+#include "core/encoder/image_tensors.h"
+#include "tests/support/random_features.h"
 
 namespace color3d {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 #include "core/keycolor/automatic/color_bins.h"
 #include "core/keycolor/automatic/color_head.h"
 #include "tests/bench/pretrain/photo_set.h"

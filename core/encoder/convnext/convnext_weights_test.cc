@@ -1,4 +1,4 @@
-#include "core/encoder/convnext_weights.h"
+#include "core/encoder/convnext/convnext_weights.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/encoder/random_features.h"
+#include "tests/support/random_features.h"
 
 namespace color3d {
 namespace {

@@ -1,4 +1,6 @@
-#include "core/encoder/convnext_weights.h"
+#include "core/encoder/convnext/convnext_weights.h"
+
+#include <fmt/core.h>
 
 #include <utility>
 #include <vector>
@@ -34,8 +36,9 @@ void ReadStem(const WeightMap& weights, ConvNextConfig& config) {
   const std::vector<int64_t> shape = ShapeOf(weights, kStem);
   const bool square = shape.size() == 4 && shape[1] == 3 && shape[2] == shape[3];
   if (!square || (shape[2] != 4 && shape[2] != 8)) {
-    throw InvalidArgument("the ConvNeXt's stem is " + ShapeText(shape) +
-                          "; known are [*,3,4,4] (stride 4) and [*,3,8,8] (stride 2)");
+    throw InvalidArgument(
+        "the ConvNeXt's stem is {}; known are [*,3,4,4] (stride 4) and [*,3,8,8] (stride 2)",
+        ShapeText(shape));
   }
   config.stem_kernel = static_cast<int>(shape[2]);
   config.stem_stride = config.stem_kernel == 4 ? 4 : 2;
@@ -47,17 +50,18 @@ ConvNextConfig ReadConfig(const WeightMap& weights) {
   config.dims.clear();
   config.depths.clear();
   for (int stage = 0;; ++stage) {
-    const std::string index = std::to_string(stage);
     const std::vector<int64_t> shape =
-        ShapeOf(weights, "downsample_layers." + index + (stage == 0 ? ".0" : ".1") + ".weight");
+        ShapeOf(weights, fmt::format("downsample_layers.{}.{}.weight", stage, stage == 0 ? 0 : 1));
     if (shape.size() != 4) break;
     if (shape[0] < 1 || shape[0] > kMaxChannels) {
-      throw InvalidArgument("the ConvNeXt's stage " + index + " has " + std::to_string(shape[0]) +
-                            " channels; at most " + std::to_string(kMaxChannels) + " are taken");
+      throw InvalidArgument("the ConvNeXt's stage {} has {} channels; at most {} are taken",
+                            stage,
+                            shape[0],
+                            kMaxChannels);
     }
     config.dims.push_back(static_cast<int>(shape[0]));
     int depth = 0;
-    while (weights.count("stages." + index + "." + std::to_string(depth) + ".dwconv.weight") > 0) {
+    while (weights.count(fmt::format("stages.{}.{}.dwconv.weight", stage, depth)) > 0) {
       ++depth;
     }
     config.depths.push_back(depth);
@@ -73,7 +77,7 @@ bool HoldsConvNext(const WeightMap& weights) {
 
 ConvNextWeights TakeConvNextWeights(WeightMap& weights) {
   if (!HoldsConvNext(weights)) {
-    throw InvalidArgument("the weights hold no ConvNeXt (no \"" + std::string(kStem) + "\")");
+    throw InvalidArgument("the weights hold no ConvNeXt (no \"{}\")", kStem);
   }
   const std::string prefix = PrefixOf(weights);
   ConvNextWeights found;
@@ -90,12 +94,12 @@ ConvNextWeights TakeConvNextWeights(WeightMap& weights) {
   found.description = "published ConvNeXt, " + found.config.ToString();
   int own_norms = 0;
   for (int stage = 0; stage < found.config.StageCount(); ++stage) {
-    own_norms += found.weights.count("norm" + std::to_string(stage) + ".weight") > 0 ? 1 : 0;
+    own_norms += found.weights.count(fmt::format("norm{}.weight", stage)) > 0 ? 1 : 0;
   }
   if (own_norms == 0) {
     for (int stage = 0; stage < found.config.StageCount(); ++stage) {
       const int64_t c = found.config.dims[stage];
-      const std::string name = "norm" + std::to_string(stage);
+      const std::string name = fmt::format("norm{}", stage);
       const size_t count = static_cast<size_t>(c);
       found.weights[name + ".weight"] = {{c}, std::vector<float>(count, 1.0f)};
       found.weights[name + ".bias"] = {{c}, std::vector<float>(count, 0.0f)};

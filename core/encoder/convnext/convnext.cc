@@ -1,13 +1,14 @@
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 
+#include <fmt/core.h>
 #include <torch/types.h>
 
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/encoder/embedded/embedded_weights.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/encoder/weight_tensors.h"
@@ -31,8 +32,8 @@ torch::Tensor ChannelNorm(const torch::Tensor& x,
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the encoder takes a picture with 1 channel (L), this one has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the encoder takes a picture with 1 channel (L), this one has {}",
+                          luminance.channels);
   }
 }
 
@@ -49,29 +50,11 @@ torch::Tensor GrayFromLuminanceTensor(const torch::Tensor& luminance) {
 }  // namespace
 
 std::string ConvNextConfig::ToString() const {
-  std::string text =
-      "convnext stem " + std::to_string(stem_kernel) + "/" + std::to_string(stem_stride) + " dims";
-  for (int dim : dims) text += " " + std::to_string(dim);
+  std::string text = fmt::format("convnext stem {}/{} dims", stem_kernel, stem_stride);
+  for (int dim : dims) text += fmt::format(" {}", dim);
   text += " depths";
-  for (int depth : depths) text += " " + std::to_string(depth);
+  for (int depth : depths) text += fmt::format(" {}", depth);
   return text;
-}
-
-torch::Tensor TensorFromImage(const Image& image) {
-  torch::Tensor tensor =
-      torch::empty({1, image.channels, image.height, image.width}, torch::kFloat32);
-  std::memcpy(tensor.data_ptr<float>(), image.data.data(), image.data.size() * sizeof(float));
-  return tensor;
-}
-
-Image ImageFromTensor(const torch::Tensor& tensor) {
-  const torch::Tensor planar =
-      (tensor.dim() == 4 ? tensor[0] : tensor).to(torch::kFloat32).contiguous();
-  Image image(static_cast<int>(planar.size(2)),
-              static_cast<int>(planar.size(1)),
-              static_cast<int>(planar.size(0)));
-  std::memcpy(image.data.data(), planar.data_ptr<float>(), image.data.size() * sizeof(float));
-  return image;
 }
 
 ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description)
@@ -82,7 +65,7 @@ ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string 
   for (int i = 0; i < config.StageCount(); ++i) {
     Stage stage;
     const int64_t c = config.dims[i];
-    const std::string down = "downsample_layers." + std::to_string(i) + ".";
+    const std::string down = fmt::format("downsample_layers.{}.", i);
     if (i == 0) {
       stage.down_weight =
           TakeTensor(reader, down + "0.weight", {c, 3, config.stem_kernel, config.stem_kernel});
@@ -97,7 +80,7 @@ ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string 
       stage.down_bias = TakeTensor(reader, down + "1.bias", {c});
     }
     for (int j = 0; j < config.depths[i]; ++j) {
-      const std::string name = "stages." + std::to_string(i) + "." + std::to_string(j) + ".";
+      const std::string name = fmt::format("stages.{}.{}.", i, j);
       Block block;
       block.dwconv_weight = TakeTensor(reader, name + "dwconv.weight", {c, 1, 7, 7});
       block.dwconv_bias = TakeTensor(reader, name + "dwconv.bias", {c});
@@ -110,8 +93,8 @@ ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string 
       block.gamma = TakeTensor(reader, name + "gamma", {c});
       stage.blocks.push_back(std::move(block));
     }
-    stage.norm_weight = TakeTensor(reader, "norm" + std::to_string(i) + ".weight", {c});
-    stage.norm_bias = TakeTensor(reader, "norm" + std::to_string(i) + ".bias", {c});
+    stage.norm_weight = TakeTensor(reader, fmt::format("norm{}.weight", i), {c});
+    stage.norm_bias = TakeTensor(reader, fmt::format("norm{}.bias", i), {c});
     stages_.push_back(std::move(stage));
   }
   reader.Finish();
@@ -121,7 +104,7 @@ std::vector<std::pair<std::string, torch::Tensor>> ConvNext::Parameters() const 
   std::vector<std::pair<std::string, torch::Tensor>> parameters;
   for (size_t i = 0; i < stages_.size(); ++i) {
     const Stage& stage = stages_[i];
-    const std::string down = "downsample_layers." + std::to_string(i) + ".";
+    const std::string down = fmt::format("downsample_layers.{}.", i);
     const std::string conv = down + (i == 0 ? "0." : "1.");
     const std::string norm = down + (i == 0 ? "1." : "0.");
     parameters.emplace_back(conv + "weight", stage.down_weight);
@@ -130,7 +113,7 @@ std::vector<std::pair<std::string, torch::Tensor>> ConvNext::Parameters() const 
     parameters.emplace_back(norm + "bias", stage.down_norm_bias);
     for (size_t j = 0; j < stage.blocks.size(); ++j) {
       const Block& block = stage.blocks[j];
-      const std::string name = "stages." + std::to_string(i) + "." + std::to_string(j) + ".";
+      const std::string name = fmt::format("stages.{}.{}.", i, j);
       parameters.emplace_back(name + "dwconv.weight", block.dwconv_weight);
       parameters.emplace_back(name + "dwconv.bias", block.dwconv_bias);
       parameters.emplace_back(name + "norm.weight", block.norm_weight);
@@ -141,8 +124,8 @@ std::vector<std::pair<std::string, torch::Tensor>> ConvNext::Parameters() const 
       parameters.emplace_back(name + "pwconv2.bias", block.pwconv2_bias);
       parameters.emplace_back(name + "gamma", block.gamma);
     }
-    parameters.emplace_back("norm" + std::to_string(i) + ".weight", stage.norm_weight);
-    parameters.emplace_back("norm" + std::to_string(i) + ".bias", stage.norm_bias);
+    parameters.emplace_back(fmt::format("norm{}.weight", i), stage.norm_weight);
+    parameters.emplace_back(fmt::format("norm{}.bias", i), stage.norm_bias);
   }
   return parameters;
 }

@@ -1,4 +1,6 @@
-#include "core/encoder/random_features.h"
+#include "tests/support/random_features.h"
+
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>
@@ -122,7 +124,7 @@ void AddStem(const ConvNextConfig& config, Random& random, WeightMap& weights) {
 void AddDownsampling(int stage, const ConvNextConfig& config, Random& random, WeightMap& weights) {
   const int in = config.dims[stage - 1];
   const int out = config.dims[stage];
-  const std::string prefix = "downsample_layers." + std::to_string(stage) + ".";
+  const std::string prefix = fmt::format("downsample_layers.{}.", stage);
   const std::vector<double> mix = OrthogonalRows(out, in, random);
   WeightArray weight = Filled({out, in, 2, 2}, 0.0f);
   for (size_t i = 0; i < mix.size(); ++i) {
@@ -192,13 +194,10 @@ WeightMap RandomFeatureWeights(const ConvNextConfig& config, uint64_t seed) {
   for (int stage = 0; stage < config.StageCount(); ++stage) {
     if (stage > 0) AddDownsampling(stage, config, random, weights);
     for (int block = 0; block < config.depths[stage]; ++block) {
-      AddBlock("stages." + std::to_string(stage) + "." + std::to_string(block) + ".",
-               config.dims[stage],
-               random,
-               weights);
+      AddBlock(fmt::format("stages.{}.{}.", stage, block), config.dims[stage], random, weights);
     }
-    weights["norm" + std::to_string(stage) + ".weight"] = Filled({config.dims[stage]}, 1.0f);
-    weights["norm" + std::to_string(stage) + ".bias"] = Filled({config.dims[stage]}, 0.0f);
+    weights[fmt::format("norm{}.weight", stage)] = Filled({config.dims[stage]}, 1.0f);
+    weights[fmt::format("norm{}.bias", stage)] = Filled({config.dims[stage]}, 0.0f);
   }
   return weights;
 }

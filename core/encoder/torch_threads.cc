@@ -1,4 +1,4 @@
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 
 #include <ATen/Parallel.h>
 

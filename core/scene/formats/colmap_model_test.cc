@@ -1,3 +1,5 @@
+#include "core/scene/formats/colmap_model.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,7 +8,6 @@
 #include <fstream>
 #include <limits>
 
-#include "core/scene/formats/colmap_model.h"
 #include "core/scene/import.h"
 #include "core/scene/photos.h"
 #include "tests/support/test_scenes.h"

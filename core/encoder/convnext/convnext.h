@@ -1,4 +1,4 @@
-// ConvNeXt as frozen feature extractor, with torch in the interface: for the colorizer only.
+// ConvNeXt as frozen feature extractor, with torch in the interface.
 // Immutable after construction; Taps() may be called from any number of threads.
 #pragma once
 
@@ -9,15 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "core/encoder/convnext_config.h"
+#include "core/encoder/convnext/convnext_config.h"
 #include "core/encoder/tap_encoder.h"
 #include "core/weights/weight_map.h"
 
 namespace color3d {
-
-// [1,1,H,W] float tensor (a copy) of a 1-channel picture, and back.
-torch::Tensor TensorFromImage(const Image& image);   // [1,C,H,W]
-Image ImageFromTensor(const torch::Tensor& tensor);  // [1,C,H,W] or [C,H,W], any memory format
 
 class ConvNext : public TapEncoder {
  public:

@@ -1,9 +1,10 @@
+#include "core/scene/formats/transforms_json.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/scene/formats/transforms_json.h"
 #include "core/scene/import.h"
 #include "tests/support/test_scenes.h"
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/encoder/convnext_config.h"
+#include "core/encoder/convnext/convnext_config.h"
 #include "core/weights/weight_map.h"
 
 namespace color3d {

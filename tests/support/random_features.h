@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "core/encoder/convnext_config.h"
+#include "core/encoder/convnext/convnext_config.h"
 #include "core/weights/weight_map.h"
 
 namespace color3d {
