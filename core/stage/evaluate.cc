@@ -73,8 +73,10 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   };
   WithoutCurves progress(context.progress());
   NoCheckpoints none;
-  return FitChroma(
-      geometry, scene, images, targets, options, context.pool(), none, progress, context.cancel());
+  return FitChroma(geometry,
+                   ChromaProblemOf(scene, images, targets),
+                   options,
+                   {context.pool(), none, progress, context.cancel()});
 }
 
 SceneConsistency CompareViews(const Scene& scene,

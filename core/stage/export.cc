@@ -69,13 +69,7 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   RgbRefineOptions refine;
   refine.seed = context.seed();
   const auto refined = [&](RgbHarmonics start) {
-    return RefineRgbHarmonics(model,
-                              std::move(start),
-                              views,
-                              refine,
-                              context.pool(),
-                              context.progress(),
-                              context.cancel());
+    return RefineRgbHarmonics(model, std::move(start), views, refine, context.control());
   };
   const RgbHarmonics fitted = FitRgbHarmonics(model, context.pool());
   nlohmann::ordered_json scores;

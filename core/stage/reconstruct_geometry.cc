@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/scene/view_images.h"
+#include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/memory_plan.h"
 #include "core/stage/artifacts.h"
@@ -52,13 +53,8 @@ void RunReconstructGeometry(const GeometryOptions& options,
   if (!memory.note.empty()) context.progress().OnWarning(memory.note);
   const ViewImages images(
       scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
-  const GaussianModel model = TrainGeometry(scene,
-                                            images,
-                                            planned,
-                                            context.pool(),
-                                            context.checkpoints(),
-                                            context.progress(),
-                                            context.cancel());
+  const GaussianModel model =
+      TrainGeometry(GeometryProblemOf(scene, images), planned, context.control());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));
   context.WriteOutput(artifact::kMemoryPlan, MemoryPlanToJson(memory));
 }

@@ -3,6 +3,7 @@
 
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
+#include "core/splat/chroma/chroma_fit.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -35,15 +36,8 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     }
     return target;
   };
-  const GaussianModel model = FitChroma(geometry,
-                                        scene,
-                                        images,
-                                        targets,
-                                        options,
-                                        context.pool(),
-                                        context.checkpoints(),
-                                        context.progress(),
-                                        context.cancel());
+  const GaussianModel model =
+      FitChroma(geometry, ChromaProblemOf(scene, images, targets), options, context.control());
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }
 

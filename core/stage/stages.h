@@ -14,7 +14,8 @@
 #include "core/keycolor/keycolor.h"
 #include "core/keyview/select.h"
 #include "core/scene/import.h"
-#include "core/splat/training/trainer.h"
+#include "core/splat/chroma/chroma_options.h"
+#include "core/splat/geometry/geometry_options.h"
 #include "core/stage/stage.h"
 
 namespace color3d {

@@ -152,7 +152,7 @@ void PrintTable(const Json& report) {
               "speed-up");
   for (const Json& r : report["cases"]) {
     const std::string size =
-        std::to_string(r["width_px"].get<int>()) + "x" + std::to_string(r["height_px"].get<int>());
+        fmt::format("{}x{}", r["width_px"].get<int>(), r["height_px"].get<int>());
     std::printf("%9d %10s %2d %2d %9lld %10.2f %9.2f %7.2f %8.2f %7.2f %8.2f %7.2f %7.2f %9.3f",
                 r["gaussians"].get<int>(),
                 size.c_str(),

@@ -1,4 +1,4 @@
-#include "core/splat/training/held_out.h"
+#include "core/splat/geometry/held_out.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
-#include "core/splat/training/regularize.h"
+#include "core/splat/geometry/regularize.h"
 
 #include "core/simd/instruction_set.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "core/splat/training/regularize.cc"
+#define HWY_TARGET_INCLUDE "core/splat/geometry/regularize.cc"
 #include <hwy/foreach_target.h>
 
 #include "core/splat/raster/projection_math-inl.h"
@@ -12,28 +12,6 @@ HWY_BEFORE_NAMESPACE();
 namespace color3d {
 namespace HWY_NAMESPACE {
 namespace {
-
-// Sixteen approximately standard normal numbers: the sum of the four bytes of a hash.
-F32 HashNormal(uint32_t seed, int64_t first) {
-  namespace hn = hwy::HWY_NAMESPACE;
-  const hn::RebindToUnsigned<simd::FloatTag> d;
-  const hn::RebindToSigned<simd::FloatTag> di;
-  F32 r;
-  for (int k = 0; k < simd::kParts; ++k) {
-    auto x = hn::Iota(d, static_cast<uint32_t>(first) + k * simd::kRegisterLanes);
-    x = hn::Add(hn::Mul(x, hn::Set(d, 0x9E3779B1u)), hn::Set(d, seed));
-    x = hn::Xor(x, hn::ShiftRight<16>(x));
-    x = hn::Mul(x, hn::Set(d, 0x85EBCA6Bu));
-    x = hn::Xor(x, hn::ShiftRight<13>(x));
-    x = hn::Mul(x, hn::Set(d, 0xC2B2AE35u));
-    x = hn::Xor(x, hn::ShiftRight<16>(x));
-    const auto byte = hn::Set(d, 255u);
-    const auto low = hn::Add(hn::And(x, byte), hn::And(hn::ShiftRight<8>(x), byte));
-    const auto high = hn::Add(hn::And(hn::ShiftRight<16>(x), byte), hn::ShiftRight<24>(x));
-    r.part[k] = hn::ConvertTo(simd::FloatTag(), hn::BitCast(di, hn::Add(low, high)));
-  }
-  return (r - 510.0f) * (1.0f / 147.80f);  // sqrt(4 (256^2 - 1) / 12)
-}
 
 // Lanes [begin, end), multiples of 16.
 void PenaltyRange(const ParameterBlock& parameters,
@@ -70,32 +48,6 @@ void NeedleRange(float max_log_ratio, int64_t begin, int64_t end, ParameterBlock
   }
 }
 
-void NoiseRange(
-    float strength, uint32_t seed, int64_t begin, int64_t end, ParameterBlock& parameters) {
-  for (int64_t i = begin; i < end; i += simd::kLanes) {
-    Projected g;
-    LoadOpacity(parameters, i, g);
-    const F32 opacity = 1.0f - g.one_minus_opacity;
-    // Solid Gaussians do not move: sigmoid(100 (0.005 - 0.1)) < 1e-4.
-    const Mask faint = simd::Less(opacity, Broadcast(0.1f));
-    if (!simd::Any(faint)) continue;
-    LoadShape(parameters, i, g);
-    const F32 gate = 1.0f / (1.0f + simd::Exp2((opacity - 0.005f) * (100.0f * kLog2E)));
-    F32 local[3] = {simd::Zero(), simd::Zero(), simd::Zero()};
-    for (int k = 0; k < 3; ++k) {
-      const F32 eta = HashNormal(seed + static_cast<uint32_t>(k) * 0x68E31DA4u, i);
-      for (int j = 0; j < 3; ++j) local[j] = local[j] + g.r[3 * k + j] * eta;
-    }
-    for (int j = 0; j < 3; ++j) local[j] = local[j] * g.s[j] * g.s[j];
-    for (int k = 0; k < 3; ++k) {
-      float* p = parameters.Row(kPositionRow + k) + i;
-      const F32 move =
-          g.r[3 * k] * local[0] + g.r[3 * k + 1] * local[1] + g.r[3 * k + 2] * local[2];
-      simd::Store(p, simd::Load(p) + simd::SelectOrZero(faint, strength * gate * move));
-    }
-  }
-}
-
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace color3d
@@ -106,7 +58,6 @@ namespace color3d {
 namespace {
 HWY_EXPORT(PenaltyRange);
 HWY_EXPORT(NeedleRange);
-HWY_EXPORT(NoiseRange);
 }  // namespace
 
 void AddPenaltyGradients(const ParameterBlock& parameters,
@@ -126,13 +77,6 @@ void LimitNeedles(float max_log_ratio, ThreadPool& pool, ParameterBlock& paramet
   const auto needle_range = &COLOR3D_KERNEL(NeedleRange);
   pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
     needle_range(max_log_ratio, begin * 16, end * 16, parameters);
-  });
-}
-
-void AddPositionNoise(float strength, uint32_t seed, ThreadPool& pool, ParameterBlock& parameters) {
-  const auto noise_range = &COLOR3D_KERNEL(NoiseRange);
-  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
-    noise_range(strength, seed, begin * 16, end * 16, parameters);
   });
 }
 

@@ -1,9 +1,7 @@
-// What keeps Gaussians in shape beside the picture's loss: the penalties on opacity and scale and
-// the noise on positions of 3DGS-MCMC (Kheradmand et al. 2024), and a limit on needles. Internal to
-// the splat module; deterministic whatever the thread count.
+// What keeps Gaussians in shape beside the picture's loss: the penalties on opacity and scale of
+// 3DGS-MCMC (Kheradmand et al. 2024), and a limit on needles. Internal to the splat module;
+// deterministic whatever the thread count.
 #pragma once
-
-#include <cstdint>
 
 #include "core/base/parallel.h"
 #include "core/splat/model/parameter_block.h"
@@ -20,9 +18,5 @@ void AddPenaltyGradients(const ParameterBlock& parameters,
 // Shortens the longest axis to exp(max_log_ratio) times the middle one. Needles fit the pixels of
 // one view and are streaks in all others; flat Gaussians are surfaces and stay as they are.
 void LimitNeedles(float max_log_ratio, ThreadPool& pool, ParameterBlock& parameters);
-
-// position += strength * sigmoid(100 (0.005 - opacity)) * covariance * normal noise. The noise is a
-// hash of (seed, Gaussian), so the same seed repeats it.
-void AddPositionNoise(float strength, uint32_t seed, ThreadPool& pool, ParameterBlock& parameters);
 
 }  // namespace color3d

@@ -49,6 +49,7 @@ Trained TrainOnce(const ProceduralScene& s, uint64_t seed) {
     (i == kHeldOut ? problem.held_out : problem.training).push_back(posed);
   }
   problem.luminance = [&s](int view) { return s.Luminance(view); };
+  problem.initial = InitialGaussians(s.scene);
   problem.extent = s.scene.Extent();
   GeometryOptions options;
   options.iterations = 200;
@@ -59,14 +60,7 @@ Trained TrainOnce(const ProceduralScene& s, uint64_t seed) {
   NoCheckpoints none;
   LastHeldOut observer;
   Trained trained;
-  trained.model = TrainGeometryOn(problem,
-                                  InitialGaussians(s.scene),
-                                  options,
-                                  GeometryTuning(),
-                                  pool,
-                                  none,
-                                  observer,
-                                  CancellationToken());
+  trained.model = TrainGeometry(problem, options, {pool, none, observer, CancellationToken()});
   trained.psnr_db = observer.psnr_db;
   return trained;
 }

@@ -1,8 +1,10 @@
-// What both chroma solvers are given. Internal to the splat module. References outlive the run.
+// One fit of chroma as both solvers are given it. Internal to the splat module. References outlive
+// the fit.
 #pragma once
 
 #include <chrono>
 
+#include "core/base/run_control.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/chroma/chroma_parameters.h"
 
@@ -18,14 +20,11 @@ class ChromaClock {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-struct ChromaRun {
+struct ChromaFitting {
   const GaussianModel& geometry;
   const ChromaProblem& problem;
   const ChromaOptions& options;
-  ThreadPool& pool;
-  CheckpointStore& checkpoints;
-  ProgressObserver& progress;
-  const CancellationToken& cancel;
+  const RunControl& run;
   const ChromaClock& clock;  // started before the closed form
 
   void Snapshot(int64_t iteration, const ChromaParameters& parameters) const {
