@@ -70,6 +70,7 @@ class Colorize {
     }
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     spec.mutable_colorize_scene()->clear_select_key_view();
+    AddMoreKeys(*connection_, options_, spec.mutable_colorize_scene());
     for (const std::string& input : WithItsInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }

@@ -65,6 +65,19 @@ TEST_F(KeyTest, SelectColorLookAcceptAndColorTheSceneWithoutDoingItAgain) {
   EXPECT_NE(ReadFile(Path("out") / "report.html").find("Best of "), std::string::npos);
   EXPECT_EQ(CountJobs("select_key_view"), 1);
   EXPECT_EQ(CountJobs("colorize_key_view"), 1) << "the accepted colour was computed again";
+
+  const std::string other = view == "view001.png" ? "view004.png" : "view001.png";
+  const ProcessResult more = Client({"colorize",
+                                     "--scene",
+                                     scene,
+                                     "--more-key",
+                                     other + "=" + (Path("room") / "truth" / other).string(),
+                                     "-o",
+                                     Path("more").string(),
+                                     "--detach"});
+  ASSERT_EQ(more.exit_code, 0) << more.out << more.err;
+  const v1::ColorizeSceneSpec spec = NewestJob("colorize_scene").spec().colorize_scene();
+  EXPECT_EQ(spec.carry_color().further_key_views_size(), 1) << "--more-key was not heeded";
 }
 
 TEST_F(KeyTest, AnotherViewAndAnOlderColorCanBeTaken) {
