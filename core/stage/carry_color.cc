@@ -20,6 +20,7 @@ namespace {
 
 constexpr float kCovered = 0.25f;        // confidence from which a pixel counts as covered
 constexpr double kSmallCoverage = 0.01;  // below, the user is told
+constexpr size_t kMaxFurtherKeyViews = 16;
 
 // The user's colours of a further key view, undistorted and reduced.
 CarriedColor ColorOfFurther(const FurtherKeyView& further,
@@ -117,9 +118,11 @@ void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
   const RangeCheck check("carry_color option");
   check("depth_side_px", depth_side_px, 64, 2048);
-  check("depth_sources", depth_sources, 1, 16);
-  if (further.size() > 16) {
-    throw InvalidArgument("{} further key views were given; at most 16 are taken", further.size());
+  check("depth_sources", depth_sources, 1, kMaxSweepSources);
+  if (further.size() > kMaxFurtherKeyViews) {
+    throw InvalidArgument("{} further key views were given; at most {} are taken",
+                          further.size(),
+                          kMaxFurtherKeyViews);
   }
   sweep.Validate();
   carry.Validate();

@@ -15,8 +15,6 @@
 namespace color3d {
 namespace {
 
-constexpr int kThumbnailSidePx = 260;
-
 const char* StrategyName(KeyViewStrategy strategy) {
   switch (strategy) {
     case KeyViewStrategy::kEntropy:
