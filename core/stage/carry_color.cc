@@ -9,7 +9,7 @@
 #include "core/keyview/next_key_view.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/carry_facts.h"
 #include "core/stage/sources/key_color_sources.h"
