@@ -116,7 +116,7 @@ void Conclude(const Scene& scene,
 
 void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
-  const RangeCheck check("carry_color option");
+  const RangeCheck check("carry option");
   check("depth_side_px", depth_side_px, 64, 2048);
   check("depth_sources", depth_sources, 1, kMaxSweepSources);
   if (further.size() > kMaxFurtherKeyViews) {
