@@ -10,6 +10,7 @@
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
+#include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
