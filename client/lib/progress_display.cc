@@ -1,4 +1,4 @@
-#include "client/commands/progress_display.h"
+#include "client/lib/progress_display.h"
 
 #include <fmt/core.h>
 #include <sys/ioctl.h>
