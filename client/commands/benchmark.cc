@@ -62,7 +62,7 @@ Selection SelectKeyView(Connection& connection,
                         const std::string& scene,
                         ProgressDisplay& display) {
   const v1::Job import_job = SubmitJob(connection, ImportSpec(options, scene));
-  v1::JobSpec spec = SelectSpec(options, scene);
+  v1::JobSpec spec = SelectSpec(connection, options, scene);
   spec.add_inputs(import_job.name());
   const v1::Job select_job = SubmitJob(connection, spec);
   if (!Follow(connection, {import_job.name(), select_job.name()}, context, display)) {

@@ -134,9 +134,10 @@ class Colorize {
 
   ExitCode SelectOnly(const std::string& scene) {
     std::vector<std::string> jobs;
-    v1::JobSpec spec = SelectSpec(options_, scene);
-    if (options_.hold_out) {
-      jobs.push_back(SubmitJob(*connection_, ImportSpec(options_, scene)).name());
+    v1::JobSpec spec = SelectSpec(*connection_, options_, scene);
+    const v1::JobSpec import = ImportSpec(options_, scene);
+    if (import.import_scene().ByteSizeLong() > 0) {  // else the server's own will do
+      jobs.push_back(SubmitJob(*connection_, import).name());
       spec.add_inputs(jobs.back());
     }
     const v1::Job submitted = SubmitJob(*connection_, spec);

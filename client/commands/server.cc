@@ -1,6 +1,13 @@
+#include <fmt/format.h>
+#include <google/protobuf/text_format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/lib/text.h"
+#include "core/base/error.h"
 
 namespace color3d::client {
 namespace {
@@ -58,6 +65,35 @@ ExitCode RunServerInfo(const Context& context) {
   return ExitCode::kOk;
 }
 
+ExitCode RunServerPresets(const Context& context, const std::string& name) {
+  Connection connection(context.server, *context.interrupt);
+  const auto info = connection.Call(
+      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+  v1::ServerInfo asked_for;
+  std::string known;
+  for (const v1::PresetInfo& preset : info.presets()) {
+    known += (known.empty() ? "" : ", ") + preset.name();
+    if (name.empty() || name == preset.name()) *asked_for.add_presets() = preset;
+  }
+  if (asked_for.presets().empty()) {
+    throw Error(ErrorCode::kNotFound, "the server has no preset '{}'; it has {}", name, known);
+  }
+  if (context.json) {
+    nlohmann::ordered_json presets = nlohmann::ordered_json::array();
+    for (const v1::PresetInfo& preset : asked_for.presets()) presets.push_back(ToJson(preset));
+    PrintJson({{"presets", presets}});
+    return ExitCode::kOk;
+  }
+  std::string text;
+  for (const v1::PresetInfo& preset : asked_for.presets()) {
+    std::string options;
+    google::protobuf::TextFormat::PrintToString(preset.options(), &options);
+    text += fmt::format("{}# {}\n{}", text.empty() ? "" : "\n", preset.name(), options);
+  }
+  PrintText(text);
+  return ExitCode::kOk;
+}
+
 }  // namespace
 
 void AddServerCommands(CLI::App& app, Context& context) {
@@ -66,6 +102,14 @@ void AddServerCommands(CLI::App& app, Context& context) {
   server->add_subcommand("info", "Version, job kinds, workers, memory")
       ->fallthrough()
       ->callback([&context] { context.action = [&context] { return RunServerInfo(context); }; });
+  const auto name = std::make_shared<std::string>();
+  CLI::App* presets = server->add_subcommand(
+      "presets",
+      "What the presets mean, as text: the form that `color3d colorize --preset FILE` reads");
+  presets->add_option("NAME", *name, "Only this one");
+  presets->fallthrough()->callback([&context, name] {
+    context.action = [&context, name] { return RunServerPresets(context, *name); };
+  });
 }
 
 }  // namespace color3d::client

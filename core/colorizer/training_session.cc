@@ -44,7 +44,7 @@ TrainingSession::TrainingSession(const std::vector<TrainingPicture>& pictures,
       model_(model),
       samples_(pictures, recipe.augment, options, model),
       adam_(model.parameters()),
-      early_stop_({.least_improvement = options.least_improvement}) {
+      early_stop_({.min_improvement = options.min_improvement}) {
   if (options_.average_decay > 0.0) {
     for (const auto& [name, tensor] : model_.parameters()) {
       average_.push_back(tensor.detach().clone());

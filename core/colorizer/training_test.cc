@@ -216,7 +216,7 @@ TEST_F(TrainingTest, PicturesAreDrawnByTheirShare) {
 
 TEST_F(TrainingTest, ConsistencyAndPaperRecipesTrain) {
   for (bool paper : {false, true}) {
-    options_.recipe = paper ? ColorizerOptions::Recipe::kPaper : ColorizerOptions::Recipe::kOurs;
+    options_.recipe = paper ? ColorizerOptions::Recipe::kPaper : ColorizerOptions::Recipe::kColor3d;
     options_.consistency_weight = 1.0;
     options_.iterations = 4;
     recipe_ = RecipeFor(options_);
@@ -265,7 +265,7 @@ TEST_F(TrainingTest, AHelpingThreadChangesNothing) {
 
 TEST_F(TrainingTest, StopsEarlyWhenTheCurveIsFlatAlsoAfterResuming) {
   options_.iterations = 400;
-  options_.least_improvement = 0.5;
+  options_.min_improvement = 0.5;
   OneCheckpoint checkpoints;
   NullObserver progress;
   PersonalModel model = MakeModel();
@@ -283,13 +283,13 @@ TEST_F(TrainingTest, StopsEarlyWhenTheCurveIsFlatAlsoAfterResuming) {
 }
 
 TEST(EarlyStopTest, ComparesMeansOfThreeOverAWindowOfFour) {
-  EarlyStop falling({.least_improvement = 0.01});
+  EarlyStop falling({.min_improvement = 0.01});
   double error = 10.0;
   for (int i = 0; i < 40; ++i) EXPECT_FALSE(falling.Add(error *= 0.99)) << i;
-  EarlyStop flat({.least_improvement = 0.01});
+  EarlyStop flat({.min_improvement = 0.01});
   for (int i = 0; i < 6; ++i) EXPECT_FALSE(flat.Add(5.0)) << i;
   EXPECT_TRUE(flat.Add(5.0));
-  EarlyStop off({.least_improvement = 0.0});
+  EarlyStop off({.min_improvement = 0.0});
   for (int i = 0; i < 40; ++i) EXPECT_FALSE(off.Add(5.0 + i));
 }
 

@@ -21,11 +21,12 @@ const char* LayoutName(SceneLayout layout) {
 
 void RunImportScene(const ImportOptions& options, StageContext& context) {
   options.Validate();
-  const ImportResult result = ImportScene(context.scene_folder(),
-                                          context.scratch_folder(),
-                                          options,
-                                          context.progress(),
-                                          context.cancel());
+  ThreadPool pool(context.threads());
+  const ImportResult result =
+      ImportScene(context.scene_folder(),
+                  context.scratch_folder(),
+                  options,
+                  {pool, context.checkpoints(), context.progress(), context.cancel()});
   CheckStemsAreUnique(result.scene);
   for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
   ImportFacts facts;

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <map>
 #include <mutex>
 
@@ -8,17 +7,6 @@
 #include "core/stage/stages.h"
 
 namespace color3d {
-namespace {
-
-// Longer side at which the views were coloured: chroma is fitted at that size.
-int ColoredSide(const StageContext& context, const View& view) {
-  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
-  const ImageInfo info = ProbeImage(context.ReadInput(name), name);
-  return std::max(info.width, info.height);
-}
-
-}  // namespace
-
 void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
@@ -47,13 +35,12 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     }
     return target;
   };
-  ThreadPool pool(context.threads());
   const GaussianModel model = FitChroma(geometry,
                                         scene,
                                         images,
                                         targets,
                                         options,
-                                        pool,
+                                        context.pool(),
                                         context.checkpoints(),
                                         context.progress(),
                                         context.cancel());

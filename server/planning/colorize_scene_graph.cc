@@ -83,13 +83,6 @@ void CheckGiven(const std::map<std::string, JobRecord>& given, const ColorizeSce
   }
 }
 
-// Copies the options of the stage from the field of its name, where a scene has one.
-void TakeStageOptions(const ColorizeSceneSpec& options, const std::string& kind, JobSpec* spec) {
-  const auto* field = options.GetDescriptor()->FindFieldByName(kind);
-  if (field == nullptr || !options.GetReflection()->HasField(options, field)) return;
-  MutableStage(spec, kind)->CopyFrom(options.GetReflection()->GetMessage(options, field));
-}
-
 // What the scene's options say of a stage outside of the field of its name.
 void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
   switch (spec->stage_case()) {
@@ -103,10 +96,11 @@ void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
       *spec->mutable_colorize_key_view()->mutable_source() = options.key_color();
       return;
     case JobSpec::kGenerateAugmentations:
-      if (!options.has_generate_augmentations() || options.generate_augmentations().has_samples()) {
-        return;
+      if (!options.has_generate_augmentations()) {  // the user's own files at most
+        spec->mutable_generate_augmentations()->set_samples(0);
+      } else if (!options.generate_augmentations().has_samples()) {
+        spec->mutable_generate_augmentations()->set_samples(kDefaultSamples);
       }
-      spec->mutable_generate_augmentations()->set_samples(kDefaultSamples);
       return;
     case JobSpec::kColorizeViews:
       // The colorizer runs on the encoder that it was trained with.
@@ -124,52 +118,42 @@ void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
   }
 }
 
-// Why no colour is carried; empty when it is.
-std::string WhyNothingIsCarried(const ColorizeSceneSpec& options) {
-  const v1::CarryColorSpec& carry = options.carry_color();
-  if (carry.has_skip()) return carry.skip() ? "carry_color.skip is set" : "";
-  if (options.preset() == v1::PRESET_PAPER && carry.further_key_views().empty()) {
-    return "the paper's recipe carries no colour through geometry";
-  }
-  return "";
+// Why no colour is carried; empty when it is. `scene`: `given` over its preset.
+std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSceneSpec& scene) {
+  if (!scene.carry_color().skip()) return "";
+  return given.carry_color().has_skip() ? "carry_color.skip is set"
+                                        : "the preset carries no colour through geometry";
 }
 
 // Why no pictures are generated; empty when they are.
-std::string WhyNoAugmentations(const ColorizeSceneSpec& options,
-                               const SceneFacts& facts,
-                               int preset_samples) {
+std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   if (facts.augment_files > 0) return "";
-  if (options.has_generate_augmentations()) {
-    // Whoever writes options wants the stage, unless they say 0.
-    const auto& spec = options.generate_augmentations();
-    return spec.has_samples() && spec.samples() == 0
-               ? "no samples are asked for and augment/ holds no files"
-               : "";
+  if (!scene.has_generate_augmentations()) {
+    return "the preset learns from the key view alone, and augment/ holds no files";
   }
-  return preset_samples > 0
-             ? ""
-             : "the preset learns from the key view alone, and augment/ holds no files";
+  // Whoever writes options wants the stage, unless they say 0.
+  const auto& spec = scene.generate_augmentations();
+  return spec.has_samples() && spec.samples() == 0
+             ? "no samples are asked for and augment/ holds no files"
+             : "";
 }
 
 }  // namespace
 
 void BuildColorizeSceneGraph(const JobSpec& submitted,
+                             const ColorizeSceneSpec& scene,
                              const SceneFacts& facts,
-                             int preset_samples,
                              GraphBuilder* builder) {
-  const ColorizeSceneSpec& options = submitted.colorize_scene();
-  if (submitted.inputs_size() > 0) CheckGiven(builder->given(), options);
+  const ColorizeSceneSpec& given = submitted.colorize_scene();
+  if (submitted.inputs_size() > 0) CheckGiven(builder->given(), given);
   for (const Stage& stage : StageCatalogue()) {
     const std::string kind = stage.kind;
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
     JobSpec spec = builder->StageSpec(kind);
-    TakeStageOptions(options, kind, &spec);
-    TakeSceneOptions(options, &spec);
+    TakeSceneOptions(scene, &spec);
     std::string skip_reason;
-    if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(options);
-    if (kind == kind::kGenerateAugmentations) {
-      skip_reason = WhyNoAugmentations(options, facts, preset_samples);
-    }
+    if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);
+    if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
     builder->Add(std::move(spec), skip_reason);
   }
   builder->AddParent();

@@ -11,11 +11,12 @@ namespace color3d {
 // Of generate_augmentations, where somebody asks for it without a number.
 inline constexpr int kDefaultSamples = 8;
 
-// Adds all jobs to the builder. `preset_samples`: of generate_augmentations, by the preset. Throws
-// Error for inputs that the options contradict, or that lack a job which they read.
+// Adds all jobs to the builder, which fills in the options of each stage from `scene`: what was
+// submitted, over its preset. Throws Error for inputs that the submitted options contradict, or
+// that lack a job which they read.
 void BuildColorizeSceneGraph(const v1::JobSpec& submitted,
+                             const v1::ColorizeSceneSpec& scene,
                              const SceneFacts& facts,
-                             int preset_samples,
                              GraphBuilder* builder);
 
 }  // namespace color3d

@@ -14,49 +14,6 @@
 namespace color3d {
 namespace {
 
-// Writes the preset's values into the unset fields of a stage's options.
-void ApplyPreset(const PresetValues& preset, int max_side_px, v1::JobSpec* spec) {
-  if (spec->has_select_key_view()) {
-    auto* s = spec->mutable_select_key_view();
-    if (s->strategy() == v1::SelectKeyViewSpec::STRATEGY_UNSPECIFIED) {
-      s->set_strategy(preset.strategy);
-    }
-  } else if (spec->has_generate_augmentations()) {
-    auto* s = spec->mutable_generate_augmentations();
-    if (!s->has_samples()) s->set_samples(preset.augmentation_samples);
-  } else if (spec->has_personalize()) {
-    auto* s = spec->mutable_personalize();
-    if (s->recipe() == v1::PersonalizeSpec::RECIPE_UNSPECIFIED) s->set_recipe(preset.recipe);
-    if (!s->has_iterations()) s->set_iterations(preset.personalize_iterations);
-    if (!s->has_least_improvement()) s->set_least_improvement(preset.least_improvement);
-  } else if (spec->has_colorize_views()) {
-    auto* s = spec->mutable_colorize_views();
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-  } else if (spec->has_carry_color()) {
-    auto* s = spec->mutable_carry_color();
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-  } else if (spec->has_reconstruct_geometry()) {
-    auto* s = spec->mutable_reconstruct_geometry();
-    if (!s->has_iterations()) s->set_iterations(preset.geometry_iterations);
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-    if (!s->has_max_gaussians()) s->set_max_gaussians(preset.max_gaussians);
-    if (!s->has_sh_degree()) s->set_sh_degree(preset.sh_degree);
-    if (!s->has_densify_gradient()) s->set_densify_gradient(preset.densify_gradient);
-    if (s->recipe() == v1::ReconstructGeometrySpec::RECIPE_UNSPECIFIED) {
-      s->set_recipe(preset.geometry_recipe);
-    }
-  } else if (spec->has_solve_chroma()) {
-    auto* s = spec->mutable_solve_chroma();
-    if (!s->has_iterations()) s->set_iterations(preset.chroma_iterations);
-    if (s->solver() == v1::SolveChromaSpec::SOLVER_UNSPECIFIED) {
-      s->set_solver(preset.chroma_solver);
-    }
-  } else if (spec->has_render()) {
-    auto* s = spec->mutable_render();
-    if (!s->has_max_side_px()) s->set_max_side_px(max_side_px);
-  }
-}
-
 // A colorize_views job that names no encoder works with that of the given personalize job.
 void TakeEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
   if (!spec->has_colorize_views() || !spec->colorize_views().encoder().empty()) return;
@@ -90,19 +47,17 @@ NewGraph PlanJob(const v1::JobSpec& spec,
   if (spec.has_personalize_scenes()) {
     throw Error(ErrorCode::kInternal, "{} is planned by PlanPersonalizeScenes", KindOf(spec));
   }
-  const v1::ColorizeSceneSpec& scene = spec.colorize_scene();
-  const PresetValues preset = ValuesOf(scene.preset());
-  const int max_side_px = scene.has_max_side_px() ? scene.max_side_px() : preset.max_side_px;
+  const v1::ColorizeSceneSpec scene = WithPreset(spec.colorize_scene());
   std::optional<TimeBudget> time_budget;
   if (scene.time_budget_seconds() > 0.0) {
     time_budget = DivideTimeBudget(scene.time_budget_seconds(), facts);
   }
   GraphBuilder builder(spec, inputs, [&](v1::JobSpec* stage) {
-    ApplyPreset(preset, max_side_px, stage);
+    FillStage(scene, stage);
     if (time_budget) ApplyTimeBudget(*time_budget, stage);
   });
   if (spec.has_colorize_scene()) {
-    BuildColorizeSceneGraph(spec, facts, preset.augmentation_samples, &builder);
+    BuildColorizeSceneGraph(spec, scene, facts, &builder);
   } else {
     BuildStageGraph(spec, &builder);
   }

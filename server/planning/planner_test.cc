@@ -85,6 +85,15 @@ TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
   EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
 }
 
+TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(604'800);
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  for (const char* kind : {"reconstruct_geometry", "personalize", "solve_chroma"}) {
+    EXPECT_NO_THROW(CheckSpec(SpecOf(graph, kind))) << kind;
+  }
+}
+
 TEST(Planner, ExactlyTheStagesThatKeepATimeLimitGetAShareOfTheBudget) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
@@ -156,20 +165,20 @@ TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
   spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
   spec.mutable_colorize_scene()->mutable_personalize()->set_iterations(7);
   NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
-  const PresetValues paper = ValuesOf(v1::PRESET_PAPER);
+  const v1::ColorizeSceneSpec& paper = OptionsOf(v1::PRESET_PAPER);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().iterations(), 7);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().recipe(), v1::PersonalizeSpec::RECIPE_PAPER);
-  EXPECT_TRUE(SpecOf(graph, "personalize").personalize().has_least_improvement());
-  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.0)
+  EXPECT_TRUE(SpecOf(graph, "personalize").personalize().has_min_improvement());
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().min_improvement(), 0.0)
       << "the paper's schedule runs to its end";
   EXPECT_EQ(SpecOf(graph, "select_key_view").select_key_view().strategy(),
             v1::SelectKeyViewSpec::STRATEGY_ENTROPY);
   EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_gaussians(),
-            paper.max_gaussians);
-  EXPECT_EQ(SpecOf(graph, "render").render().max_side_px(), paper.max_side_px);
-  spec.mutable_colorize_scene()->mutable_personalize()->set_least_improvement(0.25);
+            paper.reconstruct_geometry().max_gaussians());
+  EXPECT_EQ(SpecOf(graph, "render").render().max_side_px(), paper.max_side_px());
+  spec.mutable_colorize_scene()->mutable_personalize()->set_min_improvement(0.25);
   graph = PlanJob(spec, {}, kTwentyPhotos);
-  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.25);
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().min_improvement(), 0.25);
   spec.mutable_colorize_scene()->set_max_side_px(333);
   graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_side_px(), 333);
@@ -334,8 +343,8 @@ TEST(Planner, BadOptionsNameFieldValueAndRange) {
               HasSubstr("colorize_scene.reconstruct_geometry.ssim_weight is 1.5"));
   EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_average_decay(1.0); }),
             "colorize_scene.personalize.average_decay is 1; the range is 0 to 0.9999");
-  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_least_improvement(0.6); }),
-            "colorize_scene.personalize.least_improvement is 0.6; the range is 0 to 0.5");
+  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_min_improvement(0.6); }),
+            "colorize_scene.personalize.min_improvement is 0.6; the range is 0 to 0.5");
   EXPECT_EQ(
       message([](auto* s) {
         s->mutable_personalize()->set_precision(static_cast<v1::PersonalizeSpec::Precision>(7));

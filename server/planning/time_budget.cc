@@ -2,8 +2,10 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "proto/option_text.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -49,7 +51,9 @@ TimeBudget DivideTimeBudget(double seconds, const SceneFacts& facts) {
 
 void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec) {
   const auto limit = [](auto* options, double seconds) {
-    if (!options->has_time_limit_seconds()) options->set_time_limit_seconds(seconds);
+    if (options->has_time_limit_seconds()) return;
+    const auto* field = options->GetDescriptor()->FindFieldByName("time_limit_seconds");
+    options->set_time_limit_seconds(std::min(seconds, InfoOf(field).max()));
   };
   if (spec->has_reconstruct_geometry()) {
     limit(spec->mutable_reconstruct_geometry(), budget.geometry_seconds);

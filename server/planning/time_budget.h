@@ -21,7 +21,8 @@ double FixedSeconds(const SceneFacts& facts);
 // leave nothing for the rest.
 TimeBudget DivideTimeBudget(double seconds, const SceneFacts& facts);
 
-// Writes a stage's share into its options, unless they have a time limit of their own.
+// Writes a stage's share into its options, at most what they take as a time limit, unless they
+// have one of their own.
 void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec);
 
 }  // namespace color3d

@@ -6,6 +6,7 @@
 #include "core/base/utf8.h"
 #include "core/catalogue/stages.h"
 #include "server/ops/process.h"
+#include "server/planning/presets.h"
 #include "server/rpc/convert.h"
 
 namespace color3d {
@@ -23,6 +24,14 @@ void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
     } catch (const Error& e) {
       model->set_problem(CleanUtf8(e.what()));
     }
+  }
+}
+
+void ListPresets(v1::ServerInfo* info) {
+  for (const Preset& preset : Presets()) {
+    v1::PresetInfo* entry = info->add_presets();
+    entry->set_name(preset.name);
+    *entry->mutable_options() = preset.options;
   }
 }
 
@@ -104,6 +113,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
       entry->set_memory_bytes(worker.memory_bytes);
       entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
     }
+    ListPresets(out);
     ListModels(parts_, out);
     ListBackends(parts_, out);
     out->set_draining(parts_.draining.load());

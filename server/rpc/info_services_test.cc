@@ -35,6 +35,9 @@ TEST_F(InfoServicesTest, ColorizersAndServerInfo) {
   EXPECT_GT(info.memory_bytes(), 0);
   EXPECT_EQ(info.limits().max_unfinished_jobs(), 40);
   EXPECT_EQ(info.job_kinds_size(), 14);
+  ASSERT_EQ(info.presets_size(), 3);
+  EXPECT_EQ(info.presets(0).name(), "fast");
+  EXPECT_EQ(info.presets(0).options().personalize().iterations(), 300);
 }
 
 }  // namespace

@@ -42,6 +42,8 @@ TEST_F(ColorizeTest, ReadOnlyCommandsAnswerInWordsAndInJson) {
   WriteProceduralScene(Path("room"), SmallRoom(3));
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"server", "info"},
+        std::vector<std::string>{"server", "presets"},
+        std::vector<std::string>{"server", "presets", "paper"},
         std::vector<std::string>{"job", "list"},
         std::vector<std::string>{"scene", "list"},
         std::vector<std::string>{"inspect", Path("room").string()}}) {
@@ -53,6 +55,7 @@ TEST_F(ColorizeTest, ReadOnlyCommandsAnswerInWordsAndInJson) {
     EXPECT_TRUE(json::accept(program.out)) << program.out;
   }
   EXPECT_EQ(Client({"job", "show", "jobs/0000"}).exit_code, 2);
+  EXPECT_EQ(Client({"server", "presets", "heroic"}).exit_code, 2);
 }
 
 void ExpectResults(const fs::path& out, int min_renders) {

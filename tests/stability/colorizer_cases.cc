@@ -224,8 +224,8 @@ void AddColorizerCases(std::vector<StabilityCase>& cases) {
   cases.push_back(Case("ab +-128 from pixel to pixel", [] { return Train(Extremes(128.0f)); }));
   cases.push_back(Case("ab +-1e6 from pixel to pixel",
                        [] { return Refused(Extremes(1e6f), ErrorCode::kInvalidArgument); }));
-  cases.push_back(Case("learning rate x100", [] { return FastLearning(Recipe::kOurs, 0.1); }));
-  cases.push_back(Case("learning rate x1000", [] { return FastLearning(Recipe::kOurs, 1.0); }));
+  cases.push_back(Case("learning rate x100", [] { return FastLearning(Recipe::kColor3d, 0.1); }));
+  cases.push_back(Case("learning rate x1000", [] { return FastLearning(Recipe::kColor3d, 1.0); }));
   cases.push_back(Case("paper's recipe, learning rate x100",
                        [] { return FastLearning(Recipe::kPaper, 1e-2); }));
   cases.push_back(Case("no pixel has weight", NoWeight));

@@ -17,22 +17,24 @@
 
 namespace color3d {
 
+// The defaults of both structs are those of the service's preset "fast".
 struct GeometryOptions {
-  // kOurs: coarse to fine, measured on CPUs. kPaper: the schedule of Kerbl et al. 2023.
-  enum class Recipe { kOurs, kPaper };
-  Recipe recipe = Recipe::kOurs;
-  int iterations = 3000;  // 0..100000
+  // kColor3d: coarse to fine, measured on CPUs. kPaper: the schedule of Kerbl et al. 2023.
+  enum class Recipe { kColor3d, kPaper };
+  Recipe recipe = Recipe::kColor3d;
+  int iterations = 1500;  // 0..100000
   // Of training, 0: none, at most 86400. The whole schedule then fits into this time or the
   // iterations, whichever is used up first; the same input gives similar results, not the same.
   double time_limit_seconds = 0.0;
-  int max_gaussians = 150'000;       // hard cap, 1..10,000,000
+  int max_gaussians = 40'000;        // hard cap, 1..10,000,000
   int sh_degree = 2;                 // of luminance at the end, 0..3
   double ssim_weight = 0.2;          // lambda of (1 - SSIM), 0..1
   double edge_weight = 1.0;          // of the Charbonnier-Laplacian term, 0..10
-  double densify_gradient = 5e-5;    // NDC units (3DGS: 2e-4, for 30k iterations)
+  double densify_gradient = 5e-5;    // NDC units, 1e-9..1e9 (3DGS: 2e-4, for 30k iterations)
   double learning_rate_scale = 1.0;  // on all learning rates, 1e-3..1e3
   uint64_t seed = 1;
   void Validate() const;
+  bool operator==(const GeometryOptions&) const = default;
 };
 
 struct ChromaOptions {
@@ -40,7 +42,7 @@ struct ChromaOptions {
   Solver solver = Solver::kConjugateGradients;
   // 0..100000. Of Adam; of conjugate gradients at most (they stop by themselves, see below). 0: the
   // closed form alone.
-  int iterations = 600;
+  int iterations = 300;
   int chroma_sh_degree = 0;         // 0..1
   double ssim_weight = 0.2;         // of Adam's loss, 0..1
   double time_limit_seconds = 0.0;  // 0: none; 0..86400. Ends on time with the best so far
@@ -60,6 +62,7 @@ struct ChromaOptions {
   double tikhonov_rest = 10.0;
   int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..1e15
   void Validate() const;
+  bool operator==(const ChromaOptions&) const = default;
 };
 
 // Trains on the training views of `scene` at the working size of `images`. Reports curves

@@ -20,6 +20,7 @@
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
+#include "tests/support/quiet_run.h"
 
 namespace color3d {
 namespace {
@@ -37,8 +38,8 @@ struct ChromaArguments {
   int memory_budget_mib = 2048;
   std::string runs = "closed,cg,adam-preset,adam";
   std::vector<int> degrees = {0, 1};
-  GeometryOptions geometry;
-  ChromaOptions chroma;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
+  ChromaOptions chroma{.iterations = 600};
 };
 
 // Of all threads: what is left of a timing on a machine that others use too.
@@ -111,11 +112,11 @@ class ChromaBench {
 
  private:
   ImportResult Import() const {
-    NullObserver silent;
+    QuietRun run;
     const ScratchFolder scratch;
     ImportOptions options;
     options.hold_out_every_eighth = true;
-    return ImportScene(args_.scene_folder, scratch.path(), options, silent, CancellationToken());
+    return ImportScene(args_.scene_folder, scratch.path(), options, run.control());
   }
 
   void TrainOrReadGeometry(const ViewImages& images) {

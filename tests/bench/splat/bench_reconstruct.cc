@@ -29,21 +29,22 @@ struct ReconstructArguments {
   int max_side_px = 500;
   int threads = 2;
   TrainingColours colours = TrainingColours::kSrgb;
-  GeometryOptions geometry;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
 };
 
 // The geometry values of a preset of the service.
 void UsePreset(const std::string& name, ReconstructArguments& args) {
-  const PresetValues values = ValuesOf(name == "best"    ? v1::PRESET_BEST
-                                       : name == "paper" ? v1::PRESET_PAPER
-                                                         : v1::PRESET_FAST);
+  const v1::ColorizeSceneSpec& options = OptionsOf(name == "best"    ? v1::PRESET_BEST
+                                                   : name == "paper" ? v1::PRESET_PAPER
+                                                                     : v1::PRESET_FAST);
   args.preset = name;
-  args.max_side_px = values.max_side_px;
-  args.geometry.iterations = values.geometry_iterations;
-  args.geometry.max_gaussians = values.max_gaussians;
-  args.geometry.sh_degree = values.sh_degree;
-  args.geometry.densify_gradient = values.densify_gradient;
-  if (values.geometry_recipe == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
+  args.max_side_px = options.max_side_px();
+  const v1::ReconstructGeometrySpec& geometry = options.reconstruct_geometry();
+  args.geometry.iterations = geometry.iterations();
+  args.geometry.max_gaussians = geometry.max_gaussians();
+  args.geometry.sh_degree = geometry.sh_degree();
+  args.geometry.densify_gradient = geometry.densify_gradient();
+  if (geometry.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     args.geometry.recipe = GeometryOptions::Recipe::kPaper;
   }
 }
@@ -155,10 +156,10 @@ void RunReconstruct(ReconstructArguments args) {
   const ScratchFolder scratch;
   ImportOptions import_options;
   import_options.hold_out_every_eighth = true;
-  const ImportResult imported =
-      ImportScene(args.scene_folder, scratch.path(), import_options, silent, cancel);
-  const ViewImages images(imported.scene, args.scene_folder, args.max_side_px);
   ThreadPool pool(args.threads);
+  const ImportResult imported =
+      ImportScene(args.scene_folder, scratch.path(), import_options, {pool, none, silent, cancel});
+  const ViewImages images(imported.scene, args.scene_folder, args.max_side_px);
   CurveRecorder recorder("reconstruct_geometry", silent, none);
   TrainingTrace trace;
   if (!args.pictures_folder.empty()) {
