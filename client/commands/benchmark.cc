@@ -8,8 +8,8 @@
 #include "client/commands/follow.h"
 #include "client/commands/results.h"
 #include "client/lib/blob_transfer.h"
-#include "client/lib/gray_copies.h"
 #include "client/lib/job_watch.h"
+#include "client/lib/photos/gray_copies.h"
 #include "client/lib/scene_upload.h"
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
@@ -78,6 +78,43 @@ Selection SelectKeyView(Connection& connection,
           ParseKeyView(ReadArtifact(connection, selected, artifact::kKeyView))};
 }
 
+// The originals of the key view and of the views that are scored against, as the scene's options.
+// Returns the files to upload.
+std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
+                                      const PhotoFolder& folder,
+                                      const GrayCopies& copies,
+                                      const Selection& selection,
+                                      v1::ColorizeSceneSpec* colorize) {
+  std::map<std::string, const LocalFile*> originals;
+  for (const LocalFile& photo : folder.photos) originals[photo.path] = &photo;
+  std::vector<UploadFile> uploads;
+  for (const BenchmarkView& view : selection.views) {
+    const auto original = originals.find(view.image_file);
+    const bool is_key = view.name == selection.key_view && !options.color.Given();
+    const bool is_bound = options.bound && !view.held_out;
+    if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
+    if (!copies.in_color.contains(view.image_file)) {
+      if (view.held_out) continue;  // nothing to score against
+      if (is_key) {
+        throw InvalidArgument(
+            "the key view {} is monochrome itself; choose one in colour with --key-view",
+            view.name);
+      }
+      throw InvalidArgument(
+          "{} is monochrome itself; --bound needs the true colours of all views: leave it out",
+          view.name);
+    }
+    uploads.push_back({original->second->file, DigestFile(original->second->file)});
+    const v1::Digest digest = ToProto(uploads.back().digest);
+    if (is_key) *colorize->mutable_key_color()->mutable_image() = digest;
+    if (!view.held_out && !is_bound) continue;
+    v1::TruthImage* truth = view.held_out ? colorize->add_truth() : colorize->add_training_truth();
+    truth->set_view(view.name);
+    *truth->mutable_image() = digest;
+  }
+  return uploads;
+}
+
 }  // namespace
 
 void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& cancel) {
@@ -104,8 +141,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
                              const PhotoFolder& folder,
                              ProgressDisplay& display) {
   const ScratchFolder scratch;
-  display.Say("benchmark: dropping the colour of " + std::to_string(folder.photos.size()) +
-              " photos");
+  display.Say(fmt::format("benchmark: dropping the colour of {} photos", folder.photos.size()));
   const GrayCopies copies = MakeGrayCopies(folder, scratch.path(), *context.interrupt);
   const v1::Scene scene = UploadScene(
       connection,
@@ -114,8 +150,6 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
       [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
   const Selection selection = SelectKeyView(connection, context, options, scene.name(), display);
 
-  std::map<std::string, const LocalFile*> originals;
-  for (const LocalFile& photo : folder.photos) originals[photo.path] = &photo;
   v1::JobSpec spec = ColorizeSpec(options, scene.name());
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
   colorize->set_key_view(selection.key_view);
@@ -123,29 +157,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
     *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
   }
   AddMoreKeys(connection, options, colorize);
-  std::vector<UploadFile> uploads;
-  for (const BenchmarkView& view : selection.views) {
-    const auto original = originals.find(view.image_file);
-    const bool is_key = view.name == selection.key_view && !options.color.Given();
-    const bool is_bound = options.bound && !view.held_out;
-    if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
-    if (!copies.in_color.contains(view.image_file)) {
-      if (view.held_out) continue;  // nothing to score against
-      throw InvalidArgument(is_key ? "the key view " + view.name +
-                                         " is monochrome itself; choose one in colour with "
-                                         "--key-view"
-                                   : view.name +
-                                         " is monochrome itself; --bound needs the true "
-                                         "colours of all views: leave it out");
-    }
-    uploads.push_back({original->second->file, DigestFile(original->second->file)});
-    const v1::Digest digest = ToProto(uploads.back().digest);
-    if (is_key) *colorize->mutable_key_color()->mutable_image() = digest;
-    if (!view.held_out && !is_bound) continue;
-    v1::TruthImage* truth = view.held_out ? colorize->add_truth() : colorize->add_training_truth();
-    truth->set_view(view.name);
-    *truth->mutable_image() = digest;
-  }
+  const auto uploads = AddTrueColors(options, folder, copies, selection, colorize);
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);
   });

@@ -4,7 +4,7 @@
 
 #include "client/commands/command.h"
 #include "client/commands/console.h"
-#include "client/lib/gray_copies.h"
+#include "client/lib/photos/gray_copies.h"
 
 namespace color3d::client {
 namespace {

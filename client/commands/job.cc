@@ -20,9 +20,9 @@ constexpr int64_t kMaxSpecBytes = 4 << 20;
 
 std::vector<std::string> JobRow(const v1::Job& job) {
   const v1::Progress& progress = job.progress();
-  const std::string steps = progress.total_steps() > 0 ? std::to_string(progress.step()) + "/" +
-                                                             std::to_string(progress.total_steps())
-                                                       : "-";
+  const std::string steps = progress.total_steps() > 0
+                                ? fmt::format("{}/{}", progress.step(), progress.total_steps())
+                                : "-";
   return {job.name(),
           job.kind(),
           StateName(job.state()) + (job.cached() ? " (cached)" : ""),
@@ -108,11 +108,16 @@ ExitCode RunShow(const Context& context, const std::string& name) {
     PrintJson(job);
     return ExitCode::kOk;
   }
-  std::string text = job.name() + "\nkind       " + job.kind() + "\nscene      " +
-                     job.spec().scene() + "\nstate      " + StateName(job.state()) +
-                     (job.cached() ? " (cached)" : "") + "\nattempt    " +
-                     std::to_string(job.attempt()) + " of " + std::to_string(job.max_attempts()) +
-                     "\nartifacts  " + std::to_string(job.artifacts_size()) + "\n";
+  std::string text = fmt::format(
+      "{}\nkind       {}\nscene      {}\nstate      {}{}\nattempt    {} of {}\nartifacts  {}\n",
+      job.name(),
+      job.kind(),
+      job.spec().scene(),
+      StateName(job.state()),
+      job.cached() ? " (cached)" : "",
+      job.attempt(),
+      job.max_attempts(),
+      job.artifacts_size());
   if (!job.parent().empty()) text += "parent     " + job.parent() + "\n";
   if (job.state() == v1::Job::STATE_RUNNING) text += "progress   " + ProgressLine(job, 200) + "\n";
   if (job.has_error()) text += "error      " + DescribeStatus(job.error()) + "\n";

@@ -43,7 +43,7 @@ std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
     const std::string stem = Stem(picture.label);
     std::string name = stem + ".png";
     for (int i = 2; !taken.insert(name).second; ++i) {
-      name = stem + "_" + std::to_string(i) + ".png";
+      name = fmt::format("{}_{}.png", stem, i);
     }
     names.push_back(name);
   }
@@ -130,14 +130,14 @@ ExitCode Conclude(const Context& context, const LiveSummary& summary, const fs::
                           summary.colorizer.empty() ? "" : ", by " + summary.colorizer));
   }
   if (summary.errors.empty()) return ExitCode::kOk;
-  std::string text = std::to_string(summary.errors.size()) + " of " +
-                     std::to_string(summary.errors.size() + summary.files.size()) +
-                     " pictures could not be coloured: ";
+  std::string text = fmt::format("{} of {} pictures could not be coloured: ",
+                                 summary.errors.size(),
+                                 summary.errors.size() + summary.files.size());
   for (size_t i = 0; i < std::min(kShownErrors, summary.errors.size()); ++i) {
     text += (i > 0 ? "; " : "") + summary.errors[i];
   }
   if (summary.errors.size() > kShownErrors) {
-    text += "; and " + std::to_string(summary.errors.size() - kShownErrors) + " more";
+    text += fmt::format("; and {} more", summary.errors.size() - kShownErrors);
   }
   if (!context.json) throw CommandFailure(summary.code, text);
   return summary.code;

@@ -2,8 +2,8 @@
 
 #include "client/commands/command.h"
 #include "client/commands/console.h"
-#include "client/commands/progress_display.h"
 #include "client/lib/names.h"
+#include "client/lib/progress_display.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
 

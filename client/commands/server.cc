@@ -20,8 +20,10 @@ std::string DescribeModel(const v1::ModelInfo& model) {
 }
 
 std::string DescribeBackend(const v1::BackendStatus& backend) {
-  std::string text = "backend    " + backend.name() + " at " + backend.address() + ", " +
-                     (backend.ready() ? "ready" : backend.problem());
+  std::string text = fmt::format("backend    {} at {}, {}",
+                                 backend.name(),
+                                 backend.address(),
+                                 backend.ready() ? "ready" : backend.problem());
   if (!backend.description().empty()) text += ", " + backend.description();
   std::string takes;
   for (const std::string& capability : backend.capabilities()) {
@@ -29,7 +31,7 @@ std::string DescribeBackend(const v1::BackendStatus& backend) {
   }
   if (!takes.empty()) text += ", takes " + takes;
   if (backend.max_pixels() > 0) {
-    text += ", up to " + std::to_string(backend.max_pixels()) + " pixels";
+    text += fmt::format(", up to {} pixels", backend.max_pixels());
   }
   return text + "\n";
 }
@@ -37,18 +39,25 @@ std::string DescribeBackend(const v1::BackendStatus& backend) {
 std::string Describe(const v1::ServerInfo& info) {
   std::string kinds;
   for (const std::string& kind : info.job_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
-  std::string text = "version    " + info.version() + (info.draining() ? " (draining)" : "") +
-                     "\nmemory     " + HumanBytes(info.memory_bytes()) + "\ndisk free  " +
-                     HumanBytes(info.disk_free_bytes()) + "\njobs       " +
-                     std::to_string(info.running_jobs()) + " running, " +
-                     std::to_string(info.queued_jobs()) + " queued\nkinds      " + kinds + "\n";
+  std::string text = fmt::format(
+      "version    {}{}\nmemory     {}\ndisk free  {}\njobs       {} running, {} queued\n"
+      "kinds      {}\n",
+      info.version(),
+      info.draining() ? " (draining)" : "",
+      HumanBytes(info.memory_bytes()),
+      HumanBytes(info.disk_free_bytes()),
+      info.running_jobs(),
+      info.queued_jobs(),
+      kinds);
   for (const v1::ModelInfo& model : info.models()) text += DescribeModel(model);
   for (const v1::BackendStatus& backend : info.backends()) text += DescribeBackend(backend);
   for (const v1::WorkerInfo& worker : info.workers()) {
-    text += "worker     " + worker.worker_id() + ", pid " + std::to_string(worker.pid()) + ", " +
-            HumanBytes(worker.memory_bytes()) + ", " +
-            (worker.job().empty() ? "idle" : "works on " + worker.job()) + ", heard of " +
-            HumanSeconds(worker.heartbeat_age_seconds()) + " ago\n";
+    text += fmt::format("worker     {}, pid {}, {}, {}, heard of {} ago\n",
+                        worker.worker_id(),
+                        worker.pid(),
+                        HumanBytes(worker.memory_bytes()),
+                        worker.job().empty() ? "idle" : "works on " + worker.job(),
+                        HumanSeconds(worker.heartbeat_age_seconds()));
   }
   return text;
 }

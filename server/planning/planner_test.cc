@@ -9,7 +9,6 @@
 #include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
-#include "server/planning/stage_key.h"
 #include "server/planning/time_budget.h"
 #include "server/service_error.h"
 
@@ -426,24 +425,6 @@ TEST(PlanColorizeScene, TakesAnAcceptedKeyViewInPlaceOfMakingItsOwn) {
   EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("without the select_key_view"));
   EXPECT_THAT(PlanError(spec, {Done("import_scene")}).message, HasSubstr("key_color is required"));
   EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
-}
-
-TEST(StageKey, DependsOnOptionsAndSeedOnly) {
-  v1::JobSpec spec;
-  spec.set_scene("scenes/a");
-  spec.mutable_reconstruct_geometry()->set_iterations(10);
-  const std::string key = KeyPartOf(spec).bytes;
-  v1::JobSpec other = spec;
-  other.set_scene("scenes/b");
-  other.add_inputs("jobs/x");
-  other.set_skip_cache(true);
-  EXPECT_EQ(KeyPartOf(other).bytes, key);
-  other.mutable_reconstruct_geometry()->set_iterations(11);
-  EXPECT_NE(KeyPartOf(other).bytes, key);
-  other = spec;
-  other.set_seed(2);
-  EXPECT_NE(KeyPartOf(other).bytes, key);
-  EXPECT_EQ(KeyPartOf(SceneSpec()).bytes, "") << "reports are never cached";
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include "server/rpc/info_services.h"
 
-#include <algorithm>
 
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
@@ -74,16 +73,14 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
   return AnswerUnary(
       parts_, context, request, response, [this](const auto& in, v1::ListColorizersResponse* out) {
         if (!in.scene().empty()) CheckName(in.scene(), "scenes");
-        const std::string listing = "colorizers of " + in.scene();
-        const size_t size = PageSize(in.page_size());
-        const auto colorizers = parts_.store.ListColorizers(
-            in.scene(), ParsePageToken(in.page_token(), listing), static_cast<int>(size) + 1);
-        for (size_t i = 0; i < std::min(size, colorizers.size()); ++i) {
-          *out->add_colorizers() = ToProto(colorizers[i]);
-        }
-        if (colorizers.size() > size) {
-          out->set_next_page_token(MakePageToken(colorizers[size - 1].id, listing));
-        }
+        AnswerPage(
+            in,
+            "colorizers of " + in.scene(),
+            out,
+            [&](int64_t before_id, int limit) {
+              return parts_.store.ListColorizers(in.scene(), before_id, limit);
+            },
+            [&](const ColorizerRecord& colorizer) { *out->add_colorizers() = ToProto(colorizer); });
       });
 }
 

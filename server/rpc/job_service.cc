@@ -146,14 +146,12 @@ void ListJobPage(const RpcParts& parts,
     CheckName(request.parent(), "jobs");
     filter.parent = request.parent();
   }
-  const std::string listing = "jobs of " + request.parent();
-  const size_t size = PageSize(request.page_size());
-  const int64_t before = ParsePageToken(request.page_token(), listing);
-  const auto jobs = parts.store.ListJobs(filter, before, static_cast<int>(size) + 1);
-  for (size_t i = 0; i < std::min(size, jobs.size()); ++i) *response->add_jobs() = ToProto(jobs[i]);
-  if (jobs.size() > size) {
-    response->set_next_page_token(MakePageToken(jobs[size - 1].id, listing));
-  }
+  AnswerPage(
+      request,
+      "jobs of " + request.parent(),
+      response,
+      [&](int64_t before_id, int limit) { return parts.store.ListJobs(filter, before_id, limit); },
+      [&](const JobRecord& job) { *response->add_jobs() = ToProto(job); });
 }
 
 }  // namespace

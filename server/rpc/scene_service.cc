@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <set>
 
 #include "core/base/files.h"
@@ -91,15 +90,12 @@ grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerConte
                                                        v1::ListScenesResponse* response) {
   return AnswerUnary(
       parts_, context, request, response, [this](const auto& in, v1::ListScenesResponse* out) {
-        const size_t size = PageSize(in.page_size());
-        const int64_t before = ParsePageToken(in.page_token(), "scenes");
-        const auto scenes = parts_.store.ListScenes(before, static_cast<int>(size) + 1);
-        for (size_t i = 0; i < std::min(size, scenes.size()); ++i) {
-          *out->add_scenes() = ToProto(scenes[i]);
-        }
-        if (scenes.size() > size) {
-          out->set_next_page_token(MakePageToken(scenes[size - 1].id, "scenes"));
-        }
+        AnswerPage(
+            in,
+            "scenes",
+            out,
+            [&](int64_t before_id, int limit) { return parts_.store.ListScenes(before_id, limit); },
+            [&](const SceneRecord& scene) { *out->add_scenes() = ToProto(scene); });
       });
 }
 

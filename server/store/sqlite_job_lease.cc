@@ -102,10 +102,7 @@ std::vector<JobRecord> SqliteJobStore::GetInputs(int64_t job_id) {
       SelectJob("where job_id in (select input_id from job_dependency where job_id=?) "
                 "order by job_id"));
   select.Bind(job_id);
-  std::vector<JobRecord> jobs;
-  while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
-  return jobs;
+  return ReadJobs(select);
 }
 
 JobRecord SqliteJobStore::RequireLease(const Lease& lease) {

@@ -87,6 +87,13 @@ std::vector<ArtifactRecord> SqliteJobStore::LoadArtifacts(int64_t job_id) {
   return artifacts;
 }
 
+std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteStatement& select) {
+  std::vector<JobRecord> jobs;
+  while (select.Step()) jobs.push_back(JobFromRow(select));
+  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
+  return jobs;
+}
+
 std::vector<JobRecord> SqliteJobStore::GraphOf(const JobRecord& root) {
   std::vector<JobRecord> jobs;
   SqliteStatement select(db_->handle(), SelectJob("where parent=? order by job_id"));
@@ -113,20 +120,14 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
   if (!filter.parent.empty()) select.Bind(filter.parent);
   if (!filter.scene.empty()) select.Bind(filter.scene);
   select.Bind(limit);
-  std::vector<JobRecord> jobs;
-  while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
-  return jobs;
+  return ReadJobs(select);
 }
 
 std::vector<JobRecord> SqliteJobStore::ListChildren(const std::string& name) {
   std::lock_guard lock(mutex_);
   SqliteStatement select(db_->handle(), SelectJob("where parent=? order by job_id"));
   select.Bind(name);
-  std::vector<JobRecord> jobs;
-  while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
-  return jobs;
+  return ReadJobs(select);
 }
 
 std::optional<std::string> SqliteJobStore::CheckRequest(const RequestKey& request) {
@@ -238,8 +239,7 @@ JobsSnapshot SqliteJobStore::Snapshot(const std::vector<int64_t>& job_ids) {
     if (sequence.Step()) snapshot.revision = sequence.Int(0);
     SqliteStatement select(
         db_->handle(), SelectJob("where job_id in (" + JoinIds(job_ids) + ") order by revision"));
-    while (select.Step()) snapshot.jobs.push_back(JobFromRow(select));
-    for (JobRecord& job : snapshot.jobs) job.artifacts = LoadArtifacts(job.id);
+    snapshot.jobs = ReadJobs(select);
   } catch (...) {
     db_->Exec("rollback");
     throw;

@@ -102,6 +102,8 @@ class SqliteJobStore : public JobStore {
   JobRecord RequireJob(const std::string& name);
   JobRecord JobById(int64_t job_id);
   std::vector<ArtifactRecord> LoadArtifacts(int64_t job_id);
+  // All rows of a SelectJob statement, with artifacts.
+  std::vector<JobRecord> ReadJobs(SqliteStatement& select);
   std::vector<JobRecord> GraphOf(const JobRecord& root);
   SceneRecord RequireScene(const std::string& name, bool with_files);
 

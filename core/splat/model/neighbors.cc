@@ -25,7 +25,9 @@ bool Nearer(const NeighborTree::Neighbor& a, const NeighborTree::Neighbor& b) {
                                                   : a.index < b.index;
 }
 
-// What nanoflann searches into: the k nearest in order, whatever order they come in.
+// What nanoflann searches into: the k nearest in order, whatever order they come in. The names are
+// those that nanoflann calls.
+// NOLINTBEGIN(readability-identifier-naming)
 class NearestInOrder {
  public:
   using DistanceType = float;
@@ -53,6 +55,7 @@ class NearestInOrder {
   size_t k_;
   std::vector<NeighborTree::Neighbor>& nearest_;
 };
+// NOLINTEND(readability-identifier-naming)
 
 }  // namespace
 

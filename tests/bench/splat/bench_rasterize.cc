@@ -1,4 +1,6 @@
 // color3d-bench rasterize: how the cost of a training iteration grows, on synthetic loads.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -129,7 +131,7 @@ Json MemoryPerGaussian(int channels) {
               {"splat_row", splat_bytes},
               {"binning", binning_bytes},
               {"total", 4 * row_bytes + statistics_bytes + splat_bytes + binning_bytes},
-              {"per_pair", 4 + 4 + 2 + 4 * GradientRowFloats(channels, false)}};
+              {"per_pair", 4 + 4 + 2 + 4 * GradientRowFloats(channels)}};
 }
 
 void PrintTable(const Json& report) {

@@ -1,4 +1,4 @@
-#include "client/lib/gray_copies.h"
+#include "client/lib/photos/gray_copies.h"
 
 #include <algorithm>
 #include <array>

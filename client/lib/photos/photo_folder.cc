@@ -1,4 +1,4 @@
-#include "client/lib/photo_folder.h"
+#include "client/lib/photos/photo_folder.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "client/lib/photo_folder.h"
+#include "client/lib/photos/photo_folder.h"
 #include "core/base/cancellation.h"
 #include "core/base/image.h"
 

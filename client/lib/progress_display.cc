@@ -1,4 +1,4 @@
-#include "client/commands/progress_display.h"
+#include "client/lib/progress_display.h"
 
 #include <fmt/core.h>
 #include <sys/ioctl.h>
@@ -64,7 +64,7 @@ bool ProgressDisplay::SomethingRuns() const {
 
 void ProgressDisplay::OnTick() {
   if (unfinished_.empty() || SomethingRuns() || steady_clock::now() - idle_since_ < kIdle) return;
-  Draw("waiting for a worker (" + std::to_string(unfinished_.size()) + " stages to go)");
+  Draw(fmt::format("waiting for a worker ({} stages to go)", unfinished_.size()));
 }
 
 void ProgressDisplay::OnTransfer(const std::string& what, int64_t done, int64_t total) {

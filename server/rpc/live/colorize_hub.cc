@@ -1,12 +1,12 @@
-#include "server/rpc/colorize_hub.h"
+#include "server/rpc/live/colorize_hub.h"
 
 #include <deque>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "server/rpc/colorize_request.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/live/colorize_request.h"
 #include "server/service_error.h"
 
 namespace color3d {

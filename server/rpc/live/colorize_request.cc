@@ -1,4 +1,4 @@
-#include "server/rpc/colorize_request.h"
+#include "server/rpc/live/colorize_request.h"
 
 #include "core/base/utf8.h"
 #include "core/catalogue/stages.h"

@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <mutex>
-#include <set>
 #include <thread>
 
 #include "server/store/sqlite_db.h"
@@ -10,9 +7,9 @@
 
 namespace color3d {
 namespace {
-using JobRecordsTest = JobStoreTest;
+using SqliteJobStoreTest = JobStoreTest;
 
-TEST_F(JobRecordsTest, RequestIdMakesCallsIdempotent) {
+TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
   const RequestKey key{"CreateJob", "id-1", "body-1"};
   const JobRecord first = CreateDiamond(key);
   EXPECT_EQ(CreateDiamond(key).name, first.name);
@@ -31,7 +28,7 @@ TEST_F(JobRecordsTest, RequestIdMakesCallsIdempotent) {
   EXPECT_EQ(store_->Retry(first.name, false, retry).state, JobState::kFailed);
 }
 
-TEST_F(JobRecordsTest, EqualRequestsAtOnceMakeOneJob) {
+TEST_F(SqliteJobStoreTest, EqualRequestsAtOnceMakeOneJob) {
   SqliteJobStore other(scratch_.path() / "jobs.db", [this] { return now_.load(); });
   const RequestKey key{"CreateJob", "same", "body"};
   NewGraph graph;
@@ -50,7 +47,7 @@ TEST_F(JobRecordsTest, EqualRequestsAtOnceMakeOneJob) {
   EXPECT_EQ(store_->ListJobs({}, 0, 100).size(), 1u);
 }
 
-TEST_F(JobRecordsTest, StateSurvivesReopening) {
+TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
   const JobRecord root = CreateDiamond();
   const JobRecord import = ClaimOne();
   store_.reset();
@@ -61,14 +58,14 @@ TEST_F(JobRecordsTest, StateSurvivesReopening) {
   EXPECT_GT(store_->NewestRevision(), 0);
 }
 
-TEST_F(JobRecordsTest, NewerSchemaIsRefused) {
+TEST_F(SqliteJobStoreTest, NewerSchemaIsRefused) {
   store_.reset();
   SqliteDatabase(scratch_.path() / "jobs.db").Exec("update schema_version set version=99");
   EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_VERSION");
 }
 
 // A data directory of version 1 goes on with its scenes.
-TEST_F(JobRecordsTest, StoreOfVersion1IsBroughtUpToDate) {
+TEST_F(SqliteJobStoreTest, StoreOfVersion1IsBroughtUpToDate) {
   store_.reset();
   {
     SqliteDatabase old(scratch_.path() / "jobs.db");
@@ -82,61 +79,14 @@ TEST_F(JobRecordsTest, StoreOfVersion1IsBroughtUpToDate) {
   EXPECT_EQ(store_->ListScenes(0, 10).size(), 1u);
 }
 
-TEST_F(JobRecordsTest, OnlyAColoredKeyViewOfTheSceneIsAccepted) {
-  SceneRecord other;
-  other.name = "scenes/other";
-  store_->CreateScene(other, {});
-  NewGraph graph;
-  graph.scene = "scenes/test";
-  graph.jobs = {Job("colorize_key_view")};
-  const std::string job = store_->CreateGraph(graph, {}, kNoLimit).name;
-  const auto accept = [&](const std::string& scene, const std::string& name) {
-    return store_->AcceptKeyColor(scene, name, {}).key_color_job;
-  };
-  EXPECT_EQ(ReasonThrown([&] { accept("scenes/test", job); }), "WRONG_STATE");
-  Succeed(ClaimOne());
-  EXPECT_EQ(accept("scenes/test", job), job);
-  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, job);
-  EXPECT_THROW(accept("scenes/other", job), Error);
-  EXPECT_THROW(accept("scenes/test", CreateSingle().name), Error);
-  EXPECT_EQ(ReasonThrown([&] { accept("scenes/test", "jobs/0000"); }), "JOB_NOT_FOUND");
-  EXPECT_EQ(ReasonThrown([&] { accept("scenes/none", job); }), "SCENE_NOT_FOUND");
-  EXPECT_EQ(accept("scenes/test", ""), "");
-  accept("scenes/test", job);
-  store_->Delete(job, {});
-  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "") << "a job that is gone";
-}
-
-TEST_F(JobRecordsTest, GarbageFileIsReportedNotCrashed) {
+TEST_F(SqliteJobStoreTest, GarbageFileIsReportedNotCrashed) {
   store_.reset();
   std::filesystem::remove(scratch_.path() / "jobs.db-wal");
   WriteFileAtomic(scratch_.path() / "jobs.db", std::string(4096, 'x'));
   EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_CORRUPT");
 }
 
-TEST_F(JobRecordsTest, TwoStoresNeverClaimTheSameJob) {
-  constexpr int kJobs = 60;
-  for (int i = 0; i < kJobs; ++i) CreateSingle();
-  std::atomic<int> claims{0};
-  std::mutex mutex;
-  std::set<std::string> names;
-  std::vector<std::thread> threads;
-  for (int t = 0; t < 4; ++t) {
-    threads.emplace_back([&, t] {
-      SqliteJobStore own(scratch_.path() / "jobs.db", [this] { return now_.load(); });
-      while (const auto job = own.Claim("w" + std::to_string(t), kLease)) {
-        ++claims;
-        std::lock_guard lock(mutex);
-        names.insert(job->name);
-      }
-    });
-  }
-  for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(claims.load(), kJobs);
-  EXPECT_EQ(names.size(), static_cast<size_t>(kJobs));
-}
-
-TEST_F(JobRecordsTest, EventsResumeAndCoalesceProgress) {
+TEST_F(SqliteJobStoreTest, EventsResumeAndCoalesceProgress) {
   const JobRecord job = CreateSingle();
   const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
   const JobRecord running = ClaimOne();
@@ -158,7 +108,7 @@ TEST_F(JobRecordsTest, EventsResumeAndCoalesceProgress) {
   EXPECT_GT(later[0].revision, events[2].revision);
 }
 
-TEST_F(JobRecordsTest, CompactedRevisionsAreReported) {
+TEST_F(SqliteJobStoreTest, CompactedRevisionsAreReported) {
   const JobRecord job = CreateSingle();
   const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
   Succeed(ClaimOne());
@@ -170,7 +120,7 @@ TEST_F(JobRecordsTest, CompactedRevisionsAreReported) {
   EXPECT_EQ(store_->NewestRevision(), newest);
 }
 
-TEST_F(JobRecordsTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
+TEST_F(SqliteJobStoreTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "WRONG_STATE");
   EXPECT_EQ(ReasonThrown([&] { store_->DeleteScene("scenes/test", {}); }), "SCENE_IN_USE");
@@ -194,7 +144,7 @@ TEST_F(JobRecordsTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
   EXPECT_EQ(ReasonThrown([&] { store_->GetScene("scenes/test"); }), "SCENE_NOT_FOUND");
 }
 
-TEST_F(JobRecordsTest, ListsArePagedNewestFirst) {
+TEST_F(SqliteJobStoreTest, ListsArePagedNewestFirst) {
   const JobRecord root = CreateDiamond();
   CreateSingle();
   const auto first = store_->ListJobs({}, 0, 3);
@@ -205,44 +155,6 @@ TEST_F(JobRecordsTest, ListsArePagedNewestFirst) {
   EXPECT_EQ(store_->ListJobs({root.name, ""}, 0, 10).size(), 3u);
   EXPECT_EQ(store_->ListJobs({"", "scenes/test"}, 0, 10).size(), 5u);
   EXPECT_TRUE(store_->ListJobs({"", "scenes/other"}, 0, 10).empty());
-}
-
-TEST_F(JobRecordsTest, StageCacheFindsSucceededJobsByKey) {
-  CreateSingle();
-  const JobRecord job = ClaimOne();
-  EXPECT_FALSE(store_->FindStage("key"));
-  Publication publication;
-  publication.stage_key = "key";
-  publication.artifacts = {{"a", {Sha256Hex("a"), 1}, ""}};
-  store_->Publish(LeaseOf(job), publication);
-  EXPECT_EQ(store_->FindStage("key").value().artifacts.size(), 1u);
-  EXPECT_FALSE(store_->FindStage(""));
-}
-
-TEST_F(JobRecordsTest, DeadWorkersLoseTheirLeasesAtOnce) {
-  const JobRecord job = CreateSingle();
-  ClaimOne("worker-1-77");
-  store_->UpdateWorker({"worker-1-77", 77, job.name, 5, 0});
-  ASSERT_EQ(store_->ListWorkers().size(), 1u);
-  EXPECT_TRUE(store_->ExpireLeasesOf("worker-2-78").empty());
-  EXPECT_EQ(store_->ExpireLeasesOf("worker-1-77"), std::vector<std::string>{job.name});
-  EXPECT_EQ(store_->ReapExpired(), 1);
-  EXPECT_EQ(StateOf(job.name), JobState::kQueued);
-}
-
-TEST_F(JobRecordsTest, ColorizersAreListedOncePerFile) {
-  NewGraph graph;
-  graph.scene = "scenes/test";
-  graph.jobs = {Job("personalize")};
-  for (int i = 0; i < 2; ++i) {  // the second is a cached run with the same file
-    store_->CreateGraph(graph, {}, kNoLimit);
-    Succeed(ClaimOne(), "colorizer.c3c");
-  }
-  const auto colorizers = store_->ListColorizers("", 0, 10);
-  ASSERT_EQ(colorizers.size(), 1u);
-  EXPECT_EQ(store_->GetColorizer(colorizers[0].digest.sha256).job, colorizers[0].job);
-  EXPECT_TRUE(store_->ListColorizers("scenes/other", 0, 10).empty());
-  EXPECT_EQ(ReasonThrown([&] { store_->GetColorizer(Sha256Hex("no")); }), "COLORIZER_NOT_FOUND");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "server/rpc/inference_client.h"
+#include "server/rpc/live/inference_client.h"
 
 #include <fmt/core.h>
 #include <grpcpp/create_channel.h>
