@@ -82,12 +82,12 @@ struct OtherEncoder : Encoder {
 TEST(ColorizerTest, LearnsTheKeyView) {
   const Key key = MakeKey(128, 96);
   const double gray = MeanError(key.luminance, key.ab, Image(128, 96, 2));
-  const double neighbours =
+  const double neighbors =
       MeanError(key.luminance, key.ab, Train(key, Quick(0))->Colorize(key.luminance));
   const double trained =
       MeanError(key.luminance, key.ab, Train(key, Quick(40))->Colorize(key.luminance));
   EXPECT_GT(gray, 15.0);
-  EXPECT_LT(neighbours, 0.25 * gray);
+  EXPECT_LT(neighbors, 0.25 * gray);
   EXPECT_LT(trained, 0.25 * gray);
 }
 
@@ -131,7 +131,7 @@ TEST(ColorizerTest, RefusesASizeOfTheNetworkThatIsOutOfRange) {
 TEST(ColorizerTest, SameSeedSameColorizer) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(5);
-  // Without neighbours, whose colours are the key's own under any seed.
+  // Without neighbors, whose colours are the key's own under any seed.
   options.recipe = ColorizerOptions::Recipe::kPaper;
   const Image first = Train(key, options)->Colorize(key.luminance);
   EXPECT_EQ(Train(key, options)->Colorize(key.luminance).data, first.data);

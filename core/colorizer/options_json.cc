@@ -33,8 +33,7 @@ T FromName(const Names<T>& names, const char* what, const std::string& text) {
   for (const auto& [known, name] : names) {
     if (text == name) return known;
   }
-  throw InvalidArgument(std::string("the colorizer file names the unknown ") + what + " \"" + text +
-                        "\"");
+  throw InvalidArgument("the colorizer file names the unknown {} \"{}\"", what, text);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Many scenes in one batch: fair turns, and results that do not depend on the neighbours.
+// Many scenes in one batch: fair turns, and results that do not depend on the neighbors.
 #include "core/colorizer/scene_batch.h"
 
 #include <gtest/gtest.h>
@@ -78,7 +78,7 @@ struct CancelAfter : NullObserver {
 
 // In one batch: the scenes, a scene with a NaN, one that is cancelled and one whose checkpoint
 // store throws.
-TEST(SceneBatchTest, NeighboursEvenPoisonedOnesLeaveResultsUnchanged) {
+TEST(SceneBatchTest, NeighborsEvenPoisonedOnesLeaveResultsUnchanged) {
   SceneBatch batch(2);
   std::vector<std::shared_ptr<const Colorizer>> together(kScenes);
   std::atomic<int> failures{0};
@@ -164,7 +164,7 @@ TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
   std::vector<std::thread> threads;
   for (int i = 0; i < 6; ++i) {
     threads.emplace_back([&, i] {
-      SceneBatch::Seat seat(batch, i < 5 ? "a" : "b");
+      SceneBatch::Membership membership(batch, i < 5 ? "a" : "b");
       while (!stop) {
         SceneBatch::Turn turn(seat, {});
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -186,7 +186,7 @@ TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
 
 TEST(SceneBatchTest, AWaitingSceneCanBeCancelled) {
   SceneBatch batch(1);
-  SceneBatch::Seat first(batch, "a"), second(batch, "a");
+  SceneBatch::Membership first(batch, "a"), second(batch, "a");
   const SceneBatch::Turn turn(first, {});
   CancellationToken cancel;
   std::thread canceller([&] {

@@ -1,4 +1,4 @@
-// The parts that only core/colorizer sees: model, optimiser, trainer, feature neighbours.
+// The parts that only core/colorizer sees: model, optimiser, trainer, feature neighbors.
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
@@ -9,7 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/colorizer/adam.h"
-#include "core/colorizer/feature_neighbours.h"
+#include "core/colorizer/feature_neighbors.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
@@ -396,13 +396,13 @@ TEST(AdamTest, ANonFiniteGradientChangesNothing) {
   EXPECT_EQ(adam.steps(), 0);
 }
 
-TEST_F(TrainingTest, NeighboursOfTheKeyViewHaveItsColours) {
-  FeatureNeighboursOptions options;
+TEST_F(TrainingTest, NeighborsOfTheKeyViewHaveItsColours) {
+  FeatureNeighborsOptions options;
   options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
-  const FeatureNeighbours neighbours(encoder_, pictures_, options, Random(1), {});
+  const FeatureNeighbors neighbors(encoder_, pictures_, options, Random(1), {});
   const torch::Tensor l = KeyTensor();
-  const NeighbourColors found =
-      neighbours.Lookup(encoder_.Taps(encoder_.Input(l)), l, pictures_[0].luminance.height);
+  const NeighborColors found =
+      neighbors.Lookup(encoder_.Taps(encoder_.Input(l)), l, pictures_[0].luminance.height);
   ASSERT_EQ(found.ab.sizes(), (std::vector<int64_t>{2, 16, 24}));
   // Away from the border between the two colours.
   EXPECT_NEAR(found.ab[0].slice(1, 2, 9).mean().item<double>(), 40.0, 2.0);
@@ -410,15 +410,15 @@ TEST_F(TrainingTest, NeighboursOfTheKeyViewHaveItsColours) {
   EXPECT_LT(found.distance.mean().item<double>(), 0.1);
 }
 
-TEST_F(TrainingTest, NeighboursAgreeWithTheDefinitionInFloat64) {
-  FeatureNeighboursOptions options;
+TEST_F(TrainingTest, NeighborsAgreeWithTheDefinitionInFloat64) {
+  FeatureNeighborsOptions options;
   options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
   options.bank_size = 300;
-  const FeatureNeighbours neighbours(encoder_, pictures_, options, Random(1), {});
-  const torch::Tensor bank = neighbours.State().at("bank").to(torch::kFloat64);
-  const torch::Tensor colors = neighbours.State().at("colors").to(torch::kFloat64);
-  const FeatureNeighbours::Matches matches =
-      neighbours.LookupFeatures(neighbours.State().at("bank") + 0.05f);
+  const FeatureNeighbors neighbors(encoder_, pictures_, options, Random(1), {});
+  const torch::Tensor bank = neighbors.State().at("bank").to(torch::kFloat64);
+  const torch::Tensor colors = neighbors.State().at("colors").to(torch::kFloat64);
+  const FeatureNeighbors::Matches matches =
+      neighbors.LookupFeatures(neighbors.State().at("bank") + 0.05f);
   const torch::Tensor answer = matches.ab.to(torch::kFloat64);
   for (int64_t q = 0; q < 5; ++q) {
     const torch::Tensor d = (bank - (bank[q] + 0.05)).square().sum(1);
