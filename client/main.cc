@@ -36,6 +36,7 @@ int Main(int argc, char** argv) {
   context.interrupt = &interrupt;
   context.arguments.assign(argv + 1, argv + argc);
   CLI::App app("Turns monochrome photos of a scene into a coloured 3D scene.", "color3d");
+  app.set_version_flag("--version", COLOR3D_VERSION);
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help for all commands");
   app.footer(

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Installs what Color3D needs to build, run and test on Debian 12 (or a later Debian or Ubuntu that
-# has the same packages). Run as root or as a user with sudo; does nothing when all is there.
+# Installs what Color3D needs to build and run on Debian 12 (or a later Debian or Ubuntu that has the
+# same packages). Run as root or as a user with sudo; does nothing when all is there.
+#   deploy/install-deps.sh           what deploy/demo.sh needs
+#   deploy/install-deps.sh --tests   what tests/run.sh needs, too
 set -euo pipefail
 
 packages=(
@@ -9,8 +11,13 @@ packages=(
   libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libabsl-dev
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
-  libicu-dev zlib1g-dev libgtest-dev libgmock-dev libbenchmark-dev
+  libicu-dev zlib1g-dev
 )
+case "${1:-}" in
+  "") ;;
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy) ;;
+  *) echo "install-deps: unknown option $1; there is --tests" >&2; exit 2 ;;
+esac
 
 if ! command -v apt-get >/dev/null 2>&1; then
   echo "install-deps: this is not a Debian-like system (no apt-get); install the equivalents of:" >&2

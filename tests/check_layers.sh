@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
-#           <- {keyview, keycolor, augment, carry, colorizer, splat, metrics, report} <- stage
+#           <- matching (of encoder) <- {keyview, keycolor, augment, carry, colorizer, splat, metrics, report} <- stage
 #   server: store <- {planning, storage} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers and SQL never below the server. What tests
 # (*_test.cc) set up is not held against their folder; the product never includes tests/.
@@ -45,19 +45,22 @@ allow core/encoder 'core/(base|color|image|weights|encoder(/[a-z]+)?)'
 for folder in keyview augment metrics; do
   allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
 done
-allow core/keycolor 'core/(base|grid|color|image|weights|encoder(/[a-z]+)?|keycolor(/[a-z]+)?)'
-for source in hints references words automatic external; do
+allow core/matching 'core/(base|encoder(/[a-z]+)?|matching)'
+allow core/keycolor \
+  'core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/[a-z]+)?)'
+allow core/keycolor/hints 'core/(base|grid|color|image|keycolor/hints)'
+for source in references words automatic external; do
   allow "core/keycolor/$source" \
-    "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|keycolor|keycolor/$source)"
+    "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/hints)?|keycolor/$source)"
 done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
-allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|augment|colorizer)'
+allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
 lower=
 for part in model raster training geometry chroma export; do
   lower="$lower${lower:+|}$part"
   allow "core/splat/$part" "core/(base|simd|color|image|scene|splat/($lower))"
 done
-allow core/report 'core/(base|image|report)'
+allow core/report 'core/(base|catalogue|image|report)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
 allow server/store 'core/(base|catalogue)|server/store'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'
@@ -68,7 +71,7 @@ allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/stage server client \
-  core/keycolor/hints core/keycolor/references core/keycolor/words
+  core/keycolor/hints core/keycolor/words
 forbid 'grpc|google/protobuf|color3d/v1|sqlite3|spdlog' core
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base core/simd core/grid

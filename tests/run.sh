@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds Color3D and runs its test suite. Installs what is missing (as root or with sudo).
-#   tests/run.sh            everything: layering, API checks, fast and integration tests
+#   tests/run.sh            everything: format, layers, documents, API, lint, then every test
 #   tests/run.sh -L fast    only the tests with this CTest label (fast, stability, integration, slow)
 # BUILD_DIR names another build folder (default: build). With CI=true nothing is asked or coloured.
 set -euo pipefail
@@ -16,10 +16,12 @@ while getopts "L:h" option; do
 done
 build=${BUILD_DIR:-build}
 
-deploy/install-deps.sh
+deploy/install-deps.sh --tests
+tests/check_format.sh
 tests/check_layers.sh
+tests/check_docs.sh
 tests/check_proto.sh "$build"
-cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release
+cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCOLOR3D_TESTS=ON
 cmake --build "$build"
 # One test at a time: most of them use every core.
 ctest --test-dir "$build" --output-on-failure --timeout 900 "${label_args[@]}"

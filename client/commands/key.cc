@@ -166,7 +166,7 @@ ExitCode Key::Colour() {
     return ExitCode::kOk;
   }
   PrintText("key view   " + choice.view + "\ncolour     from " + DescribeSource(job) +
-            "\nlook at    " + (fs::path(options_.out) / "key_view_coloured.png").string() +
+            "\nlook at    " + (fs::path(options_.out) / "key_view_colored.png").string() +
             "\nIf you like it, accept it\n" + Command({"key", "accept", scene}) +
             "or colour it again in another way: each try is kept.\n");
   return ExitCode::kOk;

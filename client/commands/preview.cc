@@ -73,7 +73,7 @@ v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::stri
                     scene + " ...`");
   }
   *key = ReadChoice(connection, *job).view;
-  return FindArtifact(*job, "key_view_coloured.png").digest();
+  return FindArtifact(*job, "key_view_colored.png").digest();
 }
 
 ExitCode Preview(const Context& context, const PreviewOptions& options) {

@@ -25,7 +25,7 @@ constexpr MetricLine kMetricLines[] = {
     {"psnr_l", "PSNR of luminance           %.2f dB"},
     {"delta_e00_chroma", "chroma error (CIEDE2000)    %.2f"},
     {"delta_e00_chroma_bound", "  with all true colours     %.2f"},
-    {"delta_e00_grey", "  for comparison, grey      %.2f"},
+    {"delta_e00_gray", "  for comparison, grey      %.2f"},
     {"share_seen", "share seen in a key view    %.2f"},
     {"gaussians", "Gaussians                   %.0f"},
 };

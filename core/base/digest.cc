@@ -52,7 +52,7 @@ std::string Sha256Hex(std::string_view bytes) {
 
 FileDigest DigestFile(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
-  if (!in) throw Error(ErrorCode::kNotFound, "cannot open " + path.string());
+  if (!in) throw Error(ErrorCode::kNotFound, "cannot open {}", path.string());
   Sha256 hash;
   FileDigest result;
   std::vector<char> buffer(1 << 18);
@@ -62,7 +62,7 @@ FileDigest DigestFile(const std::filesystem::path& path) {
     hash.Update({buffer.data(), static_cast<size_t>(got)});
     result.size_bytes += got;
   }
-  if (in.bad()) throw Error(ErrorCode::kDataLoss, "cannot read " + path.string());
+  if (in.bad()) throw Error(ErrorCode::kDataLoss, "cannot read {}", path.string());
   result.sha256 = hash.FinishHex();
   return result;
 }

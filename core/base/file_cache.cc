@@ -1,5 +1,6 @@
 #include "core/base/file_cache.h"
 
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -95,8 +96,7 @@ void FileCache::Put(const std::string& key, std::string_view bytes) const {
   fs::create_directories(folder_, error);
   const fs::space_info space = fs::space(folder_, error);
   if (error || space.available < kReserveBytes + bytes.size()) return;
-  const fs::path temporary =
-      folder_ / (kTemporary + std::to_string(::getpid()) + "-" + std::to_string(counter++));
+  const fs::path temporary = folder_ / fmt::format("{}{}-{}", kTemporary, ::getpid(), counter++);
   if (WriteWhole(temporary, Seal(key, bytes), bytes)) fs::rename(temporary, folder_ / key, error);
   fs::remove(temporary, error);
 }

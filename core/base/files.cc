@@ -1,6 +1,7 @@
 #include "core/base/files.h"
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -29,7 +30,7 @@ namespace {
   } else if (error == ENOENT || error == ENOTDIR) {
     code = ErrorCode::kNotFound;
   }
-  throw Error(code, what + " " + path.string() + ": " + std::strerror(error) + remedy);
+  throw Error(code, "{} {}: {}{}", what, path.string(), std::strerror(error), remedy);
 }
 
 class FileDescriptor {
@@ -58,11 +59,13 @@ std::string ReadFile(const fs::path& path, int64_t max_bytes) {
   if (fd.get() < 0) ThrowErrno("cannot open", path);
   struct stat status {};
   if (::fstat(fd.get(), &status) != 0) ThrowErrno("cannot read", path);
-  if (S_ISDIR(status.st_mode)) throw InvalidArgument(path.string() + " is a folder, not a file");
+  if (S_ISDIR(status.st_mode)) throw InvalidArgument("{} is a folder, not a file", path.string());
   if (status.st_size > max_bytes) {
     throw Error(ErrorCode::kResourceExhausted,
-                path.string() + " has " + std::to_string(status.st_size) +
-                    " bytes, more than the " + std::to_string(max_bytes) + " allowed here");
+                "{} has {} bytes, more than the {} allowed here",
+                path.string(),
+                status.st_size,
+                max_bytes);
   }
   std::string bytes(static_cast<size_t>(status.st_size), '\0');
   size_t done = 0;
@@ -90,8 +93,8 @@ void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
   static std::atomic<uint64_t> counter{0};
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   const fs::path temporary =
-      folder / ("." + path.filename().string() + "." + std::to_string(::getpid()) + "." +
-                std::to_string(counter.fetch_add(1)) + ".part");
+      folder /
+      fmt::format(".{}.{}.{}.part", path.filename().string(), ::getpid(), counter.fetch_add(1));
   try {
     {
       FileDescriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
@@ -114,7 +117,7 @@ void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
 std::vector<std::string> ListFiles(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    throw Error(ErrorCode::kNotFound, folder.string() + " is not a folder");
+    throw Error(ErrorCode::kNotFound, "{} is not a folder", folder.string());
   }
   std::vector<std::string> files;
   fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied);

@@ -56,14 +56,14 @@ int64_t MemAvailable(const fs::path& root) {
 }  // namespace
 
 int64_t AvailableMemoryBytes(const fs::path& root) {
-  int64_t least = MemAvailable(root);
+  int64_t available = MemAvailable(root);
   const fs::path v2 = root / "sys/fs/cgroup", v1 = v2 / "memory";
   const auto consider_v2 = [&](const fs::path& group) {
-    least = std::min(least, LeftInGroup(v2 / group, "memory.max", "memory.current"));
+    available = std::min(available, LeftInGroup(v2 / group, "memory.max", "memory.current"));
   };
   const auto consider_v1 = [&](const fs::path& group) {
-    least =
-        std::min(least, LeftInGroup(v1 / group, "memory.limit_in_bytes", "memory.usage_in_bytes"));
+    available = std::min(available,
+                         LeftInGroup(v1 / group, "memory.limit_in_bytes", "memory.usage_in_bytes"));
   };
   // A container sees its own group as the root; elsewhere every group on the way up may limit.
   consider_v2("");
@@ -79,7 +79,7 @@ int64_t AvailableMemoryBytes(const fs::path& root) {
       if (controllers == "memory") consider_v1(group);
     }
   }
-  return least;
+  return available;
 }
 
 int64_t ResidentMemoryBytes() { return StatusBytes("VmRSS:"); }

@@ -40,7 +40,8 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   const std::string program = FindProgram(options.arguments.at(0));
   if (program.empty()) {
     throw Error(ErrorCode::kFailedPrecondition,
-                options.arguments[0] + " is not installed; run deploy/install-deps.sh");
+                "{} is not installed; run deploy/install-deps.sh",
+                options.arguments[0]);
   }
   // Everything the child needs is prepared before fork: only async-signal-safe calls after it.
   std::vector<char*> arguments;
@@ -55,7 +56,7 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   const std::string log = options.log_path.empty() ? "/dev/null" : options.log_path.string();
   const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (log_fd < 0) {
-    throw Error(ErrorCode::kFailedPrecondition, "cannot write " + log + ": " + strerror(errno));
+    throw Error(ErrorCode::kFailedPrecondition, "cannot write {}: {}", log, strerror(errno));
   }
   const int null_fd = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   const pid_t parent = ::getpid();
@@ -73,7 +74,7 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   }
   ::close(log_fd);
   ::close(null_fd);
-  if (child < 0) throw Error(ErrorCode::kResourceExhausted, "cannot start " + program);
+  if (child < 0) throw Error(ErrorCode::kResourceExhausted, "cannot start {}", program);
   // Also here: whichever side runs first, the group exists before it may have to be killed.
   ::setpgid(child, child);
 

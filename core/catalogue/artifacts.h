@@ -1,45 +1,45 @@
 // Names of what stages hand to each other and to people: paths below a job's results. The only
-// place where they are spelled. Those that end in "/" are folders, with a file for each view or
-// picture.
+// place where they are spelled; stages.cc says which stage makes and reads which. A name that ends
+// in "/" is a folder with one or more files for each view or picture.
 #pragma once
 
-namespace color3d {
-namespace artifact {
+namespace color3d::artifact {
+
 inline constexpr char kScene[] = "scene.json";
-inline constexpr char kImportFacts[] = "import.json";
+inline constexpr char kImportFacts[] = "import.json";  // what the import found out
 inline constexpr char kSfmLog[] = "sfm.log";
-inline constexpr char kKeyView[] = "key_view.json";
-inline constexpr char kKeyViewGray[] = "key_view.png";               // as captured, grey: to colour
-inline constexpr char kKeyViewRanking[] = "key_view_ranking.jpg";    // contact sheet
-inline constexpr char kKeyColor[] = "key_color.png";                 // ab, undistorted, see codec.h
-inline constexpr char kKeyColorFacts[] = "key_color.json";           // where the colour came from
+inline constexpr char kKeyView[] = "key_view.json";                // which view, and why
+inline constexpr char kKeyViewGray[] = "key_view.png";             // as captured: to be coloured
+inline constexpr char kKeyViewRanking[] = "key_view_ranking.jpg";  // contact sheet of candidates
+inline constexpr char kKeyColor[] = "key_color.png";               // ab, undistorted: image/codec.h
+inline constexpr char kKeyColorFacts[] = "key_color.json";         // where the colour came from
 inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which words went where
-inline constexpr char kKeyViewColored[] = "key_view_coloured.png";   // for people
-inline constexpr char kAugmentationFacts[] = "augmentations.json";   // what was made, what not, why
-// + name + ".png" (for people, and L), ".ab.png" and ".weight.png"
+inline constexpr char kKeyViewColored[] = "key_view_colored.png";    // for people
+inline constexpr char kGeometry[] = "geometry.c3g";  // Gaussians with luminance only
+inline constexpr char kMemoryPlan[] = "memory_plan.json";
+inline constexpr char kCarried[] = "carried/";       // view's stem + ".png": ab and confidence
+inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
+inline constexpr char kAugmentationFacts[] = "augmentations.json";  // what was made, what not, why
+// name + ".png" (the picture), ".ab.png" (its colour) and ".weight.png"
 inline constexpr char kAugmentations[] = "augmentations/";
 inline constexpr char kAugmentationSheet[] = "augmentations.jpg";  // contact sheet
 inline constexpr char kColorizer[] = "colorizer.c3c";
-inline constexpr char kCarried[] = "carried/";   // + view's stem + ".png": ab and confidence
-inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
-// + view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255).
+inline constexpr char kViewsAb[] = "views_ab/";  // view's stem + ".png"
+// view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255)
 inline constexpr char kProvenance[] = "provenance/";
-inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
-inline constexpr char kGeometry[] = "geometry.c3g";
-inline constexpr char kMemoryPlan[] = "memory_plan.json";
-inline constexpr char kModel[] = "model.c3g";
+inline constexpr char kModel[] = "model.c3g";  // Gaussians in colour
 inline constexpr char kPly[] = "scene.ply";
 inline constexpr char kSplat[] = "scene.splat";
-inline constexpr char kExportScores[] = "export.json";   // loss of the PLY against our own renders
-inline constexpr char kRenders[] = "renders/";           // + view's stem + ".png"
-inline constexpr char kTruths[] = "truths/";             // + view's stem + ".jpg"
-inline constexpr char kColored2d[] = "coloured_views/";  // + view's stem + ".jpg"
+inline constexpr char kExportScores[] = "export.json";  // what the PLY loses against our renders
+inline constexpr char kRenders[] = "renders/";          // view's stem + ".png"
 inline constexpr char kScores[] = "scores.json";
-inline constexpr char kCurves[] = "curves/";  // + stage + ".csv"
+inline constexpr char kTruths[] = "truths/";            // view's stem + ".jpg"
+inline constexpr char kColored2d[] = "colored_views/";  // view's stem + ".jpg"
+inline constexpr char kReport[] = "report.html";
 inline constexpr char kMetrics[] = "metrics.json";
 inline constexpr char kAllCurves[] = "curves.csv";
 inline constexpr char kPlan[] = "plan.json";
-inline constexpr char kReport[] = "report.html";
-}  // namespace artifact
+// Left by every stage that measures errors while it runs: the stage's kind + ".csv".
+inline constexpr char kCurves[] = "curves/";
 
-}  // namespace color3d
+}  // namespace color3d::artifact

@@ -8,15 +8,17 @@ namespace color3d {
 const std::vector<Stage>& StageCatalogue() {
   using namespace artifact;
   static const std::vector<Stage> catalogue = {
-      {.kind = kind::kImportScene, .leaves = {kScene, kImportFacts, kSfmLog}},
+      {.kind = kind::kImportScene, .leaves = {kScene, kImportFacts, kSfmLog}, .results = {kSfmLog}},
       {.kind = kind::kSelectKeyView,
        .needs = {kScene},
        .reads = {kImportFacts},
        .leaves = {kKeyView, kKeyViewGray, kKeyViewRanking},
+       .results = {kKeyView, kKeyViewGray, kKeyViewRanking},
        .brings_prerequisites = true},
       {.kind = kind::kColorizeKeyView,
        .needs = {kScene, kKeyView},
        .leaves = {kKeyColor, kKeyColorFacts, kKeyColorRegions, kKeyViewColored},
+       .results = {kKeyColorFacts, kKeyColorRegions, kKeyViewColored},
        .brings_prerequisites = true},
       {.kind = kind::kReconstructGeometry,
        .needs = {kScene},
@@ -31,11 +33,13 @@ const std::vector<Stage>& StageCatalogue() {
       {.kind = kind::kGenerateAugmentations,
        .needs = {kScene, kKeyView, kKeyColor},
        .reads = {kGeometry, kCarryFacts},
-       .leaves = {kAugmentationFacts, kAugmentations, kAugmentationSheet}},
+       .leaves = {kAugmentationFacts, kAugmentations, kAugmentationSheet},
+       .results = {kAugmentationSheet}},
       {.kind = kind::kPersonalize,
        .needs = {kScene, kKeyView, kKeyColor},
-       .reads = {kAugmentations, kCarried},
+       .reads = {kAugmentationFacts, kAugmentations, kCarried},
        .leaves = {kColorizer},
+       .results = {kColorizer},
        .runs_in_batch = true,
        .resumes = true,
        .keeps_time_limit = true},
@@ -45,15 +49,27 @@ const std::vector<Stage>& StageCatalogue() {
        .leaves = {kViewsAb, kProvenance}},
       {.kind = kind::kSolveChroma,
        .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry},
+       .reads = {kProvenance},
        .leaves = {kModel},
+       .results = {kModel},
        .resumes = true,
        .keeps_time_limit = true},
-      {.kind = kind::kExport, .needs = {kScene, kModel}, .leaves = {kPly, kSplat, kExportScores}},
-      {.kind = kind::kRender, .needs = {kScene, kModel}, .leaves = {kRenders}},
+      {.kind = kind::kExport,
+       .needs = {kScene, kModel},
+       .leaves = {kPly, kSplat, kExportScores},
+       .results = {kPly, kSplat}},
+      {.kind = kind::kRender,
+       .needs = {kScene, kModel},
+       .leaves = {kRenders},
+       .results = {kRenders}},
       {.kind = kind::kEvaluate,
-       .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kModel},
+       .needs = {kScene, kViewsAb, kModel},
+       .reads = {kProvenance},
        .leaves = {kScores, kTruths, kColored2d}},
-      {.kind = kind::kColorizeScene, .leaves = {kReport, kMetrics, kAllCurves, kPlan}},
+      // Its report reads what all the others have left.
+      {.kind = kind::kColorizeScene,
+       .leaves = {kReport, kMetrics, kAllCurves, kPlan},
+       .results = {kReport, kMetrics, kAllCurves, kPlan}},
       {.kind = kind::kPersonalizeScenes},
   };
   return catalogue;
@@ -69,7 +85,7 @@ const Stage* FindStage(std::string_view kind) {
 const Stage& StageOf(std::string_view kind) {
   const Stage* stage = FindStage(kind);
   if (stage == nullptr) {
-    throw Error(ErrorCode::kInternal, "there is no stage '" + std::string(kind) + "'");
+    throw Error(ErrorCode::kInternal, "there is no stage '{}'", kind);
   }
   return *stage;
 }

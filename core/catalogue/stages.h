@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// Kinds of jobs, as the fields of color3d.v1.JobSpec are named. The only place where they are
-// spelled.
+// Kinds of jobs, as the fields of color3d.v1.JobSpec are named. The only place where C++ spells
+// them.
 namespace kind {
 inline constexpr char kImportScene[] = "import_scene";
 inline constexpr char kSelectKeyView[] = "select_key_view";
@@ -23,7 +23,7 @@ inline constexpr char kSolveChroma[] = "solve_chroma";
 inline constexpr char kExport[] = "export";
 inline constexpr char kRender[] = "render";
 inline constexpr char kEvaluate[] = "evaluate";
-// These have no work of their own beyond a report: they are planned as a graph of the others.
+// Planned as a graph of the others; their own work is the report, or nothing.
 inline constexpr char kColorizeScene[] = "colorize_scene";
 inline constexpr char kPersonalizeScenes[] = "personalize_scenes";
 }  // namespace kind
@@ -33,11 +33,15 @@ struct Stage {
   // Artifacts that it cannot run without, and others that it reads when they are among its inputs.
   std::vector<const char*> needs = {};
   std::vector<const char*> reads = {};
-  // Artifacts that it makes; a folder stands for all below it. The first is what others ask it for.
+  // Artifacts that it makes, some of them only when there is something to tell. The first is always
+  // made, and is what other stages ask it for.
   std::vector<const char*> leaves = {};
-  // It needs no decision of the user's, so a job of its own brings the stages along that it lacks.
+  // Those of them that people get with a coloured scene: its report publishes them again.
+  std::vector<const char*> results = {};
+  // A job of its own plans the stages along that make what it needs: they want no decision of the
+  // user's.
   bool brings_prerequisites = false;
-  // Many jobs of it run in one worker at once.
+  // One worker runs many jobs of this kind at once; they share an encoder and take turns.
   bool runs_in_batch = false;
   // A lost worker's successor goes on at the last checkpoint.
   bool resumes = false;
@@ -54,7 +58,7 @@ const Stage* FindStage(std::string_view kind);
 // The row of a kind that is known to exist. Throws Error{kInternal}.
 const Stage& StageOf(std::string_view kind);
 
-// The stage that makes an artifact, or the one whose folder it lies in; nothing when none does.
+// The stage that makes an artifact or the folder that it lies in; nothing when there is none.
 const Stage* StageThatLeaves(std::string_view artifact);
 
 }  // namespace color3d

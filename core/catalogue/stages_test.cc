@@ -30,6 +30,13 @@ TEST(StageCatalogueTest, EveryArtifactHasOneMaker) {
   }
 }
 
+TEST(StageCatalogueTest, ResultsAreAmongWhatTheStageLeaves) {
+  for (const Stage& stage : StageCatalogue()) {
+    const std::set<std::string_view> made(stage.leaves.begin(), stage.leaves.end());
+    for (const char* name : stage.results) EXPECT_TRUE(made.contains(name)) << name;
+  }
+}
+
 TEST(StageCatalogueTest, FindsMakersByNameAndByFolder) {
   EXPECT_STREQ(StageThatLeaves(artifact::kModel)->kind, kind::kSolveChroma);
   EXPECT_STREQ(StageThatLeaves(std::string(artifact::kViewsAb) + "0001.png")->kind,

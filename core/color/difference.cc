@@ -79,11 +79,14 @@ double DeltaE00(const LabColor& x, const LabColor& y) {
 double MeanDeltaE00(const Image& lab_x, const Image& lab_y) {
   if (lab_x.channels != 3 || lab_y.channels != 3 || lab_x.width != lab_y.width ||
       lab_x.height != lab_y.height || lab_x.Empty()) {
-    throw InvalidArgument("colour difference needs two Lab images of one size, got " +
-                          std::to_string(lab_x.width) + " x " + std::to_string(lab_x.height) +
-                          " x " + std::to_string(lab_x.channels) + " and " +
-                          std::to_string(lab_y.width) + " x " + std::to_string(lab_y.height) +
-                          " x " + std::to_string(lab_y.channels));
+    throw InvalidArgument(
+        "colour difference needs two Lab images of one size, got {} x {} x {} and {} x {} x {}",
+        lab_x.width,
+        lab_x.height,
+        lab_x.channels,
+        lab_y.width,
+        lab_y.height,
+        lab_y.channels);
   }
   const size_t n = lab_x.PlaneSize();
   const float* p = lab_x.data.data();
@@ -95,10 +98,10 @@ double MeanDeltaE00(const Image& lab_x, const Image& lab_y) {
   return sum / static_cast<double>(n);
 }
 
-double Colourfulness(const Image& srgb) {
+double Colorfulness(const Image& srgb) {
   if (srgb.channels != 3 || srgb.Empty()) {
-    throw InvalidArgument("colourfulness needs a 3-channel sRGB image, got " +
-                          std::to_string(srgb.channels) + " channels");
+    throw InvalidArgument("colourfulness needs a 3-channel sRGB image, got {} channels",
+                          srgb.channels);
   }
   const size_t n = srgb.PlaneSize();
   double sum_rg = 0.0, sum_yb = 0.0, sum_rg2 = 0.0, sum_yb2 = 0.0;

@@ -13,6 +13,6 @@ double MeanDeltaE00(const Image& lab_x, const Image& lab_y);
 
 // Hasler & Suesstrunk 2003, signed opponent channels, of a 3-channel sRGB image in 0..1 (the
 // formula works on 0..255).
-double Colourfulness(const Image& srgb);
+double Colorfulness(const Image& srgb);
 
 }  // namespace color3d

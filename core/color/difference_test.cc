@@ -63,7 +63,7 @@ TEST(DeltaE00, AgreesWithSharmasTable) {
   }
 }
 
-TEST(DeltaE00, IsZeroForEqualColoursAndFiniteAtTheEdges) {
+TEST(DeltaE00, IsZeroForEqualColorsAndFiniteAtTheEdges) {
   Random random(3);
   for (int i = 0; i < 1000; ++i) {
     const LabColor c{
@@ -92,16 +92,16 @@ TEST(DeltaE00, MeanOverAnImage) {
   EXPECT_THROW(MeanDeltaE00(x, Image(2, 1, 1)), Error);
 }
 
-TEST(Colourfulness, MatchesTheFormula) {
-  EXPECT_NEAR(Colourfulness(Image(4, 3, 3, 0.4f)), 0.0, 1e-6);
+TEST(Colorfulness, MatchesTheFormula) {
+  EXPECT_NEAR(Colorfulness(Image(4, 3, 3, 0.4f)), 0.0, 1e-6);
   // Two pixels, pure red and pure blue: rg = 255, 0; yb = 127.5, -255.
   Image image(2, 1, 3);
   image.At(0, 0, 0) = 1.0f;
   image.At(2, 0, 1) = 1.0f;
   const double sigma = std::hypot(127.5, 191.25);
   const double mu = std::hypot(127.5, -63.75);
-  EXPECT_NEAR(Colourfulness(image), sigma + 0.3 * mu, 1e-4);
-  EXPECT_THROW(Colourfulness(Image(2, 2, 1)), Error);
+  EXPECT_NEAR(Colorfulness(image), sigma + 0.3 * mu, 1e-4);
+  EXPECT_THROW(Colorfulness(Image(2, 2, 1)), Error);
 }
 
 }  // namespace

@@ -132,7 +132,7 @@ constexpr double kGamutSlack = 1e-9;
 
 // At constant lightness and hue the sRGB gamut is star-shaped about the neutral axis with one
 // exception: just inside its bright yellow edge (L 91..99) red rises to 1.0304 linear, 1.013
-// encoded. Reducing chroma strictly would throw a yellow that misses the edge by a hair to half its
+// encoded. Reducing chroma strictly would throw a yellow that just misses the edge to half its
 // chroma. There red alone may go this far and is cut afterwards, which moves a colour by at most
 // 0.84 CIEDE2000 and makes the mapping continuous everywhere.
 double RedLimit(double l) {
@@ -201,7 +201,7 @@ double GrayFromLuminanceWith(double luminance) {
 }
 
 [[noreturn]] void ThrowChannels(const Image& image, const std::string& wanted) {
-  throw InvalidArgument("the image has " + std::to_string(image.channels) + " channels; " + wanted);
+  throw InvalidArgument("the image has {} channels; {}", image.channels, wanted);
 }
 
 }  // namespace
@@ -283,9 +283,11 @@ Image JoinLab(const Image& luminance, const Image& ab) {
   if (luminance.channels != 1) ThrowChannels(luminance, "JoinLab needs 1 (L) first");
   if (ab.channels != 2) ThrowChannels(ab, "JoinLab needs 2 (a, b) second");
   if (luminance.width != ab.width || luminance.height != ab.height) {
-    throw InvalidArgument("luminance is " + std::to_string(luminance.width) + " x " +
-                          std::to_string(luminance.height) + " px but ab is " +
-                          std::to_string(ab.width) + " x " + std::to_string(ab.height) + " px");
+    throw InvalidArgument("luminance is {} x {} px but ab is {} x {} px",
+                          luminance.width,
+                          luminance.height,
+                          ab.width,
+                          ab.height);
   }
   Image lab;
   lab.width = ab.width;

@@ -27,7 +27,7 @@ RgbColor SrgbFromLabUnclamped(const LabColor& lab);
 // In 0..1: chroma is reduced at constant L and hue until the colour fits, continuously in `lab`.
 // Channels are not clipped, but for up to 1.3 % of red at L 90..100: the gamut's bright yellow edge
 // is not convex, and there clipping costs at most 0.84 CIEDE2000 where strict reduction would halve
-// the chroma of colours that miss the gamut by a hair. L outside 0..100 becomes black or white.
+// the chroma of colours just outside of the gamut. L outside 0..100 becomes black or white.
 RgbColor SrgbFromLab(const LabColor& lab);
 
 // L* of a gamma-encoded grey value in 0..1, and back.

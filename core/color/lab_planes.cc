@@ -10,8 +10,7 @@ namespace {
 
 Image Planes(const Image& lab, int first, int count) {
   if (lab.channels != 3) {
-    throw InvalidArgument("a Lab picture has 3 channels, this one has " +
-                          std::to_string(lab.channels));
+    throw InvalidArgument("a Lab picture has 3 channels, this one has {}", lab.channels);
   }
   Image part(lab.width, lab.height, count);
   std::copy_n(lab.Plane(first), part.data.size(), part.data.begin());

@@ -17,7 +17,7 @@ double Worst(const LabColor& x, double l, double a, double b) {
   return std::max({std::abs(x.l - l), std::abs(x.a - a), std::abs(x.b - b)});
 }
 
-TEST(Lab, KnownColours) {
+TEST(Lab, KnownColors) {
   // Lindbloom's calculator, sRGB D65.
   const LabColor red = LabFromSrgb(RgbColor{1, 0, 0});
   EXPECT_LT(Worst(red, 53.2408, 80.0925, 67.2032), 2e-3);

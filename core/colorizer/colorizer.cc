@@ -16,8 +16,9 @@
 #include "core/colorizer/recipe.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/colorizer/training_session.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 
 namespace color3d {
@@ -26,9 +27,7 @@ namespace {
 constexpr float kMaxGivenAb = 256.0f;
 constexpr int kMaxAdapterStages = 8;  // more than any encoder has: all
 
-std::string SizeOf(const Image& image) {
-  return fmt::format("{}x{}", image.width, image.height);
-}
+std::string SizeOf(const Image& image) { return fmt::format("{}x{}", image.width, image.height); }
 
 void CheckPicture(const TrainingPicture& picture) {
   const std::string& name = picture.name;
@@ -57,10 +56,8 @@ void CheckPicture(const TrainingPicture& picture) {
   for (float value : picture.ab.data) {
     // Far beyond every colour; what is stored in half precision would overflow.
     if (std::abs(value) > kMaxGivenAb) {
-      throw InvalidArgument("{} holds the chroma {}; a and b are Lab units, at most {}",
-                            name,
-                            value,
-                            kMaxGivenAb);
+      throw InvalidArgument(
+          "{} holds the chroma {}; a and b are Lab units, at most {}", name, value, kMaxGivenAb);
     }
   }
   for (float value : picture.weight.data) {
@@ -186,10 +183,10 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
   SetTorchThreads(1);
   if (recipe.neighbors) {
     parts.neighbors = std::make_unique<FeatureNeighbors>(*parts.encoder,
-                                                           pictures,
-                                                           recipe.neighbor_options,
-                                                           Random(options.seed, /*stream=*/3),
-                                                           cancel);
+                                                         pictures,
+                                                         recipe.neighbor_options,
+                                                         Random(options.seed, /*stream=*/3),
+                                                         cancel);
   }
   Random start(options.seed, /*stream=*/0);
   parts.model =

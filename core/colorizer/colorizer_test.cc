@@ -41,7 +41,6 @@ ColorizerOptions Quick(int iterations) {
   ColorizerOptions options;
   options.iterations = iterations;
   options.crop_px = 64;
-  options.threads = 1;
   return options;
 }
 
@@ -52,10 +51,11 @@ const std::shared_ptr<const Encoder>& TheEncoder() {
 }
 
 std::shared_ptr<const Colorizer> Train(const Key& key, const ColorizerOptions& options) {
+  ThreadPool pool(1);
   NoCheckpoints checkpoints;
   NullObserver progress;
   return TrainColorizer(
-      TheEncoder(), {{"key", key.luminance, key.ab}}, options, checkpoints, progress, {});
+      TheEncoder(), {{"key", key.luminance, key.ab}}, options, {pool, checkpoints, progress, {}});
 }
 
 double MeanError(const Image& luminance, const Image& x, const Image& y) {
@@ -206,15 +206,15 @@ TEST(ColorizerTest, AnotherEncoderIsRefused) {
   const std::string bytes = Train(key, Quick(0))->Serialize();
   EXPECT_THROW(LoadColorizer(bytes, std::make_shared<OtherEncoder>()), Error);
   EXPECT_THROW(LoadColorizer(bytes, nullptr), Error);
+  ThreadPool pool(1);
   NoCheckpoints checkpoints;
   NullObserver progress;
-  EXPECT_THROW(TrainColorizer(std::make_shared<OtherEncoder>(),
-                              {{"key", key.luminance, key.ab}},
-                              Quick(0),
-                              checkpoints,
-                              progress,
-                              {}),
-               Error);
+  const CancellationToken cancel;
+  const RunControl control{pool, checkpoints, progress, cancel};
+  EXPECT_THROW(
+      TrainColorizer(
+          std::make_shared<OtherEncoder>(), {{"key", key.luminance, key.ab}}, Quick(0), control),
+      Error);
 }
 
 TEST(ColorizerTest, BadOptionsAndKeyViewsAreRefused) {

@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/colorizer/padding.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/image_tensors.h"
 #include "core/image/codec.h"
 
 namespace color3d {

@@ -10,8 +10,9 @@
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/tensor_file.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/weights/byte_source.h"
@@ -19,14 +20,9 @@
 namespace color3d {
 namespace {
 
-// Version 4: safetensors.
-constexpr TensorFormat kFormat = {"color3d.colorizer", 4, "C3DCOLR1", "personalize the scene again"};
 constexpr char kWhat[] = "the colorizer file";
 constexpr char kModel[] = "model.";  // before the names of the network's arrays
-// Guided upsampling: windows of 5x5 cells; contrasts of L below about 4 units are no edges.
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
-constexpr double kMaxAb = 128.0;  // Lab units; sRGB spans about -108..98
+constexpr double kMaxAb = 128.0;     // Lab units; sRGB spans about -108..98
 
 Image CropTo(const Image& image, int width, int height) {
   Image out(width, height, image.channels);
@@ -81,8 +77,8 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
   const NeighborColors found = parts_.neighbors->Lookup(taps, luminance, wanted);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
-  const torch::Tensor near = TensorFromImage(UpsampleGuided(
-      ImageFromTensor(found.ab), ImageFromTensor(guide), kGuideRadius, kGuideVarianceFloor));
+  const torch::Tensor near =
+      TensorFromImage(UpsampleGuided(ImageFromTensor(found.ab), ImageFromTensor(guide)));
   if (!decode) return {near, found.distance};
   return {torch::lerp(near, decoded, DecoderShare(found.variance, decoded)), found.distance};
 }
@@ -122,8 +118,7 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
                                                    const Image& luminance,
                                                    const Image& known) const {
   const Answer answer = Blend(taps, padded, WantedCells(known, small));
-  const Image fine = UpsampleGuided(
-      ImageFromTensor(answer.ab), ImageFromTensor(padded), kGuideRadius, kGuideVarianceFloor);
+  const Image fine = UpsampleGuided(ImageFromTensor(answer.ab), ImageFromTensor(padded));
   ColorPrediction prediction;
   prediction.ab = CropTo(fine, small.width, small.height);
   if (answer.distance.defined()) {
@@ -132,7 +127,7 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
         CropTo(Resize(coarse, fine.width, fine.height), small.width, small.height);
   }
   if (small.width == luminance.width && small.height == luminance.height) return prediction;
-  prediction.ab = UpsampleGuided(prediction.ab, luminance, kGuideRadius, kGuideVarianceFloor);
+  prediction.ab = UpsampleGuided(prediction.ab, luminance);
   if (!prediction.distance.Empty()) {
     prediction.distance = Resize(prediction.distance, luminance.width, luminance.height);
   }
@@ -175,13 +170,13 @@ std::string PersonalColorizer::Serialize() const {
     PutTensors(parts_.model->parameters(), kModel, StoredType::kFloat16, &file);
     PutTensors(parts_.model->statistics(), kModel, StoredType::kFloat32, &file);
     if (parts_.neighbors) parts_.neighbors->PutInto(&file);
-    return WriteTensorFile(file, kFormat);
+    return WriteTensorFile(file, kColorizerFormat);
   });
 }
 
 std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
     std::string_view bytes, std::shared_ptr<const TapEncoder> encoder, int threads) {
-  TensorFile file = ReadTensorFile(bytes, kFormat, kWhat);
+  TensorFile file = ReadTensorFile(bytes, kColorizerFormat, kWhat);
   Parts parts;
   bool has_neighbors = false;
   try {

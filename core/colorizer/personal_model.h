@@ -11,7 +11,7 @@
 
 #include "core/base/random.h"
 #include "core/colorizer/named_tensors.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 
 namespace color3d {
 

@@ -48,11 +48,10 @@ ColorizerOptions Quick() {
 }
 
 std::shared_ptr<const Colorizer> TrainAlone(int scene) {
+  ThreadPool pool(2);
   NoCheckpoints none;
   NullObserver silent;
-  ColorizerOptions options = Quick();
-  options.threads = 2;
-  return TrainColorizer(TheEncoder(), {KeyOf(scene)}, options, none, silent, {});
+  return TrainColorizer(TheEncoder(), {KeyOf(scene)}, Quick(), {pool, none, silent, {}});
 }
 
 float LargestDifference(const Image& x, const Image& y) {
@@ -85,10 +84,11 @@ TEST(SceneBatchTest, NeighborsEvenPoisonedOnesLeaveResultsUnchanged) {
   std::vector<std::thread> threads;
   for (int scene = 0; scene < kScenes; ++scene) {
     threads.emplace_back([&, scene] {
+      ThreadPool pool(2);
       NoCheckpoints none;
       NullObserver silent;
-      together[scene] =
-          TrainColorizer(TheEncoder(), {KeyOf(scene)}, Quick(), none, silent, {}, batch, "a");
+      together[scene] = TrainColorizer(
+          TheEncoder(), {KeyOf(scene)}, Quick(), {pool, none, silent, {}}, BatchPlace{batch, "a"});
     });
   }
   for (int poison = 0; poison < 3; ++poison) {
@@ -103,14 +103,12 @@ TEST(SceneBatchTest, NeighborsEvenPoisonedOnesLeaveResultsUnchanged) {
       ColorizerOptions options = Quick();
       options.iterations = 60;
       try {
-        TrainColorizer(TheEncoder(),
-                       {key},
-                       options,
-                       poison == 2 ? static_cast<CheckpointStore&>(failing) : none,
-                       poison == 1 ? static_cast<ProgressObserver&>(cancelling) : silent,
-                       cancel,
-                       batch,
-                       "b");
+        ThreadPool pool(2);
+        const RunControl control{pool,
+                                 poison == 2 ? static_cast<CheckpointStore&>(failing) : none,
+                                 poison == 1 ? static_cast<ProgressObserver&>(cancelling) : silent,
+                                 cancel};
+        TrainColorizer(TheEncoder(), {key}, options, control, BatchPlace{batch, "b"});
       } catch (const Error&) {
         ++failures;
       }
@@ -142,18 +140,6 @@ TEST(SceneBatchTest, NeighborsEvenPoisonedOnesLeaveResultsUnchanged) {
     EXPECT_LT(LargestDifference(routed[i], expected), 1e-4f) << i;
   }
   EXPECT_GT(LargestDifference(routed[0], routed[1]), 5.0f);
-}
-
-TEST(SceneColorizersTest, AnUnknownSceneIsNamedBeforeAnythingIsComputed) {
-  const TrainingPicture key = KeyOf(0);
-  const std::vector<RoutedPicture> pictures = {{"scenes/lost", &key.luminance}};
-  try {
-    ColorizeRouted(pictures, [](const std::string&) { return nullptr; });
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kNotFound);
-    EXPECT_NE(std::string(error.what()).find("scenes/lost"), std::string::npos);
-  }
 }
 
 // Project "a" has five scenes, "b" one: b's gets about half of the time.

@@ -78,9 +78,10 @@ TensorFile ReadTensorFile(std::string_view bytes,
                           format.name);
   }
   if (metadata["version"] != std::to_string(format.version)) {
+    const std::string version = QuotedName(metadata["version"]);
     throw InvalidArgument("{} has version {}, this program reads version {}; {}",
                           what,
-                          QuotedName(metadata["version"]),
+                          version.substr(1, version.size() - 2),
                           format.version,
                           format.remedy);
   }
@@ -120,8 +121,7 @@ void TakeTensors(const NamedTensors& tensors,
       throw InvalidArgument("{} holds \"{}{}\" with another shape", what, prefix, name);
     }
     if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); })) {
-      throw InvalidArgument(
-          "{} holds numbers that are not finite in \"{}{}\"", what, prefix, name);
+      throw InvalidArgument("{} holds numbers that are not finite in \"{}{}\"", what, prefix, name);
     }
     torch::Tensor target = tensor;
     target.copy_(torch::from_blob(values.data(), found->second.shape, torch::kFloat32));

@@ -23,6 +23,13 @@ struct TensorFormat {
   std::string_view remedy;       // what the user does about a file that is not read
 };
 
+// Version 4: safetensors.
+inline constexpr TensorFormat kColorizerFormat = {
+    "color3d.colorizer", 4, "C3DCOLR1", "personalize the scene again"};
+// Version 3: safetensors. One that cannot be read costs the time of training, no more.
+inline constexpr TensorFormat kCheckpointFormat = {
+    "color3d.colorizer-training", 3, "C3DCKPT1", "training starts afresh"};
+
 struct TensorFile {
   nlohmann::json facts;
   WeightMap arrays;

@@ -1,59 +1,86 @@
-#include "core/colorizer/archive.h"
+#include "core/colorizer/tensor_file.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <torch/torch.h>
 
+#include <limits>
 #include <string>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/random.h"
+#include "core/weights/safetensors.h"
 
 namespace color3d {
 namespace {
 
-constexpr char kMagic[] = "TESTFILE";
+using ::testing::HasSubstr;
 
-Archive MakeArchive() {
-  Archive archive;
-  archive.version = 3;
-  archive.header = R"({"hello": 1})";
-  archive.arrays["one"] = {ArchiveArray::Type::kFloat32, {2, 3}, std::string(24, 'x')};
-  archive.arrays["two"] = {ArchiveArray::Type::kFloat16, {5}, std::string(10, 'y')};
-  archive.arrays["empty"] = {ArchiveArray::Type::kFloat32, {0, 7}, ""};
-  archive.arrays["scalar"] = {ArchiveArray::Type::kFloat32, {}, "1234"};
-  return archive;
+constexpr TensorFormat kFormat = {"color3d.test", 3, "OLDFILE1", "make it anew"};
+constexpr char kDigestKey[] = "\"sha256\":\"";
+
+TensorFile MakeFile() {
+  TensorFile file;
+  file.facts = {{"hello", 1}, {"text", "with \"sha256\":\" in it"}};
+  file.arrays["one"] = {{2, 3}, {1, 2, 3, 4, 5, 6}};
+  file.arrays["two"] = {{5}, {1, 0.5, -2, 0, 1024}};
+  file.arrays["empty"] = {{0, 7}, {}};
+  file.arrays["scalar"] = {{}, {0.1f}};
+  file.half = {"two"};
+  return file;
 }
 
-Archive Read(const std::string& bytes) { return ReadArchive(bytes, kMagic, 3, "the test file"); }
+TensorFile Read(const std::string& bytes) {
+  return ReadTensorFile(bytes, kFormat, "the test file");
+}
+
+std::string MessageOf(const std::string& bytes) {
+  try {
+    Read(bytes);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
+    return error.what();
+  }
+  return "";
+}
 
 // Replaces the checksum, so that what lies behind it is tested.
 std::string Resign(std::string bytes) {
-  bytes.resize(bytes.size() - 64);
-  return bytes + Sha256Hex(bytes);
+  const size_t key = bytes.find(kDigestKey);
+  if (key == std::string::npos || key + 10 + 64 > bytes.size()) return bytes;
+  bytes.replace(key + 10, 64, std::string(64, '0'));
+  return bytes.replace(key + 10, 64, Sha256Hex(bytes));
 }
 
-TEST(ArchiveTest, RoundTrip) {
-  const Archive archive = MakeArchive();
-  const Archive read = Read(WriteArchive(archive, kMagic));
-  EXPECT_EQ(read.header, archive.header);
-  ASSERT_EQ(read.arrays.size(), archive.arrays.size());
-  for (const auto& [name, array] : archive.arrays) {
+TEST(TensorFileTest, RoundTrip) {
+  const TensorFile file = MakeFile();
+  const std::string bytes = WriteTensorFile(file, kFormat);
+  EXPECT_EQ(Resign(bytes), bytes);
+  const TensorFile read = Read(bytes);
+  EXPECT_EQ(read.facts, file.facts);
+  ASSERT_EQ(read.arrays.size(), file.arrays.size());
+  for (const auto& [name, array] : file.arrays) {
     EXPECT_EQ(read.arrays.at(name).shape, array.shape);
-    EXPECT_EQ(read.arrays.at(name).bytes, array.bytes);
-    EXPECT_EQ(read.arrays.at(name).type, array.type);
+    EXPECT_EQ(read.arrays.at(name).values, array.values);
   }
 }
 
-TEST(ArchiveTest, EveryTruncationIsRefused) {
-  const std::string bytes = WriteArchive(MakeArchive(), kMagic);
+TEST(TensorFileTest, AnySafetensorsReaderReadsIt) {
+  const WeightMap weights = ParseSafetensors(WriteTensorFile(MakeFile(), kFormat));
+  EXPECT_EQ(weights.at("two").values, MakeFile().arrays.at("two").values);
+}
+
+TEST(TensorFileTest, EveryTruncationIsRefused) {
+  const std::string bytes = WriteTensorFile(MakeFile(), kFormat);
   for (size_t length = 0; length < bytes.size(); ++length) {
     EXPECT_THROW(Read(bytes.substr(0, length)), Error) << length;
   }
   EXPECT_THROW(Read(bytes + "x"), Error);
 }
 
-TEST(ArchiveTest, EveryChangedByteIsRefused) {
-  const std::string bytes = WriteArchive(MakeArchive(), kMagic);
+TEST(TensorFileTest, EveryChangedByteIsRefused) {
+  const std::string bytes = WriteTensorFile(MakeFile(), kFormat);
   for (size_t i = 0; i < bytes.size(); ++i) {
     std::string changed = bytes;
     changed[i] = static_cast<char>(changed[i] ^ 0x40);
@@ -61,15 +88,15 @@ TEST(ArchiveTest, EveryChangedByteIsRefused) {
   }
 }
 
-TEST(ArchiveTest, HostileBytesWithARightChecksumNeverCrash) {
-  const std::string bytes = WriteArchive(MakeArchive(), kMagic);
+TEST(TensorFileTest, HostileBytesWithARightChecksumNeverCrash) {
+  const std::string bytes = WriteTensorFile(MakeFile(), kFormat);
   Random random(1);
   int refused = 0;
   for (int round = 0; round < 5000; ++round) {
     std::string changed = bytes;
     const int changes = 1 + static_cast<int>(random.NextBelow(4));
     for (int i = 0; i < changes; ++i) {
-      const size_t at = 8 + random.NextBelow(static_cast<uint32_t>(bytes.size() - 8 - 64));
+      const size_t at = random.NextBelow(static_cast<uint32_t>(bytes.size()));
       changed[at] = static_cast<char>(random.NextUint32());
     }
     if (random.NextBelow(4) == 0) changed.erase(20, random.NextBelow(30));
@@ -83,21 +110,45 @@ TEST(ArchiveTest, HostileBytesWithARightChecksumNeverCrash) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST(ArchiveTest, AnotherKindOrVersionIsNamed) {
-  Archive archive = MakeArchive();
-  try {
-    ReadArchive(WriteArchive(archive, "OTHERONE"), kMagic, 3, "the test file");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("another kind"), std::string::npos);
-  }
-  archive.version = 4;
-  try {
-    Read(WriteArchive(archive, kMagic));
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("version 4"), std::string::npos);
-  }
+TEST(TensorFileTest, AnotherKindOrVersionIsNamed) {
+  TensorFormat other = kFormat;
+  other.name = "color3d.other";
+  EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("another kind"));
+  EXPECT_THAT(MessageOf(std::string(200, 'x')), HasSubstr("another kind"));
+  EXPECT_THAT(MessageOf(SerializeSafetensors(MakeFile().arrays, false)), HasSubstr("another kind"));
+  other = kFormat;
+  other.version = 4;
+  EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("version 4"));
+  EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("make it anew"));
+}
+
+TEST(TensorFileTest, AFileFromBeforeSafetensorsIsRefusedWithTheRemedy) {
+  EXPECT_THAT(MessageOf("OLDFILE1 and more"), HasSubstr("earlier version"));
+  EXPECT_THAT(MessageOf("OLDFILE1 and more"), HasSubstr("make it anew"));
+}
+
+TEST(TensorFileTest, TensorsThatDoNotFitAreNamed) {
+  TensorFile file;
+  PutTensors({{"x", torch::ones({2, 3})}}, "net.", StoredType::kFloat16, &file);
+  EXPECT_TRUE(file.half.contains("net.x"));
+  const auto message_of = [&](const NamedTensors& tensors) -> std::string {
+    TensorFile copy = file;
+    try {
+      TakeTensors(tensors, "net.", "the test file", &copy);
+    } catch (const Error& error) {
+      EXPECT_EQ(copy.arrays.size(), 1u);
+      return error.what();
+    }
+    EXPECT_TRUE(copy.arrays.empty());
+    return "";
+  };
+  EXPECT_THAT(message_of({{"y", torch::ones({2, 3})}}), HasSubstr("lacks the array \"net.y\""));
+  EXPECT_THAT(message_of({{"x", torch::ones({3, 2})}}), HasSubstr("another shape"));
+  torch::Tensor target = torch::zeros({2, 3});
+  EXPECT_EQ(message_of({{"x", target}}), "");
+  EXPECT_EQ(target.sum().item<float>(), 6.0f);
+  file.arrays.at("net.x").values[4] = std::numeric_limits<float>::infinity();
+  EXPECT_THAT(message_of({{"x", target}}), HasSubstr("not finite in \"net.x\""));
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/digest.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/image_tensors.h"
 
 namespace color3d {
 namespace {

@@ -1,8 +1,7 @@
 #include "core/colorizer/training_session.h"
 
-#include <torch/torch.h>
-
 #include <fmt/format.h>
+#include <torch/torch.h>
 
 #include <algorithm>
 #include <chrono>
@@ -15,16 +14,14 @@
 #include "core/color/difference.h"
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/tensor_file.h"
-#include "core/encoder/convnext.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
+#include "core/encoder/torch_threads.h"
 
 namespace color3d {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Version 3: safetensors. A checkpoint that cannot be read costs the time of training, no more.
-constexpr TensorFormat kFormat = {"color3d.colorizer-training", 3, "C3DCKPT1", "it is made anew"};
 constexpr char kWhat[] = "the checkpoint";
 constexpr int kReports = 20;  // validation points over the whole schedule
 constexpr int kMaxRollbacks = 16;
@@ -98,11 +95,13 @@ bool TrainingSession::TrainOn(const TrainingSample& sample) {
   const torch::Tensor loss = Loss(sample);
   const double value = loss.item<double>();
   if (!std::isfinite(value)) return false;
-  if (course_.running_loss > 0.0 && value > kExplosion * course_.running_loss + kDriftFloor) return false;
+  if (course_.running_loss > 0.0 && value > kExplosion * course_.running_loss + kDriftFloor)
+    return false;
   loss.backward();
   if (!std::isfinite(adam_.Step(LearningRate(), recipe_.max_gradient_norm))) return false;
-  course_.running_loss =
-      course_.running_loss > 0.0 ? kLossMemory * course_.running_loss + (1.0 - kLossMemory) * value : value;
+  course_.running_loss = course_.running_loss > 0.0
+                             ? kLossMemory * course_.running_loss + (1.0 - kLossMemory) * value
+                             : value;
   if (HasDrifted()) return false;
   if (course_.best_running_loss == 0.0 || course_.running_loss < course_.best_running_loss) {
     course_.best_running_loss = course_.running_loss;
@@ -113,7 +112,8 @@ bool TrainingSession::TrainOn(const TrainingSample& sample) {
 
 // Divergence without any single step that explodes.
 bool TrainingSession::HasDrifted() const {
-  return course_.best_running_loss > 0.0 && course_.running_loss > kDrift * course_.best_running_loss + kDriftFloor;
+  return course_.best_running_loss > 0.0 &&
+         course_.running_loss > kDrift * course_.best_running_loss + kDriftFloor;
 }
 
 // Exponential mean of the parameters; younger at the beginning, so that the random start is soon
@@ -157,10 +157,11 @@ void TrainingSession::KeepGoodState() {
 
 void TrainingSession::RollBack(ProgressObserver& progress) {
   if (++course_.rollbacks > kMaxRollbacks) {
-    throw Error(ErrorCode::kInternal,
-                "personalization diverged {} times even with smaller steps; try another key view or "
-                "another seed",
-                course_.rollbacks);
+    throw Error(
+        ErrorCode::kInternal,
+        "personalization diverged {} times even with smaller steps; try another key view or "
+        "another seed",
+        course_.rollbacks);
   }
   torch::NoGradGuard no_grad;
   size_t next = 0;
@@ -248,7 +249,8 @@ void TrainingSession::Step(ProgressObserver& progress, ThreadPool* helpers) {
 }
 
 void TrainingSession::Conclude(ProgressObserver& progress) {
-  if (course_.stopped_early) progress.OnError(course_.iteration, "stopped_early_iteration", course_.iteration);
+  if (course_.stopped_early)
+    progress.OnError(course_.iteration, "stopped_early_iteration", course_.iteration);
   if (average_.empty() || course_.iteration == 0) return;
   const double last = ValidationDeltaE00();
   SwapWithAverage();
@@ -283,7 +285,7 @@ std::string TrainingSession::Checkpoint() const {
   PutTensors(model_.statistics(), "", StoredType::kFloat32, &file);
   PutTensors(adam_.Moments(), "", StoredType::kFloat32, &file);
   PutTensors(Average(), kAverage, StoredType::kFloat32, &file);
-  return WriteTensorFile(file, kFormat);
+  return WriteTensorFile(file, kCheckpointFormat);
 }
 
 NamedTensors TrainingSession::Average() const {
@@ -295,7 +297,7 @@ NamedTensors TrainingSession::Average() const {
 }
 
 void TrainingSession::LoadState(const std::string& state) {
-  TensorFile file = ReadTensorFile(state, kFormat, kWhat);
+  TensorFile file = ReadTensorFile(state, kCheckpointFormat, kWhat);
   const nlohmann::json& facts = file.facts;
   try {
     if (facts.at("pictures") != samples_.Digest() ||

@@ -3,8 +3,8 @@
 #include "core/base/error.h"
 #include "core/encoder/clip/clip.h"
 #include "core/encoder/clip/clip_weights.h"
-#include "core/encoder/convnext.h"
-#include "core/encoder/convnext_weights.h"
+#include "core/encoder/convnext/convnext.h"
+#include "core/encoder/convnext/convnext_weights.h"
 #include "core/encoder/encoder.h"
 #include "core/encoder/torch_errors.h"
 #include "core/weights/weight_file.h"
@@ -25,10 +25,11 @@ std::shared_ptr<const Encoder> Encoder::FromWeightFile(const std::filesystem::pa
     weights.clear();
     return ClipModel::FromWeightFile(path);
   }
-  throw InvalidArgument(path.string() + " holds no known encoder (" +
-                        std::to_string(weights.size()) +
-                        " arrays): known are DDColor, ConvNeXt with its authors' names, and CLIP "
-                        "with a ViT");
+  throw InvalidArgument(
+      "{} holds no known encoder ({} arrays): known are DDColor, ConvNeXt with its authors' names, "
+      "and CLIP with a ViT",
+      path.string(),
+      weights.size());
 }
 
 }  // namespace color3d

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/encoder/convnext_config.h"
+#include "core/encoder/convnext/convnext_config.h"
 #include "core/encoder/encoder.h"
 
 namespace color3d {

@@ -20,7 +20,9 @@ auto WithTorchErrors(const char* what, Body&& body) {
     const std::string text = error.what_without_backtrace();
     const bool memory = text.find("allocate memory") != std::string::npos;
     throw Error(memory ? ErrorCode::kResourceExhausted : ErrorCode::kInternal,
-                std::string(what) + ": " + text.substr(0, text.find('\n')));
+                "{}: {}",
+                what,
+                text.substr(0, text.find('\n')));
   }
 }
 

@@ -1,6 +1,8 @@
 // The name of a network: SHA-256 over what it is and its weights.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <string>
 #include <string_view>
 
@@ -15,7 +17,7 @@ inline std::string DigestOfWeights(std::string_view architecture, const WeightMa
   hash.Update(architecture);
   for (const auto& [name, array] : weights) {
     std::string shape = "\n" + name;
-    for (int64_t size : array.shape) shape += " " + std::to_string(size);
+    for (int64_t size : array.shape) shape += fmt::format(" {}", size);
     hash.Update(shape + "\n");
     hash.Update(
         {reinterpret_cast<const char*>(array.values.data()), array.values.size() * sizeof(float)});

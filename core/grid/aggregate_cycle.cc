@@ -10,7 +10,7 @@ namespace {
 
 constexpr int64_t kCoarsestNodes = 300;
 constexpr int64_t kChunkNodes = 1 << 14;
-constexpr double kLeastShrink = 1.2;  // levels end when they hardly get smaller
+constexpr double kMinShrink = 1.2;  // levels end when they hardly get smaller
 constexpr double kShrinkForTwice = 2.4;
 // The largest levels are visited once: twice saves iterations there, but no time (measured).
 constexpr size_t kLevelsOnce = 2;
@@ -133,7 +133,7 @@ AggregateCycle::AggregateCycle(AggregateGraph finest,
     }
     if (nodes <= kCoarsestNodes) break;
     Clusters clusters = ClusterGraph(g, pool_);
-    if (static_cast<double>(nodes) < kLeastShrink * static_cast<double>(clusters.count)) break;
+    if (static_cast<double>(nodes) < kMinShrink * static_cast<double>(clusters.count)) break;
     level.twice =
         levels_.size() > kLevelsOnce &&
         static_cast<double>(nodes) > kShrinkForTwice * static_cast<double>(clusters.count);

@@ -6,9 +6,9 @@
 namespace color3d {
 namespace {
 
-// A cluster grows along edges of at least this share of a node's strongest, up to kMostNodes.
+// A cluster grows along edges of at least this share of a node's strongest, up to kMaxNodes.
 constexpr float kStrongShare = 0.8f;
-constexpr int32_t kMostNodes = 4;
+constexpr int32_t kMaxNodes = 4;
 // A node whose strongest edge holds this share of its diagonal may join a full cluster: one step of
 // the smoother settles it, and stars of many leaves would not get any smaller otherwise.
 constexpr float kDominantShare = 0.5f;
@@ -80,7 +80,7 @@ class RangeClusterer {
     });
     if (strongest_node < 0) return;
     const int32_t own = SizeOf(i);
-    if (own < kMostNodes) {
+    if (own < kMaxNodes) {
       const int64_t partner = SmallestStrongNeighbor(i, kStrongShare * strongest, own);
       if (partner >= 0) return Join(i, partner);
     }
@@ -93,14 +93,14 @@ class RangeClusterer {
 
   // The strong neighbour in the smallest other cluster that i's may be joined with, or -1. Of the
   // two clusters one is always a single node.
-  int64_t SmallestStrongNeighbor(int64_t i, float least_weight, int32_t own) const {
-    int32_t smallest = kMostNodes + 1;
+  int64_t SmallestStrongNeighbor(int64_t i, float min_weight, int32_t own) const {
+    int32_t smallest = kMaxNodes + 1;
     int64_t best = -1;
     view_.Visit(i, [&](int64_t j, float w) {
-      if (w < least_weight || !InRange(j)) return;
+      if (w < min_weight || !InRange(j)) return;
       if (of_node_[j] >= 0 && of_node_[j] == of_node_[i]) return;
       const int32_t size = SizeOf(j);
-      if (size >= smallest || own + size > kMostNodes) return;
+      if (size >= smallest || own + size > kMaxNodes) return;
       if (of_node_[i] >= 0 && of_node_[j] >= 0) return;
       smallest = size;
       best = j;

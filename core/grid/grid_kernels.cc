@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/simd/instruction_set.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/grid/grid_kernels.cc"
 #include <hwy/foreach_target.h>
@@ -186,12 +188,12 @@ void GridResidual(const GridSystem& system,
                   int64_t begin,
                   int64_t end,
                   GridVector& out) {
-  HWY_DYNAMIC_DISPATCH(Residual)(system, u, f, begin, end, out);
+  COLOR3D_KERNEL(Residual)(system, u, f, begin, end, out);
 }
 
 GridPair GridApply(
     const GridSystem& system, const GridVector& u, int64_t begin, int64_t end, GridVector& out) {
-  return HWY_DYNAMIC_DISPATCH(Apply)(system, u, begin, end, out);
+  return COLOR3D_KERNEL(Apply)(system, u, begin, end, out);
 }
 
 void GridJacobi(const GridSystem& system,
@@ -201,16 +203,16 @@ void GridJacobi(const GridSystem& system,
                 int64_t begin,
                 int64_t end,
                 GridVector& out) {
-  HWY_DYNAMIC_DISPATCH(Jacobi)(system, scale, u, f, begin, end, out);
+  COLOR3D_KERNEL(Jacobi)(system, scale, u, f, begin, end, out);
 }
 
 void GridScale(
     const GridPlane& scale, const GridVector& f, int64_t begin, int64_t end, GridVector& out) {
-  HWY_DYNAMIC_DISPATCH(Scale)(scale, f, begin, end, out);
+  COLOR3D_KERNEL(Scale)(scale, f, begin, end, out);
 }
 
 GridPair GridDot(const GridVector& x, const GridVector& y, int64_t begin, int64_t end) {
-  return HWY_DYNAMIC_DISPATCH(Dot)(x, y, begin, end);
+  return COLOR3D_KERNEL(Dot)(x, y, begin, end);
 }
 
 void GridCombine(const GridPair& p,
@@ -219,7 +221,7 @@ void GridCombine(const GridPair& p,
                  const GridVector& y,
                  int64_t begin,
                  int64_t end) {
-  HWY_DYNAMIC_DISPATCH(Combine)(p, x, q, y, begin, end);
+  COLOR3D_KERNEL(Combine)(p, x, q, y, begin, end);
 }
 
 }  // namespace color3d

@@ -1,4 +1,5 @@
-// The loops over all pixels of the grid solver, vectorised for the machine at hand. Internal.
+// The loops over all pixels of the grid solver, for the instruction set in use
+// (core/simd/instruction_set.h). Internal.
 #pragma once
 
 #include <array>

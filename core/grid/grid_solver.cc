@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 
 // A restart that leaves more than this of the residual has met float32's resolution of u.
-constexpr double kLeastGain = 0.7;
+constexpr double kMaxResidualShare = 0.7;
 
 // sqrt(now / start) of the worse component; a component that starts at zero is solved.
 double RelativeNorm(const GridPair& now, const GridPair& start) {
@@ -63,7 +63,7 @@ class Solver {
       });
       solution.relative_residual = RelativeNorm(Dot(r_, r_), b_norm);
       solution.converged = solution.relative_residual <= options.tolerance;
-      const bool stuck = solution.relative_residual > kLeastGain * before;
+      const bool stuck = solution.relative_residual > kMaxResidualShare * before;
       if (stuck || solution.iterations >= options.max_iterations) break;
       before = solution.relative_residual;
       if (!solution.converged) Iterate(options, b_norm, report, solution);

@@ -7,13 +7,30 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/random.h"
+#include "core/simd/instruction_set.h"
 
 namespace color3d {
 namespace {
+
+// Every test runs on each instruction set of this machine.
+class GridSolverTest : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    LimitInstructionSet(GetParam());
+    ASSERT_EQ(ActiveInstructionSet(), GetParam());
+  }
+  void TearDown() override { LimitInstructionSet(""); }
+};
+
+INSTANTIATE_TEST_SUITE_P(InstructionSets,
+                         GridSolverTest,
+                         testing::ValuesIn(SupportedInstructionSets()),
+                         [](const auto& test) { return test.param; });
 
 // Weights over `decades` powers of ten, data on every `step`-th pixel, pinned on its neighbour.
 GridSystem RandomSystem(int width, int height, double decades, int step, uint64_t seed) {
@@ -81,7 +98,7 @@ Eigen::MatrixXd DenseSolve(const GridSystem& s, const std::vector<float>& target
   return a.partialPivLu().solve(b);
 }
 
-TEST(GridSolverTest, AgreesWithADenseSolve) {
+TEST_P(GridSolverTest, AgreesWithADenseSolve) {
   struct Case {
     int width, height;
     double decades;
@@ -107,13 +124,13 @@ TEST(GridSolverTest, AgreesWithADenseSolve) {
   }
 }
 
-TEST(GridSolverTest, ConstantTargetGivesAConstant) {
+TEST_P(GridSolverTest, ConstantTargetGivesAConstant) {
   const GridSystem system = RandomSystem(60, 45, 5, 700, 3);
   const std::vector<float> target(2 * system.PixelCount(), 37.5f);
   for (float value : Solve(system, target, {1e-6, 1000}).u) ASSERT_NEAR(value, 37.5f, 1e-2);
 }
 
-TEST(GridSolverTest, ZeroTargetNeedsNoIteration) {
+TEST_P(GridSolverTest, ZeroTargetNeedsNoIteration) {
   const GridSystem system = RandomSystem(30, 30, 1, 100, 3);
   const std::vector<float> target(2 * system.PixelCount(), 0.0f);
   const GridSolution solution = Solve(system, target, {1e-6, 1000});
@@ -121,7 +138,7 @@ TEST(GridSolverTest, ZeroTargetNeedsNoIteration) {
   EXPECT_TRUE(solution.converged);
 }
 
-TEST(GridSolverTest, MaximumPrincipleHolds) {
+TEST_P(GridSolverTest, MaximumPrincipleHolds) {
   const GridSystem system = RandomSystem(70, 70, 4, 1000, 5);
   const std::vector<float> target = RandomTarget(system, 6);
   float low = 1e9f, high = -1e9f;
@@ -136,7 +153,7 @@ TEST(GridSolverTest, MaximumPrincipleHolds) {
   }
 }
 
-TEST(GridSolverTest, PinnedPixelsAreExact) {
+TEST_P(GridSolverTest, PinnedPixelsAreExact) {
   const GridSystem system = RandomSystem(64, 48, 3, 10, 5);
   const std::vector<float> target = RandomTarget(system, 6);
   const GridSolution solution = Solve(system, target, {1e-2, 1});
@@ -147,7 +164,7 @@ TEST(GridSolverTest, PinnedPixelsAreExact) {
   }
 }
 
-TEST(GridSolverTest, WholeRowsOfPinnedPixelsCutThePictureInPieces) {
+TEST_P(GridSolverTest, WholeRowsOfPinnedPixelsCutThePictureInPieces) {
   // Pockets that are connected to nothing but pinned pixels, and one without any connection.
   GridSystem system = RandomSystem(96, 96, 2, 96 * 96 - 1, 9);
   for (int y = 0; y < 96; ++y) {
@@ -161,7 +178,7 @@ TEST(GridSolverTest, WholeRowsOfPinnedPixelsCutThePictureInPieces) {
   EXPECT_EQ(Solve(system, target, {1e-6, 100}).u, target);
 }
 
-TEST(GridSolverTest, StarsOfManyLeavesShrink) {
+TEST_P(GridSolverTest, StarsOfManyLeavesShrink) {
   // One huge, tightly bound region with 10^4 specks that touch nothing else.
   GridSystem system(300, 300);
   for (int64_t i = 0; i < system.PixelCount(); ++i) {
@@ -180,14 +197,14 @@ TEST(GridSolverTest, StarsOfManyLeavesShrink) {
   for (int64_t i = 0; i < system.PixelCount(); ++i) ASSERT_NEAR(solution.u[i], 50.0f, 0.5f);
 }
 
-TEST(GridSolverTest, TheNumberOfThreadsDoesNotChangeABit) {
+TEST_P(GridSolverTest, TheNumberOfThreadsDoesNotChangeABit) {
   const GridSystem system = RandomSystem(700, 500, 3, 5003, 7);
   const std::vector<float> target = RandomTarget(system, 8);
   const GridSolution one = Solve(system, target, {1e-3, 200}, 1);
   EXPECT_EQ(one.u, Solve(system, target, {1e-3, 200}, 3).u);
 }
 
-TEST(GridSolverTest, AMegapixelConvergesInFewIterations) {
+TEST_P(GridSolverTest, AMegapixelConvergesInFewIterations) {
   // Edge weights over six decades and one hint in 100 000 pixels.
   const GridSystem system = RandomSystem(1024, 1024, 6, 100003, 7);
   const std::vector<float> target = RandomTarget(system, 8);
@@ -197,7 +214,7 @@ TEST(GridSolverTest, AMegapixelConvergesInFewIterations) {
   RecordProperty("iterations", solution.iterations);
 }
 
-TEST(GridSolverTest, StopsWhenCancelledOrOutOfIterations) {
+TEST_P(GridSolverTest, StopsWhenCancelledOrOutOfIterations) {
   const GridSystem system = RandomSystem(50, 50, 3, 1000, 7);
   const std::vector<float> target = RandomTarget(system, 8);
   CancellationToken cancel;

@@ -11,10 +11,13 @@ std::string EncodeAbPng(const Image& ab, const Image& confidence) {
   if (ab.channels != 2 || ab.Empty() ||
       (has_confidence && (confidence.channels != 1 || confidence.width != ab.width ||
                           confidence.height != ab.height))) {
-    throw InvalidArgument("an ab map needs 2 channels and a confidence of its size, got " +
-                          std::to_string(ab.width) + " x " + std::to_string(ab.height) + " x " +
-                          std::to_string(ab.channels) + " and " + std::to_string(confidence.width) +
-                          " x " + std::to_string(confidence.height));
+    throw InvalidArgument(
+        "an ab map needs 2 channels and a confidence of its size, got {} x {} x {} and {} x {}",
+        ab.width,
+        ab.height,
+        ab.channels,
+        confidence.width,
+        confidence.height);
   }
   Image packed(ab.width, ab.height, 3, 1.0f);
   const size_t n = ab.PlaneSize();
@@ -26,7 +29,7 @@ std::string EncodeAbPng(const Image& ab, const Image& confidence) {
 AbMap DecodeAbPng(std::string_view bytes, const std::string& file_name) {
   const ImageInfo info = ProbeImage(bytes, file_name);
   if (info.format != ImageFormat::kPng || info.bits_per_channel != 16 || info.channels != 3) {
-    throw InvalidArgument(file_name + " is not an ab map: a 16-bit RGB PNG is needed");
+    throw InvalidArgument("{} is not an ab map: a 16-bit RGB PNG is needed", file_name);
   }
   const Image packed = DecodeImage(bytes, file_name);
   AbMap map{Image(packed.width, packed.height, 2), Image(packed.width, packed.height, 1)};

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/range_check.h"
 #include "core/image/probe/orientation.h"
 #include "core/image/reduced.h"
 
@@ -79,13 +80,13 @@ Image Oriented(const Image& stored, int orientation) {
 Image SelectChannels(Image image, const ImageInfo& info, bool keep_alpha) {
   const bool gray = info.channels <= 2;
   const bool has_alpha = image.channels == 4;
-  const int colours = gray ? 1 : std::min(image.channels, 3);
+  const int color_channels = gray ? 1 : std::min(image.channels, 3);
   const bool alpha = has_alpha && keep_alpha;
-  if (image.channels == colours + (alpha ? 1 : 0)) return image;
-  Image out(image.width, image.height, colours + (alpha ? 1 : 0));
+  if (image.channels == color_channels + (alpha ? 1 : 0)) return image;
+  Image out(image.width, image.height, color_channels + (alpha ? 1 : 0));
   const size_t n = image.PlaneSize();
-  std::copy_n(image.data.begin(), n * colours, out.data.begin());
-  if (alpha) std::copy_n(image.Plane(3), n, out.Plane(colours));
+  std::copy_n(image.data.begin(), n * color_channels, out.data.begin());
+  if (alpha) std::copy_n(image.Plane(3), n, out.Plane(color_channels));
   return out;
 }
 
@@ -107,16 +108,17 @@ cv::Mat DecodeStored(std::string_view bytes,
     mat = cv::imdecode(
         input, reduction == 1 ? flags : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION));
   } catch (const cv::Exception& e) {
-    throw InvalidArgument(file_name + " cannot be decoded (" + e.err + "); save it again");
+    throw InvalidArgument("{} cannot be decoded ({}); save it again", file_name, e.err);
   }
   if (mat.empty()) {
-    throw InvalidArgument(file_name +
-                          " cannot be decoded: its image data is damaged or of a rare "
-                          "kind; save it again as JPEG or PNG");
+    throw InvalidArgument(
+        "{} cannot be decoded: its image data is damaged or of a rare kind; save it again as JPEG "
+        "or PNG",
+        file_name);
   }
   const auto reduced = [reduction](int size) { return (size + reduction - 1) / reduction; };
   if (mat.cols != reduced(info.width) || mat.rows != reduced(info.height)) {
-    throw InvalidArgument(file_name + " is damaged: its header and its data differ in size");
+    throw InvalidArgument("{} is damaged: its header and its data differ in size", file_name);
   }
   return mat;
 }
@@ -128,17 +130,16 @@ std::string Encode(const cv::Mat& mat, const char* extension, const std::vector<
       return std::string(bytes.begin(), bytes.end());
     }
   } catch (const cv::Exception& e) {
-    throw Error(ErrorCode::kInternal, "encoding " + std::string(extension) + " failed: " + e.err);
+    throw Error(ErrorCode::kInternal, "encoding {} failed: {}", extension, e.err);
   }
-  throw Error(ErrorCode::kInternal, "encoding " + std::string(extension) + " failed");
+  throw Error(ErrorCode::kInternal, "encoding {} failed", extension);
 }
 
 void CheckEncodable(const Image& image, bool alpha_allowed) {
   const int c = image.channels;
   if (image.Empty() || !(c == 1 || c == 3 || (alpha_allowed && c == 4))) {
-    throw InvalidArgument("cannot encode an image of " + std::to_string(image.width) + " x " +
-                          std::to_string(image.height) + " px and " + std::to_string(c) +
-                          " channels");
+    throw InvalidArgument(
+        "cannot encode an image of {} x {} px and {} channels", image.width, image.height, c);
   }
 }
 
@@ -158,7 +159,7 @@ Image Decode(std::string_view bytes,
       for (float& v : image.data) v = 1.0f - v;
     }
   } else {
-    throw InvalidArgument(file_name + " has neither 8 nor 16 bits per channel; save it as such");
+    throw InvalidArgument("{} has neither 8 nor 16 bits per channel; save it as such", file_name);
   }
   image = SelectChannels(std::move(image), info, keep_alpha);
   return Oriented(image, ReadOrientation(bytes));
@@ -172,7 +173,7 @@ Image DecodeImage(std::string_view bytes, const std::string& file_name, bool kee
 
 Image ReadImageWithin(const std::filesystem::path& path, int max_side_px) {
   if (max_side_px < 1) {
-    throw InvalidArgument("a picture cannot be reduced to " + std::to_string(max_side_px) + " px");
+    throw InvalidArgument("a picture cannot be reduced to {} px", max_side_px);
   }
   const std::string bytes = ReadFile(path);
   const std::string name = path.filename().string();
@@ -196,11 +197,11 @@ bool IsGray(const Image& srgb, float tolerance) {
   const float* r = srgb.Plane(0);
   const float* g = srgb.Plane(1);
   const float* b = srgb.Plane(2);
-  size_t coloured = 0;
+  size_t colored = 0;
   for (size_t i = 0; i < n; ++i) {
-    if (std::abs(r[i] - g[i]) > tolerance || std::abs(g[i] - b[i]) > tolerance) ++coloured;
+    if (std::abs(r[i] - g[i]) > tolerance || std::abs(g[i] - b[i]) > tolerance) ++colored;
   }
-  return static_cast<double>(coloured) <= 0.005 * static_cast<double>(n);
+  return static_cast<double>(colored) <= 0.005 * static_cast<double>(n);
 }
 
 std::string EncodePng8(const Image& image) {
@@ -215,9 +216,7 @@ std::string EncodePng16(const Image& image) {
 
 std::string EncodeJpeg(const Image& image, int quality) {
   CheckEncodable(image, false);
-  if (quality < 1 || quality > 100) {
-    throw InvalidArgument("JPEG quality is " + std::to_string(quality) + "; it must be 1..100");
-  }
+  RangeCheck("JPEG")("quality", quality, 1, 100);
   return Encode(
       MatFromPlanar<uint8_t>(image, CV_8U, 255.0f), ".jpg", {cv::IMWRITE_JPEG_QUALITY, quality});
 }

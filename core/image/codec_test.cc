@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -105,7 +106,7 @@ TEST(Codec, PngRoundTripsKeepPrecisionAndChannels) {
   EXPECT_EQ(DecodeImage(EncodePng8(Noise(5, 4, 4)), "a.png").channels, 3);
 }
 
-TEST(Codec, ColoursAreInTheRightOrder) {
+TEST(Codec, ColorsAreInTheRightOrder) {
   Image image(16, 16, 3);
   std::fill_n(image.Plane(0), 256, 0.9f);
   std::fill_n(image.Plane(1), 256, 0.5f);
@@ -190,15 +191,11 @@ std::string WithExif(const std::string& bytes, int orientation) {
     return bytes.substr(0, 2) + segment + bytes.substr(2);
   }
   std::string body = "eXIf" + tiff;
-  uint32_t crc = 0xFFFFFFFFu;
-  for (char c : body) {
-    crc ^= static_cast<unsigned char>(c);
-    for (int k = 0; k < 8; ++k) crc = (crc & 1u) != 0 ? 0xEDB88320u ^ (crc >> 1) : crc >> 1;
-  }
+  const uLong crc = ::crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size());
   std::string chunk;
   AppendInteger(&chunk, static_cast<uint32_t>(tiff.size()), 4, true);
   chunk += body;
-  AppendInteger(&chunk, ~crc, 4, true);
+  AppendInteger(&chunk, static_cast<uint32_t>(crc), 4, true);
   return bytes.substr(0, 33) + chunk + bytes.substr(33);
 }
 

@@ -15,8 +15,7 @@ constexpr int kMarginPx = 3;
 
 void RequireColor(const Image& canvas) {
   if (canvas.channels == 3 && !canvas.Empty()) return;
-  throw InvalidArgument("drawing needs a picture of 3 channels, this one has " +
-                        std::to_string(canvas.channels));
+  throw InvalidArgument("drawing needs a picture of 3 channels, this one has {}", canvas.channels);
 }
 
 // UTF-8 sequences become one '?' each.
@@ -54,8 +53,7 @@ void DrawBox(int x, int y, int width, int height, const DrawColor& color, Image*
 void DrawPicture(const Image& picture, int x, int y, float strength, Image* canvas) {
   RequireColor(*canvas);
   if (picture.channels != 1 && picture.channels != 3) {
-    throw InvalidArgument("a picture of " + std::to_string(picture.channels) +
-                          " channels cannot be drawn");
+    throw InvalidArgument("a picture of {} channels cannot be drawn", picture.channels);
   }
   ForEachPixel(
       x, y, picture.width, picture.height, canvas, [&](int c, int row, int column, float p) {

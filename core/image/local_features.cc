@@ -25,7 +25,7 @@ cv::Mat Bytes(const Image& gray) {
 LocalFeatures DetectLocalFeatures(const Image& gray, int max_count) {
   if (gray.Empty()) throw InvalidArgument("a picture without pixels has no features");
   if (max_count < 1) {
-    throw InvalidArgument(std::to_string(max_count) + " features asked for; ask for at least 1");
+    throw InvalidArgument("{} features asked for; ask for at least 1", max_count);
   }
   constexpr int kDimensions = LocalFeatures::kDimensions;
   LocalFeatures features;
@@ -56,7 +56,7 @@ LocalFeatures DetectLocalFeatures(const Image& gray, int max_count) {
       }
     }
   } catch (const cv::Exception& e) {
-    throw Error(ErrorCode::kInternal, "finding features failed: " + e.err);
+    throw Error(ErrorCode::kInternal, "finding features failed: {}", e.err);
   }
   return features;
 }

@@ -29,9 +29,12 @@ cv::Mat EightBit(const Image& luminance) {
 Image DenseFlow(const Image& from, const Image& to) {
   if (from.channels != 1 || to.channels != 1 || from.width != to.width ||
       from.height != to.height) {
-    throw InvalidArgument("optical flow needs two pictures of one channel and one size, got " +
-                          std::to_string(from.width) + "x" + std::to_string(from.height) + " and " +
-                          std::to_string(to.width) + "x" + std::to_string(to.height));
+    throw InvalidArgument(
+        "optical flow needs two pictures of one channel and one size, got {}x{} and {}x{}",
+        from.width,
+        from.height,
+        to.width,
+        to.height);
   }
   Image flow(from.width, from.height, 2);
   if (std::min(from.width, from.height) < kSmallestSide) return flow;

@@ -19,7 +19,7 @@ Image ResizeWith(const Image& image, int width, int height, int interpolation) {
       cv::resize(from, to, to.size(), 0, 0, interpolation);
     }
   } catch (const cv::Exception& e) {
-    throw Error(ErrorCode::kInternal, "resizing failed: " + e.err);
+    throw Error(ErrorCode::kInternal, "resizing failed: {}", e.err);
   }
   return out;
 }
@@ -28,9 +28,8 @@ Image ResizeWith(const Image& image, int width, int height, int interpolation) {
 
 Image Resize(const Image& image, int width, int height) {
   if (image.Empty() || width < 1 || height < 1) {
-    throw InvalidArgument("cannot resize " + std::to_string(image.width) + " x " +
-                          std::to_string(image.height) + " px to " + std::to_string(width) + " x " +
-                          std::to_string(height) + " px");
+    throw InvalidArgument(
+        "cannot resize {} x {} px to {} x {} px", image.width, image.height, width, height);
   }
   if (width == image.width && height == image.height) return image;
   // Down first, each side on its own, then up: area averaging is for shrinking only.

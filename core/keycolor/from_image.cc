@@ -1,9 +1,10 @@
+#include "core/keycolor/from_image.h"
+
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "core/base/error.h"
-#include "core/keycolor/keycolor.h"
 #include "core/keycolor/picture_checks.h"
 
 namespace color3d {

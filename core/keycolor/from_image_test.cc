@@ -1,3 +1,5 @@
+#include "core/keycolor/from_image.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,7 +10,6 @@
 #include "core/base/random.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
-#include "core/keycolor/keycolor.h"
 
 namespace color3d {
 namespace {

@@ -14,7 +14,7 @@ namespace color3d {
 namespace {
 
 // Chroma (Lab units) below which a difference is no edit: twice what 8 bits per channel round to.
-constexpr float kLeastChange = 2.0f;
+constexpr float kMinChange = 2.0f;
 constexpr int kFeatherPx = 2;
 
 std::string SizeOf(const Image& image) {
@@ -99,7 +99,7 @@ Image KeyColorFromEdit(const Image& original_srgb, const Image& edited_srgb, con
   for (size_t i = 0; i < ab.PlaneSize(); ++i) {
     const float da = after.Plane(1)[i] - before.Plane(1)[i];
     const float db = after.Plane(2)[i] - before.Plane(2)[i];
-    if (allowed[i] && std::hypot(da, db) > kLeastChange) changed = true;
+    if (allowed[i] && std::hypot(da, db) > kMinChange) changed = true;
     ab.Plane(0)[i] = before.Plane(1)[i] + shares[i] * da;
     ab.Plane(1)[i] = before.Plane(2)[i] + shares[i] * db;
   }

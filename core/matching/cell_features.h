@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/encoder/convnext_config.h"
+#include "core/encoder/convnext/convnext_config.h"
 
 namespace color3d {
 

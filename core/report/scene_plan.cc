@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
 
 namespace color3d {
 namespace {
@@ -19,8 +21,9 @@ double SfmSeconds(const PlanFacts& f) {
   return 0.3 * f.views + kSecondsPerSfmPair * pairs;
 }
 
-PlanStep Step(std::string name, bool needed, std::string reason, double seconds) {
-  return {std::move(name), needed, std::move(reason), seconds, -1.0};
+PlanStep Step(
+    std::string name, bool needed, std::string reason, double seconds, std::string stage = "") {
+  return {std::move(name), needed, std::move(reason), seconds, -1.0, std::move(stage)};
 }
 
 }  // namespace
@@ -32,7 +35,8 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
       "structure_from_motion",
       !f.has_poses,
       f.has_poses ? "the scene comes with camera poses" : "the photos come without camera poses",
-      SfmSeconds(f)));
+      SfmSeconds(f),
+      kind::kImportScene));
   plan.push_back(
       Step("undistortion",
            f.has_distortion,
@@ -47,11 +51,17 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
       "key_view_selection",
       !f.key_view_given,
       f.key_view_given ? "the key view was given" : "the key view is chosen by feature coverage",
-      kSecondsPerFeatureMegapixel * megapixels));
-  plan.push_back(Step("luminance_geometry", true, "every scene needs geometry", 0.0));
+      kSecondsPerFeatureMegapixel * megapixels,
+      kind::kSelectKeyView));
+  plan.push_back(Step(
+      "luminance_geometry", true, "every scene needs geometry", 0.0, kind::kReconstructGeometry));
+  plan.push_back(Step("personalization",
+                      true,
+                      "the key view's colours must reach every view",
+                      0.0,
+                      kind::kPersonalize));
   plan.push_back(
-      Step("personalization", true, "the key view's colours must reach every view", 0.0));
-  plan.push_back(Step("chroma", true, "a and b are fitted on the finished geometry", 0.0));
+      Step("chroma", true, "a and b are fitted on the finished geometry", 0.0, kind::kSolveChroma));
   plan.push_back(Step("warm_up_in_three_channels",
                       false,
                       "three identical luminance channels are one channel: one is rasterised",
@@ -69,7 +79,8 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
            true,
            f.has_truth ? "true colours of held-out views were given"
                        : "no true colours were given: the views are compared with each other only",
-           0.0));
+           0.0,
+           kind::kEvaluate));
   return plan;
 }
 
@@ -100,7 +111,7 @@ std::vector<PlanStep> PlanFromJson(std::string_view json) {
     }
     return steps;
   } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument(std::string("plan.json is damaged: ") + e.what());
+    throw InvalidArgument("{} is damaged: {}", artifact::kPlan, e.what());
   }
 }
 

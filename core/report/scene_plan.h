@@ -12,9 +12,12 @@ struct PlanStep {
   std::string step;  // e.g. "structure_from_motion"
   bool needed = true;
   std::string reason;  // one sentence
-  double estimated_seconds =
-      0.0;  // of this machine's threads; what leaving it out saves, if left out
+  // On this machine's threads; of a step that is left out: what that saves.
+  double estimated_seconds = 0.0;
   double measured_seconds = -1.0;  // < 0: not run, or not measured on its own
+  // Kind of the stage whose time the step takes; empty when it is only a part of one. Not in the
+  // file.
+  std::string stage = {};
 };
 
 // What the plan depends on.

@@ -1,5 +1,7 @@
 #include "core/scene/import.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -56,9 +58,9 @@ void AddRandomPointsWhenEmpty(ImportResult* result) {
         "common; check the poses");
   }
   result->random_points = true;
-  result->warnings.push_back(
-      "the scene has poses but no sparse points; reconstruction starts from " +
-      std::to_string(scene.points.size()) + " random ones");
+  result->warnings.push_back(fmt::format(
+      "the scene has poses but no sparse points; reconstruction starts from {} random ones",
+      scene.points.size()));
 }
 
 void Normalise(ImportResult* result) {
@@ -67,9 +69,9 @@ void Normalise(ImportResult* result) {
   }
   const double behind = ShareBehindCameras(result->scene);
   if (behind > kSuspiciousShareBehind) {
-    result->warnings.push_back(std::to_string(std::lround(100.0 * behind)) +
-                               " % of the observations of sparse points lie behind their camera; "
-                               "check the poses");
+    result->warnings.push_back(fmt::format(
+        "{} % of the observations of sparse points lie behind their camera; check the poses",
+        std::lround(100.0 * behind)));
   }
 }
 
@@ -77,8 +79,8 @@ void HoldOut(ImportResult* result) {
   std::vector<View>& views = result->scene.views;
   const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
   if (views.size() < held_out + kMinTrainingViews) {
-    result->warnings.push_back("no view is held out for evaluation: the scene has only " +
-                               std::to_string(views.size()));
+    result->warnings.push_back(
+        fmt::format("no view is held out for evaluation: the scene has only {}", views.size()));
     return;
   }
   for (size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].held_out = true;
@@ -93,7 +95,7 @@ void ImportPhotos(const fs::path& scene_folder,
   std::vector<Photo> photos = ListPhotos(scene_folder);
   result->photos_found = static_cast<int>(photos.size());
   if (photos.empty()) {
-    throw InvalidArgument(scene_folder.string() + " contains no photographs (JPEG, PNG, TIFF)");
+    throw InvalidArgument("{} contains no photographs (JPEG, PNG, TIFF)", scene_folder.string());
   }
   for (size_t i = 0; i < photos.size(); ++i) {
     cancel.ThrowIfCancelled();
@@ -102,8 +104,10 @@ void ImportPhotos(const fs::path& scene_folder,
     ProbePhoto(scene_folder, &photos[i]);
   }
   if (photos.size() == 1) {
-    throw InvalidArgument(scene_folder.string() + " contains one photograph (" + photos[0].name +
-                          "); at least 3 photos from different places are needed");
+    throw InvalidArgument(
+        "{} contains one photograph ({}); at least 3 photos from different places are needed",
+        scene_folder.string(),
+        photos[0].name);
   }
   SfmResult sfm =
       RunStructureFromMotion(photos, scene_folder, scratch_folder, options, progress, cancel);
@@ -112,11 +116,13 @@ void ImportPhotos(const fs::path& scene_folder,
   result->ran_structure_from_motion = true;
   if (sfm.unplaced.empty()) return;
   const bool few = 2 * result->scene.views.size() < photos.size();
-  result->warnings.push_back((few ? "only " : "") + std::to_string(result->scene.views.size()) +
-                             " of " + std::to_string(photos.size()) +
-                             " photos could be placed; the others share too few features "
-                             "with them and were left out: " +
-                             FirstNames(sfm.unplaced, 5));
+  result->warnings.push_back(
+      fmt::format("{}{} of {} photos could be placed; the others share too few features with them "
+                  "and were left out: {}",
+                  few ? "only " : "",
+                  result->scene.views.size(),
+                  photos.size(),
+                  FirstNames(sfm.unplaced, 5)));
 }
 
 void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
@@ -130,8 +136,8 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
     if (!std::binary_search(files.begin(), files.end(), photo.file)) unposed.push_back(photo.name);
   }
   if (unposed.empty()) return;
-  result->warnings.push_back(std::to_string(unposed.size()) +
-                             " photos have no pose and were left out: " + FirstNames(unposed, 5));
+  result->warnings.push_back(fmt::format(
+      "{} photos have no pose and were left out: {}", unposed.size(), FirstNames(unposed, 5)));
 }
 
 }  // namespace
@@ -154,7 +160,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   cancel.ThrowIfCancelled();
   std::error_code error;
   if (!fs::is_directory(scene_folder, error)) {
-    throw Error(ErrorCode::kNotFound, scene_folder.string() + " is not a folder");
+    throw Error(ErrorCode::kNotFound, "{} is not a folder", scene_folder.string());
   }
   ImportResult result;
   const fs::path colmap_folder = FindColmapFolder(scene_folder);
@@ -172,8 +178,8 @@ ImportResult ImportScene(const fs::path& scene_folder,
   }
   Scene& scene = result.scene;
   if (scene.views.size() < kMinTrainingViews) {
-    throw InvalidArgument("the scene has only " + std::to_string(scene.views.size()) +
-                          " posed view; at least 2 are needed");
+    throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
+                          scene.views.size());
   }
   result.photos_registered = static_cast<int>(scene.views.size());
   result.undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {

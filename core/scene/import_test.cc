@@ -5,8 +5,6 @@
 
 #include <algorithm>
 
-#include "core/scene/sfm/sfm_photos.h"
-#include "core/scene/sparse_cloud.h"
 #include "tests/support/test_exif.h"
 #include "tests/support/test_scenes.h"
 
@@ -153,81 +151,6 @@ TEST_F(Import, PosesWithoutPointsGetRandomOnesThatViewsSee) {
     }
   }
   EXPECT_EQ(SceneToJson(Run().scene), SceneToJson(result.scene));  // the same every time
-}
-
-TEST(SparseCloud, FocusOfConvergingParallelAndDivergingCameras) {
-  EXPECT_LT(FocusPoint(ArcScene(7)).norm(), 0.05);
-  Scene parallel = ArcScene(5);
-  for (int i = 0; i < 5; ++i) {
-    parallel.views[i].cam_from_world.rotation.setIdentity();
-    parallel.views[i].cam_from_world.translation = Eigen::Vector3d(-i, 0, 0);
-  }
-  const Eigen::Vector3d focus = FocusPoint(parallel);
-  EXPECT_NEAR(focus.x(), 2.0, 1e-6);
-  EXPECT_NEAR(focus.z(), 6.0, 1e-6);  // three baselines of 2
-  Scene diverging = ArcScene(5);
-  for (View& view : diverging.views) {
-    const Eigen::Vector3d c = view.cam_from_world.Center();
-    view.cam_from_world = LookAt(c, 2.0 * c);
-  }
-  const Eigen::Vector3d ahead = FocusPoint(diverging);
-  int in_front = 0;
-  for (const View& view : diverging.views) in_front += view.cam_from_world.Apply(ahead).z() > 0;
-  EXPECT_GE(in_front, 3);
-}
-
-TEST(SparseCloud, CamerasInOnePlaceOrWithoutOverlapStillGivePoints) {
-  Scene one_place = ArcScene(3);
-  for (View& view : one_place.views) view.cam_from_world = one_place.views[0].cam_from_world;
-  EXPECT_EQ(RandomPoints(one_place, 500, 1).size(), 500u);
-  Scene apart = ArcScene(2);
-  apart.views[0].cam_from_world = LookAt({0, 0, 0.1}, {0, 0, 5});
-  apart.views[1].cam_from_world = LookAt({0, 0, -0.1}, {0, 0, -5});
-  EXPECT_GT(RandomPoints(apart, 100, 1).size(), 0u);
-}
-
-TEST(FeatureImage, DullPhotosAreStretchedOthersNot) {
-  Image dull = GradientPhoto(64, 64, 1);
-  for (float& v : dull.data) v = 0.4f + 0.1f * v;
-  const Image stretched = FeatureImage(dull, 1000);
-  const auto [low, high] = std::minmax_element(stretched.data.begin(), stretched.data.end());
-  EXPECT_GT(*high - *low, 0.9f);
-  const Image bright = GradientPhoto(64, 64, 1);
-  EXPECT_EQ(FeatureImage(bright, 1000).data, bright.data);
-  EXPECT_EQ(FeatureImage(GradientPhoto(64, 48, 3), 32).width, 32);
-  for (float v : FeatureImage(Image(8, 8, 1, 0.5f), 100).data) EXPECT_LE(v, 1.0f);
-}
-
-// Photos of one camera share its focal length; those of another zoom or size do not.
-TEST_F(Import, FeatureImagesAreGroupedByCamera) {
-  std::vector<Photo> photos;
-  const auto add = [&](const std::string& name, int width, uint32_t film_mm) {
-    const std::string jpeg = EncodeJpeg(GradientPhoto(width, 60, 1));
-    WriteFileAtomic(folder_.path() / name,
-                    film_mm > 0 ? WithExif(jpeg, {{41989, 3, film_mm}}) : jpeg);
-    photos.push_back({name, name});
-    ProbePhoto(folder_.path(), &photos.back());
-  };
-  add("a.jpg", 80, 28);
-  add("b.jpg", 80, 28);
-  add("c.jpg", 80, 50);
-  add("d.jpg", 80, 0);
-  add("e.jpg", 100, 28);
-  EXPECT_NEAR(photos[0].focal_px, 28.0 * 100.0 / 43.2666, 0.1);
-  ThreadPool pool(2);
-  const FeatureImages written = WriteFeatureImages(
-      photos, folder_.path(), scratch_.path() / "copies", 40, 50, pool, progress_, {});
-  ASSERT_EQ(written.groups.size(), 4u);
-  EXPECT_EQ(written.groups[0].names,
-            (std::vector<std::string>{written.names[0], written.names[1]}));
-  EXPECT_NEAR(written.groups[0].focal_px, 14.0 * 100.0 / 43.2666, 0.1);
-  EXPECT_EQ(written.groups[2].focal_px, 0.0);
-  EXPECT_EQ(written.features.size(), 5u);
-  for (const std::string& name : written.names) {
-    const Image copy = ReadImage(scratch_.path() / "copies" / name);
-    EXPECT_EQ(copy.width, 40);
-    EXPECT_EQ(copy.channels, 1);
-  }
 }
 
 }  // namespace

@@ -120,9 +120,10 @@ Camera UndistortedCamera(const Camera& captured, const Distortion& distortion) {
     low = high;
     high *= 1.25;
     if (high > kMaxFactor) {
-      throw InvalidArgument("the lens distortion (k1 " + std::to_string(distortion.k[0]) + ", k2 " +
-                            std::to_string(distortion.k[1]) +
-                            ") folds the picture over; calibrate the camera again");
+      throw InvalidArgument(
+          "the lens distortion (k1 {}, k2 {}) folds the picture over; calibrate the camera again",
+          distortion.k[0],
+          distortion.k[1]);
     }
   }
   while (high - low > 1e-4) {

@@ -1,8 +1,9 @@
 #include "core/scene/normalise.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "core/base/error.h"
 #include "core/scene/sparse_cloud.h"
@@ -10,17 +11,13 @@
 namespace color3d {
 namespace {
 
-constexpr double kLeastDepth = 1.0;
-constexpr double kMostDepth = 1000.0;
+constexpr double kMinDepth = 1.0;
+constexpr double kMaxDepth = 1000.0;
 constexpr double kStandardDepth = 10.0;
 constexpr double kFarFromOrigin = 1e3;
 constexpr double kOutOfReach = 1e9;  // typical depths
 
-std::string Short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.3g", value);
-  return text;
-}
+std::string Short(double value) { return fmt::format("{:.3g}", value); }
 
 Eigen::Vector3d MeanCenter(const Scene& scene) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -33,15 +30,18 @@ Eigen::Vector3d MeanCenter(const Scene& scene) {
 void CheckWithinReach(const Scene& scene, const Eigen::Vector3d& mean, double depth) {
   const auto check = [&](const Eigen::Vector3d& position, const std::string& what) {
     if ((position - mean).cwiseAbs().maxCoeff() <= kOutOfReach * depth) return;
-    throw InvalidArgument(what + " lies " + Short((position - mean).norm()) +
-                          " units away from the cameras, which see things " + Short(depth) +
-                          " units away; remove it or correct it");
+    throw InvalidArgument(
+        "{} lies {} units away from the cameras, which see things {} units away; remove it or "
+        "correct it",
+        what,
+        Short((position - mean).norm()),
+        Short(depth));
   };
   for (const View& view : scene.views) {
     check(view.cam_from_world.Center(), "the camera of " + view.name);
   }
   for (size_t i = 0; i < scene.points.size(); ++i) {
-    check(scene.points[i].position, "sparse point " + std::to_string(i));
+    check(scene.points[i].position, fmt::format("sparse point {}", i));
   }
 }
 
@@ -96,9 +96,10 @@ double TypicalDepth(const Scene& scene) {
     }
   }
   if (depths.empty()) {
-    throw InvalidArgument("all " + std::to_string(scene.points.size()) +
-                          " sparse points lie behind the cameras that observe them; poses must be "
-                          "world-to-camera with z forward (COLMAP's convention)");
+    throw InvalidArgument(
+        "all {} sparse points lie behind the cameras that observe them; poses must be "
+        "world-to-camera with z forward (COLMAP's convention)",
+        scene.points.size());
   }
   const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
   std::nth_element(depths.begin(), middle, depths.end());
@@ -114,7 +115,7 @@ std::vector<std::string> NormaliseScene(Scene* scene) {
   CheckWithinReach(*scene, mean, std::max(depth, 1e-300));
   std::vector<std::string> notes;
   // All cameras in one place with one direction have no scale.
-  const bool in_band = !(depth > 0.0) || (depth >= kLeastDepth && depth <= kMostDepth);
+  const bool in_band = !(depth > 0.0) || (depth >= kMinDepth && depth <= kMaxDepth);
   const double scale = in_band ? 1.0 : depth / kStandardDepth;
   const bool far = LargestCoordinate(*scene) / scale > kFarFromOrigin &&
                    mean.cwiseAbs().maxCoeff() / scale > kFarFromOrigin;

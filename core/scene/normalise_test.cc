@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "core/scene/import.h"
-#include "core/scene/reprojection.h"
 #include "tests/support/test_scenes.h"
 
 namespace color3d {
@@ -139,20 +138,6 @@ TEST_F(ImportedScene, WritersGoBackToTheWorld) {
   EXPECT_LT((colmap.points[3].position - written.points[3].position).norm(), 1e-12);
 }
 
-TEST_F(ImportedScene, OldSceneFilesHaveScaleOne) {
-  Scene scene = ArcScene(3);
-  scene.world_from_scene_scale = 2.5;
-  std::string text = SceneToJson(scene);
-  EXPECT_EQ(SceneFromJson(text).world_from_scene_scale, 2.5);
-  const std::string field = "\"world_from_scene_scale\":2.5,";
-  ASSERT_NE(text.find(field), std::string::npos) << text.substr(0, 400);
-  EXPECT_EQ(
-      SceneFromJson(std::string(text).erase(text.find(field), field.size())).world_from_scene_scale,
-      1.0);
-  text.replace(text.find(field), field.size(), "\"world_from_scene_scale\":0,");
-  EXPECT_THAT(Refusal([&] { SceneFromJson(text); }), HasSubstr("must be positive"));
-}
-
 TEST_F(ImportedScene, NumbersThatAreNotFiniteAreNamedByTheirPlace) {
   const Scene scene = ArcScene(3);
   const auto said = [&](const char* file, const char* from, const char* to) {
@@ -195,13 +180,6 @@ TEST_F(ImportedScene, WrongIntrinsicsAreNamed) {
   // A little wrong, and the other camera exact: below half a pixel nothing is said.
   Write(TwoCameras(), "cameras.txt", "PINHOLE 48 32 47 51", "PINHOLE 48 32 47.5 51.5");
   EXPECT_THAT(Import().warnings, IsEmpty());
-  // The same error in pixels where all cameras have it.
-  CameraReprojection camera{1, {"a.png"}, 100, 1.6, 1.5};
-  EXPECT_THAT(ReprojectionWarnings({camera, camera}), IsEmpty());
-  camera.median_px = 2.1;
-  EXPECT_EQ(ReprojectionWarnings({camera, camera}).size(), 2u);
-  camera.observations = 3;
-  EXPECT_THAT(ReprojectionWarnings({camera}), IsEmpty());
 }
 
 TEST_F(ImportedScene, PosesTheWrongWayRoundAreSaid) {

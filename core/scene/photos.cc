@@ -1,5 +1,7 @@
 #include "core/scene/photos.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -20,9 +22,7 @@ bool StartsWith(const std::string& text, const std::string& prefix) {
   return text.compare(0, prefix.size(), prefix) == 0;
 }
 
-std::string Size(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height) + " px";
-}
+std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
 
 // Same shape up to the rounding of a downscaled copy: one pixel of the smaller picture.
 bool SameShape(int width, int height, int other_width, int other_height) {
@@ -124,19 +124,22 @@ void FitViewToPhoto(const Photo& photo, View* view) {
   const bool as_stored = SameShape(camera.width, camera.height, w, h);
   const bool as_seen = SameShape(camera.width, camera.height, photo.width, photo.height);
   if (!as_stored && !as_seen) {
-    throw InvalidArgument("photo " + photo.name + " has " + Size(photo.width, photo.height) +
-                          " but its camera was calibrated for " +
-                          Size(camera.width, camera.height) +
-                          "; use the photos that the poses were computed from");
+    throw InvalidArgument(
+        "photo {} has {} but its camera was calibrated for {}; use the photos that the poses were "
+        "computed from",
+        photo.name,
+        Size(photo.width, photo.height),
+        Size(camera.width, camera.height));
   }
   if (as_stored) {
     view->captured_camera = camera.Scaled(w, h);
     if (photo.orientation == 2 || photo.orientation == 4 || photo.orientation == 5 ||
         photo.orientation == 7) {
-      throw InvalidArgument("photo " + photo.name + " is mirrored by its EXIF orientation " +
-                            std::to_string(photo.orientation) +
-                            ", which no camera pose can express; save it upright and compute its "
-                            "pose again");
+      throw InvalidArgument(
+          "photo {} is mirrored by its EXIF orientation {}, which no camera pose can express; save "
+          "it upright and compute its pose again",
+          photo.name,
+          photo.orientation);
     }
     TurnView(photo.orientation, view);
   } else {
@@ -145,7 +148,7 @@ void FitViewToPhoto(const Photo& photo, View* view) {
   try {
     view->camera = UndistortedCamera(view->captured_camera, view->distortion);
   } catch (const Error& e) {
-    throw Error(e.code(), "photo " + photo.name + ": " + e.what());
+    throw Error(e.code(), "photo {}: {}", photo.name, e.what());
   }
 }
 

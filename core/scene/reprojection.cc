@@ -1,8 +1,9 @@
 #include "core/scene/reprojection.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <unordered_map>
 
 #include "core/base/error.h"
@@ -13,8 +14,8 @@ namespace {
 
 constexpr double kLargeMedianPx = 2.0;
 constexpr double kTimesTheOthers = 4.0;
-constexpr double kLeastSuspiciousPx = 0.5;
-constexpr int64_t kFewestObservations = 20;
+constexpr double kMinSuspiciousPx = 0.5;
+constexpr int64_t kMinObservations = 20;
 constexpr size_t kNamedPhotos = 3;
 
 double Median(std::vector<double> values) {
@@ -35,12 +36,6 @@ double DistancePx(const ColmapCamera& camera,
   return std::isfinite(distance) ? std::min(distance, diagonal) : diagonal;
 }
 
-std::string Pixels(double value) {
-  char text[32];
-  std::snprintf(text, sizeof(text), "%.2f px", value);
-  return text;
-}
-
 }  // namespace
 
 std::vector<CameraReprojection> MeasureReprojection(const ColmapModel& model) {
@@ -55,8 +50,9 @@ std::vector<CameraReprojection> MeasureReprojection(const ColmapModel& model) {
     for (const ColmapObservation& observation : image.observations) {
       if (observation.point_id < 0) continue;
       if (!observation.pixel.allFinite()) {
-        throw InvalidArgument("image " + image.name + " has an observation of point " +
-                              std::to_string(observation.point_id) + " that is not finite");
+        throw InvalidArgument("image {} has an observation of point {} that is not finite",
+                              image.name,
+                              observation.point_id);
       }
       const auto found = point_of.find(observation.point_id);
       if (found == point_of.end()) continue;
@@ -81,28 +77,31 @@ std::vector<CameraReprojection> MeasureReprojection(const ColmapModel& model) {
 std::vector<std::string> ReprojectionWarnings(const std::vector<CameraReprojection>& cameras) {
   std::vector<std::string> warnings;
   for (const CameraReprojection& camera : cameras) {
-    if (camera.observations < kFewestObservations) continue;
+    if (camera.observations < kMinObservations) continue;
     std::vector<double> others;
     for (const CameraReprojection& other : cameras) {
-      if (&other != &camera && other.observations >= kFewestObservations) {
+      if (&other != &camera && other.observations >= kMinObservations) {
         others.push_back(other.median_px);
       }
     }
     const double usual = Median(others);
     const bool stands_out = !others.empty() && camera.median_px > kTimesTheOthers * usual &&
-                            camera.median_px > kLeastSuspiciousPx;
+                            camera.median_px > kMinSuspiciousPx;
     if (camera.median_px <= kLargeMedianPx && !stands_out) continue;
     std::string photos;
     for (size_t i = 0; i < std::min(camera.photos.size(), kNamedPhotos); ++i) {
       photos += (i == 0 ? "" : ", ") + camera.photos[i];
     }
     if (camera.photos.size() > kNamedPhotos) photos += ", ...";
-    warnings.push_back("the intrinsics of camera " + std::to_string(camera.camera_id) + " (" +
-                       photos + ") do not fit its photos: points project " +
-                       Pixels(camera.median_px) + " from where they are seen (median; mean " +
-                       Pixels(camera.mean_px) +
-                       (others.empty() ? "" : "; other cameras " + Pixels(usual)) +
-                       "); check focal length and distortion, or give the photos without poses");
+    warnings.push_back(fmt::format(
+        "the intrinsics of camera {} ({}) do not fit its photos: points project {:.2f} px from "
+        "where they are seen (median; mean {:.2f} px{}); check focal length and distortion, or "
+        "give the photos without poses",
+        camera.camera_id,
+        photos,
+        camera.median_px,
+        camera.mean_px,
+        others.empty() ? "" : fmt::format("; other cameras {:.2f} px", usual)));
   }
   return warnings;
 }

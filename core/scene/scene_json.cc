@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -44,17 +46,17 @@ class Field {
   Field(const json& value, std::string place) : value_(value), place_(std::move(place)) {}
 
   Error Wrong(const std::string& wanted) const {
-    return InvalidArgument("scene: " + place_ + " must be " + wanted);
+    return InvalidArgument("scene: {} must be {}", place_, wanted);
   }
   Field operator[](const char* key) const {
     if (!value_.is_object()) throw Wrong("an object");
     const auto it = value_.find(key);
     const std::string place = place_.empty() ? key : place_ + "." + key;
-    if (it == value_.end()) throw InvalidArgument("scene: " + place + " is missing");
+    if (it == value_.end()) throw InvalidArgument("scene: {} is missing", place);
     return Field(*it, place);
   }
   Field operator[](size_t index) const {
-    return Field(value_.at(index), place_ + "[" + std::to_string(index) + "]");
+    return Field(value_.at(index), fmt::format("{}[{}]", place_, index));
   }
   size_t ArraySize() const {
     if (!value_.is_array()) throw Wrong("a list");
@@ -75,11 +77,11 @@ class Field {
     if (!value_.is_number_integer()) throw Wrong("a whole number");
     // Values above the range of int64 are read as unsigned.
     if (value_.is_number_unsigned() && value_.get<uint64_t>() > uint64_t{INT32_MAX}) {
-      throw Wrong("at most " + std::to_string(high));
+      throw Wrong(fmt::format("at most {}", high));
     }
     const int64_t v = value_.get<int64_t>();
     if (v < low || v > high) {
-      throw Wrong(std::to_string(low) + ".." + std::to_string(high) + ", not " + std::to_string(v));
+      throw Wrong(fmt::format("{}..{}, not {}", low, high, v));
     }
     return static_cast<int>(v);
   }
@@ -220,7 +222,7 @@ Scene SceneFromJson(std::string_view text) {
   if (!root.is_object()) throw InvalidArgument("scene: must be a JSON object");
   if (field["format"].Text() != kFormat) throw field["format"].Wrong(kFormat);
   if (field["version"].Integer(1, INT32_MAX) != kVersion) {
-    throw field["version"].Wrong(std::to_string(kVersion) + "; update color3d to read it");
+    throw field["version"].Wrong(fmt::format("{}; update color3d to read it", kVersion));
   }
   Scene scene;
   if (root.contains("world_from_scene_scale")) {  // absent from older files

@@ -94,5 +94,19 @@ TEST(Scene, BrokenJsonIsRefusedByField) {
   }
 }
 
+TEST(Scene, OldFilesHaveScaleOne) {
+  Scene scene = ArcScene(3);
+  scene.world_from_scene_scale = 2.5;
+  std::string text = SceneToJson(scene);
+  EXPECT_EQ(SceneFromJson(text).world_from_scene_scale, 2.5);
+  const std::string field = "\"world_from_scene_scale\":2.5,";
+  ASSERT_NE(text.find(field), std::string::npos) << text.substr(0, 400);
+  EXPECT_EQ(
+      SceneFromJson(std::string(text).erase(text.find(field), field.size())).world_from_scene_scale,
+      1.0);
+  text.replace(text.find(field), field.size(), "\"world_from_scene_scale\":0,");
+  EXPECT_THAT(Refusal([&] { SceneFromJson(text); }), HasSubstr("must be positive"));
+}
+
 }  // namespace
 }  // namespace color3d

@@ -1,5 +1,7 @@
 #include "core/scene/view_images.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -99,9 +101,7 @@ bool SameLens(const View& x, const View& y) {
          x.distortion.k == y.distortion.k;
 }
 
-std::string Size(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height) + " px";
-}
+std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
 
 }  // namespace
 
@@ -134,8 +134,7 @@ struct ViewImages::Impl {
 
   const View& At(int view) const {
     if (view < 0 || view >= static_cast<int>(scene.views.size())) {
-      throw InvalidArgument("view " + std::to_string(view) + " does not exist; the scene has " +
-                            std::to_string(scene.views.size()));
+      throw InvalidArgument("view {} does not exist; the scene has {}", view, scene.views.size());
     }
     return scene.views[view];
   }
@@ -168,8 +167,10 @@ struct ViewImages::Impl {
     const View& v = At(view);
     const Camera& c = v.captured_camera;
     if (captured.width != c.width || captured.height != c.height) {
-      throw InvalidArgument("view " + v.name + " was captured at " + Size(c.width, c.height) +
-                            " but this picture of it has " + Size(captured.width, captured.height));
+      throw InvalidArgument("view {} was captured at {} but this picture of it has {}",
+                            v.name,
+                            Size(c.width, c.height),
+                            Size(captured.width, captured.height));
     }
     const Camera working = v.camera.FitWithin(max_side_px);
     if (IsUndistorted(v.distortion)) return Resize(captured, working.width, working.height);

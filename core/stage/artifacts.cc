@@ -11,39 +11,6 @@
 
 namespace color3d {
 
-std::string StageThatMakes(std::string_view name) {
-  using namespace artifact;
-  const std::pair<std::string_view, const char*> makers[] = {
-      {kScene, "import_scene"},
-      {kImportFacts, "import_scene"},
-      {kKeyView, "select_key_view"},
-      {kKeyViewGray, "select_key_view"},
-      {kKeyViewRanking, "select_key_view"},
-      {kKeyColor, "colorize_key_view"},
-      {kKeyColorFacts, "colorize_key_view"},
-      {kKeyColorRegions, "colorize_key_view"},
-      {kAugmentationFacts, "generate_augmentations"},
-      {kAugmentations, "generate_augmentations"},
-      {kAugmentationSheet, "generate_augmentations"},
-      {kColorizer, "personalize"},
-      {kCarried, "carry_color"},
-      {kCarryFacts, "carry_color"},
-      {kViewsAb, "colorize_views"},
-      {kProvenance, "colorize_views"},
-      {kGeometry, "reconstruct_geometry"},
-      {kModel, "solve_chroma"},
-      {kMemoryPlan, "reconstruct_geometry"},
-      {kPly, "export"},
-      {kSplat, "export"},
-      {kExportScores, "export"},
-      {kRenders, "render"},
-      {kScores, "evaluate"}};
-  for (const auto& [prefix, kind] : makers) {
-    if (name.starts_with(prefix)) return kind;
-  }
-  return "another";
-}
-
 std::string ViewArtifact(std::string_view folder, const View& view, std::string_view extension) {
   const std::filesystem::path stem = std::filesystem::path(view.name).replace_extension();
   return std::string(folder) + stem.generic_string() + std::string(extension);
@@ -54,8 +21,10 @@ void CheckStemsAreUnique(const Scene& scene) {
   for (const View& view : scene.views) {
     const auto [found, fresh] = seen.emplace(ViewArtifact("", view, ""), view.name);
     if (!fresh) {
-      throw InvalidArgument(found->second + " and " + view.name +
-                            " differ only in their extension; remove or rename one of them");
+      throw InvalidArgument(
+          "{} and {} differ only in their extension; remove or rename one of them",
+          found->second,
+          view.name);
     }
   }
 }
@@ -85,7 +54,7 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
     f.photos_registered = value.at("photos_registered");
     return f;
   } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument(std::string("import.json is damaged: ") + e.what());
+    throw InvalidArgument("{} is damaged: {}", artifact::kImportFacts, e.what());
   }
 }
 
@@ -98,7 +67,7 @@ int ReadKeyView(const StageContext& context, const Scene& scene) {
     const auto value = nlohmann::json::parse(context.ReadInput(artifact::kKeyView));
     return scene.FindView(value.at("view").get<std::string>());
   } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument(std::string("key_view.json is damaged: ") + e.what());
+    throw InvalidArgument("{} is damaged: {}", artifact::kKeyView, e.what());
   }
 }
 
@@ -121,7 +90,7 @@ Image ReadViewConfidence(const StageContext& context, const View& view, int widt
   const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
   if (!context.HasInput(name)) return {};
   const Image shares = DecodeImage(context.ReadInput(name), name);
-  if (shares.channels != 3) throw InvalidArgument(name + " is grey; it must be RGB");
+  if (shares.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
   Image confidence(shares.width, shares.height, 1);
   for (size_t i = 0; i < confidence.data.size(); ++i) {
     confidence.data[i] = std::min(1.0f, shares.Plane(1)[i] + 0.5f * shares.Plane(2)[i]);

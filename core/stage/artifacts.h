@@ -1,58 +1,17 @@
-// Names and formats of what stages hand to each other. The only place where they are spelled.
+// Formats of what stages hand to each other; the names are in core/catalogue/artifacts.h.
 #pragma once
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "core/base/image.h"
 #include "core/carry/carry.h"
+#include "core/catalogue/artifacts.h"
 #include "core/scene/scene.h"
 
 namespace color3d {
 
 class StageContext;
-
-namespace artifact {
-inline constexpr char kScene[] = "scene.json";
-inline constexpr char kImportFacts[] = "import.json";
-inline constexpr char kSfmLog[] = "sfm.log";
-inline constexpr char kKeyView[] = "key_view.json";
-inline constexpr char kKeyViewGray[] = "key_view.png";               // as captured, grey: to colour
-inline constexpr char kKeyViewRanking[] = "key_view_ranking.jpg";    // contact sheet
-inline constexpr char kKeyColor[] = "key_color.png";                 // ab, undistorted, see codec.h
-inline constexpr char kKeyColorFacts[] = "key_color.json";           // where the colour came from
-inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // which words went where
-inline constexpr char kKeyViewColored[] = "key_view_coloured.png";   // for people
-inline constexpr char kAugmentationFacts[] = "augmentations.json";   // what was made, what not, why
-// + name + ".png" (for people, and L), ".ab.png" and ".weight.png"
-inline constexpr char kAugmentations[] = "augmentations/";
-inline constexpr char kAugmentationSheet[] = "augmentations.jpg";  // contact sheet
-inline constexpr char kColorizer[] = "colorizer.c3c";
-inline constexpr char kCarried[] = "carried/";   // + view's stem + ".png": ab and confidence
-inline constexpr char kViewsAb[] = "views_ab/";  // + view's stem + ".png"
-// + view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255).
-inline constexpr char kProvenance[] = "provenance/";
-inline constexpr char kCarryFacts[] = "carry.json";  // coverage, which view to colour next
-inline constexpr char kGeometry[] = "geometry.c3g";
-inline constexpr char kMemoryPlan[] = "memory_plan.json";
-inline constexpr char kModel[] = "model.c3g";
-inline constexpr char kPly[] = "scene.ply";
-inline constexpr char kSplat[] = "scene.splat";
-inline constexpr char kExportScores[] = "export.json";   // loss of the PLY against our own renders
-inline constexpr char kRenders[] = "renders/";           // + view's stem + ".png"
-inline constexpr char kTruths[] = "truths/";             // + view's stem + ".jpg"
-inline constexpr char kColored2d[] = "coloured_views/";  // + view's stem + ".jpg"
-inline constexpr char kScores[] = "scores.json";
-inline constexpr char kCurves[] = "curves/";  // + stage + ".csv"
-inline constexpr char kMetrics[] = "metrics.json";
-inline constexpr char kAllCurves[] = "curves.csv";
-inline constexpr char kPlan[] = "plan.json";
-inline constexpr char kReport[] = "report.html";
-}  // namespace artifact
-
-// Job kind that makes an artifact, for error messages; "another" when the name is unknown.
-std::string StageThatMakes(std::string_view artifact_name);
 
 // "views_ab/0001.png" for the view "0001.jpg", and so on. The import stage sees to it that stems
 // are unique (CheckStemsAreUnique).

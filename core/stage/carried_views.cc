@@ -1,8 +1,11 @@
 #include "core/stage/carried_views.h"
 
+#include <fmt/format.h>
+
 #include <cstdint>
 #include <optional>
 
+#include "core/catalogue/stages.h"
 #include "core/stage/artifacts.h"
 
 namespace color3d {
@@ -42,8 +45,8 @@ CarriedViews::CarriedViews(const Scene& scene, StageContext& context)
   try {
     done = Parse(*state, scene);
   } catch (const json::exception& e) {
-    context.progress().OnWarning(
-        std::string("carry_color starts afresh: its checkpoint is damaged (") + e.what() + ")");
+    context.progress().OnWarning(fmt::format(
+        "{} starts afresh: its checkpoint is damaged ({})", kind::kCarryColor, e.what()));
   }
   for (const Done& one : done) {
     Keep(one.view, one.coverage, one.png);

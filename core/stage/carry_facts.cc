@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/catalogue/stages.h"
 #include "core/stage/artifacts.h"
 
 namespace color3d {
@@ -24,8 +25,8 @@ CarryFacts ReadCarryFacts(const StageContext& context) {
       facts.next = {next->at("name"), next->at("coverage_now"), next->at("coverage_with")};
     }
   } catch (const ordered_json::exception& e) {
-    throw InvalidArgument(std::string(artifact::kCarryFacts) + " is damaged: " + e.what() +
-                          "; run carry_color again");
+    throw InvalidArgument(
+        "{} is damaged: {}; run {} again", artifact::kCarryFacts, e.what(), kind::kCarryColor);
   }
   return facts;
 }

@@ -67,7 +67,7 @@ class HeldOutScores {
     if (bound_) {
       const Image lab = RenderView(*bound_, camera, view.cam_from_world, pool_).lab;
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab);
-      scores["colourfulness_bound"] = Colourfulness(SrgbFromLab(lab));
+      scores["colorfulness_bound"] = Colorfulness(SrgbFromLab(lab));
     }
     const std::string provenance = ViewArtifact(artifact::kProvenance, view, ".png");
     if (context_.HasInput(provenance)) {
@@ -89,11 +89,11 @@ class HeldOutScores {
   Scores Mean() const {
     Scores mean;
     for (const auto& [name, value] : sum_) mean[name] = value / static_cast<double>(views_.size());
-    const double truth = mean.contains("colourfulness_truth") ? mean["colourfulness_truth"] : 0.0;
+    const double truth = mean.contains("colorfulness_truth") ? mean["colorfulness_truth"] : 0.0;
     if (truth > 0.0) {
-      mean["colourfulness_ratio"] = mean["colourfulness"] / truth;
-      mean["colourfulness_ratio_2d"] = mean["colourfulness_2d"] / truth;
-      if (bound_) mean["colourfulness_ratio_bound"] = mean["colourfulness_bound"] / truth;
+      mean["colorfulness_ratio"] = mean["colorfulness"] / truth;
+      mean["colorfulness_ratio_2d"] = mean["colorfulness_2d"] / truth;
+      if (bound_) mean["colorfulness_ratio_bound"] = mean["colorfulness_bound"] / truth;
     }
     return mean;
   }
@@ -125,7 +125,7 @@ ordered_json JsonOf(const ConsistencyScores& scores) {
   ordered_json json = ordered_json::object();
   if (scores.rendered.pairs > 0) {
     json["rendered"] = JsonOf(scores.rendered);
-    json["coloured_views"] = JsonOf(scores.colored);
+    json["colored_views"] = JsonOf(scores.colored);
     if (scores.truth) json["truth"] = JsonOf(*scores.truth);
   }
   return json;

@@ -66,10 +66,10 @@ TEST_F(EvaluateTest, WithoutTruthTheViewsAreStillCompared) {
   const json scores = Evaluated({});
   EXPECT_TRUE(scores.at("views").empty());
   const json& consistency = scores.at("consistency");
-  EXPECT_EQ(consistency.at("coloured_views").at("pairs"), 3);  // (0, 1), (1, 2) and (0, 2)
+  EXPECT_EQ(consistency.at("colored_views").at("pairs"), 3);  // (0, 1), (1, 2) and (0, 2)
   EXPECT_GT(consistency.at("rendered").at("matches"), 50);
   // The chroma of p2 differs from the others': matches with it must show that, the model's not.
-  EXPECT_GT(consistency.at("coloured_views").at("me_de00"), 3.0);
+  EXPECT_GT(consistency.at("colored_views").at("me_de00"), 3.0);
   EXPECT_LT(consistency.at("rendered").at("me_de00"), 1.0);
   EXPECT_FALSE(consistency.contains("truth"));
 }
@@ -84,11 +84,11 @@ TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
   const json scores = Evaluated(options);
   const json& mean = scores.at("mean");
   EXPECT_NEAR(mean.at("delta_e00_chroma_2d").get<double>(), 0.0, 0.05);
-  EXPECT_NEAR(mean.at("colourfulness_ratio_2d").get<double>(), 1.0, 0.01);
+  EXPECT_NEAR(mean.at("colorfulness_ratio_2d").get<double>(), 1.0, 0.01);
   EXPECT_LT(mean.at("delta_e00_chroma_bound"), mean.at("delta_e00_chroma"));
-  EXPECT_NEAR(mean.at("colourfulness_ratio_bound").get<double>(), 1.0, 0.2);
+  EXPECT_NEAR(mean.at("colorfulness_ratio_bound").get<double>(), 1.0, 0.2);
   EXPECT_LT(scores.at("consistency").at("truth").at("me_de00"),
-            scores.at("consistency").at("coloured_views").at("me_de00"));
+            scores.at("consistency").at("colored_views").at("me_de00"));
   EXPECT_FALSE(scores.contains("sources"));
   options.training_truth.clear();
   EXPECT_THROW(Evaluated(options), Error);

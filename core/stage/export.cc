@@ -1,5 +1,7 @@
 #include "core/splat/export/export.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -53,13 +55,15 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   const bool with_confidence = options.confidence && !model.confidence.empty();
   if (options.confidence && !with_confidence) {
     context.progress().OnWarning(
-        "the model does not know where its colours come from: scene.ply has no confidence");
+        fmt::format("the model does not know where its colours come from: {} has no confidence",
+                    artifact::kPly));
   }
   const ExportFrame frame = ExportFrameOf(scene);
   if (!frame.left_out.isZero(0.0)) {
-    context.progress().OnWarning(
+    context.progress().OnWarning(fmt::format(
         "the scene lies so far from the origin that the 32-bit numbers of its files cannot say "
-        "where: positions are relative to the offset in the header of scene.ply");
+        "where: positions are relative to the offset in the header of {}",
+        artifact::kPly));
   }
   std::vector<std::string> names;
   const std::vector<RgbView> views = ViewsToCompare(scene, &names);

@@ -3,13 +3,15 @@
 #include <algorithm>
 
 #include "core/base/files.h"
+#include "core/base/run_control.h"
 #include "core/color/lab.h"
 #include "core/encoder/clip/clip.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/keycolor/external/remote.h"
 #include "core/keycolor/external/script.h"
+#include "core/keycolor/from_image.h"
 #include "core/keycolor/recolor.h"
 #include "core/keycolor/references/reference.h"
 #include "core/keycolor/words/prompt.h"
@@ -22,6 +24,15 @@ using Options = ColorizeKeyViewOptions;
 
 constexpr int64_t kMaxPointsBytes = 1 << 26;
 constexpr int kRegionsSidePx = 540;
+
+// What the sources of colour run on.
+struct RunOf {
+  explicit RunOf(StageContext& context)
+      : pool(context.threads()),
+        control{pool, context.checkpoints(), context.progress(), context.cancel()} {}
+  ThreadPool pool;
+  RunControl control;
+};
 
 // White is 1: any grey or colour picture, by its luminance.
 Image ReadMask(const std::filesystem::path& file) {
@@ -47,8 +58,7 @@ KeyColorResult FromStrokes(const Options& options, const KeyPhoto& photo, StageC
   return FromHints(KeyColorFromStrokes(photo.luminance,
                                        ReadImage(options.file, /*keep_alpha=*/true),
                                        options.hints,
-                                       context.progress(),
-                                       context.cancel()));
+                                       RunOf(context).control));
 }
 
 KeyColorResult FromPoints(const Options& options, const KeyPhoto& photo, StageContext& context) {
@@ -62,8 +72,8 @@ KeyColorResult FromPoints(const Options& options, const KeyPhoto& photo, StageCo
   HintPictures pictures;
   if (!labels.Empty()) pictures.labels = &labels;
   if (asks_automatic) pictures.automatic_ab = &automatic;
-  return FromHints(KeyColorFromHints(
-      photo.luminance, hints, options.hints, context.progress(), context.cancel(), pictures));
+  return FromHints(
+      KeyColorFromHints(photo.luminance, hints, options.hints, RunOf(context).control, pictures));
 }
 
 KeyColorResult FromReferences(const Options& options,
@@ -75,10 +85,9 @@ KeyColorResult FromReferences(const Options& options,
   }
   const auto encoder = context.LoadEncoder(options.name);
   ReferenceOptions reference;
-  reference.threads = context.threads();
   reference.seed = static_cast<unsigned>(context.seed());
   ReferenceSolution solution = KeyColorFromReferences(
-      photo.luminance, references, *encoder, reference, context.progress(), context.cancel());
+      photo.luminance, references, *encoder, reference, RunOf(context).control);
   KeyColorResult result{std::move(solution.ab),
                         {{"description", encoder->description()},
                          {"explained", solution.explained},
@@ -179,7 +188,7 @@ KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageCo
   PromptOptions prompt;
   prompt.hints = options.hints;
   PromptSolution solution = KeyColorFromPrompt(
-      photo.luminance, options.prompt, *clip, rest, prompt, context.progress(), context.cancel());
+      photo.luminance, options.prompt, *clip, rest, prompt, RunOf(context).control);
   KeyColorResult result{std::move(solution.ab),
                         {{"description", clip->description()},
                          {"prompt", options.prompt},
@@ -225,9 +234,7 @@ KeyColorResult SolveKeyColor(const ColorizeKeyViewOptions& options,
                              const KeyPhoto& photo,
                              StageContext& context) {
   SetTorchThreads(context.threads());
-  ColorizeKeyViewOptions with_threads = options;
-  with_threads.hints.threads = context.threads();
-  return Find(options.source).solve(with_threads, photo, context);
+  return Find(options.source).solve(options, photo, context);
 }
 
 }  // namespace color3d

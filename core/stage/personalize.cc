@@ -18,9 +18,12 @@ Image KeyAb(const Image& luminance, StageContext& context) {
   const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
   const double height = static_cast<double>(luminance.width) / color.ab.width * color.ab.height;
   if (std::abs(height - luminance.height) > 1.0 + 0.01 * luminance.height) {
-    throw InvalidArgument("key_color.png is " + SizeText(color.ab) + " px, the key view " +
-                          SizeText(luminance) +
-                          ": its shape is another; colour the photo that is the key view");
+    throw InvalidArgument(
+        "{} is {} px, the key view {}: its shape is another; colour the photo that "
+        "is the key view",
+        artifact::kKeyColor,
+        SizeText(color.ab),
+        SizeText(luminance));
   }
   Image ab = Resize(color.ab, luminance.width, luminance.height);
   const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, ab));
@@ -95,17 +98,15 @@ void RunPersonalize(const ColorizerOptions& options,
   for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
     pictures.push_back(std::move(picture));
   }
-  SceneBatch alone(options.threads);
+  ThreadPool pool(context.threads());
+  SceneBatch alone(pool.thread_count());
   SceneBatch& batch = context.batch() != nullptr ? *context.batch() : alone;
   const auto colorizer =
       TrainColorizer(batch.SharedEncoder(encoder, [&] { return context.LoadEncoder(encoder); }),
                      std::move(pictures),
                      options,
-                     context.checkpoints(),
-                     context.progress(),
-                     context.cancel(),
-                     batch,
-                     context.project());
+                     {pool, context.checkpoints(), context.progress(), context.cancel()},
+                     BatchPlace{batch, context.project()});
   context.WriteOutput(artifact::kColorizer, colorizer->Serialize());
 }
 

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "core/base/parallel.h"
+#include "core/catalogue/stages.h"
 #include "core/image/codec.h"
 #include "core/report/curves.h"
 #include "core/report/report_page.h"
@@ -40,12 +41,12 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                              "delta_e00_chroma",
                              "delta_e00_chroma_2d",
                              "delta_e00_chroma_bound",
-                             "delta_e00_grey",
-                             "colourfulness",
-                             "colourfulness_truth",
-                             "colourfulness_ratio",
-                             "colourfulness_ratio_2d",
-                             "colourfulness_ratio_bound"}) {
+                             "delta_e00_gray",
+                             "colorfulness",
+                             "colorfulness_truth",
+                             "colorfulness_ratio",
+                             "colorfulness_ratio_2d",
+                             "colorfulness_ratio_bound"}) {
       if (mean.contains(name)) metrics[name] = mean.at(name);
     }
   }
@@ -108,41 +109,30 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   const Camera camera = scene.views.at(0).camera.FitWithin(kReportSidePx);
   plan_facts.megapixels_per_view = 1e-6 * camera.width * camera.height;
   std::vector<PlanStep> plan = PlanScene(plan_facts);
-  const std::pair<const char*, const char*> stage_of[] = {
-      {"structure_from_motion", "import_scene"},
-      {"key_view_selection", "select_key_view"},
-      {"luminance_geometry", "reconstruct_geometry"},
-      {"personalization", "personalize"},
-      {"chroma", "solve_chroma"},
-      {"evaluation", "evaluate"}};
   for (PlanStep& step : plan) {
-    for (const auto& [name, kind] : stage_of) {
-      if (step.needed && step.step == name) step.measured_seconds = SecondsOf(stages, kind);
-    }
+    if (step.needed && !step.stage.empty()) step.measured_seconds = SecondsOf(stages, step.stage);
   }
-  const auto add_reason = [&plan](const char* name, const std::string& note) {
+  const auto add_reason = [&plan](const char* stage, const std::string& note) {
     for (PlanStep& step : plan) {
-      if (step.step == name && !note.empty()) step.reason += "; " + note;
+      if (step.stage == stage && !note.empty()) step.reason += "; " + note;
     }
   };
-  add_reason("structure_from_motion", facts.sfm_plan);
+  add_reason(kind::kImportScene, facts.sfm_plan);
   if (context.HasInput(artifact::kMemoryPlan)) {
     const auto memory = ordered_json::parse(context.ReadInput(artifact::kMemoryPlan));
-    add_reason("luminance_geometry", memory.at("note"));
+    add_reason(kind::kReconstructGeometry, memory.at("note"));
   }
   if (context.HasInput(artifact::kAugmentationFacts)) {
     const auto facts = ordered_json::parse(context.ReadInput(artifact::kAugmentationFacts));
     for (const auto& left_out : facts.at("left_out")) {
-      plan.push_back({"augmentation_" + left_out.at("kind").get<std::string>(),
-                      false,
-                      left_out.at("reason"),
-                      0.0,
-                      -1.0});
+      plan.push_back({.step = "augmentation_" + left_out.at("kind").get<std::string>(),
+                      .needed = false,
+                      .reason = left_out.at("reason")});
     }
   }
   for (const StageSummary& s : stages) {
     if (s.state == "SKIPPED") {
-      plan.push_back({s.kind, false, s.skip_reason, 0.0, -1.0});
+      plan.push_back({.step = s.kind, .needed = false, .reason = s.skip_reason});
     }
   }
   return plan;
@@ -181,22 +171,13 @@ std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context)
 }
 
 void PassOnResults(StageContext& context) {
-  using namespace artifact;
-  for (const char* name : {kPly,
-                           kSplat,
-                           kModel,
-                           kColorizer,
-                           kKeyView,
-                           kKeyViewGray,
-                           kKeyViewRanking,
-                           kKeyViewColored,
-                           kKeyColorFacts,
-                           kKeyColorRegions,
-                           kAugmentationSheet,
-                           kSfmLog}) {
-    if (context.HasInput(name)) context.PassOn(name);
+  for (const Stage& stage : StageCatalogue()) {
+    for (const char* result : stage.results) {
+      if (context.HasInput(result)) context.PassOn(result);
+      if (!std::string_view(result).ends_with('/')) continue;
+      for (const std::string& name : context.InputsBelow(result)) context.PassOn(name);
+    }
   }
-  for (const std::string& name : context.InputsBelow(kRenders)) context.PassOn(name);
 }
 
 }  // namespace
@@ -221,7 +202,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
                       curves.end(),
                       std::back_inserter(personalization),
                       std::back_inserter(data.curves),
-                      [](const CurvePoint& p) { return p.stage == "personalize"; });
+                      [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
   data.sections = colors.Sections(std::move(personalization));
   data.views = ViewRows(scene, context);
   for (const auto& [name, value] : metrics.items()) {

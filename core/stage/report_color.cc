@@ -76,7 +76,7 @@ void ColorFacts::ReadScores() {
     if (const auto found = scores.find("consistency"); found != scores.end()) {
       const std::pair<const char*, const char*> rows[] = {
           {"rendered", "rendered from the 3D scene"},
-          {"coloured_views", "the photos in colour"},
+          {"colored_views", "the photos in colour"},
           {"truth", "the true colours"}};
       for (const auto& [name, what] : rows) {
         if (!found->contains(name)) continue;

@@ -2,15 +2,14 @@
 
 #include "core/base/files.h"
 #include "core/base/memory.h"
-#include "core/stage/artifacts.h"
+#include "core/catalogue/stages.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
 
 void CheckMaxSide(int max_side_px) {
   if (max_side_px < 64 || max_side_px > 4096) {
-    throw InvalidArgument("max_side_px is " + std::to_string(max_side_px) +
-                          "; it must be 64 to 4096");
+    throw InvalidArgument("max_side_px is {}; it must be 64 to 4096", max_side_px);
   }
 }
 
@@ -32,17 +31,21 @@ std::filesystem::path StageContext::Model(const std::string& name) const {
   if (found != setup_.models.end()) return found->second;
   std::string known;
   for (const auto& [other, file] : setup_.models) known += (known.empty() ? "" : ", ") + other;
-  throw Error(ErrorCode::kFailedPrecondition,
-              "this server has no model '" + name +
-                  "' (it has: " + (known.empty() ? "none" : known) + "); start it with --model " +
-                  name + "=FILE and retry the job");
+  throw Error(
+      ErrorCode::kFailedPrecondition,
+      "this server has no model '{0}' (it has: {1}); start it with --model {0}=FILE and retry "
+      "the job",
+      name,
+      known.empty() ? "none" : known);
 }
 
 std::unique_ptr<RemoteColorizer> StageContext::Remote(const std::string& name) const {
   if (!setup_.remote_colorizers) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "this server has no backend '" + name + "'; start it with --backend " + name +
-                    "=ADDRESS and retry the job");
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "this server has no backend '{0}'; start it with --backend {0}=ADDRESS and retry the "
+        "job",
+        name);
   }
   return setup_.remote_colorizers(name);
 }
@@ -55,9 +58,11 @@ std::shared_ptr<const Encoder> StageContext::LoadEncoder(const std::string& mode
 std::filesystem::path StageContext::Input(const std::string& name) const {
   const auto found = setup_.inputs.find(name);
   if (found == setup_.inputs.end()) {
+    const Stage* maker = StageThatLeaves(name);
     throw Error(ErrorCode::kFailedPrecondition,
-                "this stage needs " + name + ", which a " + StageThatMakes(name) +
-                    " job makes: name one among the inputs");
+                "this stage needs {}, which a {} job makes: name one among the inputs",
+                name,
+                maker != nullptr ? maker->kind : "another");
   }
   return found->second;
 }
@@ -74,7 +79,7 @@ std::string StageContext::ReadInput(const std::string& name) const { return Read
 
 void StageContext::WriteOutput(const std::string& name, std::string_view bytes) {
   if (!IsSafeRelativePath(name)) {
-    throw InvalidArgument("\"" + name + "\" cannot name an artifact; rename the photo");
+    throw InvalidArgument("\"{}\" cannot name an artifact; rename the photo", name);
   }
   const std::filesystem::path path = setup_.output_folder / name;
   std::error_code error;

@@ -119,7 +119,7 @@ TEST_F(StageTest, TheBackendsFactsAndWarningsReachTheUser) {
   EXPECT_EQ(facts.at("description"), "sepia 1");
   EXPECT_GT(facts.at("mean_luminance_difference").get<double>(), 5.0);
   EXPECT_NE(observer_.text.find("changed the luminance"), std::string::npos) << observer_.text;
-  const Image shown = ReadImage(scratch_.path() / "out/key_view_coloured.png");
+  const Image shown = ReadImage(scratch_.path() / "out/key_view_colored.png");
   const Image photo = ReadImage(scratch_.path() / "p1.png");
   EXPECT_NEAR(LuminanceFromSrgb(shown).At(0, 16, 24), LuminanceFromSrgb(photo).At(0, 16, 24), 1.0)
       << "the photo's own luminance was not put back";

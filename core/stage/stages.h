@@ -1,5 +1,6 @@
 // Every stage of the method: options, and the function that runs it. What each reads and leaves is
-// said beside it; names are in artifacts.h. All throw Error and leave nothing half-written.
+// said beside it; names are in core/catalogue/artifacts.h. All throw Error and leave nothing
+// half-written.
 #pragma once
 
 #include <filesystem>
@@ -8,8 +9,9 @@
 
 #include "core/carry/carry.h"
 #include "core/carry/plane_sweep.h"
+#include "core/catalogue/stage_summary.h"
 #include "core/colorizer/colorizer.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 #include "core/keyview/select.h"
 #include "core/scene/import.h"
 #include "core/splat/training/trainer.h"
@@ -54,7 +56,7 @@ struct ColorizeKeyViewOptions {
   std::string name;  // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
 };
-// scene.json, key_view.json -> key_color.png, key_view_coloured.png, key_color.json.
+// scene.json, key_view.json -> key_color.png, key_view_colored.png, key_color.json.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
 // A key view beside the first one. Of its colours only those are taken that the key views before it
@@ -144,18 +146,9 @@ struct EvaluateOptions {
   void Validate() const;
 };
 // scene.json, model.c3g, views_ab/* (provenance/*) -> scores.json, truths/*.jpg,
-// coloured_views/*.jpg. Without any truth only the consistency between views (ME, TC) is scored.
+// colored_views/*.jpg. Without any truth only the consistency between views (ME, TC) is scored.
 void RunEvaluate(const EvaluateOptions& options, StageContext& context);
 
-// What became of the other stages of the graph.
-struct StageSummary {
-  std::string kind;
-  std::string state;
-  std::string skip_reason;
-  double seconds = 0.0;
-  int64_t peak_memory_bytes = 0;
-  std::vector<std::string> warnings;
-};
 // All of the above -> metrics.json, curves.csv, plan.json, report.html, and the results of the
 // other stages passed on.
 void RunReport(const std::vector<StageSummary>& stages, StageContext& context);

@@ -8,7 +8,7 @@
 #include "core/base/files.h"
 #include "core/base/parallel.h"
 #include "core/color/lab.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/image/reduced.h"
 #include "core/keyview/coverage.h"

@@ -29,9 +29,9 @@ Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image&
   v["ssim_rgb"] = Ssim(rendered_srgb, true_srgb, 1.0);
   v["psnr_l"] = Psnr(LuminanceOfLab(rendered_lab), LuminanceOfLab(true_lab), 100.0);
   v["ab_rmse"] = AbRmse(rendered_lab, true_lab);
-  v["colourfulness"] = Colourfulness(rendered_srgb);
-  v["colourfulness_2d"] = Colourfulness(SrgbFromLab(UnderTrueL(true_lab, view_ab)));
-  v["colourfulness_truth"] = Colourfulness(true_srgb);
+  v["colorfulness"] = Colorfulness(rendered_srgb);
+  v["colorfulness_2d"] = Colorfulness(SrgbFromLab(UnderTrueL(true_lab, view_ab)));
+  v["colorfulness_truth"] = Colorfulness(true_srgb);
 
   const Image truth = FitWithin(true_lab, kColorSidePx);
   const Image rendered = FitWithin(rendered_lab, kColorSidePx);
@@ -39,7 +39,7 @@ Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image&
   v["delta_e00_chroma"] = MeanDeltaE00(UnderTrueL(truth, ChromaOfLab(rendered)), truth);
   v["delta_e00_chroma_2d"] =
       MeanDeltaE00(UnderTrueL(truth, FitWithin(view_ab, kColorSidePx)), truth);
-  v["delta_e00_grey"] = MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
+  v["delta_e00_gray"] = MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
   return v;
 }
 

@@ -13,8 +13,7 @@ namespace color3d {
 
 void ByteSource::ReadAt(uint64_t offset, uint64_t count, void* out) const {
   if (offset > size_ || count > size_ - offset) {
-    throw Refusal("cut short: " + std::to_string(count) + " bytes at " + std::to_string(offset) +
-                  " are asked for, the file has " + std::to_string(size_));
+    throw Refusal("cut short: {} bytes at {} are asked for, the file has {}", count, offset, size_);
   }
   if (count > 0) DoRead(offset, count, static_cast<char*>(out));
 }
@@ -28,7 +27,7 @@ std::string ByteSource::ReadString(uint64_t offset, uint64_t count) const {
 }
 
 Error ByteSource::Refusal(const std::string& reason) const {
-  return InvalidArgument(name_ + ": " + reason);
+  return InvalidArgument("{}: {}", name_, reason);
 }
 
 MemorySource::MemorySource(std::string_view bytes, const std::string& name)
@@ -42,12 +41,14 @@ FileSource::Opened FileSource::Open(const std::filesystem::path& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
     throw Error(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kFailedPrecondition,
-                "cannot open the weight file " + path.string() + ": " + std::strerror(errno));
+                "cannot open the weight file {}: {}",
+                path.string(),
+                std::strerror(errno));
   }
   struct stat status {};
   if (fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     close(descriptor);
-    throw Error(ErrorCode::kNotFound, "the weight file " + path.string() + " is no regular file");
+    throw Error(ErrorCode::kNotFound, "the weight file {} is no regular file", path.string());
   }
   return {descriptor, static_cast<uint64_t>(status.st_size)};
 }
@@ -64,10 +65,10 @@ void FileSource::DoRead(uint64_t offset, uint64_t count, char* out) const {
     const ssize_t got = pread(descriptor_, out, count, static_cast<off_t>(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) {
-      throw Error(
-          ErrorCode::kDataLoss,
-          name() + ": " +
-              (got < 0 ? std::strerror(errno) : "the file became shorter while it was read"));
+      throw Error(ErrorCode::kDataLoss,
+                  "{}: {}",
+                  name(),
+                  got < 0 ? std::strerror(errno) : "the file became shorter while it was read");
     }
     out += got;
     offset += static_cast<uint64_t>(got);

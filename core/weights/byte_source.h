@@ -3,10 +3,13 @@
 // reader keeps. Immutable; ReadAt() may be called from any thread.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "core/base/error.h"
 
@@ -25,6 +28,11 @@ class ByteSource {
   std::string ReadString(uint64_t offset, uint64_t count) const;
   // Error{kInvalidArgument} that names the source and the reason.
   Error Refusal(const std::string& reason) const;
+  // With the parts of the reason put in as fmt does.
+  template <typename First, typename... Rest>
+  Error Refusal(fmt::format_string<First, Rest...> reason, First&& first, Rest&&... rest) const {
+    return Refusal(fmt::format(reason, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
 
  protected:
   ByteSource(std::string name, uint64_t size) : name_(std::move(name)), size_(size) {}

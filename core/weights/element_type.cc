@@ -129,9 +129,11 @@ std::vector<float> ReadElements(const ByteSource& source,
                                 uint64_t count) {
   const uint64_t size = static_cast<uint64_t>(ElementBytes(type));
   if (offset > source.size() || count > (source.size() - offset) / size) {
-    throw source.Refusal("cut short: " + std::to_string(count) + " elements of " +
-                         std::to_string(size) + " bytes at " + std::to_string(offset) +
-                         " do not fit its " + std::to_string(source.size()) + " bytes");
+    throw source.Refusal("cut short: {} elements of {} bytes at {} do not fit its {} bytes",
+                         count,
+                         size,
+                         offset,
+                         source.size());
   }
   std::vector<float> values(count);
   if (type == ElementType::kFloat32) {
@@ -151,20 +153,20 @@ std::vector<float> ReadElements(const ByteSource& source,
 int64_t CheckedElementCount(const ByteSource& source,
                             std::string_view name,
                             const std::vector<int64_t>& shape) {
-  constexpr int64_t kMost = int64_t{1} << 60;
+  constexpr int64_t kMaxElements = int64_t{1} << 60;
   constexpr size_t kMaxRank = 16;
   if (shape.size() > kMaxRank) {
-    throw source.Refusal(QuotedName(name) + " has " + std::to_string(shape.size()) +
-                         " dimensions, at most 16 are read");
+    throw source.Refusal(
+        "{} has {} dimensions, at most 16 are read", QuotedName(name), shape.size());
   }
   int64_t count = 1;
   for (int64_t size : shape) {
     if (size < 0) {
-      throw source.Refusal(QuotedName(name) + " has the negative size " + std::to_string(size));
+      throw source.Refusal("{} has the negative size {}", QuotedName(name), size);
     }
     // The largest product so far is kept even when a later size is 0: [2^60, 2^60, 0] is no shape.
-    if (size > 0 && count > kMost / size) {
-      throw source.Refusal(QuotedName(name) + " has more elements than can be counted");
+    if (size > 0 && count > kMaxElements / size) {
+      throw source.Refusal("{} has more elements than can be counted", QuotedName(name));
     }
     count *= std::max<int64_t>(size, 1);
   }

@@ -1,5 +1,7 @@
 #include "core/weights/safetensors.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -97,8 +99,10 @@ class HeaderHandler : public nlohmann::json::json_sax_t {
     } else if (place_ == Place::kEntry && key_ == "dtype" && !entries_.back().type) {
       entries_.back().type = TypeFromName(text);
       if (!entries_.back().type) {
-        throw source_.Refusal(QuotedName(entries_.back().name) + " has the number format " +
-                              QuotedName(text) + ", which is not read; save it as F32 or F16");
+        throw source_.Refusal(
+            "{} has the number format {}, which is not read; save it as F32 or F16",
+            QuotedName(entries_.back().name),
+            QuotedName(text));
       }
     } else {
       Unexpected("a text");
@@ -111,7 +115,7 @@ class HeaderHandler : public nlohmann::json::json_sax_t {
     } else if (place_ == Place::kOffsets && entries_.back().offsets.size() < 2) {
       entries_.back().offsets.push_back(value);
     } else {
-      Unexpected("the number " + std::to_string(value));
+      Unexpected(fmt::format("the number {}", value));
     }
     return true;
   }
@@ -123,21 +127,21 @@ class HeaderHandler : public nlohmann::json::json_sax_t {
   bool parse_error(std::size_t position,
                    const std::string&,
                    const nlohmann::detail::exception&) override {
-    throw source_.Refusal("its header is not JSON at byte " +
-                          std::to_string(kLengthBytes + position));
+    throw source_.Refusal("its header is not JSON at byte {}", kLengthBytes + position);
   }
 
  private:
   enum class Place { kStart, kTop, kMetadata, kEntry, kShape, kOffsets, kEnd };
 
   [[noreturn]] bool Unexpected(const std::string& what) {
-    throw source_.Refusal("its header has " + what + " after " + QuotedName(key_) +
-                          ", where the safetensors format has none");
+    throw source_.Refusal("its header has {} after {}, where the safetensors format has none",
+                          what,
+                          QuotedName(key_));
   }
   void CheckComplete() {
     const Entry& entry = entries_.back();
     if (!entry.type || !entry.shape || entry.offsets.size() != 2) {
-      throw source_.Refusal(QuotedName(entry.name) + " lacks dtype, shape or data_offsets");
+      throw source_.Refusal("{} lacks dtype, shape or data_offsets", QuotedName(entry.name));
     }
   }
 
@@ -157,10 +161,12 @@ void CheckLayout(const ByteSource& source, std::vector<Entry>& entries, uint64_t
   uint64_t expected = 0;
   for (const Entry& entry : entries) {
     const uint64_t begin = entry.offsets[0], end = entry.offsets[1];
-    const std::string range = " at [" + std::to_string(begin) + ", " + std::to_string(end) + ")";
+    const std::string range = fmt::format(" at [{}, {})", begin, end);
     if (end > data_bytes || begin > end) {
-      throw source.Refusal(QuotedName(entry.name) + range + " is not inside its " +
-                           std::to_string(data_bytes) + " data bytes; the file may be cut short");
+      throw source.Refusal("{}{} is not inside its {} data bytes; the file may be cut short",
+                           QuotedName(entry.name),
+                           range,
+                           data_bytes);
     }
     if (begin != expected) {
       throw source.Refusal(QuotedName(entry.name) + range +
@@ -169,14 +175,16 @@ void CheckLayout(const ByteSource& source, std::vector<Entry>& entries, uint64_t
     const auto count = static_cast<uint64_t>(CheckedElementCount(source, entry.name, *entry.shape));
     const auto size = static_cast<uint64_t>(ElementBytes(*entry.type));
     if ((end - begin) % size != 0 || (end - begin) / size != count) {
-      throw source.Refusal(QuotedName(entry.name) + " has " + std::to_string(end - begin) +
-                           " bytes for " + std::to_string(count) + " elements of " +
-                           std::to_string(size));
+      throw source.Refusal("{} has {} bytes for {} elements of {}",
+                           QuotedName(entry.name),
+                           end - begin,
+                           count,
+                           size);
     }
     expected = end;
   }
   if (expected != data_bytes) {
-    throw source.Refusal(std::to_string(data_bytes - expected) + " bytes belong to no array");
+    throw source.Refusal("{} bytes belong to no array", data_bytes - expected);
   }
 }
 
@@ -186,8 +194,10 @@ void AppendHalf(const std::string& name, const std::vector<float>& values, std::
     const float value = values[i];
     const uint16_t half = halves[i] = HalfFromFloat(value);
     if (std::isfinite(value) && (half & 0x7c00u) == 0x7c00u) {
-      throw InvalidArgument("weight " + QuotedName(name) + " holds " + std::to_string(value) +
-                            ", which half precision cannot hold; write it in single precision");
+      throw InvalidArgument(
+          "weight {} holds {}, which half precision cannot hold; write it in single precision",
+          QuotedName(name),
+          value);
     }
   }
   bytes.append(reinterpret_cast<const char*>(halves.data()), halves.size() * sizeof(uint16_t));
@@ -199,8 +209,8 @@ WeightMap ReadSafetensors(const ByteSource& source, WeightMetadata* metadata) {
   uint64_t header_bytes = 0;
   source.ReadAt(0, kLengthBytes, &header_bytes);
   if (header_bytes > kMaxHeaderBytes || header_bytes > source.size() - kLengthBytes) {
-    throw source.Refusal("its header claims " + std::to_string(header_bytes) +
-                         " bytes, more than the file or the format allows");
+    throw source.Refusal("its header claims {} bytes, more than the file or the format allows",
+                         header_bytes);
   }
   std::vector<Entry> entries;
   {
@@ -215,7 +225,7 @@ WeightMap ReadSafetensors(const ByteSource& source, WeightMetadata* metadata) {
   WeightMap weights;
   for (Entry& entry : entries) {
     const auto [at, fresh] = weights.try_emplace(entry.name);
-    if (!fresh) throw source.Refusal(QuotedName(entry.name) + " is there twice");
+    if (!fresh) throw source.Refusal("{} is there twice", QuotedName(entry.name));
     const auto count = static_cast<uint64_t>(CheckedElementCount(source, entry.name, *entry.shape));
     at->second.values = ReadElements(source, data_begin + entry.offsets[0], *entry.type, count);
     at->second.shape = std::move(*entry.shape);
@@ -244,8 +254,8 @@ std::string SerializeSafetensors(const WeightMap& weights,
     const MemorySource place({}, "weights to write");
     const auto count = static_cast<uint64_t>(CheckedElementCount(place, name, array.shape));
     if (count != array.values.size()) {
-      throw place.Refusal(QuotedName(name) + " has " + std::to_string(array.values.size()) +
-                          " values, its shape says " + std::to_string(count));
+      throw place.Refusal(
+          "{} has {} values, its shape says {}", QuotedName(name), array.values.size(), count);
     }
     const uint64_t size = half(name) ? sizeof(uint16_t) : sizeof(float);
     header[name] = {{"dtype", half(name) ? "F16" : "F32"},

@@ -25,12 +25,12 @@ constexpr size_t kMaxVisits = 100'000;  // a graph that shares modules can have 
 // Last element that a view touches plus one, relative to its first; 0 when it is empty, and more
 // than 2^62 when it does not fit.
 int64_t SpanOf(const PickleTensor& tensor) {
-  constexpr __int128 kMost = __int128{1} << 62;
+  constexpr __int128 kMaxSpan = __int128{1} << 62;
   __int128 last = 0;
   for (size_t i = 0; i < tensor.shape.size(); ++i) {
     if (tensor.shape[i] == 0) return 0;
     last += static_cast<__int128>(tensor.shape[i] - 1) * tensor.strides[i];
-    if (last >= kMost) return static_cast<int64_t>(kMost);
+    if (last >= kMaxSpan) return static_cast<int64_t>(kMaxSpan);
   }
   return static_cast<int64_t>(last) + 1;
 }
@@ -74,8 +74,8 @@ class ArchiveReader {
     }
     const ZipRecord& pickle = *FindStored(directory_, stem_ + "data.pkl", source);
     if (pickle.size > kMaxPickleBytes) {
-      throw source.Refusal("its data.pkl has " + std::to_string(pickle.size) +
-                           " bytes, far more than a state dict needs");
+      throw source.Refusal("its data.pkl has {} bytes, far more than a state dict needs",
+                           pickle.size);
     }
     pickle_ = source.ReadString(pickle.offset, pickle.size);
     graph_ = ReadPickle(pickle_, source, is_script_);
@@ -160,7 +160,7 @@ class ArchiveReader {
   void AddTensor(const std::string& name, const PickleValue& value) {
     Spend(kSpareForName + name.size() / sizeof(float));
     const auto [at, fresh] = weights_.try_emplace(name);
-    if (!fresh) throw source_.Refusal(QuotedName(name) + " is there twice");
+    if (!fresh) throw source_.Refusal("{} is there twice", QuotedName(name));
     const PickleTensor& tensor = graph_.tensors[static_cast<size_t>(value.number)];
     const PickleStorage& storage = graph_.storages[tensor.storage];
     at->second.values = ReadTensor(name, tensor, storage);
@@ -173,16 +173,16 @@ class ArchiveReader {
     const ZipRecord* record =
         FindStored(directory_, stem_ + "data/" + std::string(storage.key), source_);
     if (!record) {
-      throw source_.Refusal("the data of " + QuotedName(name) + " (record " +
-                            QuotedName(storage.key) + ") are missing");
+      throw source_.Refusal(
+          "the data of {} (record {}) are missing", QuotedName(name), QuotedName(storage.key));
     }
     const auto bytes = static_cast<uint64_t>(ElementBytes(storage.type));
     const uint64_t there = std::min(static_cast<uint64_t>(storage.count), record->size / bytes);
     const int64_t count = CheckedElementCount(source_, name, tensor.shape);
     const auto span = static_cast<uint64_t>(SpanOf(tensor));
     if (span > there || static_cast<uint64_t>(tensor.offset) > there - span) {
-      throw source_.Refusal(QuotedName(name) + " reaches beyond the " + std::to_string(there) +
-                            " elements of its storage");
+      throw source_.Refusal(
+          "{} reaches beyond the {} elements of its storage", QuotedName(name), there);
     }
     const bool contiguous = IsContiguous(tensor);
     Spend(static_cast<uint64_t>(count) + (contiguous ? 0 : span));

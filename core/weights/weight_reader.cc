@@ -1,5 +1,7 @@
 #include "core/weights/weight_reader.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <bit>
 #include <utility>
@@ -15,7 +17,7 @@ constexpr size_t kNamesShown = 10;
 template <typename Names>
 std::string Section(const char* title, const Names& names) {
   if (names.empty()) return "";
-  std::string text = "; " + std::to_string(names.size()) + " " + title + ":";
+  std::string text = fmt::format("; {} {}:", names.size(), title);
   size_t shown = 0;
   for (const std::string& name : names) {
     if (shown++ == kNamesShown) return text + ", ...";
@@ -37,7 +39,7 @@ bool AllFinite(const std::vector<float>& values) {
 
 std::string ShapeText(const std::vector<int64_t>& shape) {
   std::string text = "[";
-  for (size_t i = 0; i < shape.size(); ++i) text += (i ? "," : "") + std::to_string(shape[i]);
+  for (size_t i = 0; i < shape.size(); ++i) text += fmt::format("{}{}", i ? "," : "", shape[i]);
   return text + "]";
 }
 
@@ -102,11 +104,13 @@ void WeightReader::Report(bool complete) const {
       unexpected.push_back(QuotedName(name) + " " + ShapeText(array.shape));
     }
   }
-  throw InvalidArgument(what_ + " do not fit the network" + Section("missing", missing_) +
-                        Section("of another shape", misshapen_) +
-                        Section("unexpected", unexpected) +
-                        Section("with values that are not finite", not_finite_) +
-                        (complete ? "" : "; and it has too few values for the rest"));
+  throw InvalidArgument("{} do not fit the network{}{}{}{}{}",
+                        what_,
+                        Section("missing", missing_),
+                        Section("of another shape", misshapen_),
+                        Section("unexpected", unexpected),
+                        Section("with values that are not finite", not_finite_),
+                        complete ? "" : "; and it has too few values for the rest");
 }
 
 }  // namespace color3d

@@ -113,11 +113,11 @@ uint64_t ReadListed(const ByteSource& source, std::string_view bytes, Listed& li
   listed.name = bytes.substr(kCentralBytes, name_bytes);
   // A folder's own record ends in '/'.
   if (!IsSafeRelativePath(listed.name.substr(0, listed.name.find_last_not_of('/') + 1))) {
-    throw source.Refusal("the record name " + QuotedName(listed.name) +
-                         " is not a plain relative path");
+    throw source.Refusal("the record name {} is not a plain relative path",
+                         QuotedName(listed.name));
   }
   if (Field<uint16_t>(bytes, 8) & 1) {
-    throw source.Refusal("the record " + QuotedName(listed.name) + " is encrypted");
+    throw source.Refusal("the record {} is encrypted", QuotedName(listed.name));
   }
   uint64_t size = Field<uint32_t>(bytes, 24), stored_size = Field<uint32_t>(bytes, 20);
   listed.local_offset = Field<uint32_t>(bytes, 42);
@@ -130,7 +130,7 @@ uint64_t ReadListed(const ByteSource& source, std::string_view bytes, Listed& li
   }
   listed.compressed = Field<uint16_t>(bytes, 10) != 0;
   if (!listed.compressed && stored_size != size) {
-    throw source.Refusal("the record " + QuotedName(listed.name) + " has two sizes");
+    throw source.Refusal("the record {} has two sizes", QuotedName(listed.name));
   }
   listed.size = stored_size;
   return length;
@@ -142,14 +142,14 @@ ZipRecord Locate(const ByteSource& source, const Listed& listed) {
   const uint64_t name_bytes = Field<uint16_t>(local, 26);
   if (Field<uint32_t>(local, 0) != kLocalSignature || name_bytes != listed.name.size() ||
       source.ReadString(listed.local_offset + kLocalBytes, name_bytes) != listed.name) {
-    throw source.Refusal("the record " + QuotedName(listed.name) +
-                         " is not where the zip directory says");
+    throw source.Refusal("the record {} is not where the zip directory says",
+                         QuotedName(listed.name));
   }
   const uint64_t offset =
       listed.local_offset + kLocalBytes + name_bytes + Field<uint16_t>(local, 28);
   if (offset > source.size() || listed.size > source.size() - offset) {
-    throw source.Refusal("the record " + QuotedName(listed.name) + " of " +
-                         std::to_string(listed.size) + " bytes is not inside the file");
+    throw source.Refusal(
+        "the record {} of {} bytes is not inside the file", QuotedName(listed.name), listed.size);
   }
   return {offset, listed.size, listed.compressed};
 }
@@ -170,7 +170,7 @@ ZipDirectory ReadZipDirectory(const ByteSource& source) {
     rest.remove_prefix(ReadListed(source, rest, listed));
     const ZipRecord record = Locate(source, listed);
     if (!directory.emplace(listed.name, record).second) {
-      throw source.Refusal("the record " + QuotedName(listed.name) + " is there twice");
+      throw source.Refusal("the record {} is there twice", QuotedName(listed.name));
     }
     ranges.emplace_back(listed.local_offset, record.offset + record.size);
   }
@@ -190,9 +190,10 @@ const ZipRecord* FindStored(const ZipDirectory& directory,
   const auto found = directory.find(name);
   if (found == directory.end()) return nullptr;
   if (found->second.compressed) {
-    throw source.Refusal("the record " + QuotedName(name) +
-                         " is compressed, which PyTorch never does; pack the archive again with "
-                         "stored records (zip -0)");
+    throw source.Refusal(
+        "the record {} is compressed, which PyTorch never does; pack the archive again with stored "
+        "records (zip -0)",
+        QuotedName(name));
   }
   return &found->second;
 }

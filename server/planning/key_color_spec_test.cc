@@ -139,7 +139,11 @@ TEST(SpecNames, UnknownNamesAreRefusedWithThoseThatThereAre) {
 TEST(SpecNames, CacheKeysTellWhichFilesTheyDependOn) {
   const NewGraph graph = PlanJob(SpecWithNames(), {}, {.photos = 20, .has_poses = true});
   std::map<std::string, StageKeyPart> parts;
-  for (const NewJob& job : graph.jobs) parts[job.kind] = KeyPartOf(job.spec);
+  for (const NewJob& job : graph.jobs) {
+    v1::JobSpec stage;
+    ASSERT_TRUE(stage.ParseFromString(job.spec));
+    parts[job.kind] = KeyPartOf(stage);
+  }
   EXPECT_THAT(parts["select_key_view"].models, ElementsAre("clip"));
   EXPECT_THAT(parts["personalize"].models, ElementsAre("tiny"));
   EXPECT_THAT(parts["colorize_views"].models, ElementsAre("tiny"));

@@ -450,13 +450,8 @@ NewGraph PlanJob(const v1::JobSpec& spec,
   return spec.has_colorize_scene() ? builder.BuildColorizeScene() : builder.BuildStage();
 }
 
-StageKeyPart KeyPartOf(const std::string& serialized_spec) {
-  v1::JobSpec spec;
-  if (!spec.ParseFromString(serialized_spec)) {
-    throw Error(ErrorCode::kDataLoss, "the stored spec of the job cannot be read");
-  }
+StageKeyPart KeyPartOf(v1::JobSpec spec) {
   StageKeyPart part;
-  part.skip_cache = spec.skip_cache();
   if (spec.has_colorize_scene() || spec.has_personalize_scenes()) return part;
   const std::string kind = KindOf(spec);
   // Where the work happens is no part of what it is: equal scenes give equal results.

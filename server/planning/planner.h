@@ -20,15 +20,14 @@ NewGraph PlanJob(const v1::JobSpec& spec,
 
 // What the options, the seed and the kind contribute to the stage cache's key: equal bytes, equal
 // work. Empty when the job must not be served from the cache or found in it (the report of a
-// graph). Throws Error{kDataLoss} when the bytes are no JobSpec.
+// graph).
 struct StageKeyPart {
   std::string bytes;
-  bool skip_cache = false;  // do not look it up, but let later jobs find the result
   // What the bytes name without saying what it is: the caller adds the files' digests and the
   // backends' addresses, so that other weights under an old name are other work.
   std::vector<std::string> models;
   std::vector<std::string> backends;
 };
-StageKeyPart KeyPartOf(const std::string& serialized_spec);
+StageKeyPart KeyPartOf(v1::JobSpec spec);
 
 }  // namespace color3d

@@ -8,7 +8,7 @@
 namespace color3d {
 namespace {
 
-// Measured at 500 px on two cores (README, "Performance").
+// Measured at 500 px on two cores (tests/bench/RESULTS.md "Scenes end to end").
 constexpr double kBaseSeconds = 6.0;
 constexpr double kSecondsPerPhoto = 1.7;  // carries into and colours one view, renders, evaluates
 constexpr double kPosesSecondsPerPhoto = 0.6;    // structure-from-motion

@@ -144,7 +144,9 @@ void Attempt::Prepare() {
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
   run_.project = job_.parent.empty() ? job_.name : job_.parent;
-  run_.spec = job_.spec;
+  if (!run_.spec.ParseFromString(job_.spec)) {
+    throw Error(ErrorCode::kDataLoss, "the stored spec of {} is damaged", job_.name);
+  }
   run_.threads = context_.threads;
   run_.attempt = job_.attempt;
   run_.models = context_.models;
@@ -170,15 +172,14 @@ void Attempt::Prepare() {
     }
   }
   for (const JobRecord& child : context_.store.ListChildren(job_.name)) {
-    run_.graph.push_back({child.kind,
-                          JobStateName(child.state),
-                          child.skip_reason,
-                          child.progress.seconds,
-                          child.cached,
-                          child.peak_memory_bytes,
-                          child.warnings});
+    run_.graph.push_back({.kind = child.kind,
+                          .state = JobStateName(child.state),
+                          .skip_reason = child.skip_reason,
+                          .seconds = child.progress.seconds,
+                          .peak_memory_bytes = child.peak_memory_bytes,
+                          .warnings = child.warnings});
   }
-  const StageKeyPart part = KeyPartOf(job_.spec);
+  const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;
   std::string material = context_.code_version + '\n' + Sha256Hex(manifest) + '\n';
@@ -231,7 +232,7 @@ void Attempt::RequireModelsUnchanged() const {
 }
 
 bool Attempt::ServeFromCache() {
-  if (KeyPartOf(job_.spec).skip_cache) return false;
+  if (run_.spec.skip_cache()) return false;
   const std::optional<JobRecord> earlier = context_.store.FindStage(stage_key_);
   if (!earlier) return false;
   for (const ArtifactRecord& artifact : earlier->artifacts) {

@@ -9,8 +9,7 @@ using Precision = ColorizerOptions::Precision;
 
 TEST(ColorizerOptionsFromTest, UnsetFieldsKeepTheMethodsDefaults) {
   const ColorizerOptions defaults;
-  const ColorizerOptions options = ColorizerOptionsFrom(v1::PersonalizeSpec(), 3, 17);
-  EXPECT_EQ(options.threads, 3);
+  const ColorizerOptions options = ColorizerOptionsFrom(v1::PersonalizeSpec(), 17);
   EXPECT_EQ(options.seed, 17u);
   EXPECT_EQ(options.precision, Precision::kAuto);
   EXPECT_EQ(options.average_decay, defaults.average_decay);
@@ -23,14 +22,14 @@ TEST(ColorizerOptionsFromTest, WhatIsSetArrives) {
   spec.set_precision(v1::PersonalizeSpec::PRECISION_FLOAT32);
   spec.set_average_decay(0.0);
   spec.set_least_improvement(0.02);
-  ColorizerOptions options = ColorizerOptionsFrom(spec, 1, 1);
+  ColorizerOptions options = ColorizerOptionsFrom(spec, 1);
   EXPECT_EQ(options.precision, Precision::kFloat32);
   EXPECT_EQ(options.average_decay, 0.0);
   EXPECT_EQ(options.least_improvement, 0.02);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_BFLOAT16);
-  EXPECT_EQ(ColorizerOptionsFrom(spec, 1, 1).precision, Precision::kBfloat16);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kBfloat16);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_AUTO);
-  EXPECT_EQ(ColorizerOptionsFrom(spec, 1, 1).precision, Precision::kAuto);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kAuto);
 }
 
 // What the server lets through, the method takes.
@@ -38,7 +37,7 @@ TEST(ColorizerOptionsFromTest, EndsOfTheDocumentedRangesAreValid) {
   v1::PersonalizeSpec spec;
   spec.set_average_decay(0.9999);
   spec.set_least_improvement(0.5);
-  EXPECT_NO_THROW(ColorizerOptionsFrom(spec, 1, 1).Validate());
+  EXPECT_NO_THROW(ColorizerOptionsFrom(spec, 1).Validate());
 }
 
 }  // namespace

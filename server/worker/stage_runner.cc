@@ -2,12 +2,13 @@
 
 #include <mutex>
 
-#include "color3d/v1/job.pb.h"
+#include "core/catalogue/stages.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/report/curves.h"
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 #include "server/backends/grpc_colorizer.h"
+#include "server/planning/spec_check.h"
 #include "server/worker/stage_options.h"
 
 namespace color3d {
@@ -110,15 +111,6 @@ void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext
   RunEvaluate(options, context);
 }
 
-void RunRootReport(const std::vector<JobSummary>& graph, StageContext& context) {
-  std::vector<StageSummary> stages;
-  for (const JobSummary& job : graph) {
-    stages.push_back(
-        {job.kind, job.state, job.skip_reason, job.seconds, job.peak_memory_bytes, job.warnings});
-  }
-  RunReport(stages, context);
-}
-
 class CoreStageRunner : public StageRunner {
  public:
   StageOutput Run(const StageRun& run,
@@ -126,14 +118,7 @@ class CoreStageRunner : public StageRunner {
                   CheckpointStore& checkpoints,
                   ProgressObserver& progress,
                   const CancellationToken& cancel) override {
-    JobSpec spec;
-    if (!spec.ParseFromString(run.spec)) {
-      throw Error(ErrorCode::kDataLoss, "the stored spec of " + run.job_name + " is damaged");
-    }
-    const std::string kind =
-        spec.stage_case() == JobSpec::STAGE_NOT_SET
-            ? std::string()
-            : JobSpec::descriptor()->FindFieldByNumber(spec.stage_case())->name();
+    const std::string kind = KindOf(run.spec);
     CurveRecorder recorder(kind, progress, checkpoints);
     StageContext::Setup setup;
     setup.scene_folder = run.scene_folder;
@@ -141,7 +126,7 @@ class CoreStageRunner : public StageRunner {
     setup.output_folder = run.output_folder;
     setup.scratch_folder = run.scratch_folder;
     setup.threads = run.threads;
-    setup.seed = spec.seed() == 0 ? 1 : spec.seed();
+    setup.seed = run.spec.seed() == 0 ? 1 : run.spec.seed();
     setup.cache_folder = run.cache_folder;
     setup.models = run.models.files;
     setup.remote_colorizers = [&run](const std::string& name) {
@@ -151,9 +136,9 @@ class CoreStageRunner : public StageRunner {
     setup.batch = Batch(run.threads);
     setup.project = run.project;
     StageContext context(std::move(setup), recorder, recorder, cancel);
-    RunStage(spec, kind, run, blobs, context);
+    RunStage(run, blobs, context);
     const auto points = recorder.points();
-    if (!points.empty() && kind != "colorize_scene") {
+    if (!points.empty() && kind != kind::kColorizeScene) {
       context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(points));
     }
     return {context.outputs(), context.passed_on()};
@@ -167,11 +152,8 @@ class CoreStageRunner : public StageRunner {
     return batch_.get();
   }
 
-  static void RunStage(const JobSpec& spec,
-                       const std::string& kind,
-                       const StageRun& run,
-                       BlobSource& blobs,
-                       StageContext& context) {
+  static void RunStage(const StageRun& run, BlobSource& blobs, StageContext& context) {
+    const JobSpec& spec = run.spec;
     switch (spec.stage_case()) {
       case JobSpec::kImportScene:
         return RunImportScene(ImportOptionsFrom(spec.import_scene(), run.threads), context);
@@ -183,7 +165,7 @@ class CoreStageRunner : public StageRunner {
         return RunGenerateAugmentations(AugmentationOptionsFrom(spec.generate_augmentations()),
                                         context);
       case JobSpec::kPersonalize:
-        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()),
+        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), context.seed()),
                               context,
                               spec.personalize().encoder());
       case JobSpec::kCarryColor:
@@ -210,11 +192,12 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kEvaluate:
         return RunEvaluation(spec.evaluate(), blobs, context);
       case JobSpec::kColorizeScene:
-        return RunRootReport(run.graph, context);
+        return RunReport(run.graph, context);
       case JobSpec::kPersonalizeScenes:
         return;  // its jobs have done it all
       default:
-        throw Error(ErrorCode::kUnimplemented, "jobs of kind \"" + kind + "\" are not built yet");
+        throw Error(
+            ErrorCode::kUnimplemented, "jobs of kind \"{}\" are not built yet", KindOf(spec));
     }
   }
 

@@ -9,22 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "color3d/v1/job.pb.h"
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
+#include "core/catalogue/stage_summary.h"
 #include "server/store/user_models.h"
 
 namespace color3d {
-
-// What the report tells of the other jobs of a ColorizeScene graph.
-struct JobSummary {
-  std::string kind;
-  std::string state;        // "SUCCEEDED", "SKIPPED", ...
-  std::string skip_reason;  // why the plan left it out
-  double seconds = 0.0;     // of computing, over all attempts (of the original run when cached)
-  bool cached = false;
-  int64_t peak_memory_bytes = 0;
-  std::vector<std::string> warnings;
-};
 
 // Files by digest, for blobs that a spec names (key colour, truth).
 class BlobSource {
@@ -35,16 +26,16 @@ class BlobSource {
 };
 
 struct StageRun {
-  std::string job_name;                // "jobs/..."
-  std::string project;                 // the submitted job: what fairness is between
-  std::string spec;                    // serialised color3d.v1.JobSpec
+  std::string job_name;  // "jobs/..."
+  std::string project;   // the submitted job: what fairness is between
+  v1::JobSpec spec;
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
   // Artifacts of the jobs that this one depends on, by artifact name (read-only files).
   std::map<std::string, std::filesystem::path> inputs;
   std::filesystem::path output_folder;   // empty; what the runner leaves here may be published
   std::filesystem::path scratch_folder;  // empty; deleted afterwards
   std::filesystem::path cache_folder;    // shared by all jobs of the server; empty: none
-  std::vector<JobSummary> graph;         // the root job only: its children
+  std::vector<StageSummary> graph;       // the root job only: its children
   int threads = 1;
   int attempt = 1;
   UserModels models;
@@ -59,16 +50,13 @@ class StageRunner {
  public:
   virtual ~StageRunner() = default;
   // Runs one attempt. Throws Error; anything else that escapes is an internal error of ours. Called
-  // from several threads at once for jobs of kRunsInCompany.
+  // from several threads at once for jobs of stages that run in batch.
   virtual StageOutput Run(const StageRun& run,
                           BlobSource& blobs,
                           CheckpointStore& checkpoints,
                           ProgressObserver& progress,
                           const CancellationToken& cancel) = 0;
 };
-
-// Many jobs of this kind run in one worker at once, sharing an encoder and taking turns.
-inline constexpr char kRunsInCompany[] = "personalize";
 
 // The real one (stage_runner.cc): every stage of core/stage.
 std::unique_ptr<StageRunner> MakeStageRunner();

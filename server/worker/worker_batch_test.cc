@@ -12,6 +12,8 @@
 
 #include "color3d/v1/job.pb.h"
 #include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
 #include "server/storage/data_folder.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/worker/worker_loop.h"
@@ -29,8 +31,6 @@ class MeetingRunner : public StageRunner {
                   CheckpointStore& checkpoints,
                   ProgressObserver& progress,
                   const CancellationToken& cancel) override {
-    v1::JobSpec spec;
-    spec.ParseFromString(run.spec);
     std::unique_lock lock(mutex_);
     ++running_;
     most_ = std::max(most_, running_);
@@ -38,7 +38,7 @@ class MeetingRunner : public StageRunner {
     met_.notify_all();
     met_.wait_for(lock, std::chrono::seconds(3), [&] { return running_ >= wanted; });
     lock.unlock();
-    if (spec.seed() == kPoison) {
+    if (run.spec.seed() == kPoison) {
       lock.lock();
       --running_;
       throw InvalidArgument("poisoned");
@@ -46,10 +46,10 @@ class MeetingRunner : public StageRunner {
     checkpoints.Save("half way of " + run.job_name);
     progress.OnProgress(1, 1, "done");
     cancel.ThrowIfCancelled();
-    WriteFileAtomic(run.output_folder / "colorizer.c3c", "of " + run.job_name);
+    WriteFileAtomic(run.output_folder / artifact::kColorizer, "of " + run.job_name);
     lock.lock();
     --running_;
-    return {{"colorizer.c3c"}, {}};
+    return {{artifact::kColorizer}, {}};
   }
 
   int wanted = 3;
@@ -88,7 +88,7 @@ class WorkerBatchTest : public testing::Test {
     NewGraph graph;
     graph.scene = "scenes/test";
     NewJob root;
-    root.kind = "personalize_scenes";
+    root.kind = kind::kPersonalizeScenes;
     v1::JobSpec spec;
     spec.mutable_personalize_scenes();
     root.spec = spec.SerializeAsString();
@@ -96,7 +96,7 @@ class WorkerBatchTest : public testing::Test {
       spec.set_seed(seed);
       spec.mutable_personalize()->set_encoder(encoder);
       NewJob job;
-      job.kind = kRunsInCompany;
+      job.kind = kind::kPersonalize;
       job.spec = spec.SerializeAsString();
       root.inputs.push_back(static_cast<int>(graph.jobs.size()));
       graph.jobs.push_back(job);

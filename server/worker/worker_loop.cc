@@ -7,6 +7,7 @@
 
 #include "color3d/v1/job.pb.h"
 #include "core/base/memory.h"
+#include "core/catalogue/stages.h"
 #include "server/ops/process.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/worker/attempt.h"
@@ -92,8 +93,9 @@ bool WorkerLoop::Turn() {
   const std::optional<JobRecord> job = store_.Claim(id_, options_.timing.lease.count());
   if (!job) return false;
   ReportSelf(store_, job->name);
-  // A job that a worker was lost with may be what killed it: it gets no company.
-  if (job->kind == kRunsInCompany && options_.batch_scenes > 1 && job->attempt <= 1) {
+  const Stage* stage = FindStage(job->kind);
+  // A job that a worker was lost with may be what killed it: it runs alone.
+  if (stage != nullptr && stage->runs_in_batch && options_.batch_scenes > 1 && job->attempt <= 1) {
     RunBatch(*job);
   } else {
     RunAttempt(context_, *job);

@@ -130,6 +130,7 @@ void ServeInference(const WorkerArguments& arguments, const WorkerProgram& progr
 int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
   WorkerArguments arguments;
   CLI::App app("Runs the jobs of a color3d server; started by 'color3d-server serve'.");
+  app.set_version_flag("--version", COLOR3D_VERSION);
   AddFlags(&app, &arguments);
   CLI11_PARSE(app, argc, argv);
   HandleStopSignals();

@@ -1,4 +1,5 @@
 // color3d-bench golden: a published network against outputs that its authors' code wrote.
+#include <fmt/core.h>
 #include <torch/types.h>
 
 #include <algorithm>
@@ -13,7 +14,8 @@
 #include "core/base/error.h"
 #include "core/encoder/clip/clip.h"
 #include "core/encoder/clip/clip_weights.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
+#include "core/encoder/image_tensors.h"
 #include "core/keycolor/automatic/ddcolor.h"
 #include "core/weights/weight_file.h"
 #include "tests/bench/commands.h"
@@ -40,7 +42,7 @@ class Comparison {
   const WeightArray& Expected(const std::string& name) const {
     const auto found = expected_.find(name);
     if (found == expected_.end()) {
-      throw InvalidArgument("the expected file has no \"" + name + "\"");
+      throw InvalidArgument("the expected file has no \"{}\"", name);
     }
     return found->second;
   }
@@ -87,8 +89,8 @@ void CompareDdcolor(WeightMap weights, Comparison& comparison) {
   const std::vector<torch::Tensor> stages = network.encoder().StageOutputs(normalised, 4);
   const std::vector<torch::Tensor> taps = network.encoder().Taps(normalised);
   for (int i = 0; i < 4; ++i) {
-    comparison.Add("stage" + std::to_string(i), ValuesOf(stages[i]));
-    comparison.Add("norm" + std::to_string(i), ValuesOf(taps[i]));
+    comparison.Add(fmt::format("stage{}", i), ValuesOf(stages[i]));
+    comparison.Add(fmt::format("norm{}", i), ValuesOf(taps[i]));
   }
   comparison.Add("ab", network.Predict(input).data);
 }
@@ -167,7 +169,7 @@ int RunGolden(const GoldenArguments& args) {
     network = "CLIP";
     skipped = CompareClip(std::move(weights), args, metadata, comparison);
   } else {
-    throw InvalidArgument(args.weights_file + " holds neither a DDColor nor a CLIP");
+    throw InvalidArgument("{} holds neither a DDColor nor a CLIP", args.weights_file);
   }
   nlohmann::ordered_json result{{"network", network}, {"tolerance", args.tolerance}};
   double worst = 0.0;

@@ -78,7 +78,6 @@ void RunPipeline(const PipelineArguments& args) {
     });
   }
   ColorizerOptions colorizer = args.colorizer;
-  colorizer.threads = args.threads;
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
   pipeline.Run("personalize", [&](StageContext& c) { RunPersonalize(colorizer, c); });
   pipeline.Run("colorize_views", [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });

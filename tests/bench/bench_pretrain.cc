@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/weights/safetensors.h"
 #include "tests/bench/commands.h"
@@ -52,9 +52,9 @@ nlohmann::ordered_json Validate(const PretrainArguments& args, const WeightMap& 
   const AutomaticScore mean = MeanScore(scores);
   return {{"photos", scores.size()},
           {"delta_e00", mean.delta_e00},
-          {"delta_e00_grey", mean.delta_e00_grey},
-          {"colourfulness", mean.colourfulness},
-          {"colourfulness_truth", mean.true_colourfulness}};
+          {"delta_e00_gray", mean.delta_e00_gray},
+          {"colorfulness", mean.colorfulness},
+          {"colorfulness_truth", mean.true_colorfulness}};
 }
 
 void RunPretrain(const PretrainArguments& args) {

@@ -1,5 +1,6 @@
 // color3d-bench weights: how long a weight file takes to load and how much memory at its peak, for
 // a file that the user has or for synthetic ones of DDColor-tiny's size in every format.
+#include <fmt/core.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -63,7 +64,7 @@ LoadFigures MeasureLoad(const std::filesystem::path& path) {
   const bool received = read(ends[0], &figures, sizeof(figures)) == sizeof(figures);
   close(ends[0]);
   waitpid(child, nullptr, 0);
-  if (!received) throw InvalidArgument("the weight file " + path.string() + " was not loaded");
+  if (!received) throw InvalidArgument("the weight file {} was not loaded", path.string());
   return figures;
 }
 
@@ -91,7 +92,7 @@ WeightMap DdcolorSizedWeights() {
   for (int i = 0; i < kArrays; ++i) {
     const int64_t size =
         i + 1 == kArrays ? left : kSmall[static_cast<size_t>(i) % std::size(kSmall)];
-    WeightArray& array = weights["decoder.layers." + std::to_string(i) + ".weight"];
+    WeightArray& array = weights[fmt::format("decoder.layers.{}.weight", i)];
     array.shape = {size};
     array.values.resize(static_cast<size_t>(size));
     for (float& value : array.values) value = static_cast<float>(random.NextUniform(-1.0, 1.0));

@@ -1,6 +1,8 @@
 // Runs a fuzz target without libFuzzer: on its seeds, on every prefix of them, and on seeded
 // mutations. The same inputs on every run. With a folder as argument it writes the seeds there
 // instead, for libFuzzer to start from; with files as arguments it replays those.
+#include <fmt/core.h>
+
 #include <filesystem>
 #include <string>
 
@@ -95,7 +97,7 @@ int main(int argc, char** argv) {
       continue;
     }
     for (size_t j = 0; j < seeds.size(); ++j) {
-      color3d::WriteFileAtomic(path / ("seed" + std::to_string(j)), seeds[j]);
+      color3d::WriteFileAtomic(path / fmt::format("seed{}", j), seeds[j]);
     }
   }
   return 0;

@@ -81,9 +81,9 @@ void ExpectMetrics(const json& metrics) {
                               "delta_e00",
                               "delta_e00_chroma",
                               "delta_e00_chroma_2d",
-                              "delta_e00_grey",
-                              "colourfulness",
-                              "colourfulness_truth",
+                              "delta_e00_gray",
+                              "colorfulness",
+                              "colorfulness_truth",
                               "gaussians",
                               "seconds_total"};
   for (const char* stage : {"import_scene",
@@ -105,10 +105,10 @@ void ExpectMetrics(const json& metrics) {
   }
   // Far below what it reaches with time, far above what a fault leaves.
   EXPECT_GT(metrics["psnr_l"].get<double>(), 17.0);
-  EXPECT_LT(metrics["delta_e00_chroma_2d"].get<double>(), metrics["delta_e00_grey"].get<double>());
-  EXPECT_LT(metrics["delta_e00_chroma"].get<double>(), metrics["delta_e00_grey"].get<double>());
+  EXPECT_LT(metrics["delta_e00_chroma_2d"].get<double>(), metrics["delta_e00_gray"].get<double>());
+  EXPECT_LT(metrics["delta_e00_chroma"].get<double>(), metrics["delta_e00_gray"].get<double>());
   EXPECT_GT(metrics["gaussians"].get<double>(), 500.0);
-  EXPECT_GT(metrics["colourfulness"].get<double>(), 5.0);
+  EXPECT_GT(metrics["colorfulness"].get<double>(), 5.0);
 }
 
 std::string KeyView(const fs::path& out) {
@@ -137,7 +137,7 @@ TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecon
   ExpectResults(Path("first"), 2);
   const json metrics = json::parse(ReadFile(Path("first") / "metrics.json"));
   ExpectMetrics(metrics);
-  EXPECT_LT(metrics.at("delta_e00_chroma_bound"), metrics.at("delta_e00_grey"));
+  EXPECT_LT(metrics.at("delta_e00_chroma_bound"), metrics.at("delta_e00_gray"));
   for (const char* name : {"me", "me_2d", "me_truth", "tc", "tc_2d", "tc_truth"}) {
     EXPECT_GT(metrics.value(name, 0.0), 0.0) << name;
   }

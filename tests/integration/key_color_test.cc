@@ -92,7 +92,7 @@ json KeyColorTest::Facts(const v1::Job& job) {
 }
 
 Image KeyColorTest::Coloured(const v1::Job& job) {
-  return ReadImage(Download(job) / "key_view_coloured.png");
+  return ReadImage(Download(job) / "key_view_colored.png");
 }
 
 TEST_F(KeyColorTest, ABackendColoursTheKeyViewAndItsFactsAreTold) {
@@ -168,7 +168,7 @@ TEST_F(KeyColorTest, AutoNeedsNothingOfTheUser) {
   const json facts = json::parse(ReadFile(Path("out") / "key_color.json"));
   EXPECT_EQ(facts.at("source"), "automatic");
   EXPECT_NE(facts.at("description"), "");
-  EXPECT_FALSE(IsGray(ReadImage(Path("out") / "key_view_coloured.png")));
+  EXPECT_FALSE(IsGray(ReadImage(Path("out") / "key_view_colored.png")));
   ASSERT_FALSE(ListFiles(Path("out") / "renders").empty());
   EXPECT_TRUE(fs::is_regular_file(Path("out") / "scene.ply"));
 }
@@ -199,7 +199,7 @@ TEST_F(KeyColorTest, AnEditChangesColourInsideItsMaskOnly) {
                                        Path("key").string()});
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
   const Image before = LabFromSrgb(photo);
-  const Image after = LabFromSrgb(ReadImage(Path("key") / "key_view_coloured.png"));
+  const Image after = LabFromSrgb(ReadImage(Path("key") / "key_view_colored.png"));
   double inside = 0.0, outside = 0.0;
   for (int y = 0; y < photo.height; ++y) {
     for (int x = 0; x < photo.width; ++x) {

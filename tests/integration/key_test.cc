@@ -48,7 +48,7 @@ TEST_F(KeyTest, SelectColourLookAcceptAndColourTheSceneWithoutDoingItAgain) {
   fs::copy_file(Path("room") / "truth" / view, painted);
   const json coloured = Ask({"key", "colour", scene, "--image", painted.string(), "-o", out});
   EXPECT_EQ(coloured.at("key_view"), view);
-  EXPECT_FALSE(IsGray(ReadImage(Path("key") / "key_view_coloured.png")));
+  EXPECT_FALSE(IsGray(ReadImage(Path("key") / "key_view_colored.png")));
   const json shown = Ask({"key", "show", scene});
   EXPECT_EQ(shown.at("coloured"), coloured.at("job"));
   EXPECT_TRUE(shown.at("accepted").is_null());
@@ -60,8 +60,8 @@ TEST_F(KeyTest, SelectColourLookAcceptAndColourTheSceneWithoutDoingItAgain) {
              QuickOptions());
   ASSERT_EQ(done.exit_code, 0) << done.out << done.err;
   EXPECT_TRUE(fs::is_regular_file(Path("out") / "scene.ply"));
-  EXPECT_EQ(ReadFile(Path("out") / "key_view_coloured.png"),
-            ReadFile(Path("key") / "key_view_coloured.png"));
+  EXPECT_EQ(ReadFile(Path("out") / "key_view_colored.png"),
+            ReadFile(Path("key") / "key_view_colored.png"));
   EXPECT_NE(ReadFile(Path("out") / "report.html").find("Best of "), std::string::npos);
   EXPECT_EQ(CountJobs("select_key_view"), 1);
   EXPECT_EQ(CountJobs("colorize_key_view"), 1) << "the accepted colour was computed again";

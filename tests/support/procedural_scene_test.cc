@@ -39,7 +39,7 @@ double StandardDeviation(const Image& plane) {
 TEST(ProceduralScene, PicturesHaveTextureAndColourAndAreNotClipped) {
   const ProceduralScene room(Small());
   const Image srgb = room.RenderSrgb(2);
-  EXPECT_GT(Colourfulness(srgb), 20.0);
+  EXPECT_GT(Colorfulness(srgb), 20.0);
   const Image luminance = LuminanceFromSrgb(srgb);
   EXPECT_GT(StandardDeviation(luminance), 8.0);
   size_t extreme = 0;

@@ -12,8 +12,9 @@
 #include <sstream>
 #include <thread>
 
-#include "color3d/v1/job.pb.h"
 #include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
 #include "server/planning/spec_check.h"
 #include "server/worker/worker_loop.h"
 
@@ -48,18 +49,13 @@ Script ParseScript(const std::string& text) {
   return script;
 }
 
+// What other stages ask this one for; a folder gets two files.
 std::vector<std::string> ArtifactsOf(const std::string& kind) {
-  if (kind == "import_scene") return {"scene.json"};
-  if (kind == "select_key_view") return {"key_view.json"};
-  if (kind == "colorize_key_view") return {"key_color.png"};
-  if (kind == "personalize") return {"colorizer.c3c"};
-  if (kind == "colorize_views") return {"views_ab/a.png", "views_ab/b.png"};
-  if (kind == "reconstruct_geometry") return {"geometry.c3g"};
-  if (kind == "solve_chroma") return {"model.c3g"};
-  if (kind == "export") return {"scene.ply"};
-  if (kind == "render") return {"renders/a.png"};
-  if (kind == "evaluate") return {"metrics.json"};
-  return {"report.html"};
+  const Stage& stage = StageOf(kind);
+  if (stage.leaves.empty()) return {};
+  const std::string name = stage.leaves.front();
+  if (!name.ends_with('/')) return {name};
+  return {name + "a.png", name + "b.png"};
 }
 
 // Tests count effects in shared files: a line in "<prefix>.begun" when a step begins, which repeats
@@ -99,11 +95,9 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
                                 CheckpointStore& checkpoints,
                                 ProgressObserver& progress,
                                 const CancellationToken& cancel) {
-  v1::JobSpec spec;
-  spec.ParseFromString(run.spec);
-  const std::string kind = KindOf(spec);
-  for (const FileDigest& digest : SpecBlobs(spec)) ReadFile(blobs.Fetch(digest.sha256));
-  const Script script = ParseScript(spec.select_key_view().view());
+  const std::string kind = KindOf(run.spec);
+  for (const FileDigest& digest : SpecBlobs(run.spec)) ReadFile(blobs.Fetch(digest.sha256));
+  const Script script = ParseScript(run.spec.select_key_view().view());
   Misbehave(script, checkpoints);
   // The state is one line for each step: which process did it. Each Save is fenced, so whatever is
   // killed in between, the published trace holds every step once.
@@ -126,10 +120,10 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   for (const std::string& name : output.files) {
     std::filesystem::create_directories((run.output_folder / name).parent_path());
     // No two scenes have equal colorizers.
-    const std::string own = kind == "personalize" ? run.job_name : "";
+    const std::string own = kind == kind::kPersonalize ? run.job_name : "";
     WriteFileAtomic(run.output_folder / name, kind + " " + name + own + "\n" + trace);
   }
-  if (run.inputs.count("scene.ply") > 0) output.passed_on.push_back("scene.ply");
+  if (run.inputs.contains(artifact::kPly)) output.passed_on.push_back(artifact::kPly);
   return output;
 }
 

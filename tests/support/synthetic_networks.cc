@@ -1,11 +1,13 @@
 #include "tests/support/synthetic_networks.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
 #include <string>
 #include <utility>
 
 #include "core/base/random.h"
-#include "core/encoder/random_features.h"
+#include "tests/support/random_features.h"
 
 namespace color3d {
 namespace {
@@ -101,8 +103,8 @@ void AddColorDecoder(const SyntheticDdcolor& sizes,
   make.Normal(prefix + "query_embed.weight", {sizes.queries, width}, 1.0);
   make.Normal(prefix + "level_embed.weight", {3, width}, 1.0);
   for (int i = 0; i < 3; ++i) {
-    make.Linear(prefix + "input_proj." + std::to_string(i) + ".", {width, channels[i], 1, 1});
-    make.Linear(prefix + "color_embed.layers." + std::to_string(i) + ".", {width, width});
+    make.Linear(fmt::format("{}input_proj.{}.", prefix, i), {width, channels[i], 1, 1});
+    make.Linear(fmt::format("{}color_embed.layers.{}.", prefix, i), {width, width});
   }
   const auto attention = [&](const std::string& name, const std::string& inner) {
     const WeightArray& stacked = make.Normal(
@@ -112,7 +114,7 @@ void AddColorDecoder(const SyntheticDdcolor& sizes,
     make.Norm(name + "norm.", width);
   };
   for (int i = 0; i < sizes.layers; ++i) {
-    const std::string index = std::to_string(i) + ".";
+    const std::string index = fmt::format("{}.", i);
     attention(prefix + "transformer_self_attention_layers." + index, "self_attn");
     attention(prefix + "transformer_cross_attention_layers." + index, "multihead_attn");
     const std::string feed_forward = prefix + "transformer_ffn_layers." + index;
@@ -125,7 +127,7 @@ void AddColorDecoder(const SyntheticDdcolor& sizes,
 
 void AddTower(const std::string& prefix, int64_t width, int layers, Maker& make) {
   for (int i = 0; i < layers; ++i) {
-    const std::string name = prefix + std::to_string(i) + ".";
+    const std::string name = fmt::format("{}{}.", prefix, i);
     make.Normal(name + "attn.in_proj_weight", {3 * width, width}, 1.5 / std::sqrt(double(width)));
     make.Normal(name + "attn.in_proj_bias", {3 * width}, 0.02);
     make.Linear(name + "attn.out_proj.", {width, width});
@@ -158,7 +160,7 @@ WeightMap SyntheticDdcolorWeights(const SyntheticDdcolor& sizes, uint64_t seed) 
   int64_t in = sizes.dims[3];
   std::vector<int64_t> channels;
   for (int i = 0; i < 3; ++i) {
-    const std::string name = "decoder.layers." + std::to_string(i) + ".";
+    const std::string name = fmt::format("decoder.layers.{}.", i);
     const int64_t out = i == 2 ? sizes.decoder_channels / 2 : sizes.decoder_channels;
     const int64_t skip = sizes.dims[2 - i];
     make.Spectral(name + "shuf.conv.0.", {4 * out, in, 1, 1});

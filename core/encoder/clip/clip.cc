@@ -12,7 +12,7 @@
 #include "core/color/lab.h"
 #include "core/encoder/clip/clip_network.h"
 #include "core/encoder/clip/clip_weights.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/weights/weight_file.h"
@@ -27,8 +27,8 @@ constexpr int64_t kMaxConfigBytes = 1 << 20;
 // [1,3,H,W] of a picture with 1 or 3 channels.
 torch::Tensor RgbTensor(const Image& srgb) {
   if (srgb.Empty() || (srgb.channels != 1 && srgb.channels != 3)) {
-    throw InvalidArgument("CLIP takes a picture with 1 or 3 channels, this one has " +
-                          std::to_string(srgb.channels));
+    throw InvalidArgument("CLIP takes a picture with 1 or 3 channels, this one has {}",
+                          srgb.channels);
   }
   return TensorFromImage(srgb).expand({1, 3, srgb.height, srgb.width}).contiguous();
 }
@@ -59,8 +59,8 @@ std::vector<float> Values(const torch::Tensor& tensor) {
 
 Image GrayPicture(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the encoder takes a picture with 1 channel (L), this one has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the encoder takes a picture with 1 channel (L), this one has {}",
+                          luminance.channels);
   }
   return SrgbFromLab(luminance);
 }
@@ -114,24 +114,22 @@ void ClipModel::LoadVocabulary(const std::filesystem::path& path) {
   tokenizer_ = ClipTokenizer::FromFile(path, network_->vocabulary_size());
 }
 
-std::shared_ptr<const ClipModel> ClipModel::FromWeightFile(const std::filesystem::path& path,
-                                                           const ClipOptions& options) {
+std::shared_ptr<const ClipModel> ClipModel::FromWeightFile(const std::filesystem::path& path) {
   WeightMap weights = ReadWeightFile(path);
   if (!HoldsClip(weights)) {
-    throw InvalidArgument(path.string() + " holds no CLIP with a ViT (it has " +
-                          std::to_string(weights.size()) +
-                          " arrays, none called visual.class_embedding)");
+    throw InvalidArgument(
+        "{} holds no CLIP with a ViT (it has {} arrays, none called visual.class_embedding)",
+        path.string(),
+        weights.size());
   }
-  const bool quick_gelu = options.activation == ClipOptions::Activation::kFromConfig
-                              ? QuickGeluOf(path)
-                              : options.activation == ClipOptions::Activation::kQuickGelu;
-  const auto model = std::make_shared<ClipModel>(std::move(weights), quick_gelu);
-  std::filesystem::path vocabulary = options.vocabulary;
+  const auto model = std::make_shared<ClipModel>(std::move(weights), QuickGeluOf(path));
+  if (!model->network_->HasText()) return model;
   for (const char* name : kVocabularyNames) {
-    const std::filesystem::path beside = path.parent_path() / name;
-    if (vocabulary.empty() && std::filesystem::is_regular_file(beside)) vocabulary = beside;
+    const std::filesystem::path vocabulary = path.parent_path() / name;
+    if (!std::filesystem::is_regular_file(vocabulary)) continue;
+    model->LoadVocabulary(vocabulary);
+    break;
   }
-  if (!vocabulary.empty() && model->network_->HasText()) model->LoadVocabulary(vocabulary);
   return model;
 }
 
@@ -186,9 +184,10 @@ std::vector<float> ClipModel::TextFeaturesOfTokens(const std::vector<int64_t>& t
   };
   if (tokens.empty() || tokens.size() > static_cast<size_t>(network_->context()) ||
       !std::all_of(tokens.begin(), tokens.end(), known)) {
-    throw InvalidArgument("CLIP takes 1 to " + std::to_string(network_->context()) +
-                          " tokens below " + std::to_string(network_->vocabulary_size()) +
-                          ", not these " + std::to_string(tokens.size()));
+    throw InvalidArgument("CLIP takes 1 to {} tokens below {}, not these {}",
+                          network_->context(),
+                          network_->vocabulary_size(),
+                          tokens.size());
   }
   return WithTorchErrors("CLIP", [&] {
     at::NoGradGuard no_grad;

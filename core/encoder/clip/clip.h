@@ -28,17 +28,6 @@ class TextImageModel {
   virtual std::vector<float> TextFeatures(const std::string& text) const = 0;
 };
 
-struct ClipOptions {
-  // What the feed-forward layers use cannot be told from the weights. kFromConfig reads a
-  // config.json or open_clip_config.json beside them and takes QuickGELU, OpenAI's, without one.
-  // Models of open_clip mostly have the plain GELU.
-  enum class Activation { kFromConfig, kQuickGelu, kGelu };
-  Activation activation = Activation::kFromConfig;
-  // bpe_simple_vocab_16e6.txt[.gz] or merges.txt; empty: one of these beside the weights. Without
-  // any, only pictures can be encoded.
-  std::filesystem::path vocabulary;
-};
-
 struct ClipScore {
   double cosine = 0.0;  // raw
   double score = 0.0;   // 2.5 * max(cosine, 0) (Hessel et al. 2021)
@@ -46,10 +35,13 @@ struct ClipScore {
 
 class ClipModel : public Encoder, public TextImageModel {
  public:
-  // Throws Error{kInvalidArgument} listing the weights that are missing, unexpected or misshapen,
-  // or naming what is wrong with the vocabulary.
-  static std::shared_ptr<const ClipModel> FromWeightFile(const std::filesystem::path& path,
-                                                         const ClipOptions& options = {});
+  // The vocabulary is read from beside the weights: bpe_simple_vocab_16e6.txt[.gz] or merges.txt;
+  // without one only pictures can be encoded. What the feed-forward layers use cannot be told from
+  // the weights either: config.json or open_clip_config.json beside them says it (models of
+  // open_clip mostly have the plain GELU); without one it is QuickGELU, OpenAI's. Throws
+  // Error{kInvalidArgument} listing the weights that are missing, unexpected or misshapen, or
+  // naming what is wrong with the vocabulary.
+  static std::shared_ptr<const ClipModel> FromWeightFile(const std::filesystem::path& path);
   // `weights` in OpenAI's or Hugging Face's layout.
   ClipModel(WeightMap weights, bool quick_gelu);
   ~ClipModel() override;

@@ -1,5 +1,6 @@
 #include "core/encoder/clip/clip_network.h"
 
+#include <fmt/core.h>
 #include <torch/types.h>
 
 #include <cmath>
@@ -25,8 +26,9 @@ int64_t SizeOf(const WeightReader& reader, const std::string& name, size_t dimen
 int64_t HeadsOf(int64_t width) {
   const int64_t heads = width >= kHeadChannels ? width / kHeadChannels : kHeadsOfNarrowTower;
   if (width < 1 || width % heads != 0) {
-    throw InvalidArgument("the CLIP weights have a tower of " + std::to_string(width) +
-                          " channels, which cannot be split into heads of 64");
+    throw InvalidArgument(
+        "the CLIP weights have a tower of {} channels, which cannot be split into heads of 64",
+        width);
   }
   return heads;
 }
@@ -50,7 +52,7 @@ ClipNetwork::Tower ClipNetwork::TakeTower(WeightReader& reader,
     return taken;
   };
   for (int i = 0;; ++i) {
-    const std::string name = prefix + std::to_string(i) + ".";
+    const std::string name = fmt::format("{}{}.", prefix, i);
     if (i > 0 && !reader.Has(name + "ln_1.weight")) return tower;
     const int64_t hidden = SizeOf(reader, name + "mlp.c_fc.weight", 0);
     Block block;
@@ -72,9 +74,11 @@ void ClipNetwork::TakeVision(WeightReader& reader) {
   grid_ = cells > 0 ? static_cast<int>(std::lround(std::sqrt(static_cast<double>(cells)))) : 0;
   if (patch < 1 || patch > 256 || grid_ < 1 || grid_ > 256 ||
       static_cast<int64_t>(grid_) * grid_ != cells) {
-    throw InvalidArgument("the CLIP weights describe no square picture: patches of " +
-                          std::to_string(patch) + " px (visual.conv1.weight), " +
-                          std::to_string(cells) + " positions (visual.positional_embedding)");
+    throw InvalidArgument(
+        "the CLIP weights describe no square picture: patches of {} px (visual.conv1.weight), {} "
+        "positions (visual.positional_embedding)",
+        patch,
+        cells);
   }
   patch_px_ = static_cast<int>(patch);
   patch_weight_ = TakeTensor(reader, "visual.conv1.weight", {width, 3, patch, patch});
@@ -93,8 +97,8 @@ void ClipNetwork::TakeText(WeightReader& reader) {
   const int64_t width = SizeOf(reader, "token_embedding.weight", 1);
   const int64_t context = SizeOf(reader, "positional_embedding", 0);
   if (context < 2) {
-    throw InvalidArgument("the CLIP weights have a text tower of " + std::to_string(context) +
-                          " positions; two at least are needed");
+    throw InvalidArgument(
+        "the CLIP weights have a text tower of {} positions; two at least are needed", context);
   }
   token_embedding_ = TakeTensor(reader, "token_embedding.weight", {vocabulary, width});
   text_position_ = TakeTensor(reader, "positional_embedding", {context, width});
@@ -123,10 +127,13 @@ int ClipNetwork::context() const {
 }
 
 std::string ClipNetwork::ToString() const {
-  return "ViT of width " + std::to_string(vision_.width) + ", " +
-         std::to_string(vision_.blocks.size()) + " layers, patches of " +
-         std::to_string(patch_px_) + " px in " + std::to_string(input_side_px()) + " px, " +
-         (quick_gelu_ ? "QuickGELU" : "GELU") + (HasText() ? "" : ", no text tower");
+  return fmt::format("ViT of width {}, {} layers, patches of {} px in {} px, {}{}",
+                     vision_.width,
+                     vision_.blocks.size(),
+                     patch_px_,
+                     input_side_px(),
+                     quick_gelu_ ? "QuickGELU" : "GELU",
+                     HasText() ? "" : ", no text tower");
 }
 
 torch::Tensor ClipNetwork::RunBlock(const Tower& tower,

@@ -111,9 +111,10 @@ ClipTokenizer::ClipTokenizer(std::string_view merges,
                              const std::string& source) {
   const int merge_count = vocabulary_size - 2 * kBytes - kControlTokens;
   if (merge_count < 0) {
-    throw InvalidArgument("the CLIP weights have " + std::to_string(vocabulary_size) +
-                          " tokens, fewer than the " + std::to_string(2 * kBytes + kControlTokens) +
-                          " of a byte-pair vocabulary");
+    throw InvalidArgument(
+        "the CLIP weights have {} tokens, fewer than the {} of a byte-pair vocabulary",
+        vocabulary_size,
+        2 * kBytes + kControlTokens);
   }
   ByteSymbols symbols = MakeByteSymbols();
   symbol_of_byte_ = std::move(symbols.by_byte);
@@ -128,9 +129,12 @@ ClipTokenizer::ClipTokenizer(std::string_view merges,
     const bool is_merge = space != std::string::npos && space > 0 && space + 1 < line.size() &&
                           line.find(' ', space + 1) == std::string::npos;
     if (!is_merge) {
-      throw InvalidArgument(source + ": line " + std::to_string(i + 2) + " is not a merge; the " +
-                            "weights' vocabulary needs " + std::to_string(merge_count) +
-                            " lines of two symbols after the header");
+      throw InvalidArgument(
+          "{}: line {} is not a merge; the weights' vocabulary needs {} lines of two symbols after "
+          "the header",
+          source,
+          i + 2,
+          merge_count);
     }
     rank_of_pair_.emplace(line, i);
     token_of_symbol_[line.substr(0, space) + line.substr(space + 1)] = 2 * kBytes + i;
@@ -141,17 +145,17 @@ ClipTokenizer::ClipTokenizer(std::string_view merges,
 ClipTokenizer ClipTokenizer::FromFile(const std::filesystem::path& path, int vocabulary_size) {
   // gzread passes plain files through.
   const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
-  if (!file) throw Error(ErrorCode::kNotFound, "cannot open the vocabulary " + path.string());
+  if (!file) throw Error(ErrorCode::kNotFound, "cannot open the vocabulary {}", path.string());
   std::string text;
   std::vector<char> buffer(1 << 16);
   int count = 0;
   while ((count = gzread(file.get(), buffer.data(), static_cast<unsigned>(buffer.size()))) > 0) {
     text.append(buffer.data(), static_cast<size_t>(count));
     if (text.size() > kMaxVocabularyBytes) {
-      throw InvalidArgument(path.string() + " unpacks to more than 16 MB: it is no vocabulary");
+      throw InvalidArgument("{} unpacks to more than 16 MB: it is no vocabulary", path.string());
     }
   }
-  if (count < 0) throw Error(ErrorCode::kDataLoss, path.string() + " is damaged (gzip)");
+  if (count < 0) throw Error(ErrorCode::kDataLoss, "{} is damaged (gzip)", path.string());
   return ClipTokenizer(text, vocabulary_size, path.string());
 }
 
@@ -184,8 +188,8 @@ void ClipTokenizer::AppendWord(std::string_view bytes, std::vector<int64_t>& tok
 
 std::vector<int64_t> ClipTokenizer::Tokens(const std::string& text, int context) const {
   if (text.size() > kMaxTextBytes) {
-    throw InvalidArgument("the text has " + std::to_string(text.size()) +
-                          " bytes, at most 2000 are allowed; shorten it");
+    throw InvalidArgument("the text has {} bytes, at most 2000 are allowed; shorten it",
+                          text.size());
   }
   const icu::UnicodeString clean = Clean(text);
   std::vector<int64_t> tokens{start_of_text_};

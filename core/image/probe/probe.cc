@@ -9,23 +9,26 @@ namespace color3d {
 namespace probe_internal {
 
 Error ProbeContext::Truncated(const std::string& what) const {
-  return InvalidArgument(file_name + " is truncated: " + what + "; copy the file again");
+  return InvalidArgument("{} is truncated: {}; copy the file again", file_name, what);
 }
 
 Error ProbeContext::Damaged(const std::string& what) const {
-  return InvalidArgument(file_name + " is damaged: " + what + "; copy or save the file again");
+  return InvalidArgument("{} is damaged: {}; copy or save the file again", file_name, what);
 }
 
 void ProbeContext::CheckSize(int64_t width, int64_t height) const {
   if (width <= 0 || height <= 0) {
-    throw Damaged("it claims " + std::to_string(width) + " x " + std::to_string(height) + " px");
+    throw Damaged("it claims {} x {} px", width, height);
   }
   if (width > limits.max_side_px || height > limits.max_side_px ||
       width > limits.max_pixels / height) {
     throw Error(ErrorCode::kResourceExhausted,
-                file_name + " claims " + std::to_string(width) + " x " + std::to_string(height) +
-                    " px; the limit is " + std::to_string(limits.max_side_px) + " px a side and " +
-                    std::to_string(limits.max_pixels) + " px in all");
+                "{} claims {} x {} px; the limit is {} px a side and {} px in all",
+                file_name,
+                width,
+                height,
+                limits.max_side_px,
+                limits.max_pixels);
   }
 }
 
@@ -38,8 +41,8 @@ ImageInfo ProbeImage(std::string_view bytes,
   if (probe_internal::IsJpeg(bytes)) return probe_internal::ProbeJpeg(context);
   if (probe_internal::IsPng(bytes)) return probe_internal::ProbePng(context);
   if (probe_internal::IsTiff(bytes)) return probe_internal::ProbeTiff(context);
-  throw InvalidArgument(file_name + (bytes.empty() ? " is empty," : " is") +
-                        " not an image (JPEG, PNG or TIFF)");
+  throw InvalidArgument(
+      "{}{} not an image (JPEG, PNG or TIFF)", file_name, bytes.empty() ? " is empty," : " is");
 }
 
 bool HasImageExtension(std::string_view path) {

@@ -1,9 +1,12 @@
 // The three formats behind ProbeImage, for probe*.cc and orientation.cc only.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
@@ -20,6 +23,15 @@ struct ProbeContext {
   // "a.jpg is truncated: ..." and "a.jpg is damaged: ...".
   Error Truncated(const std::string& what) const;
   Error Damaged(const std::string& what) const;
+  // With the parts of `what` put in as fmt does.
+  template <typename First, typename... Rest>
+  Error Truncated(fmt::format_string<First, Rest...> what, First&& first, Rest&&... rest) const {
+    return Truncated(fmt::format(what, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
+  template <typename First, typename... Rest>
+  Error Damaged(fmt::format_string<First, Rest...> what, First&& first, Rest&&... rest) const {
+    return Damaged(fmt::format(what, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
   // Refuses sizes of zero or above the limits.
   void CheckSize(int64_t width, int64_t height) const;
 };

@@ -29,12 +29,13 @@ void ReadFrameHeader(const ProbeContext& context,
   const bool lossless_or_hierarchical =
       (marker & 3u) == 3u || (marker >= 0xC5 && marker <= 0xC7) || marker >= 0xCD;
   if (lossless_or_hierarchical || precision != 8) {
-    throw InvalidArgument(context.file_name +
-                          " is a lossless, hierarchical or more than 8-bit JPEG, which cannot be "
-                          "read; save it as PNG or TIFF");
+    throw InvalidArgument(
+        "{} is a lossless, hierarchical or more than 8-bit JPEG, which cannot be read; save it as "
+        "PNG or TIFF",
+        context.file_name);
   }
   if (info->channels != 1 && info->channels != 3 && info->channels != 4) {
-    throw context.Damaged("it claims " + std::to_string(info->channels) + " colour components");
+    throw context.Damaged("it claims {} colour components", info->channels);
   }
 }
 

@@ -1,5 +1,6 @@
+#include <zlib.h>
+
 #include <algorithm>
-#include <array>
 
 #include "core/image/probe/probe_formats.h"
 
@@ -8,24 +9,12 @@ namespace {
 
 constexpr std::string_view kSignature("\x89PNG\r\n\x1A\n", 8);
 
-constexpr std::array<uint32_t, 256> CrcTable() {
-  std::array<uint32_t, 256> table{};
-  for (uint32_t i = 0; i < 256; ++i) {
-    uint32_t c = i;
-    for (int k = 0; k < 8; ++k) c = (c & 1u) != 0 ? 0xEDB88320u ^ (c >> 1) : c >> 1;
-    table[i] = c;
-  }
-  return table;
-}
-constexpr std::array<uint32_t, 256> kCrcTable = CrcTable();
-
 uint32_t Crc32(std::string_view bytes) {
-  uint32_t c = 0xFFFFFFFFu;
-  for (char byte : bytes) c = kCrcTable[(c ^ static_cast<unsigned char>(byte)) & 0xFFu] ^ (c >> 8);
-  return c ^ 0xFFFFFFFFu;
+  return static_cast<uint32_t>(
+      ::crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
-int ChannelsOfColourType(uint32_t type) {
+int ChannelsOfColorType(uint32_t type) {
   switch (type) {
     case 0:
       return 1;
@@ -62,10 +51,9 @@ void ReadHeader(const ProbeContext& context,
   info->width = static_cast<int>(width);
   info->height = static_cast<int>(height);
   info->bits_per_channel = static_cast<int>(depth);
-  info->channels = ChannelsOfColourType(type);
+  info->channels = ChannelsOfColorType(type);
   if (info->channels == 0 || !IsAllowedDepth(type, depth)) {
-    throw context.Damaged("colour type " + std::to_string(type) + " with " + std::to_string(depth) +
-                          " bits does not exist");
+    throw context.Damaged("colour type {} with {} bits does not exist", type, depth);
   }
 }
 
@@ -74,8 +62,7 @@ void CheckDataSize(const ProbeContext& context, const ImageInfo& info, int64_t d
   const int64_t pixels = static_cast<int64_t>(info.width) * info.height;
   const int64_t bits = pixels * info.bits_per_channel;  // of at least one channel
   if (data_bytes < bits / 8 / 1032) {
-    throw context.Truncated("it holds " + std::to_string(data_bytes) + " bytes of data for " +
-                            std::to_string(pixels) + " px");
+    throw context.Truncated("it holds {} bytes of data for {} px", data_bytes, pixels);
   }
 }
 
@@ -104,8 +91,7 @@ ImageInfo ProbePng(const ProbeContext& context) {
       throw context.Truncated("it ends inside a chunk");
     }
     if (Crc32(reader.Slice(at + 4, length + 4)) != reader.U32(at + 8 + length)) {
-      throw context.Damaged("the checksum of a chunk at byte " + std::to_string(at) +
-                            " does not match");
+      throw context.Damaged("the checksum of a chunk at byte {} does not match", at);
     }
     if (first) ReadHeader(context, reader, at + 8, length, &info);
     first = false;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <functional>
 #include <opencv2/imgcodecs.hpp>
@@ -163,12 +164,7 @@ std::string PngClaiming(uint32_t width, uint32_t height) {
     for (int shift = 24; shift >= 0; shift -= 8) header += static_cast<char>(v >> shift & 255u);
   }
   header += std::string("\x08\x02\0\0\0", 5);
-  uint32_t crc = 0xFFFFFFFFu;
-  for (char c : header) {
-    crc ^= static_cast<unsigned char>(c);
-    for (int k = 0; k < 8; ++k) crc = (crc & 1u) != 0 ? 0xEDB88320u ^ (crc >> 1) : crc >> 1;
-  }
-  crc = ~crc;
+  const uLong crc = ::crc32_z(0, reinterpret_cast<const Bytef*>(header.data()), header.size());
   std::string bytes("\x89PNG\r\n\x1A\n\0\0\0\x0D", 12);
   bytes += header;
   for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(crc >> shift & 255u);

@@ -44,8 +44,7 @@ Directory ReadDirectory(const ProbeContext& context, const ByteReader& reader, s
     if (bytes > 4) {
       entry.offset = reader.U32(entry_at + 8);
       if (bytes > reader.size() || !reader.Has(entry.offset, bytes)) {
-        throw context.Truncated("tag " + std::to_string(reader.U16(entry_at)) +
-                                " points behind its end");
+        throw context.Truncated("tag {} points behind its end", reader.U16(entry_at));
       }
     }
     directory.emplace(reader.U16(entry_at), entry);
@@ -92,8 +91,7 @@ uint64_t CheckPieces(const ProbeContext& context,
   for (size_t i = 0; i < offsets->second.count; ++i) {
     const uint32_t bytes = Value(reader, counts->second, i);
     if (!reader.Has(Value(reader, offsets->second, i), bytes)) {
-      throw context.Truncated("strip " + std::to_string(i) +
-                              " of its image data lies behind its end");
+      throw context.Truncated("strip {} of its image data lies behind its end", i);
     }
     total += bytes;
   }
@@ -104,12 +102,13 @@ void CheckSamples(const ProbeContext& context, const ImageInfo& info, uint32_t s
   const int bits = info.bits_per_channel;
   const bool integer = sample_format == 1 || sample_format == 4;
   if (!integer || (bits != 1 && bits != 2 && bits != 4 && bits != 8 && bits != 16)) {
-    throw InvalidArgument(context.file_name + " has " + std::to_string(bits) +
-                          (integer ? "-bit" : "-bit signed or floating-point") +
-                          " samples; save it as 8- or 16-bit unsigned TIFF or PNG");
+    throw InvalidArgument("{} has {}{} samples; save it as 8- or 16-bit unsigned TIFF or PNG",
+                          context.file_name,
+                          bits,
+                          integer ? "-bit" : "-bit signed or floating-point");
   }
   if (info.channels < 1 || info.channels > 4) {
-    throw context.Damaged("it claims " + std::to_string(info.channels) + " channels");
+    throw context.Damaged("it claims {} channels", info.channels);
   }
 }
 
@@ -137,8 +136,8 @@ bool IsTiff(std::string_view bytes) {
 
 ImageInfo ProbeTiff(const ProbeContext& context) {
   if (context.bytes[2] == '+' || context.bytes[3] == '+') {
-    throw InvalidArgument(context.file_name +
-                          " is a BigTIFF, which cannot be read; save it as TIFF or PNG");
+    throw InvalidArgument("{} is a BigTIFF, which cannot be read; save it as TIFF or PNG",
+                          context.file_name);
   }
   TiffHeader header;
   if (!ReadTiffHeader(context.bytes, &header)) throw context.Truncated("it ends inside its header");
@@ -168,8 +167,7 @@ ImageInfo ProbeTiff(const ProbeContext& context) {
   const bool compressed = ValueOr(reader, directory, kCompression, 1) != 1;
   // No TIFF compression in use shrinks more than deflate (1032) does by more than a few times.
   if (data_bytes < (compressed ? raw_bytes / 5000 : raw_bytes)) {
-    throw context.Truncated("it holds " + std::to_string(data_bytes) + " bytes of data for " +
-                            std::to_string(width) + " x " + std::to_string(height) + " px");
+    throw context.Truncated("it holds {} bytes of data for {} x {} px", data_bytes, width, height);
   }
   return info;
 }

@@ -126,8 +126,8 @@ TEST(AutomaticColorizerTest, ColoursHeldOutPhotographsBetterThanGrey) {
     const Image predicted = JoinLab(luminance, colorizer->Colorize(luminance).ab);
     error += MeanDeltaE00(predicted, truth);
     grey_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
-    colourfulness += Colourfulness(SrgbFromLab(predicted));
-    true_colourfulness += Colourfulness(SrgbFromLab(truth));
+    colourfulness += Colorfulness(SrgbFromLab(predicted));
+    true_colourfulness += Colorfulness(SrgbFromLab(truth));
   }
   EXPECT_LT(error, 0.95 * grey_error);
   EXPECT_GT(colourfulness, 0.5 * true_colourfulness);

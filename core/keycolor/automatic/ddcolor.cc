@@ -7,8 +7,9 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/encoder/convnext.h"
-#include "core/encoder/convnext_weights.h"
+#include "core/encoder/convnext/convnext.h"
+#include "core/encoder/convnext/convnext_weights.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/image/codec.h"
@@ -20,8 +21,6 @@ namespace color3d {
 namespace {
 
 constexpr int kNetworkSidePx = 512;
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -88,7 +87,7 @@ AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
   });
   const bool enlarges = luminance.width > coarse.width || luminance.height > coarse.height;
   AutomaticColor color;
-  color.ab = enlarges ? UpsampleGuided(coarse, luminance, kGuideRadius, kGuideVarianceFloor)
+  color.ab = enlarges ? UpsampleGuided(coarse, luminance)
                       : Resize(coarse, luminance.width, luminance.height);
   color.confidence = Image(luminance.width, luminance.height, 1, 1.0f);
   return color;

@@ -6,8 +6,9 @@
 #include <cmath>
 
 #include "core/base/error.h"
-#include "core/encoder/convnext.h"
+#include "core/encoder/convnext/convnext.h"
 #include "core/encoder/embedded/embedded_weights.h"
+#include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
 #include "core/encoder/weight_tensors.h"
@@ -22,8 +23,9 @@ namespace {
 // The network saw things at about these sizes in training; a bigger picture is coloured small and
 // brought to its size along the edges of L. Falling.
 constexpr int kWorkingSidesPx[] = {320, 224};
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 4.0f;
+// Below the guided filter's default, so that contrasts of 2 L units are edges: this grid is the
+// picture at its working size, not cells of several px. Not measured against the default.
+constexpr float kFineGridVarianceFloor = 4.0f;
 // Spread of the colours in question (Lab units) at which the confidence is one half.
 constexpr double kHalfConfidenceSpread = 20.0;
 
@@ -81,7 +83,8 @@ class EmbeddedColorizer : public AutomaticColorizer {
               .clamp_min(0.0);
       const double half = kHalfConfidenceSpread * kHalfConfidenceSpread;
       AutomaticColor result;
-      result.ab = UpsampleGuided(ImageFromTensor(ab), luminance, kGuideRadius, kGuideVarianceFloor);
+      result.ab =
+          UpsampleGuided(ImageFromTensor(ab), luminance, kGuideRadius, kFineGridVarianceFloor);
       result.confidence =
           Resize(ImageFromTensor(half / (half + variance)), luminance.width, luminance.height);
       return result;

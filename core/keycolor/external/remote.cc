@@ -15,8 +15,6 @@ namespace {
 constexpr int64_t kMinPixels = 64 * 64;       // nothing useful can be coloured below
 constexpr double kMaxAspectDeviation = 0.02;  // of the sides' ratio, beyond the rounding to px
 constexpr double kNotableDifference = 5.0;    // mean |dL| that is worth a warning
-constexpr int kGuideRadius = 2;               // cells, as the guided filter's other callers
-constexpr float kGuideVarianceFloor = 20.0f;  // L units squared
 
 [[noreturn]] void Refuse(const RemoteOptions& options, const std::string& why) {
   throw Error(ErrorCode::kFailedPrecondition, "the backend '" + options.name + "' " + why);
@@ -210,9 +208,8 @@ RemoteSolution KeyColorFromRemote(const Image& luminance,
     solution.warnings.push_back("the backend '" + options.name + "' coloured the photo at " +
                                 SizeText(ab) + " px; its colours were brought to " +
                                 SizeText(luminance) + " px");
-    ab = ab.width < luminance.width
-             ? UpsampleGuided(ab, luminance, kGuideRadius, kGuideVarianceFloor)
-             : Resize(ab, luminance.width, luminance.height);
+    ab = ab.width < luminance.width ? UpsampleGuided(ab, luminance)
+                                    : Resize(ab, luminance.width, luminance.height);
   }
   solution.ab = std::move(ab);
   ClearOutside(options.mask, &solution.ab);

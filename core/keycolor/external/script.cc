@@ -22,8 +22,6 @@ constexpr int kMultiple = 32;
 constexpr int kMaxAnswerSidePx = 16384;
 constexpr float kMaxChroma = 150.0f;
 constexpr float kRgbMargin = 0.1f;
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
 
 Error Refused(const std::filesystem::path& file, const std::string& why) {
   return InvalidArgument("the TorchScript file " + file.filename().string() + " " + why);
@@ -150,8 +148,7 @@ ScriptColor KeyColorFromScript(const Image& luminance, const std::filesystem::pa
     std::copy_n(lab.Plane(1), answer.data.size(), answer.data.begin());
   }
   const bool fits = answer.width == luminance.width && answer.height == luminance.height;
-  color.ab = fits ? std::move(answer)
-                  : UpsampleGuided(answer, luminance, kGuideRadius, kGuideVarianceFloor);
+  color.ab = fits ? std::move(answer) : UpsampleGuided(answer, luminance);
   return color;
 }
 

@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 
 namespace color3d {
 namespace {

@@ -16,9 +16,10 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
-#include "core/encoder/convnext.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/image_tensors.h"
+#include "core/encoder/tap_encoder.h"
 #include "core/encoder/torch_errors.h"
+#include "core/encoder/torch_threads.h"
 #include "core/grid/edge_weights.h"
 #include "core/grid/grid_solver.h"
 #include "core/image/codec.h"
@@ -35,14 +36,11 @@ constexpr int kMinSidePx = 16;
 constexpr std::array<double, 3> kScales{0.75, 1.0, 1.33};  // of a reference: sizes of things differ
 constexpr int64_t kScaleSample = 500;
 constexpr int kFirstTapStridePx = 2;  // of the embedded encoder
-// Of the vote; the few matches of another picture are further away than those of the key view
-// itself, so it is wider than the colorizer's.
+// Of the vote among matches in other photos.
 constexpr double kTemperature = 0.3;
 constexpr int kLevels = 1024;  // of the histograms of L
-// Smallest weight of a match: regions without any get their neighbours' colour.
+// Smallest weight of a match: regions without any get their neighbors' colour.
 constexpr float kMinConfidence = 1e-4f;
-constexpr int kGuideRadius = 2;
-constexpr float kGuideVarianceFloor = 20.0f;
 
 void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -54,8 +52,7 @@ void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
     const Image& picture = references[k];
     const std::string name = fmt::format("reference picture {}", k);
     if (picture.channels != 3) {
-      throw InvalidArgument(
-          "{} has no colour ({} channels, 3 are needed)", name, picture.channels);
+      throw InvalidArgument("{} has no colour ({} channels, 3 are needed)", name, picture.channels);
     }
     if (std::min(picture.width, picture.height) < kMinSidePx) {
       throw InvalidArgument(
@@ -121,8 +118,7 @@ void AddCells(const TapEncoder& encoder,
               Random& random,
               ReferenceCells& cells) {
   const CellFeatures features = Describe(encoder, luminance);
-  const torch::Tensor rows =
-      SampleRows(features.Count(), std::max<int64_t>(1, wanted), random);
+  const torch::Tensor rows = SampleRows(features.Count(), std::max<int64_t>(1, wanted), random);
   const std::vector<torch::Tensor> selected = SelectRows(features.blocks, rows);
   cells.blocks.resize(selected.size());
   for (size_t k = 0; k < selected.size(); ++k) cells.blocks[k].push_back(selected[k]);
@@ -245,8 +241,7 @@ void Spread(const Image& luminance,
   Image spread(small.width, small.height, 2);
   spread.data = std::move(solved.u);
   const bool same = small.width == luminance.width && small.height == luminance.height;
-  solution.ab = same ? std::move(spread)
-                     : UpsampleGuided(spread, luminance, kGuideRadius, kGuideVarianceFloor);
+  solution.ab = same ? std::move(spread) : UpsampleGuided(spread, luminance);
   solution.confidence = Resize(matches.confidence, luminance.width, luminance.height);
 }
 

@@ -18,8 +18,10 @@ namespace {
 constexpr const char* kBackgrounds[] = {"the background", "something else", "an empty surface"};
 constexpr int kLargestPictureSidePx = 1536;  // what the finest windows are cut from
 constexpr int kHintsPerSide = 64;
-constexpr int kGuideRadius = 3;
-constexpr float kGuideVarianceFloor = 30.0f;
+// Above the guided filter's defaults: one of CLIP's patches covers several cells, so the borders
+// lie further from the edges of L that they belong to. Not measured against the defaults.
+constexpr int kPatchGuideRadius = 3;
+constexpr float kPatchGuideVarianceFloor = 30.0f;
 
 void CheckPictures(const Image& luminance, const Image& rest) {
   if (luminance.channels != 1 || luminance.Empty()) {
@@ -81,8 +83,8 @@ Image Probabilities(const Image& luminance,
   probabilities = UpsampleGuided(
       Resize(probabilities, std::max(1, planes.width / 4), std::max(1, planes.height / 4)),
       guide,
-      kGuideRadius,
-      kGuideVarianceFloor);
+      kPatchGuideRadius,
+      kPatchGuideVarianceFloor);
   for (float& value : probabilities.data) value = std::clamp(value, 0.0f, 1.0f);
   return probabilities;
 }
@@ -113,7 +115,7 @@ Leader LeaderAt(const Image& probabilities, size_t i, const std::vector<bool>& a
 
 std::vector<PromptRegion> RegionsOf(const std::vector<ColorPhrase>& phrases,
                                     const Image& probabilities,
-                                    double least_share) {
+                                    double min_share) {
   std::vector<PromptRegion> regions;
   const std::vector<bool> all(probabilities.channels, true);
   std::vector<size_t> pixels(probabilities.channels, 0);
@@ -128,7 +130,7 @@ std::vector<PromptRegion> RegionsOf(const std::vector<ColorPhrase>& phrases,
     std::copy_n(plane, region.mask.data.size(), region.mask.data.begin());
     region.score = *std::max_element(region.mask.data.begin(), region.mask.data.end());
     region.share = static_cast<double>(pixels[p]) / static_cast<double>(region.mask.data.size());
-    region.found = region.share >= least_share;
+    region.found = region.share >= min_share;
     regions.push_back(std::move(region));
   }
   return regions;
@@ -230,7 +232,7 @@ void PromptOptions::Validate() const {
   for (const int count : windows_per_side) check("windows_per_side", count, 1, 8);
   check("temperature", temperature, 1e-4, 10.0);
   check("seed_confidence", seed_confidence, 0.0, 1.0);
-  check("least_share", least_share, 0.0, 1.0);
+  check("min_share", min_share, 0.0, 1.0);
   check("map_side_px", map_side_px, 32, 1024);
   hints.Validate();
 }
@@ -240,16 +242,15 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
                                   const TextImageModel& model,
                                   const Image& rest,
                                   const PromptOptions& options,
-                                  ProgressObserver& progress,
-                                  const CancellationToken& cancel) {
+                                  const RunControl& control) {
   options.Validate();
   CheckPictures(luminance, rest);
   ParsedPrompt parsed = ParsePrompt(prompt);
   PromptSolution solution;
   solution.notes = std::move(parsed.notes);
   const Image probabilities =
-      Probabilities(luminance, parsed.phrases, model, options, progress, cancel);
-  solution.regions = RegionsOf(parsed.phrases, probabilities, options.least_share);
+      Probabilities(luminance, parsed.phrases, model, options, control.progress, control.cancel);
+  solution.regions = RegionsOf(parsed.phrases, probabilities, options.min_share);
   bool any = false;
   for (const PromptRegion& region : solution.regions) {
     any = any || region.found;
@@ -263,7 +264,7 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
   const std::vector<ColorHint> hints = placer.Place();
   if (hints.empty()) throw NothingFound(solution.regions);
   solution.confidence = placer.Confidence();
-  solution.spread = KeyColorFromHints(luminance, hints, options.hints, progress, cancel);
+  solution.spread = KeyColorFromHints(luminance, hints, options.hints, control);
   solution.ab = std::move(solution.spread.ab);
   return solution;
 }

@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <bit>
 #include <cstring>
 
@@ -42,8 +44,11 @@ class Cursor {
   uint64_t ReadCount(size_t record_bytes, const std::string& what) {
     const uint64_t count = Read<uint64_t>();
     if (count > Left() / record_bytes) {
-      throw InvalidArgument(name_ + " is truncated or damaged: it claims " + std::to_string(count) +
-                            " " + what + " but " + std::to_string(Left()) + " bytes are left");
+      throw InvalidArgument("{} is truncated or damaged: it claims {} {} but {} bytes are left",
+                            name_,
+                            count,
+                            what,
+                            Left());
     }
     return count;
   }
@@ -51,8 +56,8 @@ class Cursor {
  private:
   void Need(size_t count) {
     if (count > Left()) {
-      throw InvalidArgument(name_ + " is truncated at byte " + std::to_string(bytes_.size()) +
-                            "; copy the model again");
+      throw InvalidArgument(
+          "{} is truncated at byte {}; copy the model again", name_, bytes_.size());
     }
   }
 
@@ -67,14 +72,14 @@ std::map<uint32_t, ColmapCamera> ReadCameras(const fs::path& path) {
   const uint64_t count = cursor.ReadCount(24, "cameras");
   for (uint64_t i = 0; i < count; ++i) {
     const uint32_t id = cursor.Read<uint32_t>();
-    const std::string place = cursor.name() + ": camera " + std::to_string(id);
+    const std::string place = fmt::format("{}: camera {}", cursor.name(), id);
     const std::string model = ColmapModelName(cursor.Read<int32_t>(), place);
     const uint64_t width = cursor.Read<uint64_t>();
     const uint64_t height = cursor.Read<uint64_t>();
     std::vector<double> parameters(static_cast<size_t>(ColmapParameterCount(model, place)));
     for (double& p : parameters) p = cursor.Read<double>();
     if (!cameras.emplace(id, MakeColmapCamera(model, width, height, parameters, place)).second) {
-      throw InvalidArgument(place + " appears twice");
+      throw InvalidArgument("{} appears twice", place);
     }
   }
   return cameras;
@@ -105,7 +110,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
       image.observations.push_back(observation);
     }
     if (!images.emplace(id, std::move(image)).second) {
-      throw InvalidArgument(place + " has the number of another one");
+      throw InvalidArgument("{} has the number of another one", place);
     }
   }
   return images;
@@ -126,7 +131,7 @@ std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
     uint8_t rgb[3];
     cursor.ReadInto(rgb);
     point.error_px = cursor.Read<double>();
-    CheckColmapPoint(point, cursor.name() + ": point " + std::to_string(id));
+    CheckColmapPoint(point, fmt::format("{}: point {}", cursor.name(), id));
     const uint64_t track = cursor.ReadCount(8, "track elements");
     point.image_ids.reserve(track);
     for (uint64_t k = 0; k < track; ++k) {

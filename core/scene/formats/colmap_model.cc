@@ -41,18 +41,19 @@ int ColmapParameterCount(const std::string& model, const std::string& place) {
   for (const ModelInfo& info : kModels) {
     if (model != info.name) continue;
     if (!info.supported) {
-      throw InvalidArgument(place + " has the camera model " + model +
-                            ", which is not supported; run colmap image_undistorter first");
+      throw InvalidArgument(
+          "{} has the camera model {}, which is not supported; run colmap image_undistorter first",
+          place,
+          model);
     }
     return info.parameter_count;
   }
-  throw InvalidArgument(place + " has the unknown camera model " + model);
+  throw InvalidArgument("{} has the unknown camera model {}", place, model);
 }
 
 std::string ColmapModelName(int model_id, const std::string& place) {
   if (model_id < 0 || model_id >= static_cast<int>(kModels.size())) {
-    throw InvalidArgument(place + " has the unknown camera model number " +
-                          std::to_string(model_id));
+    throw InvalidArgument("{} has the unknown camera model number {}", place, model_id);
   }
   return kModels[static_cast<size_t>(model_id)].name;
 }
@@ -64,15 +65,17 @@ ColmapCamera MakeColmapCamera(const std::string& model,
                               const std::string& place) {
   constexpr uint64_t kMaxSidePx = 1'000'000;
   if (width < 1 || height < 1 || width > kMaxSidePx || height > kMaxSidePx) {
-    throw InvalidArgument(place + " is " + std::to_string(width) + " x " + std::to_string(height) +
-                          " px");
+    throw InvalidArgument("{} is {} x {} px", place, width, height);
   }
   if (static_cast<int>(parameters.size()) != ColmapParameterCount(model, place)) {
-    throw InvalidArgument(place + " has " + std::to_string(parameters.size()) + " parameters; " +
-                          model + " has " + std::to_string(ColmapParameterCount(model, place)));
+    throw InvalidArgument("{} has {} parameters; {} has {}",
+                          place,
+                          parameters.size(),
+                          model,
+                          ColmapParameterCount(model, place));
   }
   for (double p : parameters) {
-    if (!std::isfinite(p)) throw InvalidArgument(place + " has a parameter that is not finite");
+    if (!std::isfinite(p)) throw InvalidArgument("{} has a parameter that is not finite", place);
   }
   ColmapCamera out;
   Camera& c = out.camera;
@@ -84,8 +87,8 @@ ColmapCamera MakeColmapCamera(const std::string& model,
   c.cx = parameters[next++];
   c.cy = parameters[next++];
   if (!(c.fx > 0.0 && c.fy > 0.0)) {
-    throw InvalidArgument(place + " has a focal length of " + std::to_string(std::min(c.fx, c.fy)) +
-                          " px; it must be positive");
+    throw InvalidArgument(
+        "{} has a focal length of {} px; it must be positive", place, std::min(c.fx, c.fy));
   }
   // What is left is in OpenCV's order: RADIAL has k1 k2, OPENCV k1 k2 p1 p2, FULL_OPENCV goes on
   // with k3..k6, the fisheyes have k1..k4.
@@ -104,9 +107,9 @@ Pose MakeColmapPose(const double (&q)[4], const double (&t)[3], const std::strin
   const Eigen::Vector3d translation(t[0], t[1], t[2]);
   const double norm = rotation.norm();
   if (!std::isfinite(norm) || !translation.allFinite()) {
-    throw InvalidArgument(place + " has a pose that is not finite");
+    throw InvalidArgument("{} has a pose that is not finite", place);
   }
-  if (norm < 1e-6) throw InvalidArgument(place + " has a zero rotation quaternion");
+  if (norm < 1e-6) throw InvalidArgument("{} has a zero rotation quaternion", place);
   Pose pose;
   pose.rotation = rotation.normalized();
   pose.translation = translation;
@@ -116,11 +119,11 @@ Pose MakeColmapPose(const double (&q)[4], const double (&t)[3], const std::strin
 void CheckColmapPoint(const ColmapPoint& point, const std::string& place) {
   for (int i = 0; i < 3; ++i) {
     const double v = point.position[i];
-    if (std::isnan(v)) throw InvalidArgument(place + " has a NaN coordinate");
-    if (std::isinf(v)) throw InvalidArgument(place + " has an infinite coordinate");
+    if (std::isnan(v)) throw InvalidArgument("{} has a NaN coordinate", place);
+    if (std::isinf(v)) throw InvalidArgument("{} has an infinite coordinate", place);
   }
   if (!std::isfinite(point.error_px)) {
-    throw InvalidArgument(place + " has an error that is not finite");
+    throw InvalidArgument("{} has an error that is not finite", place);
   }
 }
 
@@ -135,19 +138,21 @@ ColmapModel LoadColmapModel(const fs::path& folder) {
   const bool binary = fs::is_regular_file(folder / "cameras.bin", error);
   if (!binary && !fs::is_regular_file(folder / "cameras.txt", error)) {
     throw Error(ErrorCode::kNotFound,
-                folder.string() + " holds no COLMAP model (cameras.bin or cameras.txt)");
+                "{} holds no COLMAP model (cameras.bin or cameras.txt)",
+                folder.string());
   }
   for (const char* part : {"images", "points3D"}) {
     const std::string file = std::string(part) + (binary ? ".bin" : ".txt");
     if (!fs::is_regular_file(folder / file, error)) {
-      throw InvalidArgument("the COLMAP model in " + folder.string() + " has no " + file);
+      throw InvalidArgument("the COLMAP model in {} has no {}", folder.string(), file);
     }
   }
   ColmapModel model = binary ? LoadColmapBinary(folder) : LoadColmapText(folder);
   for (const auto& [id, image] : model.images) {
     if (model.cameras.count(image.camera_id) == 0) {
-      throw InvalidArgument("image " + image.name + " refers to camera " +
-                            std::to_string(image.camera_id) + ", which the model does not have");
+      throw InvalidArgument("image {} refers to camera {}, which the model does not have",
+                            image.name,
+                            image.camera_id);
     }
   }
   return model;

@@ -17,10 +17,13 @@ void ThrowMissing(const std::vector<std::string>& missing, size_t total, const f
   for (size_t i = 0; i < std::min<size_t>(missing.size(), 3); ++i) {
     names += (i == 0 ? "" : ", ") + missing[i];
   }
-  throw InvalidArgument(std::to_string(missing.size()) + " of the " + std::to_string(total) +
-                        " photos that the COLMAP model names are not in " +
-                        (folder / "images").string() + " (" + names +
-                        (missing.size() > 3 ? ", ..." : "") + "); put them there");
+  throw InvalidArgument(
+      "{} of the {} photos that the COLMAP model names are not in {} ({}{}); put them there",
+      missing.size(),
+      total,
+      (folder / "images").string(),
+      names,
+      missing.size() > 3 ? ", ..." : "");
 }
 
 }  // namespace
@@ -35,7 +38,7 @@ Scene ReadColmapModel(const fs::path& model_folder,
     warnings->insert(warnings->end(), said.begin(), said.end());
   }
   if (model.images.empty()) {
-    throw InvalidArgument("the COLMAP model in " + model_folder.string() + " has no images");
+    throw InvalidArgument("the COLMAP model in {} has no images", model_folder.string());
   }
   // By name, so that view order does not depend on the numbers that COLMAP gave.
   std::vector<std::pair<std::string, uint32_t>> order;
@@ -47,11 +50,11 @@ Scene ReadColmapModel(const fs::path& model_folder,
   std::vector<std::string> missing;
   for (const auto& [name, id] : order) {
     if (!IsSafeRelativePath(name)) {
-      throw InvalidArgument("the COLMAP model names a photo \"" + name +
-                            "\"; names must be relative paths without '..'");
+      throw InvalidArgument(
+          "the COLMAP model names a photo \"{}\"; names must be relative paths without '..'", name);
     }
     if (!scene.views.empty() && scene.views.back().name == name) {
-      throw InvalidArgument("the COLMAP model names the photo " + name + " twice");
+      throw InvalidArgument("the COLMAP model names the photo {} twice", name);
     }
     const ColmapImage& image = model.images.at(id);
     const ColmapCamera& camera = model.cameras.at(image.camera_id);
@@ -82,8 +85,8 @@ Scene ReadColmapModel(const fs::path& model_folder,
     for (uint32_t image_id : from.image_ids) {
       const auto it = view_of_image.find(image_id);
       if (it == view_of_image.end()) {
-        throw InvalidArgument("points3D refers to image " + std::to_string(image_id) +
-                              ", which the model does not have");
+        throw InvalidArgument("points3D refers to image {}, which the model does not have",
+                              image_id);
       }
       views.insert(it->second);
     }

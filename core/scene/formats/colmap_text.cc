@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <charconv>
 
@@ -34,12 +36,12 @@ class Lines {
     }
     return false;
   }
-  std::string Place() const { return name_ + " line " + std::to_string(number_); }
+  std::string Place() const { return fmt::format("{} line {}", name_, number_); }
   bool AtEndOfLine() const { return line_.empty(); }
 
   std::string_view Word() {
     const size_t end = std::min(line_.find_first_of(kBlanks), line_.size());
-    if (end == 0) throw InvalidArgument(Place() + " ends too early; is the file truncated?");
+    if (end == 0) throw InvalidArgument("{} ends too early; is the file truncated?", Place());
     const std::string_view word = line_.substr(0, end);
     line_.remove_prefix(end);
     SkipBlanks();
@@ -54,8 +56,8 @@ class Lines {
     T value{};
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size()) {
-      throw InvalidArgument(Place() + ": \"" + std::string(shown.substr(0, 40)) +
-                            "\" is not a number that fits here");
+      throw InvalidArgument(
+          "{}: \"{}\" is not a number that fits here", Place(), shown.substr(0, 40));
     }
     return value;
   }
@@ -84,14 +86,14 @@ std::map<uint32_t, ColmapCamera> ReadCameras(const fs::path& path) {
   std::map<uint32_t, ColmapCamera> cameras;
   while (lines.NextRecord()) {
     const uint32_t id = lines.Number<uint32_t>();
-    const std::string place = lines.Place() + ": camera " + std::to_string(id);
+    const std::string place = fmt::format("{}: camera {}", lines.Place(), id);
     const std::string model(lines.Word());
     const uint64_t width = lines.Number<uint64_t>();
     const uint64_t height = lines.Number<uint64_t>();
     std::vector<double> parameters;
     while (!lines.AtEndOfLine()) parameters.push_back(lines.Number<double>());
     if (!cameras.emplace(id, MakeColmapCamera(model, width, height, parameters, place)).second) {
-      throw InvalidArgument(place + " appears twice");
+      throw InvalidArgument("{} appears twice", place);
     }
   }
   return cameras;
@@ -122,7 +124,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
       }
     }
     if (!images.emplace(id, std::move(image)).second) {
-      throw InvalidArgument(place + " has the number of another one");
+      throw InvalidArgument("{} has the number of another one", place);
     }
   }
   return images;
@@ -138,7 +140,7 @@ std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
     for (int i = 0; i < 3; ++i) point.position[i] = lines.Number<double>();
     for (int i = 0; i < 3; ++i) lines.Number<int>();  // colour
     point.error_px = lines.Number<double>();
-    CheckColmapPoint(point, lines.Place() + ": point " + std::to_string(id));
+    CheckColmapPoint(point, fmt::format("{}: point {}", lines.Place(), id));
     while (!lines.AtEndOfLine()) {
       point.image_ids.push_back(lines.Number<uint32_t>());
       lines.Number<uint32_t>();  // index of the observation

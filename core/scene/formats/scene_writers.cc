@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <charconv>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -37,8 +39,7 @@ std::string CameraLine(int id, const Camera& c, const Distortion& d) {
     model = rational ? "FULL_OPENCV" : "OPENCV";
     coefficients = rational ? 8 : 4;
   }
-  std::string line = std::to_string(id) + " " + model + " " + std::to_string(c.width) + " " +
-                     std::to_string(c.height);
+  std::string line = fmt::format("{} {} {} {}", id, model, c.width, c.height);
   for (double v : {c.fx, c.fy, c.cx, c.cy}) AppendWord(&line, Text(v));
   for (size_t i = 0; i < coefficients; ++i) AppendWord(&line, Text(d.k[i]));
   return line + "\n";
@@ -82,8 +83,8 @@ void WriteColmapText(const Scene& scene, const fs::path& model_folder) {
     for (int v : point.views) {
       const Eigen::Vector2d pixel = ObservedPixel(scene.views[v], point.position);
       AppendWord(&observations[v],
-                 Text(pixel.x()) + " " + Text(pixel.y()) + " " + std::to_string(i + 1));
-      AppendWord(&line, std::to_string(v + 1) + " " + std::to_string(observation_count[v]++));
+                 fmt::format("{} {} {}", Text(pixel.x()), Text(pixel.y()), i + 1));
+      AppendWord(&line, fmt::format("{} {}", v + 1, observation_count[v]++));
     }
     points += line + "\n";
   }
@@ -98,7 +99,7 @@ void WriteColmapText(const Scene& scene, const fs::path& model_folder) {
         scene.world_from_scene_scale * pose.translation - q * scene.world_offset;
     std::string line = std::to_string(i + 1);
     for (double v : {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) AppendWord(&line, Text(v));
-    line += " " + std::to_string(camera_of_view[i]) + " " + scene.views[i].name;
+    line += fmt::format(" {} {}", camera_of_view[i], scene.views[i].name);
     images += line + "\n" + observations[i] + "\n";
   }
   std::error_code error;
@@ -122,7 +123,7 @@ void WriteTransformsJson(const Scene& scene, const fs::path& json_file) {
                   {"cy", c.cy}};
     if (view.distortion.model == Distortion::Model::kFisheye) {
       frame["camera_model"] = "OPENCV_FISHEYE";
-      for (int i = 0; i < 4; ++i) frame["k" + std::to_string(i + 1)] = k[i];
+      for (int i = 0; i < 4; ++i) frame[fmt::format("k{}", i + 1)] = k[i];
     } else if (view.distortion.model == Distortion::Model::kBrown) {
       const bool rational = k[5] != 0.0 || k[6] != 0.0 || k[7] != 0.0;
       frame["camera_model"] = rational ? "FULL_OPENCV" : "OPENCV";

@@ -1,5 +1,7 @@
 #include "core/scene/formats/transforms_json.h"
 
+#include <fmt/core.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -28,7 +30,7 @@ class FrameFields {
     const json* value = Find(key);
     if (value == nullptr) return std::nullopt;
     if (!value->is_number() || !std::isfinite(value->get<double>())) {
-      throw InvalidArgument(place_ + ": " + key + " must be a finite number");
+      throw InvalidArgument("{}: {} must be a finite number", place_, key);
     }
     return value->get<double>();
   }
@@ -36,7 +38,7 @@ class FrameFields {
   std::string TextOr(const char* key, const std::string& absent) const {
     const json* value = Find(key);
     if (value == nullptr) return absent;
-    if (!value->is_string()) throw InvalidArgument(place_ + ": " + key + " must be a text");
+    if (!value->is_string()) throw InvalidArgument("{}: {} must be a text", place_, key);
     return value->get<std::string>();
   }
   bool IsTrue(const char* key) const {
@@ -64,8 +66,10 @@ Distortion ReadDistortion(const FrameFields& fields) {
   const bool brown =
       model == "OPENCV" || model == "SIMPLE_RADIAL" || model == "RADIAL" || model == "FULL_OPENCV";
   if (!fisheye && !pinhole && !brown) {
-    throw InvalidArgument(fields.place() + ": camera_model " + model +
-                          " is not supported; use OPENCV, OPENCV_FISHEYE or PINHOLE");
+    throw InvalidArgument(
+        "{}: camera_model {} is not supported; use OPENCV, OPENCV_FISHEYE or PINHOLE",
+        fields.place(),
+        model);
   }
   Distortion distortion;
   if (pinhole && !fisheye) return distortion;
@@ -79,7 +83,7 @@ Distortion ReadDistortion(const FrameFields& fields) {
   }
   if (model != "FULL_OPENCV" && fields.NumberOr("k4", 0.0) != 0.0) {
     // OpenCV means a denominator by k4, nerfstudio a fourth power: better none than the wrong one.
-    throw InvalidArgument(fields.place() + ": k4 is not supported for camera_model " + model);
+    throw InvalidArgument("{}: k4 is not supported for camera_model {}", fields.place(), model);
   }
   distortion.k = {fields.NumberOr("k1", 0),
                   fields.NumberOr("k2", 0),
@@ -98,7 +102,7 @@ Distortion ReadDistortion(const FrameFields& fields) {
 int ReadSide(const FrameFields& fields, const char* key, int absent) {
   const double side = fields.NumberOr(key, absent);
   if (!(side >= 1.0 && side <= 1e6)) {
-    throw InvalidArgument(fields.place() + ": " + key + " is " + std::to_string(side) + " px");
+    throw InvalidArgument("{}: {} is {} px", fields.place(), key, side);
   }
   return static_cast<int>(std::lround(side));
 }
@@ -118,15 +122,17 @@ Camera ReadCamera(const FrameFields& fields, const Photo& photo) {
   if (!fy) fy = from_angle("camera_angle_y", camera.height);
   if (!fx) fx = fy;
   if (!fx) {
-    throw InvalidArgument(fields.place() + ": fl_x or camera_angle_x is missing");
+    throw InvalidArgument("{}: fl_x or camera_angle_x is missing", fields.place());
   }
   camera.fx = *fx;
   camera.fy = fy.value_or(*fx);  // square pixels unless told otherwise
   camera.cx = fields.NumberOr("cx", 0.5 * camera.width);
   camera.cy = fields.NumberOr("cy", 0.5 * camera.height);
   if (!(camera.fx > 0.0 && camera.fy > 0.0 && camera.fx < 1e9 && camera.fy < 1e9)) {
-    throw InvalidArgument(fields.place() + ": the focal length is " + std::to_string(camera.fx) +
-                          " x " + std::to_string(camera.fy) + " px; it must be positive");
+    throw InvalidArgument("{}: the focal length is {} x {} px; it must be positive",
+                          fields.place(),
+                          camera.fx,
+                          camera.fy);
   }
   return camera;
 }
@@ -135,19 +141,18 @@ Camera ReadCamera(const FrameFields& fields, const Photo& photo) {
 Pose ReadPose(const FrameFields& fields) {
   const json* rows = fields.Find("transform_matrix");
   if (rows == nullptr || !rows->is_array() || (rows->size() != 4 && rows->size() != 3)) {
-    throw InvalidArgument(fields.place() + ": transform_matrix must have 4 rows");
+    throw InvalidArgument("{}: transform_matrix must have 4 rows", fields.place());
   }
   Eigen::Matrix<double, 3, 4> m;
   for (int r = 0; r < 3; ++r) {
     const json& row = (*rows)[r];
     if (!row.is_array() || row.size() != 4) {
-      throw InvalidArgument(fields.place() + ": transform_matrix must have 4 columns");
+      throw InvalidArgument("{}: transform_matrix must have 4 columns", fields.place());
     }
     for (int c = 0; c < 4; ++c) {
       if (!row[c].is_number() || !std::isfinite(row[c].get<double>())) {
-        throw InvalidArgument(fields.place() +
-                              ": transform_matrix has an element that is not a "
-                              "finite number");
+        throw InvalidArgument("{}: transform_matrix has an element that is not a finite number",
+                              fields.place());
       }
       m(r, c) = row[c].get<double>();
     }
@@ -156,8 +161,9 @@ Pose ReadPose(const FrameFields& fields) {
   const double scale = std::cbrt(axes.determinant());
   if (!(scale > 1e-9) ||
       !(axes.transpose() * axes / (scale * scale)).isApprox(Eigen::Matrix3d::Identity(), 1e-2)) {
-    throw InvalidArgument(fields.place() + ": transform_matrix is not a rotation (determinant " +
-                          std::to_string(axes.determinant()) + ")");
+    throw InvalidArgument("{}: transform_matrix is not a rotation (determinant {})",
+                          fields.place(),
+                          axes.determinant());
   }
   // The nearest rotation, then y and z reversed.
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -180,10 +186,10 @@ json ParseRoot(const fs::path& file) {
   try {
     root = json::parse(ReadFile(file));
   } catch (const json::exception& e) {
-    throw InvalidArgument(file.filename().string() + " is not JSON: " + e.what());
+    throw InvalidArgument("{} is not JSON: {}", file.filename().string(), e.what());
   }
   if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
-    throw InvalidArgument(file.filename().string() + " has no list of frames");
+    throw InvalidArgument("{} has no list of frames", file.filename().string());
   }
   return root;
 }
@@ -191,7 +197,7 @@ json ParseRoot(const fs::path& file) {
 // False when the frame's photo does not exist.
 bool ReadFrame(const FrameFields& fields, const fs::path& scene_folder, View* view) {
   const std::string path = WithoutPrefix(fields.TextOr("file_path", ""), "./");
-  if (path.empty()) throw InvalidArgument(fields.place() + ": file_path is missing");
+  if (path.empty()) throw InvalidArgument("{}: file_path is missing", fields.place());
   view->image_file = FindPhotoFile(scene_folder, WithoutPrefix(path, "images/"), true);
   if (view->image_file.empty()) return false;
   view->name = WithoutPrefix(view->image_file, "images/");
@@ -215,8 +221,8 @@ Scene LoadTransformsJson(const fs::path& json_file,
   std::vector<std::string> missing;
   for (size_t i = 0; i < root["frames"].size(); ++i) {
     const json& frame = root["frames"][i];
-    const std::string place = file_name + ": frame " + std::to_string(i);
-    if (!frame.is_object()) throw InvalidArgument(place + " must be an object");
+    const std::string place = fmt::format("{}: frame {}", file_name, i);
+    if (!frame.is_object()) throw InvalidArgument("{} must be an object", place);
     const FrameFields fields(root, frame, place);
     View view;
     if (ReadFrame(fields, scene_folder, &view)) {
@@ -230,19 +236,24 @@ Scene LoadTransformsJson(const fs::path& json_file,
   });
   for (size_t i = 1; i < scene.views.size(); ++i) {
     if (scene.views[i].name == scene.views[i - 1].name) {
-      throw InvalidArgument(file_name + " names the photo " + scene.views[i].name + " twice");
+      throw InvalidArgument("{} names the photo {} twice", file_name, scene.views[i].name);
     }
   }
   if (scene.views.size() < 2) {
-    throw InvalidArgument(file_name + " names " + std::to_string(root["frames"].size()) +
-                          " photos, of which " + std::to_string(scene.views.size()) + " exist in " +
-                          scene_folder.string() + "; at least 2 are needed" +
-                          (missing.empty() ? "" : " (missing: " + missing[0] + ", ...)"));
+    throw InvalidArgument("{} names {} photos, of which {} exist in {}; at least 2 are needed{}",
+                          file_name,
+                          root["frames"].size(),
+                          scene.views.size(),
+                          scene_folder.string(),
+                          missing.empty() ? "" : fmt::format(" (missing: {}, ...)", missing[0]));
   }
   if (!missing.empty()) {
-    warnings->push_back(std::to_string(missing.size()) + " of the " +
-                        std::to_string(root["frames"].size()) + " photos that " + file_name +
-                        " names do not exist (" + missing[0] + ", ...) and were left out");
+    warnings->push_back(
+        fmt::format("{} of the {} photos that {} names do not exist ({}, ...) and were left out",
+                    missing.size(),
+                    root["frames"].size(),
+                    file_name,
+                    missing[0]));
   }
   return scene;
 }

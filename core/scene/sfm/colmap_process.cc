@@ -1,5 +1,7 @@
 #include "core/scene/sfm/colmap_process.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <fstream>
 #include <future>
@@ -84,9 +86,7 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
       if (done == reported) continue;
       reported = done;
       progress_.OnProgress(
-          done,
-          phase.total,
-          phase.message + " " + std::to_string(done) + "/" + std::to_string(phase.total));
+          done, phase.total, fmt::format("{} {}/{}", phase.message, done, phase.total));
     }
   } catch (...) {
     stop.Cancel();  // the future's destructor waits for the child to be gone
@@ -102,15 +102,18 @@ void ColmapProcess::RunOrThrow(const std::vector<std::string>& arguments,
   const int code = Run(arguments, phase);
   if (code == 0) return;
   throw Error(ErrorCode::kInternal,
-              "colmap " + arguments.at(0) + " failed with exit code " + std::to_string(code) +
-                  ": " + LastLogLine() + "; log: " + log_.filename().string());
+              "colmap {} failed with exit code {}: {}; log: {}",
+              arguments.at(0),
+              code,
+              LastLogLine(),
+              log_.filename().string());
 }
 
 void ColmapProcess::ThrowTooSlow() const {
   throw Error(ErrorCode::kDeadlineExceeded,
-              "finding camera positions took longer than " +
-                  std::to_string(options_.sfm_timeout.count()) +
-                  " s; use fewer photos, fewer features or a longer time limit");
+              "finding camera positions took longer than {} s; use fewer photos, fewer features or "
+              "a longer time limit",
+              options_.sfm_timeout.count());
 }
 
 std::string ColmapProcess::LastLogLine() const {

@@ -1,5 +1,7 @@
 #include "core/scene/sfm/pair_planner.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
@@ -120,15 +122,16 @@ PairPlan PlanPairs(const SimilarityTable& similarity,
   AddSpanningTrees(similarity, &pairs);
   const size_t count = similarity.count();
   const size_t all = count * (count - 1) / 2;
-  constexpr double kMost = 0.7;
-  if (static_cast<double>(pairs.size()) >= kMost * static_cast<double>(all)) {
-    return {AllPairs(similarity.count()), "all " + std::to_string(all) + " pairs: few photos"};
+  constexpr double kMaxShareOfPairs = 0.7;
+  if (static_cast<double>(pairs.size()) >= kMaxShareOfPairs * static_cast<double>(all)) {
+    return {AllPairs(similarity.count()), fmt::format("all {} pairs: few photos", all)};
   }
   return {{pairs.begin(), pairs.end()},
-          std::to_string(pairs.size()) + " of " + std::to_string(all) + " pairs: the " +
-              std::to_string(neighbors) + " most similar photos of each, " +
-              (sequence.empty() ? "" : "neighbours in the sequence of names, ") +
-              "two spanning trees"};
+          fmt::format("{} of {} pairs: the {} most similar photos of each, {}two spanning trees",
+                      pairs.size(),
+                      all,
+                      neighbors,
+                      sequence.empty() ? "" : "neighbours in the sequence of names, ")};
 }
 
 std::vector<PhotoPair> PairsOfUnplaced(const std::vector<bool>& placed,

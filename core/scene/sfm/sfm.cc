@@ -1,5 +1,7 @@
 #include "core/scene/sfm/sfm.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -69,8 +71,11 @@ class Solver {
     if (planned) {
       SolvePlanned(plan);
       if (PlannedIsEnough()) return std::move(*best_);
-      Say(std::to_string(Placed()) + " of " + std::to_string(Count()) +
-          " photos hang together by the planned pairs; comparing all pairs, which takes longer");
+      Say(
+          fmt::format("{} of {} photos hang together by the planned pairs; comparing all pairs, "
+                      "which takes longer",
+                      Placed(),
+                      Count()));
     }
     SolveExhaustively(planned);
     return best_ ? std::move(*best_) : ColmapModel{};
@@ -123,8 +128,10 @@ class Solver {
     if (Placed() == copies_.names.size()) return;
     const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
     if (AreWorthMatching(more)) {
-      colmap_.Note(std::to_string(Placed()) + " photos found a place; matching the others with " +
-                   "all: " + std::to_string(more.size()) + " more pairs");
+      colmap_.Note(
+          fmt::format("{} photos found a place; matching the others with all: {} more pairs",
+                      Placed(),
+                      more.size()));
       Match(more);
       Attempt("widened", Strictness::kDefault);
     }
@@ -188,9 +195,10 @@ PairPlan Plan(const std::vector<Photo>& photos,
 void RequirePlaced(size_t placed, size_t count, const fs::path& log) {
   if (placed >= kMinPlaced) return;
   throw InvalidArgument(
-      (placed == 0 ? "none" : "only " + std::to_string(placed)) + " of " + std::to_string(count) +
-      " photos could be placed: the others share too few features with them; take at least 3 sharp "
-      "photos from different places that overlap by 60 %; log: " +
+      "{} of {} photos could be placed: the others share too few features with them; take at least "
+      "3 sharp photos from different places that overlap by 60 %; log: {}",
+      placed == 0 ? "none" : fmt::format("only {}", placed),
+      count,
       log.filename().string());
 }
 

@@ -1,7 +1,8 @@
 #include "core/scene/sfm/sfm_matching.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <map>
 
 #include "core/base/files.h"
@@ -18,14 +19,8 @@ constexpr int kMatchingBlock = 10;
 
 // COLMAP's parameters f, cx, cy, k of a camera with a known focal length.
 std::string CameraParameters(const FeatureImages::Group& group) {
-  char text[128];
-  std::snprintf(text,
-                sizeof(text),
-                "%.3f,%.1f,%.1f,0",
-                group.focal_px,
-                0.5 * group.width,
-                0.5 * group.height);
-  return text;
+  return fmt::format(
+      "{:.3f},{:.1f},{:.1f},0", group.focal_px, 0.5 * group.width, 0.5 * group.height);
 }
 
 void WriteLines(const fs::path& file, const std::vector<std::string>& lines) {
@@ -115,11 +110,11 @@ void MatchPairs(ColmapProcess& colmap,
     std::vector<std::string> arguments = MatchingArguments(colmap, work, "matches_importer");
     arguments.insert(arguments.end(),
                      {"--match_list_path", list.string(), "--match_type", "pairs"});
-    colmap.RunOrThrow(arguments,
-                      {"matching pairs of photos " + std::to_string(begin) + ".." +
-                           std::to_string(end) + " of " + std::to_string(pairs.size()),
-                       "Matching block",
-                       1});
+    colmap.RunOrThrow(
+        arguments,
+        {fmt::format("matching pairs of photos {}..{} of {}", begin, end, pairs.size()),
+         "Matching block",
+         1});
   }
 }
 

@@ -1,8 +1,9 @@
 #include "core/scene/sfm/sfm_photos.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 
 #include "core/base/files.h"
@@ -33,8 +34,8 @@ std::pair<float, float> UsedRange(const Image& image) {
 
 // Equal for photos of one camera and zoom.
 std::string GroupFolder(const FeatureImages::Group& group) {
-  std::string name = std::to_string(group.width) + "x" + std::to_string(group.height);
-  if (group.focal_px > 0.0) name += "_f" + std::to_string(std::lround(group.focal_px));
+  std::string name = fmt::format("{}x{}", group.width, group.height);
+  if (group.focal_px > 0.0) name += fmt::format("_f{}", std::lround(group.focal_px));
   return name;
 }
 
@@ -82,9 +83,7 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     const double focal_px = photo.focal_px * image.width / photo.width;
     seen[i] = {image.width, image.height, focal_px, {}};
     folders[i] = GroupFolder(seen[i]);
-    char number[32];
-    std::snprintf(number, sizeof(number), "%06d.png", static_cast<int>(i + 1));
-    written.names[i] = folders[i] + "/" + number;
+    written.names[i] = fmt::format("{}/{:06}.png", folders[i], i + 1);
     fs::create_directories(folder / folders[i]);
     WriteFileAtomic(folder / written.names[i], EncodePng8(image));
     if (local_features > 0) {
@@ -95,8 +94,7 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
   // Observers are called from one thread; large photos take memory, hence not too many at a time.
   const int64_t batch = std::min(pool.thread_count(), kMaxPhotosInMemory);
   for (int64_t begin = 0; begin < count; begin += batch) {
-    progress.OnProgress(
-        begin, count, "reading photos " + std::to_string(begin + 1) + "/" + std::to_string(count));
+    progress.OnProgress(begin, count, fmt::format("reading photos {}/{}", begin + 1, count));
     pool.ForEach(std::min(batch, count - begin), [&](int64_t i, int) { write(begin + i); });
   }
   std::map<std::string, size_t> group_of_folder;

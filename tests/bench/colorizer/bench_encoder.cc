@@ -3,9 +3,10 @@
 #include <torch/torch.h>
 
 #include "core/color/lab.h"
-#include "core/encoder/convnext.h"
-#include "core/encoder/random_features.h"
+#include "core/encoder/convnext/convnext.h"
+#include "core/encoder/image_tensors.h"
 #include "tests/bench/pretrain/squeezenet.h"
+#include "tests/support/random_features.h"
 
 namespace color3d {
 namespace {

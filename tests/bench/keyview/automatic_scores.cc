@@ -67,8 +67,8 @@ AutomaticScore ScoreAutomatic(const AutomaticColorizer& colorizer,
   return {photo.filename().string(),
           MeanDeltaE00(predicted, truth),
           MeanDeltaE00(grey, truth),
-          Colourfulness(srgb),
-          Colourfulness(true_srgb)};
+          Colorfulness(srgb),
+          Colorfulness(true_srgb)};
 }
 
 AutomaticScore MeanScore(const std::vector<AutomaticScore>& scores) {
@@ -77,9 +77,9 @@ AutomaticScore MeanScore(const std::vector<AutomaticScore>& scores) {
   const double n = static_cast<double>(scores.size());
   for (const AutomaticScore& score : scores) {
     mean.delta_e00 += score.delta_e00 / n;
-    mean.delta_e00_grey += score.delta_e00_grey / n;
-    mean.colourfulness += score.colourfulness / n;
-    mean.true_colourfulness += score.true_colourfulness / n;
+    mean.delta_e00_gray += score.delta_e00_gray / n;
+    mean.colorfulness += score.colorfulness / n;
+    mean.true_colorfulness += score.true_colorfulness / n;
   }
   return mean;
 }

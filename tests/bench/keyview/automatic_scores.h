@@ -12,9 +12,9 @@ namespace color3d {
 struct AutomaticScore {
   std::string photo;
   double delta_e00 = 0.0;  // mean CIEDE2000 to the true colours, at the true L
-  double delta_e00_grey = 0.0;
-  double colourfulness = 0.0;
-  double true_colourfulness = 0.0;
+  double delta_e00_gray = 0.0;
+  double colorfulness = 0.0;
+  double true_colorfulness = 0.0;
 };
 
 // Photographs below a folder, sorted; at most `count` of them, evenly thinned out (0: all). Throws

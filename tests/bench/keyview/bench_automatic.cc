@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/encoder/embedded/embedded_weights.h"
-#include "core/encoder/threads.h"
+#include "core/encoder/torch_threads.h"
 #include "core/weights/weight_file.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/keyview/automatic_scores.h"
@@ -38,9 +38,9 @@ std::shared_ptr<const AutomaticColorizer> MakeColorizer(const AutomaticArguments
 nlohmann::ordered_json Json(const AutomaticScore& score) {
   return {{"photo", score.photo},
           {"delta_e00", score.delta_e00},
-          {"delta_e00_grey", score.delta_e00_grey},
-          {"colourfulness", score.colourfulness},
-          {"colourfulness_truth", score.true_colourfulness}};
+          {"delta_e00_gray", score.delta_e00_gray},
+          {"colorfulness", score.colorfulness},
+          {"colorfulness_truth", score.true_colorfulness}};
 }
 
 void RunAutomatic(const AutomaticArguments& args) {

@@ -1,0 +1,51 @@
+#include "core/base/files.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Files, WriteIsAtomicAndReadable) {
+  ScratchFolder scratch;
+  const fs::path path = scratch.path() / "value.bin";
+  WriteFileAtomic(path, "one");
+  WriteFileAtomic(path, std::string("two\0three", 9));
+  EXPECT_EQ(ReadFile(path), std::string("two\0three", 9));
+  EXPECT_EQ(DigestFile(path).sha256, Sha256Hex(std::string("two\0three", 9)));
+  EXPECT_EQ(ListFiles(scratch.path()), std::vector<std::string>{"value.bin"});
+}
+
+TEST(Files, ErrorsNameThePathAndLeaveNothing) {
+  ScratchFolder scratch;
+  try {
+    WriteFileAtomic(scratch.path() / "missing" / "x", "y");
+    FAIL() << "wrote into a folder that does not exist";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kNotFound);
+    EXPECT_NE(std::string(e.what()).find("missing"), std::string::npos);
+  }
+  EXPECT_THROW(ReadFile(scratch.path() / "absent"), Error);
+  EXPECT_THROW(ReadFile(scratch.path()), Error);
+  EXPECT_TRUE(ListFiles(scratch.path()).empty());
+}
+
+TEST(Files, UnsafePathsAreRecognised) {
+  for (const char* good : {"a.jpg", "images/a b.jpg", "x/..y/z"}) {
+    EXPECT_TRUE(IsSafeRelativePath(good)) << good;
+  }
+  for (const char* bad : {"", "/etc/passwd", "../a", "a/../b", "a//b", "a/.", "a\\b", "a/\n"}) {
+    EXPECT_FALSE(IsSafeRelativePath(bad)) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace color3d

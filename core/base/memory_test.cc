@@ -1,0 +1,79 @@
+#include "core/base/memory.h"
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <barrier>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/base/files.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(AvailableMemory, IsTheMinimumOfWhatTheSystemAndTheGroupsLeave) {
+  const ScratchFolder root;
+  const auto put = [&](const std::string& file, const std::string& text) {
+    fs::create_directories((root.path() / file).parent_path());
+    WriteFileAtomic(root.path() / file, text);
+  };
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), INT64_MAX);
+  put("proc/meminfo", "MemTotal:  9000 kB\nMemAvailable:   5000 kB\n");
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), 5000 * 1024);
+  put("proc/self/cgroup", "4:memory:/a/b\n0::/c/d\n");
+  put("sys/fs/cgroup/c/memory.max", "4000000\n");
+  put("sys/fs/cgroup/c/memory.current", "1000000\n");
+  put("sys/fs/cgroup/c/d/memory.max", "max\n");
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), 3000000);
+  put("sys/fs/cgroup/memory/a/b/memory.limit_in_bytes", "2500000\n");
+  put("sys/fs/cgroup/memory/a/b/memory.usage_in_bytes", "2600000\n");
+  EXPECT_EQ(AvailableMemoryBytes(root.path()), 0);  // over its limit: never negative
+  EXPECT_GT(AvailableMemoryBytes(), 1 << 20);
+}
+
+// Pools of a process in which eight threads hold memory at the same time.
+int ArenasOfEightThreads() {
+  std::barrier all(8);
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i) {
+    threads.emplace_back([&] {
+      const std::vector<char> small(1000);
+      all.arrive_and_wait();
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  char* text = nullptr;
+  size_t size = 0;
+  std::FILE* file = ::open_memstream(&text, &size);
+  ::malloc_info(0, file);
+  std::fclose(file);
+  int count = 0;
+  for (const char* at = text; (at = std::strstr(at, "<heap nr=")) != nullptr; ++at) ++count;
+  std::free(text);
+  return count;
+}
+
+// In processes of their own: the limit holds for all threads, forever.
+TEST(ShareMallocArenasDeathTest, ThreadsShareThem) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  EXPECT_EXIT(
+      {
+        ShareMallocArenas(2);
+        std::exit(ArenasOfEightThreads());
+      },
+      testing::ExitedWithCode(2),
+      "");
+  EXPECT_EXIT(std::exit(ArenasOfEightThreads() > 2 ? 0 : 1), testing::ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace color3d
