@@ -1,5 +1,6 @@
 #include "core/colorizer/colorizer.h"
 
+#include <fmt/format.h>
 #include <torch/torch.h>
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 #include "core/colorizer/feature_neighbors.h"
 
+#include <fmt/format.h>
 #include <torch/torch.h>
 
 #include <algorithm>

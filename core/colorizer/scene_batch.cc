@@ -64,7 +64,8 @@ SceneBatch::Membership::Membership(SceneBatch& batch, const std::string& project
   if (!batch_.project_seconds_.contains(project)) {
     double min_seconds = 0.0;
     for (auto it = batch_.project_seconds_.begin(); it != batch_.project_seconds_.end(); ++it) {
-      min_seconds = it == batch_.project_seconds_.begin() ? it->second : std::min(min_seconds, it->second);
+      min_seconds =
+          it == batch_.project_seconds_.begin() ? it->second : std::min(min_seconds, it->second);
     }
     batch_.project_seconds_[project] = min_seconds;
   }
@@ -82,7 +83,8 @@ SceneBatch::Membership::~Membership() {
   batch_.changed_.notify_all();
 }
 
-SceneBatch::Turn::Turn(Membership& membership, const CancellationToken& cancel) : membership_(membership) {
+SceneBatch::Turn::Turn(Membership& membership, const CancellationToken& cancel)
+    : membership_(membership) {
   SceneBatch& batch = membership.batch_;
   std::unique_lock lock(batch.mutex_);
   Member& member = *membership.member_;

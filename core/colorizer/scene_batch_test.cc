@@ -152,7 +152,7 @@ TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
     threads.emplace_back([&, i] {
       SceneBatch::Membership membership(batch, i < 5 ? "a" : "b");
       while (!stop) {
-        SceneBatch::Turn turn(seat, {});
+        SceneBatch::Turn turn(membership, {});
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
         ++turns[i];
       }

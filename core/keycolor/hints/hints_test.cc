@@ -10,6 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
+#include "core/color/lab.h"
 
 namespace color3d {
 namespace {

@@ -71,8 +71,9 @@ Image Cosines(const Image& features, const std::vector<std::vector<float>>& text
   for (const std::vector<float>& text : texts) {
     if (static_cast<int>(text.size()) != features.channels) {
       throw Error(ErrorCode::kInternal,
-                  "the dense features have " + std::to_string(features.channels) +
-                      " channels, the texts " + std::to_string(text.size()));
+                  "the dense features have {} channels, the texts {}",
+                  features.channels,
+                  text.size());
     }
   }
   for (size_t i = 0; i < features.PlaneSize(); ++i) {

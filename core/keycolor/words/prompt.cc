@@ -1,5 +1,7 @@
 #include "core/keycolor/words/prompt.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -25,17 +27,20 @@ constexpr float kPatchGuideVarianceFloor = 30.0f;
 
 void CheckPictures(const Image& luminance, const Image& rest) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+                          luminance.channels);
   }
   const bool fits =
       rest.channels == 2 && rest.width == luminance.width && rest.height == luminance.height;
   if (!rest.Empty() && !fits) {
-    throw InvalidArgument("the colours of the rest are " + std::to_string(rest.width) + "x" +
-                          std::to_string(rest.height) + " px with " +
-                          std::to_string(rest.channels) + " channels, the key view has " +
-                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
-                          " px and needs 2");
+    throw InvalidArgument(
+        "the colours of the rest are {}x{} px with {} channels, the key view has {}x{} px and "
+        "needs 2",
+        rest.width,
+        rest.height,
+        rest.channels,
+        luminance.width,
+        luminance.height);
   }
 }
 
@@ -219,9 +224,10 @@ class HintPlacer {
 Error NothingFound(const std::vector<PromptRegion>& regions) {
   std::string text = "none of the prompt's things was found in the key view:";
   for (const PromptRegion& region : regions) {
-    text += " \"" + region.phrase.thing + "\" (best score " + std::to_string(region.score) + ")";
+    text += fmt::format(" \"{}\" (best score {:.3g})", region.phrase.thing, region.score);
   }
-  return Error(ErrorCode::kFailedPrecondition, text + "; name other things, or place colour hints");
+  return Error(
+      ErrorCode::kFailedPrecondition, "{}; name other things, or place colour hints", text);
 }
 
 }  // namespace
@@ -255,8 +261,8 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
   for (const PromptRegion& region : solution.regions) {
     any = any || region.found;
     if (region.found) continue;
-    solution.notes.push_back("\"" + region.phrase.thing +
-                             "\" was not found in the key view; its colour is not used");
+    solution.notes.push_back(fmt::format(
+        "\"{}\" was not found in the key view; its colour is not used", region.phrase.thing));
   }
   if (!any) throw NothingFound(solution.regions);
   const HintPlacer placer(

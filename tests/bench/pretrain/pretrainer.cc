@@ -1,5 +1,6 @@
 #include "tests/bench/pretrain/pretrainer.h"
 
+#include <fmt/format.h>
 #include <torch/torch.h>
 
 #include <cmath>
