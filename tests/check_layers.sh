@@ -62,6 +62,7 @@ for part in model raster training geometry chroma export; do
 done
 allow core/report 'core/(base|catalogue|image|report)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
+allow proto 'proto'
 allow server/store 'core/(base|catalogue)|server/store'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'
 allow server/storage 'core/base|server/(store|storage)'

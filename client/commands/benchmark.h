@@ -3,8 +3,8 @@
 
 #include "client/commands/colorize_options.h"
 #include "client/commands/command.h"
-#include "client/commands/progress_display.h"
 #include "client/lib/connection.h"
+#include "client/lib/progress_display.h"
 
 namespace color3d::client {
 

@@ -1,17 +1,72 @@
 #include "client/commands/colorize_options.h"
 
+#include <fmt/format.h>
+
 #include <map>
 
+#include "client/commands/option_fields.h"
+#include "client/commands/preset_file.h"
 #include "core/base/error.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-v1::Preset PresetOf(const std::string& name) {
-  if (name == "best") return v1::PRESET_BEST;
-  if (name == "paper") return v1::PRESET_PAPER;
-  return v1::PRESET_FAST;
+// Options with a flag of their own; the rest is reached by --set.
+struct OptionFlag {
+  const char* flag;
+  const char* option;
+  const char* help;
+};
+constexpr OptionFlag kOptionFlags[] = {
+    {"--max-side", "max_side_px", "Longer side of the working pictures"},
+    {"--geometry-iterations", "reconstruct_geometry.iterations", "Of luminance Gaussians"},
+    {"--max-gaussians", "reconstruct_geometry.max_gaussians", "Hard cap"},
+    {"--colorizer-iterations", "personalize.iterations", "Of the scene's colorizer"},
+    {"--augment",
+     "generate_augmentations.samples",
+     "Pictures made from the key view that the colorizer learns from, too (the paper: 8); those in "
+     "PHOTOS/augment/ always count"},
+    {"--augment-backend", "generate_augmentations.backend", "Model server that makes them"},
+    {"--chroma-iterations", "solve_chroma.iterations", "After the closed-form start"},
+};
+
+// Why a setting cannot be made; empty: it can.
+std::string Complaint(const std::string& setting) {
+  v1::ColorizeSceneSpec spec;
+  try {
+    SetOption(setting, &spec);
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
+  for (const OptionFlag& flag : kOptionFlags) {
+    const std::string name = flag.option;
+    app.add_option_function<std::string>(
+           flag.flag,
+           [o, name](const std::string& value) { o->settings.push_back(name + "=" + value); },
+           fmt::format("{}: {}", flag.help, DescribeOption(name)))
+        ->check([name](const std::string& value) { return Complaint(name + "=" + value); });
+  }
+  app.add_option_function<std::vector<std::string>>(
+         "--set",
+         [o](const std::vector<std::string>& settings) {
+           o->settings.insert(o->settings.end(), settings.begin(), settings.end());
+         },
+         "STAGE.OPTION=VALUE: any option of a stage, e.g. carry_color.depth_tolerance=0.05; `--set "
+         "STAGE` names its options. May be repeated")
+      ->allow_extra_args(false)
+      ->check(Complaint);
+}
+
+// What preset, file and settings say, before the flags of this command.
+v1::ColorizeSceneSpec Chosen(const ColorizeOptions& options) {
+  v1::ColorizeSceneSpec spec = ReadPreset(options.preset);
+  for (const std::string& setting : options.settings) SetOption(setting, &spec);
+  return spec;
 }
 
 fs::path Canonical(const fs::path& path) {
@@ -40,6 +95,7 @@ void ColorizeOptions::Check() const {
   if (bound && !benchmark) {
     throw InvalidArgument("--bound is a part of the score; it needs --benchmark");
   }
+  Chosen(*this);  // the preset's file can be read
   color.Check();
   for (const std::string& text : more_keys) ParseMoreKey(text);
   // What is drawn for a view that is known beforehand cannot be scored against that view.
@@ -56,8 +112,8 @@ MoreKey ParseMoreKey(const std::string& text) {
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
     throw InvalidArgument(
         "--more-key wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
-        "VIEW=POINTS.json, VIEW=auto); '" +
-        text + "' is not of that form");
+        "VIEW=POINTS.json, VIEW=auto); '{}' is not of that form",
+        text);
   }
   const std::string value = text.substr(equals + 1);
   MoreKey key{text.substr(0, equals), {}};
@@ -71,7 +127,7 @@ MoreKey ParseMoreKey(const std::string& text) {
   try {
     key.color.Check();
   } catch (const Error& e) {
-    throw Error(e.code(), "--more-key " + key.view + ": " + e.what());
+    throw Error(e.code(), "--more-key {}: {}", key.view, e.what());
   }
   return key;
 }
@@ -103,12 +159,12 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
                  o->more_keys,
                  "VIEW=COLOURED.png: a further key view, for what the first one does not show; its "
                  "colours never replace those of the key views before it. May be repeated");
-  app.add_option("--preset", o->preset, "How much time quality is worth: fast, best or paper")
-      ->capture_default_str()
-      ->check([](const std::string& name) -> std::string {
-        if (name == "fast" || name == "best" || name == "paper") return "";
-        return "'" + name + "' is unknown; known presets are fast, best and paper";
-      });
+  app.add_option("--preset",
+                 o->preset,
+                 fmt::format("How much time quality is worth: {}; or a file of your own (`color3d "
+                             "server presets NAME` prints one to start from)",
+                             PresetNames()))
+      ->capture_default_str();
   app.add_option("--time-budget",
                  o->time_budget_seconds,
                  "Shorten the preset's schedules to end in about this time: 90s, 5m, 1h")
@@ -124,21 +180,7 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");
-  app.add_option("--max-side", o->max_side_px, "Longer side of the working pictures, px")
-      ->check(CLI::Range(64, 4096));
-  app.add_option("--geometry-iterations", o->geometry_iterations, "Of luminance Gaussians")
-      ->check(CLI::Range(0, 100'000));
-  app.add_option("--max-gaussians", o->max_gaussians, "Hard cap")->check(CLI::Range(1, 10'000'000));
-  app.add_option("--colorizer-iterations", o->colorizer_iterations, "Of the scene's colorizer")
-      ->check(CLI::Range(0, 100'000));
-  app.add_option("--augment",
-                 o->augment,
-                 "Pictures made from the key view that the colorizer learns from, too (the paper: "
-                 "8); those in PHOTOS/augment/ always count")
-      ->check(CLI::Range(0, 64));
-  app.add_option("--augment-backend", o->augment_backend, "Model server that makes them");
-  app.add_option("--chroma-iterations", o->chroma_iterations, "After the closed-form start")
-      ->check(CLI::Range(0, 100'000));
+  DeclareOptionFlags(app, o);
 }
 
 v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene) {
@@ -151,19 +193,32 @@ v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene)
 v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene) {
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::ImportSceneSpec* import_scene = spec.mutable_import_scene();
+  *import_scene = Chosen(options).import_scene();
   if (options.hold_out || options.benchmark) import_scene->set_hold_out_every_eighth(true);
   return spec;
 }
 
-v1::JobSpec SelectSpec(const ColorizeOptions& options, const std::string& scene) {
+v1::JobSpec SelectSpec(Connection& connection,
+                       const ColorizeOptions& options,
+                       const std::string& scene) {
+  const v1::ColorizeSceneSpec chosen = Chosen(options);
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
-  select->set_encoder(options.encoder);
+  // A job of one stage takes the default preset by itself.
+  if (chosen.preset() > v1::PRESET_FAST) {
+    const auto info = connection.Call(
+        &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+    for (const v1::PresetInfo& preset : info.presets()) {
+      if (preset.options().preset() == chosen.preset()) {
+        *select = preset.options().select_key_view();
+      }
+    }
+  }
+  select->MergeFrom(chosen.select_key_view());
+  if (!options.encoder.empty()) select->set_encoder(options.encoder);
   if (!options.key_view.empty()) {
     select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
     select->set_view(options.key_view);
-  } else if (PresetOf(options.preset) == v1::PRESET_PAPER) {
-    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_ENTROPY);
   }
   return spec;
 }
@@ -171,7 +226,7 @@ v1::JobSpec SelectSpec(const ColorizeOptions& options, const std::string& scene)
 v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene) {
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
-  colorize->set_preset(PresetOf(options.preset));
+  *colorize = Chosen(options);
   if (!options.encoder.empty()) {
     colorize->mutable_select_key_view()->set_encoder(options.encoder);
     colorize->mutable_personalize()->set_encoder(options.encoder);
@@ -179,26 +234,8 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   if (options.time_budget_seconds > 0.0) {
     colorize->set_time_budget_seconds(options.time_budget_seconds);
   }
-  if (options.max_side_px) colorize->set_max_side_px(*options.max_side_px);
   if (options.hold_out || options.benchmark) {
     colorize->mutable_import_scene()->set_hold_out_every_eighth(true);
-  }
-  if (options.geometry_iterations) {
-    colorize->mutable_reconstruct_geometry()->set_iterations(*options.geometry_iterations);
-  }
-  if (options.max_gaussians) {
-    colorize->mutable_reconstruct_geometry()->set_max_gaussians(*options.max_gaussians);
-  }
-  if (options.colorizer_iterations) {
-    colorize->mutable_personalize()->set_iterations(*options.colorizer_iterations);
-  }
-  if (options.augment || !options.augment_backend.empty()) {
-    v1::GenerateAugmentationsSpec* augment = colorize->mutable_generate_augmentations();
-    if (options.augment) augment->set_samples(*options.augment);
-    augment->set_backend(options.augment_backend);
-  }
-  if (options.chroma_iterations) {
-    colorize->mutable_solve_chroma()->set_iterations(*options.chroma_iterations);
   }
   return spec;
 }
@@ -214,9 +251,10 @@ void RequireOutBesidePhotos(const fs::path& out, const PhotoFolder& folder) {
     if (inside) break;
   }
   if (!inside) return;
-  throw InvalidArgument("-o " + out.string() +
-                        " is where the photographs are: the results would be taken for photos the "
-                        "next time; name another folder");
+  throw InvalidArgument(
+      "-o {} is where the photographs are: the results would be taken for photos the next time; "
+      "name another folder",
+      out.string());
 }
 
 }  // namespace color3d::client

@@ -4,12 +4,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/commands/key_color_flags.h"
-#include "client/lib/photo_folder.h"
+#include "client/lib/photos/photo_folder.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {
@@ -22,20 +21,14 @@ struct ColorizeOptions {
   std::vector<std::string> more_keys;  // "VIEW=COLOURED_PICTURE", in order of importance
   std::string key_view;                // view name or stem; empty: selected
   std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
-  std::string preset = "fast";
+  std::string preset = "fast";  // of the server's, or a file of the user's own
   bool benchmark = false;
   bool bound = false;  // of the benchmark: upload all true colours, and score what they would give
   bool detach = false;
   bool hold_out = false;
-  uint64_t seed = 0;                 // 0: the server's default
-  double time_budget_seconds = 0.0;  // 0: none
-  std::optional<int> max_side_px;
-  std::optional<int> geometry_iterations;
-  std::optional<int> max_gaussians;
-  std::optional<int> colorizer_iterations;
-  std::optional<int> chroma_iterations;
-  std::optional<int> augment;   // pictures made from the key view
-  std::string augment_backend;  // generator by name; empty: the embedded surrogates
+  uint64_t seed = 0;                  // 0: the server's default
+  double time_budget_seconds = 0.0;   // 0: none
+  std::vector<std::string> settings;  // "stage.field=value", over what the preset says
 
   // What can be said without the server: throws Error when options do not go together or files
   // cannot be read.
@@ -62,8 +55,10 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* options);
 v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene);
 v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene);
 // The key view by the preset's strategy, or `options.key_view`.
-v1::JobSpec SelectSpec(const ColorizeOptions& options, const std::string& scene);
-// Everything but key view, key colour and truth.
+v1::JobSpec SelectSpec(Connection& connection,
+                       const ColorizeOptions& options,
+                       const std::string& scene);
+// Everything but key view, key colour and truth. Throws what reading the preset's file throws.
 v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene);
 
 // Throws Error{kInvalidArgument} when results in `out` would be taken for photos by the next run.

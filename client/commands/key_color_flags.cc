@@ -17,12 +17,12 @@ namespace {
 void RequireImage(const std::string& option, const std::string& file) {
   std::error_code none;
   if (!fs::is_regular_file(file, none)) {
-    throw Error(ErrorCode::kNotFound, option + ": there is no file " + file + "; give a picture");
+    throw Error(ErrorCode::kNotFound, "{}: there is no file {}; give a picture", option, file);
   }
   try {
     ProbeImage(ReadFile(file), file);
   } catch (const Error& e) {
-    throw Error(e.code(), option + ": " + e.what());
+    throw Error(e.code(), "{}: {}", option, e.what());
   }
 }
 
@@ -32,7 +32,7 @@ void RequirePoints(const std::string& file) {
   const std::string format = R"([{"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}, ...])";
   const auto json = nlohmann::json::parse(ReadFile(file), nullptr, /*allow_exceptions=*/false);
   if (!json.is_structured() || json.empty()) {
-    throw InvalidArgument("--hints: " + file + " is not a JSON list of points: " + format);
+    throw InvalidArgument("--hints: {} is not a JSON list of points: {}", file, format);
   }
 }
 
@@ -71,8 +71,10 @@ std::vector<std::string> Sources(const KeyColorFlags& flags) {
 void CheckCombination(const KeyColorFlags& flags) {
   const std::vector<std::string> sources = Sources(flags);
   if (sources.size() > 1) {
-    throw InvalidArgument(sources[0] + " and " + sources[1] +
-                          " do not go together: the key view takes its colour from one source");
+    throw InvalidArgument(
+        "{} and {} do not go together: the key view takes its colour from one source",
+        sources[0],
+        sources[1]);
   }
   const bool backend = !flags.backend.empty();
   if (!flags.mask.empty() && flags.edit.empty() && !backend) {
@@ -85,12 +87,11 @@ void CheckCombination(const KeyColorFlags& flags) {
         "name its values; leave it out");
   }
   if (backend && !flags.hints.empty() && !IsJson(flags.hints)) {
-    throw InvalidArgument("--hints for a backend must be points (a .json file), not " +
+    throw InvalidArgument("--hints for a backend must be points (a .json file), not {}",
                           flags.hints);
   }
   if (backend && flags.references.size() > 1) {
-    throw InvalidArgument("a backend takes one --reference, not " +
-                          std::to_string(flags.references.size()));
+    throw InvalidArgument("a backend takes one --reference, not {}", flags.references.size());
   }
   const bool takes_model =
       !backend && (flags.automatic || !flags.prompt.empty() || !flags.references.empty());

@@ -353,10 +353,12 @@ GeneratedPicture OutpaintQuadrant(const Image& lab,
                                   uint64_t seed,
                                   const CancellationToken& cancel) {
   if (lab.channels != 3 || std::min(lab.width, lab.height) < kMinSidePx) {
-    throw InvalidArgument("outpainting takes a Lab picture of at least " +
-                          std::to_string(kMinSidePx) + " px each way, got " +
-                          std::to_string(lab.width) + "x" + std::to_string(lab.height) + " with " +
-                          std::to_string(lab.channels) + " channels");
+    throw InvalidArgument(
+        "outpainting takes a Lab picture of at least {} px each way, got {}x{} with {} channels",
+        kMinSidePx,
+        lab.width,
+        lab.height,
+        lab.channels);
   }
   const bool flip_x = quadrant == Quadrant::kUpperLeft || quadrant == Quadrant::kLowerLeft;
   const bool flip_y = quadrant == Quadrant::kUpperLeft || quadrant == Quadrant::kUpperRight;

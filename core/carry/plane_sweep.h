@@ -25,6 +25,7 @@ struct PlaneSweepOptions {
   double large_step = 16.0;
   double edge_contrast = 8.0;
   void Validate() const;
+  bool operator==(const PlaneSweepOptions&) const = default;
 };
 
 struct DepthMap {

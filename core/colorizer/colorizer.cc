@@ -134,13 +134,13 @@ std::array<float, 2> MeanAb(const Image& ab) {
 void ColorizerOptions::Validate() const {
   const RangeCheck check("colorizer option");
   check("iterations", iterations, 0, 100000);
-  check("time_limit_seconds", time_limit_seconds, 0, 1e7);
+  check("time_limit_seconds", time_limit_seconds, 0, 86400);
   check("max_side_px", max_side_px, 64, 2048);
   check("crop_px", crop_px, 64, 1024);
   check("learning_rate", learning_rate, 0, 1);
   check("consistency_weight", consistency_weight, 0, 1e3);
   check("average_decay", average_decay, 0, 0.9999);
-  check("least_improvement", least_improvement, 0, 0.5);
+  check("min_improvement", min_improvement, 0, 0.5);
   check("adapter_stages", adapter_stages, -1, kMaxAdapterStages);
   check("decoder_width", decoder_width, 0.25, 4);
 }

@@ -17,10 +17,11 @@ namespace color3d {
 
 class SceneBatch;
 
+// The defaults are those of the service's preset "fast".
 struct ColorizerOptions {
   enum class Recipe {
-    kOurs,   // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
-    kPaper,  // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
+    kColor3d,  // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
+    kPaper,    // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
   };
   // Of matrix products and convolutions while training; the rest is float32 always.
   enum class Precision {
@@ -28,27 +29,28 @@ struct ColorizerOptions {
     kFloat32,
     kBfloat16,
   };
-  Recipe recipe = Recipe::kOurs;
+  Recipe recipe = Recipe::kColor3d;
   Precision precision = Precision::kAuto;
-  int iterations = 800;  // 0..100000
-  // > 0: the schedule is shortened to end after so many seconds of computing (in a batch a scene
-  // also waits for its turns, which does not count).
+  int iterations = 300;  // 0..100000
+  // > 0: the schedule is shortened to end after so many seconds of computing, at most 86400 (in a
+  // batch a scene also waits for its turns, which does not count).
   double time_limit_seconds = 0.0;
   int max_side_px = 400;            // of the key view during training, 64..2048
   int crop_px = 256;                // 64..1024, clipped to the picture
   double learning_rate = 0.0;       // at the start of the schedule, 0..1; 0: the recipe's
-  double consistency_weight = 0.0;  // the paper's A4 term; 0 = off
+  double consistency_weight = 0.0;  // the paper's A4 term, 0..1000; 0 = off
   // Exponential mean of the parameters over iterations, 0..0.9999; 0 = off. The better one of mean
   // and last is delivered.
   double average_decay = 0.99;
   // Training stops when the held-out error, smoothed over 3 of 20 points of the schedule, has
   // fallen by less than this share over the last 4; 0..0.5, 0 = never.
-  double least_improvement = 0.0;
+  double min_improvement = 0.0;
   // How many of the encoder's deepest stages get Conv-Adapters, 0..8; -1: ours none, the paper all.
   int adapter_stages = -1;
   double decoder_width = 1.0;  // factor on the decoder's channels, 0.25..4
   uint64_t seed = 1;
   void Validate() const;
+  bool operator==(const ColorizerOptions&) const = default;
 };
 
 struct ColorPrediction {

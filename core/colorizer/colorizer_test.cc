@@ -93,7 +93,7 @@ TEST(ColorizerTest, LearnsTheKeyView) {
 
 TEST(ColorizerTest, FileGivesBackTheSameColorizer) {
   const Key key = MakeKey(96, 80);
-  for (auto recipe : {ColorizerOptions::Recipe::kOurs, ColorizerOptions::Recipe::kPaper}) {
+  for (auto recipe : {ColorizerOptions::Recipe::kColor3d, ColorizerOptions::Recipe::kPaper}) {
     ColorizerOptions options = Quick(3);
     options.recipe = recipe;
     const auto trained = Train(key, options);

@@ -13,7 +13,7 @@
 #include "core/base/cancellation.h"
 #include "core/base/random.h"
 #include "core/colorizer/colorizer.h"
-#include "core/colorizer/tensor_file.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/encoder/tap_encoder.h"
 #include "core/matching/cell_features.h"
 #include "core/matching/cell_matches.h"

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
-#include "core/colorizer/tensor_file.h"
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"

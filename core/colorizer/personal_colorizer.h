@@ -20,7 +20,7 @@ class PersonalColorizer : public Colorizer {
   struct Parts {
     std::shared_ptr<const TapEncoder> encoder;
     ColorizerOptions options;
-    std::unique_ptr<PersonalModel> model;           // refers to *encoder
+    std::unique_ptr<PersonalModel> model;         // refers to *encoder
     std::unique_ptr<FeatureNeighbors> neighbors;  // may be null
     std::vector<TrainingPoint> curve;
     int threads = 0;  // that torch answers on; 0: what the machine has

@@ -1,8 +1,8 @@
 // Many scenes in one running batch (METHOD.md "All-in-one"): each scene's thread trains with its
 // own options, checkpoints, clock and cancellation; here they share one frozen encoder and take
 // turns at the compute slots. A turn goes to the project that has computed least, then to the scene
-// of it that has. Scenes join and leave at any time, and fail alone. Nothing of a scene's arithmetic
-// depends on the others: it gives the same bytes alone and in company. Thread-safe.
+// of it that has. Scenes join and leave at any time, and fail alone. Nothing of a scene's
+// arithmetic depends on the others: it gives the same bytes alone and in company. Thread-safe.
 //
 // Measured on 2 cores against stacking scenes on the batch axis: an encoder pass over stacked crops
 // and grouped convolutions over stacked decoders were no faster than a call for each scene.

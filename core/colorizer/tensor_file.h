@@ -1,6 +1,6 @@
 // Colorizer files and training checkpoints: named arrays and facts about them in one safetensors
 // file. Self-checking (SHA-256 over the whole file), so damaged or hostile bytes are refused before
-// anything is used. Torch in the interface. Pure functions, thread-safe.
+// anything is used. No torch. Pure functions, thread-safe.
 //
 // The header's __metadata__ holds "format" and "version" (TensorFormat), "facts" (JSON text) and
 // "sha256": of the file with 64 zeros in place of these digits.
@@ -11,7 +11,6 @@
 #include <string>
 #include <string_view>
 
-#include "core/colorizer/named_tensors.h"
 #include "core/weights/weight_map.h"
 
 namespace color3d {
@@ -42,18 +41,5 @@ std::string WriteTensorFile(const TensorFile& file, const TensorFormat& format);
 TensorFile ReadTensorFile(std::string_view bytes,
                           const TensorFormat& format,
                           const std::string& what);
-
-enum class StoredType { kFloat32, kFloat16 };
-void PutTensors(const NamedTensors& tensors,
-                const std::string& prefix,
-                StoredType type,
-                TensorFile* file);
-// Copies the arrays into the tensors, and takes them out of the file. Throws
-// Error{kInvalidArgument} naming `what` and the array that is missing, of another shape or not
-// finite.
-void TakeTensors(const NamedTensors& tensors,
-                 const std::string& prefix,
-                 const std::string& what,
-                 TensorFile* file);
 
 }  // namespace color3d

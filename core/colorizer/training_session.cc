@@ -12,8 +12,8 @@
 #include "core/base/error.h"
 #include "core/base/flush_to_zero.h"
 #include "core/color/difference.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/colorizer/options_json.h"
-#include "core/colorizer/tensor_file.h"
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_threads.h"
 
@@ -43,7 +43,7 @@ TrainingSession::TrainingSession(const std::vector<TrainingPicture>& pictures,
       model_(model),
       samples_(pictures, recipe.augment, options, model),
       adam_(model.parameters()),
-      early_stop_({.least_improvement = options.least_improvement}) {
+      early_stop_({.min_improvement = options.min_improvement}) {
   if (options_.average_decay > 0.0) {
     for (const auto& [name, tensor] : model_.parameters()) {
       average_.push_back(tensor.detach().clone());

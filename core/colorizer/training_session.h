@@ -41,7 +41,9 @@ class TrainingSession {
   // meanwhile; the result is the same.
   void Step(ProgressObserver& progress, ThreadPool* helpers);
   // Checkpoint() may be called now.
-  bool AtCheckpoint() const { return course_.iteration > 0 && course_.iteration % kGoodStateInterval == 0; }
+  bool AtCheckpoint() const {
+    return course_.iteration > 0 && course_.iteration % kGoodStateInterval == 0;
+  }
   std::string Checkpoint() const;
   // Leaves the better of the last and the averaged parameters in the model. Once, at the end.
   void Conclude(ProgressObserver& progress);

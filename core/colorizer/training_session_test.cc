@@ -149,7 +149,7 @@ TEST_F(TrainingTest, PicturesAreDrawnByTheirShare) {
 
 TEST_F(TrainingTest, ConsistencyAndPaperRecipesTrain) {
   for (bool paper : {false, true}) {
-    options_.recipe = paper ? ColorizerOptions::Recipe::kPaper : ColorizerOptions::Recipe::kOurs;
+    options_.recipe = paper ? ColorizerOptions::Recipe::kPaper : ColorizerOptions::Recipe::kColor3d;
     options_.consistency_weight = 1.0;
     options_.iterations = 4;
     recipe_ = RecipeFor(options_);
@@ -198,7 +198,7 @@ TEST_F(TrainingTest, AHelpingThreadChangesNothing) {
 
 TEST_F(TrainingTest, StopsEarlyWhenTheCurveIsFlatAlsoAfterResuming) {
   options_.iterations = 400;
-  options_.least_improvement = 0.5;
+  options_.min_improvement = 0.5;
   OneCheckpoint checkpoints;
   NullObserver progress;
   PersonalModel model = MakeModel();

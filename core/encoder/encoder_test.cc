@@ -64,7 +64,7 @@ TEST(EncoderTest, ThreadsGetTheSameAnswer) {
   }
 }
 
-TEST(EncoderFileTest, TakesTheConvNextOfADdcolor) {
+TEST(EncoderTest, TakesTheConvNextOfADdcolor) {
   const ScratchFolder folder;
   const auto path = folder.path() / "ddcolor.safetensors";
   WriteFileAtomic(
@@ -77,21 +77,21 @@ TEST(EncoderFileTest, TakesTheConvNextOfADdcolor) {
   EXPECT_EQ(deep.height, 10);
 }
 
-TEST(EncoderFileTest, TakesAClip) {
+TEST(EncoderTest, TakesAClip) {
   const ScratchFolder folder;
   const auto path = folder.path() / "clip.safetensors";
   WriteFileAtomic(path, SerializeSafetensors(SyntheticClipWeights({}, 1), true));
   EXPECT_EQ(Encoder::FromWeightFile(path)->Describe(Image(100, 70, 1, 30.0f)).size(), 32u);
 }
 
-TEST(EncoderFileTest, SaysWhatItKnowsWhenTheFileIsAnother) {
+TEST(EncoderTest, SaysWhatItKnowsWhenTheFileIsAnother) {
   const ScratchFolder folder;
   const auto path = folder.path() / "other.safetensors";
   WriteFileAtomic(path, SerializeSafetensors({{"x", {{1}, {0.0f}}}}, false));
   EXPECT_THROW(Encoder::FromWeightFile(path), Error);
 }
 
-TEST(EncoderFileTest, AllFormatsAreTheSameEncoder) {
+TEST(EncoderTest, AllFormatsAreTheSameEncoder) {
   if (!std::filesystem::exists(Golden("ddcolor_mini.safetensors"))) GTEST_SKIP() << "no data";
   const auto expected = Encoder::FromWeightFile(Golden("ddcolor_mini.safetensors"))->digest();
   EXPECT_EQ(Encoder::FromWeightFile(Golden("ddcolor_mini_params.pth"))->digest(), expected);

@@ -1,4 +1,4 @@
-// One multigrid cycle on the aggregated graphs (aggregate_graph.h). Internal to the grid solver.
+// One multigrid cycle on the aggregated graphs (aggregate_graph.h). For this folder only.
 #pragma once
 
 #include <Eigen/Cholesky>

@@ -1,6 +1,6 @@
 // Coarse levels of the grid solver: weighted graphs whose nodes are small clusters of strongly
 // connected nodes of the level above (aggregation multigrid, Notay 2010; clusters follow the
-// strongest edge, so that no cluster straddles an edge of the picture). Internal to the solver.
+// strongest edge, so that no cluster straddles an edge of the picture). For this folder only.
 #pragma once
 
 #include <cstdint>

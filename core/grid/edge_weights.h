@@ -1,5 +1,5 @@
-// How strongly the colours of neighbouring pixels hang together, by their luminances. Internal to
-// core/keycolor.
+// How strongly the colours of neighbouring pixels hang together, by their luminances. Pure,
+// thread-safe.
 #pragma once
 
 #include "core/base/image.h"

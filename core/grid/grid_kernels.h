@@ -1,5 +1,5 @@
 // The loops over all pixels of the grid solver, for the instruction set in use
-// (core/simd/instruction_set.h). Internal.
+// (core/simd/instruction_set.h). For this folder only.
 #pragma once
 
 #include <array>

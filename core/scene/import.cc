@@ -8,7 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/scene/formats/colmap_model.h"
-#include "core/scene/formats/transforms_json.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/lens.h"
 #include "core/scene/normalise.h"
 #include "core/scene/photos.h"
@@ -89,8 +89,7 @@ void HoldOut(ImportResult* result) {
 void ImportPhotos(const fs::path& scene_folder,
                   const fs::path& scratch_folder,
                   const ImportOptions& options,
-                  ProgressObserver& progress,
-                  const CancellationToken& cancel,
+                  const RunControl& run,
                   ImportResult* result) {
   std::vector<Photo> photos = ListPhotos(scene_folder);
   result->photos_found = static_cast<int>(photos.size());
@@ -98,8 +97,8 @@ void ImportPhotos(const fs::path& scene_folder,
     throw InvalidArgument("{} contains no photographs (JPEG, PNG, TIFF)", scene_folder.string());
   }
   for (size_t i = 0; i < photos.size(); ++i) {
-    cancel.ThrowIfCancelled();
-    progress.OnProgress(
+    run.cancel.ThrowIfCancelled();
+    run.progress.OnProgress(
         static_cast<int64_t>(i), static_cast<int64_t>(photos.size()), "checking photos");
     ProbePhoto(scene_folder, &photos[i]);
   }
@@ -109,8 +108,7 @@ void ImportPhotos(const fs::path& scene_folder,
         scene_folder.string(),
         photos[0].name);
   }
-  SfmResult sfm =
-      RunStructureFromMotion(photos, scene_folder, scratch_folder, options, progress, cancel);
+  SfmResult sfm = RunStructureFromMotion(photos, scene_folder, scratch_folder, options, run);
   result->scene = std::move(sfm.scene);
   result->sfm = std::move(sfm.report);
   result->ran_structure_from_motion = true;
@@ -148,16 +146,14 @@ void ImportOptions::Validate() const {
   check("sfm_max_features", sfm_max_features, 512, 16384);
   check("sfm_neighbors", sfm_neighbors, 2, 100);
   check("sfm_timeout", sfm_timeout.count(), 1, 7 * 24 * 3600);
-  check("threads", threads, 0, 1024);
 }
 
 ImportResult ImportScene(const fs::path& scene_folder,
                          const fs::path& scratch_folder,
                          const ImportOptions& options,
-                         ProgressObserver& progress,
-                         const CancellationToken& cancel) {
+                         const RunControl& run) {
   options.Validate();
-  cancel.ThrowIfCancelled();
+  run.cancel.ThrowIfCancelled();
   std::error_code error;
   if (!fs::is_directory(scene_folder, error)) {
     throw Error(ErrorCode::kNotFound, "{} is not a folder", scene_folder.string());
@@ -171,10 +167,10 @@ ImportResult ImportScene(const fs::path& scene_folder,
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;
     result.scene =
-        LoadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
+        ReadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
     WarnOfUnposedPhotos(scene_folder, &result);
   } else {
-    ImportPhotos(scene_folder, scratch_folder, options, progress, cancel, &result);
+    ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }
   Scene& scene = result.scene;
   if (scene.views.size() < kMinTrainingViews) {

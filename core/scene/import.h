@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancellation.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/scene/scene.h"
 
 namespace color3d {
@@ -28,8 +27,8 @@ struct ImportOptions {
   SfmPairs sfm_pairs = SfmPairs::kPlanned;
   int sfm_neighbors = 8;  // 2..100, similar photos that each photo is matched with
   std::chrono::seconds sfm_timeout{3600};
-  int threads = 0;        // 0: all
   void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const ImportOptions&) const = default;
 };
 
 // What structure-from-motion did.
@@ -63,22 +62,10 @@ struct ImportResult {
 // it may have failed), points that all lie behind their cameras or absurdly far away. Scenes far
 // from the origin are recentred, very small and very large ones rescaled (normalise.h); points with
 // fewer than 2 observations are dropped; poses without points get 20 000 seeded random ones. Warns
-// of cameras whose intrinsics do not fit their observations.
+// of cameras whose intrinsics do not fit their observations. Keeps no checkpoints.
 ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const std::filesystem::path& scratch_folder,
                          const ImportOptions& options,
-                         ProgressObserver& progress,
-                         const CancellationToken& cancel);
-
-// Readers on their own. The returned views have `image_file` relative to `scene_folder`. `warnings`
-// (may be null) receives what is wrong with cameras whose intrinsics do not fit their observations.
-Scene ReadColmapModel(const std::filesystem::path& model_folder,
-                      const std::filesystem::path& scene_folder,
-                      std::vector<std::string>* warnings = nullptr);
-Scene ReadTransformsJson(const std::filesystem::path& json_file,
-                         const std::filesystem::path& scene_folder);
-// Writers for round trips and for users who want to look at the poses elsewhere.
-void WriteColmapText(const Scene& scene, const std::filesystem::path& model_folder);
-void WriteTransformsJson(const Scene& scene, const std::filesystem::path& json_file);
+                         const RunControl& run);
 
 }  // namespace color3d

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "tests/support/quiet_run.h"
+#include "tests/support/scene_writers.h"
 #include "tests/support/test_exif.h"
 #include "tests/support/test_scenes.h"
 
@@ -17,7 +19,7 @@ using ::testing::HasSubstr;
 class Import : public testing::Test {
  protected:
   ImportResult Run() {
-    return ImportScene(folder_.path(), scratch_.path(), options_, progress_, {});
+    return ImportScene(folder_.path(), scratch_.path(), options_, run_.ReportingTo(progress_));
   }
   std::string Said() {
     return Refusal([&] { Run(); });
@@ -30,6 +32,7 @@ class Import : public testing::Test {
   ScratchFolder scratch_;
   ImportOptions options_;
   RecordingObserver progress_;
+  QuietRun run_;
 };
 
 TEST_F(Import, BadInputsSayWhatIsWrong) {
@@ -43,7 +46,7 @@ TEST_F(Import, BadInputsSayWhatIsWrong) {
   const std::string png = EncodePng8(GradientPhoto(48, 32, 1));
   WriteFileAtomic(folder_.path() / "notes.jpg", png.substr(0, png.size() / 2));
   EXPECT_THAT(Said(), HasSubstr("notes.jpg is truncated"));
-  EXPECT_THROW(ImportScene("/no/such/folder", scratch_.path(), options_, progress_, {}), Error);
+  EXPECT_THROW(ImportScene("/no/such/folder", scratch_.path(), options_, run_.control()), Error);
 }
 
 TEST_F(Import, OptionsAreChecked) {
@@ -58,9 +61,6 @@ TEST_F(Import, OptionsAreChecked) {
   options_ = {};
   options_.sfm_neighbors = 1;
   EXPECT_THAT(Said(), HasSubstr("sfm_neighbors is 1; it must be 2 to 100"));
-  options_ = {};
-  options_.threads = -1;
-  EXPECT_THAT(Said(), HasSubstr("threads"));
 }
 
 TEST_F(Import, ColmapWinsOverTransforms) {

@@ -5,7 +5,10 @@
 
 #include <cmath>
 
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
+#include "tests/support/quiet_run.h"
+#include "tests/support/scene_writers.h"
 #include "tests/support/test_scenes.h"
 
 namespace color3d {
@@ -99,7 +102,7 @@ TEST(NormaliseScene, PointsBehindAllCamerasAreRefused) {
 
 class ImportedScene : public testing::Test {
  protected:
-  ImportResult Import() { return ImportScene(folder_.path(), scratch_.path(), {}, progress_, {}); }
+  ImportResult Import() { return ImportScene(folder_.path(), scratch_.path(), {}, run_.control()); }
   // Text model of a scene, with one string of one file replaced.
   void Write(const Scene& scene,
              const std::string& file = "",
@@ -115,7 +118,7 @@ class ImportedScene : public testing::Test {
   }
   ScratchFolder folder_;
   ScratchFolder scratch_;
-  RecordingObserver progress_;
+  QuietRun run_;
 };
 
 TEST_F(ImportedScene, WritersGoBackToTheWorld) {

@@ -8,9 +8,11 @@
 #include <map>
 
 #include "core/scene/formats/colmap_model.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "core/scene/lens.h"
 #include "core/scene/view_images.h"
+#include "tests/support/quiet_run.h"
 #include "tests/support/test_scenes.h"
 
 namespace color3d {
@@ -88,10 +90,10 @@ TEST_P(RealScenes, ImportIsQuickAndSane) {
   const fs::path folder = Folder(GetParam());
   if (!fs::exists(folder / "sparse/0")) GTEST_SKIP() << "no " << folder;
   const ScratchFolder scratch;
-  NullObserver progress;
+  QuietRun run;
   ImportOptions options;
   options.hold_out_every_eighth = true;
-  const ImportResult result = ImportScene(folder, scratch.path(), options, progress, {});
+  const ImportResult result = ImportScene(folder, scratch.path(), options, run.control());
   EXPECT_EQ(result.layout, SceneLayout::kColmap);
   EXPECT_TRUE(result.undistorted);
   EXPECT_FALSE(result.ran_structure_from_motion);

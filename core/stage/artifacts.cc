@@ -71,12 +71,26 @@ int ReadKeyView(const StageContext& context, const Scene& scene) {
   }
 }
 
+nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& name) {
+  try {
+    return nlohmann::ordered_json::parse(context.ReadInput(name));
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument("{} is damaged: {}", name, e.what());
+  }
+}
+
 CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height) {
   const std::string name = ViewArtifact(artifact::kCarried, view, ".png");
   if (!context.HasInput(name)) return {Image(width, height, 2), Image(width, height, 1)};
   const AbMap map = DecodeAbPng(context.ReadInput(name), name);
   if (map.ab.width == width && map.ab.height == height) return {map.ab, map.confidence};
   return {Resize(map.ab, width, height), Resize(map.confidence, width, height)};
+}
+
+int ColoredSide(const StageContext& context, const View& view) {
+  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  const ImageInfo info = ProbeImage(context.ReadInput(name), name);
+  return std::max(info.width, info.height);
 }
 
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height) {

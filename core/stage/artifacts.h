@@ -1,6 +1,7 @@
 // Formats of what stages hand to each other; the names are in core/catalogue/artifacts.h.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 
@@ -34,12 +35,17 @@ struct ImportFacts {
 std::string ImportFactsToJson(const ImportFacts& facts);
 ImportFacts ImportFactsFromJson(std::string_view json);
 
-// The chosen key view by name, with its index in the scene.
-int ReadKeyView(const StageContext& context, const Scene& scene);
 Scene ReadScene(const StageContext& context);
+// Index of the chosen key view in the scene.
+int ReadKeyView(const StageContext& context, const Scene& scene);
+// Throws Error{kInvalidArgument} with the artifact's name when it is no JSON.
+nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& name);
 
 // What was carried into a view, resized; nothing where there is no such artifact.
 CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height);
+
+// Longer side at which a view was coloured, px.
+int ColoredSide(const StageContext& context, const View& view);
 
 // Colour map of one view from its artifact, resized to width x height px.
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height);

@@ -21,11 +21,8 @@ const char* LayoutName(SceneLayout layout) {
 
 void RunImportScene(const ImportOptions& options, StageContext& context) {
   options.Validate();
-  const ImportResult result = ImportScene(context.scene_folder(),
-                                          context.scratch_folder(),
-                                          options,
-                                          context.progress(),
-                                          context.cancel());
+  const ImportResult result =
+      ImportScene(context.scene_folder(), context.scratch_folder(), options, context.control());
   CheckStemsAreUnique(result.scene);
   for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
   ImportFacts facts;

@@ -1,4 +1,5 @@
-// Number formats of weight files and their conversion to float32. Pure functions.
+// Number formats of weight files and their conversion to float32. Pure functions. For this
+// folder only.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // The few opcodes of Python's pickle that PyTorch's state dicts and TorchScript modules consist of,
 // read into inert values. Nothing is executed: the only callables known are those of the list in
 // pickle_callables.cc, each answered by building a value. Format: Python's pickletools.py; opcodes
-// up to protocol 4.
+// up to protocol 4. For this folder only.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // PyTorch's zip archives: state dicts (.pth, pytorch_model.bin) and TorchScript modules (.pt), read
-// without PyTorch and without executing anything in them.
+// without PyTorch and without executing anything in them. For this folder only.
 #pragma once
 
 #include "core/weights/byte_source.h"

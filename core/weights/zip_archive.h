@@ -1,6 +1,6 @@
 // The directory of a zip archive as PyTorch writes it. Arrays are stored, not compressed, so each
 // is a range of the file; the source code in TorchScript archives is compressed, and never looked
-// at. Zip64 is read.
+// at. Zip64 is read. For this folder only.
 #pragma once
 
 #include <cstdint>

@@ -72,12 +72,13 @@ std::shared_ptr<const Encoder> CoreLiveEngine::FindEncoder(const std::string& na
   }
   const auto file = setup_.models.files.find(name);
   if (file == setup_.models.files.end()) {
-    throw ServiceError(
-        ErrorCode::kFailedPrecondition,
-        "UNKNOWN_MODEL",
-        "the colorizer was trained with the encoder '" + name +
-            "', which this server does not have; it has: " + NamesOf(setup_.models.files) +
-            "; start it with --model " + name + "=FILE");
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "UNKNOWN_MODEL",
+                       "the colorizer was trained with the encoder '{}', which this server does "
+                       "not have; it has: {}; start it with --model {}=FILE",
+                       name,
+                       NamesOf(setup_.models.files),
+                       name);
   }
   std::weak_ptr<const Encoder>& known = encoders_[digests_.Of(file->second).sha256];
   std::shared_ptr<const Encoder> encoder = known.lock();

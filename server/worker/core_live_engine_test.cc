@@ -111,7 +111,7 @@ TEST_F(CoreLiveEngineTest, MixedExamplesDoNotMixAndLuminanceIsKept) {
   }
 }
 
-TEST_F(CoreLiveEngineTest, ColourPicturesAndSixteenBitsAreTakenAndSizesObeyed) {
+TEST_F(CoreLiveEngineTest, ColorPicturesAndSixteenBitsAreTakenAndSizesObeyed) {
   const std::string red = Example(40, 15);
   std::vector<Request> requests = {
       ByExample(red, EncodePng8(SrgbFromLab(TintedLab(-20, 20)))),

@@ -16,9 +16,8 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
 
 }  // namespace
 
-ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec, int threads) {
+ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec) {
   ImportOptions options;
-  options.threads = threads;
   options.hold_out_every_eighth = spec.hold_out_every_eighth();
   if (spec.has_sfm_max_image_side_px())
     options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
@@ -91,17 +90,19 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   if (spec.has_consistency_weight()) options.consistency_weight = spec.consistency_weight();
   options.precision = PrecisionFrom(spec.precision());
   if (spec.has_average_decay()) options.average_decay = spec.average_decay();
-  if (spec.has_least_improvement()) options.least_improvement = spec.least_improvement();
+  if (spec.has_min_improvement()) options.min_improvement = spec.min_improvement();
   return options;
 }
 
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
   CarryColorOptions options;
-  options.max_side_px = spec.has_max_side_px() ? spec.max_side_px() : kDefaultMaxSidePx;
-  if (spec.has_max_reprojection_px()) options.carry.flow_tolerance_px = spec.max_reprojection_px();
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  if (spec.has_flow_tolerance_px()) options.carry.flow_tolerance_px = spec.flow_tolerance_px();
   if (spec.has_depth_tolerance()) options.carry.depth_tolerance = spec.depth_tolerance();
-  if (spec.has_depth_side_px()) options.sweep_side_px = spec.depth_side_px();
-  if (spec.has_depth_sources()) options.sweep_sources = spec.depth_sources();
+  if (spec.has_luminance_tolerance())
+    options.carry.luminance_tolerance = spec.luminance_tolerance();
+  if (spec.has_depth_side_px()) options.depth_side_px = spec.depth_side_px();
+  if (spec.has_depth_sources()) options.depth_sources = spec.depth_sources();
   return options;
 }
 
@@ -146,7 +147,7 @@ RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec) {
   RenderOptions options;
   options.views.assign(spec.views().begin(), spec.views().end());
   if (spec.has_max_views()) options.max_views = spec.max_views();
-  options.max_side_px = spec.has_max_side_px() ? spec.max_side_px() : kDefaultMaxSidePx;
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
   return options;
 }
 

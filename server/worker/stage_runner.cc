@@ -156,7 +156,7 @@ class CoreStageRunner : public StageRunner {
     const JobSpec& spec = run.spec;
     switch (spec.stage_case()) {
       case JobSpec::kImportScene:
-        return RunImportScene(ImportOptionsFrom(spec.import_scene(), run.threads), context);
+        return RunImportScene(ImportOptionsFrom(spec.import_scene()), context);
       case JobSpec::kSelectKeyView:
         return RunSelectKeyView(SelectOptionsFrom(spec.select_key_view()), context);
       case JobSpec::kColorizeKeyView:

@@ -12,9 +12,11 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
+#include "tests/support/quiet_run.h"
 
 namespace color3d {
 namespace {
@@ -26,6 +28,7 @@ struct PosesArguments {
   std::string pairs = "planned";
   std::string json_file;
   std::string keep_folder;
+  int threads = 0;
   ImportOptions options;
 };
 
@@ -131,15 +134,16 @@ void RunPoses(PosesArguments& args) {
   CopyPhotos(args.scene_folder, photos.path());
   const fs::path work = args.keep_folder.empty() ? scratch.path() : fs::path(args.keep_folder);
   WarningList observer;
-  const CancellationToken cancel;
+  QuietRun run(args.threads);
   const auto start = std::chrono::steady_clock::now();
-  const ImportResult imported = ImportScene(photos.path(), work, args.options, observer, cancel);
+  const ImportResult imported =
+      ImportScene(photos.path(), work, args.options, run.ReportingTo(observer));
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const SfmReport& sfm = imported.sfm;
   nlohmann::ordered_json result{{"scene", args.scene_folder},
                                 {"pairs", args.pairs},
-                                {"threads", args.options.threads},
+                                {"threads", args.threads},
                                 {"seconds", seconds},
                                 {"cpu_seconds", CpuSeconds()},
                                 {"seconds_photos", sfm.photos_seconds},
@@ -172,7 +176,7 @@ void AddPosesCommand(CLI::App& app) {
   command->add_option("--pairs", args->pairs)->check(CLI::IsMember({"planned", "exhaustive"}));
   command->add_option("--neighbors", args->options.sfm_neighbors, "similar photos per photo");
   command->add_option("--max-features", args->options.sfm_max_features, "per photo");
-  command->add_option("--threads", args->options.threads, "0: all");
+  command->add_option("--threads", args->threads, "0: all");
   command->add_option("--keep", args->keep_folder, "keeps COLMAP's files and sfm.log here");
   command->add_option("--json", args->json_file, "default: standard output");
   command->callback([args] { RunPoses(*args); });

@@ -13,6 +13,7 @@
 #include "core/stage/artifacts.h"
 #include "core/stage/stages.h"
 #include "tests/support/procedural_scene.h"
+#include "tests/support/quiet_run.h"
 
 namespace color3d {
 namespace {
@@ -103,8 +104,8 @@ class SelectTest : public ::testing::Test {
 
   // The scene, with its files in a folder of our own to which others can be added.
   Scene Import(const fs::path& folder) {
-    NullObserver silent;
-    Scene scene = ImportScene(folder, scratch_.path(), {}, silent, {}).scene;
+    QuietRun run;
+    Scene scene = ImportScene(folder, scratch_.path(), {}, run.control()).scene;
     scene_folder_ = scratch_.path() / ("of " + folder.filename().string());
     fs::create_directories(scene_folder_);
     fs::create_directory_symlink(folder, scene_folder_ / "photos");
@@ -148,8 +149,8 @@ TEST_F(SelectTest, BadFramesOfRealScenesNeverWin) {
 TEST_F(SelectTest, OnlyNewPhotosAreComputedAndTheAnswerIsTheSame) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 6, .width = 160, .height = 120});
-  NullObserver silent;
-  Scene scene = ImportScene(scene_folder_, scratch_.path(), {}, silent, {}).scene;
+  QuietRun run;
+  Scene scene = ImportScene(scene_folder_, scratch_.path(), {}, run.control()).scene;
   Scene fewer = scene;
   fewer.views.pop_back();
   fewer.points.clear();
@@ -175,8 +176,8 @@ TEST_F(SelectTest, OnlyNewPhotosAreComputedAndTheAnswerIsTheSame) {
 TEST_F(SelectTest, TracksFallBackWithAReasonAndTheRankingIsAPicture) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 5, .width = 160, .height = 120});
-  NullObserver silent;
-  Scene scene = ImportScene(scene_folder_, scratch_.path(), {}, silent, {}).scene;
+  QuietRun run;
+  Scene scene = ImportScene(scene_folder_, scratch_.path(), {}, run.control()).scene;
   const json tracks = json::parse(Select(scene, KeyViewStrategy::kTracks));
   EXPECT_EQ(tracks.at("strategy"), "tracks");
   EXPECT_FALSE(tracks.contains("fallback"));
@@ -194,8 +195,8 @@ TEST_F(SelectTest, TracksFallBackWithAReasonAndTheRankingIsAPicture) {
 TEST_F(SelectTest, AnUnreadablePhotoIsNamed) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 3, .width = 160, .height = 120});
-  NullObserver silent;
-  Scene scene = ImportScene(scene_folder_, scratch_.path(), {}, silent, {}).scene;
+  QuietRun run;
+  Scene scene = ImportScene(scene_folder_, scratch_.path(), {}, run.control()).scene;
   WriteFileAtomic(scene_folder_ / scene.views[1].image_file, "no image");
   try {
     Select(scene, KeyViewStrategy::kCoverage);

@@ -12,8 +12,8 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/scene/import.h"
 #include "tests/support/room.h"
+#include "tests/support/scene_writers.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

@@ -11,6 +11,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/import.h"
+#include "tests/support/quiet_run.h"
 
 namespace color3d {
 namespace {
@@ -96,15 +97,14 @@ TEST(ProceduralScene, TheSamePointHasTheSameColourInTwoViews) {
 
 TEST(ProceduralScene, WrittenSceneIsReadBackWithItsPoses) {
   const ScratchFolder folder;
-  NullObserver quiet;
-  const CancellationToken cancel;
+  QuietRun run;
   for (const auto poses :
        {ProceduralSceneOptions::Poses::kColmap, ProceduralSceneOptions::Poses::kTransforms}) {
     ProceduralSceneOptions options = Small();
     options.poses = poses;
     const auto path = folder.path() / (poses == ProceduralSceneOptions::Poses::kColmap ? "c" : "t");
     WriteProceduralScene(path, options);
-    const ImportResult result = ImportScene(path, folder.path() / "scratch", {}, quiet, cancel);
+    const ImportResult result = ImportScene(path, folder.path() / "scratch", {}, run.control());
     ASSERT_EQ(result.scene.views.size(), 6u);
     const ProceduralScene room(options);
     for (int i = 0; i < 6; ++i) {

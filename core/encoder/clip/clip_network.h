@@ -1,6 +1,6 @@
 // The two towers of CLIP (Radford et al. 2021): a vision transformer for pictures, a causal
-// transformer for text, into one space. Torch in the interface; used inside core/encoder only.
-// Immutable after construction, thread-safe.
+// transformer for text, into one space. Torch in the interface. Immutable after construction,
+// thread-safe. For this folder only.
 #pragma once
 
 #include <torch/types.h>

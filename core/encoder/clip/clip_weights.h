@@ -1,4 +1,5 @@
-// CLIP's weights under OpenAI's names, whatever the file's own layout. No torch.
+// CLIP's weights under OpenAI's names, whatever the file's own layout. No torch. For this folder
+// only.
 #pragma once
 
 #include "core/weights/weight_map.h"

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/encoder/embedded/embedded_weights.h"
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
@@ -260,14 +259,6 @@ Image ConvNext::DeepFeatures(const Image& luminance) const {
     at::NoGradGuard no_grad;
     return ImageFromTensor(DeepTap(luminance, kDeepSidePx, stage));
   });
-}
-
-std::shared_ptr<const Encoder> Encoder::Embedded() {
-  // Built anew for each caller: unpacking 4 M weights takes some milliseconds, and nothing global
-  // outlives the caller.
-  const ConvNextConfig config;
-  return std::make_shared<const ConvNext>(
-      config, EmbeddedWeights("encoder."), "embedded ConvNeXt, " + config.ToString());
 }
 
 }  // namespace color3d

@@ -1,4 +1,5 @@
-// Bounds-checked integers out of a byte string. A plain view: the bytes must outlive it.
+// Bounds-checked integers out of a byte string. A plain view: the bytes must outlive it. For
+// this folder only.
 #pragma once
 
 #include <cstddef>

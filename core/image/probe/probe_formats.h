@@ -1,4 +1,4 @@
-// The three formats behind ProbeImage, for probe*.cc and orientation.cc only.
+// The three formats behind ProbeImage. For this folder only.
 #pragma once
 
 #include <fmt/core.h>

@@ -111,7 +111,7 @@ HintSolution Solve(const Image& luminance,
 
 void HintOptions::Validate() const {
   const RangeCheck check("hint option");
-  check("sigma", sigma, 1e-3, 1e3);
+  check("sigma", sigma, 0.1, 50.0);
   check("max_side_px", max_side_px, 64, 16384);
   check("tolerance", tolerance, 1e-6, 0.1);
   check("max_iterations", max_iterations, 1, 1000000);

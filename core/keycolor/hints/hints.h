@@ -31,11 +31,12 @@ struct ColorHint {
 };
 
 struct HintOptions {
-  double sigma = 0.5;       // L difference (0..100) at which two neighbours half agree, > 0
+  double sigma = 0.5;       // L difference (0..100) at which two neighbours half agree, 0.1..50
   int max_side_px = 8192;   // larger photos are solved at this size, then upsampled guided by L
   double tolerance = 5e-4;  // relative residual of the conjugate gradients
   int max_iterations = 200;
   void Validate() const;
+  bool operator==(const HintOptions&) const = default;
 };
 
 struct HintSolution {

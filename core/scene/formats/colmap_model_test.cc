@@ -8,8 +8,9 @@
 #include <fstream>
 #include <limits>
 
-#include "core/scene/import.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/photos.h"
+#include "tests/support/scene_writers.h"
 #include "tests/support/test_scenes.h"
 
 namespace color3d {

@@ -4,7 +4,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/scene/formats/colmap_model.h"
-#include "core/scene/import.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/photos.h"
 #include "core/scene/reprojection.h"
 

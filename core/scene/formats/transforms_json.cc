@@ -1,5 +1,3 @@
-#include "core/scene/formats/transforms_json.h"
-
 #include <fmt/core.h>
 
 #include <Eigen/Dense>
@@ -10,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "core/scene/photos.h"
 
@@ -212,7 +211,7 @@ bool ReadFrame(const FrameFields& fields, const fs::path& scene_folder, View* vi
 
 }  // namespace
 
-Scene LoadTransformsJson(const fs::path& json_file,
+Scene ReadTransformsJson(const fs::path& json_file,
                          const fs::path& scene_folder,
                          std::vector<std::string>* warnings) {
   const json root = ParseRoot(json_file);
@@ -247,7 +246,7 @@ Scene LoadTransformsJson(const fs::path& json_file,
                           scene_folder.string(),
                           missing.empty() ? "" : fmt::format(" (missing: {}, ...)", missing[0]));
   }
-  if (!missing.empty()) {
+  if (!missing.empty() && warnings != nullptr) {
     warnings->push_back(
         fmt::format("{} of the {} photos that {} names do not exist ({}, ...) and were left out",
                     missing.size(),
@@ -256,11 +255,6 @@ Scene LoadTransformsJson(const fs::path& json_file,
                     missing[0]));
   }
   return scene;
-}
-
-Scene ReadTransformsJson(const fs::path& json_file, const fs::path& scene_folder) {
-  std::vector<std::string> warnings;
-  return LoadTransformsJson(json_file, scene_folder, &warnings);
 }
 
 }  // namespace color3d

@@ -1,11 +1,10 @@
-#include "core/scene/formats/transforms_json.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/scene/import.h"
+#include "core/scene/formats/scene_readers.h"
+#include "tests/support/scene_writers.h"
 #include "tests/support/test_scenes.h"
 
 namespace color3d {

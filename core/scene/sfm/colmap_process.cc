@@ -45,23 +45,14 @@ class LogCounter {
 
 }  // namespace
 
-ColmapProcess::ColmapProcess(fs::path log,
-                             const ImportOptions& options,
-                             ProgressObserver& progress,
-                             const CancellationToken& cancel)
-    : log_(std::move(log)),
-      options_(options),
-      progress_(progress),
-      cancel_(cancel),
-      deadline_(Clock::now() + options.sfm_timeout) {}
+ColmapProcess::ColmapProcess(fs::path log, std::chrono::seconds timeout, const RunControl& run)
+    : log_(std::move(log)), timeout_(timeout), run_(run), deadline_(Clock::now() + timeout) {}
 
 void ColmapProcess::Note(const std::string& line) const {
   std::ofstream(log_, std::ios::app) << "color3d: " << line << "\n";
 }
 
-std::string ColmapProcess::Threads() const {
-  return std::to_string(options_.threads > 0 ? options_.threads : -1);
-}
+std::string ColmapProcess::Threads() const { return std::to_string(run_.pool.thread_count()); }
 
 int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPhase& phase) {
   SubprocessOptions child;
@@ -72,7 +63,7 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   child.timeout = std::chrono::duration_cast<std::chrono::seconds>(deadline_ - Clock::now());
   if (child.timeout.count() <= 0) ThrowTooSlow();
   LogCounter counter(log_, phase.mark);
-  progress_.OnProgress(0, phase.total, phase.message);
+  run_.progress.OnProgress(0, phase.total, phase.message);
   // The child runs on a thread of its own, so that progress is reported from ours, and with a token
   // of its own, so that it stops as well when an observer throws.
   CancellationToken stop;
@@ -81,11 +72,11 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   int64_t reported = 0;
   try {
     while (running.wait_for(std::chrono::milliseconds(200)) != std::future_status::ready) {
-      cancel_.ThrowIfCancelled();
+      run_.cancel.ThrowIfCancelled();
       const int64_t done = std::min(counter.Count(), phase.total);
       if (done == reported) continue;
       reported = done;
-      progress_.OnProgress(
+      run_.progress.OnProgress(
           done, phase.total, fmt::format("{} {}/{}", phase.message, done, phase.total));
     }
   } catch (...) {
@@ -113,7 +104,7 @@ void ColmapProcess::ThrowTooSlow() const {
   throw Error(ErrorCode::kDeadlineExceeded,
               "finding camera positions took longer than {} s; use fewer photos, fewer features or "
               "a longer time limit",
-              options_.sfm_timeout.count());
+              timeout_.count());
 }
 
 std::string ColmapProcess::LastLogLine() const {

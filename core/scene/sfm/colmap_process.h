@@ -8,9 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancellation.h"
-#include "core/base/progress.h"
-#include "core/scene/import.h"
+#include "core/base/run_control.h"
 
 namespace color3d {
 
@@ -23,11 +21,8 @@ struct ColmapPhase {
 
 class ColmapProcess {
  public:
-  // The arguments outlive the object. The clock of options.sfm_timeout starts now.
-  ColmapProcess(std::filesystem::path log,
-                const ImportOptions& options,
-                ProgressObserver& progress,
-                const CancellationToken& cancel);
+  // What `run` refers to outlives the object. The clock of the time limit starts now.
+  ColmapProcess(std::filesystem::path log, std::chrono::seconds timeout, const RunControl& run);
 
   const std::filesystem::path& log() const { return log_; }
   // Adds a line of our own to the log.
@@ -46,9 +41,8 @@ class ColmapProcess {
   std::string LastLogLine() const;
 
   std::filesystem::path log_;
-  const ImportOptions& options_;
-  ProgressObserver& progress_;
-  const CancellationToken& cancel_;
+  std::chrono::seconds timeout_;
+  RunControl run_;
   std::chrono::steady_clock::time_point deadline_;
 };
 

@@ -181,13 +181,12 @@ class Solver {
 PairPlan Plan(const std::vector<Photo>& photos,
               const FeatureImages& copies,
               const ImportOptions& options,
-              ThreadPool& pool,
-              const CancellationToken& cancel) {
+              const RunControl& run) {
   const int count = static_cast<int>(photos.size());
   if (copies.features.empty()) return {AllPairs(count), "all pairs, as asked for"};
   std::vector<std::string> names;
   for (const Photo& photo : photos) names.push_back(photo.name);
-  return PlanPairs(CompareAll(copies.features, pool, cancel),
+  return PlanPairs(CompareAll(copies.features, run.pool, run.cancel),
                    SequenceOrder(names).value_or(std::vector<int>()),
                    options.sfm_neighbors);
 }
@@ -262,12 +261,10 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const fs::path& scene_folder,
                                  const fs::path& scratch_folder,
                                  const ImportOptions& options,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel) {
+                                 const RunControl& run) {
   RemoveEarlierRun(scratch_folder);
   const SfmWorkspace work{scratch_folder};
-  ColmapProcess colmap(scratch_folder / "sfm.log", options, progress, cancel);
-  ThreadPool pool(options.threads);
+  ColmapProcess colmap(scratch_folder / "sfm.log", options.sfm_timeout, run);
   SfmReport report;
   FeatureImages copies;
   PairPlan plan;
@@ -278,14 +275,13 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                 work.images(),
                                 options.sfm_max_image_side_px,
                                 LocalFeatureCount(options, photos.size()),
-                                pool,
-                                progress,
-                                cancel);
-    plan = Plan(photos, copies, options, pool, cancel);
+                                run);
+    plan = Plan(photos, copies, options, run);
   }
   report.plan = plan.reason;
   colmap.Note("planned " + plan.reason);
-  const ColmapModel model = Solver(colmap, work, copies, options, progress, &report).Solve(plan);
+  const ColmapModel model =
+      Solver(colmap, work, copies, options, run.progress, &report).Solve(plan);
   RequirePlaced(model.images.size(), photos.size(), colmap.log());
   SfmResult result = SceneOfModel(model, photos, copies.names);
   result.report = std::move(report);

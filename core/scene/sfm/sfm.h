@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancellation.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/scene/import.h"
 #include "core/scene/photos.h"
 
@@ -31,7 +30,6 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& scratch_folder,
                                  const ImportOptions& options,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel);
+                                 const RunControl& run);
 
 }  // namespace color3d

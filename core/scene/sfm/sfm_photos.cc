@@ -67,9 +67,7 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
                                  const fs::path& folder,
                                  int max_side_px,
                                  int local_features,
-                                 ThreadPool& pool,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel) {
+                                 const RunControl& run) {
   FeatureImages written;
   const int64_t count = static_cast<int64_t>(photos.size());
   written.names.resize(photos.size());
@@ -77,7 +75,7 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
   std::vector<std::string> folders(photos.size());
   std::vector<FeatureImages::Group> seen(photos.size());
   const auto write = [&](int64_t i) {
-    cancel.ThrowIfCancelled();
+    run.cancel.ThrowIfCancelled();
     const Photo& photo = photos[i];
     const Image image = FeatureImage(ReadImage(scene_folder / photo.file), max_side_px);
     const double focal_px = photo.focal_px * image.width / photo.width;
@@ -92,10 +90,10 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     }
   };
   // Observers are called from one thread; large photos take memory, hence not too many at a time.
-  const int64_t batch = std::min(pool.thread_count(), kMaxPhotosInMemory);
+  const int64_t batch = std::min(run.pool.thread_count(), kMaxPhotosInMemory);
   for (int64_t begin = 0; begin < count; begin += batch) {
-    progress.OnProgress(begin, count, fmt::format("reading photos {}/{}", begin + 1, count));
-    pool.ForEach(std::min(batch, count - begin), [&](int64_t i, int) { write(begin + i); });
+    run.progress.OnProgress(begin, count, fmt::format("reading photos {}/{}", begin + 1, count));
+    run.pool.ForEach(std::min(batch, count - begin), [&](int64_t i, int) { write(begin + i); });
   }
   std::map<std::string, size_t> group_of_folder;
   for (size_t i = 0; i < photos.size(); ++i) {

@@ -5,10 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancellation.h"
 #include "core/base/image.h"
-#include "core/base/parallel.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/image/local_features.h"
 #include "core/scene/photos.h"
 
@@ -39,8 +37,6 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
                                  const std::filesystem::path& folder,
                                  int max_side_px,
                                  int local_features,
-                                 ThreadPool& pool,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel);
+                                 const RunControl& run);
 
 }  // namespace color3d

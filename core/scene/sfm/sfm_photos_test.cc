@@ -9,6 +9,7 @@
 
 #include "core/base/files.h"
 #include "core/image/codec.h"
+#include "tests/support/quiet_run.h"
 #include "tests/support/test_exif.h"
 #include "tests/support/test_scenes.h"
 
@@ -45,10 +46,9 @@ TEST(FeatureImages, AreGroupedByCamera) {
   add("d.jpg", 80, 0);
   add("e.jpg", 100, 28);
   EXPECT_NEAR(photos[0].focal_px, 28.0 * 100.0 / 43.2666, 0.1);
-  ThreadPool pool(2);
-  NullObserver progress;
-  const FeatureImages written = WriteFeatureImages(
-      photos, folder.path(), scratch.path() / "copies", 40, 50, pool, progress, {});
+  QuietRun run(2);
+  const FeatureImages written =
+      WriteFeatureImages(photos, folder.path(), scratch.path() / "copies", 40, 50, run.control());
   ASSERT_EQ(written.groups.size(), 4u);
   EXPECT_EQ(written.groups[0].names,
             (std::vector<std::string>{written.names[0], written.names[1]}));

@@ -9,7 +9,9 @@
 #include <filesystem>
 #include <thread>
 
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
+#include "tests/support/quiet_run.h"
 #include "tests/support/test_exif.h"
 #include "tests/support/test_scenes.h"
 
@@ -99,13 +101,13 @@ class Sfm : public testing::Test {
     if (!HasColmap()) GTEST_SKIP() << "colmap is not installed";
   }
   ImportResult Run() {
-    return ImportScene(folder_.path(), scratch_.path(), options_, progress_, cancel_);
+    return ImportScene(folder_.path(), scratch_.path(), options_, run_.ReportingTo(progress_));
   }
   ScratchFolder folder_;
   ScratchFolder scratch_;
   ImportOptions options_;
   RecordingObserver progress_;
-  CancellationToken cancel_;
+  QuietRun run_;
 };
 
 TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
@@ -204,7 +206,7 @@ TEST_F(Sfm, CancellationStopsTheChild) {
   }
   std::thread canceller([this] {
     std::this_thread::sleep_for(std::chrono::milliseconds(400));
-    cancel_.Cancel();
+    run_.cancel().Cancel();
   });
   EXPECT_THAT(Refusal([&] { Run(); }), HasSubstr("cancelled"));
   canceller.join();

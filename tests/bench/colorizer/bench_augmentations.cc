@@ -17,7 +17,7 @@ struct AugmentationsArguments {
   int threads = 2;
   uint64_t seed = 1;
   bool no_geometry = false;
-  GeometryOptions geometry;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
   AugmentationOptions options;
 };
 

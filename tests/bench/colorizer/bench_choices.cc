@@ -13,10 +13,9 @@
 #include "core/base/files.h"
 #include "core/color/lab_planes.h"
 #include "core/colorizer/scene_batch.h"
+#include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
 #include "core/stage/artifacts.h"
-#include "core/stage/view_color.h"
-#include "core/stage/view_scores.h"
 #include "tests/bench/colorizer/bench_encoder.h"
 #include "tests/bench/colorizer/choice_results.h"
 #include "tests/bench/commands.h"
@@ -216,7 +215,8 @@ class ChoiceBench {
       const CarriedColor carried =
           ReadCarried(context, scene_.views[view], luminance.width, luminance.height);
       point->alone += ChromaError(truth, JoinLab(luminance, colorizer.Colorize(luminance)));
-      const FusedColor fused = ColorOfView(colorizer, luminance, carried, pool_, cancel_);
+      const FusedColor fused =
+          ColorOfView(luminance, carried, SourcesOf(colorizer), pool_, cancel_);
       point->delivered += ChromaError(truth, JoinLab(luminance, fused.ab));
       ++point->views;
     }

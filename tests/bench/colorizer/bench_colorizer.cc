@@ -17,7 +17,7 @@
 #include "core/image/probe/probe.h"
 #include "core/report/curves.h"
 #include "core/stage/artifacts.h"
-#include "core/stage/training_pictures.h"
+#include "core/stage/formats/training_pictures.h"
 #include "tests/bench/colorizer/bench_encoder.h"
 #include "tests/bench/colorizer/colorizer_memory.h"
 #include "tests/bench/commands.h"
@@ -44,7 +44,7 @@ struct ColorizerArguments {
   std::string pictures_folder;
   std::string kinds;
   double picture_share = kGeneratedShare;
-  ColorizerOptions options;
+  ColorizerOptions options{.iterations = 800};
 };
 
 // A folder of colour photos, whose middle one (or `key`) is the key view.
@@ -292,7 +292,7 @@ void AddColorizerCommand(CLI::App& app) {
   command->add_option("--crop", args->options.crop_px, "px");
   command->add_option("--seed", args->options.seed);
   command->add_option("--average-decay", args->options.average_decay, "0: off");
-  command->add_option("--least-improvement", args->options.least_improvement, "0: no early stop");
+  command->add_option("--min-improvement", args->options.min_improvement, "0: no early stop");
   command->add_option("--precision", args->precision, "auto, float32 or bfloat16")
       ->check(CLI::IsMember({"auto", "float32", "bfloat16"}))
       ->capture_default_str();

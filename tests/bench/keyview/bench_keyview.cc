@@ -18,6 +18,7 @@
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
+#include "tests/support/quiet_run.h"
 
 namespace color3d {
 namespace {
@@ -66,8 +67,8 @@ class SceneFolder {
       return scene;
     }
     const ScratchFolder scratch;
-    NullObserver silent;
-    scene = ImportScene(folder, scratch.path(), {}, silent, {}).scene;
+    QuietRun run;
+    scene = ImportScene(folder, scratch.path(), {}, run.control()).scene;
     const std::string link = Link(folder);
     for (View& view : scene.views) view.image_file = link + "/" + view.image_file;
     return scene;

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "core/base/error.h"
-#include "core/colorizer/tensor_file.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/encoder/image_tensors.h"
 #include "tests/support/random_features.h"
 

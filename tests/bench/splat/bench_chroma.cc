@@ -15,11 +15,12 @@
 #include "core/color/lab.h"
 #include "core/metrics/quality.h"
 #include "core/splat/chroma/chroma_fit.h"
+#include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/raster/render.h"
-#include "core/splat/training/trainer.h"
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
+#include "tests/support/quiet_run.h"
 
 namespace color3d {
 namespace {
@@ -37,8 +38,8 @@ struct ChromaArguments {
   int memory_budget_mib = 2048;
   std::string runs = "closed,cg,adam-preset,adam";
   std::vector<int> degrees = {0, 1};
-  GeometryOptions geometry;
-  ChromaOptions chroma;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
+  ChromaOptions chroma{.iterations = 600};
 };
 
 // Of all threads: what is left of a timing on a machine that others use too.
@@ -111,11 +112,11 @@ class ChromaBench {
 
  private:
   ImportResult Import() const {
-    NullObserver silent;
+    QuietRun run;
     const ScratchFolder scratch;
     ImportOptions options;
     options.hold_out_every_eighth = true;
-    return ImportScene(args_.scene_folder, scratch.path(), options, silent, CancellationToken());
+    return ImportScene(args_.scene_folder, scratch.path(), options, run.control());
   }
 
   void TrainOrReadGeometry(const ViewImages& images) {
@@ -125,8 +126,9 @@ class ChromaBench {
     }
     NullObserver silent;
     NoCheckpoints none;
-    geometry_ = TrainGeometry(
-        imported_.scene, images, args_.geometry, pool_, none, silent, CancellationToken());
+    geometry_ = TrainGeometry(GeometryProblemOf(imported_.scene, images),
+                              args_.geometry,
+                              {pool_, none, silent, CancellationToken()});
     if (!args_.geometry_file.empty()) {
       WriteFileAtomic(args_.geometry_file, SerializeGaussians(geometry_));
     }
@@ -194,7 +196,7 @@ class ChromaBench {
     NoCheckpoints none;
     SolverCurves curves([&] { return since_start() - paused; });
     const GaussianModel model =
-        FitChromaOn(geometry_, problem_, options, pool_, none, curves, CancellationToken());
+        FitChroma(geometry_, problem_, options, {pool_, none, curves, CancellationToken()});
     const double seconds = since_start() - paused;
     const double cpu_seconds = CpuSeconds() - cpu_start - cpu_paused;
     Json last = Score(model);

@@ -1,0 +1,26 @@
+// Posed scenes in the formats of other programs. Every photo that a model names is looked for below
+// `scene_folder`; the returned views have `image_file` relative to it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.h"
+
+namespace color3d {
+
+// A COLMAP model, text or binary. `warnings` (may be null) receives what is wrong with cameras
+// whose intrinsics do not fit their observations. Throws Error{kInvalidArgument} naming the file
+// and the place in it.
+Scene ReadColmapModel(const std::filesystem::path& model_folder,
+                      const std::filesystem::path& scene_folder,
+                      std::vector<std::string>* warnings = nullptr);
+
+// The transforms.json of NeRF and Nerfstudio. `warnings` (may be null) receives which frames were
+// left out because their photo does not exist. Throws as ReadColmapModel.
+Scene ReadTransformsJson(const std::filesystem::path& json_file,
+                         const std::filesystem::path& scene_folder,
+                         std::vector<std::string>* warnings = nullptr);
+
+}  // namespace color3d

@@ -1,0 +1,29 @@
+// What a long computation is given when nobody listens and nothing is kept, for tests and
+// benchmarks.
+#pragma once
+
+#include "core/base/run_control.h"
+
+namespace color3d {
+
+class QuietRun {
+ public:
+  // `threads`: as ThreadPool's.
+  explicit QuietRun(int threads = 0) : pool_(threads) {}
+
+  ThreadPool& pool() { return pool_; }
+  CancellationToken& cancel() { return cancel_; }
+  RunControl control() { return {pool_, checkpoints_, progress_, cancel_}; }
+  // With an observer, which must outlive the computation.
+  RunControl ReportingTo(ProgressObserver& progress) {
+    return {pool_, checkpoints_, progress, cancel_};
+  }
+
+ private:
+  ThreadPool pool_;
+  NoCheckpoints checkpoints_;
+  NullObserver progress_;
+  CancellationToken cancel_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,15 @@
+// Scenes written in the formats that core/scene/formats reads, for round trips and made-up
+// captures.
+#pragma once
+
+#include <filesystem>
+
+#include "core/scene/scene.h"
+
+namespace color3d {
+
+// cameras.txt, images.txt and points3D.txt.
+void WriteColmapText(const Scene& scene, const std::filesystem::path& model_folder);
+void WriteTransformsJson(const Scene& scene, const std::filesystem::path& json_file);
+
+}  // namespace color3d
