@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
-#           <- matching (of encoder) <- {keyview, keycolor, augment, carry, colorizer, splat, metrics, report} <- stage
+#           <- {keyview, augment, carry, splat, metrics, report, matching <- {keycolor, colorizer}} <- stage
 #   server: store <- {planning, storage} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers and SQL never below the server. What tests
 # (*_test.cc) set up is not held against their folder; the product never includes tests/.
@@ -30,6 +30,14 @@ forbid() {
   shift
   bad=$(grep -rnE "#include [<\"]($pattern)" "$@" --include='*.h' --include='*.cc' || true)
   [ -z "$bad" ] || complain "not allowed here:" "$bad"
+}
+# exposes FOLDER REGEX: the product's sources outside of FOLDER include only these headers of it, without
+# their ".h". Tests and benchmarks may look inside.
+exposes() {
+  local bad
+  bad=$(grep -rnE "#include \"$1/" core server client --include='*.h' --include='*.cc' |
+    grep -vE "^$1/|^[^:]*_test\.cc:|#include \"$1/($2)\.h\"" || true)
+  [ -z "$bad" ] || complain "$1 keeps to itself:" "$bad"
 }
 
 allow core/base 'core/base'
@@ -69,6 +77,13 @@ allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(store|planning|storage|ops|rpc)'
 allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
+
+exposes core/colorizer 'colorizer|scene_batch|scene_colorizers'
+exposes core/keycolor/hints 'hints'
+exposes core/keycolor/references 'reference'
+exposes core/keycolor/words 'prompt|prompt_phrases'
+exposes core/keycolor/automatic 'automatic'
+exposes core/keycolor/external 'remote|script'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/stage server client \

@@ -12,7 +12,7 @@ namespace {
 
 using FeatureNeighborsTest = SmallColorizerTest;
 
-TEST_F(FeatureNeighborsTest, NeighborsOfTheKeyViewHaveItsColours) {
+TEST_F(FeatureNeighborsTest, NeighborsOfTheKeyViewHaveItsColors) {
   FeatureNeighborsOptions options;
   options.whitening.tap_shares = {1.0, 1.0, 1.0, 1.0, 1.0};
   const FeatureNeighbors neighbors(encoder_, pictures_, options, Random(1), {});

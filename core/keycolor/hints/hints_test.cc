@@ -54,7 +54,7 @@ Image TwoHalves(int width, int height) {
   return luminance;
 }
 
-TEST(HintsTest, ColourStopsAtALuminanceEdge) {
+TEST(HintsTest, ColorStopsAtALuminanceEdge) {
   const Image luminance = TwoHalves(80, 60);
   const HintSolution solution = Spread(luminance, {{10, 30, 2, 50, 20}, {70, 30, 2, -40, 10}});
   for (int y = 0; y < 60; ++y) {

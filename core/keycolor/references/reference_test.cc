@@ -68,7 +68,7 @@ double MeanError(const Image& ab, const Image& lab) {
   return sum / static_cast<double>(ab.PlaneSize());
 }
 
-TEST(ReferenceTest, ColoursFollowTexture) {
+TEST(ReferenceTest, ColorsFollowTexture) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution =

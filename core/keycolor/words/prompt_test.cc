@@ -68,7 +68,7 @@ PromptSolution Solve(const Image& l, const std::string& prompt, const Image& res
   return SolveWith({}, l, prompt, rest);
 }
 
-TEST(PromptTest, PhrasesColourTheirRegions) {
+TEST(PromptTest, PhrasesColorTheirRegions) {
   const Image l = Scene(320, 240);
   const PromptSolution solution = Solve(l, "blue sky over green grass, and a red wall");
   ASSERT_EQ(solution.regions.size(), 3u);
@@ -104,7 +104,7 @@ TEST(PromptTest, AThingThatIsNotThereIsReportedAndNotForced) {
   }
 }
 
-TEST(PromptTest, WhatNoPhraseNamesTakesTheRestsColour) {
+TEST(PromptTest, WhatNoPhraseNamesTakesTheRestsColor) {
   // The model knows no unicorn: its text is near the "nothing" feature, which no patch shows.
   const Image l = Scene(320, 240);
   Image rest(320, 240, 2);

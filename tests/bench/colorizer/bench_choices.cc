@@ -56,7 +56,7 @@ double Number(const std::string& name, const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
   if (text.empty() || *end != '\0') {
-    throw InvalidArgument("the choice " + name + " is \"" + text + "\", which is no number");
+    throw InvalidArgument("the choice {} is \"{}\", which is no number", name, text);
   }
   return value;
 }
@@ -64,7 +64,7 @@ double Number(const std::string& name, const std::string& text) {
 ColorizerOptions::Precision PrecisionOf(const std::string& name) {
   if (name == "float32") return ColorizerOptions::Precision::kFloat32;
   if (name == "bfloat16") return ColorizerOptions::Precision::kBfloat16;
-  throw InvalidArgument("the precision \"" + name + "\" is neither float32 nor bfloat16");
+  throw InvalidArgument("the precision \"{}\" is neither float32 nor bfloat16", name);
 }
 
 using Setter = std::function<void(const std::string& value, Choice* choice)>;
@@ -117,7 +117,7 @@ Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
   if (equals == std::string::npos || setter == Setters().end()) {
     std::string known;
     for (const auto& [name, set] : Setters()) known += ", " + name + "=";
-    throw InvalidArgument("the choice \"" + text + "\" is none of default" + known);
+    throw InvalidArgument("the choice \"{}\" is none of default{}", text, known);
   }
   choice.value = text.substr(equals + 1);
   setter->second(choice.value, &choice);
@@ -245,7 +245,7 @@ class ChoiceBench {
         wanted.push_back(sample);
       }
     }
-    if (wanted.empty()) throw InvalidArgument("no pictures of kind " + choice.pictures);
+    if (wanted.empty()) throw InvalidArgument("no pictures of kind {}", choice.pictures);
     facts["samples"] = wanted;
     const fs::path file = folder / artifact::kAugmentationFacts;
     WriteFileAtomic(file, facts.dump());

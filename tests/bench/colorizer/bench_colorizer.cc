@@ -54,7 +54,7 @@ struct Photos {
     for (const std::string& name : ListFiles(folder)) {
       if (HasImageExtension(name)) names.push_back(name);
     }
-    if (names.size() < 2) throw InvalidArgument(folder.string() + " holds fewer than 2 photos");
+    if (names.size() < 2) throw InvalidArgument("{} holds fewer than 2 photos", folder.string());
     key = wanted_key.empty() ? names[names.size() / 2] : wanted_key;
   }
   Image Lab(const std::string& name) const {

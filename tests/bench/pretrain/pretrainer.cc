@@ -191,8 +191,8 @@ PretrainLosses Pretrainer::Step() {
     bad_steps_ = 0;
   } else if (++bad_steps_ >= kMaxBadSteps) {
     throw Error(ErrorCode::kInternal,
-                "pre-training diverged at iteration " + std::to_string(iteration_) +
-                    ": lower --learning-rate");
+                "pre-training diverged at iteration {}: lower --learning-rate",
+                iteration_);
   }
   ++iteration_;
   return losses;
