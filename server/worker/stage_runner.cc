@@ -165,7 +165,7 @@ class CoreStageRunner : public StageRunner {
         return RunGenerateAugmentations(AugmentationOptionsFrom(spec.generate_augmentations()),
                                         context);
       case JobSpec::kPersonalize:
-        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()),
+        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), context.seed()),
                               context,
                               spec.personalize().encoder());
       case JobSpec::kCarryColor:

@@ -79,7 +79,6 @@ void RunPipeline(const PipelineArguments& args) {
     });
   }
   ColorizerOptions colorizer = args.colorizer;
-  colorizer.threads = args.threads;
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
   pipeline.Run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
   pipeline.Run(kind::kColorizeViews,

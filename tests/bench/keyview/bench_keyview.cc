@@ -109,16 +109,14 @@ class ErrorOfKeys {
     ColorizerOptions options;
     options.iterations = 0;
     options.max_side_px = args_.side_px;
-    options.threads = args_.threads;
+    ThreadPool pool(args_.threads);
     NullObserver silent;
     NoCheckpoints none;
     const auto colorizer =
         TrainColorizer(encoder_,
                        {{"key view", LuminanceOfLab(truth_[key]), ChromaOfLab(truth_[key])}},
                        options,
-                       none,
-                       silent,
-                       {});
+                       {pool, none, silent, {}});
     double sum = 0.0;
     int count = 0;
     for (int test : tests_) {

@@ -1,60 +1,23 @@
-// The parts that only core/colorizer sees: model, optimiser, trainer, feature neighbours.
+#include "core/colorizer/training_session.h"
+
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/colorizer/adam.h"
-#include "core/colorizer/feature_neighbours.h"
-#include "core/colorizer/padding.h"
-#include "core/colorizer/personal_model.h"
-#include "core/colorizer/recipe.h"
-#include "core/colorizer/training_session.h"
-#include "core/encoder/image_tensors.h"
-#include "tests/support/random_features.h"
+#include "tests/support/small_colorizer.h"
 
 namespace color3d {
 namespace {
 
-// A small encoder and decoder: the same code in milliseconds.
-ConvNextConfig SmallEncoder() {
-  ConvNextConfig config;
-  config.dims = {16, 16};
-  config.depths = {1, 1};
-  return config;
-}
-
-class TrainingTest : public testing::Test {
+class TrainingTest : public SmallColorizerTest {
  protected:
-  TrainingTest() : encoder_(SmallEncoder(), RandomFeatureWeights(SmallEncoder(), 1), "small") {
-    at::set_num_threads(1);
+  TrainingTest() {
     options_.iterations = 60;
     options_.crop_px = 64;
-    Image& luminance = pictures_[0].luminance;
-    Image& ab = pictures_[0].ab;
-    for (int y = 0; y < 64; ++y) {
-      for (int x = 0; x < 96; ++x) {
-        const bool left = x < 48;
-        luminance.At(0, y, x) = 50.0f + 20.0f * std::sin(left ? 0.9f * x : 0.9f * y);
-        ab.At(0, y, x) = left ? 40.0f : -40.0f;
-        ab.At(1, y, x) = left ? 30.0f : -10.0f;
-      }
-    }
-  }
-
-  torch::Tensor KeyTensor() const {
-    return PadToMultiple(TensorFromImage(pictures_[0].luminance), kPadMultiple);
-  }
-  PersonalModel MakeModel() const {
-    Random random(1);
-    PersonalModel model(encoder_, recipe_.model, {0.0f, 0.1f}, random);
-    model.FreezeStatistics(KeyTensor());
-    model.RequireGradients(true);
-    return model;
   }
 
   struct Outcome {
@@ -85,10 +48,7 @@ class TrainingTest : public testing::Test {
     }
   }
 
-  ConvNext encoder_;
-  TrainingRecipe recipe_;
   ColorizerOptions options_;
-  std::vector<TrainingPicture> pictures_{{"key", Image(96, 64, 1), Image(96, 64, 2)}};
 };
 
 struct Warnings : NullObserver {
@@ -117,15 +77,6 @@ struct OneCheckpoint : CheckpointStore {
   bool die_after_save = false;
 };
 
-TEST_F(TrainingTest, AdaptersStartAsTheFrozenEncoderExactly) {
-  recipe_.model.adapter_stages = 8;
-  PersonalModel model = MakeModel();
-  torch::NoGradGuard no_grad;
-  const auto adapted = model.Taps(KeyTensor());
-  const auto frozen = encoder_.Taps(encoder_.Input(KeyTensor()));
-  for (size_t i = 0; i < frozen.size(); ++i) EXPECT_TRUE(torch::equal(adapted[i], frozen[i]));
-}
-
 TEST_F(TrainingTest, AdaptersLearnWhileTheEncoderStaysFrozen) {
   recipe_.model.adapter_stages = 8;
   PersonalModel model = MakeModel();
@@ -139,24 +90,6 @@ TEST_F(TrainingTest, AdaptersLearnWhileTheEncoderStaysFrozen) {
   const auto adapted = model.Taps(KeyTensor());
   EXPECT_TRUE(torch::equal(before[1], after[1]));
   EXPECT_FALSE(torch::equal(adapted[1], after[1]));
-}
-
-TEST_F(TrainingTest, FrozenStatisticsAreTheKeyViews) {
-  PersonalModel model = MakeModel();
-  torch::NoGradGuard no_grad;
-  // The prediction for a part of the picture does not depend on the rest of it: with instance norm
-  // it would. Compared away from the border of the crop.
-  const torch::Tensor whole = torch::rand({1, 1, 64, 128}) * 100.0;
-  torch::Tensor other = whole.clone();
-  other.slice(3, 96, 128).fill_(5.0);
-  const torch::Tensor x = model.Forward(whole).slice(3, 0, 20);
-  const torch::Tensor y = model.Forward(other).slice(3, 0, 20);
-  EXPECT_LT((x - y).abs().max().item<double>(), 1e-6);
-  recipe_.model.instance_norm = true;
-  PersonalModel paper = MakeModel();
-  const torch::Tensor u = paper.Forward(whole).slice(3, 0, 20);
-  const torch::Tensor v = paper.Forward(other).slice(3, 0, 20);
-  EXPECT_GT((u - v).abs().max().item<double>(), 1e-5);
 }
 
 TEST_F(TrainingTest, LossFalls) {
@@ -282,17 +215,6 @@ TEST_F(TrainingTest, StopsEarlyWhenTheCurveIsFlatAlsoAfterResuming) {
   ExpectSameParameters(model, resumed);
 }
 
-TEST(EarlyStopTest, ComparesMeansOfThreeOverAWindowOfFour) {
-  EarlyStop falling({.min_improvement = 0.01});
-  double error = 10.0;
-  for (int i = 0; i < 40; ++i) EXPECT_FALSE(falling.Add(error *= 0.99)) << i;
-  EarlyStop flat({.min_improvement = 0.01});
-  for (int i = 0; i < 6; ++i) EXPECT_FALSE(flat.Add(5.0)) << i;
-  EXPECT_TRUE(flat.Add(5.0));
-  EarlyStop off({.min_improvement = 0.0});
-  for (int i = 0; i < 40; ++i) EXPECT_FALSE(off.Add(5.0 + i));
-}
-
 TEST_F(TrainingTest, TheAverageIsDeliveredWhenItIsBetter) {
   NoCheckpoints none;
   Warnings averaged, plain;
@@ -366,82 +288,6 @@ TEST_F(TrainingTest, TimeLimitShortensTheSchedule) {
   EXPECT_LT(trainer.curve.back().iteration, 100000);
   EXPECT_GE(trainer.curve.back().seconds, 0.5);
   EXPECT_LT(trainer.curve.back().seconds, 10.0);
-}
-
-TEST(AdamTest, AgreesWithTheFormulaInFloat64) {
-  torch::Tensor x = torch::tensor({3.0f, -2.0f}).requires_grad_(true);
-  Adam adam({{"x", x}});
-  double value[2] = {3.0, -2.0}, m[2] = {}, v[2] = {};
-  for (int step = 1; step <= 20; ++step) {
-    x.square().sum().backward();
-    double gradient[2] = {2.0 * value[0], 2.0 * value[1]};
-    const double norm = std::hypot(gradient[0], gradient[1]);
-    EXPECT_NEAR(adam.Step(0.1, 1.5), norm, 1e-4);
-    const double clip = norm > 1.5 ? 1.5 / norm : 1.0;
-    for (int i = 0; i < 2; ++i) {
-      m[i] = 0.9 * m[i] + 0.1 * gradient[i] * clip;
-      v[i] = 0.999 * v[i] + 0.001 * gradient[i] * gradient[i] * clip * clip;
-      value[i] -= 0.1 * (m[i] / (1.0 - std::pow(0.9, step))) /
-                  (std::sqrt(v[i] / (1.0 - std::pow(0.999, step))) + 1e-8);
-      EXPECT_NEAR(x[i].item<double>(), value[i], 1e-4);
-    }
-  }
-}
-
-TEST(AdamTest, ANonFiniteGradientChangesNothing) {
-  torch::Tensor x = torch::tensor({3.0f}).requires_grad_(true);
-  Adam adam({{"x", x}});
-  (x * std::numeric_limits<float>::quiet_NaN()).sum().backward();
-  EXPECT_FALSE(std::isfinite(adam.Step(0.1, 1.0)));
-  EXPECT_EQ(x.item<float>(), 3.0f);
-  EXPECT_EQ(adam.steps(), 0);
-}
-
-TEST_F(TrainingTest, NeighboursOfTheKeyViewHaveItsColours) {
-  FeatureNeighboursOptions options;
-  options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
-  const FeatureNeighbours neighbours(encoder_, pictures_, options, Random(1), {});
-  const torch::Tensor l = KeyTensor();
-  const NeighbourColors found =
-      neighbours.Lookup(encoder_.Taps(encoder_.Input(l)), l, pictures_[0].luminance.height);
-  ASSERT_EQ(found.ab.sizes(), (std::vector<int64_t>{2, 16, 24}));
-  // Away from the border between the two colours.
-  EXPECT_NEAR(found.ab[0].slice(1, 2, 9).mean().item<double>(), 40.0, 2.0);
-  EXPECT_NEAR(found.ab[0].slice(1, 15, 22).mean().item<double>(), -40.0, 2.0);
-  EXPECT_LT(found.distance.mean().item<double>(), 0.1);
-}
-
-TEST_F(TrainingTest, NeighboursAgreeWithTheDefinitionInFloat64) {
-  FeatureNeighboursOptions options;
-  options.tap_weights = {1.0, 1.0, 1.0, 1.0, 1.0};
-  options.bank_size = 300;
-  const FeatureNeighbours neighbours(encoder_, pictures_, options, Random(1), {});
-  const torch::Tensor bank = neighbours.State().at("bank").to(torch::kFloat64);
-  const torch::Tensor colors = neighbours.State().at("colors").to(torch::kFloat64);
-  const FeatureNeighbours::Matches matches =
-      neighbours.LookupFeatures(neighbours.State().at("bank") + 0.05f);
-  const torch::Tensor answer = matches.ab.to(torch::kFloat64);
-  for (int64_t q = 0; q < 5; ++q) {
-    const torch::Tensor d = (bank - (bank[q] + 0.05)).square().sum(1);
-    const torch::Tensor best = d.min();
-    const torch::Tensor weight =
-        torch::exp(-(d - best) / (options.temperature * (best + options.distance_floor)));
-    const torch::Tensor expected = torch::mv(colors.t(), weight) / weight.sum();
-    EXPECT_LT((answer[q] - expected).abs().max().item<double>(), 1e-2);
-    const double variance =
-        (torch::mv((colors - expected).square().t(), weight) / weight.sum()).sum().item<double>();
-    EXPECT_NEAR(matches.variance[q].item<double>(), variance, 1e-2 * (1.0 + variance));
-  }
-}
-
-TEST(PaddingTest, ReflectsOrReplicatesToMultiples) {
-  const torch::Tensor x = torch::arange(12, torch::kFloat32).view({1, 1, 3, 4});
-  const torch::Tensor padded = PadToMultiple(x, 5);
-  EXPECT_EQ(padded.sizes(), (std::vector<int64_t>{1, 1, 5, 5}));
-  EXPECT_EQ(padded[0][0][0][4].item<float>(), 2.0f);
-  EXPECT_EQ(padded[0][0][3][0].item<float>(), 4.0f);
-  EXPECT_TRUE(torch::equal(PadToMultiple(x, 1), x));
-  EXPECT_EQ(PadToMultiple(torch::ones({1, 1, 1, 1}), 32).sum().item<float>(), 1024.0f);
 }
 
 }  // namespace

@@ -48,11 +48,11 @@ std::shared_ptr<const Colorizer> Train(const std::shared_ptr<const Encoder>& enc
   options.recipe = recipe;
   options.iterations = iterations;
   options.crop_px = 64;
-  options.threads = 1;
+  ThreadPool pool(1);
   NoCheckpoints checkpoints;
   NullObserver progress;
   return TrainColorizer(
-      encoder, {{"key", key.luminance, key.ab}}, options, checkpoints, progress, {});
+      encoder, {{"key", key.luminance, key.ab}}, options, {pool, checkpoints, progress, {}});
 }
 
 TEST(PublishedEncoderColorizerTest, LearnsTheKeyViewFromADdcolorEncoder) {

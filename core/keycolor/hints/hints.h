@@ -1,5 +1,6 @@
-// Colouring the key view from what the user gives (METHOD.md "Stage 1b"). All pictures have the
-// key photo's size as captured; L of the photo is always kept, only a and b are decided here.
+// Colours of the key view from hints (METHOD.md "Stage 1b"): strokes, points, lines and regions,
+// spread along the luminance. All pictures have the key photo's size as captured; the result is the
+// same for any number of threads.
 #pragma once
 
 #include <array>
@@ -7,18 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancellation.h"
 #include "core/base/image.h"
-#include "core/base/progress.h"
-#include "core/color/lab.h"
+#include "core/base/run_control.h"
 
 namespace color3d {
-
-// a, b of a coloured picture of the key view. `luminance`: 1 channel, L 0..100 of the key photo;
-// `coloured`: 3 channels sRGB. Throws Error{kInvalidArgument} when sizes differ (both are named),
-// when the picture has no colour, or when its luminance does not correlate with the key view's
-// (it shows something else).
-Image KeyColorFromImage(const Image& luminance, const Image& coloured);
 
 // Pixels whose colour is given: a disc, a line, a polygon, or a label of a label picture.
 struct ColorHint {
@@ -42,7 +35,6 @@ struct HintOptions {
   int max_side_px = 8192;   // larger photos are solved at this size, then upsampled guided by L
   double tolerance = 5e-4;  // relative residual of the conjugate gradients
   int max_iterations = 200;
-  int threads = 0;  // 0: what the machine has; the result is the same for any number
   void Validate() const;
   bool operator==(const HintOptions&) const = default;
 };
@@ -66,8 +58,7 @@ struct HintPictures {
 HintSolution KeyColorFromStrokes(const Image& luminance,
                                  const Image& strokes,
                                  const HintOptions& options,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel);
+                                 const RunControl& control);
 
 // A JSON list of entries, each one of
 //   {"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}     a disc; radius 2 when left out
@@ -83,8 +74,7 @@ std::vector<ColorHint> ParseHintsJson(const std::string& json);
 HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
-                               ProgressObserver& progress,
-                               const CancellationToken& cancel,
+                               const RunControl& control,
                                const HintPictures& pictures = {});
 
 }  // namespace color3d
