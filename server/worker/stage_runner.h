@@ -1,6 +1,6 @@
 // What the worker loop (leases, blobs, heartbeats) asks of the method library: the loop prepares
-// files, the runner turns the job's spec into one core stage and leaves its results as
-// files. The only folder of the server that links the method library is server/worker.
+// files, the runner turns the job's spec into one core stage and leaves its results as files. The
+// only folder of the server that links the method library is server/worker.
 #pragma once
 
 #include <filesystem>
