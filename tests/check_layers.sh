@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
-#           <- {keyview, keycolor, augment, carry, colorizer, splat, metrics, report} <- stage
+#           <- {keyview, augment, carry, splat, metrics, report, matching <- {keycolor, colorizer}} <- stage
 #   server: store <- {planning, storage} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers and SQL never below the server. What tests
 # (*_test.cc) set up is not held against their folder; the product never includes tests/.
@@ -31,6 +31,14 @@ forbid() {
   bad=$(grep -rnE "#include [<\"]($pattern)" "$@" --include='*.h' --include='*.cc' || true)
   [ -z "$bad" ] || complain "not allowed here:" "$bad"
 }
+# exposes FOLDER REGEX: the product's sources outside of FOLDER include only these headers of it, without
+# their ".h". Tests and benchmarks may look inside.
+exposes() {
+  local bad
+  bad=$(grep -rnE "#include \"$1/" core server client --include='*.h' --include='*.cc' |
+    grep -vE "^$1/|^[^:]*_test\.cc:|#include \"$1/($2)\.h\"" || true)
+  [ -z "$bad" ] || complain "$1 keeps to itself:" "$bad"
+}
 
 allow core/base 'core/base'
 allow core/catalogue 'core/(base|catalogue)'
@@ -45,13 +53,16 @@ allow core/encoder 'core/(base|color|image|weights|encoder(/[a-z]+)?)'
 for folder in keyview augment metrics; do
   allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
 done
-allow core/keycolor 'core/(base|grid|color|image|weights|encoder(/[a-z]+)?|keycolor(/[a-z]+)?)'
-for source in hints references words automatic external; do
+allow core/matching 'core/(base|encoder(/[a-z]+)?|matching)'
+allow core/keycolor \
+  'core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/[a-z]+)?)'
+allow core/keycolor/hints 'core/(base|grid|color|image|keycolor/hints)'
+for source in references words automatic external; do
   allow "core/keycolor/$source" \
-    "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|keycolor|keycolor/$source)"
+    "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/hints)?|keycolor/$source)"
 done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
-allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|augment|colorizer)'
+allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
 lower=
 for part in model raster training geometry chroma export; do
   lower="$lower${lower:+|}$part"
@@ -67,9 +78,16 @@ allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(store|planning|storage|ops|rpc)'
 allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
 
+exposes core/colorizer 'colorizer|scene_batch|scene_colorizers'
+exposes core/keycolor/hints 'hints'
+exposes core/keycolor/references 'reference'
+exposes core/keycolor/words 'prompt|prompt_phrases'
+exposes core/keycolor/automatic 'automatic'
+exposes core/keycolor/external 'remote|script'
+
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/stage server client \
-  core/keycolor/hints core/keycolor/references core/keycolor/words
+  core/keycolor/hints core/keycolor/words
 forbid 'grpc|google/protobuf|color3d/v1|sqlite3|spdlog' core
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base core/simd core/grid

@@ -4,13 +4,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "core/base/cancellation.h"
 #include "core/base/image.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/encoder/encoder.h"
 
 namespace color3d {
@@ -48,7 +48,6 @@ struct ColorizerOptions {
   // How many of the encoder's deepest stages get Conv-Adapters, 0..8; -1: ours none, the paper all.
   int adapter_stages = -1;
   double decoder_width = 1.0;  // factor on the decoder's channels, 0.25..4
-  int threads = 0;
   uint64_t seed = 1;
   void Validate() const;
   bool operator==(const ColorizerOptions&) const = default;
@@ -57,7 +56,7 @@ struct ColorizerOptions {
 struct ColorPrediction {
   Image ab;  // 2 channels, Lab units
   // 1 channel: mean squared distance per feature dimension to the most similar place of the key
-  // view, 0: the same; about 1 where nothing is alike. Empty for colorizers without neighbours.
+  // view, 0: the same; about 1 where nothing is alike. Empty for colorizers without neighbors.
   Image distance;
 };
 
@@ -85,28 +84,27 @@ class Colorizer {
   virtual std::string Serialize() const = 0;
 };
 
-// `pictures`: the undistorted key view first (statistics, neighbours and held-out augmentations are
+// A scene's place among those that train together (scene_batch.h).
+struct BatchPlace {
+  SceneBatch& batch;
+  std::string project;  // what fairness is between, e.g. the submitted job
+};
+
+// `pictures`: the undistorted key view first (statistics, neighbors and held-out augmentations are
 // its), then others of the scene, of any size. Reports "train_l1_ab" and, on views of the key that
 // are never trained on (held-out augmentations), "validation_delta_e00". Gradient clipping; a
-// non-finite loss restores the last good state with half the step and warns. Resumable.
+// non-finite loss restores the last good state with half the step and warns. Resumable. With a
+// `place` it takes turns with the other scenes of the batch; the result is the same, bit for bit,
+// as it is for any number of threads. The colorizer answers on as many threads as the pool has.
 std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
                                                 std::vector<TrainingPicture> pictures,
                                                 const ColorizerOptions& options,
-                                                CheckpointStore& checkpoints,
-                                                ProgressObserver& progress,
-                                                const CancellationToken& cancel);
-// The same, bit for bit, taking turns with the other scenes of a batch (scene_batch.h).
-std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
-                                                std::vector<TrainingPicture> pictures,
-                                                const ColorizerOptions& options,
-                                                CheckpointStore& checkpoints,
-                                                ProgressObserver& progress,
-                                                const CancellationToken& cancel,
-                                                SceneBatch& batch,
-                                                const std::string& project);
+                                                const RunControl& control,
+                                                const std::optional<BatchPlace>& place = {});
 
-// Throws Error{kInvalidArgument} on a damaged file, kFailedPrecondition when it was trained on
-// another encoder (both digests are named).
+// Answers on `threads` threads; 0: what the machine has. Throws Error{kInvalidArgument} on a
+// damaged file, kFailedPrecondition when it was trained on another encoder (both digests are
+// named).
 std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
                                                int threads = 0);

@@ -8,7 +8,7 @@
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/training_pictures.h"
 #include "core/stage/stages.h"
 
@@ -100,17 +100,14 @@ void RunPersonalize(const ColorizerOptions& options,
   for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
     pictures.push_back(std::move(picture));
   }
-  SceneBatch alone(options.threads);
+  SceneBatch alone(context.pool().thread_count());
   SceneBatch& batch = context.batch() != nullptr ? *context.batch() : alone;
   const auto colorizer =
       TrainColorizer(batch.SharedEncoder(encoder, [&] { return context.LoadEncoder(encoder); }),
                      std::move(pictures),
                      options,
-                     context.checkpoints(),
-                     context.progress(),
-                     context.cancel(),
-                     batch,
-                     context.project());
+                     context.control(),
+                     BatchPlace{batch, context.project()});
   context.WriteOutput(artifact::kColorizer, colorizer->Serialize());
 }
 

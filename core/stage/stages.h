@@ -11,7 +11,7 @@
 #include "core/carry/view_color.h"
 #include "core/catalogue/stage_summary.h"
 #include "core/colorizer/colorizer.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 #include "core/keyview/select.h"
 #include "core/scene/import.h"
 #include "core/splat/chroma/chroma_options.h"

@@ -108,18 +108,16 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   ColorizerOptions options;
   options.iterations = 0;
   options.max_side_px = kExampleSidePx;
-  options.threads = setup_.threads;
   const Image lab = LabFromSrgb(FitWithin(srgb, options.max_side_px));
   LoadedColorizer loaded;
   loaded.encoder = FindEncoder(request.encoder());
+  ThreadPool pool(setup_.threads);
   NoCheckpoints checkpoints;
   NullObserver progress;
   loaded.colorizer = TrainColorizer(loaded.encoder,
                                     {{"the example", LuminanceOfLab(lab), ChromaOfLab(lab)}},
                                     options,
-                                    checkpoints,
-                                    progress,
-                                    CancellationToken());
+                                    {pool, checkpoints, progress, CancellationToken()});
   loaded.bytes = int64_t{8} << 20;  // bank and decoder
   return loaded;
 }

@@ -77,9 +77,8 @@ AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec&
   return options;
 }
 
-ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed) {
+ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed) {
   ColorizerOptions options;
-  options.threads = threads;
   options.seed = seed;
   if (spec.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) {
     options.recipe = ColorizerOptions::Recipe::kPaper;

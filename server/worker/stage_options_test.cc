@@ -23,9 +23,8 @@ using Precision = ColorizerOptions::Precision;
 
 TEST(ColorizerOptionsFromTest, UnsetFieldsKeepTheMethodsDefaults) {
   ColorizerOptions defaults;
-  defaults.threads = 3;
   defaults.seed = 17;
-  EXPECT_EQ(ColorizerOptionsFrom(v1::PersonalizeSpec(), 3, 17), defaults);
+  EXPECT_EQ(ColorizerOptionsFrom(v1::PersonalizeSpec(), 17), defaults);
 }
 
 TEST(ColorizerOptionsFromTest, WhatIsSetArrives) {
@@ -33,14 +32,14 @@ TEST(ColorizerOptionsFromTest, WhatIsSetArrives) {
   spec.set_precision(v1::PersonalizeSpec::PRECISION_FLOAT32);
   spec.set_average_decay(0.0);
   spec.set_min_improvement(0.02);
-  ColorizerOptions options = ColorizerOptionsFrom(spec, 1, 1);
+  ColorizerOptions options = ColorizerOptionsFrom(spec, 1);
   EXPECT_EQ(options.precision, Precision::kFloat32);
   EXPECT_EQ(options.average_decay, 0.0);
   EXPECT_EQ(options.min_improvement, 0.02);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_BFLOAT16);
-  EXPECT_EQ(ColorizerOptionsFrom(spec, 1, 1).precision, Precision::kBfloat16);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kBfloat16);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_AUTO);
-  EXPECT_EQ(ColorizerOptionsFrom(spec, 1, 1).precision, Precision::kAuto);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kAuto);
 }
 
 // What the method makes of a stage's options.
@@ -91,9 +90,8 @@ const std::map<std::string, Method>& Methods() {
       {"generate_augmentations", MakeMethod<v1::GenerateAugmentationsSpec>([](const auto& s) {
          return AugmentationOptionsFrom(s);
        })},
-      {"personalize", MakeMethod<v1::PersonalizeSpec>([](const auto& s) {
-         return ColorizerOptionsFrom(s, 1, 1);
-       })},
+      {"personalize",
+       MakeMethod<v1::PersonalizeSpec>([](const auto& s) { return ColorizerOptionsFrom(s, 1); })},
       {"colorize_views",
        MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) { return MaxSideFrom(s); })},
       {"carry_color",
@@ -210,7 +208,7 @@ TEST(OptionDefaults, TheMethodsOwnAreThoseOfTheFastPreset) {
   const v1::ColorizeSceneSpec fast = WithPreset({});
   EXPECT_EQ(GeometryOptionsFrom(fast.reconstruct_geometry(), 1), GeometryOptions());
   EXPECT_EQ(fast.reconstruct_geometry().max_side_px(), kDefaultMaxSidePx);
-  EXPECT_EQ(ColorizerOptionsFrom(fast.personalize(), 0, 1), ColorizerOptions());
+  EXPECT_EQ(ColorizerOptionsFrom(fast.personalize(), 1), ColorizerOptions());
   EXPECT_EQ(ChromaOptionsFrom(fast.solve_chroma(), 1), ChromaOptions());
   EXPECT_EQ(SelectOptionsFrom(fast.select_key_view()).selection, KeyViewOptions());
   EXPECT_EQ(CarryOptionsFrom(fast.carry_color()), CarryColorOptions());

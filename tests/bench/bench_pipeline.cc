@@ -3,7 +3,7 @@
 
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 
@@ -79,7 +79,6 @@ void RunPipeline(const PipelineArguments& args) {
     });
   }
   ColorizerOptions colorizer = args.colorizer;
-  colorizer.threads = args.threads;
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
   pipeline.Run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
   pipeline.Run(kind::kColorizeViews,

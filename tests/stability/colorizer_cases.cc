@@ -30,7 +30,6 @@ struct Problem {
     options.iterations = 30;
     options.max_side_px = kSide;
     options.crop_px = 64;
-    options.threads = 2;
   }
 };
 
@@ -74,10 +73,11 @@ StabilityResult Train(const Problem& p) {
   NoCheckpoints none;
   const CancellationToken go_on;
   const auto encoder = Encoder::Embedded();
+  ThreadPool pool(2);
   const auto trained = TrainColorizer(
-      encoder, {{"key", p.luminance, p.ab, p.weight}}, p.options, none, observer, go_on);
+      encoder, {{"key", p.luminance, p.ab, p.weight}}, p.options, {pool, none, observer, go_on});
   // What is stored and read again is what colours.
-  const auto colorizer = LoadColorizer(trained->Serialize(), encoder, p.options.threads);
+  const auto colorizer = LoadColorizer(trained->Serialize(), encoder, pool.thread_count());
   const Image key = colorizer->Colorize(p.luminance);
   Image other = p.unlike;
   if (other.Empty()) {

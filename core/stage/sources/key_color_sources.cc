@@ -10,6 +10,7 @@
 #include "core/keycolor/automatic/automatic.h"
 #include "core/keycolor/external/remote.h"
 #include "core/keycolor/external/script.h"
+#include "core/keycolor/from_image.h"
 #include "core/keycolor/recolor.h"
 #include "core/keycolor/references/reference.h"
 #include "core/keycolor/words/prompt.h"
@@ -47,8 +48,7 @@ KeyColorResult FromStrokes(const Options& options, const KeyPhoto& photo, StageC
   return FromHints(KeyColorFromStrokes(photo.luminance,
                                        ReadImage(options.file, /*keep_alpha=*/true),
                                        options.hints,
-                                       context.progress(),
-                                       context.cancel()));
+                                       context.control()));
 }
 
 KeyColorResult FromPoints(const Options& options, const KeyPhoto& photo, StageContext& context) {
@@ -62,8 +62,8 @@ KeyColorResult FromPoints(const Options& options, const KeyPhoto& photo, StageCo
   HintPictures pictures;
   if (!labels.Empty()) pictures.labels = &labels;
   if (asks_automatic) pictures.automatic_ab = &automatic;
-  return FromHints(KeyColorFromHints(
-      photo.luminance, hints, options.hints, context.progress(), context.cancel(), pictures));
+  return FromHints(
+      KeyColorFromHints(photo.luminance, hints, options.hints, context.control(), pictures));
 }
 
 KeyColorResult FromReferences(const Options& options,
@@ -75,10 +75,9 @@ KeyColorResult FromReferences(const Options& options,
   }
   const auto encoder = context.LoadEncoder(options.name);
   ReferenceOptions reference;
-  reference.threads = context.pool().thread_count();
   reference.seed = static_cast<unsigned>(context.seed());
-  ReferenceSolution solution = KeyColorFromReferences(
-      photo.luminance, references, *encoder, reference, context.progress(), context.cancel());
+  ReferenceSolution solution =
+      KeyColorFromReferences(photo.luminance, references, *encoder, reference, context.control());
   KeyColorResult result{std::move(solution.ab),
                         {{"description", encoder->description()},
                          {"explained", solution.explained},
@@ -178,8 +177,8 @@ KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageCo
   const Image rest = AutomaticColorizer::Embedded()->Colorize(photo.luminance).ab;
   PromptOptions prompt;
   prompt.hints = options.hints;
-  PromptSolution solution = KeyColorFromPrompt(
-      photo.luminance, options.prompt, *clip, rest, prompt, context.progress(), context.cancel());
+  PromptSolution solution =
+      KeyColorFromPrompt(photo.luminance, options.prompt, *clip, rest, prompt, context.control());
   KeyColorResult result{std::move(solution.ab),
                         {{"description", clip->description()},
                          {"prompt", options.prompt},
@@ -225,9 +224,7 @@ KeyColorResult SolveKeyColor(const ColorizeKeyViewOptions& options,
                              const KeyPhoto& photo,
                              StageContext& context) {
   SetTorchThreads(context.pool().thread_count());
-  ColorizeKeyViewOptions with_threads = options;
-  with_threads.hints.threads = context.pool().thread_count();
-  return Find(options.source).solve(with_threads, photo, context);
+  return Find(options.source).solve(options, photo, context);
 }
 
 }  // namespace color3d
