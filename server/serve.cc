@@ -1,5 +1,6 @@
 #include "server/serve.h"
 
+#include <fmt/format.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -35,10 +36,11 @@ std::chrono::milliseconds Milliseconds(double seconds) {
 void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   if (!IsLoopback(options.listen) && !options.insecure_any_address) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "refusing to listen on " + options.listen +
-                    ": there is no authentication yet, anybody who reaches the port could use it; "
-                    "listen on 127.0.0.1, or say --insecure-any-address in a network you trust");
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "refusing to listen on {}: there is no authentication yet, anybody who reaches the port "
+        "could use it; listen on 127.0.0.1, or say --insecure-any-address in a network you trust",
+        options.listen);
   }
 }
 
@@ -48,8 +50,9 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
       options.worker_program.empty() ? ProgramFolder() / "color3d-worker" : options.worker_program;
   if (options.workers > 0 && ::access(setup.program.c_str(), X_OK) != 0) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot find the worker program " + setup.program.string() +
-                    "; install color3d-worker beside color3d-server, or say --workers 0");
+                "cannot find the worker program {}; install color3d-worker beside color3d-server, "
+                "or say --workers 0",
+                setup.program.string());
   }
   setup.workers = options.workers;
   const int machine = std::max(1u, std::thread::hardware_concurrency());
@@ -58,25 +61,25 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   setup.arguments = {"--data-dir",
                      options.data_folder.string(),
                      "--threads",
-                     std::to_string(threads),
+                     fmt::to_string(threads),
                      "--log-level",
                      options.log_level,
                      "--lease-seconds",
-                     std::to_string(options.lease_seconds),
+                     fmt::to_string(options.lease_seconds),
                      "--heartbeat-seconds",
-                     std::to_string(options.heartbeat_seconds),
+                     fmt::to_string(options.heartbeat_seconds),
                      "--checkpoint-seconds",
-                     std::to_string(options.checkpoint_seconds),
+                     fmt::to_string(options.checkpoint_seconds),
                      "--stuck-seconds",
-                     std::to_string(options.stuck_seconds),
+                     fmt::to_string(options.stuck_seconds),
                      "--drain-grace-seconds",
-                     std::to_string(options.drain_seconds * 0.75),
+                     fmt::to_string(options.drain_seconds * 0.75),
                      "--stop-grace-seconds",
-                     std::to_string(options.stop_grace_seconds),
+                     fmt::to_string(options.stop_grace_seconds),
                      "--retry-backoff-ms",
-                     std::to_string(options.retry_backoff_ms),
+                     fmt::to_string(options.retry_backoff_ms),
                      "--reserve-mib",
-                     std::to_string(options.reserve_mib)};
+                     fmt::to_string(options.reserve_mib)};
   const std::vector<std::string> model_flags = ToFlags(models);
   setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
   setup.max_stopped = Milliseconds(3.0 * options.lease_seconds);
@@ -106,7 +109,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   if (::access(setup->program.c_str(), X_OK) != 0) return {};
   sockets.RemoveAll();
   // A name of its own: a worker that has outlived its server removes its socket when it ends.
-  const std::string socket = "inference-" + std::to_string(::getpid());
+  const std::string socket = "inference-" + fmt::to_string(::getpid());
   const int machine = std::max(1u, std::thread::hardware_concurrency());
   setup->inference_arguments = {
       "--inference",
@@ -114,13 +117,13 @@ InferenceLink InferenceSetup(const ServeOptions& options,
       "--data-dir",
       options.data_folder.string(),
       "--threads",
-      std::to_string(options.live_threads > 0 ? options.live_threads : machine),
+      fmt::to_string(options.live_threads > 0 ? options.live_threads : machine),
       "--log-level",
       options.log_level,
       "--drain-grace-seconds",
-      std::to_string(options.drain_seconds * 0.5),
+      fmt::to_string(options.drain_seconds * 0.5),
       "--reserve-mib",
-      std::to_string(options.reserve_mib)};
+      fmt::to_string(options.reserve_mib)};
   const std::vector<std::string> model_flags = ToFlags(models);
   setup->inference_arguments.insert(
       setup->inference_arguments.end(), model_flags.begin(), model_flags.end());
@@ -128,7 +131,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   setup->inference_demand = demand;
   InferenceLink link;
   link.target = sockets.Address(socket);
-  link.demand = [demand] { demand->Ask(); };
+  link.demand = [demand] { demand->Request(); };
   link.hold = [demand] { return demand->Hold(); };
   return link;
 }

@@ -2,6 +2,9 @@
 // requests, one line for each bad field or file. Immutable; thrown by value.
 #pragma once
 
+#include <fmt/core.h>
+
+#include <concepts>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +27,16 @@ class ServiceError : public Error {
                const std::string& message,
                std::vector<FieldViolation> violations = {})
       : Error(code, message), reason_(std::move(reason)), violations_(std::move(violations)) {}
+  // The message as fmt::format puts it together. With violations, format it yourself.
+  template <typename First, typename... Rest>
+  requires(!std::convertible_to<First, std::vector<FieldViolation>>)
+      ServiceError(ErrorCode code,
+                   std::string reason,
+                   fmt::format_string<First, Rest...> message,
+                   First&& first,
+                   Rest&&... rest)
+      : Error(code, message, std::forward<First>(first), std::forward<Rest>(rest)...),
+        reason_(std::move(reason)) {}
   const std::string& reason() const { return reason_; }
   const std::vector<FieldViolation>& violations() const { return violations_; }
 

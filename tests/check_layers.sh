@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
-#           <- {keyview, keycolor, augment, carry, colorizer, splat, metrics, report} <- stage
+#           <- {keyview, augment, carry, splat, metrics, report, matching <- {keycolor, colorizer}} <- stage
 #   server: store <- {planning, storage} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers and SQL never below the server. What tests
 # (*_test.cc) set up is not held against their folder; the product never includes tests/.
@@ -31,6 +31,14 @@ forbid() {
   bad=$(grep -rnE "#include [<\"]($pattern)" "$@" --include='*.h' --include='*.cc' || true)
   [ -z "$bad" ] || complain "not allowed here:" "$bad"
 }
+# exposes FOLDER REGEX: the product's sources outside of FOLDER include only these headers of it, without
+# their ".h". Tests and benchmarks may look inside.
+exposes() {
+  local bad
+  bad=$(grep -rnE "#include \"$1/" core server client --include='*.h' --include='*.cc' |
+    grep -vE "^$1/|^[^:]*_test\.cc:|#include \"$1/($2)\.h\"" || true)
+  [ -z "$bad" ] || complain "$1 keeps to itself:" "$bad"
+}
 
 allow core/base 'core/base'
 allow core/catalogue 'core/(base|catalogue)'
@@ -45,13 +53,16 @@ allow core/encoder 'core/(base|color|image|weights|encoder(/[a-z]+)?)'
 for folder in keyview augment metrics; do
   allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
 done
-allow core/keycolor 'core/(base|grid|color|image|weights|encoder(/[a-z]+)?|keycolor(/[a-z]+)?)'
-for source in hints references words automatic external; do
+allow core/matching 'core/(base|encoder(/[a-z]+)?|matching)'
+allow core/keycolor \
+  'core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/[a-z]+)?)'
+allow core/keycolor/hints 'core/(base|grid|color|image|keycolor/hints)'
+for source in references words automatic external; do
   allow "core/keycolor/$source" \
-    "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|keycolor|keycolor/$source)"
+    "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/hints)?|keycolor/$source)"
 done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
-allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|augment|colorizer)'
+allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
 lower=
 for part in model raster training geometry chroma export; do
   lower="$lower${lower:+|}$part"
@@ -59,6 +70,7 @@ for part in model raster training geometry chroma export; do
 done
 allow core/report 'core/(base|catalogue|image|report)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
+allow proto 'proto'
 allow server/store 'core/(base|catalogue)|server/store'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'
 allow server/storage 'core/base|server/(store|storage)'
@@ -66,12 +78,58 @@ allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(store|planning|storage|ops|rpc)'
 allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
 
+exposes core/colorizer 'colorizer|scene_batch|scene_colorizers'
+exposes core/keycolor/hints 'hints'
+exposes core/keycolor/references 'reference'
+exposes core/keycolor/words 'prompt|prompt_phrases'
+exposes core/keycolor/automatic 'automatic'
+exposes core/keycolor/external 'remote|script'
+
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/stage server client \
-  core/keycolor/hints core/keycolor/references core/keycolor/words
+  core/keycolor/hints core/keycolor/words
 forbid 'grpc|google/protobuf|color3d/v1|sqlite3|spdlog' core
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base core/simd core/grid
+
+# public FOLDER HEADER...: what the product outside of FOLDER may include of it; the rest is its own.
+# (Tests and benchmarks look inside.)
+public() {
+  local folder=$1 known bad
+  shift
+  known=$(printf '%s|' "$@")
+  bad=$(grep -rnE "#include \"$folder/" core server client deploy --include='*.h' --include='*.cc' |
+    grep -vE "^($folder/|[^:]*_test\.cc:)" |
+    grep -vE "#include \"$folder/(${known%|})\.h\"" || true)
+  [ -z "$bad" ] || complain "these headers are $folder's own:" "$bad"
+}
+
+public core/augment augment outpaint surrogates
+public core/carry carry carry_views plane_sweep view_color
+public core/colorizer colorizer scene_batch scene_colorizers
+public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
+  weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
+  embedded/embedded_weights
+public core/grid edge_weights grid_solver
+public core/image codec draw guided_upsample local_features optical_flow plane_sampling reduced \
+  probe/focal_length probe/orientation probe/probe
+public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
+  external/script hints/hints references/reference words/prompt
+public core/keyview collect_features coverage next_key_view select tracks view_features
+public core/metrics scene_consistency view_scores
+public core/report contact_sheet curves report_page scene_plan
+public core/scene camera import scene view_images
+public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
+  geometry/geometry_options geometry/geometry_trainer chroma/chroma_fit chroma/chroma_options \
+  export/export export/rgb_refine
+public core/stage stages formats/artifacts
+public core/weights byte_source safetensors weight_file weight_map weight_reader
+public server/backends backend_address backend_prober grpc_colorizer
+public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
+public server/rpc error_mapping rpc_server
+public server/storage blob_store data_folder upload_store
+public server/store job job_store sqlite_job_store user_models
+public server/worker supervisor
 
 if [ "$failed" -ne 0 ]; then exit 1; fi
 echo "check_layers: ok"

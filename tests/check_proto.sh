@@ -21,7 +21,8 @@ fi
 
 (cd proto && "$buf" lint && "$buf" format --diff --exit-code)
 
-# The API may only grow: compare with the newest release, or with the commit before this one.
+# On the wire the API may only grow (before 1.0 names may change, field numbers never): compare with
+# the newest release, or with the commit before this one.
 base=$(git describe --tags --abbrev=0 --match 'v*' 2>/dev/null || git rev-parse -q --verify HEAD~1 || true)
 if [ -z "$base" ] || [ -z "$(git ls-tree "$base" proto 2>/dev/null)" ]; then
   echo "check_proto: SKIPPED the compatibility check: there is no earlier API to compare with" >&2
@@ -31,4 +32,4 @@ before=$(mktemp -d)
 trap 'rm -rf "$before"' EXIT
 git archive "$base" proto | tar -x -C "$before"
 (cd proto && "$buf" breaking --against "$before/proto")
-echo "check_proto: the API is clean and compatible with $base"
+echo "check_proto: the API is clean and understands $base on the wire"

@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 
 #include "client/commands/command.h"
@@ -6,6 +8,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/text.h"
+#include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
 namespace {
@@ -41,8 +44,9 @@ ExitCode RunDownload(const Context& context, const ArtifactOptions& options) {
   if (!options.name.empty()) artifacts = {FindArtifact(job, options.name)};
   if (artifacts.empty()) {
     throw Error(ErrorCode::kFailedPrecondition,
-                job.name() + " has no artifacts: it is " + StateName(job.state()) +
-                    "; they come when it has succeeded");
+                "{} has no artifacts: it is {}; they come when it has succeeded",
+                job.name(),
+                StateName(job.state()));
   }
   PrepareOut(options.out);
   ProgressDisplay display(context.json);
@@ -50,8 +54,11 @@ ExitCode RunDownload(const Context& context, const ArtifactOptions& options) {
   if (context.json) {
     PrintJson({{"job", job.name()}, {"out", options.out}, {"files", names}});
   } else {
-    PrintText(std::to_string(names.size()) + (names.size() == 1 ? " file" : " files") + " in " +
-              options.out + "\n" + (options.name.empty() ? Summary(options.out) : ""));
+    PrintText(fmt::format("{}{} in {}\n{}",
+                          names.size(),
+                          names.size() == 1 ? " file" : " files",
+                          options.out,
+                          options.name.empty() ? Summary(options.out) : ""));
   }
   return ExitCode::kOk;
 }
@@ -72,7 +79,8 @@ void AddArtifactCommands(CLI::App& app, Context& context) {
   CLI::App* download = artifact->add_subcommand("download", "Fetch one result, or all");
   download->fallthrough();
   download->add_option("JOB", options->job, "jobs/ID")->required();
-  download->add_option("NAME", options->name, "Of the artifact, e.g. scene.ply");
+  download->add_option(
+      "NAME", options->name, fmt::format("Of the artifact, e.g. {}", artifact::kPly));
   download->add_option("-o,--out", options->out, "Folder to write to")->required();
   download->callback([&context, options] {
     context.action = [&context, options] { return RunDownload(context, *options); };

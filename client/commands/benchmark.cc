@@ -1,15 +1,18 @@
 #include "client/commands/benchmark.h"
 
+#include <fmt/core.h>
+
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "client/commands/follow.h"
 #include "client/commands/results.h"
 #include "client/lib/blob_transfer.h"
-#include "client/lib/gray_copies.h"
 #include "client/lib/job_watch.h"
+#include "client/lib/photos/gray_copies.h"
 #include "client/lib/scene_upload.h"
 #include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
 namespace {
@@ -32,8 +35,8 @@ std::vector<BenchmarkView> ParseViews(const std::string& scene_json) {
     }
     return views;
   } catch (const nlohmann::json::exception& e) {
-    throw Error(ErrorCode::kDataLoss,
-                std::string("scene.json from the server cannot be read: ") + e.what());
+    throw Error(
+        ErrorCode::kDataLoss, "{} from the server cannot be read: {}", artifact::kScene, e.what());
   }
 }
 
@@ -42,7 +45,9 @@ std::string ParseKeyView(const std::string& key_view_json) {
     return nlohmann::json::parse(key_view_json).at("view");
   } catch (const nlohmann::json::exception& e) {
     throw Error(ErrorCode::kDataLoss,
-                std::string("key_view.json from the server cannot be read: ") + e.what());
+                "{} from the server cannot be read: {}",
+                artifact::kKeyView,
+                e.what());
   }
 }
 
@@ -57,7 +62,7 @@ Selection SelectKeyView(Connection& connection,
                         const std::string& scene,
                         ProgressDisplay& display) {
   const v1::Job import_job = SubmitJob(connection, ImportSpec(options, scene));
-  v1::JobSpec spec = SelectSpec(options, scene);
+  v1::JobSpec spec = SelectSpec(connection, options, scene);
   spec.add_inputs(import_job.name());
   const v1::Job select_job = SubmitJob(connection, spec);
   if (!Follow(connection, {import_job.name(), select_job.name()}, context, display)) {
@@ -69,52 +74,19 @@ Selection SelectKeyView(Connection& connection,
   RequireSuccess(connection, context, imported);
   const v1::Job selected = GetJob(connection, select_job.name());
   RequireSuccess(connection, context, selected);
-  return {ParseViews(ReadArtifact(connection, imported, "scene.json")),
-          ParseKeyView(ReadArtifact(connection, selected, "key_view.json"))};
+  return {ParseViews(ReadArtifact(connection, imported, artifact::kScene)),
+          ParseKeyView(ReadArtifact(connection, selected, artifact::kKeyView))};
 }
 
-}  // namespace
-
-void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& cancel) {
-  const std::string root = folder.root.string();
-  if (folder.photos.size() < kMinPhotos) {
-    throw InvalidArgument(root + " contains " + std::to_string(folder.photos.size()) +
-                          " photographs; --benchmark needs at least " + std::to_string(kMinPhotos));
-  }
-  const ColorCount count = CountColorPhotos(folder, kPhotosToLookAt, cancel);
-  if (count.MostlyColor()) return;
-  throw InvalidArgument("the photographs in " + root + " are monochrome (" +
-                        std::to_string(count.looked_at - count.in_color) + " of " +
-                        std::to_string(count.looked_at) +
-                        " looked at); --benchmark drops the colour of colour photos and scores "
-                        "against it: leave it out");
-}
-
-v1::JobSpec PrepareBenchmark(Connection& connection,
-                             const Context& context,
-                             const ColorizeOptions& options,
-                             const PhotoFolder& folder,
-                             ProgressDisplay& display) {
-  const ScratchFolder scratch;
-  display.Say("benchmark: dropping the colour of " + std::to_string(folder.photos.size()) +
-              " photos");
-  const GrayCopies copies = MakeGrayCopies(folder, scratch.path(), *context.interrupt);
-  const v1::Scene scene = UploadScene(
-      connection,
-      BuildManifest(copies.folder, *context.interrupt),
-      std::filesystem::absolute(folder.root).filename().string() + " (grey)",
-      [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
-  const Selection selection = SelectKeyView(connection, context, options, scene.name(), display);
-
+// The originals of the key view and of the views that are scored against, as the scene's options.
+// Returns the files to upload.
+std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
+                                      const PhotoFolder& folder,
+                                      const GrayCopies& copies,
+                                      const Selection& selection,
+                                      v1::ColorizeSceneSpec* colorize) {
   std::map<std::string, const LocalFile*> originals;
   for (const LocalFile& photo : folder.photos) originals[photo.path] = &photo;
-  v1::JobSpec spec = ColorizeSpec(options, scene.name());
-  v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
-  colorize->set_key_view(selection.key_view);
-  if (options.color.Given()) {
-    *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
-  }
-  AddMoreKeys(connection, options, colorize);
   std::vector<UploadFile> uploads;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);
@@ -123,12 +95,14 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
     if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
     if (!copies.in_color.contains(view.image_file)) {
       if (view.held_out) continue;  // nothing to score against
-      throw InvalidArgument(is_key ? "the key view " + view.name +
-                                         " is monochrome itself; choose one in colour with "
-                                         "--key-view"
-                                   : view.name +
-                                         " is monochrome itself; --bound needs the true "
-                                         "colours of all views: leave it out");
+      if (is_key) {
+        throw InvalidArgument(
+            "the key view {} is monochrome itself; choose one in colour with --key-view",
+            view.name);
+      }
+      throw InvalidArgument(
+          "{} is monochrome itself; --bound needs the true colours of all views: leave it out",
+          view.name);
     }
     uploads.push_back({original->second->file, DigestFile(original->second->file)});
     const v1::Digest digest = ToProto(uploads.back().digest);
@@ -138,11 +112,57 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
     truth->set_view(view.name);
     *truth->mutable_image() = digest;
   }
+  return uploads;
+}
+
+}  // namespace
+
+void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& cancel) {
+  const std::string root = folder.root.string();
+  if (folder.photos.size() < kMinPhotos) {
+    throw InvalidArgument("{} contains {} photographs; --benchmark needs at least {}",
+                          root,
+                          folder.photos.size(),
+                          kMinPhotos);
+  }
+  const ColorCount count = CountColorPhotos(folder, kPhotosToLookAt, cancel);
+  if (count.MostlyColor()) return;
+  throw InvalidArgument(
+      "the photographs in {} are monochrome ({} of {} looked at); --benchmark drops the colour of "
+      "colour photos and scores against it: leave it out",
+      root,
+      count.looked_at - count.in_color,
+      count.looked_at);
+}
+
+v1::JobSpec PrepareBenchmark(Connection& connection,
+                             const Context& context,
+                             const ColorizeOptions& options,
+                             const PhotoFolder& folder,
+                             ProgressDisplay& display) {
+  const ScratchFolder scratch;
+  display.Say(fmt::format("benchmark: dropping the colour of {} photos", folder.photos.size()));
+  const GrayCopies copies = MakeGrayCopies(folder, scratch.path(), *context.interrupt);
+  const v1::Scene scene = UploadScene(
+      connection,
+      BuildManifest(copies.folder, *context.interrupt),
+      std::filesystem::absolute(folder.root).filename().string() + " (grey)",
+      [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
+  const Selection selection = SelectKeyView(connection, context, options, scene.name(), display);
+
+  v1::JobSpec spec = ColorizeSpec(options, scene.name());
+  v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
+  colorize->set_key_view(selection.key_view);
+  if (options.color.Given()) {
+    *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
+  }
+  AddMoreKeys(connection, options, colorize);
+  const auto uploads = AddTrueColors(options, folder, copies, selection, colorize);
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);
   });
-  display.Say("key view " + selection.key_view + "; " + std::to_string(colorize->truth_size()) +
-              " views are held out and scored");
+  display.Say(fmt::format(
+      "key view {}; {} views are held out and scored", selection.key_view, colorize->truth_size()));
   return spec;
 }
 

@@ -1,9 +1,10 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "client/commands/benchmark.h"
-#include "client/commands/colorize_options.h"
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
@@ -13,7 +14,8 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/text.h"
-#include "core/base/files.h"
+#include "client/options/colorize_options.h"
+#include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -62,19 +64,27 @@ class Colorize {
     const KeyState state = ReadKeyState(*connection_, scene);
     if (!state.accepted) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  scene +
-                      " has no accepted key view: give a source of colour (--auto, ...), or "
-                      "select, colour and accept one (`color3d key select`, `key colour`, `key "
-                      "accept`)");
+                  "{} has no accepted key view: give a source of colour (--auto, ...), or select, "
+                  "colour and accept one (`color3d key select`, `key color`, `key accept`)",
+                  scene);
     }
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     spec.mutable_colorize_scene()->clear_select_key_view();
+    AddMoreKeys(*connection_, options_, spec.mutable_colorize_scene());
     for (const std::string& input : WithItsInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }
-    display_.Say("key view " + ReadChoice(*connection_, *state.accepted).view + ", as accepted (" +
-                 state.accepted->name() + ")");
+    display_.Say(fmt::format("key view {}, as accepted ({})",
+                             ReadChoice(*connection_, *state.accepted).view,
+                             state.accepted->name()));
     return spec;
+  }
+
+  // What a selection before has left in the folder of results; may be empty.
+  std::string SelectedView() const {
+    const auto key_view = ReadResult(out_, artifact::kKeyView);
+    const auto view = key_view.find("view");
+    return view != key_view.end() && view->is_string() ? view->get<std::string>() : "";
   }
 
   // The view that the user's colour belongs to; empty: the server selects.
@@ -83,12 +93,7 @@ class Colorize {
     // A file that is called like a photo is that photo, whatever was selected before.
     const std::string same_stem = PhotoOfSameStem(folder_, options_.color.FileOfView());
     if (!same_stem.empty()) return same_stem;
-    std::error_code none;
-    if (!fs::is_regular_file(out_ / "key_view.json", none)) return "";
-    const auto json = nlohmann::json::parse(
-        ReadFile(out_ / "key_view.json"), nullptr, /*allow_exceptions=*/false);
-    if (!json.is_object() || !json.contains("view") || !json["view"].is_string()) return "";
-    const std::string view = json["view"];
+    const std::string view = SelectedView();
     // From another scene? Then it says nothing about this one.
     const bool known =
         std::any_of(folder_.photos.begin(), folder_.photos.end(), [&](const LocalFile& photo) {
@@ -116,13 +121,12 @@ class Colorize {
         FollowToSuccess(*connection_, context_, {submitted.name()}, out_.string(), display_);
     const auto files = DownloadResults(*connection_, context_, job, out_, display_);
     if (context_.json) {
-      const auto metrics = Metrics();
       PrintJson({{"job", job.name()},
                  {"scene", spec.scene()},
                  {"state", StateName(job.state())},
                  {"out", out_.string()},
                  {"files", files},
-                 {"metrics", metrics}});
+                 {"metrics", ReadResult(out_, artifact::kMetrics)}});
     } else {
       PrintText(Summary(out_));
     }
@@ -131,9 +135,10 @@ class Colorize {
 
   ExitCode SelectOnly(const std::string& scene) {
     std::vector<std::string> jobs;
-    v1::JobSpec spec = SelectSpec(options_, scene);
-    if (options_.hold_out) {
-      jobs.push_back(SubmitJob(*connection_, ImportSpec(options_, scene)).name());
+    v1::JobSpec spec = SelectSpec(*connection_, options_, scene);
+    const v1::JobSpec import = ImportSpec(options_, scene);
+    if (import.import_scene().ByteSizeLong() > 0) {  // else the server's own will do
+      jobs.push_back(SubmitJob(*connection_, import).name());
       spec.add_inputs(jobs.back());
     }
     const v1::Job submitted = SubmitJob(*connection_, spec);
@@ -141,9 +146,7 @@ class Colorize {
     jobs.push_back(submitted.name());
     const v1::Job job = FollowToSuccess(*connection_, context_, jobs, out_.string(), display_);
     const auto files = DownloadResults(*connection_, context_, job, out_, display_);
-    const auto key_view = nlohmann::json::parse(
-        ReadFile(out_ / "key_view.json"), nullptr, /*allow_exceptions=*/false);
-    const std::string view = key_view.is_object() ? key_view.value("view", "") : "";
+    const std::string view = SelectedView();
     if (context_.json) {
       PrintJson({{"job", job.name()},
                  {"scene", scene},
@@ -158,7 +161,7 @@ class Colorize {
   }
 
   std::string HowToGoOn(const std::string& view) const {
-    const std::string picture = (out_ / "key_view.png").string();
+    const std::string picture = (out_ / artifact::kKeyViewGray).string();
     const std::string again = "  color3d " + ShellLine(context_.arguments);
     return "The key view is " + view + ", saved as " + picture +
            ".\nColour it by any means and keep its size, then run\n" + again +
@@ -176,14 +179,6 @@ class Colorize {
       PrintNote(context_, ReattachHint(context_, job.name(), out_.string()));
     }
     return ExitCode::kOk;
-  }
-
-  nlohmann::ordered_json Metrics() const {
-    std::error_code none;
-    if (!fs::is_regular_file(out_ / "metrics.json", none)) return nullptr;
-    auto metrics = nlohmann::ordered_json::parse(
-        ReadFile(out_ / "metrics.json"), nullptr, /*allow_exceptions=*/false);
-    return metrics.is_discarded() ? nlohmann::ordered_json() : metrics;
   }
 
   const Context& context_;

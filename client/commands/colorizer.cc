@@ -1,4 +1,6 @@
 // `color3d colorizer`: list, show and apply personalized colorizers.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <filesystem>
 
@@ -18,7 +20,7 @@ struct ColorizerOptions {
   std::string scene;  // of list
   int limit = 100;
   std::vector<std::string> photos;
-  std::string out = "coloured";
+  std::string out = "colored";
   LiveOptions live;
 };
 
@@ -63,9 +65,12 @@ ExitCode Show(const Context& context, const ColorizerOptions& options) {
     PrintJson(colorizer);
     return ExitCode::kOk;
   }
-  PrintText(colorizer.name() + "\nscene  " + colorizer.scene() + "\njob    " + colorizer.job() +
-            "\nsize   " + HumanBytes(colorizer.file().size_bytes()) + "\nmade   " +
-            HumanTime(colorizer.create_time()) + "\n");
+  PrintText(fmt::format("{}\nscene  {}\njob    {}\nsize   {}\nmade   {}\n",
+                        colorizer.name(),
+                        colorizer.scene(),
+                        colorizer.job(),
+                        HumanBytes(colorizer.file().size_bytes()),
+                        HumanTime(colorizer.create_time())));
   return ExitCode::kOk;
 }
 

@@ -1,5 +1,6 @@
 #include "client/commands/console.h"
 
+#include <fmt/core.h>
 #include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
@@ -29,7 +30,7 @@ std::string WithViolations(const RpcError& error) {
             violations[i].description;
   }
   if (violations.size() > kMaxViolations) {
-    text += "\n  and " + std::to_string(violations.size() - kMaxViolations) + " more";
+    text += fmt::format("\n  and {} more", violations.size() - kMaxViolations);
   }
   return text;
 }
@@ -50,7 +51,9 @@ nlohmann::ordered_json ToJson(const google::protobuf::Message& message) {
   const auto status = google::protobuf::util::MessageToJsonString(message, &text, options);
   if (!status.ok()) {
     throw Error(ErrorCode::kInternal,
-                "cannot write " + message.GetTypeName() + " as JSON: " + status.ToString());
+                "cannot write {} as JSON: {}",
+                message.GetTypeName(),
+                status.ToString());
   }
   return nlohmann::ordered_json::parse(text);
 }

@@ -1,5 +1,7 @@
 #include "client/commands/follow.h"
 
+#include <fmt/core.h>
+
 #include <set>
 
 #include "client/commands/console.h"
@@ -67,10 +69,11 @@ bool Follow(Connection& connection,
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kUnavailable) throw;
     display.Clear();
-    throw CommandFailure(ExitCode::kUnreachable,
-                         "lost the server at " + connection.address() +
-                             "; what it had accepted goes on when it is back: " +
-                             ReattachHint(context, jobs.back(), ""));
+    throw CommandFailure(
+        ExitCode::kUnreachable,
+        fmt::format("lost the server at {}; what it had accepted goes on when it is back: {}",
+                    connection.address(),
+                    ReattachHint(context, jobs.back(), "")));
   }
 }
 
@@ -78,8 +81,9 @@ void RequireSuccess(Connection& connection, const Context& context, const v1::Jo
   if (job.state() == v1::Job::STATE_SUCCEEDED) return;
   if (job.state() == v1::Job::STATE_CANCELLED) {
     throw CommandFailure(ExitCode::kJobFailed,
-                         job.name() + " was cancelled; `" +
-                             CommandLine(context, {"job", "retry", job.name()}) + "` goes on");
+                         fmt::format("{} was cancelled; `{}` goes on",
+                                     job.name(),
+                                     CommandLine(context, {"job", "retry", job.name()})));
   }
   // The stage that is to blame: the first failed child, or the job itself.
   v1::Job blamed = job;
@@ -109,7 +113,8 @@ v1::Job FollowToSuccess(Connection& connection,
   if (!Follow(connection, jobs, context, display)) {
     throw CommandFailure(
         ExitCode::kDetached,
-        "detached; " + jobs.back() + " goes on; " + ReattachHint(context, jobs.back(), out));
+        fmt::format(
+            "detached; {} goes on; {}", jobs.back(), ReattachHint(context, jobs.back(), out)));
   }
   v1::Job job;
   for (const std::string& name : jobs) {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "client/commands/command.h"
-#include "client/commands/progress_display.h"
 #include "client/lib/connection.h"
+#include "client/lib/progress_display.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {

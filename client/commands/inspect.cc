@@ -1,8 +1,10 @@
+#include <fmt/core.h>
+
 #include <nlohmann/json.hpp>
 
 #include "client/commands/command.h"
 #include "client/commands/console.h"
-#include "client/lib/gray_copies.h"
+#include "client/lib/photos/gray_copies.h"
 
 namespace color3d::client {
 namespace {
@@ -20,9 +22,11 @@ ExitCode RunInspect(const Context& context, const std::string& photos) {
                {"in_colour", count.in_color},
                {"monochrome", count.looked_at - count.in_color}});
   } else {
-    PrintText(kind + ": " + std::to_string(count.in_color) + " of " +
-              std::to_string(count.looked_at) + " photos looked at are in colour (" +
-              std::to_string(count.photos) + " photos)\n");
+    PrintText(fmt::format("{}: {} of {} photos looked at are in colour ({} photos)\n",
+                          kind,
+                          count.in_color,
+                          count.looked_at,
+                          count.photos));
   }
   return ExitCode::kOk;
 }

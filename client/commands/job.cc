@@ -1,3 +1,4 @@
+#include <fmt/core.h>
 #include <google/protobuf/util/json_util.h>
 
 #include <iostream>
@@ -19,9 +20,9 @@ constexpr int64_t kMaxSpecBytes = 4 << 20;
 
 std::vector<std::string> JobRow(const v1::Job& job) {
   const v1::Progress& progress = job.progress();
-  const std::string steps = progress.total_steps() > 0 ? std::to_string(progress.step()) + "/" +
-                                                             std::to_string(progress.total_steps())
-                                                       : "-";
+  const std::string steps = progress.total_steps() > 0
+                                ? fmt::format("{}/{}", progress.step(), progress.total_steps())
+                                : "-";
   return {job.name(),
           job.kind(),
           StateName(job.state()) + (job.cached() ? " (cached)" : ""),
@@ -37,7 +38,7 @@ void PrintJob(const Context& context, const v1::Job& job) {
   if (context.json) {
     PrintJson(job);
   } else {
-    PrintText(job.name() + "  " + job.kind() + "  " + StateName(job.state()) + "\n");
+    PrintText(fmt::format("{}  {}  {}\n", job.name(), job.kind(), StateName(job.state())));
   }
 }
 
@@ -47,7 +48,7 @@ ExitCode RunSubmit(const Context& context, const std::string& file) {
   v1::JobSpec spec;
   const auto status = google::protobuf::util::JsonStringToMessage(text, &spec);
   if (!status.ok()) {
-    throw InvalidArgument(file + " is not a JobSpec in JSON: " + std::string(status.message()));
+    throw InvalidArgument("{} is not a JobSpec in JSON: {}", file, std::string(status.message()));
   }
   Connection connection(context.server, *context.interrupt);
   PrintJob(context, SubmitJob(connection, spec));
@@ -107,11 +108,16 @@ ExitCode RunShow(const Context& context, const std::string& name) {
     PrintJson(job);
     return ExitCode::kOk;
   }
-  std::string text = job.name() + "\nkind       " + job.kind() + "\nscene      " +
-                     job.spec().scene() + "\nstate      " + StateName(job.state()) +
-                     (job.cached() ? " (cached)" : "") + "\nattempt    " +
-                     std::to_string(job.attempt()) + " of " + std::to_string(job.max_attempts()) +
-                     "\nartifacts  " + std::to_string(job.artifacts_size()) + "\n";
+  std::string text = fmt::format(
+      "{}\nkind       {}\nscene      {}\nstate      {}{}\nattempt    {} of {}\nartifacts  {}\n",
+      job.name(),
+      job.kind(),
+      job.spec().scene(),
+      StateName(job.state()),
+      job.cached() ? " (cached)" : "",
+      job.attempt(),
+      job.max_attempts(),
+      job.artifacts_size());
   if (!job.parent().empty()) text += "parent     " + job.parent() + "\n";
   if (job.state() == v1::Job::STATE_RUNNING) text += "progress   " + ProgressLine(job, 200) + "\n";
   if (job.has_error()) text += "error      " + DescribeStatus(job.error()) + "\n";
@@ -132,8 +138,9 @@ ExitCode RunWatch(const Context& context, const std::string& text) {
   const std::string name = ResourceName(text, "jobs");
   ProgressDisplay display(context.json);
   if (!Follow(connection, {name}, context, display)) {
-    throw CommandFailure(ExitCode::kDetached,
-                         "detached; " + name + " goes on; " + ReattachHint(context, name, ""));
+    throw CommandFailure(
+        ExitCode::kDetached,
+        fmt::format("detached; {} goes on; {}", name, ReattachHint(context, name, "")));
   }
   const v1::Job job = GetJob(connection, name);
   RequireSuccess(connection, context, job);

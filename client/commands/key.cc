@@ -1,4 +1,6 @@
 // `color3d key`: choose, colour, look at and accept the key view before the long job starts.
+#include <fmt/core.h>
+
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -6,13 +8,14 @@
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
-#include "client/commands/key_color_flags.h"
 #include "client/commands/key_jobs.h"
 #include "client/commands/results.h"
 #include "client/commands/scene_target.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
+#include "client/options/key_color_flags.h"
 #include "core/base/error.h"
+#include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -39,7 +42,7 @@ class Key {
         connection_(context.server, *context.interrupt) {}
 
   ExitCode Select();
-  ExitCode Colour();
+  ExitCode Color();
   ExitCode Show();
   ExitCode Accept();
 
@@ -73,7 +76,7 @@ class Key {
     return "  " + CommandLine(context_, std::move(arguments)) + "\n";
   }
   // What can be done with the chosen view.
-  std::string HowToColour(const std::string& scene) const;
+  std::string HowToColor(const std::string& scene) const;
 
   const Context& context_;
   const KeyOptions& options_;
@@ -104,10 +107,10 @@ v1::Job Key::SubmitSelection(const std::string& scene) {
   return SubmitJob(connection_, spec);
 }
 
-std::string Key::HowToColour(const std::string& scene) const {
-  return "Colour it, for instance\n" + Command({"key", "colour", scene, "--auto"}) +
-         Command({"key", "colour", scene, "--image", "COLOURED.png"}) +
-         Command({"key", "colour", scene, "--hints", "STROKES.png"}) + "or take another view\n" +
+std::string Key::HowToColor(const std::string& scene) const {
+  return "Colour it, for instance\n" + Command({"key", "color", scene, "--auto"}) +
+         Command({"key", "color", scene, "--image", "COLOURED.png"}) +
+         Command({"key", "color", scene, "--hints", "STROKES.png"}) + "or take another view\n" +
          Command({"key", "select", scene, "--view", "NAME"});
 }
 
@@ -126,9 +129,12 @@ ExitCode Key::Select() {
     return ExitCode::kOk;
   }
   const fs::path out(options_.out);
-  PrintText("key view   " + choice.view + "\n           " + choice.description + "\nto colour  " +
-            (out / "key_view.png").string() + "\nranking    " +
-            (out / "key_view_ranking.jpg").string() + "\n" + HowToColour(scene));
+  PrintText(fmt::format("key view   {}\n           {}\nto colour  {}\nranking    {}\n{}",
+                        choice.view,
+                        choice.description,
+                        (out / artifact::kKeyViewGray).string(),
+                        (out / artifact::kKeyViewRanking).string(),
+                        HowToColor(scene)));
   return ExitCode::kOk;
 }
 
@@ -142,7 +148,7 @@ std::vector<std::string> Key::SelectionFor(const std::string& scene) {
   return {};  // the server selects
 }
 
-ExitCode Key::Colour() {
+ExitCode Key::Color() {
   options_.color.Check();
   if (!options_.color.Given()) {
     throw InvalidArgument(
@@ -165,10 +171,13 @@ ExitCode Key::Colour() {
                {"files", files}});
     return ExitCode::kOk;
   }
-  PrintText("key view   " + choice.view + "\ncolour     from " + DescribeSource(job) +
-            "\nlook at    " + (fs::path(options_.out) / "key_view_colored.png").string() +
-            "\nIf you like it, accept it\n" + Command({"key", "accept", scene}) +
-            "or colour it again in another way: each try is kept.\n");
+  PrintText(
+      fmt::format("key view   {}\ncolour     from {}\nlook at    {}\nIf you like it, accept "
+                  "it\n{}or colour it again in another way: each try is kept.\n",
+                  choice.view,
+                  DescribeSource(job),
+                  (fs::path(options_.out) / artifact::kKeyViewColored).string(),
+                  Command({"key", "accept", scene})));
   return ExitCode::kOk;
 }
 
@@ -189,7 +198,7 @@ ExitCode Key::Show() {
                {"key_view", choice.view},
                {"description", choice.description},
                {"selected", name(state.selected)},
-               {"coloured", name(state.colored)},
+               {"colored", name(state.colored)},
                {"accepted", name(state.accepted)}});
     return ExitCode::kOk;
   }
@@ -210,7 +219,7 @@ ExitCode Key::Show() {
   text += state.accepted
               ? "colour the scene\n" + Command({"colorize", "--scene", scene, "-o", "OUT"})
           : state.colored ? "accept the colour\n" + Command({"key", "accept", scene})
-                          : HowToColour(scene);
+                          : HowToColor(scene);
   PrintText(text);
   return ExitCode::kOk;
 }
@@ -222,8 +231,9 @@ ExitCode Key::Accept() {
     const KeyState state = ReadKeyState(connection_, scene);
     if (!state.colored) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "no key view of " + scene + " has been coloured yet; first run `" +
-                      CommandLine(context_, {"key", "colour", scene, "--auto"}) + "`");
+                  "no key view of {} has been coloured yet; first run `{}`",
+                  scene,
+                  CommandLine(context_, {"key", "color", scene, "--auto"}));
     }
     job = state.colored->name();
   }
@@ -232,8 +242,10 @@ ExitCode Key::Accept() {
   if (context_.json) {
     PrintJson({{"scene", scene}, {"job", job}, {"key_view", choice.view}, {"accepted", true}});
   } else {
-    PrintText("accepted " + choice.view + " as " + job + " coloured it; now colour the scene\n" +
-              Command({"colorize", "--scene", scene, "-o", "OUT"}));
+    PrintText(fmt::format("accepted {} as {} coloured it; now colour the scene\n{}",
+                          choice.view,
+                          job,
+                          Command({"colorize", "--scene", scene, "-o", "OUT"})));
   }
   return ExitCode::kOk;
 }
@@ -272,12 +284,12 @@ void AddKeyCommands(CLI::App& app, Context& context) {
   select->add_option("--features", options->features, "CLIP weights that this server knows");
   run(select, &Key::Select);
 
-  CLI::App* colour = key->add_subcommand("colour", "Colour it, and fetch it to look at");
-  colour->alias("color");
-  AddTarget(colour, options.get());
-  AddView(colour, options.get());
-  DeclareKeyColorFlags(*colour, &options->color);
-  run(colour, &Key::Colour);
+  CLI::App* color = key->add_subcommand("color", "Colour it, and fetch it to look at");
+  color->alias("colour");
+  AddTarget(color, options.get());
+  AddView(color, options.get());
+  DeclareKeyColorFlags(*color, &options->color);
+  run(color, &Key::Color);
 
   CLI::App* show = key->add_subcommand("show", "What is selected, coloured and accepted");
   AddTarget(show, options.get());

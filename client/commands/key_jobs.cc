@@ -6,14 +6,14 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "core/base/error.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
 
 namespace color3d::client {
 namespace {
 
 constexpr int kPageSize = 200;
 constexpr int kMaxPages = 50;
-constexpr char kSelect[] = "select_key_view";
-constexpr char kColorize[] = "colorize_key_view";
 
 // Newest first; stops as soon as both have been found.
 void FindNewest(Connection& connection, KeyState* state) {
@@ -24,8 +24,8 @@ void FindNewest(Connection& connection, KeyState* state) {
     const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
     for (const v1::Job& job : jobs.jobs()) {
       if (job.state() != v1::Job::STATE_SUCCEEDED || !job.parent().empty()) continue;
-      if (job.kind() == kSelect && !state->selected) state->selected = job;
-      if (job.kind() == kColorize && !state->colored) state->colored = job;
+      if (job.kind() == kind::kSelectKeyView && !state->selected) state->selected = job;
+      if (job.kind() == kind::kColorizeKeyView && !state->colored) state->colored = job;
     }
     if (jobs.next_page_token().empty()) return;
     request.set_page_token(jobs.next_page_token());
@@ -56,14 +56,16 @@ std::vector<std::string> WithItsInputs(Connection& connection, const v1::Job& jo
 KeyViewChoice ReadChoice(Connection& connection, const v1::Job& job) {
   for (const std::string& name : WithItsInputs(connection, job)) {
     const v1::Job input = name == job.name() ? job : GetJob(connection, name);
-    if (input.kind() != kSelect) continue;
+    if (input.kind() != kind::kSelectKeyView) continue;
     const auto json = nlohmann::json::parse(
-        ReadArtifact(connection, input, "key_view.json"), nullptr, /*allow_exceptions=*/false);
+        ReadArtifact(connection, input, artifact::kKeyView), nullptr, /*allow_exceptions=*/false);
     if (!json.is_object()) break;
     return {json.value("view", ""), json.value("description", "")};
   }
   throw Error(ErrorCode::kNotFound,
-              job.name() + " read no key view: its select_key_view job is gone; select again");
+              "{} read no key view: its {} job is gone; select again",
+              job.name(),
+              kind::kSelectKeyView);
 }
 
 std::string DescribeSource(const v1::Job& job) {

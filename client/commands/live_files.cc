@@ -1,5 +1,7 @@
 #include "client/commands/live_files.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -27,7 +29,7 @@ void AddFolder(const fs::path& folder, std::vector<LivePicture>* pictures) {
     if (!name.starts_with('.') && HasImageExtension(name)) found.push_back(entry.path());
   }
   std::sort(found.begin(), found.end());
-  if (found.empty()) throw InvalidArgument("there are no photos in " + root.string());
+  if (found.empty()) throw InvalidArgument("there are no photos in {}", root.string());
   for (const fs::path& file : found) {
     pictures->push_back({file.filename().string(), file, std::nullopt});
   }
@@ -41,7 +43,7 @@ std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
     const std::string stem = Stem(picture.label);
     std::string name = stem + ".png";
     for (int i = 2; !taken.insert(name).second; ++i) {
-      name = stem + "_" + std::to_string(i) + ".png";
+      name = fmt::format("{}_{}.png", stem, i);
     }
     names.push_back(name);
   }
@@ -59,7 +61,7 @@ std::vector<LivePicture> CollectPictures(const std::vector<std::string>& argumen
     } else if (fs::is_regular_file(argument, none)) {
       pictures.push_back({fs::path(argument).filename().string(), argument, std::nullopt});
     } else {
-      throw Error(ErrorCode::kNotFound, "there is no photo or folder " + argument);
+      throw Error(ErrorCode::kNotFound, "there is no photo or folder {}", argument);
     }
   }
   return pictures;
@@ -121,19 +123,21 @@ ExitCode Conclude(const Context& context, const LiveSummary& summary, const fs::
     json["out"] = out.string();
     PrintJson(json);
   } else {
-    PrintText(std::to_string(summary.files.size()) + " pictures in " + out.string() + ", " +
-              HumanSeconds(summary.seconds) +
-              (summary.colorizer.empty() ? "" : ", by " + summary.colorizer) + "\n");
+    PrintText(fmt::format("{} pictures in {}, {}{}\n",
+                          summary.files.size(),
+                          out.string(),
+                          HumanSeconds(summary.seconds),
+                          summary.colorizer.empty() ? "" : ", by " + summary.colorizer));
   }
   if (summary.errors.empty()) return ExitCode::kOk;
-  std::string text = std::to_string(summary.errors.size()) + " of " +
-                     std::to_string(summary.errors.size() + summary.files.size()) +
-                     " pictures could not be coloured: ";
+  std::string text = fmt::format("{} of {} pictures could not be coloured: ",
+                                 summary.errors.size(),
+                                 summary.errors.size() + summary.files.size());
   for (size_t i = 0; i < std::min(kShownErrors, summary.errors.size()); ++i) {
     text += (i > 0 ? "; " : "") + summary.errors[i];
   }
   if (summary.errors.size() > kShownErrors) {
-    text += "; and " + std::to_string(summary.errors.size() - kShownErrors) + " more";
+    text += fmt::format("; and {} more", summary.errors.size() - kShownErrors);
   }
   if (!context.json) throw CommandFailure(summary.code, text);
   return summary.code;

@@ -12,6 +12,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/live_coloring.h"
 #include "client/lib/scene_upload.h"
+#include "core/catalogue/artifacts.h"
 #include "core/image/probe/probe.h"
 
 namespace color3d::client {
@@ -67,13 +68,13 @@ v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::stri
   const std::optional<v1::Job>& job = state.accepted ? state.accepted : state.colored;
   if (!job) {
     throw Error(ErrorCode::kFailedPrecondition,
-                scene +
-                    " has no coloured key view yet: give one with --key-color, or make one with "
-                    "`color3d key colour " +
-                    scene + " ...`");
+                "{} has no coloured key view yet: give one with --key-color, or make one with "
+                "`color3d key color {} ...`",
+                scene,
+                scene);
   }
   *key = ReadChoice(connection, *job).view;
-  return FindArtifact(*job, "key_view_colored.png").digest();
+  return FindArtifact(*job, artifact::kKeyViewColored).digest();
 }
 
 ExitCode Preview(const Context& context, const PreviewOptions& options) {

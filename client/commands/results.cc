@@ -1,15 +1,17 @@
 #include "client/commands/results.h"
 
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "client/commands/follow.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -17,33 +19,38 @@ namespace {
 
 struct MetricLine {
   const char* name;
-  const char* format;
+  const char* label;
+  int decimals;
+  const char* unit;
 };
 constexpr MetricLine kMetricLines[] = {
-    {"psnr_rgb", "PSNR of held-out views      %.2f dB"},
-    {"ssim_rgb", "SSIM                        %.4f"},
-    {"psnr_l", "PSNR of luminance           %.2f dB"},
-    {"delta_e00_chroma", "chroma error (CIEDE2000)    %.2f"},
-    {"delta_e00_chroma_bound", "  with all true colours     %.2f"},
-    {"delta_e00_gray", "  for comparison, grey      %.2f"},
-    {"share_seen", "share seen in a key view    %.2f"},
-    {"gaussians", "Gaussians                   %.0f"},
+    {"psnr_rgb", "PSNR of held-out views", 2, " dB"},
+    {"ssim_rgb", "SSIM", 4, ""},
+    {"psnr_l", "PSNR of luminance", 2, " dB"},
+    {"delta_e00_chroma", "chroma error (CIEDE2000)", 2, ""},
+    {"delta_e00_chroma_bound", "  with all true colours", 2, ""},
+    {"delta_e00_gray", "  for comparison, grey", 2, ""},
+    {"share_seen", "share seen in a key view", 2, ""},
+    {"gaussians", "Gaussians", 0, ""},
 };
+
+std::string Line(const std::string& label, const std::string& value) {
+  return fmt::format("{:<28}{}\n", label, value);
+}
 
 FileDigest DigestOf(const v1::Artifact& artifact) {
   return {artifact.digest().sha256(), artifact.digest().size_bytes()};
 }
 
-// Empty when there is none or it cannot be read: a summary is not worth an error.
-nlohmann::json ReadMetrics(const fs::path& out) {
-  std::error_code none;
-  if (!fs::is_regular_file(out / "metrics.json", none)) return {};
-  const auto json =
-      nlohmann::json::parse(ReadFile(out / "metrics.json"), nullptr, /*allow_exceptions=*/false);
-  return json.is_object() ? json : nlohmann::json();
-}
-
 }  // namespace
+
+nlohmann::ordered_json ReadResult(const fs::path& out, const std::string& name) {
+  std::error_code none;
+  if (!fs::is_regular_file(out / name, none)) return nullptr;
+  const auto json =
+      nlohmann::ordered_json::parse(ReadFile(out / name), nullptr, /*allow_exceptions=*/false);
+  return json.is_object() ? json : nlohmann::ordered_json();
+}
 
 const v1::Artifact& FindArtifact(const v1::Job& job, const std::string& name) {
   std::string known;
@@ -52,8 +59,10 @@ const v1::Artifact& FindArtifact(const v1::Job& job, const std::string& name) {
     if (known.size() < 200) known += (known.empty() ? "" : ", ") + artifact.name();
   }
   throw Error(ErrorCode::kNotFound,
-              job.name() + " has no artifact '" + name + "'; it has " +
-                  (known.empty() ? "none (it is " + StateName(job.state()) + ")" : known));
+              "{} has no artifact '{}'; it has {}",
+              job.name(),
+              name,
+              known.empty() ? "none (it is " + StateName(job.state()) + ")" : known);
 }
 
 std::string ReadArtifact(Connection& connection, const v1::Job& job, const std::string& name) {
@@ -68,13 +77,14 @@ void PrepareOut(const fs::path& out) {
   fs::create_directories(out, error);
   if (error || !fs::is_directory(out)) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot create the folder " + out.string() +
-                    (error ? ": " + error.message() : ": there is a file of this name") +
-                    "; name another with -o");
+                "cannot create the folder {}{}; name another with -o",
+                out.string(),
+                error ? ": " + error.message() : ": there is a file of this name");
   }
   if (::access(out.c_str(), W_OK | X_OK) != 0) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot write into the folder " + out.string() + "; name another with -o");
+                "cannot write into the folder {}; name another with -o",
+                out.string());
   }
 }
 
@@ -85,7 +95,7 @@ std::vector<std::string> DownloadArtifacts(Connection& connection,
   int64_t total = 0;
   for (const v1::Artifact& artifact : artifacts) {
     if (!IsSafeRelativePath(artifact.name())) {
-      throw Error(ErrorCode::kDataLoss, "the artifact name '" + artifact.name() + "' is not safe");
+      throw Error(ErrorCode::kDataLoss, "the artifact name '{}' is not safe", artifact.name());
     }
     total += artifact.digest().size_bytes();
   }
@@ -114,31 +124,34 @@ std::vector<std::string> DownloadResults(Connection& connection,
     if (e.code() != ErrorCode::kCancelled) throw;
     throw CommandFailure(
         ExitCode::kDetached,
-        job.name() + " is done, its results are partly here; fetch them with `" +
-            CommandLine(context, {"artifact", "download", job.name(), "-o", out.string()}) + "`");
+        fmt::format(
+            "{} is done, its results are partly here; fetch them with `{}`",
+            job.name(),
+            CommandLine(context, {"artifact", "download", job.name(), "-o", out.string()})));
   }
 }
 
 std::string Summary(const fs::path& out) {
   std::string text;
-  const nlohmann::json metrics = ReadMetrics(out);
+  const nlohmann::ordered_json metrics = ReadResult(out, artifact::kMetrics);
+  const auto number = [&](const char* name) -> std::optional<double> {
+    const auto found = metrics.find(name);
+    if (found == metrics.end() || !found->is_number()) return std::nullopt;
+    return found->get<double>();
+  };
   for (const MetricLine& line : kMetricLines) {
-    const auto found = metrics.find(line.name);
-    if (found == metrics.end() || !found->is_number()) continue;
-    char buffer[120];
-    std::snprintf(buffer, sizeof(buffer), line.format, found->get<double>());
-    text += std::string(buffer) + "\n";
+    if (const auto value = number(line.name)) {
+      text += Line(line.label, fmt::format("{:.{}f}{}", *value, line.decimals, line.unit));
+    }
   }
-  const auto seconds = metrics.find("seconds_total");
-  if (seconds != metrics.end() && seconds->is_number()) {
-    text += "computing time              " + HumanSeconds(seconds->get<double>()) + "\n";
+  if (const auto seconds = number("seconds_total")) {
+    text += Line("computing time", HumanSeconds(*seconds));
   }
-  std::error_code none;
-  if (fs::exists(out / "scene.ply", none)) {
-    text += "coloured scene              " + (out / "scene.ply").string() + "\n";
-  }
-  if (fs::exists(out / "report.html", none)) {
-    text += "report                      " + (out / "report.html").string() + "\n";
+  const std::pair<const char*, const char*> files[] = {{"coloured scene", artifact::kPly},
+                                                       {"report", artifact::kReport}};
+  for (const auto& [label, name] : files) {
+    std::error_code none;
+    if (fs::exists(out / name, none)) text += Line(label, (out / name).string());
   }
   return text;
 }

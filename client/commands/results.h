@@ -2,12 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "client/commands/command.h"
-#include "client/commands/progress_display.h"
 #include "client/lib/connection.h"
+#include "client/lib/progress_display.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {
@@ -36,7 +37,10 @@ std::vector<std::string> DownloadResults(Connection& connection,
                                          const std::filesystem::path& out,
                                          ProgressDisplay& display);
 
-// A few lines about out/metrics.json and what lies in `out`, for people.
+// A JSON artifact that was downloaded into `out`; null when there is none or it cannot be read.
+nlohmann::ordered_json ReadResult(const std::filesystem::path& out, const std::string& name);
+
+// A few lines about the metrics and what else lies in `out`, for people.
 std::string Summary(const std::filesystem::path& out);
 
 }  // namespace color3d::client

@@ -1,7 +1,9 @@
+#include <fmt/core.h>
+
 #include "client/commands/command.h"
 #include "client/commands/console.h"
-#include "client/commands/progress_display.h"
 #include "client/lib/names.h"
+#include "client/lib/progress_display.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
 
@@ -83,10 +85,13 @@ ExitCode RunShow(const Context& context, const std::string& name) {
     PrintJson(scene);
     return ExitCode::kOk;
   }
-  PrintText(scene.name() + "\nstate    " + SceneState(scene) + "\nlayout   " +
-            LayoutName(scene.layout()) + "\nphotos   " + std::to_string(scene.photo_count()) +
-            "\nfolder   " + scene.display_name() + "\ncreated  " + HumanTime(scene.create_time()) +
-            "\n");
+  PrintText(fmt::format("{}\nstate    {}\nlayout   {}\nphotos   {}\nfolder   {}\ncreated  {}\n",
+                        scene.name(),
+                        SceneState(scene),
+                        LayoutName(scene.layout()),
+                        scene.photo_count(),
+                        scene.display_name(),
+                        HumanTime(scene.create_time())));
   std::vector<std::vector<std::string>> rows = {{"FILE", "SIZE"}};
   for (const v1::SceneFile& file : scene.files()) {
     rows.push_back({file.path(), HumanBytes(file.digest().size_bytes())});

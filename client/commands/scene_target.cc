@@ -1,5 +1,7 @@
 #include "client/commands/scene_target.h"
 
+#include <fmt/core.h>
+
 #include <filesystem>
 
 #include "client/commands/console.h"
@@ -18,7 +20,7 @@ std::string UploadFolder(Connection& connection,
   const v1::Scene scene = UploadScene(connection, entries, name, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading", done, total);
   });
-  display.Say(scene.name() + ": " + std::to_string(scene.photo_count()) + " photos");
+  display.Say(fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }
 
@@ -30,9 +32,9 @@ std::string ResolveScene(Connection& connection,
   if (!fs::is_directory(text, none)) {
     if (text.starts_with("scenes/")) return text;
     throw Error(ErrorCode::kNotFound,
-                "'" + text +
-                    "' is neither a folder of photos nor a scene of the server's "
-                    "(scenes/ID; `color3d scene list` shows them)");
+                "'{}' is neither a folder of photos nor a scene of the server's (scenes/ID; "
+                "`color3d scene list` shows them)",
+                text);
   }
   const PhotoFolder folder = CollectPhotos(text);
   for (const std::string& note : folder.notes) PrintNote(context, note);

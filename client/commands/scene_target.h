@@ -5,8 +5,8 @@
 #include <string>
 
 #include "client/commands/command.h"
-#include "client/commands/progress_display.h"
-#include "client/lib/photo_folder.h"
+#include "client/lib/photos/photo_folder.h"
+#include "client/lib/progress_display.h"
 
 namespace color3d::client {
 

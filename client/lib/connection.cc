@@ -87,9 +87,9 @@ void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& 
 
 Error UnreachableError(const std::string& address) {
   return Error(ErrorCode::kUnavailable,
-               "cannot reach a server at " + address +
-                   ": start one with `color3d-server serve --data-dir DIR`, or name another with "
-                   "--server");
+               "cannot reach a server at {}: start one with `color3d-server serve --data-dir DIR`, "
+               "or name another with --server",
+               address);
 }
 
 }  // namespace color3d::client

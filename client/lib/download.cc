@@ -41,8 +41,8 @@ class Download {
     if (DigestFile(part_).sha256 == digest_.sha256) return;
     fs::remove(part_, none);
     throw Error(ErrorCode::kDataLoss,
-                "the bytes received for blob " + digest_.sha256 +
-                    " do not have this digest; run the command again");
+                "the bytes received for blob {} do not have this digest; run the command again",
+                digest_.sha256);
   }
 
  private:
@@ -61,9 +61,9 @@ class Download {
       if (!output.flush()) {
         context.TryCancel();
         stream->Finish();
-        throw Error(
-            ErrorCode::kResourceExhausted,
-            "cannot write " + part_.string() + "; free some disk space and run the command again");
+        throw Error(ErrorCode::kResourceExhausted,
+                    "cannot write {}; free some disk space and run the command again",
+                    part_.string());
       }
       received_ += static_cast<int64_t>(response.data().size());
       progress(received_);
@@ -98,7 +98,9 @@ void DownloadBlob(Connection& connection,
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
   if (error) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot create the folder " + path.parent_path().string() + ": " + error.message());
+                "cannot create the folder {}: {}",
+                path.parent_path().string(),
+                error.message());
   }
   const fs::path part = path.parent_path() / (".color3d-" + digest.sha256.substr(0, 16) + ".part");
   Download(connection, digest, part).Run(progress);

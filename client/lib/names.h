@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include "core/base/digest.h"
 
@@ -20,8 +19,5 @@ std::string BlobResource(const FileDigest& digest);
 
 // "a/b/photo.jpg" -> "photo".
 std::string Stem(const std::string& path);
-
-// Protobuf strings must be UTF-8; file names need not be.
-bool IsUtf8(std::string_view text);
 
 }  // namespace color3d::client

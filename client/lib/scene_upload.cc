@@ -1,11 +1,14 @@
 #include "client/lib/scene_upload.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <optional>
 
 #include "client/lib/names.h"
 #include "core/base/files.h"
 #include "core/base/parallel.h"
+#include "core/base/utf8.h"
 #include "core/image/probe/probe.h"
 
 namespace color3d::client {
@@ -19,7 +22,7 @@ constexpr std::chrono::seconds kCommitTimeLimit{600};
 [[noreturn]] void ThrowBadPhotos(const std::vector<std::string>& complaints) {
   std::string message = complaints[0];
   if (complaints.size() > 1) {
-    message = std::to_string(complaints.size()) + " photographs cannot be used:";
+    message = fmt::format("{} photographs cannot be used:", complaints.size());
     for (size_t i = 0; i < std::min(complaints.size(), kMaxListed); ++i) {
       message += "\n  " + complaints[i];
     }

@@ -6,7 +6,7 @@
 
 #include "client/lib/blob_transfer.h"
 #include "client/lib/connection.h"
-#include "client/lib/photo_folder.h"
+#include "client/lib/photos/photo_folder.h"
 #include "core/base/digest.h"
 
 namespace color3d::client {

@@ -1,22 +1,18 @@
 #include "client/lib/text.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
+
+#include "core/catalogue/stages.h"
 
 namespace color3d::client {
 namespace {
 
 constexpr size_t kNameColumns = 21;
 constexpr int kBarColumns = 20;
-
-template <typename... Args>
-std::string Format(const char* format, Args... args) {
-  char text[128];
-  std::snprintf(text, sizeof(text), format, args...);
-  return text;
-}
 
 std::string Padded(std::string text, size_t columns) {
   if (text.size() < columns) text.append(columns - text.size(), ' ');
@@ -40,8 +36,11 @@ std::string Cut(std::string text, size_t bytes) {
 std::string Bar(const v1::Progress& progress) {
   const double part = static_cast<double>(progress.step()) / progress.total_steps();
   const int filled = static_cast<int>(std::clamp(part, 0.0, 1.0) * kBarColumns);
-  return "[" + std::string(filled, '#') + std::string(kBarColumns - filled, '-') + "] " +
-         std::to_string(progress.step()) + "/" + std::to_string(progress.total_steps());
+  return fmt::format("[{}{}] {}/{}",
+                     std::string(filled, '#'),
+                     std::string(kBarColumns - filled, '-'),
+                     progress.step(),
+                     progress.total_steps());
 }
 
 // The server repeats the whole error in every stage that could not run because of it.
@@ -62,7 +61,7 @@ double SecondsOf(const v1::Job& job) {
 }  // namespace
 
 std::string HumanBytes(int64_t bytes) {
-  if (bytes < 1000) return std::to_string(bytes) + " B";
+  if (bytes < 1000) return fmt::format("{} B", bytes);
   double value = static_cast<double>(bytes);
   const char* unit = "";
   for (const char* next : {"kB", "MB", "GB", "TB"}) {
@@ -70,23 +69,23 @@ std::string HumanBytes(int64_t bytes) {
     value /= 1000.0;
     unit = next;
   }
-  return Format("%.1f %s", value, unit);
+  return fmt::format("{:.1f} {}", value, unit);
 }
 
 std::string HumanSeconds(double seconds) {
-  if (seconds < 9.95) return Format("%.1f s", std::max(0.0, seconds));
+  if (seconds < 9.95) return fmt::format("{:.1f} s", std::max(0.0, seconds));
   const int64_t whole = std::llround(seconds);
-  if (whole < 600) return std::to_string(whole) + " s";
-  if (whole < 3600) return Format("%d min", static_cast<int>(whole / 60));
-  return Format("%d h %02d min", static_cast<int>(whole / 3600), static_cast<int>(whole / 60 % 60));
+  if (whole < 600) return fmt::format("{} s", whole);
+  if (whole < 3600) return fmt::format("{} min", whole / 60);
+  return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
 std::string HumanClock(double seconds) {
   const int64_t whole = std::llround(std::clamp(seconds, 0.0, 1e8));
-  const int s = static_cast<int>(whole % 60);
-  const int m = static_cast<int>(whole / 60 % 60);
-  if (whole < 3600) return Format("%d:%02d", m, s);
-  return Format("%d:%02d:%02d", static_cast<int>(whole / 3600), m, s);
+  const int64_t s = whole % 60;
+  const int64_t m = whole / 60 % 60;
+  if (whole < 3600) return fmt::format("{}:{:02}", m, s);
+  return fmt::format("{}:{:02}:{:02}", whole / 3600, m, s);
 }
 
 std::string HumanTime(const google::protobuf::Timestamp& time) {
@@ -105,7 +104,7 @@ std::string StateName(v1::Job::State state) {
 }
 
 std::string StageName(const v1::Job& job) {
-  return job.kind() == "colorize_scene" ? "report" : job.kind();
+  return job.kind() == kind::kColorizeScene ? "report" : job.kind();
 }
 
 std::string ProgressLine(const v1::Job& job, int width) {
@@ -114,10 +113,10 @@ std::string ProgressLine(const v1::Job& job, int width) {
   if (progress.total_steps() > 0) {
     line += Bar(progress);
   } else if (progress.step() > 0) {
-    line += std::to_string(progress.step());
+    line += fmt::format("{}", progress.step());
   }
   if (!progress.error_name().empty()) {
-    line += "  " + OneLine(progress.error_name()) + Format("=%.4g", progress.error_value());
+    line += fmt::format("  {}={:.4g}", OneLine(progress.error_name()), progress.error_value());
   }
   if (progress.eta_seconds() >= 0.0 && progress.step() > 0) {
     line += "  " + HumanClock(progress.eta_seconds()) + " left";

@@ -127,8 +127,8 @@ class Upload {
   }
 
   Error Changed() const {
-    return InvalidArgument(file_.file.string() +
-                           " changed while it was read; run the command again");
+    return InvalidArgument("{} changed while it was read; run the command again",
+                           file_.file.string());
   }
 
   Connection& connection_;

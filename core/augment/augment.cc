@@ -24,9 +24,12 @@ constexpr double kMaxTilt = 6.0 * std::numbers::pi / 180.0;
 void Check(const Image& luminance, const Image& ab, const AugmentOptions& options) {
   if (luminance.channels != 1 || ab.channels != 2 || luminance.Empty() ||
       luminance.width != ab.width || luminance.height != ab.height) {
-    throw InvalidArgument("augmentation takes L (1 channel) and ab (2 channels) of one size, got " +
-                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
-                          " and " + std::to_string(ab.width) + "x" + std::to_string(ab.height));
+    throw InvalidArgument(
+        "augmentation takes L (1 channel) and ab (2 channels) of one size, got {}x{} and {}x{}",
+        luminance.width,
+        luminance.height,
+        ab.width,
+        ab.height);
   }
   if (options.crop_px < 1 || options.shuffle_grid < 1 || !(options.min_scale > 0.0) ||
       !(options.max_scale >= options.min_scale) || !(options.elastic_sigma_px > 0.0)) {
@@ -244,10 +247,12 @@ AugmentedSample Augment(const Image& luminance,
   Check(luminance, ab, options);
   if (!weight.Empty() && (weight.channels != 1 || weight.width != luminance.width ||
                           weight.height != luminance.height)) {
-    throw InvalidArgument("the weights of a picture to be augmented are " +
-                          std::to_string(weight.width) + "x" + std::to_string(weight.height) +
-                          " px, the picture " + std::to_string(luminance.width) + "x" +
-                          std::to_string(luminance.height));
+    throw InvalidArgument(
+        "the weights of a picture to be augmented are {}x{} px, the picture {}x{}",
+        weight.width,
+        weight.height,
+        luminance.width,
+        luminance.height);
   }
   const SamplingMap map(luminance.width, luminance.height, options, random);
   const float offset =

@@ -14,7 +14,6 @@
 namespace color3d {
 namespace {
 
-constexpr int kMinSidePx = 32;
 constexpr int kSearchSidePx = 160;     // the picture's longer side while patches are compared
 constexpr double kPatchShare = 0.12;   // of the longer side
 constexpr double kOverlapShare = 0.3;  // of the patch
@@ -352,11 +351,13 @@ GeneratedPicture OutpaintQuadrant(const Image& lab,
                                   Quadrant quadrant,
                                   uint64_t seed,
                                   const CancellationToken& cancel) {
-  if (lab.channels != 3 || std::min(lab.width, lab.height) < kMinSidePx) {
-    throw InvalidArgument("outpainting takes a Lab picture of at least " +
-                          std::to_string(kMinSidePx) + " px each way, got " +
-                          std::to_string(lab.width) + "x" + std::to_string(lab.height) + " with " +
-                          std::to_string(lab.channels) + " channels");
+  if (lab.channels != 3 || std::min(lab.width, lab.height) < kMinGeneratedSidePx) {
+    throw InvalidArgument(
+        "outpainting takes a Lab picture of at least {} px each way, got {}x{} with {} channels",
+        kMinGeneratedSidePx,
+        lab.width,
+        lab.height,
+        lab.channels);
   }
   const bool flip_x = quadrant == Quadrant::kUpperLeft || quadrant == Quadrant::kLowerLeft;
   const bool flip_y = quadrant == Quadrant::kUpperLeft || quadrant == Quadrant::kUpperRight;

@@ -147,10 +147,12 @@ void CheckSizes(const SurfaceView& view, const char* which) {
   for (const Image* image : {&view.luminance, &view.depth}) {
     if (image->channels != 1 || image->width != view.camera.width ||
         image->height != view.camera.height) {
-      throw InvalidArgument(std::string("the ") + which + " view's camera is " +
-                            std::to_string(view.camera.width) + "x" +
-                            std::to_string(view.camera.height) + " px, a picture of it " +
-                            std::to_string(image->width) + "x" + std::to_string(image->height));
+      throw InvalidArgument("the {} view's camera is {}x{} px, a picture of it {}x{}",
+                            which,
+                            view.camera.width,
+                            view.camera.height,
+                            image->width,
+                            image->height);
     }
   }
 }
@@ -159,10 +161,10 @@ void CheckSizes(const SurfaceView& view, const char* which) {
 
 void CarryOptions::Validate() const {
   const RangeCheck check("carry option");
-  check("depth_tolerance", depth_tolerance, 1e-6, 1e6);
-  check("luminance_tolerance", luminance_tolerance, 1e-6, 1e6);
+  check("depth_tolerance", depth_tolerance, 1e-4, 1.0);
+  check("luminance_tolerance", luminance_tolerance, 1.0, 100.0);
   check("structure_tolerance", structure_tolerance, 1e-6, 1e6);
-  if (flow_tolerance_px != 0.0) check("flow_tolerance_px", flow_tolerance_px, 1e-6, 1e6);
+  if (flow_tolerance_px != 0.0) check("flow_tolerance_px", flow_tolerance_px, 0.1, 10.0);
 }
 
 CarriedColor CarryColor(const SurfaceView& source,

@@ -17,15 +17,18 @@ struct SurfaceView {
 };
 
 struct CarryOptions {
-  // Depth of the surface against the source's depth there, relative: confidence falls to 1/e.
+  // Depth of the surface against the source's depth there, relative, 1e-4..1: confidence falls to
+  // 1/e.
   double depth_tolerance = 0.03;
-  // Difference of the mean L of a small window, L units: confidence falls to 1/e.
+  // Difference of the mean L of a small window, L units, 1..100: confidence falls to 1/e.
   double luminance_tolerance = 20.0;
   // What is left of the window's structure, as a share of it: confidence falls to 1/e.
   double structure_tolerance = 0.7;
-  // Registration by optical flow on top of geometry: displacement at which confidence falls to 1/e.
+  // Registration by optical flow on top of geometry: displacement at which confidence falls to
+  // 1/e, 0.1..10; 0: no registration.
   double flow_tolerance_px = 4.0;
   void Validate() const;
+  bool operator==(const CarryOptions&) const = default;
 };
 
 struct CarriedColor {

@@ -15,17 +15,20 @@ namespace color3d {
 namespace {
 
 constexpr double kTolerance = 1e-3;
-constexpr double kLeastPull = 1e-6;   // keeps the system definite
-constexpr double kMostStrange = 4.0;  // feature distance; beyond, all is equally strange
+constexpr double kMinPull = 1e-6;    // keeps the system definite
+constexpr double kMaxStrange = 4.0;  // feature distance; beyond, all is equally strange
 
 void CheckSize(const char* what, const Image& image, int channels, const Image& luminance) {
   if (image.width != luminance.width || image.height != luminance.height ||
       image.channels != channels) {
-    throw InvalidArgument(std::string("fusion: the ") + what + " picture is " +
-                          std::to_string(image.width) + "x" + std::to_string(image.height) + "x" +
-                          std::to_string(image.channels) + ", wanted " +
-                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
-                          "x" + std::to_string(channels));
+    throw InvalidArgument("fusion: the {} picture is {}x{}x{}, wanted {}x{}x{}",
+                          what,
+                          image.width,
+                          image.height,
+                          image.channels,
+                          luminance.width,
+                          luminance.height,
+                          channels);
   }
 }
 
@@ -39,11 +42,11 @@ double SmoothStep(double x, double begin, double end) {
 void FusionOptions::Validate() const {
   const RangeCheck check("fusion option");
   check("inferred_weight", inferred_weight, 1e-6, 1e3);
-  check("least_confidence", least_confidence, 0, 1);
+  check("min_confidence", min_confidence, 0, 1);
   check("edge_sigma", edge_sigma, 0.01, 100);
   check("guess_begins", guess_begins, 0, 1e6);
   check("guess_ends", guess_ends, guess_begins + 1e-6, 2e6);
-  check("most_guessed", most_guessed, 0, 1);
+  check("max_guessed", max_guessed, 0, 1);
   check("guess_chroma", guess_chroma, 0, 1);
 }
 
@@ -68,15 +71,15 @@ FusedColor FuseColors(const Image& luminance,
   std::vector<float> target(2 * pixels);
   for (size_t i = 0; i < pixels; ++i) {
     const double confidence = carried.confidence.data[i];
-    const double seen = confidence > options.least_confidence ? confidence * confidence : 0.0;
+    const double seen = confidence > options.min_confidence ? confidence * confidence : 0.0;
     const double guess = distance.Empty() ? 0.0
-                                          : options.most_guessed * SmoothStep(distance.data[i],
-                                                                              options.guess_begins,
-                                                                              options.guess_ends);
+                                          : options.max_guessed * SmoothStep(distance.data[i],
+                                                                             options.guess_begins,
+                                                                             options.guess_ends);
     const double strangeness =
-        distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMostStrange);
+        distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMaxStrange);
     const double pull =
-        (1.0 - seen) * options.inferred_weight / (1.0 + strangeness * strangeness) + kLeastPull;
+        (1.0 - seen) * options.inferred_weight / (1.0 + strangeness * strangeness) + kMinPull;
     const double total = seen + pull;
     for (int c = 0; c < 2; ++c) {
       const double guess_ab = guessed.Empty() ? 0.0 : options.guess_chroma * guessed.Plane(c)[i];

@@ -17,14 +17,14 @@ struct FusionOptions {
   // neighbours of equal luminance with 1.
   double inferred_weight = 0.1;
   // Carried colours below this confidence are not used, 0..1.
-  double least_confidence = 0.05;
+  double min_confidence = 0.05;
   // Luminance difference (L units) at which neighbours half agree, as for hints.
   double edge_sigma = 1.0;
   // Feature distances (ColorPrediction::distance) where the automatic guess begins to replace the
   // inferred colour and where it has its full share.
   double guess_begins = 3.5;
   double guess_ends = 7.0;
-  double most_guessed = 0.6;  // that full share, 0..1
+  double max_guessed = 0.6;   // that full share, 0..1
   double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
   void Validate() const;
 };

@@ -35,7 +35,7 @@ StereoPlan PlanStereo(const Scene& scene,
                       int view,
                       const std::vector<Eigen::Vector3d>& surface,
                       const std::vector<int>& candidates,
-                      int most_sources) {
+                      int max_sources) {
   const View& reference = scene.views.at(view);
   StereoPlan plan;
   std::vector<double> depths;
@@ -64,7 +64,7 @@ StereoPlan PlanStereo(const Scene& scene,
   }
   std::sort(ranked.begin(), ranked.end());
   for (const auto& [score, other] : ranked) {
-    if (static_cast<int>(plan.sources.size()) == most_sources) break;
+    if (static_cast<int>(plan.sources.size()) == max_sources) break;
     plan.sources.push_back(other);
   }
   return plan;

@@ -20,6 +20,6 @@ StereoPlan PlanStereo(const Scene& scene,
                       int view,
                       const std::vector<Eigen::Vector3d>& surface,
                       const std::vector<int>& candidates,
-                      int most_sources);
+                      int max_sources);
 
 }  // namespace color3d

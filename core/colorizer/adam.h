@@ -5,13 +5,11 @@
 #include <torch/types.h>
 
 #include <cstdint>
-#include <string>
-#include <utility>
 #include <vector>
 
-namespace color3d {
+#include "core/colorizer/named_tensors.h"
 
-using NamedTensors = std::vector<std::pair<std::string, torch::Tensor>>;
+namespace color3d {
 
 class Adam {
  public:

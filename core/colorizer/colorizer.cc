@@ -1,5 +1,6 @@
 #include "core/colorizer/colorizer.h"
 
+#include <fmt/format.h>
 #include <torch/torch.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/colorizer/feature_neighbors.h"
 #include "core/colorizer/padding.h"
 #include "core/colorizer/personal_colorizer.h"
 #include "core/colorizer/recipe.h"
@@ -24,48 +26,48 @@ namespace color3d {
 namespace {
 
 constexpr float kMaxGivenAb = 256.0f;
-constexpr int kMostAdapterStages = 8;  // more than any encoder has: all
+constexpr int kMaxAdapterStages = 8;  // more than any encoder has: all
 
-std::string SizeOf(const Image& image) {
-  return std::to_string(image.width) + "x" + std::to_string(image.height);
-}
+std::string SizeOf(const Image& image) { return fmt::format("{}x{}", image.width, image.height); }
 
 void CheckPicture(const TrainingPicture& picture) {
   const std::string& name = picture.name;
   if (picture.luminance.channels != 1 || picture.ab.channels != 2 || picture.luminance.Empty()) {
-    throw InvalidArgument(name + " needs L with 1 channel and ab with 2, got " +
-                          std::to_string(picture.luminance.channels) + " and " +
-                          std::to_string(picture.ab.channels));
+    throw InvalidArgument("{} needs L with 1 channel and ab with 2, got {} and {}",
+                          name,
+                          picture.luminance.channels,
+                          picture.ab.channels);
   }
   const bool weighted = !picture.weight.Empty();
   for (const Image* map : {&picture.luminance, &picture.ab, &picture.weight}) {
     if (map == &picture.weight && !weighted) continue;
     if (SizeOf(*map) != SizeOf(picture.luminance)) {
-      throw InvalidArgument("the L of " + name + " is " + SizeOf(picture.luminance) + " px, its " +
-                            (map == &picture.ab ? "ab " : "weight ") + SizeOf(*map));
+      throw InvalidArgument("the L of {} is {} px, its {} {}",
+                            name,
+                            SizeOf(picture.luminance),
+                            map == &picture.ab ? "ab" : "weight",
+                            SizeOf(*map));
     }
     for (float value : map->data) {
       if (!std::isfinite(value)) {
-        throw InvalidArgument(name + " holds a value that is not finite");
+        throw InvalidArgument("{} holds a value that is not finite", name);
       }
     }
   }
   for (float value : picture.ab.data) {
     // Far beyond every colour; what is stored in half precision would overflow.
     if (std::abs(value) > kMaxGivenAb) {
-      throw InvalidArgument(name + " holds the chroma " + std::to_string(value) +
-                            "; a and b are Lab units, at most " + std::to_string(kMaxGivenAb));
+      throw InvalidArgument(
+          "{} holds the chroma {}; a and b are Lab units, at most {}", name, value, kMaxGivenAb);
     }
   }
   for (float value : picture.weight.data) {
     if (value < 0.0f || value > 1.0f) {
-      throw InvalidArgument("the weights of " + name + " hold " + std::to_string(value) +
-                            ", allowed are 0 to 1");
+      throw InvalidArgument("the weights of {} hold {}, allowed are 0 to 1", name, value);
     }
   }
   if (!(picture.share >= 0.0 && picture.share <= 1e6)) {
-    throw InvalidArgument("the share of " + name + " is " + std::to_string(picture.share) +
-                          ", allowed are 0 to 1e6");
+    throw InvalidArgument("the share of {} is {}, allowed are 0 to 1e6", name, picture.share);
   }
 }
 
@@ -101,8 +103,8 @@ std::shared_ptr<const TapEncoder> RequireTaps(const std::shared_ptr<const Encode
   if (!network) {
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "the colorizer needs an encoder that shows its feature maps (a ConvNeXt); this one is " +
-            (encoder ? encoder->description() : std::string("null")));
+        "the colorizer needs an encoder that shows its feature maps (a ConvNeXt); this one is {}",
+        encoder ? encoder->description() : "null");
   }
   return network;
 }
@@ -112,8 +114,9 @@ void CheckTaps(const ConvNextConfig& encoder) {
   const int last_stride = encoder.Stride(encoder.StageCount() - 1);
   if (kPadMultiple % last_stride == 0) return;
   throw Error(ErrorCode::kFailedPrecondition,
-              "the colorizer works on encoders with strides up to " + std::to_string(kPadMultiple) +
-                  "; this one goes up to " + std::to_string(last_stride));
+              "the colorizer works on encoders with strides up to {}; this one goes up to {}",
+              kPadMultiple,
+              last_stride);
 }
 
 std::array<float, 2> MeanAb(const Image& ab) {
@@ -131,29 +134,28 @@ std::array<float, 2> MeanAb(const Image& ab) {
 void ColorizerOptions::Validate() const {
   const RangeCheck check("colorizer option");
   check("iterations", iterations, 0, 100000);
-  check("time_limit_seconds", time_limit_seconds, 0, 1e7);
+  check("time_limit_seconds", time_limit_seconds, 0, 86400);
   check("max_side_px", max_side_px, 64, 2048);
   check("crop_px", crop_px, 64, 1024);
   check("learning_rate", learning_rate, 0, 1);
   check("consistency_weight", consistency_weight, 0, 1e3);
   check("average_decay", average_decay, 0, 0.9999);
-  check("least_improvement", least_improvement, 0, 0.5);
-  check("adapter_stages", adapter_stages, -1, kMostAdapterStages);
+  check("min_improvement", min_improvement, 0, 0.5);
+  check("adapter_stages", adapter_stages, -1, kMaxAdapterStages);
   check("decoder_width", decoder_width, 0.25, 4);
-  check("threads", threads, 0, 1024);
 }
 
 TrainingRecipe RecipeFor(const ColorizerOptions& options) {
   // Ours has no adapters: on random features they left the error where it was (fern 3.77 against
-  // 3.75) and made an iteration dearer, because gradients then run through the encoder.
+  // 3.75) and made an iteration slower, because gradients then run through the encoder.
   TrainingRecipe recipe;
   if (options.recipe == ColorizerOptions::Recipe::kPaper) {
     recipe.model.instance_norm = true;
-    recipe.model.adapter_stages = kMostAdapterStages;
+    recipe.model.adapter_stages = kMaxAdapterStages;
     recipe.augment = AugmentOptions::Paper();
     recipe.first_learning_rate = 1e-4;
     recipe.warmup_iterations = 0;
-    recipe.neighbours = false;
+    recipe.neighbors = false;
   }
   if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
   recipe.model.decoder_width = options.decoder_width;
@@ -169,7 +171,7 @@ namespace {
 // Steps in a turn: seldom enough that handing over costs nothing.
 constexpr int kStepsPerTurn = 5;
 
-// What training starts from: neighbours and the model with the key view's statistics.
+// What training starts from: neighbors and the model with the key view's statistics.
 PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
                                  const std::vector<TrainingPicture>& pictures,
                                  const ColorizerOptions& options,
@@ -180,12 +182,12 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
   parts.options = options;
   const TrainingPicture& key = pictures.front();
   SetTorchThreads(1);
-  if (recipe.neighbours) {
-    parts.neighbours = std::make_unique<FeatureNeighbours>(*parts.encoder,
-                                                           pictures,
-                                                           recipe.neighbour_options,
-                                                           Random(options.seed, /*stream=*/3),
-                                                           cancel);
+  if (recipe.neighbors) {
+    parts.neighbors = std::make_unique<FeatureNeighbors>(*parts.encoder,
+                                                         pictures,
+                                                         recipe.neighbor_options,
+                                                         Random(options.seed, /*stream=*/3),
+                                                         cancel);
   }
   Random start(options.seed, /*stream=*/0);
   parts.model =
@@ -196,22 +198,20 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
 }
 
 void Train(TrainingSession& session,
-           CheckpointStore& checkpoints,
-           ProgressObserver& progress,
-           const CancellationToken& cancel,
-           SceneBatch::Seat& seat) {
-  std::unique_ptr<ThreadPool> helpers;
+           const RunControl& control,
+           SceneBatch::Membership& membership) {
   while (!session.Finished()) {
-    cancel.ThrowIfCancelled();
+    control.cancel.ThrowIfCancelled();
     {
-      const SceneBatch::Turn turn(seat, cancel);
-      if (turn.slots() > 1 && !helpers) helpers = std::make_unique<ThreadPool>(2);
+      const SceneBatch::Turn turn(membership, control.cancel);
       for (int i = 0; i < kStepsPerTurn && !session.Finished(); ++i) {
-        cancel.ThrowIfCancelled();
-        session.Step(progress, turn.slots() > 1 ? helpers.get() : nullptr);
+        control.cancel.ThrowIfCancelled();
+        session.Step(control.progress, turn.slots() > 1 ? &control.pool : nullptr);
       }
     }
-    if (session.AtCheckpoint() && checkpoints.WantsSave()) checkpoints.Save(session.Checkpoint());
+    if (session.AtCheckpoint() && control.checkpoints.WantsSave()) {
+      control.checkpoints.Save(session.Checkpoint());
+    }
   }
 }
 
@@ -220,39 +220,27 @@ void Train(TrainingSession& session,
 std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
                                                 std::vector<TrainingPicture> pictures,
                                                 const ColorizerOptions& options,
-                                                CheckpointStore& checkpoints,
-                                                ProgressObserver& progress,
-                                                const CancellationToken& cancel) {
-  SceneBatch alone(options.threads);
-  return TrainColorizer(
-      std::move(encoder), std::move(pictures), options, checkpoints, progress, cancel, alone, "");
-}
-
-std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
-                                                std::vector<TrainingPicture> pictures,
-                                                const ColorizerOptions& options,
-                                                CheckpointStore& checkpoints,
-                                                ProgressObserver& progress,
-                                                const CancellationToken& cancel,
-                                                SceneBatch& batch,
-                                                const std::string& project) {
+                                                const RunControl& control,
+                                                const std::optional<BatchPlace>& place) {
   options.Validate();
   CheckPictures(pictures);
   auto taps = RequireTaps(encoder);
   CheckTaps(taps->config());
   const TrainingRecipe recipe = RecipeFor(options);
   return WithTorchErrors("personalization", [&]() -> std::shared_ptr<const Colorizer> {
-    SceneBatch::Seat seat(batch, project);
-    std::optional<SceneBatch::Turn> turn(std::in_place, seat, cancel);
+    SceneBatch alone(control.pool.thread_count());
+    SceneBatch::Membership membership(place ? place->batch : alone, place ? place->project : "");
+    std::optional<SceneBatch::Turn> turn(std::in_place, membership, control.cancel);
     for (TrainingPicture& picture : pictures) FitWithin(options.max_side_px, &picture);
-    auto parts = Prepare(std::move(taps), pictures, options, recipe, cancel);
+    auto parts = Prepare(std::move(taps), pictures, options, recipe, control.cancel);
     TrainingSession session(pictures, options, recipe, *parts.model);
-    session.Resume(checkpoints.Load(), progress);
+    session.Resume(control.checkpoints.Load(), control.progress);
     turn.reset();
-    Train(session, checkpoints, progress, cancel, seat);
-    turn.emplace(seat, cancel);
-    session.Conclude(progress);
+    Train(session, control, membership);
+    turn.emplace(membership, control.cancel);
+    session.Conclude(control.progress);
     parts.curve = session.curve();
+    parts.threads = control.pool.thread_count();
     return std::make_shared<const PersonalColorizer>(std::move(parts));
   });
 }

@@ -4,23 +4,24 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "core/base/cancellation.h"
 #include "core/base/image.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/encoder/encoder.h"
 
 namespace color3d {
 
 class SceneBatch;
 
+// The defaults are those of the service's preset "fast".
 struct ColorizerOptions {
   enum class Recipe {
-    kOurs,   // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
-    kPaper,  // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
+    kColor3d,  // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
+    kPaper,    // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
   };
   // Of matrix products and convolutions while training; the rest is float32 always.
   enum class Precision {
@@ -28,34 +29,34 @@ struct ColorizerOptions {
     kFloat32,
     kBfloat16,
   };
-  Recipe recipe = Recipe::kOurs;
+  Recipe recipe = Recipe::kColor3d;
   Precision precision = Precision::kAuto;
-  int iterations = 800;  // 0..100000
-  // > 0: the schedule is shortened to end after so many seconds of computing (in a batch a scene
-  // also waits for its turns, which does not count).
+  int iterations = 300;  // 0..100000
+  // > 0: the schedule is shortened to end after so many seconds of computing, at most 86400 (in a
+  // batch a scene also waits for its turns, which does not count).
   double time_limit_seconds = 0.0;
   int max_side_px = 400;            // of the key view during training, 64..2048
   int crop_px = 256;                // 64..1024, clipped to the picture
   double learning_rate = 0.0;       // at the start of the schedule, 0..1; 0: the recipe's
-  double consistency_weight = 0.0;  // the paper's A4 term; 0 = off
+  double consistency_weight = 0.0;  // the paper's A4 term, 0..1000; 0 = off
   // Exponential mean of the parameters over iterations, 0..0.9999; 0 = off. The better one of mean
   // and last is delivered.
   double average_decay = 0.99;
   // Training stops when the held-out error, smoothed over 3 of 20 points of the schedule, has
   // fallen by less than this share over the last 4; 0..0.5, 0 = never.
-  double least_improvement = 0.0;
+  double min_improvement = 0.0;
   // How many of the encoder's deepest stages get Conv-Adapters, 0..8; -1: ours none, the paper all.
   int adapter_stages = -1;
   double decoder_width = 1.0;  // factor on the decoder's channels, 0.25..4
-  int threads = 0;
   uint64_t seed = 1;
   void Validate() const;
+  bool operator==(const ColorizerOptions&) const = default;
 };
 
 struct ColorPrediction {
   Image ab;  // 2 channels, Lab units
   // 1 channel: mean squared distance per feature dimension to the most similar place of the key
-  // view, 0: the same; about 1 where nothing is alike. Empty for colorizers without neighbours.
+  // view, 0: the same; about 1 where nothing is alike. Empty for colorizers without neighbors.
   Image distance;
 };
 
@@ -83,28 +84,27 @@ class Colorizer {
   virtual std::string Serialize() const = 0;
 };
 
-// `pictures`: the undistorted key view first (statistics, neighbours and held-out augmentations are
+// A scene's place among those that train together (scene_batch.h).
+struct BatchPlace {
+  SceneBatch& batch;
+  std::string project;  // what fairness is between, e.g. the submitted job
+};
+
+// `pictures`: the undistorted key view first (statistics, neighbors and held-out augmentations are
 // its), then others of the scene, of any size. Reports "train_l1_ab" and, on views of the key that
 // are never trained on (held-out augmentations), "validation_delta_e00". Gradient clipping; a
-// non-finite loss restores the last good state with half the step and warns. Resumable.
+// non-finite loss restores the last good state with half the step and warns. Resumable. With a
+// `place` it takes turns with the other scenes of the batch; the result is the same, bit for bit,
+// as it is for any number of threads. The colorizer answers on as many threads as the pool has.
 std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
                                                 std::vector<TrainingPicture> pictures,
                                                 const ColorizerOptions& options,
-                                                CheckpointStore& checkpoints,
-                                                ProgressObserver& progress,
-                                                const CancellationToken& cancel);
-// The same, bit for bit, taking turns with the other scenes of a batch (scene_batch.h).
-std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
-                                                std::vector<TrainingPicture> pictures,
-                                                const ColorizerOptions& options,
-                                                CheckpointStore& checkpoints,
-                                                ProgressObserver& progress,
-                                                const CancellationToken& cancel,
-                                                SceneBatch& batch,
-                                                const std::string& project);
+                                                const RunControl& control,
+                                                const std::optional<BatchPlace>& place = {});
 
-// Throws Error{kInvalidArgument} on a damaged file, kFailedPrecondition when it was trained on
-// another encoder (both digests are named).
+// Answers on `threads` threads; 0: what the machine has. Throws Error{kInvalidArgument} on a
+// damaged file, kFailedPrecondition when it was trained on another encoder (both digests are
+// named).
 std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
                                                int threads = 0);

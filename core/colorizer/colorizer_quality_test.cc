@@ -54,11 +54,13 @@ Errors Measure(const fs::path& folder, int iterations) {
   ColorizerOptions options;
   options.iterations = iterations;
   options.max_side_px = kSidePx;
-  options.threads = 1;
+  ThreadPool pool(1);
   NoCheckpoints checkpoints;
   NullObserver progress;
-  const auto colorizer = TrainColorizer(
-      Encoder::Embedded(), {{"key", key.luminance, key.ab}}, options, checkpoints, progress, {});
+  const auto colorizer = TrainColorizer(Encoder::Embedded(),
+                                        {{"key", key.luminance, key.ab}},
+                                        options,
+                                        {pool, checkpoints, progress, {}});
   Errors errors;
   for (const fs::path& file : held_out) {
     const Picture view = ReadPicture(file);

@@ -41,7 +41,6 @@ ColorizerOptions Quick(int iterations) {
   ColorizerOptions options;
   options.iterations = iterations;
   options.crop_px = 64;
-  options.threads = 1;
   return options;
 }
 
@@ -52,10 +51,11 @@ const std::shared_ptr<const Encoder>& TheEncoder() {
 }
 
 std::shared_ptr<const Colorizer> Train(const Key& key, const ColorizerOptions& options) {
+  ThreadPool pool(1);
   NoCheckpoints checkpoints;
   NullObserver progress;
   return TrainColorizer(
-      TheEncoder(), {{"key", key.luminance, key.ab}}, options, checkpoints, progress, {});
+      TheEncoder(), {{"key", key.luminance, key.ab}}, options, {pool, checkpoints, progress, {}});
 }
 
 double MeanError(const Image& luminance, const Image& x, const Image& y) {
@@ -82,18 +82,18 @@ struct OtherEncoder : Encoder {
 TEST(ColorizerTest, LearnsTheKeyView) {
   const Key key = MakeKey(128, 96);
   const double gray = MeanError(key.luminance, key.ab, Image(128, 96, 2));
-  const double neighbours =
+  const double neighbors =
       MeanError(key.luminance, key.ab, Train(key, Quick(0))->Colorize(key.luminance));
   const double trained =
       MeanError(key.luminance, key.ab, Train(key, Quick(40))->Colorize(key.luminance));
   EXPECT_GT(gray, 15.0);
-  EXPECT_LT(neighbours, 0.25 * gray);
+  EXPECT_LT(neighbors, 0.25 * gray);
   EXPECT_LT(trained, 0.25 * gray);
 }
 
 TEST(ColorizerTest, FileGivesBackTheSameColorizer) {
   const Key key = MakeKey(96, 80);
-  for (auto recipe : {ColorizerOptions::Recipe::kOurs, ColorizerOptions::Recipe::kPaper}) {
+  for (auto recipe : {ColorizerOptions::Recipe::kColor3d, ColorizerOptions::Recipe::kPaper}) {
     ColorizerOptions options = Quick(3);
     options.recipe = recipe;
     const auto trained = Train(key, options);
@@ -131,7 +131,7 @@ TEST(ColorizerTest, RefusesASizeOfTheNetworkThatIsOutOfRange) {
 TEST(ColorizerTest, SameSeedSameColorizer) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(5);
-  // Without neighbours, whose colours are the key's own under any seed.
+  // Without neighbors, whose colours are the key's own under any seed.
   options.recipe = ColorizerOptions::Recipe::kPaper;
   const Image first = Train(key, options)->Colorize(key.luminance);
   EXPECT_EQ(Train(key, options)->Colorize(key.luminance).data, first.data);
@@ -206,15 +206,15 @@ TEST(ColorizerTest, AnotherEncoderIsRefused) {
   const std::string bytes = Train(key, Quick(0))->Serialize();
   EXPECT_THROW(LoadColorizer(bytes, std::make_shared<OtherEncoder>()), Error);
   EXPECT_THROW(LoadColorizer(bytes, nullptr), Error);
+  ThreadPool pool(1);
   NoCheckpoints checkpoints;
   NullObserver progress;
-  EXPECT_THROW(TrainColorizer(std::make_shared<OtherEncoder>(),
-                              {{"key", key.luminance, key.ab}},
-                              Quick(0),
-                              checkpoints,
-                              progress,
-                              {}),
-               Error);
+  const CancellationToken cancel;
+  const RunControl control{pool, checkpoints, progress, cancel};
+  EXPECT_THROW(
+      TrainColorizer(
+          std::make_shared<OtherEncoder>(), {{"key", key.luminance, key.ab}}, Quick(0), control),
+      Error);
 }
 
 TEST(ColorizerTest, BadOptionsAndKeyViewsAreRefused) {

@@ -7,7 +7,7 @@ namespace color3d {
 
 struct EarlyStopOptions {
   // Relative fall of the smoothed error over `window` points below which training stops; 0: never.
-  double least_improvement = 0.0;
+  double min_improvement = 0.0;
   int smoothing = 3;  // points in a mean
   int window = 4;
 };
@@ -21,8 +21,8 @@ class EarlyStop {
     errors_.push_back(error);
     const int now = static_cast<int>(errors_.size());
     const int earlier = now - options_.window;
-    if (options_.least_improvement <= 0.0 || earlier < options_.smoothing) return false;
-    return Mean(earlier) - Mean(now) < options_.least_improvement * Mean(earlier);
+    if (options_.min_improvement <= 0.0 || earlier < options_.smoothing) return false;
+    return Mean(earlier) - Mean(now) < options_.min_improvement * Mean(earlier);
   }
 
  private:

@@ -13,7 +13,8 @@ namespace {
 template <typename T>
 using Names = std::vector<std::pair<T, const char*>>;
 
-const Names<ColorizerOptions::Recipe> kRecipes = {{ColorizerOptions::Recipe::kOurs, "ours"},
+// The words of the colorizer file. They stay as they are, whatever the code calls these things.
+const Names<ColorizerOptions::Recipe> kRecipes = {{ColorizerOptions::Recipe::kColor3d, "color3d"},
                                                   {ColorizerOptions::Recipe::kPaper, "paper"}};
 const Names<ColorizerOptions::Precision> kPrecisions = {
     {ColorizerOptions::Precision::kAuto, "auto"},
@@ -33,8 +34,7 @@ T FromName(const Names<T>& names, const char* what, const std::string& text) {
   for (const auto& [known, name] : names) {
     if (text == name) return known;
   }
-  throw InvalidArgument(std::string("the colorizer file names the unknown ") + what + " \"" + text +
-                        "\"");
+  throw InvalidArgument("the colorizer file names the unknown {} \"{}\"", what, text);
 }
 
 }  // namespace
@@ -49,7 +49,7 @@ nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
           {"learning_rate", options.learning_rate},
           {"consistency_weight", options.consistency_weight},
           {"average_decay", options.average_decay},
-          {"least_improvement", options.least_improvement},
+          {"min_improvement", options.min_improvement},
           {"adapter_stages", options.adapter_stages},
           {"decoder_width", options.decoder_width},
           {"seed", options.seed}};
@@ -67,7 +67,7 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
   options.learning_rate = json.value("learning_rate", options.learning_rate);
   options.consistency_weight = json.at("consistency_weight");
   options.average_decay = json.value("average_decay", options.average_decay);
-  options.least_improvement = json.value("least_improvement", options.least_improvement);
+  options.min_improvement = json.value("min_improvement", options.min_improvement);
   options.adapter_stages = json.value("adapter_stages", options.adapter_stages);
   options.decoder_width = json.value("decoder_width", options.decoder_width);
   options.seed = json.at("seed");

@@ -7,24 +7,22 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
-#include "core/colorizer/tensor_archive.h"
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/weights/byte_source.h"
 
 namespace color3d {
 namespace {
 
-using Json = nlohmann::json;
-
-constexpr char kMagic[] = "C3DCOLR1";
-constexpr uint32_t kVersion = 3;  // 3: weights of the neighbours
 constexpr char kWhat[] = "the colorizer file";
-constexpr double kMaxAb = 128.0;  // Lab units; sRGB spans about -108..98
+constexpr char kModel[] = "model.";  // before the names of the network's arrays
+constexpr double kMaxAb = 128.0;     // Lab units; sRGB spans about -108..98
 
 Image CropTo(const Image& image, int width, int height) {
   Image out(width, height, image.channels);
@@ -52,35 +50,31 @@ PersonalColorizer::PersonalColorizer(Parts parts)
   }
 }
 
-// Of the blend, [1,1,H/s,W/s]: large where the neighbours contradict each other.
-torch::Tensor PersonalColorizer::DecoderShare(const torch::Tensor& neighbour_variance,
+// Of the blend, [1,1,H/s,W/s]: large where the neighbors contradict each other.
+torch::Tensor PersonalColorizer::DecoderShare(const torch::Tensor& neighbor_variance,
                                               const torch::Tensor& decoded) const {
-  const double doubt = recipe_.neighbour_doubt * recipe_.neighbour_doubt;
-  const torch::Tensor share = trust_ * neighbour_variance / (doubt + neighbour_variance);
+  const double doubt = recipe_.neighbor_doubt * recipe_.neighbor_doubt;
+  const torch::Tensor share = trust_ * neighbor_variance / (doubt + neighbor_variance);
   return torch::upsample_bilinear2d(share.unsqueeze(0).unsqueeze(0),
                                     {decoded.size(2), decoded.size(3)},
                                     /*align_corners=*/false);
 }
 
 // `taps`: with adapters the adapted ones.
-PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps,
-                                                 const torch::Tensor& luminance,
-                                                 int picture_height,
-                                                 const torch::Tensor& wanted) const {
-  const bool decode = !parts_.neighbours || trust_ > 0.0;
+PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> taps,
+                                                   const torch::Tensor& luminance,
+                                                   const torch::Tensor& wanted) const {
+  const bool decode = !parts_.neighbors || trust_ > 0.0;
   const PersonalModel& model = *parts_.model;
   torch::Tensor decoded;
   if (decode) {
     decoded = model.Decode(taps, luminance) * kAbScale;
-    if (recipe_.flip_average) {
-      decoded = 0.5 * (decoded + kAbScale * model.Forward(luminance.flip({3})).flip({3}));
-    }
     // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
     decoded = decoded.clamp(-kMaxAb, kMaxAb);
   }
-  if (!parts_.neighbours) return {decoded, {}};
+  if (!parts_.neighbors) return {decoded, {}};
   if (model.config().HasAdapters()) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
-  const NeighbourColors found = parts_.neighbours->Lookup(taps, luminance, picture_height, wanted);
+  const NeighborColors found = parts_.neighbors->Lookup(taps, luminance, wanted);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
   const torch::Tensor near =
@@ -91,8 +85,8 @@ PersonalColorizer::Answer PersonalColorizer::Ask(std::vector<torch::Tensor> taps
 
 void PersonalColorizer::Check(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the colorizer takes a picture with 1 channel (L), this one has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the colorizer takes a picture with 1 channel (L), this one has {}",
+                          luminance.channels);
   }
   for (float value : luminance.data) {
     if (!std::isfinite(value)) {
@@ -112,7 +106,7 @@ torch::Tensor PersonalColorizer::Padded(const Image& small) {
   return PadToMultiple(TensorFromImage(small), kPadMultiple);
 }
 
-void PersonalColorizer::SetThreads() const { SetTorchThreads(parts_.options.threads); }
+void PersonalColorizer::SetThreads() const { SetTorchThreads(parts_.threads); }
 
 Image PersonalColorizer::AtTrainingSize(const Image& luminance) const {
   return FitWithin(luminance, parts_.options.max_side_px);
@@ -123,7 +117,7 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
                                                    const Image& small,
                                                    const Image& luminance,
                                                    const Image& known) const {
-  const Answer answer = Ask(taps, padded, small.height, WantedCells(known, small));
+  const Answer answer = Blend(taps, padded, WantedCells(known, small));
   const Image fine = UpsampleGuided(ImageFromTensor(answer.ab), ImageFromTensor(padded));
   ColorPrediction prediction;
   prediction.ab = CropTo(fine, small.width, small.height);
@@ -141,12 +135,11 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
 }
 
 torch::Tensor PersonalColorizer::WantedCells(const Image& known, const Image& small) const {
-  if (known.Empty() || !parts_.neighbours) return {};
+  if (known.Empty() || !parts_.neighbors) return {};
   Image unknown = Resize(known, small.width, small.height);
   for (float& value : unknown.data) value = value > 0.999f ? 0.0f : 1.0f;
-  const int stride = recipe_.neighbour_options.stride;
   const torch::Tensor cells =
-      torch::max_pool2d(Padded(unknown), {stride, stride}, {stride, stride});
+      torch::max_pool2d(Padded(unknown), {kCellPx, kCellPx}, {kCellPx, kCellPx});
   constexpr int kMarginCells = 5;  // guided upsampling averages twice over windows of 5 cells
   return torch::max_pool2d(cells,
                            {2 * kMarginCells + 1, 2 * kMarginCells + 1},
@@ -169,68 +162,52 @@ ColorPrediction PersonalColorizer::Predict(const Image& luminance, const Image& 
 
 std::string PersonalColorizer::Serialize() const {
   return WithTorchErrors("colorizer", [&] {
-    Json header{{"encoder", parts_.encoder->digest()},
-                {"options", JsonFromOptions(parts_.options)},
-                {"neighbours", parts_.neighbours != nullptr},
-                {"curve", Json::array()}};
-    for (const TrainingPoint& point : parts_.curve) {
-      header["curve"].push_back(
-          {point.iteration, point.seconds, point.train_l1_ab, point.validation_delta_e00});
-    }
-    Archive archive;
-    archive.version = kVersion;
-    archive.header = header.dump();
-    PutTensors(parts_.model->parameters(), "model.", ArchiveArray::Type::kFloat16, archive);
-    PutTensors(parts_.model->statistics(), "model.", ArchiveArray::Type::kFloat32, archive);
-    if (parts_.neighbours) {
-      for (const auto& [name, tensor] : parts_.neighbours->State()) {
-        archive.arrays["neighbours." + name] =
-            ArrayFromTensor(tensor,
-                            FeatureNeighbours::IsStoredAsHalf(name) ? ArchiveArray::Type::kFloat16
-                                                                    : ArchiveArray::Type::kFloat32);
-      }
-    }
-    return WriteArchive(archive, kMagic);
+    TensorFile file;
+    file.facts = {{"encoder", parts_.encoder->digest()},
+                  {"options", JsonFromOptions(parts_.options)},
+                  {"neighbors", parts_.neighbors != nullptr},
+                  {"curve", JsonFromCurve(parts_.curve)}};
+    PutTensors(parts_.model->parameters(), kModel, StoredType::kFloat16, &file);
+    PutTensors(parts_.model->statistics(), kModel, StoredType::kFloat32, &file);
+    if (parts_.neighbors) parts_.neighbors->PutInto(&file);
+    return WriteTensorFile(file, kColorizerFormat);
   });
 }
 
 std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
     std::string_view bytes, std::shared_ptr<const TapEncoder> encoder, int threads) {
-  Archive archive = ReadArchive(bytes, kMagic, kVersion, kWhat);
+  TensorFile file = ReadTensorFile(bytes, kColorizerFormat, kWhat);
   Parts parts;
-  bool has_neighbours = false;
+  bool has_neighbors = false;
   try {
-    const Json header = Json::parse(archive.header);
-    const std::string trained_on = header.at("encoder");
+    const std::string trained_on = file.facts.at("encoder");
     if (trained_on != encoder->digest()) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "the colorizer was trained on the encoder " + trained_on + ", this server has " +
-                      encoder->digest() + "; train it again");
+                  "the colorizer was trained on the encoder {}, this server has {}; train it again",
+                  trained_on,
+                  encoder->digest());
     }
-    parts.options = OptionsFromJson(header.at("options"));
-    has_neighbours = header.at("neighbours");
-    for (const Json& point : header.at("curve")) {
-      parts.curve.push_back({point.at(0), point.at(1), point.at(2), point.at(3)});
-    }
-  } catch (const Json::exception& error) {
-    throw InvalidArgument(std::string(kWhat) + " has a damaged header: " + error.what());
+    parts.options = OptionsFromJson(file.facts.at("options"));
+    has_neighbors = file.facts.at("neighbors");
+    parts.curve = CurveFromJson(file.facts.at("curve"));
+  } catch (const nlohmann::json::exception& error) {
+    throw InvalidArgument("{} has a damaged header: {}", kWhat, error.what());
   }
-  parts.options.threads = threads;
   parts.options.Validate();
   parts.encoder = encoder;
+  parts.threads = threads;
   const TrainingRecipe recipe = RecipeFor(parts.options);
   Random random(0);
   parts.model = std::make_unique<PersonalModel>(
       *encoder, recipe.model, std::array<float, 2>{0.0f, 0.0f}, random);
-  TakeTensors(parts.model->parameters(), "model.", kWhat, archive);
-  TakeTensors(parts.model->statistics(), "model.", kWhat, archive);
-  if (has_neighbours) {
-    parts.neighbours =
-        FeatureNeighbours::FromArchive(*encoder, recipe.neighbour_options, kWhat, archive);
+  TakeTensors(parts.model->parameters(), kModel, kWhat, &file);
+  TakeTensors(parts.model->statistics(), kModel, kWhat, &file);
+  if (has_neighbors) {
+    parts.neighbors = FeatureNeighbors::TakeFrom(*encoder, recipe.neighbor_options, kWhat, &file);
   }
-  if (!archive.arrays.empty()) {
-    throw InvalidArgument(std::string(kWhat) + " holds the unknown array \"" +
-                          archive.arrays.begin()->first + "\"");
+  if (!file.arrays.empty()) {
+    throw InvalidArgument(
+        "{} holds the unknown array {}", kWhat, QuotedName(file.arrays.begin()->first));
   }
   return std::make_shared<const PersonalColorizer>(std::move(parts));
 }

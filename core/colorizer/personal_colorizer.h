@@ -1,4 +1,4 @@
-// The finished colorizer: shared encoder, trained model, feature neighbours. Used inside
+// The finished colorizer: shared encoder, trained model, feature neighbors. Used inside
 // core/colorizer only. Immutable and thread-safe.
 #pragma once
 
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
-#include "core/colorizer/feature_neighbours.h"
+#include "core/colorizer/feature_neighbors.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
 #include "core/colorizer/training_session.h"
@@ -20,9 +20,10 @@ class PersonalColorizer : public Colorizer {
   struct Parts {
     std::shared_ptr<const TapEncoder> encoder;
     ColorizerOptions options;
-    std::unique_ptr<PersonalModel> model;           // refers to *encoder
-    std::unique_ptr<FeatureNeighbours> neighbours;  // may be null
+    std::unique_ptr<PersonalModel> model;         // refers to *encoder
+    std::unique_ptr<FeatureNeighbors> neighbors;  // may be null
     std::vector<TrainingPoint> curve;
+    int threads = 0;  // that torch answers on; 0: what the machine has
   };
   // Rounds the model's parameters to half precision, as they are stored.
   explicit PersonalColorizer(Parts parts);
@@ -36,7 +37,7 @@ class PersonalColorizer : public Colorizer {
   static void Check(const Image& luminance);
   static std::pair<int, int> PaddedSize(const Image& small);  // width, height
   static torch::Tensor Padded(const Image& small);
-  bool UsesFrozenTaps() const { return !recipe_.model.HasAdapters() && !recipe_.flip_average; }
+  bool UsesFrozenTaps() const { return !recipe_.model.HasAdapters(); }
   const TapEncoder& encoder() const { return *parts_.encoder; }
   void SetThreads() const;
   Image AtTrainingSize(const Image& luminance) const;
@@ -53,16 +54,15 @@ class PersonalColorizer : public Colorizer {
  private:
   struct Answer {
     torch::Tensor ab;        // [1,2,H/s,W/s], Lab units
-    torch::Tensor distance;  // [h,w] on the neighbours' grid; undefined without neighbours
+    torch::Tensor distance;  // [h,w] on the neighbors' grid; undefined without neighbors
   };
-  // Of a padded L [1,1,H,W]; `picture_height` before padding.
-  Answer Ask(std::vector<torch::Tensor> taps,
-             const torch::Tensor& luminance,
-             int picture_height,
-             const torch::Tensor& wanted) const;
-  torch::Tensor DecoderShare(const torch::Tensor& neighbour_variance,
+  // Of a padded L [1,1,H,W].
+  Answer Blend(std::vector<torch::Tensor> taps,
+               const torch::Tensor& luminance,
+               const torch::Tensor& wanted) const;
+  torch::Tensor DecoderShare(const torch::Tensor& neighbor_variance,
                              const torch::Tensor& decoded) const;
-  // Cells of the neighbours' grid that answers are wanted for, with a margin for interpolation.
+  // Cells of the neighbors' grid that answers are wanted for, with a margin for interpolation.
   torch::Tensor WantedCells(const Image& known, const Image& small) const;
 
   Parts parts_;

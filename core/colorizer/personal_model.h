@@ -7,10 +7,10 @@
 
 #include <array>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/base/random.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/encoder/convnext/convnext.h"
 
 namespace color3d {
@@ -58,12 +58,8 @@ class PersonalModel {
 
   // Everything that Forward depends on, in a fixed order: first what is trained, then the frozen
   // statistics. The tensors share storage with the model.
-  const std::vector<std::pair<std::string, torch::Tensor>>& parameters() const {
-    return parameters_;
-  }
-  const std::vector<std::pair<std::string, torch::Tensor>>& statistics() const {
-    return statistics_;
-  }
+  const NamedTensors& parameters() const { return parameters_; }
+  const NamedTensors& statistics() const { return statistics_; }
   void RequireGradients(bool on);
   void set_half_products(bool on) { config_.half_products = on; }
 
@@ -115,8 +111,8 @@ class PersonalModel {
   std::vector<std::vector<Adapter>> adapters_;
   torch::Tensor head_, head_bias_;
   bool measuring_statistics_ = false;
-  std::vector<std::pair<std::string, torch::Tensor>> parameters_;
-  std::vector<std::pair<std::string, torch::Tensor>> statistics_;
+  NamedTensors parameters_;
+  NamedTensors statistics_;
 };
 
 // The network's output times this is ab in Lab units.

@@ -4,7 +4,7 @@
 
 #include "core/augment/augment.h"
 #include "core/colorizer/colorizer.h"
-#include "core/colorizer/feature_neighbours.h"
+#include "core/colorizer/feature_neighbors.h"
 #include "core/colorizer/personal_model.h"
 
 namespace color3d {
@@ -16,14 +16,13 @@ struct TrainingRecipe {
   double last_learning_rate = 1e-6;  // cosine
   int warmup_iterations = 20;
   double max_gradient_norm = 1.0;
-  bool neighbours = true;
-  FeatureNeighboursOptions neighbour_options;
-  // Share of the neighbours in the blend with the decoder, by how well they agree on a colour:
+  bool neighbors = true;
+  FeatureNeighborsOptions neighbor_options;
+  // Share of the neighbors in the blend with the decoder, by how well they agree on a colour:
   // certainty = doubt^2 / (doubt^2 + variance of the matches' ab). A decoder trained for a few
   // iterations is trusted less: share = 1 - (1 - certainty) (1 - exp(-iterations / trust)).
-  double neighbour_doubt = 10.0;  // Lab units
+  double neighbor_doubt = 10.0;  // Lab units
   double trust_iterations = 100.0;
-  bool flip_average = false;  // mean of the picture and its mirror image: twice the time for 0.05
 };
 
 TrainingRecipe RecipeFor(const ColorizerOptions& options);

@@ -11,7 +11,7 @@ namespace {
 constexpr auto kCancelPoll = std::chrono::milliseconds(50);
 
 // A session fills two: one trains while the other prepares the next sample.
-constexpr int kMostSlotsOfATurn = 2;
+constexpr int kMaxSlotsOfTurn = 2;
 
 int CoresIfZero(int slots) {
   if (slots > 0) return slots;
@@ -49,11 +49,12 @@ const SceneBatch::Member* SceneBatch::Next() const {
   return next;
 }
 
-SceneBatch::Seat::Seat(SceneBatch& batch, const std::string& project) : batch_(batch) {
+SceneBatch::Membership::Membership(SceneBatch& batch, const std::string& project) : batch_(batch) {
   std::lock_guard lock(batch_.mutex_);
   Member member;
   member.project = project;
-  // Newcomers start level with whoever is furthest behind: no right to the past, no debt either.
+  // Newcomers start level with whoever has computed least, so that they neither catch up on the
+  // time before they came nor wait longer than the others.
   bool first = true;
   for (const Member& other : batch_.members_) {
     if (other.project != project) continue;
@@ -61,16 +62,17 @@ SceneBatch::Seat::Seat(SceneBatch& batch, const std::string& project) : batch_(b
     first = false;
   }
   if (!batch_.project_seconds_.contains(project)) {
-    double least = 0.0;
+    double min_seconds = 0.0;
     for (auto it = batch_.project_seconds_.begin(); it != batch_.project_seconds_.end(); ++it) {
-      least = it == batch_.project_seconds_.begin() ? it->second : std::min(least, it->second);
+      min_seconds =
+          it == batch_.project_seconds_.begin() ? it->second : std::min(min_seconds, it->second);
     }
-    batch_.project_seconds_[project] = least;
+    batch_.project_seconds_[project] = min_seconds;
   }
   member_ = batch_.members_.insert(batch_.members_.end(), member);
 }
 
-SceneBatch::Seat::~Seat() {
+SceneBatch::Membership::~Membership() {
   std::lock_guard lock(batch_.mutex_);
   const std::string project = member_->project;
   batch_.members_.erase(member_);
@@ -81,10 +83,11 @@ SceneBatch::Seat::~Seat() {
   batch_.changed_.notify_all();
 }
 
-SceneBatch::Turn::Turn(Seat& seat, const CancellationToken& cancel) : seat_(seat) {
-  SceneBatch& batch = seat.batch_;
+SceneBatch::Turn::Turn(Membership& membership, const CancellationToken& cancel)
+    : membership_(membership) {
+  SceneBatch& batch = membership.batch_;
   std::unique_lock lock(batch.mutex_);
-  Member& member = *seat.member_;
+  Member& member = *membership.member_;
   member.waiting = true;
   while (batch.free_slots_ == 0 || batch.Next() != &member) {
     if (cancel.IsCancelled()) {
@@ -95,20 +98,20 @@ SceneBatch::Turn::Turn(Seat& seat, const CancellationToken& cancel) : seat_(seat
     batch.changed_.wait_for(lock, kCancelPoll);
   }
   member.waiting = false;
-  slots_ = batch.Next() == nullptr ? std::min(batch.free_slots_, kMostSlotsOfATurn) : 1;
+  slots_ = batch.Next() == nullptr ? std::min(batch.free_slots_, kMaxSlotsOfTurn) : 1;
   batch.free_slots_ -= slots_;
   batch.changed_.notify_all();
   start_ = std::chrono::steady_clock::now();
 }
 
 SceneBatch::Turn::~Turn() {
-  SceneBatch& batch = seat_.batch_;
+  SceneBatch& batch = membership_.batch_;
   const double seconds =
       slots_ * std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   std::lock_guard lock(batch.mutex_);
   batch.free_slots_ += slots_;
-  seat_.member_->seconds += seconds;
-  batch.project_seconds_[seat_.member_->project] += seconds;
+  membership_.member_->seconds += seconds;
+  batch.project_seconds_[membership_.member_->project] += seconds;
   batch.changed_.notify_all();
 }
 

@@ -1,8 +1,8 @@
 // Many scenes in one running batch (METHOD.md "All-in-one"): each scene's thread trains with its
 // own options, checkpoints, clock and cancellation; here they share one frozen encoder and take
-// turns at the compute slots. A turn goes to the project that has computed least, then to its scene
-// that has. Scenes join and leave at any time, and fail alone. Nothing of a scene's arithmetic
-// depends on the others: it gives the same bytes alone and in company. Thread-safe.
+// turns at the compute slots. A turn goes to the project that has computed least, then to the scene
+// of it that has. Scenes join and leave at any time, and fail alone. Nothing of a scene's
+// arithmetic depends on the others: it gives the same bytes alone and in company. Thread-safe.
 //
 // Measured on 2 cores against stacking scenes on the batch axis: an encoder pass over stacked crops
 // and grouped convolutions over stacked decoders were no faster than a call for each scene.
@@ -44,13 +44,13 @@ class SceneBatch {
 
  public:
   // A scene's membership, from construction to destruction. Used by one thread.
-  class Seat {
+  class Membership {
    public:
     // `project`: what fairness is between, e.g. the submitted job.
-    Seat(SceneBatch& batch, const std::string& project);
-    ~Seat();
-    Seat(const Seat&) = delete;
-    Seat& operator=(const Seat&) = delete;
+    Membership(SceneBatch& batch, const std::string& project);
+    ~Membership();
+    Membership(const Membership&) = delete;
+    Membership& operator=(const Membership&) = delete;
 
    private:
     friend class SceneBatch;
@@ -59,10 +59,10 @@ class SceneBatch {
   };
 
   // The right to compute, from construction to destruction. The constructor waits until it is the
-  // seat's turn and throws Error{kCancelled} when `cancel` comes first.
+  // membership's turn and throws Error{kCancelled} when `cancel` comes first.
   class Turn {
    public:
-    Turn(Seat& seat, const CancellationToken& cancel);
+    Turn(Membership& membership, const CancellationToken& cancel);
     ~Turn();
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
@@ -70,7 +70,7 @@ class SceneBatch {
     int slots() const { return slots_; }
 
    private:
-    Seat& seat_;
+    Membership& membership_;
     int slots_ = 1;
     std::chrono::steady_clock::time_point start_;
   };

@@ -1,4 +1,4 @@
-// Many scenes in one batch: fair turns, and results that do not depend on the neighbours.
+// Many scenes in one batch: fair turns, and results that do not depend on the neighbors.
 #include "core/colorizer/scene_batch.h"
 
 #include <gtest/gtest.h>
@@ -48,11 +48,10 @@ ColorizerOptions Quick() {
 }
 
 std::shared_ptr<const Colorizer> TrainAlone(int scene) {
+  ThreadPool pool(2);
   NoCheckpoints none;
   NullObserver silent;
-  ColorizerOptions options = Quick();
-  options.threads = 2;
-  return TrainColorizer(TheEncoder(), {KeyOf(scene)}, options, none, silent, {});
+  return TrainColorizer(TheEncoder(), {KeyOf(scene)}, Quick(), {pool, none, silent, {}});
 }
 
 float LargestDifference(const Image& x, const Image& y) {
@@ -78,17 +77,18 @@ struct CancelAfter : NullObserver {
 
 // In one batch: the scenes, a scene with a NaN, one that is cancelled and one whose checkpoint
 // store throws.
-TEST(SceneBatchTest, NeighboursEvenPoisonedOnesLeaveResultsUnchanged) {
+TEST(SceneBatchTest, NeighborsEvenPoisonedOnesLeaveResultsUnchanged) {
   SceneBatch batch(2);
   std::vector<std::shared_ptr<const Colorizer>> together(kScenes);
   std::atomic<int> failures{0};
   std::vector<std::thread> threads;
   for (int scene = 0; scene < kScenes; ++scene) {
     threads.emplace_back([&, scene] {
+      ThreadPool pool(2);
       NoCheckpoints none;
       NullObserver silent;
-      together[scene] =
-          TrainColorizer(TheEncoder(), {KeyOf(scene)}, Quick(), none, silent, {}, batch, "a");
+      together[scene] = TrainColorizer(
+          TheEncoder(), {KeyOf(scene)}, Quick(), {pool, none, silent, {}}, BatchPlace{batch, "a"});
     });
   }
   for (int poison = 0; poison < 3; ++poison) {
@@ -103,14 +103,12 @@ TEST(SceneBatchTest, NeighboursEvenPoisonedOnesLeaveResultsUnchanged) {
       ColorizerOptions options = Quick();
       options.iterations = 60;
       try {
-        TrainColorizer(TheEncoder(),
-                       {key},
-                       options,
-                       poison == 2 ? static_cast<CheckpointStore&>(failing) : none,
-                       poison == 1 ? static_cast<ProgressObserver&>(cancelling) : silent,
-                       cancel,
-                       batch,
-                       "b");
+        ThreadPool pool(2);
+        const RunControl control{pool,
+                                 poison == 2 ? static_cast<CheckpointStore&>(failing) : none,
+                                 poison == 1 ? static_cast<ProgressObserver&>(cancelling) : silent,
+                                 cancel};
+        TrainColorizer(TheEncoder(), {key}, options, control, BatchPlace{batch, "b"});
       } catch (const Error&) {
         ++failures;
       }
@@ -144,18 +142,6 @@ TEST(SceneBatchTest, NeighboursEvenPoisonedOnesLeaveResultsUnchanged) {
   EXPECT_GT(LargestDifference(routed[0], routed[1]), 5.0f);
 }
 
-TEST(SceneColorizersTest, AnUnknownSceneIsNamedBeforeAnythingIsComputed) {
-  const TrainingPicture key = KeyOf(0);
-  const std::vector<RoutedPicture> pictures = {{"scenes/lost", &key.luminance}};
-  try {
-    ColorizeRouted(pictures, [](const std::string&) { return nullptr; });
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::kNotFound);
-    EXPECT_NE(std::string(error.what()).find("scenes/lost"), std::string::npos);
-  }
-}
-
 // Project "a" has five scenes, "b" one: b's gets about half of the time.
 TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
   SceneBatch batch(1);
@@ -164,9 +150,9 @@ TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
   std::vector<std::thread> threads;
   for (int i = 0; i < 6; ++i) {
     threads.emplace_back([&, i] {
-      SceneBatch::Seat seat(batch, i < 5 ? "a" : "b");
+      SceneBatch::Membership membership(batch, i < 5 ? "a" : "b");
       while (!stop) {
-        SceneBatch::Turn turn(seat, {});
+        SceneBatch::Turn turn(membership, {});
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
         ++turns[i];
       }
@@ -186,7 +172,7 @@ TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
 
 TEST(SceneBatchTest, AWaitingSceneCanBeCancelled) {
   SceneBatch batch(1);
-  SceneBatch::Seat first(batch, "a"), second(batch, "a");
+  SceneBatch::Membership first(batch, "a"), second(batch, "a");
   const SceneBatch::Turn turn(first, {});
   CancellationToken cancel;
   std::thread canceller([&] {

@@ -48,9 +48,9 @@ std::vector<Image> ColorizeRouted(std::span<const RoutedPicture> pictures,
     if (colorizers.contains(picture.scene)) continue;
     const auto colorizer = lookup(picture.scene);
     if (!colorizer) {
-      throw Error(
-          ErrorCode::kNotFound,
-          "there is no colorizer for the scene '" + picture.scene + "'; personalize it first");
+      throw Error(ErrorCode::kNotFound,
+                  "there is no colorizer for the scene '{}'; personalize it first",
+                  picture.scene);
     }
     colorizers[picture.scene] = colorizer;
   }

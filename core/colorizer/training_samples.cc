@@ -19,7 +19,7 @@ int CropFor(const Image& picture, int wanted) {
   return std::max(kCropMultiple, side / kCropMultiple * kCropMultiple);
 }
 
-// SplitMix64's finaliser (Steele et al. 2014): neighbouring numbers give unrelated seeds.
+// SplitMix64's finaliser (Steele et al. 2014): neighboring numbers give unrelated seeds.
 uint64_t Mix(uint64_t seed, uint64_t number) {
   uint64_t z = seed + 0x9e3779b97f4a7c15ULL * (number + 1);
   z = (z ^ (z >> 30u)) * 0xbf58476d1ce4e5b9ULL;

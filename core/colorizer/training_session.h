@@ -18,17 +18,10 @@
 #include "core/colorizer/early_stop.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
+#include "core/colorizer/training_curve.h"
 #include "core/colorizer/training_samples.h"
 
 namespace color3d {
-
-// One point of the error-against-time curve.
-struct TrainingPoint {
-  int64_t iteration = 0;
-  double seconds = 0.0;               // of computing, not of waiting for a turn
-  double train_l1_ab = 0.0;           // Lab units, running mean
-  double validation_delta_e00 = 0.0;  // on augmentations that are never trained on
-};
 
 class TrainingSession {
  public:
@@ -43,23 +36,43 @@ class TrainingSession {
   // that is damaged or belongs to other work is reported as a warning and ignored.
   void Resume(const std::optional<std::string>& state, ProgressObserver& progress);
 
-  bool Finished() const { return stopped_early_ || Progress() >= 1.0; }
+  bool Finished() const { return course_.stopped_early || Progress() >= 1.0; }
   // One iteration. `helpers`: null, or a pool whose second thread prepares the next sample
   // meanwhile; the result is the same.
   void Step(ProgressObserver& progress, ThreadPool* helpers);
   // Checkpoint() may be called now.
-  bool AtCheckpoint() const { return iteration_ > 0 && iteration_ % kGoodStateInterval == 0; }
+  bool AtCheckpoint() const {
+    return course_.iteration > 0 && course_.iteration % kGoodStateInterval == 0;
+  }
   std::string Checkpoint() const;
   // Leaves the better of the last and the averaged parameters in the model. Once, at the end.
   void Conclude(ProgressObserver& progress);
 
-  const std::vector<TrainingPoint>& curve() const { return curve_; }
-  int rollbacks() const { return rollbacks_; }
-  int64_t iteration() const { return iteration_; }
-  bool stopped_early() const { return stopped_early_; }
+  const std::vector<TrainingPoint>& curve() const { return course_.curve; }
+  int rollbacks() const { return course_.rollbacks; }
+  int64_t iteration() const { return course_.iteration; }
+  bool stopped_early() const { return course_.stopped_early; }
 
  private:
   static constexpr int kGoodStateInterval = 25;
+
+  // Where training stands, besides the tensors: all of it goes into checkpoints.
+  struct Course {
+    int64_t iteration = 0;
+    double seconds = 0.0;  // of computing
+    double learning_rate_scale = 1.0;
+    double running_loss = 0.0;       // Lab units / kAbScale; 0: none yet
+    double best_running_loss = 0.0;  // since the last rollback; 0: none yet
+    int rollbacks = 0;
+    bool stopped_early = false;
+    std::vector<TrainingPoint> curve;
+  };
+  // What a rollback goes back to.
+  struct GoodState {
+    std::vector<torch::Tensor> tensors;  // 16 bits per value
+    int64_t steps = 0;
+    double running_loss = 0.0;
+  };
 
   torch::Tensor Predict(const TrainingSample& sample) const;
   torch::Tensor Loss(const TrainingSample& sample) const;
@@ -84,18 +97,9 @@ class TrainingSession {
   Adam adam_;
   EarlyStop early_stop_;
   std::optional<TrainingSample> next_;  // prepared ahead
-  int64_t iteration_ = 0;
-  double seconds_ = 0.0;
-  double learning_rate_scale_ = 1.0;
-  double running_loss_ = 0.0;       // Lab units / kAbScale; 0: none yet
-  double best_running_loss_ = 0.0;  // since the last rollback; 0: none yet
-  int rollbacks_ = 0;
-  bool stopped_early_ = false;
-  std::vector<torch::Tensor> average_;     // of the parameters; empty: off
-  std::vector<torch::Tensor> good_state_;  // 16 bits per value
-  int64_t good_steps_ = 0;
-  double good_running_loss_ = 0.0;
-  std::vector<TrainingPoint> curve_;
+  std::vector<torch::Tensor> average_;  // of the parameters; empty: off
+  Course course_;
+  GoodState good_;
 };
 
 }  // namespace color3d

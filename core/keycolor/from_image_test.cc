@@ -1,3 +1,5 @@
+#include "core/keycolor/from_image.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,7 +10,6 @@
 #include "core/base/random.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
-#include "core/keycolor/keycolor.h"
 
 namespace color3d {
 namespace {
@@ -26,9 +27,9 @@ Image MakeLab(int width, int height) {
   return lab;
 }
 
-std::string MessageOf(const Image& luminance, const Image& coloured) {
+std::string MessageOf(const Image& luminance, const Image& colored) {
   try {
-    KeyColorFromImage(luminance, coloured);
+    KeyColorFromImage(luminance, colored);
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
     return error.what();
@@ -70,7 +71,7 @@ TEST(KeyColorFromImageTest, AGrayPictureIsRefused) {
   EXPECT_NE(MessageOf(luminance, Image(60, 40, 1, 0.5f)).find("has no colour"), std::string::npos);
 }
 
-TEST(KeyColorFromImageTest, ASmallColouredObjectIsColour) {
+TEST(KeyColorFromImageTest, ASmallColoredObjectIsColor) {
   Image lab = MakeLab(60, 40);
   const Image luminance = LuminanceOfLab(lab);
   for (int c = 1; c < 3; ++c) std::fill_n(lab.Plane(c), lab.PlaneSize(), 0.0f);
@@ -94,18 +95,18 @@ TEST(KeyColorFromImageTest, AnotherPictureIsRefused) {
 }
 
 TEST(KeyColorFromImageTest, FlatPicturesHaveADefinedAnswer) {
-  Image coloured(20, 20, 3, 0.4f);
-  std::fill_n(coloured.Plane(0), coloured.PlaneSize(), 0.6f);
-  EXPECT_EQ(MessageOf(Image(20, 20, 1, 50.0f), coloured), "");
+  Image colored(20, 20, 3, 0.4f);
+  std::fill_n(colored.Plane(0), colored.PlaneSize(), 0.6f);
+  EXPECT_EQ(MessageOf(Image(20, 20, 1, 50.0f), colored), "");
   const Image structured = LuminanceOfLab(MakeLab(20, 20));
-  EXPECT_NE(MessageOf(structured, coloured), "");
+  EXPECT_NE(MessageOf(structured, colored), "");
 }
 
 TEST(KeyColorFromImageTest, NonFiniteValuesAreRefused) {
   const Image lab = MakeLab(20, 20);
-  Image coloured = SrgbFromLab(lab);
-  coloured.data[3] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_NE(MessageOf(LuminanceOfLab(lab), coloured), "");
+  Image colored = SrgbFromLab(lab);
+  colored.data[3] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NE(MessageOf(LuminanceOfLab(lab), colored), "");
 }
 
 }  // namespace

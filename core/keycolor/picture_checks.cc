@@ -1,5 +1,7 @@
 #include "core/keycolor/picture_checks.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -22,9 +24,7 @@ std::vector<float> SmallLuminance(const Image& picture) {
 
 }  // namespace
 
-std::string SizeText(const Image& image) {
-  return std::to_string(image.width) + "x" + std::to_string(image.height);
-}
+std::string SizeText(const Image& image) { return fmt::format("{}x{}", image.width, image.height); }
 
 LuminanceAgreement CompareLuminance(const Image& first, const Image& second) {
   const std::vector<float> x = SmallLuminance(first);
@@ -65,18 +65,20 @@ ChromaLevel MeasureChroma(const Image& lab) {
 void ExpectSameSubject(const Image& luminance, const Image& other, const char* what) {
   const LuminanceAgreement agreement = CompareLuminance(luminance, other);
   if (agreement.SameSubject()) return;
-  throw InvalidArgument(std::string(what) +
-                        " does not look like the key view (correlation of luminances " +
-                        std::to_string(agreement.correlation) + ", needed > " +
-                        std::to_string(LuminanceAgreement::kMinCorrelation) +
-                        "); colour the photo that was chosen as key view");
+  throw InvalidArgument(
+      "{} does not look like the key view (correlation of luminances {:.3g}, needed > {}); colour "
+      "the "
+      "photo that was chosen as key view",
+      what,
+      agreement.correlation,
+      LuminanceAgreement::kMinCorrelation);
 }
 
 void ExpectColor(const Image& lab, const char* what) {
   const ChromaLevel chroma = MeasureChroma(lab);
   if (chroma.IsGray()) {
-    throw InvalidArgument(std::string(what) + " has no colour (mean chroma " +
-                          std::to_string(chroma.mean) + " Lab units); colour it first");
+    throw InvalidArgument(
+        "{} has no colour (mean chroma {:.3g} Lab units); colour it first", what, chroma.mean);
   }
 }
 

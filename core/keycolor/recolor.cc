@@ -14,21 +14,19 @@ namespace color3d {
 namespace {
 
 // Chroma (Lab units) below which a difference is no edit: twice what 8 bits per channel round to.
-constexpr float kLeastChange = 2.0f;
+constexpr float kMinChange = 2.0f;
 constexpr int kFeatherPx = 2;
-
-std::string SizeOf(const Image& image) {
-  return std::to_string(image.width) + "x" + std::to_string(image.height);
-}
 
 void CheckPicture(const Image& picture, const char* what, const Image& original) {
   if (picture.width != original.width || picture.height != original.height) {
-    throw InvalidArgument(std::string(what) + " is " + SizeOf(picture) + " px, the key view " +
-                          SizeOf(original) + "; save it at the key view's size");
+    throw InvalidArgument("{} is {} px, the key view {}; save it at the key view's size",
+                          what,
+                          SizeText(picture),
+                          SizeText(original));
   }
   for (float value : picture.data) {
     if (!std::isfinite(value)) {
-      throw InvalidArgument(std::string(what) + " holds a value that is not finite");
+      throw InvalidArgument("{} holds a value that is not finite", what);
     }
   }
 }
@@ -81,12 +79,12 @@ std::vector<float> Shares(const std::vector<uint8_t>& allowed, int width, int he
 
 Image KeyColorFromEdit(const Image& original_srgb, const Image& edited_srgb, const Image* mask) {
   if (original_srgb.channels != 3 || original_srgb.Empty()) {
-    throw InvalidArgument("recolouring needs a key photo in colour, it has " +
-                          std::to_string(original_srgb.channels) + " channels");
+    throw InvalidArgument("recolouring needs a key photo in colour, it has {} channels",
+                          original_srgb.channels);
   }
   if (edited_srgb.channels != 3) {
-    throw InvalidArgument("the edited picture has " + std::to_string(edited_srgb.channels) +
-                          " channels, it must have 3 (RGB)");
+    throw InvalidArgument("the edited picture has {} channels, it must have 3 (RGB)",
+                          edited_srgb.channels);
   }
   CheckPicture(edited_srgb, "the edited picture", original_srgb);
   const std::vector<uint8_t> allowed = Allowed(mask, original_srgb);
@@ -99,13 +97,13 @@ Image KeyColorFromEdit(const Image& original_srgb, const Image& edited_srgb, con
   for (size_t i = 0; i < ab.PlaneSize(); ++i) {
     const float da = after.Plane(1)[i] - before.Plane(1)[i];
     const float db = after.Plane(2)[i] - before.Plane(2)[i];
-    if (allowed[i] && std::hypot(da, db) > kLeastChange) changed = true;
+    if (allowed[i] && std::hypot(da, db) > kMinChange) changed = true;
     ab.Plane(0)[i] = before.Plane(1)[i] + shares[i] * da;
     ab.Plane(1)[i] = before.Plane(2)[i] + shares[i] * db;
   }
   if (!changed) {
-    throw InvalidArgument(std::string("the edited picture has the key photo's colours") +
-                          (mask != nullptr ? " inside the mask" : "") + "; nothing would change");
+    throw InvalidArgument("the edited picture has the key photo's colours{}; nothing would change",
+                          (mask != nullptr ? " inside the mask" : ""));
   }
   return ab;
 }

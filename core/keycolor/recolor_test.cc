@@ -70,7 +70,7 @@ TEST(RecolorTest, WithoutAMaskAllIsTheEdit) {
   }
 }
 
-TEST(RecolorTest, AnEditMayTakeTheColourAway) {
+TEST(RecolorTest, AnEditMayTakeTheColorAway) {
   EXPECT_EQ(MessageOf(SrgbFromLab(MakeLab(10, 10)), SrgbFromLab(MakeLab(0, 0)), nullptr), "");
 }
 

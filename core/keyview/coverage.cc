@@ -7,7 +7,6 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "core/base/parallel.h"
 
 namespace color3d {
 namespace {
@@ -148,9 +147,10 @@ std::vector<const ViewFeatures*> KeptViews(const std::vector<ViewFeatures>& view
     chosen.push_back(&views[i]);
     indices->push_back(static_cast<int>(i));
     if (views[i].Cells() > 0 && views[i].channels == chosen[0]->channels) continue;
-    throw InvalidArgument("coverage needs features with one channel count for every view, got " +
-                          std::to_string(chosen[0]->channels) + " and " +
-                          std::to_string(views[i].channels));
+    throw InvalidArgument(
+        "coverage needs features with one channel count for every view, got {} and {}",
+        chosen[0]->channels,
+        views[i].channels);
   }
   if (chosen.empty()) throw InvalidArgument("coverage needs at least one view");
   return chosen;
@@ -166,31 +166,30 @@ int CellsForCoverage(size_t views, int channels) {
 
 std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
                                          const std::vector<bool>& kept,
-                                         ProgressObserver& progress,
-                                         const CancellationToken& cancel) {
+                                         const RunControl& run) {
   std::vector<int> indices;
   const std::vector<const ViewFeatures*> chosen = KeptViews(views, kept, &indices);
   const int64_t n = static_cast<int64_t>(chosen.size());
   const CellCounts counts = CountsFor(chosen.size(), std::min(chosen[0]->channels, kMaxComponents));
   const int taken = std::max(counts.bank, counts.queries);
-  cancel.ThrowIfCancelled();
+  run.cancel.ThrowIfCancelled();
   const Projection projection = FitProjection(chosen, taken);
-  ThreadPool pool;
   std::vector<Eigen::MatrixXf> cells(chosen.size());
-  pool.ForEach(n, [&](int64_t i, int) { cells[i] = projection.Apply(Cells(*chosen[i], taken)); });
+  run.pool.ForEach(n,
+                   [&](int64_t i, int) { cells[i] = projection.Apply(Cells(*chosen[i], taken)); });
   const Queries queries = GatherQueries(cells, counts.queries);
   std::vector<double> means(views.size(), 0.0);
   // In rounds, so that cancellation and progress stay on the calling thread.
-  const int64_t round = 4 * pool.thread_count();
+  const int64_t round = 4 * run.pool.thread_count();
   for (int64_t begin = 0; begin < n; begin += round) {
-    cancel.ThrowIfCancelled();
-    pool.ForEach(std::min(round, n - begin), [&](int64_t k, int) {
+    run.cancel.ThrowIfCancelled();
+    run.pool.ForEach(std::min(round, n - begin), [&](int64_t k, int) {
       const int64_t i = begin + k;
       const Eigen::Index bank = std::min<Eigen::Index>(counts.bank, cells[i].cols());
       means[indices[i]] =
           MeanNearest(cells[i].leftCols(bank), queries, static_cast<int>(i), chosen.size());
     });
-    progress.OnProgress(std::min(n, begin + round), n, "comparing views");
+    run.progress.OnProgress(std::min(n, begin + round), n, "comparing views");
   }
   return means;
 }

@@ -4,8 +4,7 @@
 
 #include <vector>
 
-#include "core/base/cancellation.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/keyview/view_features.h"
 
 namespace color3d {
@@ -19,8 +18,7 @@ namespace color3d {
 // differ.
 std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
                                          const std::vector<bool>& kept,
-                                         ProgressObserver& progress,
-                                         const CancellationToken& cancel);
+                                         const RunControl& run);
 
 // How many cells of each view MeanFeatureDistances looks at, at most.
 int CellsForCoverage(size_t views, int channels);

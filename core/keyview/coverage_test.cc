@@ -31,9 +31,17 @@ std::vector<ViewFeatures> Packed(const std::vector<Image>& grids) {
   return views;
 }
 
+std::vector<double> Distances(const std::vector<ViewFeatures>& views,
+                              const std::vector<bool>& kept,
+                              const CancellationToken& cancel = {}) {
+  ThreadPool pool;
+  NoCheckpoints none;
+  NullObserver silent;
+  return MeanFeatureDistances(views, kept, {pool, none, silent, cancel});
+}
+
 std::vector<double> Distances(const std::vector<ViewFeatures>& views) {
-  NullObserver progress;
-  return MeanFeatureDistances(views, std::vector<bool>(views.size(), true), progress, {});
+  return Distances(views, std::vector<bool>(views.size(), true));
 }
 
 // Straight from the definition, float64, all cells and all channels.
@@ -104,8 +112,7 @@ TEST(FeatureDistancesTest, ViewsThatAreSetAsideDoNotCount) {
       Packed({RandomGrid(5, 4, 6, 1), RandomGrid(3, 7, 6, 2), RandomGrid(4, 4, 6, 3)});
   const auto before = Distances(views);
   views.push_back(Packed(Image(6, 6, 6, 1000.0f)));
-  NullObserver progress;
-  const auto after = MeanFeatureDistances(views, {true, true, true, false}, progress, {});
+  const auto after = Distances(views, {true, true, true, false});
   for (size_t i = 0; i < 3; ++i) EXPECT_EQ(after[i], before[i]);
   EXPECT_EQ(after[3], 0.0);
 }
@@ -118,14 +125,13 @@ TEST(FeatureDistancesTest, ConstantAndNonFiniteFeaturesHaveAnAnswer) {
 }
 
 TEST(FeatureDistancesTest, RefusesBadShapesAndStopsWhenCancelled) {
-  NullObserver progress;
-  EXPECT_THROW(MeanFeatureDistances({}, {}, progress, {}), Error);
+  EXPECT_THROW(Distances(std::vector<ViewFeatures>(), {}), Error);
   EXPECT_THROW(Distances(Packed({Image(2, 2, 3), Image(2, 2, 4)})), Error);
   EXPECT_THROW(Distances({ViewFeatures()}), Error);
   EXPECT_THROW(Packed(Image()), Error);
   CancellationToken cancel;
   cancel.Cancel();
-  EXPECT_THROW(MeanFeatureDistances({Packed(Image(2, 2, 3))}, {true}, progress, cancel), Error);
+  EXPECT_THROW(Distances({Packed(Image(2, 2, 3))}, {true}, cancel), Error);
 }
 
 // Fewer cells of each view, yet the same view must win: view 7 holds a piece of every other one.

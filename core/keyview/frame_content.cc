@@ -16,8 +16,8 @@ constexpr double kFlatDeviation = 0.8;
 constexpr double kBlankDeviation = 1.5;
 // Shares of the scene's median. A sharp view of a plain corner keeps half; a blur of 1 % of the
 // picture's width leaves a quarter of the detail; a frame half covered has half of the structure.
-constexpr double kLeastDetail = 0.33;
-constexpr double kLeastStructure = 0.66;
+constexpr double kMinDetail = 0.33;
+constexpr double kMinStructure = 0.66;
 // Photographs reduced to some hundred px have 0.8 and more.
 constexpr double kNoiseCorrelation = 0.4;
 
@@ -91,8 +91,8 @@ double MedianOf(const std::vector<FrameContent>& frames, Field field) {
 
 FrameContent MeasureFrameContent(const Image& luminance) {
   if (luminance.Empty() || luminance.channels != 1) {
-    throw InvalidArgument("a frame must be a picture of 1 channel, this one has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("a frame must be a picture of 1 channel, this one has {}",
+                          luminance.channels);
   }
   Image finite = luminance;
   for (float& value : finite.data) value = std::isfinite(value) ? value : 0.0f;
@@ -116,9 +116,9 @@ std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames) {
       reasons[i] = "blank";
     } else if (frame.correlation < kNoiseCorrelation && correlation > 1.5 * kNoiseCorrelation) {
       reasons[i] = "noise";
-    } else if (frame.structure < kLeastStructure * structure) {
+    } else if (frame.structure < kMinStructure * structure) {
       reasons[i] = "much of it is empty";
-    } else if (frame.detail < kLeastDetail * detail) {
+    } else if (frame.detail < kMinDetail * detail) {
       reasons[i] = "blurred";
     }
     if (!reasons[i].empty()) ++unfit;

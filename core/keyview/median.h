@@ -1,4 +1,4 @@
-// For this folder only.
+// The median of a list. Pure.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,7 @@
 #include "core/keyview/select.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -7,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "core/base/range_check.h"
 #include "core/keyview/median.h"
 
 namespace color3d {
@@ -33,9 +36,9 @@ void CheckLengths(const std::vector<std::vector<double>>& descriptors) {
   if (descriptors.empty()) throw InvalidArgument("there is no view to choose a key view from");
   for (const std::vector<double>& descriptor : descriptors) {
     if (descriptor.size() == descriptors[0].size() && !descriptor.empty()) continue;
-    throw InvalidArgument("view descriptors must have one length >= 1, got " +
-                          std::to_string(descriptors[0].size()) + " and " +
-                          std::to_string(descriptor.size()));
+    throw InvalidArgument("view descriptors must have one length >= 1, got {} and {}",
+                          descriptors[0].size(),
+                          descriptor.size());
   }
 }
 
@@ -115,17 +118,18 @@ void SetAsideUnusable(const std::vector<std::vector<double>>& descriptors, Guard
   for (size_t i = 0; i < descriptors.size(); ++i) {
     if (IsUsable(descriptors[i])) continue;
     guarded->views[i].set_aside = "no usable features";
-    if (++count <= 8) list += (list.empty() ? "" : ", ") + std::to_string(i);
+    if (++count <= 8) list += fmt::format("{}{}", list.empty() ? "" : ", ", i);
   }
   if (count == 0) return;
   if (static_cast<size_t>(count) == descriptors.size()) {
     throw InvalidArgument(
         "no view has a usable descriptor (all are zero or not finite); are the photos all black?");
   }
-  guarded->warnings.push_back("key view: " + std::to_string(count) +
-                              " views have a zero or non-finite descriptor and were set aside "
-                              "(view " +
-                              list + (count > 8 ? ", ..." : "") + ")");
+  guarded->warnings.push_back(fmt::format(
+      "key view: {} views have a zero or non-finite descriptor and were set aside (view {}{})",
+      count,
+      list,
+      count > 8 ? ", ..." : ""));
 }
 
 // A frame whose mean similarity to the others lies far below the rest's is equally unlike all
@@ -164,9 +168,7 @@ void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
 }  // namespace
 
 void KeyViewOptions::Validate() const {
-  if (temperature > 0.0 && std::isfinite(temperature)) return;
-  throw InvalidArgument("key view option temperature is " + std::to_string(temperature) +
-                        ", it must be > 0");
+  RangeCheck("key view option")("temperature", temperature, 1e-6, 1e6);
 }
 
 std::vector<bool> GuardedViews::Kept() const {
@@ -181,9 +183,9 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
   options.Validate();
   CheckLengths(descriptors);
   if (!unfit.empty() && unfit.size() != descriptors.size()) {
-    throw InvalidArgument("frames were judged for " + std::to_string(unfit.size()) +
-                          " views, descriptors are there for " +
-                          std::to_string(descriptors.size()));
+    throw InvalidArgument("frames were examined for {} views, descriptors are there for {}",
+                          unfit.size(),
+                          descriptors.size());
   }
   GuardedViews guarded;
   guarded.views.resize(descriptors.size());
@@ -204,11 +206,11 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
 
 std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& descriptors,
                                      const std::vector<bool>& kept,
-                                     const KeyViewOptions& options) {
+                                     const KeyViewOptions& options,
+                                     ThreadPool& pool) {
   options.Validate();
   CheckLengths(descriptors);
   const std::vector<int> indices = IndicesOf(kept);
-  ThreadPool pool;
   const Matrix cosines = Cosines(UnitRows(descriptors, indices), pool);
   std::vector<double> entropies(descriptors.size(), 0.0);
   pool.ForEach(static_cast<int64_t>(indices.size()), [&](int64_t i, int) {
@@ -219,15 +221,15 @@ std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& des
 
 KeyViewSelection RankViews(GuardedViews guarded, const std::vector<double>& scores) {
   if (scores.size() != guarded.views.size()) {
-    throw InvalidArgument("there are scores for " + std::to_string(scores.size()) + " of " +
-                          std::to_string(guarded.views.size()) + " views");
+    throw InvalidArgument(
+        "there are scores for {} of {} views", scores.size(), guarded.views.size());
   }
   std::vector<double> kept_scores;
   for (RankedView& view : guarded.views) {
     if (!view.set_aside.empty()) continue;
     view.score = scores[view.index];
     if (!std::isfinite(view.score)) {
-      throw InvalidArgument("the score of view " + std::to_string(view.index) + " is not finite");
+      throw InvalidArgument("the score of view {} is not finite", view.index);
     }
     kept_scores.push_back(view.score);
   }

@@ -6,18 +6,21 @@
 #include <string>
 #include <vector>
 
+#include "core/base/parallel.h"
+
 namespace color3d {
 
 enum class KeyViewStrategy { kEntropy, kCoverage, kTracks, kManual };
 
 struct KeyViewOptions {
   KeyViewStrategy strategy = KeyViewStrategy::kCoverage;
-  double temperature = 1.0;   // of the softmax, > 0
+  double temperature = 1.0;   // of the softmax, 1e-6..1e6
   bool exclude_self = false;  // leave the view's similarity to itself out of the softmax
   // Set aside frames that show nothing (UnfitFrames) and, among 5 views or more, those with mean
   // similarity < median - 2 MAD.
   bool outlier_guard = true;
   void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const KeyViewOptions&) const = default;
 };
 
 struct RankedView {
@@ -48,7 +51,8 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
 // with views^2: 32 MB for 2000.
 std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& descriptors,
                                      const std::vector<bool>& kept,
-                                     const KeyViewOptions& options);
+                                     const KeyViewOptions& options,
+                                     ThreadPool& pool);
 
 struct KeyViewSelection {
   int index = 0;

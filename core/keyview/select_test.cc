@@ -34,8 +34,9 @@ KeyViewOptions Entropy() {
 }
 
 KeyViewSelection SelectByEntropy(const Matrix& features, const KeyViewOptions& options) {
+  ThreadPool pool;
   GuardedViews guarded = GuardViews(features, {}, options);
-  const std::vector<double> scores = SoftmaxEntropies(features, guarded.Kept(), options);
+  const std::vector<double> scores = SoftmaxEntropies(features, guarded.Kept(), options, pool);
   return RankViews(std::move(guarded), scores);
 }
 
@@ -192,8 +193,9 @@ TEST(SelectKeyViewTest, AViewThatIsSetAsideDoesNotMoveTheOthersScores) {
   features.push_back(RandomFeatures(1, 5, 99)[0]);
   std::vector<std::string> unfit(13);
   unfit[12] = "blank";
+  ThreadPool pool;
   GuardedViews guarded = GuardViews(features, unfit, {});
-  const std::vector<double> scores = SoftmaxEntropies(features, guarded.Kept(), {});
+  const std::vector<double> scores = SoftmaxEntropies(features, guarded.Kept(), {}, pool);
   const KeyViewSelection after = RankViews(std::move(guarded), scores);
   EXPECT_EQ(after.ranking.back().set_aside, "blank");
   EXPECT_EQ(after.index, before.index);
@@ -234,7 +236,8 @@ TEST(SelectKeyViewTest, EntropyOfManyViewsIsQuick) {
     const Matrix features = RandomFeatures(views, 384, 5);
     const std::vector<bool> kept(features.size(), true);
     const auto start = std::chrono::steady_clock::now();
-    const std::vector<double> entropies = SoftmaxEntropies(features, kept, {});
+    ThreadPool pool;
+    const std::vector<double> entropies = SoftmaxEntropies(features, kept, {}, pool);
     EXPECT_GT(entropies.back(), 0.0);
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   };

@@ -24,8 +24,7 @@ int64_t StrideFor(const std::vector<std::vector<int>>& tracks) {
 void CheckTrack(const std::vector<int>& track, size_t views) {
   for (int view : track) {
     if (view >= 0 && static_cast<size_t>(view) < views) continue;
-    throw InvalidArgument("a track names view " + std::to_string(view) + ", the scene has " +
-                          std::to_string(views));
+    throw InvalidArgument("a track names view {}, the scene has {}", view, views);
   }
 }
 

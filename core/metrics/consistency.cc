@@ -18,10 +18,12 @@ void CheckDepth(const PosedDepth& view) {
       !d.Empty() && view.camera.fx > 0.0 && view.camera.fy > 0.0) {
     return;
   }
-  throw InvalidArgument("a depth map of " + std::to_string(d.width) + " x " +
-                        std::to_string(d.height) + " x " + std::to_string(d.channels) +
-                        " does not fit its camera of " + std::to_string(view.camera.width) + " x " +
-                        std::to_string(view.camera.height) + " px");
+  throw InvalidArgument("a depth map of {} x {} x {} does not fit its camera of {} x {} px",
+                        d.width,
+                        d.height,
+                        d.channels,
+                        view.camera.width,
+                        view.camera.height);
 }
 
 // The four pixels around (u, v), whose centres are at +0.5, and their shares.
@@ -79,11 +81,15 @@ void CheckPicture(const ColoredPicture& p) {
       p.srgb.width == p.lab.width && p.srgb.height == p.lab.height) {
     return;
   }
-  throw InvalidArgument("pictures to compare need 3 channels of sRGB and of Lab in one size, got " +
-                        std::to_string(p.srgb.width) + " x " + std::to_string(p.srgb.height) +
-                        " x " + std::to_string(p.srgb.channels) + " and " +
-                        std::to_string(p.lab.width) + " x " + std::to_string(p.lab.height) + " x " +
-                        std::to_string(p.lab.channels));
+  throw InvalidArgument(
+      "pictures to compare need 3 channels of sRGB and of Lab in one size, got {} x {} x {} and {} "
+      "x {} x {}",
+      p.srgb.width,
+      p.srgb.height,
+      p.srgb.channels,
+      p.lab.width,
+      p.lab.height,
+      p.lab.channels);
 }
 
 void AddPairs(int views, int gap, bool long_gap, int most, std::vector<ViewPair>* pairs) {
@@ -145,10 +151,11 @@ PairDifference CompareMatches(const ColoredPicture& from,
   for (const PixelMatch& m : matches) {
     const auto corners = CornersAt(m.u, m.v, to.srgb.width, to.srgb.height);
     if (!corners || m.x < 0 || m.y < 0 || m.x >= from.srgb.width || m.y >= from.srgb.height) {
-      throw InvalidArgument("the match of pixel (" + std::to_string(m.x) + ", " +
-                            std::to_string(m.y) +
-                            ") lies outside of a picture; match views at "
-                            "the pictures' size");
+      throw InvalidArgument(
+          "the match of pixel ({}, {}) lies outside of a picture; match views at the pictures' "
+          "size",
+          m.x,
+          m.y);
     }
     for (int c = 0; c < 3; ++c) {
       const double d = from.srgb.At(c, m.y, m.x) - corners->Mix(to.srgb, c);

@@ -22,14 +22,14 @@ std::string Shape(const Image& image) {
 
 void CheckPair(const Image& x, const Image& y) {
   if (x.Empty() || x.width != y.width || x.height != y.height || x.channels != y.channels) {
-    throw InvalidArgument("pictures to compare must have one size, got " + Shape(x) + " and " +
-                          Shape(y));
+    throw InvalidArgument(
+        "pictures to compare must have one size, got {} and {}", Shape(x), Shape(y));
   }
 }
 
 void CheckPeak(double peak) {
   if (!(peak > 0.0) || !std::isfinite(peak)) {
-    throw InvalidArgument("peak is " + std::to_string(peak) + "; it must be positive");
+    throw InvalidArgument("peak is {}; it must be positive", peak);
   }
 }
 
@@ -137,7 +137,7 @@ double Ssim(const Image& x, const Image& y, double peak) {
 double AbRmse(const Image& lab_x, const Image& lab_y) {
   CheckPair(lab_x, lab_y);
   if (lab_x.channels != 3) {
-    throw InvalidArgument("ab-RMSE needs Lab images of 3 channels, got " + Shape(lab_x));
+    throw InvalidArgument("ab-RMSE needs Lab images of 3 channels, got {}", Shape(lab_x));
   }
   double sum = 0.0;
   const size_t n = lab_x.PlaneSize();

@@ -13,7 +13,7 @@ namespace {
 // From 1; ties get the mean.
 std::vector<double> Ranks(const std::vector<float>& values) {
   for (const float v : values) {
-    if (!std::isfinite(v)) throw InvalidArgument("a value to rank is " + std::to_string(v));
+    if (!std::isfinite(v)) throw InvalidArgument("a value to rank is {}", v);
   }
   std::vector<size_t> order(values.size());
   std::iota(order.begin(), order.end(), size_t{0});
@@ -35,8 +35,7 @@ std::vector<double> Ranks(const std::vector<float>& values) {
 
 double RankCorrelation(const std::vector<float>& x, const std::vector<float>& y) {
   if (x.size() != y.size()) {
-    throw InvalidArgument("lists of " + std::to_string(x.size()) + " and " +
-                          std::to_string(y.size()) + " values cannot be correlated");
+    throw InvalidArgument("lists of {} and {} values cannot be correlated", x.size(), y.size());
   }
   if (x.size() < 2) return 0.0;
   const std::vector<double> p = Ranks(x), q = Ranks(y);

@@ -19,8 +19,7 @@ double NumberFrom(std::string_view text, int line) {
   double value = 0.0;
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc() || result.ptr != text.data() + text.size()) {
-    throw InvalidArgument("curves, line " + std::to_string(line) + ": \"" + std::string(text) +
-                          "\" is not a number");
+    throw InvalidArgument("curves, line {}: \"{}\" is not a number", line, text);
   }
   return value;
 }
@@ -56,8 +55,8 @@ std::vector<CurvePoint> CurvesFromCsv(std::string_view csv) {
       line.remove_prefix(comma + 1);
     }
     if (fields.size() != 5) {
-      throw InvalidArgument("curves, line " + std::to_string(line_number) + " has " +
-                            std::to_string(fields.size()) + " fields instead of 5");
+      throw InvalidArgument(
+          "curves, line {} has {} fields instead of 5", line_number, fields.size());
     }
     CurvePoint point;
     point.stage = fields[0];
@@ -122,7 +121,7 @@ std::optional<std::string> CurveRecorder::Load() {
   std::memcpy(&seconds, bytes->data(), sizeof(seconds));
   std::memcpy(&length, bytes->data() + sizeof(seconds), sizeof(length));
   if (length > bytes->size() - kPrefix || !std::isfinite(seconds)) {
-    throw Error(ErrorCode::kDataLoss, "the checkpoint of " + stage_ + " is damaged");
+    throw Error(ErrorCode::kDataLoss, "the checkpoint of {} is damaged", stage_);
   }
   std::lock_guard lock(mutex_);
   points_ = CurvesFromCsv(std::string_view(*bytes).substr(kPrefix, length));

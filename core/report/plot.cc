@@ -80,7 +80,7 @@ class Axis {
   bool logarithmic_;
 };
 
-constexpr size_t kMostMarkers = 12;  // lines of more points need no dots
+constexpr size_t kMaxMarkers = 12;  // lines of more points need no dots
 
 // A mark at each point, so that a line of one point is seen.
 std::string Markers(const PlotSeries& series,
@@ -89,7 +89,7 @@ std::string Markers(const PlotSeries& series,
                     const Axis& y_axis,
                     bool log_seconds) {
   std::string svg;
-  if (series.points.size() > kMostMarkers) return svg;
+  if (series.points.size() > kMaxMarkers) return svg;
   for (const CurvePoint& p : series.points) {
     if (log_seconds && !(p.seconds > 0.0)) continue;
     svg += "<circle class=\"" + color + "\" r=\"2\" cx=\"" + Format("%.1f", x_axis.Px(p.seconds)) +

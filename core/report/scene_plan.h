@@ -29,9 +29,7 @@ struct PlanFacts {
   bool has_truth = false;
   bool key_view_given = false;
   int views = 0;
-  int training_views = 0;
   double megapixels_per_view = 0.0;  // at working size
-  int threads = 1;
 };
 
 std::vector<PlanStep> PlanScene(const PlanFacts& facts);

@@ -28,11 +28,13 @@ struct ImportOptions {
   int sfm_neighbors = 8;  // 2..100, similar photos that each photo is matched with
   std::chrono::seconds sfm_timeout{3600};
   void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const ImportOptions&) const = default;
 };
 
 // What structure-from-motion did.
 struct SfmReport {
-  std::string plan;  // which pairs were matched and why, one line
+  std::string plan;           // which pairs were matched and why, one line
+  std::filesystem::path log;  // what COLMAP said, below the scratch folder
   int64_t pairs_tried = 0;
   bool exhaustive = false;  // all pairs were matched
   double photos_seconds = 0.0;

@@ -55,8 +55,10 @@ void Choose(std::string_view name) {
     }
     known += (known.empty() ? "" : ", ") + std::string(NameOf(target));
   }
-  throw InvalidArgument("the instruction set '" + std::string(name) +
-                        "' (COLOR3D_ISA) is not available on this machine; use one of " + known);
+  throw InvalidArgument(
+      "the instruction set '{}' (COLOR3D_ISA) is not available on this machine; use one of {}",
+      name,
+      known);
 }
 
 }  // namespace

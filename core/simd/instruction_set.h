@@ -1,4 +1,4 @@
-// Which instruction set the numeric kernels of this folder use. The kernels are compiled once per
+// Which instruction set the numeric kernels use. The kernels are compiled once per
 // set (Highway's foreach_target) and chosen when the program runs: the best that the machine has,
 // unless the environment variable COLOR3D_ISA names a lesser one (portable, sse4, avx2, avx512;
 // neon). Thread-safe, but a change in the middle of a training changes its last digits.

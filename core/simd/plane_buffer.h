@@ -13,6 +13,7 @@ struct CacheLineAllocator {
   using value_type = T;
   CacheLineAllocator() = default;
   template <class U>
+  // NOLINTNEXTLINE(google-explicit-constructor): allocators convert into each other
   CacheLineAllocator(const CacheLineAllocator<U>&) {}
   T* allocate(size_t n) {
     return static_cast<T*>(::operator new (n * sizeof(T), std::align_val_t{64}));

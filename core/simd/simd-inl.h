@@ -195,16 +195,6 @@ HWY_INLINE uint32_t MaskBits(Mask m) {
   return bits;
 }
 
-HWY_INLINE Mask MaskFromBits(uint32_t bits) {
-  Mask r;
-  for (int k = 0; k < kParts; ++k) {
-    const uint32_t part = bits >> (k * kRegisterLanes);
-    const uint8_t bytes[8] = {static_cast<uint8_t>(part), static_cast<uint8_t>(part >> 8)};
-    r.part[k] = hn::LoadMaskBits(FloatTag(), bytes);
-  }
-  return r;
-}
-
 HWY_INLINE I32 BitsOf(F32 v) {
   I32 r;
   COLOR3D_PARTS(hn::BitCast(IntTag(), v.part[k]))

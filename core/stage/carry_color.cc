@@ -1,17 +1,18 @@
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <optional>
 
 #include "core/base/range_check.h"
-#include "core/carry/stereo_views.h"
+#include "core/carry/carry_views.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/keyview/next_key_view.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/artifacts.h"
-#include "core/stage/carried_views.h"
-#include "core/stage/carry_facts.h"
-#include "core/stage/key_color_sources.h"
-#include "core/stage/next_key_view.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/carry_checkpoint.h"
+#include "core/stage/formats/carry_facts.h"
+#include "core/stage/sources/key_color_sources.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -19,124 +20,7 @@ namespace {
 
 constexpr float kCovered = 0.25f;        // confidence from which a pixel counts as covered
 constexpr double kSmallCoverage = 0.01;  // below, the user is told
-constexpr float kLeastOpacity = 0.5f;    // of the Gaussians, for a depth to count
-constexpr size_t kLeastTracked = 30;     // points of structure-from-motion that suffice
-constexpr int kSurfaceGridPx = 16;       // else: one rendered depth per so many px
-
-// Two opinions on where the surfaces of a view are: from the Gaussians, and from comparing
-// photographs. The latter may be missing (no other view shows the same).
-struct ViewSurfaces {
-  SurfaceView gaussians;
-  std::optional<SurfaceView> swept;
-};
-
-class SurfaceMaker {
- public:
-  SurfaceMaker(const Scene& scene,
-               const GaussianModel& geometry,
-               const CarryColorOptions& options,
-               const StageContext& context)
-      : scene_(scene),
-        geometry_(geometry),
-        options_(options),
-        cancel_(context.cancel()),
-        images_(scene, context.scene_folder(), options.max_side_px),
-        small_(scene, context.scene_folder(), options.sweep_side_px),
-        training_(scene.TrainingViews()),
-        tracked_(scene.views.size()) {
-    for (const SparsePoint& point : scene.points) {
-      for (int view : point.views) tracked_[view].push_back(point.position);
-    }
-  }
-
-  const ViewImages& images() const { return images_; }
-
-  // Thread-safe.
-  ViewSurfaces Make(int view) const {
-    const View& v = scene_.views[view];
-    ThreadPool one(1);
-    const Camera camera = images_.WorkingCamera(view);
-    RenderedView rendered = RenderView(geometry_, camera, v.cam_from_world, one);
-    for (size_t i = 0; i < rendered.depth.data.size(); ++i) {
-      if (rendered.opacity.data[i] < kLeastOpacity) rendered.depth.data[i] = 0.0f;
-    }
-    ViewSurfaces surfaces;
-    surfaces.gaussians = {
-        camera, v.cam_from_world, *images_.Luminance(view), std::move(rendered.depth)};
-    surfaces.swept = Sweep(view, surfaces.gaussians);
-    return surfaces;
-  }
-
- private:
-  std::optional<SurfaceView> Sweep(int view, const SurfaceView& rendered) const {
-    const StereoPlan plan =
-        PlanStereo(scene_, view, SurfaceOf(view, rendered), training_, options_.sweep_sources);
-    if (plan.sources.empty()) return std::nullopt;
-    std::vector<std::shared_ptr<const Image>> pictures;  // keeps them alive
-    const auto posed = [&](int index) {
-      pictures.push_back(small_.Luminance(index));
-      return PosedLuminance{
-          small_.WorkingCamera(index), scene_.views[index].cam_from_world, pictures.back().get()};
-    };
-    std::vector<PosedLuminance> sources;
-    for (int index : plan.sources) sources.push_back(posed(index));
-    const DepthMap map =
-        SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, options_.sweep, cancel_);
-    SurfaceView swept = rendered;
-    swept.depth = Resize(map.depth, rendered.camera.width, rendered.camera.height);
-    return swept;
-  }
-
-  // Points that the view sees: tracked ones, or the Gaussians' surface.
-  std::vector<Eigen::Vector3d> SurfaceOf(int view, const SurfaceView& rendered) const {
-    if (tracked_[view].size() >= kLeastTracked) return tracked_[view];
-    std::vector<Eigen::Vector3d> points;
-    const Camera& camera = rendered.camera;
-    for (int y = kSurfaceGridPx / 2; y < camera.height; y += kSurfaceGridPx) {
-      for (int x = kSurfaceGridPx / 2; x < camera.width; x += kSurfaceGridPx) {
-        const double depth = rendered.depth.At(0, y, x);
-        if (!(depth > 0.0)) continue;
-        points.push_back(
-            rendered.cam_from_world.WorldFromCamera(depth * camera.Ray(x + 0.5, y + 0.5)));
-      }
-    }
-    return points;
-  }
-
-  const Scene& scene_;
-  const GaussianModel& geometry_;
-  const CarryColorOptions& options_;
-  const CancellationToken& cancel_;
-  ViewImages images_;
-  ViewImages small_;
-  std::vector<int> training_;
-  std::vector<std::vector<Eigen::Vector3d>> tracked_;  // by view
-};
-
-struct ColoredKeyView {
-  int view = 0;
-  ViewSurfaces surfaces;
-  CarriedColor color;
-};
-
-CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
-                          const ViewSurfaces& target,
-                          const CarryOptions& options) {
-  const Camera& camera = target.gaussians.camera;
-  CarriedColor all{Image(camera.width, camera.height, 2), Image(camera.width, camera.height, 1)};
-  for (const ColoredKeyView& key : keys) {
-    CarriedColor carried = CarryColor(
-        key.surfaces.gaussians, key.color.ab, key.color.confidence, target.gaussians, options);
-    if (key.surfaces.swept && target.swept) {
-      TakeSurer(
-          CarryColor(
-              *key.surfaces.swept, key.color.ab, key.color.confidence, *target.swept, options),
-          &carried);
-    }
-    FillFrom(carried, &all);
-  }
-  return all;
-}
+constexpr size_t kMaxFurtherKeyViews = 16;
 
 // The user's colours of a further key view, undistorted and reduced.
 CarriedColor ColorOfFurther(const FurtherKeyView& further,
@@ -157,12 +41,13 @@ CarriedColor ColorOfFurther(const FurtherKeyView& further,
 
 std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
                                           const Scene& scene,
+                                          const ViewImages& images,
                                           const SurfaceMaker& maker,
                                           StageContext& context) {
   std::vector<ColoredKeyView> keys(1);
   keys[0].view = ReadKeyView(context, scene);
   keys[0].surfaces = maker.Make(keys[0].view);
-  const Camera& camera = keys[0].surfaces.gaussians.camera;
+  const Camera& camera = keys[0].surfaces.rendered.camera;
   const AbMap map = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
   keys[0].color = {Resize(map.ab, camera.width, camera.height),
                    Resize(map.confidence, camera.width, camera.height)};
@@ -171,22 +56,34 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
     ColoredKeyView key;
     key.view = scene.FindView(further.view);
     if (scene.views[key.view].held_out) {
-      throw InvalidArgument("the view " + scene.views[key.view].name +
-                            " is held out for evaluation and cannot be a key view");
+      throw InvalidArgument("the view {} is held out for evaluation and cannot be a key view",
+                            scene.views[key.view].name);
     }
     for (const ColoredKeyView& other : keys) {
       if (other.view == key.view) {
-        throw InvalidArgument("the view " + scene.views[key.view].name +
-                              " is a key view already; name each once");
+        throw InvalidArgument("the view {} is a key view already; name each once",
+                              scene.views[key.view].name);
       }
     }
     key.surfaces = maker.Make(key.view);
     // What the views before it have given stays; the user's colours fill the rest.
     key.color = CarryFromAll(keys, key.surfaces, options.carry);
-    FillFrom(ColorOfFurther(further, key.view, scene, maker.images(), context), &key.color);
+    FillFrom(ColorOfFurther(further, key.view, scene, images, context), &key.color);
     keys.push_back(std::move(key));
   }
   return keys;
+}
+
+// Mean over the views that are not key views.
+double MeanCoverage(const std::vector<double>& coverage, const std::vector<int>& key_views) {
+  double sum = 0.0;
+  for (size_t i = 0; i < coverage.size(); ++i) {
+    if (std::find(key_views.begin(), key_views.end(), static_cast<int>(i)) == key_views.end()) {
+      sum += coverage[i];
+    }
+  }
+  const size_t others = coverage.size() - key_views.size();
+  return others > 0 ? sum / static_cast<double>(others) : 1.0;
 }
 
 // carry.json, and a warning when the key views show next to nothing of the others.
@@ -200,41 +97,32 @@ void Conclude(const Scene& scene,
     key_views.push_back(key.view);
     facts.key_views.push_back(scene.views[key.view].name);
   }
-  double sum = 0.0;
-  for (size_t i = 0; i < coverage.size(); ++i) {
-    facts.per_view.emplace_back(scene.views[i].name, coverage[i]);
-    if (std::find(key_views.begin(), key_views.end(), static_cast<int>(i)) == key_views.end()) {
-      sum += coverage[i];
-    }
-  }
-  const size_t others = scene.views.size() - key_views.size();
-  const double mean = others > 0 ? sum / static_cast<double>(others) : 1.0;
+  const double mean = MeanCoverage(coverage, key_views);
   facts.coverage = mean;
   if (const auto next = NextKeyView(scene, key_views)) {
     facts.next = {scene.views[next->view].name, next->covered_now, next->covered_with};
   }
   context.progress().OnError(0, "coverage", mean);
   if (mean < kSmallCoverage) {
-    char percent[32];
-    std::snprintf(percent, sizeof(percent), "%.1f %%", 100.0 * mean);
     context.progress().OnWarning(
-        "the key view shows only " + std::string(percent) +
-        " of what the other views show; their colours are inferred from likeness. Colour a second "
-        "key view, or choose another one");
+        fmt::format("the key view shows only {:.1f} % of what the other views show; their colours "
+                    "are inferred from likeness. Colour a second key view, or choose another one",
+                    100.0 * mean));
   }
-  WriteCarryFacts(facts, context);
+  WriteCarryFacts(facts, scene, coverage, context);
 }
 
 }  // namespace
 
 void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
-  const RangeCheck check("carry_color option");
-  check("sweep_side_px", sweep_side_px, 64, 2048);
-  check("sweep_sources", sweep_sources, 1, 16);
-  if (further.size() > 16) {
-    throw InvalidArgument(std::to_string(further.size()) +
-                          " further key views were given; at most 16 are taken");
+  const RangeCheck check("carry option");
+  check("depth_side_px", depth_side_px, 64, 2048);
+  check("depth_sources", depth_sources, 1, kMaxSweepSources);
+  if (further.size() > kMaxFurtherKeyViews) {
+    throw InvalidArgument("{} further key views were given; at most {} are taken",
+                          further.size(),
+                          kMaxFurtherKeyViews);
   }
   sweep.Validate();
   carry.Validate();
@@ -244,12 +132,19 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  const SurfaceMaker maker(scene, geometry, options, context);
-  const std::vector<ColoredKeyView> keys = ColorKeyViews(options, scene, maker, context);
+  const ViewImages images(scene, context.scene_folder(), options.max_side_px);
+  const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);
+  const SurfaceRenderer render = [&](const Camera& camera, const Pose& pose) {
+    ThreadPool one(1);
+    RenderedView view = RenderView(geometry, camera, pose, one);
+    return RenderedSurface{std::move(view.depth), std::move(view.opacity)};
+  };
+  const SurfaceMaker maker(
+      scene, images, sweep_images, render, options.depth_sources, options.sweep, context.cancel());
+  const std::vector<ColoredKeyView> keys = ColorKeyViews(options, scene, images, maker, context);
 
-  CarriedViews done(scene, context);
-  ThreadPool pool(context.threads());
-  pool.ForEach(static_cast<int64_t>(scene.views.size()), [&](int64_t index, int) {
+  CarryCheckpoint done(scene, context);
+  context.pool().ForEach(static_cast<int64_t>(scene.views.size()), [&](int64_t index, int) {
     context.cancel().ThrowIfCancelled();
     const int view = static_cast<int>(index);
     if (done.WasDone(view)) return;

@@ -7,13 +7,13 @@
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
+#include "core/metrics/scene_consistency.h"
+#include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
+#include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/artifacts.h"
-#include "core/stage/chroma_bound.h"
-#include "core/stage/consistency_scores.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
-#include "core/stage/view_scores.h"
 
 namespace color3d {
 namespace {
@@ -21,26 +21,87 @@ namespace {
 using nlohmann::ordered_json;
 using TruthFiles = std::map<int, std::filesystem::path>;  // by view
 
-// Longer side at which the view was coloured.
-int ColoredSide(const StageContext& context, const View& view) {
-  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
-  const ImageInfo info = ProbeImage(context.ReadInput(name), name);
-  return std::max(info.width, info.height);
-}
-
 TruthFiles FilesByView(const std::vector<TruthFile>& truth, bool held_out, const Scene& scene) {
   TruthFiles files;
   for (const TruthFile& file : truth) {
     const int index = scene.FindView(file.view);
     if (scene.views[index].held_out != held_out) {
       throw InvalidArgument(
-          "truth was given for " + scene.views[index].name + ", which is a " +
-          (held_out ? "training view; only held-out views are scored"
-                    : "held-out view; only training views bound what a reconstruction can reach"));
+          "truth was given for {}, which is a {}",
+          scene.views[index].name,
+          held_out ? "training view; only held-out views are scored"
+                   : "held-out view; only training views bound what a reconstruction can reach");
     }
     files[index] = file.file;
   }
   return files;
+}
+
+// The curves of the bound's fit would stand among those of the scene's own chroma.
+class WithoutCurves : public ProgressObserver {
+ public:
+  explicit WithoutCurves(ProgressObserver& outer) : outer_(outer) {}
+  void OnProgress(int64_t step, int64_t total, const std::string& message) override {
+    outer_.OnProgress(step, total, "bound: " + message);
+  }
+  void OnError(int64_t, const std::string&, double) override {}
+  void OnWarning(const std::string& message) override { outer_.OnWarning("bound: " + message); }
+
+ private:
+  ProgressObserver& outer_;
+};
+
+// The same geometry under the true colours of the training views: what the reconstruction itself
+// costs. Throws Error{kInvalidArgument} naming a training view without truth.
+GaussianModel FitTrueChroma(const GaussianModel& geometry,
+                            const Scene& scene,
+                            const TruthFiles& truth,
+                            const ChromaOptions& options,
+                            StageContext& context) {
+  const std::vector<int> training = scene.TrainingViews();
+  for (const int view : training) {
+    if (truth.contains(view)) continue;
+    throw InvalidArgument(
+        "the bound needs the true colours of every training view; those of {} are missing",
+        scene.views[view].name);
+  }
+  const int side = ColoredSide(context, scene.views[training.at(0)]);
+  const ViewImages images(scene, context.scene_folder(), side, 0);
+  const ChromaTargetSource targets = [&](int view) {
+    auto target = std::make_shared<ChromaTarget>();
+    target->ab = ChromaOfLab(LabFromSrgb(images.Undistort(view, ReadImage(truth.at(view)))));
+    return target;
+  };
+  WithoutCurves progress(context.progress());
+  NoCheckpoints none;
+  return FitChroma(geometry,
+                   ChromaProblemOf(scene, images, targets),
+                   options,
+                   {context.pool(), none, progress, context.cancel()});
+}
+
+SceneConsistency CompareViews(const Scene& scene,
+                              const GaussianModel& model,
+                              const TruthFiles& truth,
+                              StageContext& context) {
+  const ViewImages images(scene, context.scene_folder(), kConsistencySidePx, 0);
+  ConsistencySource source;
+  source.views = static_cast<int>(scene.views.size());
+  source.render = [&](int view) {
+    const Pose& pose = scene.views[view].cam_from_world;
+    const Camera camera = images.WorkingCamera(view);
+    RenderedView rendered = RenderView(model, camera, pose, context.pool());
+    return ConsistencySource::Rendered{{camera, pose, std::move(rendered.depth)},
+                                       std::move(rendered.lab)};
+  };
+  source.colored_lab = [&](int view) {
+    const auto luminance = images.Luminance(view);
+    return JoinLab(*luminance,
+                   ReadViewAb(context, scene.views[view], luminance->width, luminance->height));
+  };
+  source.has_truth = [&](int view) { return truth.contains(view); };
+  source.true_srgb = [&](int view) { return images.Undistort(view, ReadImage(truth.at(view))); };
+  return MeasureConsistency(source, context.pool(), context.cancel());
 }
 
 // Scores of all held-out views that have a truth, as they come.
@@ -49,9 +110,8 @@ class HeldOutScores {
   HeldOutScores(const Scene& scene,
                 const GaussianModel& model,
                 const std::optional<GaussianModel>& bound,
-                ThreadPool& pool,
                 StageContext& context)
-      : scene_(scene), model_(model), bound_(bound), pool_(pool), context_(context) {}
+      : scene_(scene), model_(model), bound_(bound), context_(context) {}
 
   void Add(int index, const std::filesystem::path& truth) {
     const View& view = scene_.views[index];
@@ -59,13 +119,13 @@ class HeldOutScores {
     const Image ab = DecodeAbPng(context_.ReadInput(ab_name), ab_name).ab;
     const ViewImages images(scene_, context_.scene_folder(), std::max(ab.width, ab.height), 0);
     const Image captured = ReadImage(truth);
-    if (captured.channels != 3) throw InvalidArgument("the truth of " + view.name + " is grey");
+    if (captured.channels != 3) throw InvalidArgument("the truth of {} is grey", view.name);
     const Image true_srgb = images.Undistort(index, captured);
     const Camera camera = images.WorkingCamera(index);
-    Scores scores =
-        ScoreView(true_srgb, RenderView(model_, camera, view.cam_from_world, pool_).lab, ab);
+    Scores scores = ScoreView(
+        true_srgb, RenderView(model_, camera, view.cam_from_world, context_.pool()).lab, ab);
     if (bound_) {
-      const Image lab = RenderView(*bound_, camera, view.cam_from_world, pool_).lab;
+      const Image lab = RenderView(*bound_, camera, view.cam_from_world, context_.pool()).lab;
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab);
       scores["colorfulness_bound"] = Colorfulness(SrgbFromLab(lab));
     }
@@ -104,7 +164,6 @@ class HeldOutScores {
   const Scene& scene_;
   const GaussianModel& model_;
   const std::optional<GaussianModel>& bound_;
-  ThreadPool& pool_;
   StageContext& context_;
   ordered_json views_ = ordered_json::array();
   Scores sum_;
@@ -121,7 +180,7 @@ ordered_json JsonOf(const Consistency& c) {
           {"tc", c.tc}};
 }
 
-ordered_json JsonOf(const ConsistencyScores& scores) {
+ordered_json JsonOf(const SceneConsistency& scores) {
   ordered_json json = ordered_json::object();
   if (scores.rendered.pairs > 0) {
     json["rendered"] = JsonOf(scores.rendered);
@@ -148,13 +207,9 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const TruthFiles held_out = FilesByView(options.truth, true, scene);
   const TruthFiles training = FilesByView(options.training_truth, false, scene);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
-  ThreadPool pool(context.threads());
   std::optional<GaussianModel> bound;
-  if (options.bound) {
-    const int side = ColoredSide(context, scene.views[scene.TrainingViews().at(0)]);
-    bound = FitTrueChroma(model, scene, training, side, options.chroma, pool, context);
-  }
-  HeldOutScores scores(scene, model, bound, pool, context);
+  if (options.bound) bound = FitTrueChroma(model, scene, training, options.chroma, context);
+  HeldOutScores scores(scene, model, bound, context);
   int64_t done = 0;
   for (const auto& [view, file] : held_out) {
     context.cancel().ThrowIfCancelled();
@@ -164,7 +219,7 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   }
   TruthFiles all = held_out;
   all.insert(training.begin(), training.end());
-  const ConsistencyScores consistency = ScoreConsistency(scene, model, all, pool, context);
+  const SceneConsistency consistency = CompareViews(scene, model, all, context);
   const Scores mean = scores.Mean();
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
   ordered_json json{{"mean", mean}, {"views", scores.views()}};

@@ -6,19 +6,19 @@
 #include <nlohmann/json.hpp>
 
 #include "core/splat/export/rgb_refine.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kSidePx = 500;       // of the pictures that colours are refined on
-constexpr size_t kMostViews = 32;  // of them, spread evenly
+constexpr int kSidePx = 500;      // of the pictures that colours are refined on
+constexpr size_t kMaxViews = 32;  // of them, spread evenly
 
 std::vector<RgbView> ViewsToCompare(const Scene& scene, std::vector<std::string>* names) {
   std::vector<RgbView> views;
   const size_t count = scene.views.size();
-  const size_t wanted = std::min(count, kMostViews);
+  const size_t wanted = std::min(count, kMaxViews);
   for (size_t i = 0; i < wanted; ++i) {
     const View& view = scene.views[i * count / wanted];
     views.push_back({view.camera.FitWithin(kSidePx), view.cam_from_world, !view.held_out});
@@ -51,7 +51,6 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
-  ThreadPool pool(context.threads());
   const bool with_confidence = options.confidence && !model.confidence.empty();
   if (options.confidence && !with_confidence) {
     context.progress().OnWarning(
@@ -70,18 +69,18 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   RgbRefineOptions refine;
   refine.seed = context.seed();
   const auto refined = [&](RgbHarmonics start) {
-    return RefineRgbHarmonics(
-        model, std::move(start), views, refine, pool, context.progress(), context.cancel());
+    return RefineRgbHarmonics(model, std::move(start), views, refine, context.control());
   };
-  const RgbHarmonics fitted = FitRgbHarmonics(model, pool);
+  const RgbHarmonics fitted = FitRgbHarmonics(model, context.pool());
   nlohmann::ordered_json scores;
   if (options.ply) {
     const RgbRefinement rgb = refined(fitted);
     context.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
     context.progress().OnError(refine.epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
     scores["ply"] = ScoresOf(rgb, names);
-    context.WriteOutput(artifact::kPly,
-                        EncodeGaussianPly(model, rgb.harmonics, frame, pool, with_confidence));
+    context.WriteOutput(
+        artifact::kPly,
+        EncodeGaussianPly(model, rgb.harmonics, frame, context.pool(), with_confidence));
   }
   if (options.splat) {
     const RgbRefinement rgb = refined(DegreeZero(fitted));

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -9,9 +11,10 @@
 #include "core/image/codec.h"
 #include "core/report/contact_sheet.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
-#include "core/stage/augmentation_sources.h"
-#include "core/stage/carry_facts.h"
+#include "core/splat/raster/render.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/carry_facts.h"
+#include "core/stage/sources/augmentation_sources.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -56,33 +59,32 @@ std::map<Kind, int> Deal(const AugmentationOptions& options) {
   return counts;
 }
 
+// The coloured key view at a working size.
+Image KeyLab(const Scene& scene, int key, int max_side_px, const StageContext& context) {
+  const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+  const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
+  const auto l = images.Luminance(key);
+  return JoinLab(*l, Resize(color.ab, l->width, l->height));
+}
+
 KeyPicture ReadKeyPicture(const Scene& scene,
                           int key,
-                          const AugmentationOptions& options,
-                          StageContext& context) {
-  const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
-  const auto lab_at = [&](int side) {
-    const ViewImages images(scene, context.scene_folder(), side, 0);
-    const auto l = images.Luminance(key);
-    return JoinLab(*l, Resize(color.ab, l->width, l->height));
-  };
+                          int max_side_px,
+                          const StageContext& context) {
+  const View& view = scene.views[static_cast<size_t>(key)];
   KeyPicture picture;
-  picture.lab = lab_at(options.max_side_px);
-  if (!options.backend.empty()) {
-    picture.srgb = SrgbFromLab(lab_at(std::max(options.max_side_px, kRemoteSidePx)));
-  }
-  picture.camera =
-      scene.views[static_cast<size_t>(key)].camera.Scaled(picture.lab.width, picture.lab.height);
-  picture.cam_from_world = scene.views[static_cast<size_t>(key)].cam_from_world;
+  picture.lab = KeyLab(scene, key, max_side_px, context);
+  picture.camera = view.camera.Scaled(picture.lab.width, picture.lab.height);
+  picture.cam_from_world = view.cam_from_world;
   return picture;
 }
 
-// Asks the backend for the kinds that it claims; what it does not is left in `counts`.
-void AskBackend(const AugmentationOptions& options,
-                const KeyPicture& key,
-                StageContext& context,
-                std::map<Kind, int>* counts,
-                Outcome* outcome) {
+// Pictures of the kinds that the backend claims; those of the others stay in `counts`.
+void TakeFromBackend(const AugmentationOptions& options,
+                     const Image& key_srgb,
+                     StageContext& context,
+                     std::map<Kind, int>* counts,
+                     Outcome* outcome) {
   const auto remote = context.Remote(options.backend);
   const RemoteInfo info = remote->GetInfo(context.progress(), context.cancel());
   bool asked = false;
@@ -92,38 +94,59 @@ void AskBackend(const AugmentationOptions& options,
       continue;
     }
     asked = true;
-    std::vector<Augmentation> made = AugmentationsFromBackend(
-        options.backend, *remote, info, it->first, it->second, key, options.max_side_px, context);
+    std::vector<Augmentation> made = AugmentationsFromBackend(options.backend,
+                                                              *remote,
+                                                              info,
+                                                              it->first,
+                                                              it->second,
+                                                              key_srgb,
+                                                              options.max_side_px,
+                                                              context);
     std::move(made.begin(), made.end(), std::back_inserter(outcome->made));
     it = counts->erase(it);
   }
   if (asked || counts->empty()) return;
   throw Error(ErrorCode::kFailedPrecondition,
-              "the backend '" + options.backend +
-                  "' generates none of the pictures that are asked for (outpaint, animate, "
-                  "novel_view); leave it out to use the embedded ones");
+              "the backend '{}' generates none of the pictures that are asked for (outpaint, "
+              "animate, novel_view); leave it out to use the embedded ones",
+              options.backend);
 }
 
-void MakeEmbedded(const std::map<Kind, int>& counts,
-                  const EmbeddedAugmentations& embedded,
-                  StageContext& context,
-                  Outcome* outcome) {
+// Pictures of the luminance geometry, when it is among the inputs.
+GeometryRenderer RendererFrom(StageContext& context) {
+  if (!context.HasInput(artifact::kGeometry)) return {};
+  const auto model =
+      std::make_shared<const GaussianModel>(ParseGaussians(context.ReadInput(artifact::kGeometry)));
+  return [model, &context](const Camera& camera, const Pose& cam_from_world) {
+    RenderedView seen = RenderView(*model, camera, cam_from_world, context.pool());
+    return RenderedGeometry{std::move(seen.lab), std::move(seen.depth), std::move(seen.opacity)};
+  };
+}
+
+void MakeSurrogates(const std::map<Kind, int>& counts,
+                    const Surrogates& surrogates,
+                    StageContext& context,
+                    Outcome* outcome) {
   int64_t total = 0, done = 0;
   for (const auto& [kind, count] : counts) total += count;
   for (const auto& [kind, count] : counts) {
-    const std::string obstacle = embedded.Obstacle(kind);
+    const std::string name = AugmentationKindName(kind);
+    const std::string obstacle = surrogates.Obstacle(kind);
     int poor = 0;
     for (int i = 0; obstacle.empty() && i < count; ++i) {
       context.cancel().ThrowIfCancelled();
-      std::optional<Augmentation> made = embedded.Make(kind, i);
-      if (made) outcome->made.push_back(std::move(*made));
-      if (!made) ++poor;
+      std::optional<GeneratedPicture> made = surrogates.Make(kind, i);
+      if (made) {
+        outcome->made.push_back(
+            {AugmentationName(name, static_cast<size_t>(i)), name, "embedded", std::move(*made)});
+      } else {
+        ++poor;
+      }
       context.progress().OnProgress(++done, total, "generating augmentations");
     }
-    if (!obstacle.empty()) outcome->LeaveOut(AugmentationKindName(kind), obstacle);
+    if (!obstacle.empty()) outcome->LeaveOut(name, obstacle);
     if (poor > 0) {
-      outcome->LeaveOut(AugmentationKindName(kind),
-                        std::to_string(poor) + " would show hardly anything of the key view");
+      outcome->LeaveOut(name, fmt::format("{} would show hardly anything of the key view", poor));
     }
   }
 }
@@ -142,17 +165,20 @@ void LeaveOutNeedless(const AugmentationOptions& options,
   }
   const std::optional<double> coverage = ReadCarryFacts(context).coverage;
   if (coverage && *coverage >= kCovered && counts->erase(Kind::kOutpaint) > 0) {
-    outcome->LeaveOut(AugmentationKindName(Kind::kOutpaint),
-                      "the key view covers " + std::to_string(static_cast<int>(100.0 * *coverage)) +
-                          " % of the scene: there is nothing to invent around it");
+    outcome->LeaveOut(
+        AugmentationKindName(Kind::kOutpaint),
+        fmt::format("the key view covers {} % of the scene: there is nothing to invent "
+                    "around it",
+                    static_cast<int>(100.0 * *coverage)));
   }
 }
 
 void WriteSheet(const KeyPicture& key, const Outcome& outcome, StageContext& context) {
   ContactSheet sheet;
   sheet.title = "Training pictures of the colorizer";
-  sheet.subtitle = "The key view and " + std::to_string(outcome.made.size()) +
-                   " pictures made from it or given; what carries no weight is dimmed.";
+  sheet.subtitle = fmt::format(
+      "The key view and {} pictures made from it or given; what carries no weight is dimmed.",
+      outcome.made.size());
   sheet.ranked.push_back(
       {FitWithin(SrgbFromLab(key.lab), kThumbnailPx), "key view", "as coloured", true});
   for (const Augmentation& a : outcome.made) {
@@ -203,19 +229,18 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
   const int key_index = ReadKeyView(context, scene);
   Outcome outcome;
   outcome.made = AugmentationsFromFiles(options.max_side_px, context);
-  const KeyPicture key = ReadKeyPicture(scene, key_index, options, context);
+  const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);
   std::map<Kind, int> counts = Deal(options);
   LeaveOutNeedless(options, context, &counts, &outcome);
   if (!options.backend.empty() && !counts.empty()) {
-    AskBackend(options, key, context, &counts, &outcome);
+    const int side = std::max(options.max_side_px, kRemoteSidePx);
+    const Image key_srgb = SrgbFromLab(KeyLab(scene, key_index, side, context));
+    TakeFromBackend(options, key_srgb, context, &counts, &outcome);
   }
   if (!counts.empty()) {
-    std::optional<GaussianModel> model;
-    if (context.HasInput(artifact::kGeometry)) {
-      model = ParseGaussians(context.ReadInput(artifact::kGeometry));
-    }
-    const EmbeddedAugmentations embedded(key, scene, key_index, std::move(model), context);
-    MakeEmbedded(counts, embedded, context, &outcome);
+    const Surrogates surrogates(
+        key, scene, key_index, RendererFrom(context), context.seed(), context.cancel());
+    MakeSurrogates(counts, surrogates, context, &outcome);
   }
   WriteResults(key, outcome, context);
 }

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -6,9 +8,9 @@
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/training_pictures.h"
 #include "core/stage/stages.h"
-#include "core/stage/training_pictures.h"
 
 namespace color3d {
 namespace {
@@ -28,18 +30,18 @@ Image KeyAb(const Image& luminance, StageContext& context) {
   Image ab = Resize(color.ab, luminance.width, luminance.height);
   const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, ab));
   if (chroma.IsGray()) {
-    context.progress().OnWarning("the coloured key view has hardly any colour (mean chroma " +
-                                 std::to_string(chroma.mean) +
-                                 " Lab units), so the scene will stay grey; colour it by another "
-                                 "means, e.g. hints or a picture");
+    context.progress().OnWarning(fmt::format(
+        "the coloured key view has hardly any colour (mean chroma {:.2f} Lab units), so "
+        "the scene will stay grey; colour it by another means, e.g. hints or a picture",
+        chroma.mean));
   }
   return ab;
 }
 
 // Views that carried colours are learnt from: the best covered ones that are not the key view.
-constexpr int kMostCarriedViews = 12;
-constexpr double kLeastCoverage = 0.05;
-constexpr float kLeastConfidence = 0.3f;
+constexpr int kMaxCarriedViews = 12;
+constexpr double kMinCoverage = 0.05;
+constexpr float kMinConfidence = 0.3f;
 constexpr double kCarriedShare = 0.5;  // of the samples
 
 std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
@@ -53,10 +55,10 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
     const auto luminance = images.Luminance(view);
     CarriedColor carried =
         ReadCarried(context, scene.views[view], luminance->width, luminance->height);
-    const double coverage = Coverage(carried, kLeastConfidence);
-    if (coverage < kLeastCoverage) continue;
+    const double coverage = Coverage(carried, kMinConfidence);
+    if (coverage < kMinCoverage) continue;
     for (float& value : carried.confidence.data) {
-      if (value < kLeastConfidence) value = 0.0f;
+      if (value < kMinConfidence) value = 0.0f;
     }
     found.push_back({-coverage,
                      {scene.views[view].name,
@@ -66,7 +68,7 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
   }
   std::stable_sort(
       found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
-  if (found.size() > kMostCarriedViews) found.resize(kMostCarriedViews);
+  if (found.size() > kMaxCarriedViews) found.resize(kMaxCarriedViews);
   std::vector<TrainingPicture> pictures;
   for (auto& [coverage, picture] : found) {
     picture.share = kCarriedShare / (1.0 - kCarriedShare) / static_cast<double>(found.size());
@@ -98,17 +100,14 @@ void RunPersonalize(const ColorizerOptions& options,
   for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
     pictures.push_back(std::move(picture));
   }
-  SceneBatch alone(options.threads);
+  SceneBatch alone(context.pool().thread_count());
   SceneBatch& batch = context.batch() != nullptr ? *context.batch() : alone;
   const auto colorizer =
       TrainColorizer(batch.SharedEncoder(encoder, [&] { return context.LoadEncoder(encoder); }),
                      std::move(pictures),
                      options,
-                     context.checkpoints(),
-                     context.progress(),
-                     context.cancel(),
-                     batch,
-                     context.project());
+                     context.control(),
+                     BatchPlace{batch, context.project()});
   context.WriteOutput(artifact::kColorizer, colorizer->Serialize());
 }
 

@@ -1,27 +1,19 @@
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/scene/view_images.h"
+#include "core/splat/geometry/geometry_trainer.h"
+#include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/memory_plan.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
 namespace {
 
-// More Gaussians than this share of the training pixels cost time and fit noise: small scenes get a
-// smaller cap than asked for.
-constexpr double kMaxGaussiansPerPixel = 0.02;
-constexpr int kFewestGaussians = 5000;
-
-int GaussianCap(int wanted, int max_side_px, const Scene& scene) {
-  double pixels = 0.0;
-  for (int view : scene.TrainingViews()) {
-    const Camera camera = scene.views[view].camera.FitWithin(max_side_px);
-    pixels += static_cast<double>(camera.width) * camera.height;
-  }
-  const double cap = std::max<double>(kFewestGaussians, kMaxGaussiansPerPixel * pixels);
-  return static_cast<int>(std::min<double>(wanted, cap));
+std::vector<Camera> TrainingCameras(const Scene& scene) {
+  std::vector<Camera> cameras;
+  for (int view : scene.TrainingViews()) cameras.push_back(scene.views[view].camera);
+  return cameras;
 }
 
 MemoryPlan PlanMemory(const GeometryOptions& options,
@@ -55,15 +47,14 @@ void RunReconstructGeometry(const GeometryOptions& options,
   CheckMaxSide(max_side_px);
   const Scene scene = ReadScene(context);
   GeometryOptions planned = options;
-  planned.max_gaussians = GaussianCap(options.max_gaussians, max_side_px, scene);
+  planned.max_gaussians = GaussianCap(options.max_gaussians, TrainingCameras(scene), max_side_px);
   const MemoryPlan memory = PlanMemory(planned, max_side_px, scene, context.MemoryBytes());
   planned.max_gaussians = memory.max_gaussians;
   if (!memory.note.empty()) context.progress().OnWarning(memory.note);
   const ViewImages images(
       scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
-  ThreadPool pool(context.threads());
-  const GaussianModel model = TrainGeometry(
-      scene, images, planned, pool, context.checkpoints(), context.progress(), context.cancel());
+  const GaussianModel model =
+      TrainGeometry(GeometryProblemOf(scene, images), planned, context.control());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));
   context.WriteOutput(artifact::kMemoryPlan, MemoryPlanToJson(memory));
 }

@@ -5,7 +5,7 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -37,13 +37,12 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
-  ThreadPool pool(context.threads());
   const std::vector<int> views = ViewsToRender(options, scene);
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[views[i]];
-    const RenderedView rendered =
-        RenderView(model, view.camera.FitWithin(options.max_side_px), view.cam_from_world, pool);
+    const RenderedView rendered = RenderView(
+        model, view.camera.FitWithin(options.max_side_px), view.cam_from_world, context.pool());
     context.WriteOutput(ViewArtifact(artifact::kRenders, view, ".png"),
                         EncodePng8(SrgbFromLab(rendered.lab)));
     context.progress().OnProgress(

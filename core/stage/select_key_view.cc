@@ -1,19 +1,19 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "core/color/lab.h"
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
+#include "core/keyview/collect_features.h"
 #include "core/keyview/coverage.h"
 #include "core/keyview/tracks.h"
-#include "core/stage/artifacts.h"
-#include "core/stage/key_view_ranking.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/key_view_ranking.h"
 #include "core/stage/stages.h"
-#include "core/stage/view_features.h"
 
 namespace color3d {
 namespace {
-
-constexpr int kThumbnailSidePx = 260;
 
 const char* StrategyName(KeyViewStrategy strategy) {
   switch (strategy) {
@@ -49,11 +49,15 @@ std::vector<std::vector<int>> TracksOf(const Scene& scene,
   return tracks;
 }
 
+std::filesystem::path FeatureCache(const StageContext& context) {
+  const std::filesystem::path& folder = context.cache_folder();
+  return folder.empty() ? folder : folder / "view_features";
+}
+
 std::vector<double> CoverageScores(const std::vector<ViewFeatures>& features,
                                    const std::vector<bool>& kept,
                                    StageContext& context) {
-  std::vector<double> scores =
-      MeanFeatureDistances(features, kept, context.progress(), context.cancel());
+  std::vector<double> scores = MeanFeatureDistances(features, kept, context.control());
   for (double& score : scores) score = -score;
   return scores;
 }
@@ -65,8 +69,8 @@ void ChooseManually(const std::string& name,
   const int view = scene.FindView(name);
   const auto found = std::find(candidates.begin(), candidates.end(), view);
   if (found == candidates.end()) {
-    throw InvalidArgument("the view " + scene.views[view].name +
-                          " is held out for evaluation and cannot be the key view");
+    throw InvalidArgument("the view {} is held out for evaluation and cannot be the key view",
+                          scene.views[view].name);
   }
   ranking->selection.index = static_cast<int>(found - candidates.begin());
   ranking->selection.ranking = {{ranking->selection.index, 0.0, 0.0, ""}};
@@ -87,7 +91,8 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
       stage_options.features.empty() ? encoder : context.LoadEncoder(stage_options.features);
   ranking->encoder = encoder->description();
   if (describer != encoder) ranking->encoder += "; " + describer->description();
-  ranking->features = CollectViewFeatures(*describer, *encoder, photos, context);
+  ranking->features =
+      CollectViewFeatures(*describer, *encoder, photos, FeatureCache(context), context.control());
   std::vector<std::vector<double>> descriptors;
   std::vector<FrameContent> contents;
   for (const ViewFeatures& view : ranking->features) {
@@ -107,11 +112,11 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
     } else {
       strategy = KeyViewStrategy::kCoverage;
       ranking->fallback = "Coverage in place of tracks: " + reason + ".";
-      context.progress().OnWarning("key view: " + ranking->fallback);
+      context.progress().OnWarning(fmt::format("key view: {}", ranking->fallback));
     }
   }
   if (strategy == KeyViewStrategy::kEntropy) {
-    scores = SoftmaxEntropies(descriptors, kept, options);
+    scores = SoftmaxEntropies(descriptors, kept, options, context.pool());
   } else if (strategy == KeyViewStrategy::kCoverage) {
     scores = CoverageScores(ranking->features, kept, context);
   }
@@ -121,16 +126,16 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
 
 // The views that the guard set aside, by the names that the user knows.
 void WarnOfViewsSetAside(const KeyViewRanking& ranking, ProgressObserver& progress) {
-  constexpr int kMostNamed = 8;
+  constexpr int kMaxNamed = 8;
   std::string names;
   int count = 0;
   for (const RankedView& ranked : ranking.selection.ranking) {
-    if (ranked.set_aside.empty() || ++count > kMostNamed) continue;
-    names +=
-        (names.empty() ? " " : ", ") + ranking.names[ranked.index] + " (" + ranked.set_aside + ")";
+    if (ranked.set_aside.empty() || ++count > kMaxNamed) continue;
+    names += fmt::format(
+        "{}{} ({})", names.empty() ? " " : ", ", ranking.names[ranked.index], ranked.set_aside);
   }
-  if (count > kMostNamed) names += " and " + std::to_string(count - kMostNamed) + " more";
-  if (count > 0) progress.OnWarning("key view: set aside:" + names);
+  if (count > kMaxNamed) names += fmt::format(" and {} more", count - kMaxNamed);
+  if (count > 0) progress.OnWarning(fmt::format("key view: set aside:{}", names));
 }
 
 }  // namespace

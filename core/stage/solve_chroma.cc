@@ -1,24 +1,13 @@
-#include <algorithm>
 #include <map>
 #include <mutex>
 
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
+#include "core/splat/chroma/chroma_fit.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
-namespace {
-
-// Longer side at which the views were coloured: chroma is fitted at that size.
-int ColoredSide(const StageContext& context, const View& view) {
-  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
-  const ImageInfo info = ProbeImage(context.ReadInput(name), name);
-  return std::max(info.width, info.height);
-}
-
-}  // namespace
-
 void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
@@ -47,16 +36,8 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     }
     return target;
   };
-  ThreadPool pool(context.threads());
-  const GaussianModel model = FitChroma(geometry,
-                                        scene,
-                                        images,
-                                        targets,
-                                        options,
-                                        pool,
-                                        context.checkpoints(),
-                                        context.progress(),
-                                        context.cancel());
+  const GaussianModel model =
+      FitChroma(geometry, ChromaProblemOf(scene, images, targets), options, context.control());
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }
 

@@ -19,6 +19,11 @@ StageContext::StageContext(Setup setup,
                            const CancellationToken& cancel)
     : setup_(std::move(setup)), checkpoints_(checkpoints), progress_(progress), cancel_(cancel) {}
 
+ThreadPool& StageContext::pool() {
+  if (!pool_) pool_ = std::make_unique<ThreadPool>(setup_.threads);
+  return *pool_;
+}
+
 int64_t StageContext::MemoryBytes() const {
   // Other processes of this machine must be able to grow, too.
   constexpr double kShare = 0.6;

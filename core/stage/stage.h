@@ -1,5 +1,6 @@
-// What every stage gets and gives: files in, named files out. One file per job kind beside this
-// one: typed options in, artifacts out, checkpoints, progress and cancellation through the context.
+// What every stage is given and leaves: files in, named files out. One source per stage beside this
+// one, named as its kind: typed options in, artifacts out; threads, checkpoints, progress and
+// cancellation come from the context.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/base/cancellation.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/encoder/encoder.h"
 #include "core/keycolor/external/remote.h"
 
@@ -47,7 +47,10 @@ class StageContext {
 
   const std::filesystem::path& scene_folder() const { return setup_.scene_folder; }
   const std::filesystem::path& scratch_folder() const { return setup_.scratch_folder; }
-  int threads() const { return setup_.threads; }
+  // The threads of this run, started when they are first asked for. For the calling thread.
+  ThreadPool& pool();
+  // What long computations are given.
+  RunControl control() { return {pool(), checkpoints_, progress_, cancel_}; }
   uint64_t seed() const { return setup_.seed; }
   int64_t MemoryBytes() const;
   const std::string& attempt() const { return setup_.attempt; }
@@ -85,6 +88,7 @@ class StageContext {
   CheckpointStore& checkpoints_;
   ProgressObserver& progress_;
   const CancellationToken& cancel_;
+  std::unique_ptr<ThreadPool> pool_;
   std::vector<std::string> outputs_;
   std::vector<std::string> passed_on_;
 };

@@ -1,6 +1,5 @@
-// Every stage of the method: options, and the function that runs it. What each reads and leaves is
-// said beside it; names are in core/catalogue/artifacts.h. All throw Error and leave nothing
-// half-written.
+// Every stage of the method: its options, and the function that runs it. What each reads and leaves
+// is in core/catalogue/stages.cc. All throw Error and leave nothing half-written.
 #pragma once
 
 #include <filesystem>
@@ -9,12 +8,14 @@
 
 #include "core/carry/carry.h"
 #include "core/carry/plane_sweep.h"
+#include "core/carry/view_color.h"
 #include "core/catalogue/stage_summary.h"
 #include "core/colorizer/colorizer.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 #include "core/keyview/select.h"
 #include "core/scene/import.h"
-#include "core/splat/training/trainer.h"
+#include "core/splat/chroma/chroma_options.h"
+#include "core/splat/geometry/geometry_options.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -22,7 +23,7 @@ namespace color3d {
 // Throws Error{kInvalidArgument} unless a working size is 64..4096 px.
 void CheckMaxSide(int max_side_px);
 
-// The scene's files -> scene.json, import.json (and sfm.log).
+// The scene's files as views with poses; structure-from-motion where they have none.
 void RunImportScene(const ImportOptions& options, StageContext& context);
 
 struct SelectKeyViewOptions {
@@ -31,8 +32,8 @@ struct SelectKeyViewOptions {
   std::string encoder;   // weights by name in StageContext::Model; empty: the embedded encoder
   std::string features;  // CLIP weights by name; empty: the encoder's features
 };
-// scene.json (import.json) -> key_view.json, key_view.png, key_view_ranking.jpg. Only training
-// views can win. Features of photos that were seen before come from the context's cache folder.
+// The photo that the user should colour. Only training views can win. Features of photos that were
+// seen before come from the context's cache folder.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
 struct ColorizeKeyViewOptions {
@@ -55,8 +56,9 @@ struct ColorizeKeyViewOptions {
   std::string prompt;                             // prompt; backend, may be empty
   std::string name;  // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
+  bool operator==(const ColorizeKeyViewOptions&) const = default;
 };
-// scene.json, key_view.json -> key_color.png, key_view_colored.png, key_color.json.
+// The key view in colour, and what its source tells of that.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
 // A key view beside the first one. Of its colours only those are taken that the key views before it
@@ -64,19 +66,21 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
 struct FurtherKeyView {
   std::string view;  // name or unique file stem
   ColorizeKeyViewOptions color;
+  bool operator==(const FurtherKeyView&) const = default;
 };
 
 struct CarryColorOptions {
   int max_side_px = 500;    // of the carried maps, 64..4096
-  int sweep_side_px = 300;  // at which depth is measured, 64..2048
-  int sweep_sources = 4;    // views that each view is compared with, 1..16
+  int depth_side_px = 300;  // at which depth is measured, 64..2048
+  int depth_sources = 4;    // views that each view is compared with, 1..16
   PlaneSweepOptions sweep;
   CarryOptions carry;
   std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
   void Validate() const;
+  bool operator==(const CarryColorOptions&) const = default;
 };
-// scene.json, key_view.json, key_color.png, geometry.c3g -> carried/*.png for every view,
-// carry.json (coverage of each, and the view that would add most).
+// The key views' own colours in every view, as far as it shows the same; how much that is, and the
+// view to colour next.
 void RunCarryColor(const CarryColorOptions& options, StageContext& context);
 
 struct AugmentationOptions {
@@ -87,28 +91,30 @@ struct AugmentationOptions {
   std::string backend;    // a generator by name; empty: the embedded surrogates
   int max_side_px = 400;  // of the pictures, 64..4096
   void Validate() const;
+  bool operator==(const AugmentationOptions&) const = default;
 };
-// scene.json, key_view.json, key_color.png (geometry.c3g for novel views, carry.json) and the
-// files below augment/ of the scene's folder -> augmentations.json, augmentations/*,
-// augmentations.jpg.
+// Training pictures beside the key view: the files below augment/ of the scene's folder, a
+// generator's, and ours. Novel views need the geometry among the inputs.
 void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context);
 
-// scene.json, key_view.json, key_color.png (carried/*, and what generate_augmentations made) ->
-// colorizer.c3c. Warns when the key view has no colour. `encoder`: as SelectKeyViewOptions.
+// The scene's colorizer, trained on the key view, what was carried and what was generated. Warns
+// when the key view has no colour. `encoder`: as SelectKeyViewOptions.
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
                     const std::string& encoder = "");
 
-// scene.json, colorizer.c3c (carried/*) -> views_ab/*.png and provenance/*.png for every view at
-// max_side_px (64..4096). `encoder`: the one that the colorizer was trained with.
+// The colour of every view and where it comes from, at max_side_px (64..4096). `encoder`: the one
+// that the colorizer was trained with.
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
+// Whom it asks for colours: the scene's colorizer, which must outlive the answer, and the embedded
+// automatic one.
+ColorSources SourcesOf(const Colorizer& colorizer);
 
-// scene.json -> geometry.c3g, trained at max_side_px (64..4096), and memory_plan.json: with little
-// memory the size and the number of Gaussians are smaller, and a warning says so.
+// Gaussians of luminance, trained at max_side_px (64..4096). With little memory the size and the
+// number of Gaussians are smaller, and a warning says so.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
 
-// scene.json, key_view.json, key_color.png, views_ab/* (provenance/*), geometry.c3g -> model.c3g,
-// with confidence when every training view has its provenance.
+// The views' chroma on the geometry, with confidence when every training view has its provenance.
 void RunSolveChroma(const ChromaOptions& options, StageContext& context);
 
 struct ExportOptions {
@@ -117,9 +123,9 @@ struct ExportOptions {
   // PLY with a property "confidence", which strict viewers may refuse; needs a model that has it.
   bool confidence = false;
   void Validate() const;
+  bool operator==(const ExportOptions&) const = default;
 };
-// scene.json, model.c3g -> scene.ply, scene.splat, export.json (what RGB loses against our
-// renders).
+// The model for viewers in RGB, and what that loses against our renders.
 void RunExport(const ExportOptions& options, StageContext& context);
 
 struct RenderOptions {
@@ -127,8 +133,9 @@ struct RenderOptions {
   int max_views = 12;              // 1..1000, for the empty list
   int max_side_px = 500;           // 64..4096
   void Validate() const;
+  bool operator==(const RenderOptions&) const = default;
 };
-// scene.json, model.c3g -> renders/*.png.
+// Pictures of the model.
 void RunRender(const RenderOptions& options, StageContext& context);
 
 struct TruthFile {
@@ -145,12 +152,12 @@ struct EvaluateOptions {
   ChromaOptions chroma;  // of the bound
   void Validate() const;
 };
-// scene.json, model.c3g, views_ab/* (provenance/*) -> scores.json, truths/*.jpg,
-// colored_views/*.jpg. Without any truth only the consistency between views (ME, TC) is scored.
+// Scores, with the pictures that were compared. Without any truth only the consistency between
+// views (ME, TC) is scored.
 void RunEvaluate(const EvaluateOptions& options, StageContext& context);
 
-// All of the above -> metrics.json, curves.csv, plan.json, report.html, and the results of the
-// other stages passed on.
+// The report on a coloured scene, its metrics, curves and plan; results of the other stages are
+// passed on.
 void RunReport(const std::vector<StageSummary>& stages, StageContext& context);
 
 }  // namespace color3d

@@ -189,16 +189,18 @@ void CheckLayout(const ByteSource& source, std::vector<Entry>& entries, uint64_t
 }
 
 void AppendHalf(const std::string& name, const std::vector<float>& values, std::string& bytes) {
-  for (float value : values) {
-    const uint16_t half = HalfFromFloat(value);
+  std::vector<uint16_t> halves(values.size());
+  for (size_t i = 0; i < values.size(); ++i) {
+    const float value = values[i];
+    const uint16_t half = halves[i] = HalfFromFloat(value);
     if (std::isfinite(value) && (half & 0x7c00u) == 0x7c00u) {
       throw InvalidArgument(
           "weight {} holds {}, which half precision cannot hold; write it in single precision",
           QuotedName(name),
           value);
     }
-    bytes.append(reinterpret_cast<const char*>(&half), sizeof(half));
   }
+  bytes.append(reinterpret_cast<const char*>(halves.data()), halves.size() * sizeof(uint16_t));
 }
 
 }  // namespace
@@ -238,9 +240,15 @@ WeightMap ParseSafetensors(std::string_view bytes, WeightMetadata* metadata) {
 std::string SerializeSafetensors(const WeightMap& weights,
                                  bool half,
                                  const WeightMetadata& metadata) {
+  return SerializeSafetensors(
+      weights, [half](const std::string&) { return half; }, metadata);
+}
+
+std::string SerializeSafetensors(const WeightMap& weights,
+                                 const std::function<bool(const std::string& name)>& half,
+                                 const WeightMetadata& metadata) {
   nlohmann::ordered_json header = nlohmann::ordered_json::object();
   if (!metadata.empty()) header["__metadata__"] = metadata;
-  const uint64_t size = half ? sizeof(uint16_t) : sizeof(float);
   uint64_t offset = 0;
   for (const auto& [name, array] : weights) {
     const MemorySource place({}, "weights to write");
@@ -249,7 +257,8 @@ std::string SerializeSafetensors(const WeightMap& weights,
       throw place.Refusal(
           "{} has {} values, its shape says {}", QuotedName(name), array.values.size(), count);
     }
-    header[name] = {{"dtype", half ? "F16" : "F32"},
+    const uint64_t size = half(name) ? sizeof(uint16_t) : sizeof(float);
+    header[name] = {{"dtype", half(name) ? "F16" : "F32"},
                     {"shape", array.shape},
                     {"data_offsets", {offset, offset + count * size}}};
     offset += count * size;
@@ -266,7 +275,7 @@ std::string SerializeSafetensors(const WeightMap& weights,
   bytes.reserve(kLengthBytes + header_bytes + offset);
   bytes += text;
   for (const auto& [name, array] : weights) {
-    if (half) {
+    if (half(name)) {
       AppendHalf(name, array.values, bytes);
     } else {
       bytes.append(reinterpret_cast<const char*>(array.values.data()),

@@ -2,6 +2,7 @@
 // then the data without gaps. https://github.com/huggingface/safetensors#format
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -20,8 +21,13 @@ using WeightMetadata = std::map<std::string, std::string>;
 WeightMap ReadSafetensors(const ByteSource& source, WeightMetadata* metadata = nullptr);
 WeightMap ParseSafetensors(std::string_view bytes, WeightMetadata* metadata = nullptr);
 
-// The bytes of a safetensors file, float32 or (`half`) float16. Throws Error{kInvalidArgument}
-// naming the array whose shape and values disagree, or that does not fit float16.
+// The bytes of a safetensors file, float32 or (`half`, of an array's name) float16. Throws
+// Error{kInvalidArgument} naming the array whose shape and values disagree, or that does not fit
+// float16.
+std::string SerializeSafetensors(const WeightMap& weights,
+                                 const std::function<bool(const std::string& name)>& half,
+                                 const WeightMetadata& metadata = {});
+// All arrays alike.
 std::string SerializeSafetensors(const WeightMap& weights,
                                  bool half,
                                  const WeightMetadata& metadata = {});

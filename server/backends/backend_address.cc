@@ -22,14 +22,14 @@ void RequireHostPort(const std::string& flag, const std::string& target) {
     host = parts.host;
     port = parts.port;
   } catch (const Error& error) {
-    throw InvalidArgument(flag + ": " + error.what());
+    throw InvalidArgument("{}: {}", flag, error.what());
   }
   const bool number = port.size() <= 5 && std::all_of(port.begin(), port.end(), [](char c) {
                         return std::isdigit(static_cast<unsigned char>(c)) != 0;
                       });
   const bool good = !host.empty() && host.find('/') == std::string::npos && number &&
                     std::stoi(port) >= 1 && std::stoi(port) <= 65535;
-  if (!good) throw InvalidArgument(flag + ": '" + target + "' is not HOST:PORT with a port number");
+  if (!good) throw InvalidArgument("{}: '{}' is not HOST:PORT with a port number", flag, target);
 }
 
 }  // namespace
@@ -44,8 +44,13 @@ BackendAddress ParseBackendAddress(const std::string& name, const std::string& a
   RequireHostPort(flag, result.target);
   if (!http && !result.tls && !IsLoopback(result.target)) {
     throw InvalidArgument(
-        flag + " is another machine, and photos would travel in the clear; write " + kHttps +
-        result.target + " (TLS), or " + kHttp + result.target + " in a network you trust");
+        "{} is another machine, and photos would travel in the clear; write {}{} (TLS), or {}{} in "
+        "a network you trust",
+        flag,
+        kHttps,
+        result.target,
+        kHttp,
+        result.target);
   }
   return result;
 }

@@ -1,5 +1,7 @@
 #include "server/backends/backend_call.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 
 namespace color3d {
@@ -47,25 +49,30 @@ void SleepUnlessCancelled(std::chrono::milliseconds time, const CancellationToke
 }
 
 Error BackendError(const std::string& name, const std::string& target, const grpc::Status& status) {
-  const std::string who = "the backend '" + name + "' (" + target + ")";
+  const std::string who = fmt::format("the backend '{}' ({})", name, target);
   const std::string said = Quoted(status.error_message());
   switch (status.error_code()) {
     case grpc::StatusCode::UNAVAILABLE:
       return Error(ErrorCode::kUnavailable,
-                   who + " cannot be reached: " + said + "; start it, then retry the job");
+                   "{} cannot be reached: {}; start it, then retry the job",
+                   who,
+                   said);
     case grpc::StatusCode::DEADLINE_EXCEEDED:
       return Error(ErrorCode::kDeadlineExceeded,
-                   who + " did not answer in time; retry with a smaller photo or a faster backend");
+                   "{} did not answer in time; retry with a smaller photo or a faster backend",
+                   who);
     case grpc::StatusCode::CANCELLED:
-      return Error(ErrorCode::kUnavailable, who + " broke off: " + said + "; retry the job");
+      return Error(ErrorCode::kUnavailable, "{} broke off: {}; retry the job", who, said);
     case grpc::StatusCode::UNIMPLEMENTED:
       return Error(ErrorCode::kFailedPrecondition,
-                   who + " does not speak color3d.backend.v1.ColorBackend: " + said);
+                   "{} does not speak color3d.backend.v1.ColorBackend: {}",
+                   who,
+                   said);
     case grpc::StatusCode::RESOURCE_EXHAUSTED:
-      return Error(ErrorCode::kFailedPrecondition,
-                   who + " sent or was sent too much at once: " + said);
+      return Error(
+          ErrorCode::kFailedPrecondition, "{} sent or was sent too much at once: {}", who, said);
     default:
-      return Error(ErrorCode::kFailedPrecondition, who + " failed: " + said);
+      return Error(ErrorCode::kFailedPrecondition, "{} failed: {}", who, said);
   }
 }
 

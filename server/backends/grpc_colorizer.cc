@@ -1,5 +1,6 @@
 #include "server/backends/grpc_colorizer.h"
 
+#include <fmt/core.h>
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -74,7 +75,7 @@ backend::v1::Capability KindFromName(const std::string& name) {
                                              backend::v1::CAPABILITY_NOVEL_VIEW}) {
     if (name == CapabilityName(kind)) return kind;
   }
-  throw InvalidArgument("no backend generates pictures of kind '" + name + "'");
+  throw InvalidArgument("no backend generates pictures of kind '{}'", name);
 }
 
 class GrpcColorizer : public RemoteColorizer {
@@ -111,7 +112,7 @@ class GrpcColorizer : public RemoteColorizer {
   void ReportShare(double share, int64_t* step, ProgressObserver& progress) const;
   void RequireSendable(const google::protobuf::Message& request) const;
   [[noreturn]] void BadStream(const std::string& why) const {
-    throw Error(ErrorCode::kFailedPrecondition, "the backend '" + name_ + "' " + why);
+    throw Error(ErrorCode::kFailedPrecondition, "the backend '{}' {}", name_, why);
   }
 
   const std::string name_;
@@ -154,9 +155,10 @@ RemoteInfo GrpcColorizer::GetInfo(ProgressObserver& progress, const Cancellation
     if (info.ready()) return InfoFromProto(info);
     if (std::chrono::steady_clock::now() >= end) {
       throw Error(ErrorCode::kUnavailable,
-                  "the backend '" + name_ + "' (" + address_.target +
-                      ") is still loading its model; retry the job when it is ready (`color3d "
-                      "server info` tells)");
+                  "the backend '{}' ({}) is still loading its model; retry the job when it is "
+                  "ready (`color3d server info` tells)",
+                  name_,
+                  address_.target);
     }
     progress.OnProgress(0, 0, "waiting for the backend " + name_ + " to load its model");
     SleepUnlessCancelled(options_.ready_poll, cancel);
@@ -172,10 +174,11 @@ void GrpcColorizer::ReportShare(double share, int64_t* step, ProgressObserver& p
 
 void GrpcColorizer::RequireSendable(const google::protobuf::Message& request) const {
   if (request.ByteSizeLong() <= static_cast<size_t>(options_.max_message_bytes)) return;
-  throw InvalidArgument("the photo and what belongs to it take " +
-                        std::to_string(request.ByteSizeLong()) + " bytes; at most " +
-                        std::to_string(options_.max_message_bytes) +
-                        " are sent to a backend: use smaller photos");
+  throw InvalidArgument(
+      "the photo and what belongs to it take {} bytes; at most {} are sent to a backend: use "
+      "smaller photos",
+      request.ByteSizeLong(),
+      options_.max_message_bytes);
 }
 
 grpc::Status GrpcColorizer::ColorizeOnce(const backend::v1::ColorizeRequest& request,
@@ -235,9 +238,9 @@ grpc::Status GrpcColorizer::GenerateOnce(const backend::v1::GenerateRequest& req
     if (update.image().empty()) {
       fault = "answered with an empty picture";
     } else if (images->size() >= static_cast<size_t>(request.samples())) {
-      fault = "sent more pictures than the " + std::to_string(request.samples()) + " asked for";
+      fault = fmt::format("sent more pictures than the {} asked for", request.samples());
     } else if (bytes > static_cast<size_t>(options_.max_message_bytes)) {
-      fault = "sent more than " + std::to_string(options_.max_message_bytes) + " bytes of pictures";
+      fault = fmt::format("sent more than {} bytes of pictures", options_.max_message_bytes);
     } else {
       images->push_back(std::move(*update.mutable_image()));
     }
@@ -294,9 +297,11 @@ std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(
   std::string known;
   for (const auto& [other, address] : backends) known += (known.empty() ? "" : ", ") + other;
   throw Error(ErrorCode::kFailedPrecondition,
-              "this server has no backend '" + name +
-                  "' (it has: " + (known.empty() ? "none" : known) + "); start it with --backend " +
-                  name + "=ADDRESS and retry the job");
+              "this server has no backend '{}' (it has: {}); start it with --backend {}=ADDRESS "
+              "and retry the job",
+              name,
+              known.empty() ? "none" : known,
+              name);
 }
 
 }  // namespace color3d

@@ -21,8 +21,7 @@ void SetUpLog(const std::string& name,
               const std::filesystem::path& file) {
   const spdlog::level::level_enum parsed = spdlog::level::from_str(level);
   if (parsed == spdlog::level::off && level != "off") {
-    throw InvalidArgument("log level '" + level +
-                          "' is none of trace, debug, info, warn, error, off");
+    throw InvalidArgument("log level '{}' is none of trace, debug, info, warn, error, off", level);
   }
   std::vector<spdlog::sink_ptr> sinks = {std::make_shared<spdlog::sinks::stderr_color_sink_mt>()};
   if (!file.empty()) {
@@ -30,8 +29,8 @@ void SetUpLog(const std::string& name,
       sinks.push_back(std::make_shared<spdlog::sinks::rotating_file_sink_mt>(
           file.string(), size_t{16} << 20, 3));
     } catch (const spdlog::spdlog_ex& e) {
-      throw Error(ErrorCode::kFailedPrecondition,
-                  "cannot write the log " + file.string() + ": " + e.what());
+      throw Error(
+          ErrorCode::kFailedPrecondition, "cannot write the log {}: {}", file.string(), e.what());
     }
   }
   auto logger = std::make_shared<spdlog::logger>(name, sinks.begin(), sinks.end());

@@ -15,8 +15,9 @@ namespace fs = std::filesystem;
 SocketFolder::SocketFolder(const fs::path& folder) : folder_(folder) {
   const auto fail = [&](const std::string& why) {
     return Error(ErrorCode::kFailedPrecondition,
-                 "cannot use the folder of sockets " + folder_.string() + ": " + why +
-                     "; remove it, or choose another --data-dir");
+                 "cannot use the folder of sockets {}: {}; remove it, or choose another --data-dir",
+                 folder_.string(),
+                 why);
   };
   if (::mkdir(folder_.c_str(), 0700) != 0 && errno != EEXIST) throw fail(std::strerror(errno));
   fd_ = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);

@@ -7,6 +7,7 @@
 #include "server/planning/planner.h"
 #include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
+#include "server/planning/stage_key.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -71,13 +72,14 @@ TEST(KeyColorSpec, WhatASourceLacksIsNamedWithTheRemedy) {
   EXPECT_THAT(CheckMessage([](auto* s) { s->set_automatic(false); }), HasSubstr("set it to true"));
   EXPECT_THAT(CheckMessage([](auto* s) { s->set_backend(""); }), HasSubstr("name a backend"));
   EXPECT_THAT(CheckMessage([](auto* s) { s->set_script(""); }), HasSubstr("name a model"));
-  EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_references(); }), HasSubstr("0 pictures"));
+  EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_references(); }),
+              HasSubstr("references.images is empty"));
   EXPECT_THAT(CheckMessage([](auto* s) {
                 for (int i = 0; i < 17; ++i) {
                   *s->mutable_references()->add_images() = SomeDigest(std::to_string(i));
                 }
               }),
-              HasSubstr("17 pictures; 1 to 16"));
+              HasSubstr("references.images has 17 entries; at most 16"));
   EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_edit(); }), HasSubstr("key_color.edit.image"));
 }
 

@@ -70,7 +70,7 @@ TEST(PlanScenes, NoSceneOrOneTwiceIsRefused) {
   EXPECT_THAT(message({"scenes/a", "scenes/a"}), HasSubstr("there already"));
 }
 
-TEST(PlanScenes, AFailedKeyColourIsRefused) {
+TEST(PlanScenes, AFailedKeyColorIsRefused) {
   SceneRouteInputs inputs = RouteInputs("scenes/a");
   inputs.jobs[2].state = JobState::kFailed;
   EXPECT_THROW(PlanPersonalizeScenes(SpecOf({"scenes/a"}), {inputs}), Error);

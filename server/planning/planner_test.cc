@@ -5,8 +5,11 @@
 
 #include <limits>
 
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
+#include "server/planning/time_budget.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -82,6 +85,29 @@ TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
   EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
 }
 
+TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(604'800);
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  for (const char* kind : {"reconstruct_geometry", "personalize", "solve_chroma"}) {
+    EXPECT_NO_THROW(CheckSpec(SpecOf(graph, kind))) << kind;
+  }
+}
+
+TEST(Planner, ExactlyTheStagesThatKeepATimeLimitGetAShareOfTheBudget) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  for (const Stage& stage : StageCatalogue()) {
+    if (std::string_view(stage.kind) == kind::kPersonalizeScenes) continue;
+    v1::JobSpec planned = SpecOf(graph, stage.kind);
+    const google::protobuf::Message* options = MutableStage(&planned, stage.kind);
+    const auto* limit = options->GetDescriptor()->FindFieldByName("time_limit_seconds");
+    const bool limited = limit != nullptr && options->GetReflection()->HasField(*options, limit);
+    EXPECT_EQ(limited, stage.keeps_time_limit) << stage.kind;
+  }
+}
+
 TEST(Planner, AStagesOwnTimeLimitWinsOverTheBudget) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
@@ -139,20 +165,20 @@ TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
   spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
   spec.mutable_colorize_scene()->mutable_personalize()->set_iterations(7);
   NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
-  const PresetValues paper = ValuesOf(v1::PRESET_PAPER);
+  const v1::ColorizeSceneSpec& paper = OptionsOf(v1::PRESET_PAPER);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().iterations(), 7);
   EXPECT_EQ(SpecOf(graph, "personalize").personalize().recipe(), v1::PersonalizeSpec::RECIPE_PAPER);
-  EXPECT_TRUE(SpecOf(graph, "personalize").personalize().has_least_improvement());
-  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.0)
+  EXPECT_TRUE(SpecOf(graph, "personalize").personalize().has_min_improvement());
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().min_improvement(), 0.0)
       << "the paper's schedule runs to its end";
   EXPECT_EQ(SpecOf(graph, "select_key_view").select_key_view().strategy(),
             v1::SelectKeyViewSpec::STRATEGY_ENTROPY);
   EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_gaussians(),
-            paper.max_gaussians);
-  EXPECT_EQ(SpecOf(graph, "render").render().max_side_px(), paper.max_side_px);
-  spec.mutable_colorize_scene()->mutable_personalize()->set_least_improvement(0.25);
+            paper.reconstruct_geometry().max_gaussians());
+  EXPECT_EQ(SpecOf(graph, "render").render().max_side_px(), paper.max_side_px());
+  spec.mutable_colorize_scene()->mutable_personalize()->set_min_improvement(0.25);
   graph = PlanJob(spec, {}, kTwentyPhotos);
-  EXPECT_EQ(SpecOf(graph, "personalize").personalize().least_improvement(), 0.25);
+  EXPECT_EQ(SpecOf(graph, "personalize").personalize().min_improvement(), 0.25);
   spec.mutable_colorize_scene()->set_max_side_px(333);
   graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_EQ(SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().max_side_px(), 333);
@@ -317,8 +343,8 @@ TEST(Planner, BadOptionsNameFieldValueAndRange) {
               HasSubstr("colorize_scene.reconstruct_geometry.ssim_weight is 1.5"));
   EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_average_decay(1.0); }),
             "colorize_scene.personalize.average_decay is 1; the range is 0 to 0.9999");
-  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_least_improvement(0.6); }),
-            "colorize_scene.personalize.least_improvement is 0.6; the range is 0 to 0.5");
+  EXPECT_EQ(message([](auto* s) { s->mutable_personalize()->set_min_improvement(0.6); }),
+            "colorize_scene.personalize.min_improvement is 0.6; the range is 0 to 0.5");
   EXPECT_EQ(
       message([](auto* s) {
         s->mutable_personalize()->set_precision(static_cast<v1::PersonalizeSpec::Precision>(7));
@@ -399,24 +425,6 @@ TEST(PlanColorizeScene, TakesAnAcceptedKeyViewInPlaceOfMakingItsOwn) {
   EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("without the select_key_view"));
   EXPECT_THAT(PlanError(spec, {Done("import_scene")}).message, HasSubstr("key_color is required"));
   EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
-}
-
-TEST(StageKey, DependsOnOptionsAndSeedOnly) {
-  v1::JobSpec spec;
-  spec.set_scene("scenes/a");
-  spec.mutable_reconstruct_geometry()->set_iterations(10);
-  const std::string key = KeyPartOf(spec).bytes;
-  v1::JobSpec other = spec;
-  other.set_scene("scenes/b");
-  other.add_inputs("jobs/x");
-  other.set_skip_cache(true);
-  EXPECT_EQ(KeyPartOf(other).bytes, key);
-  other.mutable_reconstruct_geometry()->set_iterations(11);
-  EXPECT_NE(KeyPartOf(other).bytes, key);
-  other = spec;
-  other.set_seed(2);
-  EXPECT_NE(KeyPartOf(other).bytes, key);
-  EXPECT_EQ(KeyPartOf(SceneSpec()).bytes, "") << "reports are never cached";
 }
 
 }  // namespace

@@ -1,52 +1,109 @@
 #include "server/planning/presets.h"
 
+#include <google/protobuf/text_format.h>
+
+#include <memory>
+#include <utility>
+
+#include "core/base/error.h"
+#include "server/planning/preset_files.h"
+
 namespace color3d {
 namespace {
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
 
-// PersonalizeSpec.least_improvement (tests/bench/colorizer/colorizer_choices.md). Short schedules
-// gain nothing by stopping early; the paper's always runs to its end.
-constexpr double kLeastImprovementFast = 0.0;
-constexpr double kLeastImprovementBest = 0.1;
-constexpr double kLeastImprovementPaper = 0.0;
+std::vector<Preset> ReadPresets() {
+  std::vector<Preset> presets;
+  for (const PresetFile& file : PresetFiles()) {
+    Preset preset{file.name, {}};
+    if (!google::protobuf::TextFormat::ParseFromString(file.text, &preset.options)) {
+      throw Error(ErrorCode::kInternal, "the preset {} cannot be read", file.name);
+    }
+    presets.push_back(std::move(preset));
+  }
+  return presets;
+}
+
+// A choice between sources is one value: parts of two of them would make a third that nobody gave.
+bool IsOneValue(const Message& message) {
+  return message.GetDescriptor()->real_oneof_decl_count() > 0;
+}
+
+// Unlike MergeFrom, lists are replaced, sources are taken whole, and an unspecified enum is no
+// value.
+void MergeOver(const Message& given, Message* base) {
+  const Reflection* reflection = given.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection->ListFields(given, &fields);
+  const std::unique_ptr<Message> rest(given.New());  // what MergeFrom is right for
+  rest->CopyFrom(given);
+  for (const FieldDescriptor* field : fields) {
+    if (field->is_repeated()) {
+      reflection->ClearField(base, field);
+    } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_ENUM &&
+               reflection->GetEnumValue(given, field) == 0) {
+      reflection->ClearField(rest.get(), field);
+    } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
+      const Message& part = reflection->GetMessage(given, field);
+      if (IsOneValue(part)) {
+        reflection->ClearField(base, field);
+      } else {
+        MergeOver(part, reflection->MutableMessage(base, field));
+        reflection->ClearField(rest.get(), field);
+      }
+    }
+  }
+  base->MergeFrom(*rest);
+}
 
 }  // namespace
 
-PresetValues ValuesOf(v1::Preset preset) {
-  PresetValues values;
-  switch (preset) {
-    case v1::PRESET_BEST:
-      values.max_side_px = 800;
-      values.personalize_iterations = 1200;
-      values.least_improvement = kLeastImprovementBest;
-      values.geometry_iterations = 5000;
-      values.max_gaussians = 120'000;
-      values.chroma_iterations = 800;
-      break;
-    case v1::PRESET_PAPER:
-      values.max_side_px = 1600;
-      values.strategy = v1::SelectKeyViewSpec::STRATEGY_ENTROPY;
-      values.recipe = v1::PersonalizeSpec::RECIPE_PAPER;
-      values.personalize_iterations = 4000;
-      values.least_improvement = kLeastImprovementPaper;
-      values.augmentation_samples = 8;
-      values.geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_PAPER;
-      values.geometry_iterations = 15'000;
-      values.max_gaussians = 2'000'000;
-      values.sh_degree = 3;
-      values.densify_gradient = 2e-4;
-      values.chroma_solver = v1::SolveChromaSpec::SOLVER_ADAM;
-      values.chroma_iterations = 15'000;
-      break;
-    default:
-      values.max_side_px = 500;
-      values.personalize_iterations = 300;
-      values.least_improvement = kLeastImprovementFast;
-      values.geometry_iterations = 1500;
-      values.max_gaussians = 40'000;
-      values.chroma_iterations = 300;
-      break;
+const std::vector<Preset>& Presets() {
+  static const std::vector<Preset> presets = ReadPresets();
+  return presets;
+}
+
+const v1::ColorizeSceneSpec& OptionsOf(v1::Preset preset) {
+  const v1::Preset wanted = preset == v1::PRESET_UNSPECIFIED ? v1::PRESET_FAST : preset;
+  for (const Preset& known : Presets()) {
+    if (known.options.preset() == wanted) return known.options;
   }
-  return values;
+  throw InvalidArgument("there is no preset of number {}", static_cast<int>(preset));
+}
+
+v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
+  v1::ColorizeSceneSpec merged = OptionsOf(given.preset());
+  MergeOver(given, &merged);
+  // A preset that carries no colour does so where further key views need it.
+  if (!merged.carry_color().further_key_views().empty()) {
+    merged.mutable_carry_color()->clear_skip();
+  }
+  const auto take_size = [&](auto* stage) {
+    if (!stage->has_max_side_px()) stage->set_max_side_px(merged.max_side_px());
+  };
+  take_size(merged.mutable_carry_color());
+  take_size(merged.mutable_reconstruct_geometry());
+  take_size(merged.mutable_render());
+  return merged;
+}
+
+void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
+  if (spec->has_colorize_views()) {  // has no options of its own in a ColorizeSceneSpec
+    auto* views = spec->mutable_colorize_views();
+    if (!views->has_max_side_px()) views->set_max_side_px(scene.max_side_px());
+    return;
+  }
+  const FieldDescriptor* stage = spec->GetReflection()->GetOneofFieldDescriptor(
+      *spec, spec->GetDescriptor()->FindOneofByName("stage"));
+  const FieldDescriptor* options = scene.GetDescriptor()->FindFieldByName(stage->name());
+  if (options == nullptr) return;
+  Message* given = spec->GetReflection()->MutableMessage(spec, stage);
+  const std::unique_ptr<Message> own(given->New());
+  own->CopyFrom(*given);
+  given->CopyFrom(scene.GetReflection()->GetMessage(scene, options));
+  MergeOver(*own, given);
 }
 
 }  // namespace color3d

@@ -1,27 +1,33 @@
-// The one table of what a preset means for each stage.
+// What a preset means: options in protobuf's text form (proto/color3d/presets, compiled in), which
+// lie under what the user gives.
 #pragma once
 
-#include "color3d/v1/stage.pb.h"
+#include <string>
+#include <vector>
+
+#include "color3d/v1/colorize_scene.pb.h"
+#include "color3d/v1/job.pb.h"
 
 namespace color3d {
 
-struct PresetValues {
-  int max_side_px = 0;  // of all working pictures
-  v1::SelectKeyViewSpec::Strategy strategy = v1::SelectKeyViewSpec::STRATEGY_COVERAGE;
-  v1::PersonalizeSpec::Recipe recipe = v1::PersonalizeSpec::RECIPE_COLOR3D;
-  int personalize_iterations = 0;
-  double least_improvement = 0.0;  // below, personalization stops early; 0: never
-  int augmentation_samples = 0;    // made from the key view; files of the user's come on top
-  v1::ReconstructGeometrySpec::Recipe geometry_recipe = v1::ReconstructGeometrySpec::RECIPE_COLOR3D;
-  int geometry_iterations = 0;
-  int max_gaussians = 0;
-  int sh_degree = 2;  // of luminance
-  double densify_gradient = 5e-5;
-  v1::SolveChromaSpec::Solver chroma_solver = v1::SolveChromaSpec::SOLVER_CONJUGATE_GRADIENTS;
-  int chroma_iterations = 0;  // of Adam
+struct Preset {
+  std::string name;  // "fast"
+  v1::ColorizeSceneSpec options;
 };
 
-// PRESET_UNSPECIFIED is PRESET_FAST.
-PresetValues ValuesOf(v1::Preset preset);
+// In the order of their numbers.
+const std::vector<Preset>& Presets();
+
+// The options that a preset sets. PRESET_UNSPECIFIED is PRESET_FAST.
+const v1::ColorizeSceneSpec& OptionsOf(v1::Preset preset);
+
+// What was given, over its preset; stages without a size of their own take the scene's. Whatever
+// has a value in `given` keeps it, but for enums that are set to "unspecified"; lists and sources
+// of colour are taken whole.
+v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given);
+
+// The same for the options of one stage: `spec`'s, over those that `scene` (as WithPreset returns
+// it) has for this stage.
+void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec);
 
 }  // namespace color3d

@@ -1,13 +1,14 @@
 #include "server/planning/spec_check.h"
 
+#include <fmt/core.h>
 #include <google/protobuf/message.h>
 
-#include <algorithm>
-#include <cmath>
 #include <map>
 #include <set>
-#include <sstream>
 
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
+#include "proto/option_text.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -16,91 +17,29 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
 
-struct Range {
-  double low;
-  double high;
-};
-
-// Ranges as documented in stage.proto, by message and field.
-const std::map<std::string, Range>& Ranges() {
-  static const std::map<std::string, Range> ranges = {
-      {"ImportSceneSpec.sfm_max_image_side_px", {256, 4096}},
-      {"ImportSceneSpec.sfm_max_features", {512, 16384}},
-      {"ImportSceneSpec.sfm_timeout_seconds", {10, 86400}},
-      {"SelectKeyViewSpec.temperature", {1e-3, 1e3}},
-      {"ColorizeKeyViewSpec.hint_sigma", {0.1, 50}},
-      {"GenerateAugmentationsSpec.samples", {0, 64}},
-      {"GenerateAugmentationsSpec.max_side_px", {64, 2048}},
-      {"PersonalizeSpec.iterations", {0, 100'000}},
-      {"PersonalizeSpec.time_limit_seconds", {0, 86400}},
-      {"PersonalizeSpec.max_side_px", {64, 2048}},
-      {"PersonalizeSpec.crop_px", {64, 1024}},
-      {"PersonalizeSpec.consistency_weight", {0, 10}},
-      {"PersonalizeSpec.average_decay", {0, 0.9999}},
-      {"PersonalizeSpec.least_improvement", {0, 0.5}},
-      {"ColorizeViewsSpec.max_side_px", {64, 4096}},
-      {"CarryColorSpec.max_reprojection_px", {0.1, 10}},
-      {"CarryColorSpec.max_side_px", {64, 4096}},
-      {"CarryColorSpec.depth_tolerance", {1e-4, 1}},
-      {"CarryColorSpec.depth_side_px", {64, 2048}},
-      {"CarryColorSpec.depth_sources", {1, 16}},
-      {"ReconstructGeometrySpec.iterations", {0, 100'000}},
-      {"ReconstructGeometrySpec.max_side_px", {64, 4096}},
-      {"ReconstructGeometrySpec.max_gaussians", {1, 10'000'000}},
-      {"ReconstructGeometrySpec.sh_degree", {0, 3}},
-      {"ReconstructGeometrySpec.ssim_weight", {0, 1}},
-      {"ReconstructGeometrySpec.edge_weight", {0, 10}},
-      {"ReconstructGeometrySpec.time_limit_seconds", {0, 86400}},
-      {"ReconstructGeometrySpec.densify_gradient", {1e-9, 1}},
-      {"SolveChromaSpec.iterations", {0, 100'000}},
-      {"SolveChromaSpec.chroma_sh_degree", {0, 1}},
-      {"SolveChromaSpec.ssim_weight", {0, 1}},
-      {"SolveChromaSpec.time_limit_seconds", {0, 86400}},
-      {"ReconstructDynamicSpec.frames_per_second", {0.1, 1000}},
-      {"ReconstructDynamicSpec.coarse_iterations", {0, 100'000}},
-      {"ReconstructDynamicSpec.fine_iterations", {0, 100'000}},
-      {"ReconstructDenseSpec.max_side_px", {64, 4096}},
-      {"RenderSpec.max_views", {1, 1000}},
-      {"RenderSpec.max_side_px", {64, 4096}},
-      {"ColorizeSceneSpec.max_side_px", {64, 4096}},
-      {"ColorizeSceneSpec.time_budget_seconds", {0, 604'800}},
-  };
-  return ranges;
-}
-
 constexpr int kMaxRepeated = 10'000;
 constexpr size_t kMaxTextBytes = 4096;
-
-std::string Text(double value) {
-  std::ostringstream out;
-  out.precision(12);
-  out << value;
-  return out.str();
-}
 
 [[noreturn]] void Reject(const std::string& path, const std::string& why) {
   throw ServiceError(ErrorCode::kInvalidArgument, "BAD_OPTION", path + why, {{path, path + why}});
 }
 
 void CheckNumber(const FieldDescriptor* field, double value, const std::string& path) {
-  if (!std::isfinite(value)) Reject(path, " is not a finite number");
-  const std::string key = field->containing_type()->name() + "." + field->name();
-  const auto range = Ranges().find(key);
-  if (range == Ranges().end()) return;
-  if (value < range->second.low || value > range->second.high) {
-    Reject(path,
-           " is " + Text(value) + "; the range is " + Text(range->second.low) + " to " +
-               Text(range->second.high));
-  }
+  const std::string why = WhyRefused(field, value);
+  if (!why.empty()) Reject(path, why);
 }
 
 void CheckEnum(const FieldDescriptor* field, int value, const std::string& path) {
   if (field->enum_type()->FindValueByNumber(value) != nullptr) return;
-  std::string known;
-  for (int i = 1; i < field->enum_type()->value_count(); ++i) {
-    known += (i > 1 ? ", " : "") + field->enum_type()->value(i)->name();
+  Reject(path, fmt::format(" is {}, which is none of {}", value, ValuesText(field)));
+}
+
+void CheckText(const FieldDescriptor* field, size_t bytes, const std::string& path) {
+  const int own = InfoOf(field).max_bytes();
+  const size_t most = own > 0 ? static_cast<size_t>(own) : kMaxTextBytes;
+  if (bytes > most) {
+    Reject(path, fmt::format(" has {} bytes; at most {} are allowed", bytes, most));
   }
-  Reject(path, " is " + std::to_string(value) + ", which is none of " + known);
 }
 
 void CheckMessage(const Message& message, const std::string& path);
@@ -117,10 +56,7 @@ void CheckSingular(const Message& message, const FieldDescriptor* field, const s
     case FieldDescriptor::CPPTYPE_DOUBLE:
       return CheckNumber(field, reflection->GetDouble(message, field), path);
     case FieldDescriptor::CPPTYPE_STRING:
-      if (reflection->GetString(message, field).size() > kMaxTextBytes) {
-        Reject(path, " is longer than " + std::to_string(kMaxTextBytes) + " bytes");
-      }
-      return;
+      return CheckText(field, reflection->GetString(message, field).size(), path);
     default:
       return;
   }
@@ -129,21 +65,20 @@ void CheckSingular(const Message& message, const FieldDescriptor* field, const s
 void CheckRepeated(const Message& message, const FieldDescriptor* field, const std::string& path) {
   const Reflection* reflection = message.GetReflection();
   const int count = reflection->FieldSize(message, field);
-  if (count > kMaxRepeated) {
-    Reject(path,
-           " has " + std::to_string(count) + " entries; at most " + std::to_string(kMaxRepeated) +
-               " are allowed");
+  const int own = InfoOf(field).max_count();
+  const int most = own > 0 ? own : kMaxRepeated;
+  if (count > most) {
+    Reject(path, fmt::format(" has {} entries; at most {} are allowed", count, most));
   }
   for (int i = 0; field->cpp_type() == FieldDescriptor::CPPTYPE_ENUM && i < count; ++i) {
     const int value = reflection->GetRepeatedEnumValue(message, field, i);
-    const std::string entry = path + "[" + std::to_string(i) + "]";
+    const std::string entry = fmt::format("{}[{}]", path, i);
     CheckEnum(field, value, entry);
     if (value == 0) Reject(entry, " is unspecified; name a value or leave the entry out");
   }
   if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return;
   for (int i = 0; i < count; ++i) {
-    CheckMessage(reflection->GetRepeatedMessage(message, field, i),
-                 path + "[" + std::to_string(i) + "]");
+    CheckMessage(reflection->GetRepeatedMessage(message, field, i), fmt::format("{}[{}]", path, i));
   }
 }
 
@@ -152,7 +87,7 @@ void CheckDigest(const v1::Digest& digest, const std::string& path) {
     Reject(path, ".sha256 must be 64 lower-case hexadecimal digits");
   }
   if (digest.size_bytes() < 1) {
-    Reject(path, ".size_bytes is " + std::to_string(digest.size_bytes()) + "; it must be positive");
+    Reject(path, fmt::format(".size_bytes is {}; it must be positive", digest.size_bytes()));
   }
 }
 
@@ -173,14 +108,6 @@ void CheckMessage(const Message& message, const std::string& path) {
   }
 }
 
-[[noreturn]] void NotBuilt(const std::string& what, const std::string& remedy) {
-  throw ServiceError(ErrorCode::kUnimplemented, "NOT_BUILT", what + " is not built yet; " + remedy);
-}
-
-constexpr int kMaxReferences = 16;
-constexpr int kMaxFurtherKeyViews = 16;
-constexpr size_t kMaxPromptBytes = 1000;
-
 bool TakesModel(v1::KeyColorSource::SourceCase source) {
   return source == v1::KeyColorSource::kPrompt || source == v1::KeyColorSource::kAutomatic ||
          source == v1::KeyColorSource::kReference || source == v1::KeyColorSource::kReferences;
@@ -190,28 +117,16 @@ void CheckPrompt(const std::string& prompt, const std::string& path) {
   if (prompt.find_first_not_of(" \t\r\n") == std::string::npos) {
     Reject(path, " is empty; say what has which colour, e.g. \"red brick, green lawn\"");
   }
-  if (prompt.size() > kMaxPromptBytes) {
-    Reject(path,
-           " has " + std::to_string(prompt.size()) + " bytes; at most " +
-               std::to_string(kMaxPromptBytes) + " are allowed");
-  }
-}
-
-void CheckReferences(const v1::References& references, const std::string& path) {
-  const int count = references.images_size();
-  if (count < 1 || count > kMaxReferences) {
-    Reject(path,
-           ".images has " + std::to_string(count) + " pictures; 1 to " +
-               std::to_string(kMaxReferences) + " are allowed");
-  }
 }
 
 // What only some sources take.
 void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& path) {
   if (!source.model().empty() && !TakesModel(source.source_case())) {
-    Reject(path + ".model",
-           " is '" + source.model() +
-               "', but only prompt, automatic and references work with a model; leave it out");
+    Reject(
+        path + ".model",
+        fmt::format(
+            " is '{}', but only prompt, automatic and references work with a model; leave it out",
+            source.model()));
   }
   if (source.has_backend_input() && source.source_case() != v1::KeyColorSource::kBackend) {
     Reject(path + ".backend_input", " is set, but the source is no backend; leave it out");
@@ -233,7 +148,10 @@ void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
     case v1::KeyColorSource::kReference:
       return;
     case v1::KeyColorSource::kReferences:
-      return CheckReferences(source.references(), path + ".references");
+      if (source.references().images().empty()) {
+        Reject(path + ".references.images", " is empty; give at least one picture");
+      }
+      return;
     case v1::KeyColorSource::kPrompt:
       CheckPrompt(source.prompt(), path + ".prompt");
       if (source.model().empty()) {
@@ -259,16 +177,19 @@ void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
     case v1::KeyColorSource::SOURCE_NOT_SET:
       break;
   }
-  Reject(path,
-         " is required: where the key view's colour comes from (image, strokes, points, automatic, "
-         "...). To learn which photo is the key view, first run select_key_view and read its "
-         "artifact key_view.json; `automatic` needs nothing of the user");
+  Reject(
+      path,
+      fmt::format(" is required: where the key view's colour comes from (image, strokes, points, "
+                  "automatic, ...). To learn which photo is the key view, first run {} and read "
+                  "its artifact {}; `automatic` needs nothing of the user",
+                  StageThatLeaves(artifact::kKeyView)->kind,
+                  artifact::kKeyView));
 }
 
 void CheckTruth(const google::protobuf::RepeatedPtrField<v1::TruthImage>& truth,
                 const std::string& path) {
   for (int i = 0; i < truth.size(); ++i) {
-    const std::string entry = path + "[" + std::to_string(i) + "]";
+    const std::string entry = fmt::format("{}[{}]", path, i);
     if (truth[i].view().empty()) Reject(entry, ".view is empty; name the view");
     if (!truth[i].has_image()) Reject(entry, ".image is missing");
   }
@@ -291,30 +212,26 @@ void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
 
 void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
   const int count = spec.further_key_views_size();
-  if (count > kMaxFurtherKeyViews) {
-    Reject(path + ".further_key_views",
-           " has " + std::to_string(count) + " entries; at most " +
-               std::to_string(kMaxFurtherKeyViews) + " are allowed");
-  }
   if (count > 0 && spec.skip()) {
     Reject(path + ".skip", " is set, but further_key_views need the stage; leave one of them out");
   }
   for (int i = 0; i < count; ++i) {
-    const std::string entry = path + ".further_key_views[" + std::to_string(i) + "]";
+    const std::string entry = fmt::format("{}.further_key_views[{}]", path, i);
     if (spec.further_key_views(i).view().empty()) Reject(entry + ".view", " is empty; name a view");
     CheckKeyColor(spec.further_key_views(i).color(), entry + ".color");
   }
 }
 
 void CheckRoutes(const v1::PersonalizeScenesSpec& spec) {
-  if (spec.routes().empty()) Reject("personalize_scenes.routes", " is empty; name a scene");
+  const std::string routes = fmt::format("{}.routes", kind::kPersonalizeScenes);
+  if (spec.routes().empty()) Reject(routes, " is empty; name a scene");
   std::set<std::string> scenes;
   for (int i = 0; i < spec.routes_size(); ++i) {
-    const std::string path = "personalize_scenes.routes[" + std::to_string(i) + "].scene";
+    const std::string path = fmt::format("{}[{}].scene", routes, i);
     const std::string& scene = spec.routes(i).scene();
     if (scene.empty()) Reject(path, " is empty; name a scene");
     if (!scenes.insert(scene).second) {
-      Reject(path, " is '" + scene + "', which is there already; name each scene once");
+      Reject(path, fmt::format(" is '{}', which is there already; name each scene once", scene));
     }
   }
 }
@@ -325,8 +242,8 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   if (!has_inputs || spec.has_key_color() || in_options) {
     CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
   }
-  if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
-  CheckCarryColor(spec.carry_color(), "carry_color");
+  if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
+  CheckCarryColor(spec.carry_color(), kind::kCarryColor);
   CheckTruth(spec.truth(), "truth");
   CheckTraining(spec.training_truth(), !spec.truth().empty(), "training_truth");
 }
@@ -337,48 +254,32 @@ std::string KindOf(const v1::JobSpec& spec) {
   const google::protobuf::OneofDescriptor* stage = spec.GetDescriptor()->FindOneofByName("stage");
   const FieldDescriptor* field = spec.GetReflection()->GetOneofFieldDescriptor(spec, stage);
   if (field == nullptr) {
-    throw InvalidArgument("spec has no stage; set one, e.g. spec.colorize_scene");
+    throw InvalidArgument("spec has no stage; set one, e.g. spec.{}", kind::kColorizeScene);
   }
   return field->name();
 }
 
-const std::vector<std::string>& BuiltKinds() {
-  static const std::vector<std::string> kinds = {"colorize_scene",
-                                                 "import_scene",
-                                                 "select_key_view",
-                                                 "colorize_key_view",
-                                                 "generate_augmentations",
-                                                 "personalize",
-                                                 "carry_color",
-                                                 "personalize_scenes",
-                                                 "colorize_views",
-                                                 "reconstruct_geometry",
-                                                 "solve_chroma",
-                                                 "export",
-                                                 "render",
-                                                 "evaluate"};
-  return kinds;
-}
-
 void CheckSpec(const v1::JobSpec& spec) {
   const std::string kind = KindOf(spec);
-  const auto& kinds = BuiltKinds();
-  if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) {
-    NotBuilt(kind, "GetServerInfo lists the job kinds that are");
+  if (FindStage(kind) == nullptr) {
+    throw ServiceError(
+        ErrorCode::kUnimplemented,
+        "NOT_BUILT",
+        fmt::format("{} is not built yet; GetServerInfo lists the job kinds that are", kind));
   }
   CheckMessage(spec, "");
   if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene(), spec.inputs_size() > 0);
   if (spec.has_colorize_key_view()) {
-    CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
+    CheckKeyColor(spec.colorize_key_view().source(), kind + ".source");
   }
-  if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), "carry_color");
-  if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), kind);
+  if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), kind);
   if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
   if (spec.has_evaluate()) {
-    CheckTruth(spec.evaluate().truth(), "evaluate.truth");
+    CheckTruth(spec.evaluate().truth(), kind + ".truth");
     CheckTraining(spec.evaluate().training_truth(),
                   !spec.evaluate().truth().empty(),
-                  "evaluate.training_truth");
+                  kind + ".training_truth");
   }
 }
 

@@ -1,5 +1,6 @@
-// The door for job options: every enum value known, every number in the range that stage.proto
-// documents, every digest well formed, nothing asked for that is not built.
+// Checks of a job's options, before anything is planned: every enum value known, every number,
+// list and text within what the proto says of it, every digest well formed, nothing asked for that
+// is not built.
 #pragma once
 
 #include <string>
@@ -13,9 +14,6 @@ namespace color3d {
 // The stage's field name in JobSpec, e.g. "personalize". Throws Error{kInvalidArgument} when the
 // spec has no stage.
 std::string KindOf(const v1::JobSpec& spec);
-
-// Kinds that can run, in the order of the pipeline.
-const std::vector<std::string>& BuiltKinds();
 
 // Throws Error: kInvalidArgument naming field, value and range; kUnimplemented naming the kind.
 // Names of models and backends are checked by CheckNames (spec_names.h), where the configuration

@@ -1,7 +1,6 @@
 #include "server/planning/spec_names.h"
 
-#include <set>
-
+#include "proto/option_text.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -9,22 +8,6 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
-
-// Fields of stage.proto that hold names of the server's configuration, by message and field.
-const std::set<std::string>& ModelFields() {
-  static const std::set<std::string> fields = {"KeyColorSource.model",
-                                               "KeyColorSource.script",
-                                               "SelectKeyViewSpec.encoder",
-                                               "SelectKeyViewSpec.features",
-                                               "PersonalizeSpec.encoder",
-                                               "ColorizeViewsSpec.encoder"};
-  return fields;
-}
-const std::set<std::string>& BackendFields() {
-  static const std::set<std::string> fields = {"KeyColorSource.backend",
-                                               "GenerateAugmentationsSpec.backend"};
-  return fields;
-}
 
 void Collect(const Message& message, const std::string& path, SpecNames* names) {
   const Reflection* reflection = message.GetReflection();
@@ -39,16 +22,16 @@ void Collect(const Message& message, const std::string& path, SpecNames* names) 
       }
       for (int i = 0; i < reflection->FieldSize(message, field); ++i) {
         Collect(reflection->GetRepeatedMessage(message, field, i),
-                here + "[" + std::to_string(i) + "]",
+                fmt::format("{}[{}]", here, i),
                 names);
       }
       continue;
     }
-    const std::string key = field->containing_type()->name() + "." + field->name();
-    const bool model = ModelFields().contains(key);
-    if (!model && !BackendFields().contains(key)) continue;
+    const v1::OptionInfo::Names kind = InfoOf(field).names();
+    if (kind == v1::OptionInfo::NAMES_UNSPECIFIED) continue;
     const std::string name = reflection->GetString(message, field);
-    if (!name.empty()) (model ? names->models : names->backends).push_back({here, name});
+    if (name.empty()) continue;
+    (kind == v1::OptionInfo::NAMES_MODEL ? names->models : names->backends).push_back({here, name});
   }
 }
 
@@ -60,9 +43,12 @@ void Require(const std::vector<NameUse>& uses,
              const std::string& remedy) {
   for (const NameUse& use : uses) {
     if (known.contains(use.name)) continue;
-    const std::string why = " names the " + what + " '" + use.name +
-                            "', which this server does not have (it has: " + NamesOf(known) +
-                            "); start it with " + remedy;
+    const std::string why = fmt::format(
+        " names the {} '{}', which this server does not have (it has: {}); start it with {}",
+        what,
+        use.name,
+        NamesOf(known),
+        remedy);
     throw ServiceError(
         ErrorCode::kInvalidArgument, reason, use.field + why, {{use.field, use.field + why}});
   }

@@ -2,19 +2,10 @@
 // Pure arithmetic on estimates; the stages hold themselves to their shares.
 #pragma once
 
-#include <string_view>
+#include "color3d/v1/job.pb.h"
+#include "server/planning/scene_facts.h"
 
 namespace color3d {
-
-// Pictures in colour that the user gives for the colorizer to learn from: no photos of the scene.
-inline bool IsAugmentFile(std::string_view path) { return path.starts_with("augment/"); }
-
-// What the planner knows of a scene before it is imported.
-struct SceneFacts {
-  int photos = 0;
-  bool has_poses = false;
-  int augment_files = 0;
-};
 
 struct TimeBudget {
   double geometry_seconds = 0.0;
@@ -29,5 +20,9 @@ double FixedSeconds(const SceneFacts& facts);
 // Throws ServiceError{kInvalidArgument, BAD_OPTION} naming the least that works when `seconds`
 // leave nothing for the rest.
 TimeBudget DivideTimeBudget(double seconds, const SceneFacts& facts);
+
+// Writes a stage's share into its options, at most what they take as a time limit, unless they
+// have one of their own.
+void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec);
 
 }  // namespace color3d

@@ -25,7 +25,7 @@ FileDigest ParseDigest(const std::string& sha256, const std::string& size) {
   int64_t bytes = 0;
   const auto [end, error] = std::from_chars(size.data(), size.data() + size.size(), bytes);
   if (error != std::errc() || end != size.data() + size.size()) {
-    throw InvalidArgument("'" + size.substr(0, 40) + "' is not a size in bytes");
+    throw InvalidArgument("'{}' is not a size in bytes", size.substr(0, 40));
   }
   digest.set_size_bytes(bytes);
   return FromProto(digest);
@@ -36,8 +36,9 @@ FileDigest ParseDigest(const std::string& sha256, const std::string& size) {
 UploadName ParseUploadName(const std::string& resource) {
   const std::vector<std::string> parts = SplitSlashes(resource);
   if (parts.size() != 5 || parts[0] != "uploads" || parts[2] != "blobs") {
-    throw InvalidArgument("the resource '" + resource.substr(0, 200) +
-                          "' must be 'uploads/{uuid}/blobs/{sha256}/{size_bytes}'");
+    throw InvalidArgument(
+        "the resource '{}' must be 'uploads/{{uuid}}/blobs/{{sha256}}/{{size_bytes}}'",
+        resource.substr(0, 200));
   }
   return {parts[1], ParseDigest(parts[3], parts[4])};
 }
@@ -45,8 +46,8 @@ UploadName ParseUploadName(const std::string& resource) {
 FileDigest ParseBlobName(const std::string& resource) {
   const std::vector<std::string> parts = SplitSlashes(resource);
   if (parts.size() != 3 || parts[0] != "blobs") {
-    throw InvalidArgument("the resource '" + resource.substr(0, 200) +
-                          "' must be 'blobs/{sha256}/{size_bytes}'");
+    throw InvalidArgument("the resource '{}' must be 'blobs/{{sha256}}/{{size_bytes}}'",
+                          resource.substr(0, 200));
   }
   return ParseDigest(parts[1], parts[2]);
 }
@@ -61,8 +62,8 @@ grpc::ServerUnaryReactor* BlobServiceImpl::FindMissingBlobs(
                      response,
                      [this](const auto& in, v1::FindMissingBlobsResponse* out) {
                        if (in.digests_size() > 10'000) {
-                         throw InvalidArgument("digests has " + std::to_string(in.digests_size()) +
-                                               " entries; at most 10000 are allowed");
+                         throw InvalidArgument("digests has {} entries; at most 10000 are allowed",
+                                               in.digests_size());
                        }
                        std::set<std::string> seen;
                        for (const v1::Digest& proto : in.digests()) {

@@ -49,7 +49,7 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     const FileDigest digest = ParseBlobName(request_.resource_name());
     if (!parts_.blobs.Touch(digest)) {
       throw ServiceError(
-          ErrorCode::kNotFound, "BLOB_MISSING", "'" + request_.resource_name() + "' is not stored");
+          ErrorCode::kNotFound, "BLOB_MISSING", "'{}' is not stored", request_.resource_name());
     }
     if (request_.read_offset() < 0 || request_.read_limit() < 0) {
       throw InvalidArgument("read_offset and read_limit must not be negative");
@@ -57,8 +57,9 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     if (request_.read_offset() > digest.size_bytes) {
       throw ServiceError(ErrorCode::kInvalidArgument,
                          "OFFSET_BEYOND_END",
-                         "read_offset is " + std::to_string(request_.read_offset()) +
-                             ", the blob has " + std::to_string(digest.size_bytes) + " bytes");
+                         "read_offset is {}, the blob has {} bytes",
+                         request_.read_offset(),
+                         digest.size_bytes);
     }
     offset_ = request_.read_offset();
     end_ = digest.size_bytes;
@@ -73,7 +74,7 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     data->resize(static_cast<size_t>(std::min(kReadChunkBytes, end_ - offset_)));
     const ssize_t got = ::pread(fd_, data->data(), data->size(), offset_);
     if (got <= 0) {
-      throw Error(ErrorCode::kDataLoss, "'" + request_.resource_name() + "' is shorter on disk");
+      throw Error(ErrorCode::kDataLoss, "'{}' is shorter on disk", request_.resource_name());
     }
     data->resize(static_cast<size_t>(got));
     offset_ += got;
@@ -110,9 +111,9 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   // True when the RPC is answered.
   bool Store() {
     if (static_cast<int64_t>(request_.data().size()) > parts_.limits.max_chunk_bytes) {
-      throw InvalidArgument("a chunk of " + std::to_string(request_.data().size()) +
-                            " bytes; at most " + std::to_string(parts_.limits.max_chunk_bytes) +
-                            " are allowed");
+      throw InvalidArgument("a chunk of {} bytes; at most {} are allowed",
+                            request_.data().size(),
+                            parts_.limits.max_chunk_bytes);
     }
     if (!writer_) {
       const UploadName name = ParseUploadName(request_.resource_name());

@@ -1,9 +1,12 @@
 #include "server/rpc/convert.h"
 
+#include <fmt/core.h>
+
 #include <charconv>
 
+#include "core/base/utf8.h"
+#include "server/planning/job_spec.h"
 #include "server/rpc/error_mapping.h"
-#include "server/rpc/utf8.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -55,16 +58,14 @@ v1::Job ToProgressProto(const JobRecord& job) {
   progress->set_message(CleanUtf8(job.progress.message));
   progress->set_error_name(CleanUtf8(job.progress.error_name));
   progress->set_error_value(job.progress.error_value);
-  progress->set_seconds(job.progress.seconds);
+  progress->set_seconds(job.usage.seconds);
   progress->set_eta_seconds(job.progress.eta_seconds);
   return proto;
 }
 
 v1::Job ToProto(const JobRecord& job) {
   v1::Job proto = ToProgressProto(job);
-  if (!proto.mutable_spec()->ParseFromString(job.spec)) {
-    throw Error(ErrorCode::kDataLoss, "the stored spec of " + job.name + " cannot be read");
-  }
+  *proto.mutable_spec() = ParseSpec(job.spec, job.name);
   proto.set_cancel_requested(job.cancel_requested);
   proto.set_max_attempts(job.max_attempts);
   for (const ArtifactRecord& artifact : job.artifacts) {
@@ -76,12 +77,12 @@ v1::Job ToProto(const JobRecord& job) {
   if (job.error) *proto.mutable_error() = ToRpcStatus(*job.error);
   proto.set_skip_reason(CleanUtf8(job.skip_reason));
   proto.set_cached(job.cached);
-  for (const std::string& warning : job.warnings) proto.add_warnings(CleanUtf8(warning));
+  for (const std::string& warning : job.usage.warnings) proto.add_warnings(CleanUtf8(warning));
   *proto.mutable_create_time() = ToTimestamp(job.create_ms);
   if (job.start_ms != 0) *proto.mutable_start_time() = ToTimestamp(job.start_ms);
   if (job.end_ms != 0) *proto.mutable_end_time() = ToTimestamp(job.end_ms);
   proto.set_worker(job.worker);
-  proto.set_peak_memory_bytes(job.peak_memory_bytes);
+  proto.set_peak_memory_bytes(job.usage.peak_memory_bytes);
   return proto;
 }
 
@@ -102,25 +103,25 @@ void CheckName(std::string_view name, std::string_view collection) {
                         name[collection.size()] == '/';
   const std::string_view id = prefixed ? name.substr(collection.size() + 1) : "";
   if (id.empty() || id.size() > 64 || id.find_first_not_of(kAllowed) != std::string_view::npos) {
-    throw InvalidArgument("the name '" + std::string(name.substr(0, 100)) + "' must be '" +
-                          std::string(collection) + "/{id}'");
+    throw InvalidArgument("the name '{}' must be '{}/{{id}}'", name.substr(0, 100), collection);
   }
 }
 
 FileDigest FromProto(const v1::Digest& digest) {
   if (!IsSha256Hex(digest.sha256())) {
-    throw InvalidArgument("'" + digest.sha256().substr(0, 80) +
-                          "' is not a SHA-256 digest: 64 lower-case hexadecimal digits");
+    throw InvalidArgument("'{}' is not a SHA-256 digest: 64 lower-case hexadecimal digits",
+                          digest.sha256().substr(0, 80));
   }
   if (digest.size_bytes() < 0) {
-    throw InvalidArgument("the digest " + digest.sha256() + " has the size " +
-                          std::to_string(digest.size_bytes()) + "; it must not be negative");
+    throw InvalidArgument("the digest {} has the size {}; it must not be negative",
+                          digest.sha256(),
+                          digest.size_bytes());
   }
   return {digest.sha256(), digest.size_bytes()};
 }
 
 std::string MakePageToken(int64_t last_id, const std::string& listing) {
-  return std::to_string(last_id) + "." + Sha256Hex(listing).substr(0, 8);
+  return fmt::format("{}.{}", last_id, Sha256Hex(listing).substr(0, 8));
 }
 
 int64_t ParsePageToken(const std::string& token, const std::string& listing) {
@@ -128,16 +129,15 @@ int64_t ParsePageToken(const std::string& token, const std::string& listing) {
   int64_t id = 0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), id);
   if (error != std::errc() || id < 1 || token != MakePageToken(id, listing)) {
-    throw InvalidArgument("page_token '" + token.substr(0, 80) +
-                          "' does not belong to this listing; start without one");
+    throw InvalidArgument("page_token '{}' does not belong to this listing; start without one",
+                          token.substr(0, 80));
   }
   return id;
 }
 
 int PageSize(int requested) {
   if (requested < 0 || requested > 1000) {
-    throw InvalidArgument("page_size is " + std::to_string(requested) +
-                          "; the range is 1 to 1000, 0 means 50");
+    throw InvalidArgument("page_size is {}; the range is 1 to 1000, 0 means 50", requested);
   }
   return requested == 0 ? 50 : requested;
 }

@@ -1,6 +1,7 @@
 // Store records as messages of the public API, resource names and page tokens.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 
@@ -28,7 +29,25 @@ FileDigest FromProto(const v1::Digest& digest);
 std::string MakePageToken(int64_t last_id, const std::string& listing);
 // 0 for an empty token. Throws Error{kInvalidArgument} for one of another listing.
 int64_t ParsePageToken(const std::string& token, const std::string& listing);
-// 1..1000; 0 means 50.
+// 1..1000; 0 means 50. Throws Error{kInvalidArgument}.
 int PageSize(int requested);
+
+// Answers a List call: `read(before_id, limit)` gives records, newest first; `add(record)` puts one
+// into the response. `listing` says what is listed: page tokens of other listings are refused.
+template <typename Request, typename Response, typename Read, typename Add>
+void AnswerPage(const Request& request,
+                const std::string& listing,
+                Response* response,
+                const Read& read,
+                const Add& add) {
+  const int size = PageSize(request.page_size());
+  // One more than fits tells whether there is another page.
+  const auto records = read(ParsePageToken(request.page_token(), listing), size + 1);
+  const size_t fits = std::min(static_cast<size_t>(size), records.size());
+  for (size_t i = 0; i < fits; ++i) add(records[i]);
+  if (records.size() > fits) {
+    response->set_next_page_token(MakePageToken(records[fits - 1].id, listing));
+  }
+}
 
 }  // namespace color3d

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "core/base/utf8.h"
 #include "google/rpc/error_details.pb.h"
-#include "server/rpc/utf8.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -117,7 +117,7 @@ grpc::Status Guard(const std::function<void()>& body) {
     return ToGrpcStatus(Error(ErrorCode::kResourceExhausted, "the server is out of memory"));
   } catch (const std::exception& e) {
     spdlog::error("unexpected: {}", e.what());
-    return ToGrpcStatus(Error(ErrorCode::kInternal, std::string("unexpected: ") + e.what()));
+    return ToGrpcStatus(Error(ErrorCode::kInternal, "unexpected: {}", e.what()));
   }
 }
 

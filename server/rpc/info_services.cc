@@ -1,12 +1,11 @@
 #include "server/rpc/info_services.h"
 
-#include <algorithm>
-
 #include "core/base/memory.h"
+#include "core/base/utf8.h"
+#include "core/catalogue/stages.h"
 #include "server/ops/process.h"
-#include "server/planning/spec_check.h"
+#include "server/planning/presets.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/utf8.h"
 
 namespace color3d {
 namespace {
@@ -23,6 +22,14 @@ void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
     } catch (const Error& e) {
       model->set_problem(CleanUtf8(e.what()));
     }
+  }
+}
+
+void ListPresets(v1::ServerInfo* info) {
+  for (const Preset& preset : Presets()) {
+    v1::PresetInfo* entry = info->add_presets();
+    entry->set_name(preset.name);
+    *entry->mutable_options() = preset.options;
   }
 }
 
@@ -65,16 +72,14 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
   return AnswerUnary(
       parts_, context, request, response, [this](const auto& in, v1::ListColorizersResponse* out) {
         if (!in.scene().empty()) CheckName(in.scene(), "scenes");
-        const std::string listing = "colorizers of " + in.scene();
-        const size_t size = PageSize(in.page_size());
-        const auto colorizers = parts_.store.ListColorizers(
-            in.scene(), ParsePageToken(in.page_token(), listing), static_cast<int>(size) + 1);
-        for (size_t i = 0; i < std::min(size, colorizers.size()); ++i) {
-          *out->add_colorizers() = ToProto(colorizers[i]);
-        }
-        if (colorizers.size() > size) {
-          out->set_next_page_token(MakePageToken(colorizers[size - 1].id, listing));
-        }
+        AnswerPage(
+            in,
+            "colorizers of " + in.scene(),
+            out,
+            [&](int64_t before_id, int limit) {
+              return parts_.store.ListColorizers(in.scene(), before_id, limit);
+            },
+            [&](const ColorizerRecord& colorizer) { *out->add_colorizers() = ToProto(colorizer); });
       });
 }
 
@@ -88,7 +93,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
                                                            v1::ServerInfo* response) {
   return AnswerUnary(parts_, context, request, response, [this](const auto&, v1::ServerInfo* out) {
     out->set_version(parts_.version);
-    for (const std::string& kind : BuiltKinds()) out->add_job_kinds(kind);
+    for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
     v1::Limits* limits = out->mutable_limits();
     limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
     limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);
@@ -104,6 +109,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
       entry->set_memory_bytes(worker.memory_bytes);
       entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
     }
+    ListPresets(out);
     ListModels(parts_, out);
     ListBackends(parts_, out);
     out->set_draining(parts_.draining.load());

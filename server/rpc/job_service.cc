@@ -1,9 +1,11 @@
 #include "server/rpc/job_service.h"
 
+#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 
+#include "core/catalogue/stages.h"
 #include "server/planning/plan_scenes.h"
 #include "server/planning/planner.h"
 #include "server/planning/spec_check.h"
@@ -27,23 +29,25 @@ void CheckBlobs(const RpcParts& parts, const v1::JobSpec& spec) {
   for (const FileDigest& digest : SpecBlobs(spec)) {
     if (!parts.blobs.Touch(digest)) {
       missing.push_back(
-          {digest.sha256, "is not stored with " + std::to_string(digest.size_bytes) + " bytes"});
+          {digest.sha256, fmt::format("is not stored with {} bytes", digest.size_bytes)});
     }
   }
   if (missing.empty()) return;
-  throw ServiceError(ErrorCode::kFailedPrecondition,
-                     "BLOB_MISSING",
-                     "the spec names " + std::to_string(missing.size()) +
-                         " blobs that are not uploaded, first " + missing[0].field +
-                         "; upload them and try again",
-                     missing);
+  throw ServiceError(
+      ErrorCode::kFailedPrecondition,
+      "BLOB_MISSING",
+      fmt::format(
+          "the spec names {} blobs that are not uploaded, first {}; upload them and try again",
+          missing.size(),
+          missing[0].field),
+      missing);
 }
 
 // The jobs that spec.inputs names, with their children.
 std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec) {
   if (spec.inputs_size() > 100) {
-    throw InvalidArgument("spec.inputs has " + std::to_string(spec.inputs_size()) +
-                          " entries; at most 100 are allowed");
+    throw InvalidArgument("spec.inputs has {} entries; at most 100 are allowed",
+                          spec.inputs_size());
   }
   std::vector<JobRecord> inputs;
   for (const std::string& name : spec.inputs()) {
@@ -73,17 +77,22 @@ SceneRouteInputs LoadRoute(const RpcParts& parts,
   const std::string name =
       route.key_color_job().empty() ? scene.key_color_job : route.key_color_job();
   if (name.empty()) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "INPUT_MISSING",
-                       "the scene " + scene.name +
-                           " has no accepted key view; accept one, or name its "
-                           "colorize_key_view job in the route's key_color_job");
+    throw ServiceError(
+        ErrorCode::kFailedPrecondition,
+        "INPUT_MISSING",
+        "the scene {} has no accepted key view; accept one, or name its {} job in the "
+        "route's key_color_job",
+        scene.name,
+        kind::kColorizeKeyView);
   }
   CheckName(name, "jobs");
   const JobRecord key_color = parts.store.GetJob(name);
-  if (key_color.kind != "colorize_key_view") {
-    throw InvalidArgument("the key_color_job " + name + " of " + scene.name + " is a " +
-                          key_color.kind + " job; name a colorize_key_view job");
+  if (key_color.kind != kind::kColorizeKeyView) {
+    throw InvalidArgument("the key_color_job {} of {} is a {} job; name a {} job",
+                          name,
+                          scene.name,
+                          key_color.kind,
+                          kind::kColorizeKeyView);
   }
   SceneRouteInputs inputs{parts.store.GetInputs(key_color.id), FactsOf(scene)};
   inputs.jobs.push_back(key_color);
@@ -113,7 +122,7 @@ JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& req
   CheckName(spec.scene(), "scenes");
   const int priority = request.has_priority() ? request.priority() : 100;
   if (priority < 0 || priority > 1000) {
-    throw InvalidArgument("priority is " + std::to_string(priority) + "; the range is 0 to 1000");
+    throw InvalidArgument("priority is {}; the range is 0 to 1000", priority);
   }
   CheckSpec(spec);
   CheckNames(spec, parts.models);
@@ -137,14 +146,12 @@ void ListJobPage(const RpcParts& parts,
     CheckName(request.parent(), "jobs");
     filter.parent = request.parent();
   }
-  const std::string listing = "jobs of " + request.parent();
-  const size_t size = PageSize(request.page_size());
-  const int64_t before = ParsePageToken(request.page_token(), listing);
-  const auto jobs = parts.store.ListJobs(filter, before, static_cast<int>(size) + 1);
-  for (size_t i = 0; i < std::min(size, jobs.size()); ++i) *response->add_jobs() = ToProto(jobs[i]);
-  if (jobs.size() > size) {
-    response->set_next_page_token(MakePageToken(jobs[size - 1].id, listing));
-  }
+  AnswerPage(
+      request,
+      "jobs of " + request.parent(),
+      response,
+      [&](int64_t before_id, int limit) { return parts.store.ListJobs(filter, before_id, limit); },
+      [&](const JobRecord& job) { *response->add_jobs() = ToProto(job); });
 }
 
 }  // namespace

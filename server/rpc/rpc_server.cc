@@ -30,8 +30,9 @@ void CheckAddress(const std::string& listen) {
   const int failed = ::getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found);
   if (failed != 0) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot listen on " + listen + ": " + ::gai_strerror(failed) +
-                    "; choose another with --listen");
+                "cannot listen on {}: {}; choose another with --listen",
+                listen,
+                ::gai_strerror(failed));
   }
   const int fd = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
   const int on = 1;
@@ -44,7 +45,9 @@ void CheckAddress(const std::string& listen) {
   const std::string why = error == EADDRINUSE ? "the address is in use (is another server running?)"
                                               : std::string(std::strerror(error));
   throw Error(ErrorCode::kFailedPrecondition,
-              "cannot listen on " + listen + ": " + why + "; choose another with --listen");
+              "cannot listen on {}: {}; choose another with --listen",
+              listen,
+              why);
 }
 
 }  // namespace
@@ -108,7 +111,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   server_ = builder.BuildAndStart();
   if (!server_) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot listen on " + options.listen + "; choose another with --listen");
+                "cannot listen on {}; choose another with --listen",
+                options.listen);
   }
   address_ = options.listen.rfind("unix:", 0) == 0
                  ? options.listen

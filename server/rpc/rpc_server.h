@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "server/rpc/colorize_hub.h"
+#include "server/rpc/live/colorize_hub.h"
 #include "server/rpc/rpc_parts.h"
 #include "server/rpc/watch_hub.h"
 

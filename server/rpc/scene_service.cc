@@ -1,6 +1,7 @@
 #include "server/rpc/scene_service.h"
 
-#include <algorithm>
+#include <fmt/core.h>
+
 #include <set>
 
 #include "core/base/files.h"
@@ -17,21 +18,22 @@ void CheckSceneId(const std::string& id) {
       id.size() >= 4 && id.size() <= 63 && id[0] >= 'a' && id[0] <= 'z' &&
       id.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
   if (!good) {
-    throw InvalidArgument("scene_id '" + id.substr(0, 80) +
-                          "' must be 4 to 63 characters of [a-z0-9-], the first a letter");
+    throw InvalidArgument(
+        "scene_id '{}' must be 4 to 63 characters of [a-z0-9-], the first a letter",
+        id.substr(0, 80));
   }
 }
 
 SceneRecord ToRecord(const v1::CreateSceneRequest& request, const ServiceLimits& limits) {
   CheckSceneId(request.scene_id());
   if (request.display_name().size() > 200) {
-    throw InvalidArgument("display_name has " + std::to_string(request.display_name().size()) +
-                          " bytes; at most 200 are allowed");
+    throw InvalidArgument("display_name has {} bytes; at most 200 are allowed",
+                          request.display_name().size());
   }
   if (request.files_size() < 1 || request.files_size() > limits.max_files_per_scene) {
-    throw InvalidArgument("files has " + std::to_string(request.files_size()) +
-                          " entries; the range is 1 to " +
-                          std::to_string(limits.max_files_per_scene));
+    throw InvalidArgument("files has {} entries; the range is 1 to {}",
+                          request.files_size(),
+                          limits.max_files_per_scene);
   }
   SceneRecord record;
   record.name = "scenes/" + (request.scene_id().empty() ? "s" + NewId() : request.scene_id());
@@ -39,14 +41,15 @@ SceneRecord ToRecord(const v1::CreateSceneRequest& request, const ServiceLimits&
   std::set<std::string> paths;
   for (const v1::SceneFile& file : request.files()) {
     if (!IsSafeRelativePath(file.path())) {
-      throw ServiceError(ErrorCode::kInvalidArgument,
-                         "UNSAFE_PATH",
-                         "the path '" + file.path().substr(0, 200) +
-                             "' must be relative, with '/' separators and without '..'",
-                         {{"files.path", file.path().substr(0, 200)}});
+      throw ServiceError(
+          ErrorCode::kInvalidArgument,
+          "UNSAFE_PATH",
+          fmt::format("the path '{}' must be relative, with '/' separators and without '..'",
+                      file.path().substr(0, 200)),
+          {{"files.path", file.path().substr(0, 200)}});
     }
     if (!paths.insert(file.path()).second) {
-      throw InvalidArgument("the path '" + file.path() + "' is there twice");
+      throw InvalidArgument("the path '{}' is there twice", file.path());
     }
     record.files.push_back({file.path(), FromProto(file.digest())});
   }
@@ -55,7 +58,7 @@ SceneRecord ToRecord(const v1::CreateSceneRequest& request, const ServiceLimits&
     for (size_t slash = path.find('/'); slash != std::string::npos;
          slash = path.find('/', slash + 1)) {
       if (paths.count(path.substr(0, slash)) > 0) {
-        throw InvalidArgument("'" + path.substr(0, slash) + "' is both a file and a folder");
+        throw InvalidArgument("'{}' is both a file and a folder", path.substr(0, slash));
       }
     }
   }
@@ -87,15 +90,12 @@ grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerConte
                                                        v1::ListScenesResponse* response) {
   return AnswerUnary(
       parts_, context, request, response, [this](const auto& in, v1::ListScenesResponse* out) {
-        const size_t size = PageSize(in.page_size());
-        const int64_t before = ParsePageToken(in.page_token(), "scenes");
-        const auto scenes = parts_.store.ListScenes(before, static_cast<int>(size) + 1);
-        for (size_t i = 0; i < std::min(size, scenes.size()); ++i) {
-          *out->add_scenes() = ToProto(scenes[i]);
-        }
-        if (scenes.size() > size) {
-          out->set_next_page_token(MakePageToken(scenes[size - 1].id, "scenes"));
-        }
+        AnswerPage(
+            in,
+            "scenes",
+            out,
+            [&](int64_t before_id, int limit) { return parts_.store.ListScenes(before_id, limit); },
+            [&](const SceneRecord& scene) { *out->add_scenes() = ToProto(scene); });
       });
 }
 

@@ -1,6 +1,7 @@
 #include "server/rpc/scene_validation.h"
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -11,7 +12,7 @@
 
 #include "core/base/files.h"
 #include "core/image/probe/probe.h"
-#include "server/planning/time_budget.h"
+#include "server/planning/scene_facts.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -89,7 +90,8 @@ void CheckFile(const SceneFileRecord& file,
                SceneCheck* check,
                std::vector<FieldViolation>* violations) {
   if (!blobs.Touch(file.digest)) {
-    violations->push_back({file.path, "was not uploaded (blob " + file.digest.sha256 + ")"});
+    violations->push_back(
+        {file.path, fmt::format("was not uploaded (blob {})", file.digest.sha256)});
     return;
   }
   const bool is_photo = HasImageExtension(file.path);
@@ -126,7 +128,7 @@ void CheckFile(const SceneFileRecord& file,
     message += (named ? "" : violation.field + " ") + violation.description;
   }
   if (violations.size() > 3) {
-    message += "; and " + std::to_string(violations.size() - 3) + " more files";
+    message += fmt::format("; and {} more files", violations.size() - 3);
   }
   throw ServiceError(ErrorCode::kInvalidArgument, "SCENE_INVALID", message, violations);
 }

@@ -99,12 +99,10 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       const int interval =
           request_.has_min_progress_interval_ms() ? request_.min_progress_interval_ms() : 500;
       if (interval < 50 || interval > 60'000) {
-        throw InvalidArgument("min_progress_interval_ms is " + std::to_string(interval) +
-                              "; the range is 50 to 60000");
+        throw InvalidArgument("min_progress_interval_ms is {}; the range is 50 to 60000", interval);
       }
       if (request_.names_size() < 1 || request_.names_size() > 100) {
-        throw InvalidArgument("names has " + std::to_string(request_.names_size()) +
-                              " entries; the range is 1 to 100");
+        throw InvalidArgument("names has {} entries; the range is 1 to 100", request_.names_size());
       }
       if (request_.after_revision() < 0) throw InvalidArgument("after_revision is negative");
       for (const std::string& name : request_.names()) CheckName(name, "jobs");

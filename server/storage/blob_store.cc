@@ -34,10 +34,6 @@ class FolderLock {
   int fd_;
 };
 
-ServiceError StorageFull(const std::string& message) {
-  return ServiceError(ErrorCode::kResourceExhausted, "STORAGE_FULL", message);
-}
-
 }  // namespace
 
 BlobStore::BlobStore(const fs::path& folder, BlobStoreOptions options)
@@ -48,8 +44,8 @@ BlobStore::BlobStore(const fs::path& folder, BlobStoreOptions options)
 
 fs::path BlobStore::PathOf(const std::string& sha256) const {
   if (!IsSha256Hex(sha256)) {
-    throw InvalidArgument("'" + sha256.substr(0, 80) +
-                          "' is not a SHA-256 digest: 64 lower-case hexadecimal digits");
+    throw InvalidArgument("'{}' is not a SHA-256 digest: 64 lower-case hexadecimal digits",
+                          sha256.substr(0, 80));
   }
   return folder_ / sha256.substr(0, 2) / sha256.substr(2, 2) / sha256;
 }
@@ -69,7 +65,7 @@ fs::path BlobStore::Fetch(const std::string& sha256) const {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) {
     throw ServiceError(
-        ErrorCode::kNotFound, "BLOB_MISSING", "the blob " + sha256 + " is not stored; upload it");
+        ErrorCode::kNotFound, "BLOB_MISSING", "the blob {} is not stored; upload it", sha256);
   }
   return path;
 }
@@ -83,10 +79,14 @@ int64_t BlobStore::FreeBytes() const {
 void BlobStore::RequireSpace(int64_t bytes) const {
   const int64_t free = FreeBytes();
   if (free - bytes < options_.reserve_bytes) {
-    throw StorageFull(std::to_string(bytes) + " more bytes do not fit: " + std::to_string(free) +
-                      " are free on the server's disk, of which " +
-                      std::to_string(options_.reserve_bytes) +
-                      " are kept in reserve; delete jobs or scenes, or add disk space");
+    throw ServiceError(
+        ErrorCode::kResourceExhausted,
+        "STORAGE_FULL",
+        "{} more bytes do not fit: {} are free on the server's disk, of which {} are "
+        "kept in reserve; delete jobs or scenes, or add disk space",
+        bytes,
+        free,
+        options_.reserve_bytes);
   }
 }
 
@@ -114,7 +114,9 @@ FileDigest BlobStore::PutBytes(std::string_view bytes) {
   try {
     WriteFileAtomic(path, bytes);
   } catch (const Error& e) {
-    if (e.code() == ErrorCode::kResourceExhausted) throw StorageFull(e.what());
+    if (e.code() == ErrorCode::kResourceExhausted) {
+      throw ServiceError(e.code(), "STORAGE_FULL", e.what());
+    }
     throw;
   }
   ::chmod(path.c_str(), 0444);

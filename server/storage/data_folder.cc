@@ -21,17 +21,19 @@ void PrepareDataFolder(const DataPaths& paths) {
     fs::create_directories(folder, error);
     if (error || !fs::is_directory(folder)) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "cannot create the data directory " + folder.string() + ": " +
-                      (error ? error.message() : "it is not a folder") +
-                      "; choose another --data-dir or change its permissions");
+                  "cannot create the data directory {}: {}; choose another --data-dir or change "
+                  "its permissions",
+                  folder.string(),
+                  error ? error.message() : "it is not a folder");
     }
     const fs::path probe = folder / ".write-test";
     const int fd = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     if (fd < 0) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "the data directory " + folder.string() +
-                      " is not writable: " + std::strerror(errno) +
-                      "; choose another --data-dir or change its permissions");
+                  "the data directory {} is not writable: {}; choose another --data-dir or change "
+                  "its permissions",
+                  folder.string(),
+                  std::strerror(errno));
     }
     ::close(fd);
     ::unlink(probe.c_str());
@@ -42,13 +44,15 @@ DataFolderLock::DataFolderLock(const DataPaths& paths) {
   fd_ = ::open(paths.Lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (fd_ < 0) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot open " + paths.Lock().string() + ": " + std::strerror(errno));
+                "cannot open {}: {}",
+                paths.Lock().string(),
+                std::strerror(errno));
   }
   if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
     ::close(fd_);
     throw Error(ErrorCode::kFailedPrecondition,
-                "another server uses the data directory " + paths.root.string() +
-                    "; stop it or choose another --data-dir");
+                "another server uses the data directory {}; stop it or choose another --data-dir",
+                paths.root.string());
   }
 }
 

@@ -24,16 +24,16 @@ void CheckName(const UploadName& name, int64_t max_blob_bytes) {
   constexpr char kAllowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-";
   if (name.uuid.empty() || name.uuid.size() > 64 ||
       name.uuid.find_first_not_of(kAllowed) != std::string::npos) {
-    throw InvalidArgument("the upload id '" + name.uuid.substr(0, 80) +
-                          "' must be 1 to 64 letters, digits or '-'");
+    throw InvalidArgument("the upload id '{}' must be 1 to 64 letters, digits or '-'",
+                          name.uuid.substr(0, 80));
   }
   if (!IsSha256Hex(name.digest.sha256)) {
-    throw InvalidArgument("'" + name.digest.sha256.substr(0, 80) +
-                          "' is not a SHA-256 digest: 64 lower-case hexadecimal digits");
+    throw InvalidArgument("'{}' is not a SHA-256 digest: 64 lower-case hexadecimal digits",
+                          name.digest.sha256.substr(0, 80));
   }
   if (name.digest.size_bytes < 0 || name.digest.size_bytes > max_blob_bytes) {
-    throw InvalidArgument("a blob of " + std::to_string(name.digest.size_bytes) + " bytes: 0 to " +
-                          std::to_string(max_blob_bytes) + " are allowed");
+    throw InvalidArgument(
+        "a blob of {} bytes: 0 to {} are allowed", name.digest.size_bytes, max_blob_bytes);
   }
 }
 
@@ -42,9 +42,10 @@ void CheckName(const UploadName& name, int64_t max_blob_bytes) {
   if (error == ENOSPC || error == EDQUOT) {
     throw ServiceError(ErrorCode::kResourceExhausted,
                        "STORAGE_FULL",
-                       what + ": the server's disk is full; what was sent is kept, resume later");
+                       "{}: the server's disk is full; what was sent is kept, resume later",
+                       what);
   }
-  throw Error(ErrorCode::kInternal, what + ": " + std::strerror(error));
+  throw Error(ErrorCode::kInternal, "{}: {}", what, std::strerror(error));
 }
 
 }  // namespace
@@ -95,9 +96,10 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name, i
   if (offset != writer->size_) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "OFFSET_MISMATCH",
-                       "the upload has " + std::to_string(writer->size_) +
-                           " bytes, the write starts at " + std::to_string(offset) +
-                           "; ask QueryWriteStatus and go on from there");
+                       "the upload has {} bytes, the write starts at {}; ask QueryWriteStatus and "
+                       "go on from there",
+                       writer->size_,
+                       offset);
   }
   blobs_.RequireSpace(name.digest.size_bytes - writer->size_);
   writer->generation_ = ++writer->session_->generation;
@@ -130,13 +132,15 @@ void UploadStore::Writer::Append(int64_t offset, std::string_view data) {
   if (offset != size_) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "OFFSET_MISMATCH",
-                       "a write at offset " + std::to_string(offset) +
-                           " follows one that ended at " + std::to_string(size_));
+                       "a write at offset {} follows one that ended at {}",
+                       offset,
+                       size_);
   }
   if (size_ + static_cast<int64_t>(data.size()) > name_.digest.size_bytes) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "SIZE_MISMATCH",
-                       "more bytes than the announced " + std::to_string(name_.digest.size_bytes));
+                       "more bytes than the announced {}",
+                       name_.digest.size_bytes);
   }
   while (!data.empty()) {
     const ssize_t put = ::write(fd_, data.data(), data.size());
@@ -160,8 +164,9 @@ void UploadStore::Writer::Finish() {
   if (size_ != name_.digest.size_bytes) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "SIZE_MISMATCH",
-                       "the upload ends after " + std::to_string(size_) + " of the announced " +
-                           std::to_string(name_.digest.size_bytes) + " bytes");
+                       "the upload ends after {} of the announced {} bytes",
+                       size_,
+                       name_.digest.size_bytes);
   }
   const fs::path path = store_->PartPath(name_);
   const FileDigest actual = DigestFile(path);
@@ -169,8 +174,9 @@ void UploadStore::Writer::Finish() {
     ::unlink(path.c_str());
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "DIGEST_MISMATCH",
-                       "the bytes have the digest " + actual.sha256 + ", announced was " +
-                           name_.digest.sha256 + "; upload the file again");
+                       "the bytes have the digest {}, announced was {}; upload the file again",
+                       actual.sha256,
+                       name_.digest.sha256);
   }
   store_->blobs_.Adopt(path, actual);
 }

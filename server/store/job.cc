@@ -27,8 +27,8 @@ JobState JobStateFromName(std::string_view name) {
     if (name == kStateNames[i]) return static_cast<JobState>(i);
   }
   throw Error(ErrorCode::kDataLoss,
-              "the job store holds the unknown state '" + std::string(name) +
-                  "'; it may come from a newer version");
+              "the job store holds the unknown state '{}'; it may come from a newer version",
+              name);
 }
 
 std::string NewId() {

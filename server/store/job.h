@@ -40,8 +40,14 @@ struct ProgressRecord {
   std::string message;
   std::string error_name;  // empty: none yet
   double error_value = 0.0;
-  double seconds = 0.0;       // of computing, over all attempts
   double eta_seconds = -1.0;  // < 0: unknown
+};
+
+// What a job has taken, over all its attempts, and what it warned of.
+struct JobUsage {
+  double seconds = 0.0;  // of computing
+  int64_t peak_memory_bytes = 0;
+  std::vector<std::string> warnings;
 };
 
 struct JobError {
@@ -64,19 +70,18 @@ struct JobRecord {
   int max_attempts = 3;
   int64_t lease_epoch = 0;
   ProgressRecord progress;
+  JobUsage usage;
   std::vector<ArtifactRecord> artifacts;  // of succeeded jobs
   std::optional<JobError> error;
   std::string skip_reason;
   bool skipped_by_plan = false;  // at creation; not because an input failed
   bool cached = false;
-  std::vector<std::string> warnings;
   std::optional<FileDigest> checkpoint;
   int64_t create_ms = 0;
   int64_t start_ms = 0;  // 0: not yet
   int64_t end_ms = 0;
   std::string worker;
   int64_t revision = 0;
-  int64_t peak_memory_bytes = 0;
 };
 
 // What the owner of a running job shows to prove that it still is: every write of a worker names

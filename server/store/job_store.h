@@ -50,17 +50,11 @@ struct HeartbeatReply {
   bool cancel_requested = false;
 };
 
-struct AttemptUsage {
-  double seconds = 0.0;  // over all attempts
-  int64_t peak_memory_bytes = 0;
-  std::vector<std::string> warnings;
-};
-
 struct Publication {
   std::vector<ArtifactRecord> artifacts;
   std::string stage_key;  // empty: not to be found by later equal jobs
   bool cached = false;
-  AttemptUsage usage;
+  JobUsage usage;
 };
 
 enum class EventKind { kState, kProgress };
@@ -140,17 +134,17 @@ class JobStore {
   // A job of this kind to run beside those that the worker holds already: one that no worker was
   // lost with, that no waiting job of another kind comes before, of the submitted job with the
   // fewest running jobs, and that `accept` agrees to.
-  virtual std::optional<JobRecord> ClaimCompanion(
+  virtual std::optional<JobRecord> ClaimForBatch(
       const std::string& worker,
       int64_t lease_ms,
       const std::string& kind,
       const std::function<bool(const JobRecord&)>& accept) = 0;
   // The jobs that this one depends on, in order of creation, with artifacts.
   virtual std::vector<JobRecord> GetInputs(int64_t job_id) = 0;
-  // Extends the lease and stores progress and warnings (cheap: not synced to disk).
+  // Extends the lease and stores progress, seconds and warnings (cheap: not synced to disk).
   virtual HeartbeatReply Heartbeat(const Lease& lease,
                                    const ProgressRecord& progress,
-                                   const std::vector<std::string>& warnings,
+                                   const JobUsage& usage,
                                    int64_t lease_ms) = 0;
   // Reads only: whether the lease holds (kAborted if not) and cancellation was asked for.
   virtual HeartbeatReply Peek(const Lease& lease) = 0;
@@ -159,9 +153,9 @@ class JobStore {
   virtual void Publish(const Lease& lease, const Publication& publication) = 0;
   // kUnavailable and kAborted are tried again, with back-off, while attempts are left; kCancelled
   // ends as CANCELLED when cancellation was asked for.
-  virtual void Fail(const Lease& lease, const JobError& error, const AttemptUsage& usage) = 0;
+  virtual void Fail(const Lease& lease, const JobError& error, const JobUsage& usage) = 0;
   // Back to the queue without counting the attempt (drain).
-  virtual void Release(const Lease& lease, const AttemptUsage& usage) = 0;
+  virtual void Release(const Lease& lease, const JobUsage& usage) = 0;
   // Artifacts of a succeeded job with this key, newest first.
   virtual std::optional<JobRecord> FindStage(const std::string& stage_key) = 0;
 

@@ -1,5 +1,6 @@
 #include "server/store/sqlite_db.h"
 
+#include <fmt/core.h>
 #include <sqlite3.h>
 
 #include "server/service_error.h"
@@ -9,25 +10,27 @@ namespace {
 
 [[noreturn]] void ThrowSqlite(sqlite3* db, int code, const std::string& what) {
   const std::string detail = db != nullptr ? sqlite3_errmsg(db) : sqlite3_errstr(code);
-  const std::string text = "job store: " + what + ": " + detail;
+  const std::string text = fmt::format("job store: {}: {}", what, detail);
   switch (code & 0xff) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      throw ServiceError(ErrorCode::kUnavailable, "STORE_BUSY", text + "; try again");
+      throw ServiceError(ErrorCode::kUnavailable, "STORE_BUSY", "{}; try again", text);
     case SQLITE_FULL:
       throw ServiceError(
-          ErrorCode::kResourceExhausted, "STORAGE_FULL", text + "; free some disk space");
+          ErrorCode::kResourceExhausted, "STORAGE_FULL", "{}; free some disk space", text);
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
     case SQLITE_PERM:
       throw ServiceError(ErrorCode::kFailedPrecondition,
                          "STORE_NOT_WRITABLE",
-                         text + "; check the permissions of the data directory");
+                         "{}; check the permissions of the data directory",
+                         text);
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
       throw ServiceError(ErrorCode::kDataLoss,
                          "STORE_CORRUPT",
-                         text + "; restore jobs.db from a backup or start with a fresh --data-dir");
+                         "{}; restore jobs.db from a backup or start with a fresh --data-dir",
+                         text);
     default:
       throw ServiceError(ErrorCode::kInternal, "STORE_ERROR", text);
   }
@@ -104,7 +107,7 @@ SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
 
 void SqliteDatabase::Exec(const char* sql) {
   const int code = sqlite3_exec(db_, sql, nullptr, nullptr, nullptr);
-  if (code != SQLITE_OK) ThrowSqlite(db_, code, std::string("cannot run '") + sql + "'");
+  if (code != SQLITE_OK) ThrowSqlite(db_, code, fmt::format("cannot run '{}'", sql));
 }
 
 int64_t SqliteDatabase::LastInsertId() const { return sqlite3_last_insert_rowid(db_); }

@@ -1,4 +1,6 @@
 // What workers and the reaper call. Every write of a worker is fenced by its lease epoch.
+#include <fmt/core.h>
+
 #include <algorithm>
 
 #include "server/service_error.h"
@@ -12,8 +14,9 @@ namespace {
 ServiceError LeaseLost(const Lease& lease) {
   return ServiceError(ErrorCode::kAborted,
                       "LEASE_LOST",
-                      "this worker no longer holds job " + std::to_string(lease.job_id) +
-                          " (epoch " + std::to_string(lease.epoch) + ")");
+                      "this worker no longer holds job {} (epoch {})",
+                      lease.job_id,
+                      lease.epoch);
 }
 
 bool IsRetryable(ErrorCode code) {
@@ -42,7 +45,7 @@ std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_
   return job;
 }
 
-std::optional<JobRecord> SqliteJobStore::ClaimCompanion(
+std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     const std::string& worker,
     int64_t lease_ms,
     const std::string& kind,
@@ -99,10 +102,7 @@ std::vector<JobRecord> SqliteJobStore::GetInputs(int64_t job_id) {
       SelectJob("where job_id in (select input_id from job_dependency where job_id=?) "
                 "order by job_id"));
   select.Bind(job_id);
-  std::vector<JobRecord> jobs;
-  while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
-  return jobs;
+  return ReadJobs(select);
 }
 
 JobRecord SqliteJobStore::RequireLease(const Lease& lease) {
@@ -115,7 +115,7 @@ JobRecord SqliteJobStore::RequireLease(const Lease& lease) {
 
 HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
                                          const ProgressRecord& progress,
-                                         const std::vector<std::string>& warnings,
+                                         const JobUsage& usage,
                                          int64_t lease_ms) {
   std::lock_guard lock(mutex_);
   SqliteTransaction transaction(*db_, /*durable=*/false);
@@ -130,9 +130,9 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
       progress.message,
       progress.error_name,
       progress.error_value,
-      progress.seconds,
+      usage.seconds,
       progress.eta_seconds,
-      JoinLines(warnings),
+      JoinLines(usage.warnings),
       lease.job_id);
   const bool moved = before.progress.step != progress.step ||
                      before.progress.message != progress.message ||
@@ -168,7 +168,7 @@ void SqliteJobStore::FinishAttempt(const Lease& lease, const char* outcome) {
            lease.epoch);
 }
 
-void SqliteJobStore::StoreUsage(int64_t job_id, const AttemptUsage& usage) {
+void SqliteJobStore::StoreUsage(int64_t job_id, const JobUsage& usage) {
   db_->Run(
       "update job set seconds=?, eta_seconds=-1, warnings=?, "
       "peak_memory_bytes=max(peak_memory_bytes, ?) where job_id=?",
@@ -213,7 +213,7 @@ void SqliteJobStore::Requeue(const JobRecord& job, bool count_as_lost) {
   SetState(job.id, JobState::kQueued);
 }
 
-void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const AttemptUsage& usage) {
+void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const JobUsage& usage) {
   std::lock_guard lock(mutex_);
   SqliteTransaction transaction(*db_);
   const JobRecord job = RequireLease(lease);
@@ -229,7 +229,7 @@ void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const Attem
   transaction.Commit();
 }
 
-void SqliteJobStore::Release(const Lease& lease, const AttemptUsage& usage) {
+void SqliteJobStore::Release(const Lease& lease, const JobUsage& usage) {
   std::lock_guard lock(mutex_);
   SqliteTransaction transaction(*db_);
   const JobRecord job = RequireLease(lease);
@@ -282,10 +282,10 @@ int SqliteJobStore::ReapExpired() {
       EndFailed(job.id,
                 {ErrorCode::kInternal,
                  "WORKER_LOST",
-                 "the worker died or hung in each of " + std::to_string(job.attempt) +
-                     " attempts (last: " + job.worker +
-                     "); see its log, and how much memory "
-                     "the job needs"});
+                 fmt::format("the worker died or hung in each of {} attempts (last: {}); see its "
+                             "log, and how much memory the job needs",
+                             job.attempt,
+                             job.worker)});
     }
   }
   transaction.Commit();

@@ -13,7 +13,10 @@ namespace {
 ServiceError WrongState(const JobRecord& job, const std::string& remedy) {
   return ServiceError(ErrorCode::kFailedPrecondition,
                       "WRONG_STATE",
-                      job.name + " is " + JobStateName(job.state) + "; " + remedy);
+                      "{} is {}; {}",
+                      job.name,
+                      JobStateName(job.state),
+                      remedy);
 }
 
 bool CanBeRetried(const JobRecord& job) {
@@ -129,8 +132,8 @@ void RequireActive(const SceneRecord& scene) {
   if (scene.state == SceneState::kActive) return;
   throw ServiceError(ErrorCode::kFailedPrecondition,
                      "SCENE_NOT_ACTIVE",
-                     "the scene '" + scene.name +
-                         "' is not committed; upload its files and call CommitScene first");
+                     "the scene '{}' is not committed; upload its files and call CommitScene first",
+                     scene.name);
 }
 
 }  // namespace
@@ -142,23 +145,20 @@ void SqliteJobStore::InsertJob(const NewGraph& graph,
   const NewJob& job = graph.jobs[index];
   const bool is_root = index + 1 == graph.jobs.size();
   const bool skipped = !job.skip_reason.empty();
-  const int64_t now = Now();
-  db_->Run(
-      "insert into job(name, parent, kind, scene, spec, state, priority, max_attempts, "
-      "skip_reason, skipped_by_plan, create_ms, end_ms) values(?,?,?,?,?,?,?,?,?,?,?,?)",
-      names[index],
-      is_root ? std::string() : names.back(),
-      job.kind,
-      job.scene.empty() ? graph.scene : job.scene,
-      job.spec,
-      JobStateName(skipped ? JobState::kSkipped : JobState::kBlocked),
-      graph.priority,
-      options_.max_attempts,
-      job.skip_reason,
-      skipped,
-      now,
-      skipped ? now : int64_t{0});
-  const int64_t id = db_->LastInsertId();
+  JobRecord record;
+  record.name = names[index];
+  if (!is_root) record.parent = names.back();
+  record.kind = job.kind;
+  record.scene = job.scene.empty() ? graph.scene : job.scene;
+  record.spec = job.spec;
+  record.state = skipped ? JobState::kSkipped : JobState::kBlocked;
+  record.priority = graph.priority;
+  record.max_attempts = options_.max_attempts;
+  record.skip_reason = job.skip_reason;
+  record.skipped_by_plan = skipped;
+  record.create_ms = Now();
+  if (skipped) record.end_ms = record.create_ms;
+  const int64_t id = InsertJobRow(*db_, record);
   ids->push_back(id);
   std::set<int64_t> inputs;
   for (const int input : job.inputs) inputs.insert(ids->at(static_cast<size_t>(input)));
@@ -193,8 +193,9 @@ JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
   if (unfinished.Int(0) + static_cast<int64_t>(graph.jobs.size()) > max_unfinished) {
     throw ServiceError(ErrorCode::kResourceExhausted,
                        "QUEUE_FULL",
-                       std::to_string(unfinished.Int(0)) + " jobs wait or run, at most " +
-                           std::to_string(max_unfinished) + " are allowed; try again later");
+                       "{} jobs wait or run, at most {} are allowed; try again later",
+                       unfinished.Int(0),
+                       max_unfinished);
   }
   std::vector<std::string> names;
   for (size_t i = 0; i < graph.jobs.size(); ++i) names.push_back("jobs/" + NewId());

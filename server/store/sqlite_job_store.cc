@@ -32,11 +32,13 @@ void SqliteJobStore::OpenSchema() {
       return;
     }
     if (version.Int(0) != kSchemaVersion) {
-      throw ServiceError(ErrorCode::kFailedPrecondition,
-                         "STORE_VERSION",
-                         "the job store has version " + std::to_string(version.Int(0)) +
-                             ", this program reads version " + std::to_string(kSchemaVersion) +
-                             "; use the program that wrote it, or another --data-dir");
+      throw ServiceError(
+          ErrorCode::kFailedPrecondition,
+          "STORE_VERSION",
+          "the job store has version {}, this program reads version {}; use the program "
+          "that wrote it, or another --data-dir",
+          version.Int(0),
+          kSchemaVersion);
     }
     return;
   }
@@ -57,7 +59,7 @@ std::optional<JobRecord> SqliteJobStore::FindJob(const std::string& name) {
 JobRecord SqliteJobStore::RequireJob(const std::string& name) {
   std::optional<JobRecord> job = FindJob(name);
   if (!job) {
-    throw ServiceError(ErrorCode::kNotFound, "JOB_NOT_FOUND", "there is no job '" + name + "'");
+    throw ServiceError(ErrorCode::kNotFound, "JOB_NOT_FOUND", "there is no job '{}'", name);
   }
   return *std::move(job);
 }
@@ -66,7 +68,7 @@ JobRecord SqliteJobStore::JobById(int64_t job_id) {
   SqliteStatement select(db_->handle(), SelectJob("where job_id=?"));
   select.Bind(job_id);
   if (!select.Step()) {
-    throw Error(ErrorCode::kNotFound, "job " + std::to_string(job_id) + " was deleted");
+    throw Error(ErrorCode::kNotFound, "job {} was deleted", job_id);
   }
   JobRecord job = JobFromRow(select);
   job.artifacts = LoadArtifacts(job.id);
@@ -83,6 +85,13 @@ std::vector<ArtifactRecord> SqliteJobStore::LoadArtifacts(int64_t job_id) {
     artifacts.push_back({select.Text(0), {select.Text(1), select.Int(2)}, select.Text(3)});
   }
   return artifacts;
+}
+
+std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteStatement& select) {
+  std::vector<JobRecord> jobs;
+  while (select.Step()) jobs.push_back(JobFromRow(select));
+  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
+  return jobs;
 }
 
 std::vector<JobRecord> SqliteJobStore::GraphOf(const JobRecord& root) {
@@ -111,20 +120,14 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
   if (!filter.parent.empty()) select.Bind(filter.parent);
   if (!filter.scene.empty()) select.Bind(filter.scene);
   select.Bind(limit);
-  std::vector<JobRecord> jobs;
-  while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
-  return jobs;
+  return ReadJobs(select);
 }
 
 std::vector<JobRecord> SqliteJobStore::ListChildren(const std::string& name) {
   std::lock_guard lock(mutex_);
   SqliteStatement select(db_->handle(), SelectJob("where parent=? order by job_id"));
   select.Bind(name);
-  std::vector<JobRecord> jobs;
-  while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
-  return jobs;
+  return ReadJobs(select);
 }
 
 std::optional<std::string> SqliteJobStore::CheckRequest(const RequestKey& request) {
@@ -136,8 +139,9 @@ std::optional<std::string> SqliteJobStore::CheckRequest(const RequestKey& reques
   if (select.Text(0) != request.body_sha256) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "REQUEST_ID_REUSED",
-                       "request_id '" + request.id + "' was used for another " + request.method +
-                           " request; choose a fresh one");
+                       "request_id '{}' was used for another {} request; choose a fresh one",
+                       request.id,
+                       request.method);
   }
   return select.Text(1);
 }
@@ -203,10 +207,11 @@ std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision,
   if (revision < bounds.Int(0) || revision > bounds.Int(1)) {
     throw ServiceError(ErrorCode::kFailedPrecondition,
                        "REVISION_COMPACTED",
-                       "events after revision " + std::to_string(revision) +
-                           " are not kept (kept: " + std::to_string(bounds.Int(0)) + " to " +
-                           std::to_string(bounds.Int(1)) +
-                           "); get the jobs again and watch from revision 0");
+                       "events after revision {} are not kept (kept: {} to {}); get the jobs again "
+                       "and watch from revision 0",
+                       revision,
+                       bounds.Int(0),
+                       bounds.Int(1));
   }
   SqliteStatement select(db_->handle(),
                          "select revision, job_id, progress, state, attempt, at_ms from job_event "
@@ -234,8 +239,7 @@ JobsSnapshot SqliteJobStore::Snapshot(const std::vector<int64_t>& job_ids) {
     if (sequence.Step()) snapshot.revision = sequence.Int(0);
     SqliteStatement select(
         db_->handle(), SelectJob("where job_id in (" + JoinIds(job_ids) + ") order by revision"));
-    while (select.Step()) snapshot.jobs.push_back(JobFromRow(select));
-    for (JobRecord& job : snapshot.jobs) job.artifacts = LoadArtifacts(job.id);
+    snapshot.jobs = ReadJobs(select);
   } catch (...) {
     db_->Exec("rollback");
     throw;

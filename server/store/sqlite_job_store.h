@@ -53,7 +53,7 @@ class SqliteJobStore : public JobStore {
   void Delete(const std::string& name, const RequestKey& request) override;
 
   std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
-  std::optional<JobRecord> ClaimCompanion(
+  std::optional<JobRecord> ClaimForBatch(
       const std::string& worker,
       int64_t lease_ms,
       const std::string& kind,
@@ -61,13 +61,13 @@ class SqliteJobStore : public JobStore {
   std::vector<JobRecord> GetInputs(int64_t job_id) override;
   HeartbeatReply Heartbeat(const Lease& lease,
                            const ProgressRecord& progress,
-                           const std::vector<std::string>& warnings,
+                           const JobUsage& usage,
                            int64_t lease_ms) override;
   HeartbeatReply Peek(const Lease& lease) override;
   std::optional<FileDigest> SetCheckpoint(const Lease& lease, const FileDigest& blob) override;
   void Publish(const Lease& lease, const Publication& publication) override;
-  void Fail(const Lease& lease, const JobError& error, const AttemptUsage& usage) override;
-  void Release(const Lease& lease, const AttemptUsage& usage) override;
+  void Fail(const Lease& lease, const JobError& error, const JobUsage& usage) override;
+  void Release(const Lease& lease, const JobUsage& usage) override;
   std::optional<JobRecord> FindStage(const std::string& stage_key) override;
 
   int ReapExpired() override;
@@ -102,6 +102,8 @@ class SqliteJobStore : public JobStore {
   JobRecord RequireJob(const std::string& name);
   JobRecord JobById(int64_t job_id);
   std::vector<ArtifactRecord> LoadArtifacts(int64_t job_id);
+  // All rows of a SelectJob statement, with artifacts.
+  std::vector<JobRecord> ReadJobs(SqliteStatement& select);
   std::vector<JobRecord> GraphOf(const JobRecord& root);
   SceneRecord RequireScene(const std::string& name, bool with_files);
 
@@ -126,7 +128,7 @@ class SqliteJobStore : public JobStore {
                  const std::vector<std::string>& names,
                  std::vector<int64_t>* ids);
   void ResetForRetry(const JobRecord& job, bool from_scratch);
-  void StoreUsage(int64_t job_id, const AttemptUsage& usage);
+  void StoreUsage(int64_t job_id, const JobUsage& usage);
   int64_t Now() const { return clock_(); }
 
   std::mutex mutex_;

@@ -1,55 +1,153 @@
 #include "server/store/sqlite_rows.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <type_traits>
 
 namespace color3d {
+namespace {
 
-JobRecord JobFromRow(const SqliteStatement& row) {
-  JobRecord job;
-  int c = 0;
-  job.id = row.Int(c++);
-  job.name = row.Text(c++);
-  job.parent = row.Text(c++);
-  job.kind = row.Text(c++);
-  job.scene = row.Text(c++);
-  job.spec = row.Text(c++);
-  job.state = JobStateFromName(row.Text(c++));
-  job.cancel_requested = row.Int(c++) != 0;
-  job.priority = static_cast<int>(row.Int(c++));
-  job.attempt = static_cast<int>(row.Int(c++));
-  job.max_attempts = static_cast<int>(row.Int(c++));
-  job.lease_epoch = row.Int(c++);
-  job.progress.step = row.Int(c++);
-  job.progress.total_steps = row.Int(c++);
-  job.progress.message = row.Text(c++);
-  job.progress.error_name = row.Text(c++);
-  job.progress.error_value = row.Double(c++);
-  job.progress.seconds = row.Double(c++);
-  job.progress.eta_seconds = row.Double(c++);
-  JobError error;
-  error.code = static_cast<ErrorCode>(row.Int(c++));
-  error.reason = row.Text(c++);
-  error.message = row.Text(c++);
+// The columns of a table and where a record keeps their values: the one list that reading and
+// inserting follow. The id comes first; the database gives it.
+template <typename Visit>
+void VisitColumns(JobRecord& job, Visit&& visit) {
+  JobError error = job.error.value_or(JobError{});
+  FileDigest checkpoint = job.checkpoint.value_or(FileDigest{});
+  visit("job_id", job.id);
+  visit("name", job.name);
+  visit("parent", job.parent);
+  visit("kind", job.kind);
+  visit("scene", job.scene);
+  visit("spec", job.spec);
+  visit("state", job.state);
+  visit("cancel_requested", job.cancel_requested);
+  visit("priority", job.priority);
+  visit("attempt", job.attempt);
+  visit("max_attempts", job.max_attempts);
+  visit("lease_epoch", job.lease_epoch);
+  visit("lease_owner", job.worker);
+  visit("progress_step", job.progress.step);
+  visit("progress_total", job.progress.total_steps);
+  visit("progress_message", job.progress.message);
+  visit("progress_error_name", job.progress.error_name);
+  visit("progress_error_value", job.progress.error_value);
+  visit("eta_seconds", job.progress.eta_seconds);
+  visit("seconds", job.usage.seconds);
+  visit("peak_memory_bytes", job.usage.peak_memory_bytes);
+  visit("warnings", job.usage.warnings);
+  visit("error_code", error.code);
+  visit("error_reason", error.reason);
+  visit("error_message", error.message);
+  visit("skip_reason", job.skip_reason);
+  visit("skipped_by_plan", job.skipped_by_plan);
+  visit("cached", job.cached);
+  visit("checkpoint_sha256", checkpoint.sha256);
+  visit("checkpoint_bytes", checkpoint.size_bytes);
+  visit("create_ms", job.create_ms);
+  visit("start_ms", job.start_ms);
+  visit("end_ms", job.end_ms);
+  visit("revision", job.revision);
   if (!error.reason.empty()) job.error = error;
-  job.skip_reason = row.Text(c++);
-  job.skipped_by_plan = row.Int(c++) != 0;
-  job.cached = row.Int(c++) != 0;
-  job.warnings = SplitLines(row.Text(c++));
-  FileDigest checkpoint;
-  checkpoint.sha256 = row.Text(c++);
-  checkpoint.size_bytes = row.Int(c++);
   if (!checkpoint.sha256.empty()) job.checkpoint = checkpoint;
-  job.create_ms = row.Int(c++);
-  job.start_ms = row.Int(c++);
-  job.end_ms = row.Int(c++);
-  job.worker = row.Text(c++);
-  job.revision = row.Int(c++);
-  job.peak_memory_bytes = row.Int(c++);
-  return job;
 }
 
+template <typename Visit>
+void VisitColumns(SceneRecord& scene, Visit&& visit) {
+  visit("scene_id", scene.id);
+  visit("name", scene.name);
+  visit("display_name", scene.display_name);
+  visit("active", scene.state);
+  visit("layout", scene.layout);
+  visit("photo_count", scene.photo_count);
+  visit("create_ms", scene.create_ms);
+  visit("commit_ms", scene.commit_ms);
+  visit("key_color_job", scene.key_color_job);
+}
+
+template <typename T>
+void Read(const SqliteStatement& row, int column, T* value) {
+  if constexpr (std::is_same_v<T, std::string>) {
+    *value = row.Text(column);
+  } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+    *value = SplitLines(row.Text(column));
+  } else if constexpr (std::is_same_v<T, JobState>) {
+    *value = JobStateFromName(row.Text(column));
+  } else if constexpr (std::is_same_v<T, double>) {
+    *value = row.Double(column);
+  } else if constexpr (std::is_same_v<T, bool>) {
+    *value = row.Int(column) != 0;
+  } else {  // integers, and enumerations stored as such
+    *value = static_cast<T>(row.Int(column));
+  }
+}
+
+template <typename T>
+void Write(SqliteStatement& statement, const T& value) {
+  if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+    statement.Bind(JoinLines(value));
+  } else if constexpr (std::is_same_v<T, JobState>) {
+    statement.Bind(JobStateName(value));
+  } else if constexpr (std::is_enum_v<T>) {
+    statement.Bind(static_cast<int64_t>(value));
+  } else {
+    statement.Bind(value);
+  }
+}
+
+template <typename Record>
+std::vector<std::string> ColumnNames() {
+  std::vector<std::string> names;
+  Record record;
+  VisitColumns(record, [&](const char* name, auto&) { names.emplace_back(name); });
+  return names;
+}
+
+template <typename Record>
+Record RecordFromRow(const SqliteStatement& row) {
+  Record record;
+  int column = 0;
+  VisitColumns(record, [&](const char*, auto& value) { Read(row, column++, &value); });
+  return record;
+}
+
+template <typename Record>
+int64_t InsertRow(SqliteDatabase& db, const char* table, Record record) {
+  static const std::vector<std::string> names = ColumnNames<Record>();
+  const auto inserted = names.begin() + 1;  // all but the id
+  const std::vector<const char*> places(names.size() - 1, "?");
+  SqliteStatement insert(db.handle(),
+                         fmt::format("insert into {}({}) values({})",
+                                     table,
+                                     fmt::join(inserted, names.end(), ", "),
+                                     fmt::join(places, ",")));
+  VisitColumns(record, [&](const char* name, const auto& value) {
+    if (name != names.front()) Write(insert, value);
+  });
+  insert.Run();
+  return db.LastInsertId();
+}
+
+}  // namespace
+
 std::string SelectJob(const std::string& tail) {
-  return std::string("select ") + kJobColumns + " from job " + tail;
+  static const std::string columns = fmt::format("{}", fmt::join(ColumnNames<JobRecord>(), ", "));
+  return fmt::format("select {} from job {}", columns, tail);
+}
+
+JobRecord JobFromRow(const SqliteStatement& row) { return RecordFromRow<JobRecord>(row); }
+
+int64_t InsertJobRow(SqliteDatabase& db, const JobRecord& job) { return InsertRow(db, "job", job); }
+
+std::string SelectScene(const std::string& tail) {
+  static const std::string columns = fmt::format("{}", fmt::join(ColumnNames<SceneRecord>(), ", "));
+  return fmt::format("select {} from scene {}", columns, tail);
+}
+
+SceneRecord SceneFromRow(const SqliteStatement& row) { return RecordFromRow<SceneRecord>(row); }
+
+int64_t InsertSceneRow(SqliteDatabase& db, const SceneRecord& scene) {
+  return InsertRow(db, "scene", scene);
 }
 
 std::string JoinLines(const std::vector<std::string>& lines) {
@@ -75,12 +173,7 @@ std::vector<std::string> SplitLines(const std::string& text) {
 }
 
 std::string JoinIds(const std::vector<int64_t>& ids) {
-  std::string text;
-  for (const int64_t id : ids) {
-    if (!text.empty()) text += ',';
-    text += std::to_string(id);
-  }
-  return text;
+  return fmt::format("{}", fmt::join(ids, ","));
 }
 
 }  // namespace color3d

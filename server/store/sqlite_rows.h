@@ -1,4 +1,4 @@
-// Reading job and scene rows; internal to the SQLite store.
+// Jobs and scenes as rows of the database; internal to the SQLite store.
 #pragma once
 
 #include <string>
@@ -9,18 +9,16 @@
 
 namespace color3d {
 
-// The columns that JobFromRow expects, in its order.
-constexpr char kJobColumns[] =
-    "job_id, name, parent, kind, scene, spec, state, cancel_requested, priority, attempt, "
-    "max_attempts, lease_epoch, progress_step, progress_total, progress_message, "
-    "progress_error_name, progress_error_value, seconds, eta_seconds, error_code, error_reason, "
-    "error_message, skip_reason, skipped_by_plan, cached, warnings, checkpoint_sha256, "
-    "checkpoint_bytes, create_ms, start_ms, end_ms, lease_owner, revision, peak_memory_bytes";
-
-JobRecord JobFromRow(const SqliteStatement& row);
-
-// "select <job columns> from job <tail>".
+// "select <columns> from job <tail>", and such a row as a record (without artifacts).
 std::string SelectJob(const std::string& tail);
+JobRecord JobFromRow(const SqliteStatement& row);
+// A new row with all of the record but its id; returns the id.
+int64_t InsertJobRow(SqliteDatabase& db, const JobRecord& job);
+
+// The same for scenes (without files).
+std::string SelectScene(const std::string& tail);
+SceneRecord SceneFromRow(const SqliteStatement& row);
+int64_t InsertSceneRow(SqliteDatabase& db, const SceneRecord& scene);
 
 // Warnings are single lines, stored joined by newlines.
 std::string JoinLines(const std::vector<std::string>& lines);

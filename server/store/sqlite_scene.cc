@@ -1,36 +1,19 @@
 // Scenes and colorizers of the SQLite store.
+#include <fmt/core.h>
+
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
 #include "server/service_error.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"
+#include "server/store/sqlite_rows.h"
 
 namespace color3d {
-namespace {
-
-SceneRecord SceneFromRow(const SqliteStatement& row) {
-  SceneRecord scene;
-  scene.id = row.Int(0);
-  scene.name = row.Text(1);
-  scene.display_name = row.Text(2);
-  scene.state = row.Int(3) != 0 ? SceneState::kActive : SceneState::kUploading;
-  scene.layout = static_cast<StoredLayout>(row.Int(4));
-  scene.photo_count = static_cast<int>(row.Int(5));
-  scene.create_ms = row.Int(6);
-  scene.commit_ms = row.Int(7);
-  scene.key_color_job = row.Text(8);
-  return scene;
-}
-
-constexpr char kSelectScene[] =
-    "select scene_id, name, display_name, active, layout, photo_count, create_ms, commit_ms, "
-    "key_color_job from scene ";
-
-}  // namespace
-
 SceneRecord SqliteJobStore::RequireScene(const std::string& name, bool with_files) {
-  SqliteStatement select(db_->handle(), std::string(kSelectScene) + "where name=?");
+  SqliteStatement select(db_->handle(), SelectScene("where name=?"));
   select.Bind(name);
   if (!select.Step()) {
-    throw ServiceError(ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '" + name + "'");
+    throw ServiceError(ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '{}'", name);
   }
   SceneRecord scene = SceneFromRow(select);
   if (!with_files) return scene;
@@ -53,13 +36,14 @@ SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record, const Request
   if (existing.Step()) {
     throw ServiceError(ErrorCode::kAlreadyExists,
                        "SCENE_EXISTS",
-                       "the scene '" + record.name + "' exists; choose another scene_id");
+                       "the scene '{}' exists; choose another scene_id",
+                       record.name);
   }
-  db_->Run("insert into scene(name, display_name, create_ms) values(?,?,?)",
-           record.name,
-           record.display_name,
-           Now());
-  const int64_t scene_id = db_->LastInsertId();
+  SceneRecord fresh;
+  fresh.name = record.name;
+  fresh.display_name = record.display_name;
+  fresh.create_ms = Now();
+  const int64_t scene_id = InsertSceneRow(*db_, fresh);
   for (const SceneFileRecord& file : record.files) {
     db_->Run("insert into scene_file values(?,?,?,?)",
              scene_id,
@@ -80,9 +64,8 @@ SceneRecord SqliteJobStore::GetScene(const std::string& name) {
 
 std::vector<SceneRecord> SqliteJobStore::ListScenes(int64_t before_id, int limit) {
   std::lock_guard lock(mutex_);
-  SqliteStatement select(
-      db_->handle(),
-      std::string(kSelectScene) + "where scene_id < ? order by scene_id desc limit ?");
+  SqliteStatement select(db_->handle(),
+                         SelectScene("where scene_id < ? order by scene_id desc limit ?"));
   select.Bind(before_id > 0 ? before_id : INT64_MAX, limit);
   std::vector<SceneRecord> scenes;
   while (select.Step()) scenes.push_back(SceneFromRow(select));
@@ -120,15 +103,20 @@ SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
   RequireScene(name, false);
   if (!job.empty()) {
     const JobRecord record = RequireJob(job);
-    if (record.kind != "colorize_key_view" || record.scene != name) {
-      throw InvalidArgument(job + " is a " + record.kind + " job of " + record.scene +
-                            "; give a colorize_key_view job of " + name);
+    if (record.kind != kind::kColorizeKeyView || record.scene != name) {
+      throw InvalidArgument("{} is a {} job of {}; give a {} job of {}",
+                            job,
+                            record.kind,
+                            record.scene,
+                            kind::kColorizeKeyView,
+                            name);
     }
     if (record.state != JobState::kSucceeded) {
       throw ServiceError(ErrorCode::kFailedPrecondition,
                          "WRONG_STATE",
-                         job + " is " + JobStateName(record.state) +
-                             "; only a key view that has been coloured can be accepted");
+                         "{} is {}; only a key view that has been coloured can be accepted",
+                         job,
+                         JobStateName(record.state));
     }
   }
   db_->Run("update scene set key_color_job=? where name=?", job, name);
@@ -146,10 +134,11 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
   SqliteStatement busy(db_->handle(), "select name from job where scene=? and end_ms=0 limit 1");
   busy.Bind(name);
   if (busy.Step()) {
-    throw ServiceError(
-        ErrorCode::kFailedPrecondition,
-        "SCENE_IN_USE",
-        busy.Text(0) + " of the scene '" + name + "' is not finished; cancel it or wait for it");
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "SCENE_IN_USE",
+                       "{} of the scene '{}' is not finished; cancel it or wait for it",
+                       busy.Text(0),
+                       name);
   }
   db_->Run("delete from scene where scene_id=?", scene.id);
   RecordRequest(request, name);
@@ -159,10 +148,15 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
 namespace {
 
 // Equal files made by several jobs (cached runs) are one colorizer: that of the oldest job.
-constexpr char kSelectColorizer[] =
-    "select min(j.job_id), j.name, j.scene, a.sha256, a.size_bytes, j.end_ms from artifact a "
-    "join job j on j.job_id=a.job_id where a.name='colorizer.c3c' and j.kind='personalize' and "
-    "j.state='SUCCEEDED' ";
+std::string SelectColorizer(const std::string& tail) {
+  static const std::string select = fmt::format(
+      "select min(j.job_id), j.name, j.scene, a.sha256, a.size_bytes, j.end_ms from artifact a "
+      "join job j on j.job_id=a.job_id where a.name='{}' and j.kind='{}' and "
+      "j.state='SUCCEEDED' ",
+      artifact::kColorizer,
+      StageThatLeaves(artifact::kColorizer)->kind);
+  return select + tail;
+}
 
 ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
   return {row.Int(0), row.Text(1), row.Text(2), {row.Text(3), row.Int(4)}, row.Int(5)};
@@ -175,9 +169,9 @@ std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(const std::string& s
                                                             int limit) {
   std::lock_guard lock(mutex_);
   SqliteStatement select(db_->handle(),
-                         std::string(kSelectColorizer) +
-                             "and (?1='' or j.scene=?1) group by a.sha256 having "
-                             "min(j.job_id) < ?2 order by min(j.job_id) desc limit ?3");
+                         SelectColorizer("and (?1='' or j.scene=?1) group by a.sha256 having "
+                                         "min(j.job_id) < ?2 order by min(j.job_id) desc "
+                                         "limit ?3"));
   select.Bind(scene, before_id > 0 ? before_id : INT64_MAX, limit);
   std::vector<ColorizerRecord> colorizers;
   while (select.Step()) colorizers.push_back(ColorizerFromRow(select));
@@ -186,13 +180,13 @@ std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(const std::string& s
 
 ColorizerRecord SqliteJobStore::GetColorizer(const std::string& sha256) {
   std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(),
-                         std::string(kSelectColorizer) + "and a.sha256=? group by a.sha256");
+  SqliteStatement select(db_->handle(), SelectColorizer("and a.sha256=? group by a.sha256"));
   select.Bind(sha256);
   if (!select.Step()) {
     throw ServiceError(ErrorCode::kNotFound,
                        "COLORIZER_NOT_FOUND",
-                       "there is no colorizer 'colorizers/" + sha256 + "'");
+                       "there is no colorizer 'colorizers/{}'",
+                       sha256);
   }
   return ColorizerFromRow(select);
 }

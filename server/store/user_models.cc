@@ -33,19 +33,22 @@ struct Entry {
 Entry Split(const std::string& text, const std::string& flag, const std::string& what) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals + 1 == text.size()) {
-    throw InvalidArgument(flag + " " + text + " is not NAME=" + what);
+    throw InvalidArgument("{} {} is not NAME={}", flag, text, what);
   }
   Entry entry{text.substr(0, equals), text.substr(equals + 1)};
   if (!IsName(entry.name)) {
-    throw InvalidArgument(flag + " " + text + ": the name '" + entry.name +
-                          "' must be 1 to 64 of a-z, 0-9, '.', '_' and '-', beginning with a "
-                          "letter or digit");
+    throw InvalidArgument(
+        "{} {}: the name '{}' must be 1 to 64 of a-z, 0-9, '.', '_' and '-', beginning with a "
+        "letter or digit",
+        flag,
+        text,
+        entry.name);
   }
   return entry;
 }
 
 [[noreturn]] void GivenTwice(const std::string& flag, const std::string& name) {
-  throw InvalidArgument(flag + " " + name + " is given twice; give each name once");
+  throw InvalidArgument("{} {} is given twice; give each name once", flag, name);
 }
 
 std::string ReadUpTo(std::istream& stream, int64_t bytes) {
@@ -83,9 +86,11 @@ void RequireReadable(const UserModels& models) {
   for (const auto& [name, file] : models.files) {
     std::error_code none;
     if (!fs::is_regular_file(file, none) || !std::ifstream(file, std::ios::binary).good()) {
-      throw Error(ErrorCode::kNotFound,
-                  "--model " + name + "=" + file.string() +
-                      ": there is no such file that can be read; name the file with the weights");
+      throw Error(
+          ErrorCode::kNotFound,
+          "--model {}={}: there is no such file that can be read; name the file with the weights",
+          name,
+          file.string());
     }
   }
 }
@@ -103,7 +108,7 @@ std::vector<std::string> ToFlags(const UserModels& models) {
 
 std::string LooksLike(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw Error(ErrorCode::kNotFound, "cannot read " + file.string());
+  if (!stream) throw Error(ErrorCode::kNotFound, "cannot read {}", file.string());
   const std::string head = ReadUpTo(stream, kHeadBytes);
   std::error_code error;
   const auto size = static_cast<int64_t>(fs::file_size(file, error));

@@ -1,5 +1,6 @@
 #include "server/worker/attempt.h"
 
+#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -12,7 +13,8 @@
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "server/ops/process.h"
-#include "server/planning/planner.h"
+#include "server/planning/job_spec.h"
+#include "server/planning/stage_key.h"
 #include "server/service_error.h"
 #include "server/worker/blob_checkpoints.h"
 
@@ -65,7 +67,7 @@ class StoredBlobs : public BlobSource {
 
 class Attempt {
  public:
-  Attempt(const AttemptContext& context, const JobRecord& job, bool in_company)
+  Attempt(const AttemptContext& context, const JobRecord& job, bool shares_process)
       : context_(context),
         job_(job),
         tag_(AttemptTag(job)),
@@ -79,7 +81,7 @@ class Attempt {
             [this] { context_.on_heartbeat(job_); },
             [this](StopReason reason) { GiveUp(reason); }),
         checkpoints_(context.store, context.blobs, job, context.checkpoint_interval) {
-    if (!in_company) ResetPeakMemory();
+    if (!shares_process) ResetPeakMemory();
   }
   ~Attempt() {
     std::error_code error;
@@ -126,10 +128,12 @@ void Attempt::Run() {
   } catch (const Error& e) {
     HandleError({e.code(), ReasonOf(e), e.what()});
   } catch (const std::bad_alloc&) {
-    HandleError({ErrorCode::kResourceExhausted,
-                 "OUT_OF_MEMORY",
-                 job_.kind + " ran out of memory; use smaller pictures (max_side_px) or a machine "
-                             "with more"});
+    HandleError(
+        {ErrorCode::kResourceExhausted,
+         "OUT_OF_MEMORY",
+         fmt::format("{} ran out of memory; use smaller pictures (max_side_px) or a machine "
+                     "with more",
+                     job_.kind)});
   } catch (const fs::filesystem_error& e) {
     const bool full = e.code() == std::errc::no_space_on_device;
     HandleError({full ? ErrorCode::kResourceExhausted : ErrorCode::kInternal,
@@ -144,9 +148,7 @@ void Attempt::Prepare() {
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
   run_.project = job_.parent.empty() ? job_.name : job_.parent;
-  if (!run_.spec.ParseFromString(job_.spec)) {
-    throw Error(ErrorCode::kDataLoss, "the stored spec of {} is damaged", job_.name);
-  }
+  run_.spec = ParseSpec(job_.spec, job_.name);
   run_.threads = context_.threads;
   run_.attempt = job_.attempt;
   run_.models = context_.models;
@@ -175,9 +177,9 @@ void Attempt::Prepare() {
     run_.graph.push_back({.kind = child.kind,
                           .state = JobStateName(child.state),
                           .skip_reason = child.skip_reason,
-                          .seconds = child.progress.seconds,
-                          .peak_memory_bytes = child.peak_memory_bytes,
-                          .warnings = child.warnings});
+                          .seconds = child.usage.seconds,
+                          .peak_memory_bytes = child.usage.peak_memory_bytes,
+                          .warnings = child.usage.warnings});
   }
   const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
@@ -201,15 +203,19 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
     const auto file = context_.models.files.find(name);
     if (file == context_.models.files.end()) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  job_.kind + " needs the model '" + name + "', which this server does not have (" +
-                      "it has: " + NamesOf(context_.models.files) + "); start it with --model " +
-                      name + "=FILE and retry the job");
+                  "{} needs the model '{}', which this server does not have (it has: {}); start it "
+                  "with --model {}=FILE and retry the job",
+                  job_.kind,
+                  name,
+                  NamesOf(context_.models.files),
+                  name);
     }
     std::error_code none;
     if (!fs::is_regular_file(file->second, none)) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "the file of the model '" + name + "' (" + file->second.string() +
-                      ") is gone; put it back and retry the job");
+                  "the file of the model '{}' ({}) is gone; put it back and retry the job",
+                  name,
+                  file->second.string());
     }
     ModelFile& model = models_[name];
     model = {file->second, IdentityOf(file->second), ""};
@@ -226,8 +232,10 @@ void Attempt::RequireModelsUnchanged() const {
     if (IdentityOf(model.file) == model.identity) continue;
     throw ServiceError(ErrorCode::kAborted,
                        "MODEL_CHANGED",
-                       "the file of the model '" + name + "' (" + model.file.string() +
-                           ") was replaced while " + job_.kind + " ran; retry the job");
+                       "the file of the model '{}' ({}) was replaced while {} ran; retry the job",
+                       name,
+                       model.file.string(),
+                       job_.kind);
   }
 }
 
@@ -244,7 +252,7 @@ bool Attempt::ServeFromCache() {
   publication.artifacts = earlier->artifacts;
   publication.stage_key = stage_key_;
   publication.cached = true;
-  publication.usage = {earlier->progress.seconds, earlier->peak_memory_bytes, earlier->warnings};
+  publication.usage = earlier->usage;
   context_.store.Publish(keeper_.lease(), publication);
   spdlog::info("{} served from the stage cache ({})", tag_, earlier->name);
   return true;
@@ -263,8 +271,7 @@ void Attempt::Publish(const StageOutput& output) {
   for (const std::string& name : output.passed_on) {
     const auto artifact = input_artifacts_.find(name);
     if (artifact == input_artifacts_.end()) {
-      throw Error(ErrorCode::kInternal,
-                  job_.kind + " passes on '" + name + "', which no input has");
+      throw Error(ErrorCode::kInternal, "{} passes on '{}', which no input has", job_.kind, name);
     }
     publication.artifacts.push_back(artifact->second);
   }
@@ -272,9 +279,10 @@ void Attempt::Publish(const StageOutput& output) {
     const fs::path file = run_.output_folder / name;
     std::error_code error;
     if (!IsSafeRelativePath(name) || !fs::is_regular_file(fs::symlink_status(file, error))) {
-      throw Error(
-          ErrorCode::kInternal,
-          job_.kind + " names the result '" + name + "', which is not a file in its output folder");
+      throw Error(ErrorCode::kInternal,
+                  "{} names the result '{}', which is not a file in its output folder",
+                  job_.kind,
+                  name);
     }
     context_.blobs.RequireSpace(0);
     publication.artifacts.push_back({name, context_.blobs.PutFile(file), MediaType(name)});
@@ -289,7 +297,7 @@ void Attempt::Publish(const StageOutput& output) {
 }
 
 void Attempt::LogEnd(const char* how) {
-  const AttemptUsage usage = keeper_.Usage();
+  const JobUsage usage = keeper_.Usage();
   spdlog::info("{} {} after {:.1f} s, peak memory {} MiB, now {} MiB",
                tag_,
                how,
@@ -320,7 +328,7 @@ void Attempt::HandleError(const JobError& error) {
 }
 
 void Attempt::Conclude(JobStore& store, StopReason reason, const JobError& error) {
-  const AttemptUsage usage = keeper_.Usage();
+  const JobUsage usage = keeper_.Usage();
   switch (reason) {
     case StopReason::kLeaseLost:
       spdlog::warn("{} lost its lease; nothing is published", tag_);
@@ -332,12 +340,13 @@ void Attempt::Conclude(JobStore& store, StopReason reason, const JobError& error
       store.Release(keeper_.lease(), usage);
       return LogEnd("was released for another worker");
     case StopReason::kStuck:
-      store.Fail(keeper_.lease(),
-                 {ErrorCode::kDeadlineExceeded,
-                  "STAGE_STUCK",
-                  job_.kind + " made no progress for " +
-                      std::to_string(context_.timing.stuck.count() / 1000) + " s"},
-                 usage);
+      store.Fail(
+          keeper_.lease(),
+          {ErrorCode::kDeadlineExceeded,
+           "STAGE_STUCK",
+           fmt::format(
+               "{} made no progress for {} s", job_.kind, context_.timing.stuck.count() / 1000)},
+          usage);
       return LogEnd("was stuck");
     case StopReason::kNone:
       break;
@@ -362,8 +371,8 @@ void Attempt::GiveUp(StopReason reason) {
 
 }  // namespace
 
-void RunAttempt(const AttemptContext& context, const JobRecord& job, bool in_company) {
-  Attempt attempt(context, job, in_company);
+void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares_process) {
+  Attempt attempt(context, job, shares_process);
   attempt.Run();
 }
 

@@ -36,7 +36,7 @@ struct AttemptContext {
 
 // Never throws: whatever happens is written to the store, or, when that is impossible, left to the
 // lease's end.
-// `in_company`: other attempts run in this process; peak memory is then that of all together.
-void RunAttempt(const AttemptContext& context, const JobRecord& job, bool in_company = false);
+// `shares_process`: other attempts run in it, too; peak memory is then that of all together.
+void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares_process = false);
 
 }  // namespace color3d

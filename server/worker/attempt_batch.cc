@@ -9,10 +9,10 @@ AttemptBatch::~AttemptBatch() {
 }
 
 void AttemptBatch::Start(const JobRecord& job) {
-  const bool in_company = !running_.empty();
+  const bool shares_process = !running_.empty();
   Running& running = running_.emplace_back();
-  running.thread = std::thread([this, job, in_company, &running] {
-    RunAttempt(context_, job, in_company);
+  running.thread = std::thread([this, job, shares_process, &running] {
+    RunAttempt(context_, job, shares_process);
     std::lock_guard lock(mutex_);
     running.ended = true;
     ended_.notify_all();

@@ -72,12 +72,13 @@ std::shared_ptr<const Encoder> CoreLiveEngine::FindEncoder(const std::string& na
   }
   const auto file = setup_.models.files.find(name);
   if (file == setup_.models.files.end()) {
-    throw ServiceError(
-        ErrorCode::kFailedPrecondition,
-        "UNKNOWN_MODEL",
-        "the colorizer was trained with the encoder '" + name +
-            "', which this server does not have; it has: " + NamesOf(setup_.models.files) +
-            "; start it with --model " + name + "=FILE");
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "UNKNOWN_MODEL",
+                       "the colorizer was trained with the encoder '{}', which this server does "
+                       "not have; it has: {}; start it with --model {}=FILE",
+                       name,
+                       NamesOf(setup_.models.files),
+                       name);
   }
   std::weak_ptr<const Encoder>& known = encoders_[digests_.Of(file->second).sha256];
   std::shared_ptr<const Encoder> encoder = known.lock();
@@ -107,18 +108,16 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   ColorizerOptions options;
   options.iterations = 0;
   options.max_side_px = kExampleSidePx;
-  options.threads = setup_.threads;
   const Image lab = LabFromSrgb(FitWithin(srgb, options.max_side_px));
   LoadedColorizer loaded;
   loaded.encoder = FindEncoder(request.encoder());
+  ThreadPool pool(setup_.threads);
   NoCheckpoints checkpoints;
   NullObserver progress;
   loaded.colorizer = TrainColorizer(loaded.encoder,
                                     {{"the example", LuminanceOfLab(lab), ChromaOfLab(lab)}},
                                     options,
-                                    checkpoints,
-                                    progress,
-                                    CancellationToken());
+                                    {pool, checkpoints, progress, CancellationToken()});
   loaded.bytes = int64_t{8} << 20;  // bank and decoder
   return loaded;
 }

@@ -7,8 +7,8 @@
 #include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
-#include "core/colorizer/archive.h"
 #include "core/colorizer/colorizer.h"
+#include "core/colorizer/tensor_file.h"
 #include "core/image/codec.h"
 #include "server/service_error.h"
 #include "server/worker/live_engine.h"
@@ -111,7 +111,7 @@ TEST_F(CoreLiveEngineTest, MixedExamplesDoNotMixAndLuminanceIsKept) {
   }
 }
 
-TEST_F(CoreLiveEngineTest, ColourPicturesAndSixteenBitsAreTakenAndSizesObeyed) {
+TEST_F(CoreLiveEngineTest, ColorPicturesAndSixteenBitsAreTakenAndSizesObeyed) {
   const std::string red = Example(40, 15);
   std::vector<Request> requests = {
       ByExample(red, EncodePng8(SrgbFromLab(TintedLab(-20, 20)))),
@@ -157,22 +157,22 @@ TEST_F(CoreLiveEngineTest, AColorizerOfAnotherEncoderIsRefusedByDigest) {
   ColorizerOptions options;
   options.iterations = 0;
   options.max_side_px = 64;
+  ThreadPool pool(1);
   NoCheckpoints checkpoints;
   NullObserver progress;
   const Image lab = TintedLab(40, 15);
   const std::string bytes = TrainColorizer(Encoder::Embedded(),
                                            {{"key", LuminanceOfLab(lab), ChromaOfLab(lab)}},
                                            options,
-                                           checkpoints,
-                                           progress,
-                                           CancellationToken())
+                                           {pool, checkpoints, progress, CancellationToken()})
                                 ->Serialize();
-  Archive archive = ReadArchive(bytes, "C3DCOLR1", 3, "it");
+  TensorFile file = ReadTensorFile(bytes, kColorizerFormat, "it");
   const std::string digest = Encoder::Embedded()->digest(), other(64, 'f');
-  archive.header.replace(archive.header.find(digest), digest.size(), other);
+  ASSERT_EQ(file.facts.at("encoder"), digest);
+  file.facts["encoder"] = other;
   Request own, foreign;
   own.set_colorizer_sha256(Put(bytes));
-  foreign.set_colorizer_sha256(Put(WriteArchive(archive, "C3DCOLR1")));
+  foreign.set_colorizer_sha256(Put(WriteTensorFile(file, kColorizerFormat)));
   own.set_image(GrayPng());
   foreign.set_image(GrayPng());
   const auto errors = Run({own, foreign, own});

@@ -56,7 +56,7 @@ grpc::ServerUnaryReactor* InferenceQueue::ColorizeImage(
   return reactor;
 }
 
-InferenceQueue::State InferenceQueue::Look() const {
+InferenceQueue::State InferenceQueue::state() const {
   std::lock_guard lock(mutex_);
   const auto now = SteadyClock::now();
   State state;

@@ -33,7 +33,7 @@ class InferenceQueue final : public internal::v1::InferenceService::CallbackServ
     std::chrono::steady_clock::duration batch{};  // of the batch under way; 0: none
     int64_t pictures = 0;                         // answered so far
   };
-  State Look() const;
+  State state() const;
 
  private:
   using SteadyClock = std::chrono::steady_clock;

@@ -59,15 +59,16 @@ void InferenceWorker::Listen() {
   builder.RegisterService(&queue_);
   server_ = builder.BuildAndStart();
   if (server_) return;
-  throw Error(ErrorCode::kFailedPrecondition,
-              "cannot listen on the socket " + options_.socket + " in " +
-                  DataPaths(options_.data_folder).Sockets().string() +
-                  "; the file system of --data-dir must allow sockets");
+  throw Error(
+      ErrorCode::kFailedPrecondition,
+      "cannot listen on the socket {} in {}; the file system of --data-dir must allow sockets",
+      options_.socket,
+      DataPaths(options_.data_folder).Sockets().string());
 }
 
 bool InferenceWorker::ShouldEnd() const {
   if (draining_.load() || (options_.parent != 0 && ::getppid() != options_.parent)) return true;
-  const InferenceQueue::State state = queue_.Look();
+  const InferenceQueue::State state = queue_.state();
   if (!state.idle) return false;
   if (state.since > options_.idle) {
     spdlog::info("{} ends: there was nothing to colour", id_);
@@ -80,7 +81,7 @@ bool InferenceWorker::ShouldEnd() const {
 }
 
 void InferenceWorker::GiveUpIfStuck() const {
-  if (queue_.Look().batch < options_.stuck) return;
+  if (queue_.state().batch < options_.stuck) return;
   spdlog::critical("{}: a batch does not end; giving up", id_);
   spdlog::shutdown();
   ::_exit(1);

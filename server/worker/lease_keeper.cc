@@ -1,5 +1,6 @@
 #include "server/worker/lease_keeper.h"
 
+#include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -14,7 +15,7 @@ constexpr size_t kMaxWarnings = 100;
 }  // namespace
 
 std::string AttemptTag(const JobRecord& job) {
-  return "[job=" + job.name + " attempt=" + std::to_string(job.attempt) + "]";
+  return fmt::format("[job={} attempt={}]", job.name, job.attempt);
 }
 
 LeaseKeeper::LeaseKeeper(JobStore& store,
@@ -30,7 +31,7 @@ LeaseKeeper::LeaseKeeper(JobStore& store,
       draining_(draining),
       on_heartbeat_(std::move(on_heartbeat)),
       give_up_(std::move(give_up)),
-      earlier_seconds_(job.progress.seconds) {
+      earlier_seconds_(job.usage.seconds) {
   progress_ = job.progress;
   progress_.eta_seconds = -1.0;
   thread_ = std::thread([this] { Loop(); });
@@ -51,7 +52,7 @@ double LeaseKeeper::SecondsSoFar() const {
   return earlier_seconds_ + std::chrono::duration<double>(SteadyClock::now() - start_).count();
 }
 
-AttemptUsage LeaseKeeper::Usage() const {
+JobUsage LeaseKeeper::Usage() const {
   std::lock_guard lock(mutex_);
   return {SecondsSoFar(), PeakMemoryBytes(), warnings_};
 }
@@ -105,22 +106,22 @@ void LeaseKeeper::StopStage(StopReason reason) {
 // Stores progress and extends the lease, or at least looks whether the user wants it cancelled.
 void LeaseKeeper::Beat() {
   ProgressRecord progress;
-  std::vector<std::string> warnings;
+  JobUsage usage;
   bool dirty = false;
   {
     std::lock_guard lock(mutex_);
     progress = progress_;
-    warnings = warnings_;
+    usage.warnings = warnings_;
     dirty = dirty_;
     dirty_ = false;
   }
-  progress.seconds = SecondsSoFar();
+  usage.seconds = SecondsSoFar();
   const auto now = SteadyClock::now();
   try {
     bool cancel = false;
     if (dirty || now - last_attempt_ >= timing_.heartbeat) {
       last_attempt_ = now;
-      cancel = store_.Heartbeat(lease_, progress, warnings, timing_.lease.count()).cancel_requested;
+      cancel = store_.Heartbeat(lease_, progress, usage, timing_.lease.count()).cancel_requested;
       last_success_ = now;
     } else if (now - last_peek_ >= std::min(timing_.heartbeat, std::chrono::milliseconds(1000))) {
       cancel = store_.Peek(lease_).cancel_requested;

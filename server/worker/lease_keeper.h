@@ -54,7 +54,7 @@ class LeaseKeeper : public ProgressObserver {
   // Ends the heartbeats; the caller then publishes or fails the job.
   void Stop();
   // Seconds over all attempts, warnings and peak memory so far.
-  AttemptUsage Usage() const;
+  JobUsage Usage() const;
   Lease lease() const { return lease_; }
 
   void OnProgress(int64_t step, int64_t total_steps, const std::string& message) override;

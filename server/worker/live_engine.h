@@ -1,5 +1,5 @@
-// The seam between the inference worker (calls, queue, batches) and the method library, as
-// stage_runner.h is for jobs.
+// What the inference worker (calls, queue, batches) asks of the method library, as stage_runner.h
+// is for jobs.
 #pragma once
 
 #include <cstdint>

@@ -77,9 +77,8 @@ AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec&
   return options;
 }
 
-ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed) {
+ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed) {
   ColorizerOptions options;
-  options.threads = threads;
   options.seed = seed;
   if (spec.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) {
     options.recipe = ColorizerOptions::Recipe::kPaper;
@@ -91,17 +90,19 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threa
   if (spec.has_consistency_weight()) options.consistency_weight = spec.consistency_weight();
   options.precision = PrecisionFrom(spec.precision());
   if (spec.has_average_decay()) options.average_decay = spec.average_decay();
-  if (spec.has_least_improvement()) options.least_improvement = spec.least_improvement();
+  if (spec.has_min_improvement()) options.min_improvement = spec.min_improvement();
   return options;
 }
 
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
   CarryColorOptions options;
-  options.max_side_px = spec.has_max_side_px() ? spec.max_side_px() : kDefaultMaxSidePx;
-  if (spec.has_max_reprojection_px()) options.carry.flow_tolerance_px = spec.max_reprojection_px();
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  if (spec.has_flow_tolerance_px()) options.carry.flow_tolerance_px = spec.flow_tolerance_px();
   if (spec.has_depth_tolerance()) options.carry.depth_tolerance = spec.depth_tolerance();
-  if (spec.has_depth_side_px()) options.sweep_side_px = spec.depth_side_px();
-  if (spec.has_depth_sources()) options.sweep_sources = spec.depth_sources();
+  if (spec.has_luminance_tolerance())
+    options.carry.luminance_tolerance = spec.luminance_tolerance();
+  if (spec.has_depth_side_px()) options.depth_side_px = spec.depth_side_px();
+  if (spec.has_depth_sources()) options.depth_sources = spec.depth_sources();
   return options;
 }
 
@@ -146,7 +147,7 @@ RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec) {
   RenderOptions options;
   options.views.assign(spec.views().begin(), spec.views().end());
   if (spec.has_max_views()) options.max_views = spec.max_views();
-  options.max_side_px = spec.has_max_side_px() ? spec.max_side_px() : kDefaultMaxSidePx;
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
   return options;
 }
 

@@ -12,7 +12,7 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
 // Source and file are set by the caller, which holds the blobs.
 HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
 AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec& spec);
-ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, int threads, uint64_t seed);
+ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed);
 // Further key views are set by the caller, which holds the blobs.
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec);
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed);

@@ -1,44 +1,218 @@
 #include "server/worker/stage_options.h"
 
+#include <google/protobuf/text_format.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+
+#include "core/base/error.h"
+#include "proto/option_text.h"
+#include "server/planning/presets.h"
+#include "server/planning/spec_check.h"
 
 namespace color3d {
 namespace {
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
 
 using Precision = ColorizerOptions::Precision;
 
 TEST(ColorizerOptionsFromTest, UnsetFieldsKeepTheMethodsDefaults) {
-  const ColorizerOptions defaults;
-  const ColorizerOptions options = ColorizerOptionsFrom(v1::PersonalizeSpec(), 3, 17);
-  EXPECT_EQ(options.threads, 3);
-  EXPECT_EQ(options.seed, 17u);
-  EXPECT_EQ(options.precision, Precision::kAuto);
-  EXPECT_EQ(options.average_decay, defaults.average_decay);
-  EXPECT_EQ(options.average_decay, 0.99) << "as stage.proto says";
-  EXPECT_EQ(options.least_improvement, defaults.least_improvement);
+  ColorizerOptions defaults;
+  defaults.seed = 17;
+  EXPECT_EQ(ColorizerOptionsFrom(v1::PersonalizeSpec(), 17), defaults);
 }
 
 TEST(ColorizerOptionsFromTest, WhatIsSetArrives) {
   v1::PersonalizeSpec spec;
   spec.set_precision(v1::PersonalizeSpec::PRECISION_FLOAT32);
   spec.set_average_decay(0.0);
-  spec.set_least_improvement(0.02);
-  ColorizerOptions options = ColorizerOptionsFrom(spec, 1, 1);
+  spec.set_min_improvement(0.02);
+  ColorizerOptions options = ColorizerOptionsFrom(spec, 1);
   EXPECT_EQ(options.precision, Precision::kFloat32);
   EXPECT_EQ(options.average_decay, 0.0);
-  EXPECT_EQ(options.least_improvement, 0.02);
+  EXPECT_EQ(options.min_improvement, 0.02);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_BFLOAT16);
-  EXPECT_EQ(ColorizerOptionsFrom(spec, 1, 1).precision, Precision::kBfloat16);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kBfloat16);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_AUTO);
-  EXPECT_EQ(ColorizerOptionsFrom(spec, 1, 1).precision, Precision::kAuto);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kAuto);
 }
 
-// What the server lets through, the method takes.
-TEST(ColorizerOptionsFromTest, EndsOfTheDocumentedRangesAreValid) {
-  v1::PersonalizeSpec spec;
-  spec.set_average_decay(0.9999);
-  spec.set_least_improvement(0.5);
-  EXPECT_NO_THROW(ColorizerOptionsFrom(spec, 1, 1).Validate());
+// What the method makes of a stage's options.
+struct Method {
+  std::function<void(const Message&)> validate;
+  std::function<bool(const Message&, const Message&)> same;  // two specs mean the same options
+};
+
+template <typename Spec, typename From>
+Method MakeMethod(From from) {
+  return {[from](const Message& spec) { from(static_cast<const Spec&>(spec)).Validate(); },
+          [from](const Message& a, const Message& b) {
+            return from(static_cast<const Spec&>(a)) == from(static_cast<const Spec&>(b));
+          }};
+}
+
+// A working size, which some stages take beside their options.
+struct MaxSide {
+  int px;
+  void Validate() const { CheckMaxSide(px); }
+  bool operator==(const MaxSide&) const = default;
+};
+template <typename Spec>
+MaxSide MaxSideFrom(const Spec& spec) {
+  return {spec.has_max_side_px() ? spec.max_side_px() : kDefaultMaxSidePx};
+}
+
+struct SizedGeometry {
+  GeometryOptions options;
+  MaxSide size;
+  void Validate() const {
+    options.Validate();
+    size.Validate();
+  }
+  bool operator==(const SizedGeometry&) const = default;
+};
+
+// By the stage's name in JobSpec. A stage that is missing here has no options of its own.
+const std::map<std::string, Method>& Methods() {
+  static const std::map<std::string, Method> methods = {
+      {"import_scene",
+       MakeMethod<v1::ImportSceneSpec>([](const auto& s) { return ImportOptionsFrom(s, 1); })},
+      {"select_key_view", MakeMethod<v1::SelectKeyViewSpec>([](const auto& s) {
+         return SelectOptionsFrom(s).selection;
+       })},
+      {"colorize_key_view",
+       MakeMethod<v1::ColorizeKeyViewSpec>([](const auto& s) { return HintOptionsFrom(s); })},
+      {"generate_augmentations", MakeMethod<v1::GenerateAugmentationsSpec>([](const auto& s) {
+         return AugmentationOptionsFrom(s);
+       })},
+      {"personalize",
+       MakeMethod<v1::PersonalizeSpec>([](const auto& s) { return ColorizerOptionsFrom(s, 1); })},
+      {"colorize_views",
+       MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) { return MaxSideFrom(s); })},
+      {"carry_color",
+       MakeMethod<v1::CarryColorSpec>([](const auto& s) { return CarryOptionsFrom(s); })},
+      {"reconstruct_geometry", MakeMethod<v1::ReconstructGeometrySpec>([](const auto& s) {
+         return SizedGeometry{GeometryOptionsFrom(s, 1), MaxSideFrom(s)};
+       })},
+      {"solve_chroma",
+       MakeMethod<v1::SolveChromaSpec>([](const auto& s) { return ChromaOptionsFrom(s, 1); })},
+      {"export", MakeMethod<v1::ExportSpec>([](const auto& s) { return ExportOptionsFrom(s); })},
+      {"render", MakeMethod<v1::RenderSpec>([](const auto& s) { return RenderOptionsFrom(s); })},
+  };
+  return methods;
+}
+
+// Calls `check(kind, field, method)` for every option of every stage that can run.
+template <typename Check>
+void ForEachOption(Check check) {
+  const auto* stages = v1::JobSpec::descriptor()->FindOneofByName("stage");
+  for (int i = 0; i < stages->field_count(); ++i) {
+    const FieldDescriptor* stage = stages->field(i);
+    const auto method = Methods().find(stage->name());
+    if (method == Methods().end()) continue;
+    for (int f = 0; f < stage->message_type()->field_count(); ++f) {
+      check(*stage, *stage->message_type()->field(f), method->second);
+    }
+  }
+}
+
+void SetNumber(const FieldDescriptor& field, double value, Message* message) {
+  const auto* reflection = message->GetReflection();
+  if (field.cpp_type() == FieldDescriptor::CPPTYPE_INT32) {
+    reflection->SetInt32(message, &field, static_cast<int32_t>(value));
+  } else {
+    reflection->SetDouble(message, &field, value);
+  }
+}
+
+// What the server's check and the method say to one number.
+struct Verdict {
+  bool server = true;
+  bool method = true;
+};
+Verdict Try(const FieldDescriptor& stage,
+            const FieldDescriptor& field,
+            const Method& method,
+            double value) {
+  v1::JobSpec spec;
+  Message* options = spec.GetReflection()->MutableMessage(&spec, &stage);
+  if (spec.has_colorize_key_view()) {
+    spec.mutable_colorize_key_view()->mutable_source()->set_automatic(true);
+  }
+  SetNumber(field, value, options);
+  Verdict verdict;
+  try {
+    CheckSpec(spec);
+  } catch (const Error&) {
+    verdict.server = false;
+  }
+  try {
+    method.validate(*options);
+  } catch (const Error&) {
+    verdict.method = false;
+  }
+  return verdict;
+}
+
+// Every number has a range, and the method's own Validate draws it where the proto does.
+TEST(OptionRanges, TheMethodTakesWhatTheServerTakesAndNothingElse) {
+  int ranges = 0;
+  ForEachOption(
+      [&](const FieldDescriptor& stage, const FieldDescriptor& field, const Method& method) {
+        const bool is_integer = field.cpp_type() == FieldDescriptor::CPPTYPE_INT32;
+        if (!is_integer && field.cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) return;
+        SCOPED_TRACE(field.full_name());
+        const v1::OptionInfo& info = InfoOf(&field);
+        ASSERT_TRUE(info.has_min() && info.has_max());
+        ++ranges;
+        for (const double inside : {info.min(), info.max()}) {
+          const Verdict verdict = Try(stage, field, method, inside);
+          EXPECT_TRUE(verdict.server) << inside;
+          EXPECT_TRUE(verdict.method) << inside;
+        }
+        const double infinity = std::numeric_limits<double>::infinity();
+        const double below = is_integer ? info.min() - 1.0 : std::nextafter(info.min(), -infinity);
+        const double above = is_integer ? info.max() + 1.0 : std::nextafter(info.max(), infinity);
+        for (const double outside : {below, above}) {
+          const Verdict verdict = Try(stage, field, method, outside);
+          EXPECT_FALSE(verdict.server) << outside;
+          EXPECT_FALSE(verdict.method) << outside;
+        }
+      });
+  EXPECT_GT(ranges, 30);
+}
+
+TEST(OptionDefaults, TheProtoTellsTheMethodsOwn) {
+  ForEachOption(
+      [&](const FieldDescriptor& stage, const FieldDescriptor& field, const Method& method) {
+        const std::string& value = InfoOf(&field).default_value();
+        if (value.empty() || field.name() == "skip")
+          return;  // skip: the planner's, not the method's
+        SCOPED_TRACE(field.full_name());
+        const Message& unset = *google::protobuf::MessageFactory::generated_factory()->GetPrototype(
+            stage.message_type());
+        const std::unique_ptr<Message> told(unset.New());
+        ASSERT_TRUE(
+            google::protobuf::TextFormat::ParseFromString(field.name() + ": " + value, told.get()));
+        EXPECT_TRUE(method.same(*told, unset)) << value;
+      });
+}
+
+// A user of the library gets what a user of the service gets.
+TEST(OptionDefaults, TheMethodsOwnAreThoseOfTheFastPreset) {
+  const v1::ColorizeSceneSpec fast = WithPreset({});
+  EXPECT_EQ(GeometryOptionsFrom(fast.reconstruct_geometry(), 1), GeometryOptions());
+  EXPECT_EQ(fast.reconstruct_geometry().max_side_px(), kDefaultMaxSidePx);
+  EXPECT_EQ(ColorizerOptionsFrom(fast.personalize(), 1), ColorizerOptions());
+  EXPECT_EQ(ChromaOptionsFrom(fast.solve_chroma(), 1), ChromaOptions());
+  EXPECT_EQ(SelectOptionsFrom(fast.select_key_view()).selection, KeyViewOptions());
+  EXPECT_EQ(CarryOptionsFrom(fast.carry_color()), CarryColorOptions());
+  EXPECT_EQ(RenderOptionsFrom(fast.render()), RenderOptions());
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include "core/catalogue/stages.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/report/curves.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "server/backends/grpc_colorizer.h"
 #include "server/planning/spec_check.h"
@@ -165,7 +165,7 @@ class CoreStageRunner : public StageRunner {
         return RunGenerateAugmentations(AugmentationOptionsFrom(spec.generate_augmentations()),
                                         context);
       case JobSpec::kPersonalize:
-        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), run.threads, context.seed()),
+        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), context.seed()),
                               context,
                               spec.personalize().encoder());
       case JobSpec::kCarryColor:

@@ -24,16 +24,17 @@ class InferenceDemand {
   // While a copy of what this returns lives, the worker is not drained.
   std::shared_ptr<void> Hold() const { return hold_; }
   bool Held() const { return hold_.use_count() > 1; }
-  void Ask() { asked_ = std::chrono::steady_clock::now().time_since_epoch().count(); }
+  void Request() { requested_ = std::chrono::steady_clock::now().time_since_epoch().count(); }
   // Within the last minute. A worker that ends by itself afterwards is not missed.
   bool Recent() const {
-    const std::chrono::steady_clock::duration asked(asked_.load());
-    return asked.count() != 0 &&
-           std::chrono::steady_clock::now().time_since_epoch() - asked < std::chrono::seconds(60);
+    const std::chrono::steady_clock::duration requested(requested_.load());
+    return requested.count() != 0 &&
+           std::chrono::steady_clock::now().time_since_epoch() - requested <
+               std::chrono::seconds(60);
   }
 
  private:
-  std::atomic<std::chrono::steady_clock::rep> asked_{0};
+  std::atomic<std::chrono::steady_clock::rep> requested_{0};
   const std::shared_ptr<void> hold_ = std::make_shared<int>();
 };
 

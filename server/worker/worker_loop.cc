@@ -19,6 +19,13 @@ namespace {
 // Left free before one more scene is taken in: decoder, optimiser, averages and activations.
 constexpr int64_t kSceneMemoryBytes = int64_t{512} << 20;
 
+// Empty for a damaged spec, too: the job's own attempt says so.
+std::string EncoderOf(const JobRecord& job) {
+  v1::JobSpec spec;
+  spec.ParseFromString(job.spec);
+  return spec.personalize().encoder();
+}
+
 class WorkerLoop {
  public:
   WorkerLoop(const WorkerOptions& options, StageRunner& runner, const std::atomic<bool>& draining)
@@ -61,8 +68,8 @@ class WorkerLoop {
   void RunBatch(const JobRecord& first);
   // Whether another scene may join `running` ones.
   bool HasRoom(int running) const;
-  // The next job that can join `first`; none when the queue has none or cannot be read now.
-  std::optional<JobRecord> ClaimCompanion(const JobRecord& first);
+  // The next job of this kind and encoder; none when the queue has none or cannot be read now.
+  std::optional<JobRecord> ClaimForBatch(const std::string& kind, const std::string& encoder);
 
   const WorkerOptions options_;
   const std::string id_;
@@ -111,20 +118,13 @@ bool WorkerLoop::HasRoom(int running) const {
          AvailableMemoryBytes() > kSceneMemoryBytes;
 }
 
-std::optional<JobRecord> WorkerLoop::ClaimCompanion(const JobRecord& first) {
-  const auto encoder_of = [](const JobRecord& job) {
-    v1::JobSpec spec;
-    spec.ParseFromString(job.spec);
-    return spec.personalize().encoder();
-  };
-  const std::string encoder = encoder_of(first);
+std::optional<JobRecord> WorkerLoop::ClaimForBatch(const std::string& kind,
+                                                   const std::string& encoder) {
+  const auto has_encoder = [&](const JobRecord& job) { return EncoderOf(job) == encoder; };
   try {
-    return store_.ClaimCompanion(
-        id_, options_.timing.lease.count(), first.kind, [&](const JobRecord& job) {
-          return encoder_of(job) == encoder;
-        });
+    return store_.ClaimForBatch(id_, options_.timing.lease.count(), kind, has_encoder);
   } catch (const Error& e) {
-    spdlog::warn("{} cannot look for company: {}", id_, e.what());
+    spdlog::warn("{} cannot look for more jobs of its batch: {}", id_, e.what());
     return std::nullopt;
   }
 }
@@ -134,9 +134,10 @@ std::optional<JobRecord> WorkerLoop::ClaimCompanion(const JobRecord& first) {
 void WorkerLoop::RunBatch(const JobRecord& first) {
   AttemptBatch batch(context_);
   batch.Start(first);
+  const std::string encoder = EncoderOf(first);
   while (batch.size() > 0) {
     if (HasRoom(batch.size())) {
-      if (const auto companion = ClaimCompanion(first)) batch.Start(*companion);
+      if (const auto other = ClaimForBatch(first.kind, encoder)) batch.Start(*other);
     }
     jobs_done_ += batch.Reap(options_.poll);
   }

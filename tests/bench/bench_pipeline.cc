@@ -2,7 +2,8 @@
 #include <cstdio>
 
 #include "core/base/files.h"
-#include "core/stage/artifacts.h"
+#include "core/catalogue/stages.h"
+#include "core/stage/formats/artifacts.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 
@@ -16,9 +17,9 @@ struct PipelineArguments {
   int threads = 2;
   uint64_t seed = 1;
   std::string key_view;
-  GeometryOptions geometry;
-  ColorizerOptions colorizer;
-  ChromaOptions chroma;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
+  ColorizerOptions colorizer{.iterations = 800};
+  ChromaOptions chroma{.iterations = 600};
   bool paper = false;
   bool carry = true;
   bool bound = false;
@@ -46,51 +47,51 @@ void RunPipeline(const PipelineArguments& args) {
   if (args.rescore) {
     pipeline.TakeAll();
     const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
-    pipeline.Run("evaluate", [&](StageContext& c) { Evaluate(args, scene, c); });
+    pipeline.Run(kind::kEvaluate, [&](StageContext& c) { Evaluate(args, scene, c); });
     std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kScores)).c_str());
     return;
   }
   pipeline.ImportScene();
-  pipeline.Run("select_key_view", [&](StageContext& c) {
+  pipeline.Run(kind::kSelectKeyView, [&](StageContext& c) {
     SelectKeyViewOptions options;
     options.view = args.key_view;
     if (!args.key_view.empty()) options.selection.strategy = KeyViewStrategy::kManual;
     RunSelectKeyView(options, c);
   });
   const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
-  pipeline.Run("colorize_key_view", [&](StageContext& c) {
+  pipeline.Run(kind::kColorizeKeyView, [&](StageContext& c) {
     ColorizeKeyViewOptions options;
     options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
     RunColorizeKeyView(options, c);
   });
   if (args.geometry_file.empty()) {
-    pipeline.Run("reconstruct_geometry", [&](StageContext& c) {
+    pipeline.Run(kind::kReconstructGeometry, [&](StageContext& c) {
       RunReconstructGeometry(args.geometry, args.max_side_px, c);
     });
   } else {
     pipeline.Take(artifact::kGeometry, args.geometry_file);
   }
   if (args.carry) {
-    pipeline.Run("carry_color", [&](StageContext& c) {
+    pipeline.Run(kind::kCarryColor, [&](StageContext& c) {
       CarryColorOptions options;
       options.max_side_px = args.max_side_px;
       RunCarryColor(options, c);
     });
   }
   ColorizerOptions colorizer = args.colorizer;
-  colorizer.threads = args.threads;
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
-  pipeline.Run("personalize", [&](StageContext& c) { RunPersonalize(colorizer, c); });
-  pipeline.Run("colorize_views", [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
-  pipeline.Run("solve_chroma", [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
-  pipeline.Run("export", [&](StageContext& c) { RunExport({}, c); });
-  pipeline.Run("render", [&](StageContext& c) {
+  pipeline.Run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
+  pipeline.Run(kind::kColorizeViews,
+               [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
+  pipeline.Run(kind::kSolveChroma, [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
+  pipeline.Run(kind::kExport, [&](StageContext& c) { RunExport({}, c); });
+  pipeline.Run(kind::kRender, [&](StageContext& c) {
     RenderOptions options;
     options.max_side_px = args.max_side_px;
     RunRender(options, c);
   });
-  pipeline.Run("evaluate", [&](StageContext& c) { Evaluate(args, scene, c); });
-  pipeline.Run("colorize_scene", [&](StageContext& c) { RunReport(pipeline.summaries(), c); });
+  pipeline.Run(kind::kEvaluate, [&](StageContext& c) { Evaluate(args, scene, c); });
+  pipeline.Run(kind::kColorizeScene, [&](StageContext& c) { RunReport(pipeline.summaries(), c); });
   std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kMetrics)).c_str());
 }
 

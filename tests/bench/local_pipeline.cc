@@ -1,8 +1,11 @@
 #include "tests/bench/local_pipeline.h"
 
+#include <fmt/format.h>
+
 #include "core/base/files.h"
+#include "core/catalogue/stages.h"
 #include "core/report/curves.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 
 namespace color3d {
 namespace {
@@ -15,7 +18,7 @@ class SayingObserver : public ProgressObserver {
 
   void OnProgress(int64_t, int64_t, const std::string&) override {}
   void OnError(int64_t iteration, const std::string& name, double value) override {
-    Say(kind_ + " " + std::to_string(iteration) + ": " + name + " " + std::to_string(value));
+    Say(fmt::format("{} {}: {} {}", kind_, iteration, name, value));
   }
   void OnWarning(const std::string& message) override {
     warnings.push_back(message);
@@ -48,7 +51,7 @@ LocalPipeline::LocalPipeline(std::filesystem::path scene_folder,
 }
 
 void LocalPipeline::ImportScene() {
-  Run("import_scene", [&](StageContext& context) {
+  Run(kind::kImportScene, [&](StageContext& context) {
     ImportOptions options;
     options.hold_out_every_eighth = true;
     RunImportScene(options, context);
@@ -75,8 +78,9 @@ void LocalPipeline::Run(const std::string& kind, const std::function<void(StageC
     context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(recorder.points()));
   }
   for (const std::string& name : context.outputs()) artifacts_[name] = out_folder_ / name;
-  summaries_.push_back({kind, "SUCCEEDED", "", seconds, 0, observer.warnings});
-  if (say_) say_(kind + " took " + std::to_string(seconds) + " s");
+  summaries_.push_back(
+      {.kind = kind, .state = "SUCCEEDED", .seconds = seconds, .warnings = observer.warnings});
+  if (say_) say_(fmt::format("{} took {:.1f} s", kind, seconds));
 }
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
 // Fuzz target: the hints that a user draws.
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 #include "tests/fuzz/fuzz_target.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -37,9 +37,9 @@ class AllInOneTest : public ServiceTest {
       const ProcessResult created = Client({"scene", "create", folder, "--json"});
       EXPECT_EQ(created.exit_code, 0) << created.err;
       scenes.push_back(json::parse(created.out).at("name"));
-      const ProcessResult coloured =
+      const ProcessResult colored =
           Client({"key", "colour", scenes.back(), "--auto", "-o", Path("key").string()});
-      EXPECT_EQ(coloured.exit_code, 0) << coloured.out << coloured.err;
+      EXPECT_EQ(colored.exit_code, 0) << colored.out << colored.err;
       const ProcessResult accepted = Client({"key", "accept", scenes.back()});
       EXPECT_EQ(accepted.exit_code, 0) << accepted.err;
     }

@@ -41,7 +41,7 @@ class BadRequestsTest : public ServiceTest {
   }
 };
 
-TEST_F(BadRequestsTest, KeyColourOfAnotherSize) {
+TEST_F(BadRequestsTest, KeyColorOfAnotherSize) {
   StartServer();
   GrayRoom();
   const Image truth = ReadImage(Path("room") / "truth" / "view002.png");
@@ -51,7 +51,7 @@ TEST_F(BadRequestsTest, KeyColourOfAnotherSize) {
                 {"100x75", "160x120"});
 }
 
-TEST_F(BadRequestsTest, KeyColourWithoutColour) {
+TEST_F(BadRequestsTest, KeyColorWithoutColor) {
   StartServer();
   const fs::path room = GrayRoom();
   ExpectRefusal(
@@ -61,7 +61,7 @@ TEST_F(BadRequestsTest, KeyColourWithoutColour) {
       {"no colour"});
 }
 
-TEST_F(BadRequestsTest, KeyColourThatIsNoImage) {
+TEST_F(BadRequestsTest, KeyColorThatIsNoImage) {
   StartServer();
   GrayRoom();
   WriteFileAtomic(Path("text.png"), "not a picture");

@@ -42,6 +42,8 @@ TEST_F(ColorizeTest, ReadOnlyCommandsAnswerInWordsAndInJson) {
   WriteProceduralScene(Path("room"), SmallRoom(3));
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"server", "info"},
+        std::vector<std::string>{"server", "presets"},
+        std::vector<std::string>{"server", "presets", "paper"},
         std::vector<std::string>{"job", "list"},
         std::vector<std::string>{"scene", "list"},
         std::vector<std::string>{"inspect", Path("room").string()}}) {
@@ -53,6 +55,7 @@ TEST_F(ColorizeTest, ReadOnlyCommandsAnswerInWordsAndInJson) {
     EXPECT_TRUE(json::accept(program.out)) << program.out;
   }
   EXPECT_EQ(Client({"job", "show", "jobs/0000"}).exit_code, 2);
+  EXPECT_EQ(Client({"server", "presets", "heroic"}).exit_code, 2);
 }
 
 void ExpectResults(const fs::path& out, int min_renders) {
@@ -164,7 +167,7 @@ TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecon
   EXPECT_EQ(ReadFile(Path("second") / "scene.ply"), ReadFile(Path("first") / "scene.ply"));
 }
 
-TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColourItThenTheScene) {
+TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColorItThenTheScene) {
   WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));
   const std::string room = Path("room").string(), out = Path("out").string();
   const ProcessResult select = Client({"colorize", room, "-o", out});
@@ -193,7 +196,7 @@ TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColourItThenTheScene) {
   EXPECT_EQ(KeyView(Path("out")), name);
 }
 
-TEST_F(ColorizeTest, HintsAsJsonColourTheKeyView) {
+TEST_F(ColorizeTest, HintsAsJsonColorTheKeyView) {
   WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
   WriteFileAtomic(Path("hints.json"),
                   R"([{"x": 60, "y": 30, "radius": 4, "color": "#2f6f7f"},

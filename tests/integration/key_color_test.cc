@@ -50,7 +50,7 @@ class KeyColorTest : public ServiceTest {
   v1::Job ColorKeyView(const std::string& scene, const json& source, int seed = 1);
   std::string CreateScene(const fs::path& folder);
   json Facts(const v1::Job& job);
-  Image Coloured(const v1::Job& job);
+  Image Colored(const v1::Job& job);
 
  private:
   fs::path Download(const v1::Job& job);
@@ -91,11 +91,11 @@ json KeyColorTest::Facts(const v1::Job& job) {
   return json::parse(ReadFile(Download(job) / "key_color.json"));
 }
 
-Image KeyColorTest::Coloured(const v1::Job& job) {
+Image KeyColorTest::Colored(const v1::Job& job) {
   return ReadImage(Download(job) / "key_view_colored.png");
 }
 
-TEST_F(KeyColorTest, ABackendColoursTheKeyViewAndItsFactsAreTold) {
+TEST_F(KeyColorTest, ABackendColorsTheKeyViewAndItsFactsAreTold) {
   const ExampleBackend backend(Path("backend"), "127.0.0.1:0");
   ASSERT_NE(backend.address(), "");
   StartServer({"--backend", "example=" + backend.address()});
@@ -111,7 +111,7 @@ TEST_F(KeyColorTest, ABackendColoursTheKeyViewAndItsFactsAreTold) {
   EXPECT_EQ(facts.at("description"), "color3d-example-backend 1 (Apache-2.0)");
   EXPECT_EQ(facts.at("answer_px"), (json{240, 180}));
   EXPECT_LT(facts.at("mean_luminance_difference").get<double>(), 1.0);
-  EXPECT_FALSE(IsGray(Coloured(job)));
+  EXPECT_FALSE(IsGray(Colored(job)));
   EXPECT_TRUE(ColorKeyView(scene, {{"backend", "example"}}).cached());
 
   const v1::Job asked_too_much =
@@ -174,7 +174,7 @@ TEST_F(KeyColorTest, AutoNeedsNothingOfTheUser) {
 }
 
 // Red and blue swapped, allowed on the left half only.
-TEST_F(KeyColorTest, AnEditChangesColourInsideItsMaskOnly) {
+TEST_F(KeyColorTest, AnEditChangesColorInsideItsMaskOnly) {
   StartServer();
   WriteProceduralScene(Path("room"), SmallRoom(4));
   const Image photo = ReadImage(Path("room") / "images" / "view002.png");
@@ -187,7 +187,7 @@ TEST_F(KeyColorTest, AnEditChangesColourInsideItsMaskOnly) {
   WriteFileAtomic(Path("edited.png"), EncodePng8(edited));
   WriteFileAtomic(Path("mask.png"), EncodePng8(mask));
   const ProcessResult result = Client({"key",
-                                       "colour",
+                                       "color",
                                        Path("room").string(),
                                        "--view",
                                        "view002",

@@ -20,7 +20,7 @@ class KeyTest : public ServiceTest {
     WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
   }
   // The command's answer as JSON; it must succeed.
-  json Ask(const std::vector<std::string>& arguments) {
+  json RunJson(const std::vector<std::string>& arguments) {
     const ProcessResult result = Client(arguments + std::vector<std::string>{"--json"});
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
     return json::parse(result.out, nullptr, /*allow_exceptions=*/false);
@@ -32,7 +32,7 @@ class KeyTest : public ServiceTest {
   }
 };
 
-TEST_F(KeyTest, SelectColourLookAcceptAndColourTheSceneWithoutDoingItAgain) {
+TEST_F(KeyTest, SelectColorLookAcceptAndColorTheSceneWithoutDoingItAgain) {
   const std::string out = Path("key").string();
   const ProcessResult select = Client({"key", "select", Path("room").string(), "-o", out});
   ASSERT_EQ(select.exit_code, 0) << select.out << select.err;
@@ -46,15 +46,15 @@ TEST_F(KeyTest, SelectColourLookAcceptAndColourTheSceneWithoutDoingItAgain) {
   const std::string view = json::parse(ReadFile(Path("key") / "key_view.json")).at("view");
   const fs::path painted = Path("painted.png");
   fs::copy_file(Path("room") / "truth" / view, painted);
-  const json coloured = Ask({"key", "colour", scene, "--image", painted.string(), "-o", out});
-  EXPECT_EQ(coloured.at("key_view"), view);
+  const json colored = RunJson({"key", "color", scene, "--image", painted.string(), "-o", out});
+  EXPECT_EQ(colored.at("key_view"), view);
   EXPECT_FALSE(IsGray(ReadImage(Path("key") / "key_view_colored.png")));
-  const json shown = Ask({"key", "show", scene});
-  EXPECT_EQ(shown.at("coloured"), coloured.at("job"));
+  const json shown = RunJson({"key", "show", scene});
+  EXPECT_EQ(shown.at("colored"), colored.at("job"));
   EXPECT_TRUE(shown.at("accepted").is_null());
 
-  EXPECT_EQ(Ask({"key", "accept", scene}).at("job"), coloured.at("job"));
-  EXPECT_EQ(Ask({"key", "show", scene}).at("accepted"), coloured.at("job"));
+  EXPECT_EQ(RunJson({"key", "accept", scene}).at("job"), colored.at("job"));
+  EXPECT_EQ(RunJson({"key", "show", scene}).at("accepted"), colored.at("job"));
   const ProcessResult done =
       Client(std::vector<std::string>{"colorize", "--scene", scene, "-o", Path("out").string()} +
              QuickOptions());
@@ -65,36 +65,50 @@ TEST_F(KeyTest, SelectColourLookAcceptAndColourTheSceneWithoutDoingItAgain) {
   EXPECT_NE(ReadFile(Path("out") / "report.html").find("Best of "), std::string::npos);
   EXPECT_EQ(CountJobs("select_key_view"), 1);
   EXPECT_EQ(CountJobs("colorize_key_view"), 1) << "the accepted colour was computed again";
+
+  const std::string other = view == "view001.png" ? "view004.png" : "view001.png";
+  const ProcessResult more = Client({"colorize",
+                                     "--scene",
+                                     scene,
+                                     "--more-key",
+                                     other + "=" + (Path("room") / "truth" / other).string(),
+                                     "-o",
+                                     Path("more").string(),
+                                     "--detach"});
+  ASSERT_EQ(more.exit_code, 0) << more.out << more.err;
+  const v1::ColorizeSceneSpec spec = NewestJob("colorize_scene").spec().colorize_scene();
+  EXPECT_EQ(spec.carry_color().further_key_views_size(), 1) << "--more-key was not heeded";
 }
 
-TEST_F(KeyTest, AnotherViewAndAnOlderColourCanBeTaken) {
+TEST_F(KeyTest, AnotherViewAndAnOlderColorCanBeTaken) {
   const std::string room = Path("room").string(), out = Path("key").string();
   WriteFileAtomic(Path("hints.json"), R"([{"x": 60, "y": 30, "radius": 4, "color": "#2f6f7f"}])");
-  const auto colour = [&](const std::string& view) {
-    return Ask(
-        {"key", "colour", room, "--view", view, "--hints", Path("hints.json").string(), "-o", out});
+  const auto color = [&](const std::string& view) {
+    return RunJson(
+        {"key", "color", room, "--view", view, "--hints", Path("hints.json").string(), "-o", out});
   };
-  const json first = colour("view002");
+  const json first = color("view002");
   EXPECT_EQ(first.at("key_view"), "view002.png");
-  const json second = colour("view004");
+  const json second = color("view004");
   const std::string scene = second.at("scene");
-  EXPECT_EQ(Ask({"key", "accept", scene, "--job", first.at("job")}).at("key_view"), "view002.png");
-  EXPECT_EQ(Ask({"key", "accept", scene}).at("key_view"), "view004.png");
+  EXPECT_EQ(RunJson({"key", "accept", scene, "--job", first.at("job")}).at("key_view"),
+            "view002.png");
+  EXPECT_EQ(RunJson({"key", "accept", scene}).at("key_view"), "view004.png");
   // Without --view the colour goes with the newest selection.
-  Ask({"key", "select", scene, "--view", "view001", "-o", out});
-  EXPECT_EQ(Ask({"key", "colour", scene, "--hints", Path("hints.json").string(), "-o", out})
+  RunJson({"key", "select", scene, "--view", "view001", "-o", out});
+  EXPECT_EQ(RunJson({"key", "color", scene, "--hints", Path("hints.json").string(), "-o", out})
                 .at("key_view"),
             "view001.png");
 }
 
 TEST_F(KeyTest, EveryStrategySharesTheFeaturesOfTheFirst) {
   const std::string room = Path("room").string(), out = Path("key").string();
-  Ask({"key", "select", room, "-o", out});
+  RunJson({"key", "select", room, "-o", out});
   const fs::path cache = Path("server") / "data" / "cache" / "view_features";
   const std::vector<std::string> entries = ListFiles(cache);
   EXPECT_EQ(entries.size(), 6u);
   for (const char* strategy : {"entropy", "tracks"}) {
-    const json answer = Ask({"key", "select", room, "--strategy", strategy, "-o", out});
+    const json answer = RunJson({"key", "select", room, "--strategy", strategy, "-o", out});
     EXPECT_NE(answer.at("description").get<std::string>().find("Best of "), std::string::npos);
   }
   EXPECT_EQ(ListFiles(cache), entries);
@@ -104,8 +118,8 @@ TEST_F(KeyTest, RefusalsSayWhatToDo) {
   ExpectRefusal(Client({"key", "accept", "scenes/nothing"}), 2, {"scenes/nothing"});
   ExpectRefusal(Client({"key", "select", "no such folder"}), 2, {"neither a folder", "scene list"});
   const std::string room = Path("room").string();
-  ExpectRefusal(Client({"key", "colour", room}), 2, {"--auto", "--image"});
-  const std::string scene = Ask({"key", "show", room}).at("scene");
+  ExpectRefusal(Client({"key", "color", room}), 2, {"--auto", "--image"});
+  const std::string scene = RunJson({"key", "show", room}).at("scene");
   ExpectRefusal(Client({"key", "accept", scene}), 2, {"key colour"});
   ExpectRefusal(
       Client({"colorize", "--scene", scene, "-o", Path("out").string()}), 2, {"key accept"});

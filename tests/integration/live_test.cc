@@ -19,28 +19,28 @@ class LiveTest : public ServiceTest {
     StartServer();
     WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));
   }
-  json Ask(const std::vector<std::string>& arguments) {
+  json RunJson(const std::vector<std::string>& arguments) {
     const ProcessResult result = Client(arguments + std::vector<std::string>{"--json"});
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
     return json::parse(result.out, nullptr, /*allow_exceptions=*/false);
   }
   // The scene with a colorizer of a few iterations.
   std::string Personalize() {
-    const json coloured = Ask({"key",
-                               "colour",
-                               Path("room").string(),
-                               "--view",
-                               "view003",
-                               "--hints",
-                               Hints(),
-                               "-o",
-                               Path("key").string()});
+    const json colored = RunJson({"key",
+                                  "color",
+                                  Path("room").string(),
+                                  "--view",
+                                  "view003",
+                                  "--hints",
+                                  Hints(),
+                                  "-o",
+                                  Path("key").string()});
     v1::CreateJobRequest request;
-    request.mutable_spec()->set_scene(coloured.at("scene"));
+    request.mutable_spec()->set_scene(colored.at("scene"));
     request.mutable_spec()->mutable_personalize()->set_iterations(3);
-    request.mutable_spec()->add_inputs(coloured.at("job"));
+    request.mutable_spec()->add_inputs(colored.at("job"));
     for (const v1::Job& job : server().ListJobs()) {
-      if (job.name() != coloured.at("job")) request.mutable_spec()->add_inputs(job.name());
+      if (job.name() != colored.at("job")) request.mutable_spec()->add_inputs(job.name());
     }
     grpc::ClientContext context;
     v1::Job job;
@@ -48,7 +48,7 @@ class LiveTest : public ServiceTest {
         v1::JobService::NewStub(server().channel())->CreateJob(&context, request, &job);
     EXPECT_TRUE(status.ok()) << status.error_message();
     EXPECT_EQ(Client({"job", "watch", job.name()}).exit_code, 0);
-    return coloured.at("scene");
+    return colored.at("scene");
   }
   std::string Hints() {
     WriteFileAtomic(Path("hints.json"), R"([{"x": 60, "y": 30, "radius": 4, "color": "#2f6f7f"}])");
@@ -56,22 +56,22 @@ class LiveTest : public ServiceTest {
   }
 };
 
-TEST_F(LiveTest, PreviewColoursAHandfulWithoutAJob) {
+TEST_F(LiveTest, PreviewColorsAHandfulWithoutAJob) {
   const std::string key = (Path("room") / "truth" / "view003.png").string();
   const json answer =
-      Ask({"preview", Path("room").string(), "--key-color", key, "-o", Path("out").string()});
+      RunJson({"preview", Path("room").string(), "--key-color", key, "-o", Path("out").string()});
   EXPECT_EQ(answer.at("files").size(), 5u);
   EXPECT_EQ(answer.at("colorizer"), "");
   for (const auto& name : answer.at("files")) {
     EXPECT_NE(name, "view003.png") << "the key view itself is no news";
-    const Image coloured = ReadImage(Path("out") / name);
+    const Image colored = ReadImage(Path("out") / name);
     const Image photo = ReadImage(Path("room") / "images" / name);
-    EXPECT_FALSE(IsGray(coloured)) << name;
-    EXPECT_EQ(coloured.width, photo.width);
+    EXPECT_FALSE(IsGray(colored)) << name;
+    EXPECT_EQ(colored.width, photo.width);
   }
   EXPECT_TRUE(server().ListJobs().empty());
   const json again =
-      Ask({"preview", Path("room").string(), "--key-color", key, "-o", Path("out").string()});
+      RunJson({"preview", Path("room").string(), "--key-color", key, "-o", Path("out").string()});
   EXPECT_LT(again.at("seconds"), 10.0);
   const std::vector<pid_t> family = Descendants(server().pid());
   EXPECT_EQ(family.size(), 2u) << "a worker for jobs and the inference worker";
@@ -79,15 +79,15 @@ TEST_F(LiveTest, PreviewColoursAHandfulWithoutAJob) {
   for (const pid_t pid : family) EXPECT_FALSE(IsAlive(pid)) << "left behind";
 }
 
-TEST_F(LiveTest, APersonalizedColorizerColoursOtherPhotosOfItsScene) {
+TEST_F(LiveTest, APersonalizedColorizerColorsOtherPhotosOfItsScene) {
   const std::string scene = Personalize();
-  const json list = Ask({"colorizer", "list"});
+  const json list = RunJson({"colorizer", "list"});
   ASSERT_EQ(list.at("colorizers").size(), 1u);
   const std::string name = list.at("colorizers")[0].at("name");
-  EXPECT_EQ(Ask({"colorizer", "show", name}).at("scene"), scene);
+  EXPECT_EQ(RunJson({"colorizer", "show", name}).at("scene"), scene);
   const std::string photos = Path("room").string();
-  const json by_scene = Ask({"colorizer", "apply", scene, photos, "-o", Path("a").string()});
-  const json by_name = Ask({"colorizer", "apply", name, photos, "-o", Path("b").string()});
+  const json by_scene = RunJson({"colorizer", "apply", scene, photos, "-o", Path("a").string()});
+  const json by_name = RunJson({"colorizer", "apply", name, photos, "-o", Path("b").string()});
   EXPECT_EQ(by_scene.at("colorizer"), name);
   EXPECT_EQ(by_scene.at("encoder_digest").get<std::string>().size(), 64u);
   ASSERT_EQ(by_scene.at("files").size(), 8u);
@@ -96,7 +96,7 @@ TEST_F(LiveTest, APersonalizedColorizerColoursOtherPhotosOfItsScene) {
     EXPECT_FALSE(IsGray(ReadImage(Path("a") / file))) << file;
   }
   // The scene's own key view and photos: nothing is sent.
-  const json preview = Ask({"preview", scene, "-o", Path("c").string(), "--count", "3"});
+  const json preview = RunJson({"preview", scene, "-o", Path("c").string(), "--count", "3"});
   EXPECT_EQ(preview.at("files").size(), 3u);
 }
 
@@ -109,7 +109,7 @@ TEST_F(LiveTest, RefusalsSayWhatToDo) {
   ExpectRefusal(Client({"preview", room, "--key-color", room + "/images/view000.png", "-o", out}),
                 2,
                 {"has no colour"});
-  const std::string scene = Ask({"scene", "create", room}).at("name");
+  const std::string scene = RunJson({"scene", "create", room}).at("name");
   ExpectRefusal(Client({"preview", scene, "-o", out}), 2, {"key colour"});
   ExpectRefusal(
       Client({"colorizer", "apply", scene, room, "-o", out}), 2, {"has no colorizer yet"});

@@ -1,17 +1,24 @@
 #include "tests/reference/splat.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <unsupported/Eigen/AutoDiff>
 
 #include "core/splat/model/spherical_harmonics.h"
-#include "tests/reference/jet.h"
+#include "core/splat/raster/raster_constants.h"
 
 namespace color3d {
 namespace {
 
+using std::exp;
+using std::sqrt;
+
 constexpr int kShapeRows = kColorRow;  // position, log scale, rotation, opacity
-using ShapeJet = Jet<kShapeRows>;
+// A number with its derivatives by the shape rows: gradients come from the value's own formulas,
+// not from hand-derived ones that could repeat a kernel's mistake.
+using ShapeJet = Eigen::AutoDiffScalar<Eigen::Matrix<double, kShapeRows, 1>>;
 
 // A Gaussian on the screen; T is double, or a jet by the Gaussian's shape rows.
 template <class T>
@@ -25,14 +32,32 @@ struct Splat {
 };
 
 double Variable(double value, int, double) { return value; }
-ShapeJet Variable(double value, int row, const ShapeJet&) { return ShapeJet::Variable(value, row); }
+ShapeJet Variable(double value, int row, const ShapeJet&) {
+  return ShapeJet(value, kShapeRows, row);
+}
+
+double ValueOf(double x) { return x; }
+double ValueOf(const ShapeJet& x) { return x.value(); }
+
+// 1 / (1 + exp(-x)) without overflow of the derivative.
+double Sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
+ShapeJet Sigmoid(const ShapeJet& x) {
+  const double s = Sigmoid(x.value());
+  return ShapeJet(s, s * Sigmoid(-x.value()) * x.derivatives());
+}
+
+// Constant, so without derivative, outside of [low, high].
+template <class T>
+T Limited(const T& x, double low, double high) {
+  return ValueOf(x) < low ? T(low) : ValueOf(x) > high ? T(high) : x;
+}
 
 template <class T>
 void Rotation(const T* parameters, T r[3][3]) {
   T q[4], norm = 1e-24;
   for (int k = 0; k < 4; ++k)
     norm = norm + parameters[kRotationRow + k] * parameters[kRotationRow + k];
-  norm = SquareRoot(norm);
+  norm = sqrt(norm);
   for (int k = 0; k < 4; ++k) q[k] = parameters[kRotationRow + k] / norm;
   const T w = q[0], x = q[1], y = q[2], z = q[3];
   const T values[3][3] = {
@@ -50,19 +75,19 @@ void ScreenAxes(const T* parameters, const RasterCamera& c, const T cam[3], T m[
   const double fx = c.fx, fy = c.fy, cx = c.cx, cy = c.cy;
   const double margin_x = kFrustumMargin * 0.5 * c.width / fx;
   const double margin_y = kFrustumMargin * 0.5 * c.height / fy;
-  const T tx = Limited(cam[0] / cam[2], -cx / fx - margin_x, (c.width - cx) / fx + margin_x);
-  const T ty = Limited(cam[1] / cam[2], -cy / fy - margin_y, (c.height - cy) / fy + margin_y);
+  const T tx = Limited<T>(cam[0] / cam[2], -cx / fx - margin_x, (c.width - cx) / fx + margin_x);
+  const T ty = Limited<T>(cam[1] / cam[2], -cy / fy - margin_y, (c.height - cy) / fy + margin_y);
   const T jacobian[2][3] = {{fx / cam[2], 0.0, -fx * tx / cam[2]},
                             {0.0, fy / cam[2], -fy * ty / cam[2]}};
   for (int row = 0; row < 2; ++row) {
     for (int k = 0; k < 3; ++k) {
-      T sum = 0.0;
+      T sum(0.0);
       for (int a = 0; a < 3; ++a) {
         for (int b = 0; b < 3; ++b) {
           sum = sum + jacobian[row][a] * double{c.rotation[3 * a + b]} * r[b][k];
         }
       }
-      m[row][k] = sum * Exp(Limited(parameters[kLogScaleRow + k], kMinLogScale, kMaxLogScale));
+      m[row][k] = sum * exp(Limited<T>(parameters[kLogScaleRow + k], kMinLogScale, kMaxLogScale));
     }
   }
 }
@@ -101,7 +126,7 @@ void Color(const ReferenceParameters& p,
     d[k] = parameters[kPositionRow + k] - double{c.center[k]};
     norm = norm + d[k] * d[k];
   }
-  norm = SquareRoot(norm);
+  norm = sqrt(norm);
   T basis[kMaxShCoefficients];
   EvaluateSh<T>(kMaxShCoefficients, d[0] / norm, d[1] / norm, d[2] / norm, basis);
   for (int ch = 0; ch < color.channels; ++ch) {
@@ -245,10 +270,11 @@ void ProjectBackward(const ReferenceParameters& p,
   Splat<ShapeJet> s;
   if (!Project(p, color, camera, i, s)) return;
   for (int row = 0; row < kShapeRows; ++row) {
-    double sum = g.u * s.u.d[row] + g.v * s.v.d[row] + g.conic_xx * s.conic_xx.d[row] +
-                 g.conic_xy * s.conic_xy.d[row] + g.conic_yy * s.conic_yy.d[row] +
-                 g.opacity * s.opacity.d[row];
-    for (int c = 0; c < color.channels; ++c) sum += g.color[c] * s.color[c].d[row];
+    double sum =
+        g.u * s.u.derivatives()[row] + g.v * s.v.derivatives()[row] +
+        g.conic_xx * s.conic_xx.derivatives()[row] + g.conic_xy * s.conic_xy.derivatives()[row] +
+        g.conic_yy * s.conic_yy.derivatives()[row] + g.opacity * s.opacity.derivatives()[row];
+    for (int c = 0; c < color.channels; ++c) sum += g.color[c] * s.color[c].derivatives()[row];
     gradient.At(row, i) = sum;
   }
   double d[3], norm = 1e-24, basis[kMaxShCoefficients];
@@ -259,7 +285,7 @@ void ProjectBackward(const ReferenceParameters& p,
   norm = std::sqrt(norm);
   EvaluateSh<double>(kMaxShCoefficients, d[0] / norm, d[1] / norm, d[2] / norm, basis);
   for (int c = 0; c < color.channels; ++c) {
-    if (color.channel[c].clamp_at_zero && !(s.color[c].value > 0.0)) continue;
+    if (color.channel[c].clamp_at_zero && !(s.color[c].value() > 0.0)) continue;
     for (int k = 0; k < color.channel[c].coefficients; ++k) {
       gradient.At(color.channel[c].row + k, i) += g.color[c] * basis[k];
     }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/splat/model/parameter_block.h"
-#include "core/splat/raster/projection.h"
+#include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/loss.h"
 
 namespace color3d {

@@ -7,7 +7,9 @@
 
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/model/model_parameters.h"
+#include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/pipeline.h"
+#include "core/splat/raster/raster_camera.h"
 #include "tests/stability/tiny_problem.h"
 
 namespace color3d {
@@ -24,7 +26,7 @@ struct Fit {
   bool singular = false;  // beyond what NormalMatrixCondition sees
 };
 
-std::shared_ptr<ChromaTarget> OneColour(float a, float b, float weight) {
+std::shared_ptr<ChromaTarget> OneColor(float a, float b, float weight) {
   auto target = std::make_shared<ChromaTarget>();
   target->ab = Image(kSide, kSide, 2, a);
   std::fill_n(target->ab.Plane(1), target->ab.PlaneSize(), b);
@@ -35,7 +37,7 @@ std::shared_ptr<ChromaTarget> OneColour(float a, float b, float weight) {
 Fit Ordinary() {
   Fit f;
   for (int i = 0; i < 3; ++i) f.cameras.push_back(OrbitCamera(i, kSide, kSide, 0.2 * i));
-  f.target = [](int) { return OneColour(kA, kB, 1.0f); };
+  f.target = [](int) { return OneColor(kA, kB, 1.0f); };
   f.options.iterations = 40;
   return f;
 }
@@ -78,7 +80,7 @@ double NormalMatrixCondition(const Fit& f, ThreadPool& pool) {
 
 // Largest chroma among the Gaussians, Lab units; spherical harmonics' constant term only.
 double LargestChroma(const GaussianModel& model) {
-  const double scale = 255.0 * 0.28209479177387814;
+  const double scale = 255.0 * kShDc;
   const size_t stride = model.sh_a.size() / std::max<size_t>(1, model.size());
   double largest = 0.0;
   for (size_t i = 0; i < model.size(); ++i) {
@@ -95,7 +97,7 @@ StabilityResult Run(const Fit& f, ThreadPool& pool) {
   TrainingWitness witness;
   NoCheckpoints none;
   const GaussianModel model =
-      FitChromaOn(f.geometry, problem, f.options, pool, none, witness, CancellationToken());
+      FitChroma(f.geometry, problem, f.options, {pool, none, witness, CancellationToken()});
   StabilityResult result;
   result.condition =
       f.singular ? std::numeric_limits<double>::infinity() : NormalMatrixCondition(f, pool);
@@ -170,12 +172,12 @@ void AddChromaCases(std::vector<StabilityCase>& cases) {
   add("opacities and sizes badly scaled", BadlyScaled);
   add("all weights zero", [] {
     Fit f = Singular();
-    f.target = [](int) { return OneColour(kA, kB, 0.0f); };
+    f.target = [](int) { return OneColor(kA, kB, 0.0f); };
     return f;
   });
   add("weights of 1e-30", [] {
     Fit f = Singular();
-    f.target = [](int) { return OneColour(kA, kB, 1e-30f); };
+    f.target = [](int) { return OneColor(kA, kB, 1e-30f); };
     return f;
   });
   add("no view has colours", [] {
@@ -191,12 +193,12 @@ void AddChromaCases(std::vector<StabilityCase>& cases) {
   });
   add("neutral targets", [] {
     Fit f = Ordinary();
-    f.target = [](int) { return OneColour(0.0f, 0.0f, 1.0f); };
+    f.target = [](int) { return OneColor(0.0f, 0.0f, 1.0f); };
     return f;
   });
   add("a saturated colour", [] {
     Fit f = Ordinary();
-    f.target = [](int) { return OneColour(98.0f, -108.0f, 1.0f); };
+    f.target = [](int) { return OneColor(98.0f, -108.0f, 1.0f); };
     return f;
   });
   add("one Gaussian", [] {

@@ -30,7 +30,6 @@ struct Problem {
     options.iterations = 30;
     options.max_side_px = kSide;
     options.crop_px = 64;
-    options.threads = 2;
   }
 };
 
@@ -74,10 +73,11 @@ StabilityResult Train(const Problem& p) {
   NoCheckpoints none;
   const CancellationToken go_on;
   const auto encoder = Encoder::Embedded();
+  ThreadPool pool(2);
   const auto trained = TrainColorizer(
-      encoder, {{"key", p.luminance, p.ab, p.weight}}, p.options, none, observer, go_on);
+      encoder, {{"key", p.luminance, p.ab, p.weight}}, p.options, {pool, none, observer, go_on});
   // What is stored and read again is what colours.
-  const auto colorizer = LoadColorizer(trained->Serialize(), encoder, p.options.threads);
+  const auto colorizer = LoadColorizer(trained->Serialize(), encoder, pool.thread_count());
   const Image key = colorizer->Colorize(p.luminance);
   Image other = p.unlike;
   if (other.Empty()) {
@@ -94,8 +94,8 @@ StabilityResult Train(const Problem& p) {
   float most = 0.0f;
   for (const float v : elsewhere.data) most = std::max(most, std::abs(v));
   r.held = elsewhere.width == other.width && elsewhere.height == other.height && most <= 200.0f;
-  r.outcome = "CIEDE2000; largest |ab| elsewhere " + std::to_string(static_cast<int>(most)) + ", " +
-              std::to_string(r.restores) + " restores";
+  r.outcome = fmt::format(
+      "CIEDE2000; largest |ab| elsewhere {}, {} restores", static_cast<int>(most), r.restores);
   return r;
 }
 
@@ -124,7 +124,7 @@ StabilityResult ConstantImage() {
   return Train(p);
 }
 
-StabilityResult OneColour() {
+StabilityResult OneColor() {
   Problem p = Textured();
   Fill(&p.ab, 0, 40.0f);
   Fill(&p.ab, 1, 30.0f);
@@ -210,7 +210,7 @@ StabilityCase Case(const std::string& name,
 void AddColorizerCases(std::vector<StabilityCase>& cases) {
   using Recipe = ColorizerOptions::Recipe;
   cases.push_back(Case("constant image", ConstantImage));
-  cases.push_back(Case("one-colour key view", OneColour));
+  cases.push_back(Case("one-colour key view", OneColor));
   cases.push_back(Case("black key view", [] { return OneLuminance(0.0f); }));
   cases.push_back(Case("white key view", [] { return OneLuminance(100.0f); }));
   cases.push_back(
@@ -224,8 +224,8 @@ void AddColorizerCases(std::vector<StabilityCase>& cases) {
   cases.push_back(Case("ab +-128 from pixel to pixel", [] { return Train(Extremes(128.0f)); }));
   cases.push_back(Case("ab +-1e6 from pixel to pixel",
                        [] { return Refused(Extremes(1e6f), ErrorCode::kInvalidArgument); }));
-  cases.push_back(Case("learning rate x100", [] { return FastLearning(Recipe::kOurs, 0.1); }));
-  cases.push_back(Case("learning rate x1000", [] { return FastLearning(Recipe::kOurs, 1.0); }));
+  cases.push_back(Case("learning rate x100", [] { return FastLearning(Recipe::kColor3d, 0.1); }));
+  cases.push_back(Case("learning rate x1000", [] { return FastLearning(Recipe::kColor3d, 1.0); }));
   cases.push_back(Case("paper's recipe, learning rate x100",
                        [] { return FastLearning(Recipe::kPaper, 1e-2); }));
   cases.push_back(Case("no pixel has weight", NoWeight));

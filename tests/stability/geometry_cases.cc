@@ -6,7 +6,7 @@
 
 #include "core/base/files.h"
 #include "core/scene/view_images.h"
-#include "core/splat/training/trainer.h"
+#include "core/splat/geometry/geometry_trainer.h"
 #include "tests/stability/tiny_problem.h"
 #include "tests/support/procedural_scene.h"
 
@@ -39,10 +39,10 @@ GaussianModel Train(const Training& t, ProgressObserver& observer, ThreadPool& p
   GeometryProblem problem;
   problem.training = t.cameras;
   problem.extent = t.extent;
+  problem.initial = t.initial;
   problem.luminance = [&t](int view) { return std::make_shared<Image>(t.picture(view)); };
   NoCheckpoints none;
-  return TrainGeometryOn(
-      problem, t.initial, t.options, GeometryTuning(), pool, none, observer, CancellationToken());
+  return TrainGeometry(problem, t.options, {pool, none, observer, CancellationToken()});
 }
 
 StabilityResult RunTraining(const Training& t, ThreadPool& pool) {
@@ -128,7 +128,7 @@ Training OfSpoiltPhoto() {
   return t;
 }
 
-// From files, through TrainGeometry: all sparse points are mirrored to behind their cameras.
+// From files: all sparse points are mirrored to behind their cameras.
 StabilityResult PointsBehindCameras(ThreadPool& pool) {
   ProceduralSceneOptions options;
   options.views = 3;
@@ -152,7 +152,7 @@ StabilityResult PointsBehindCameras(ThreadPool& pool) {
   return MustRefuse({ErrorCode::kInvalidArgument}, [&] {
     NullObserver silent;
     NoCheckpoints none;
-    TrainGeometry(scene, images, GeometryOptions(), pool, none, silent, CancellationToken());
+    TrainGeometry(GeometryProblemOf(scene, images), {}, {pool, none, silent, CancellationToken()});
   });
 }
 

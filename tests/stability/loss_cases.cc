@@ -1,4 +1,6 @@
 // The picture loss: constant, black, white and tiny pictures, where SSIM's variances cancel.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -124,7 +126,7 @@ void AddLossCases(std::vector<StabilityCase>& cases) {
     cases.push_back({"loss", name, false, [l](ThreadPool& pool) { return Run(l, pool); }});
   };
   for (const int channels : {1, 2, 3, 4}) {
-    add("textured, " + std::to_string(channels) + " channels",
+    add(fmt::format("textured, {} channels", channels),
         {33, 21, channels, Textured(1), Textured(2), {}});
   }
   add("picture of 1x1 px", {1, 1, 1, Constant(0.3), Constant(0.8), {}});

@@ -1,4 +1,6 @@
 // Rasterizer and projection: shapes, sizes, depths, opacities and pictures at their extremes.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -267,7 +269,7 @@ using Adder = std::function<void(std::string, std::function<RasterCase()>)>;
 
 void AddShapes(const Adder& add) {
   for (const int channels : {1, 2, 3}) {
-    add("ordinary, " + std::to_string(channels) + " channels and depth",
+    add(fmt::format("ordinary, {} channels and depth", channels),
         [=] { return Ordinary(60, channels); });
   }
   add("needles 1e2:1", [=] { return Stretched(1.0, 1e-2, false); });
@@ -331,7 +333,7 @@ void AddRasterCases(std::vector<StabilityCase>& cases) {
   AddScenes(add);
   for (const auto& [w, h] : {std::pair{1, 1}, {17, 5}, {1, 50}, {50, 1}}) {
     const int width = w, height = h;
-    add("picture of " + std::to_string(width) + "x" + std::to_string(height) + " px",
+    add(fmt::format("picture of {}x{} px", width, height),
         [=] { return Ordinary(30, 1, width, height); });
   }
   add("picture of 8192x16 px", [] { return LargePicture(8192, 16, 300); });

@@ -7,8 +7,8 @@
 
 #include "core/base/error.h"
 #include "core/base/progress.h"
-#include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_model.h"
+#include "core/splat/training/posed_camera.h"
 #include "tests/stability/stability_case.h"
 
 namespace color3d {

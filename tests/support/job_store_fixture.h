@@ -50,6 +50,22 @@ class JobStoreTest : public ::testing::Test {
     graph.jobs = {Job("import"), Job("left", {0}), Job("right", {0}), Job("root", {0, 1, 2})};
     return store_->CreateGraph(graph, request, kNoLimit);
   }
+  // `count` personalize jobs under one parent.
+  static NewGraph PersonalizeJobs(int count) {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    for (int i = 0; i < count; ++i) {
+      NewJob job;
+      job.kind = "personalize";
+      job.spec = "a";
+      graph.jobs.push_back(job);
+    }
+    NewJob root;
+    root.kind = "root";
+    for (int i = 0; i < count; ++i) root.inputs.push_back(i);
+    graph.jobs.push_back(root);
+    return graph;
+  }
   JobRecord CreateSingle() {
     NewGraph graph;
     graph.scene = "scenes/test";

@@ -42,7 +42,7 @@ void ExpectSane(const AutomaticColor& color, int width, int height) {
   }
 }
 
-TEST(AutomaticColorizerTest, ColoursPicturesOfAnySize) {
+TEST(AutomaticColorizerTest, ColorsPicturesOfAnySize) {
   const auto colorizer = AutomaticColorizer::Embedded();
   const std::vector<std::pair<int, int>> sizes{{1, 1}, {3, 200}, {97, 64}, {500, 333}, {33, 1}};
   for (const auto& [width, height] : sizes) {
@@ -50,7 +50,7 @@ TEST(AutomaticColorizerTest, ColoursPicturesOfAnySize) {
   }
 }
 
-TEST(AutomaticColorizerTest, ColoursExtremePictures) {
+TEST(AutomaticColorizerTest, ColorsExtremePictures) {
   const auto colorizer = AutomaticColorizer::Embedded();
   for (float value : {0.0f, 50.0f, 100.0f}) {
     ExpectSane(colorizer->Colorize(Image(80, 60, 1, value)), 80, 60);
@@ -104,7 +104,7 @@ TEST(EmbeddedWeightsTest, AreSmallEnoughToShip) {
 }
 
 // Held-out photographs: better than grey on the whole, and colourful, but not garish.
-TEST(AutomaticColorizerTest, ColoursHeldOutPhotographsBetterThanGrey) {
+TEST(AutomaticColorizerTest, ColorsHeldOutPhotographsBetterThanGray) {
   const std::filesystem::path folder =
       std::filesystem::path(COLOR3D_SHARED_DATA) / "photos/validate";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no photographs";
@@ -117,21 +117,21 @@ TEST(AutomaticColorizerTest, ColoursHeldOutPhotographsBetterThanGrey) {
   std::sort(files.begin(), files.end());
   const auto colorizer = AutomaticColorizer::Embedded();
   double error = 0.0;
-  double grey_error = 0.0;
-  double colourfulness = 0.0;
-  double true_colourfulness = 0.0;
+  double gray_error = 0.0;
+  double colorfulness = 0.0;
+  double true_colorfulness = 0.0;
   for (size_t i = 0; i < files.size(); i += 2) {
     const Image truth = LabFromSrgb(FitWithin(ReadImage(files[i]), 256));
     const Image luminance = LuminanceOfLab(truth);
     const Image predicted = JoinLab(luminance, colorizer->Colorize(luminance).ab);
     error += MeanDeltaE00(predicted, truth);
-    grey_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
-    colourfulness += Colorfulness(SrgbFromLab(predicted));
-    true_colourfulness += Colorfulness(SrgbFromLab(truth));
+    gray_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
+    colorfulness += Colorfulness(SrgbFromLab(predicted));
+    true_colorfulness += Colorfulness(SrgbFromLab(truth));
   }
-  EXPECT_LT(error, 0.95 * grey_error);
-  EXPECT_GT(colourfulness, 0.5 * true_colourfulness);
-  EXPECT_LT(colourfulness, 2.0 * true_colourfulness);
+  EXPECT_LT(error, 0.95 * gray_error);
+  EXPECT_GT(colorfulness, 0.5 * true_colorfulness);
+  EXPECT_LT(colorfulness, 2.0 * true_colorfulness);
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ TEST(ColorBinsTest, RareBinsAreLeftOutAndSharesSumToOne) {
   EXPECT_DOUBLE_EQ(bins[0].share, 1.0);
 }
 
-TEST(ColorBinsTest, ColoursBeyondTheGridCountAtItsBorder) {
+TEST(ColorBinsTest, ColorsBeyondTheGridCountAtItsBorder) {
   ColorHistogram histogram;
   histogram.Add(Uniform(1e6f, -1e6f));
   const auto bins = histogram.Bins(0.0);

@@ -76,8 +76,8 @@ ColorQueries::ColorQueries(const std::vector<int64_t>& feature_channels, WeightR
   const int64_t query_count = queries.size() == 2 ? queries[0] : 0;
   width_ = queries.size() == 2 ? queries[1] : 0;
   if (width_ % (2 * kHeads) != 0) {
-    throw InvalidArgument("the DDColor weights have colour queries of width " +
-                          std::to_string(width_) + ", which is no multiple of 16");
+    throw InvalidArgument(
+        "the DDColor weights have colour queries of width {}, which is no multiple of 16", width_);
   }
   query_feat_ = TakeTensor(reader, prefix + "query_feat.weight", {query_count, width_});
   query_embed_ = TakeTensor(reader, prefix + "query_embed.weight", {query_count, width_});

@@ -1,5 +1,6 @@
 #include "core/keycolor/automatic/ddcolor.h"
 
+#include <fmt/format.h>
 #include <torch/types.h>
 
 #include <algorithm>
@@ -24,8 +25,9 @@ constexpr int kNetworkSidePx = 512;
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the automatic colourizer takes a picture with 1 channel (L), this one " +
-                          std::string("has ") + std::to_string(luminance.channels));
+    throw InvalidArgument(
+        "the automatic colourizer takes a picture with 1 channel (L), this one has {}",
+        luminance.channels);
   }
   const bool finite = std::all_of(luminance.data.begin(), luminance.data.end(), [](float value) {
     return std::isfinite(value);
@@ -49,7 +51,7 @@ Ddcolor::Ddcolor(WeightMap weights) : digest_(DigestOfWeights("DDColor", weights
     encoder_ = std::make_unique<const ConvNext>(
         encoder.config, std::move(encoder.weights), encoder.description);
     if (encoder.config.StageCount() != 4 || encoder.config.stem_stride != 4) {
-      throw InvalidArgument("the DDColor weights have an encoder of another kind: " +
+      throw InvalidArgument("the DDColor weights have an encoder of another kind: {}",
                             encoder.config.ToString());
     }
     WeightReader reader(std::move(weights), "the DDColor weights");
@@ -57,8 +59,8 @@ Ddcolor::Ddcolor(WeightMap weights) : digest_(DigestOfWeights("DDColor", weights
     reader.IgnorePrefix("std");
     decoder_ = std::make_unique<const DdcolorDecoder>(encoder.config.dims, reader);
   });
-  description_ = "DDColor, " + encoder_->config().ToString() + ", " +
-                 std::to_string(decoder_->query_count()) + " colour queries";
+  description_ = fmt::format(
+      "DDColor, {}, {} colour queries", encoder_->config().ToString(), decoder_->query_count());
 }
 
 Ddcolor::~Ddcolor() = default;
@@ -66,9 +68,11 @@ Ddcolor::~Ddcolor() = default;
 Image Ddcolor::Predict(const Image& gray_rgb) const {
   if (gray_rgb.channels != 3 || gray_rgb.Empty() || gray_rgb.width % 32 != 0 ||
       gray_rgb.height % 32 != 0) {
-    throw InvalidArgument("DDColor takes 3 channels and sides that are multiples of 32 px, not " +
-                          std::to_string(gray_rgb.width) + "x" + std::to_string(gray_rgb.height) +
-                          " with " + std::to_string(gray_rgb.channels));
+    throw InvalidArgument(
+        "DDColor takes 3 channels and sides that are multiples of 32 px, not {}x{} with {}",
+        gray_rgb.width,
+        gray_rgb.height,
+        gray_rgb.channels);
   }
   return WithTorchErrors("DDColor", [&] {
     at::NoGradGuard no_grad;
@@ -97,10 +101,11 @@ std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromWeightFile(
     const std::filesystem::path& ddcolor_weights) {
   WeightMap weights = ReadWeightFile(ddcolor_weights);
   if (!Ddcolor::Recognises(weights)) {
-    throw InvalidArgument(ddcolor_weights.string() + " holds no DDColor (it has " +
-                          std::to_string(weights.size()) +
-                          " arrays, none called refine_net.0.0.weight_orig); give a published "
-                          "DDColor file");
+    throw InvalidArgument(
+        "{} holds no DDColor (it has {} arrays, none called refine_net.0.0.weight_orig); give a "
+        "published DDColor file",
+        ddcolor_weights.string(),
+        weights.size());
   }
   return std::make_shared<const Ddcolor>(std::move(weights));
 }

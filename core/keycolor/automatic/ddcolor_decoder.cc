@@ -40,8 +40,10 @@ struct DdcolorDecoder::Problems {
   }
   void Throw() const {
     if (first.empty()) return;
-    throw InvalidArgument("the DDColor weights cannot be used: the norm of \"" + first +
-                          "\" divides by zero or by a negative variance");
+    throw InvalidArgument(
+        "the DDColor weights cannot be used: the norm of \"{}\" divides by zero or by a negative "
+        "variance",
+        first);
   }
 };
 

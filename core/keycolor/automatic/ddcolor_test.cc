@@ -94,7 +94,7 @@ TEST(DdcolorTest, RefusesNormsThatCannotBeFolded) {
   EXPECT_THAT(MessageOf(std::move(negative)), testing::HasSubstr("decoder.layers.2.conv.2"));
 }
 
-TEST(DdcolorTest, ColoursPicturesOfAnySize) {
+TEST(DdcolorTest, ColorsPicturesOfAnySize) {
   const Ddcolor network(Mini());
   Random random(1);
   for (const auto& [width, height] :

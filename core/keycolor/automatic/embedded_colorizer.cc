@@ -1,5 +1,6 @@
 // The automatic colourizer that is part of the program: the frozen encoder and a colour head that
 // answers with a distribution over colour bins.
+#include <fmt/format.h>
 #include <torch/torch.h>
 
 #include <algorithm>
@@ -61,7 +62,7 @@ class EmbeddedColorizer : public AutomaticColorizer {
       target.copy_(TakeTensor(reader, "color_head." + name, tensor.sizes().vec()));
     }
     reader.Finish();
-    description_ = "embedded automatic colourizer, " + std::to_string(bin_count) + " colours";
+    description_ = fmt::format("embedded automatic colourizer, {} colours", bin_count);
   }
 
   const std::string& description() const override { return description_; }
@@ -69,8 +70,8 @@ class EmbeddedColorizer : public AutomaticColorizer {
 
   AutomaticColor Colorize(const Image& luminance) const override {
     if (luminance.channels != 1 || luminance.Empty()) {
-      throw InvalidArgument("the automatic colourizer takes a picture with 1 channel (L), not " +
-                            std::to_string(luminance.channels));
+      throw InvalidArgument("the automatic colourizer takes a picture with 1 channel (L), not {}",
+                            luminance.channels);
     }
     return WithTorchErrors("automatic colourizer", [&] {
       torch::NoGradGuard no_grad;

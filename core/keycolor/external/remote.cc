@@ -1,5 +1,7 @@
 #include "core/keycolor/external/remote.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -17,7 +19,7 @@ constexpr double kMaxAspectDeviation = 0.02;  // of the sides' ratio, beyond the
 constexpr double kNotableDifference = 5.0;    // mean |dL| that is worth a warning
 
 [[noreturn]] void Refuse(const RemoteOptions& options, const std::string& why) {
-  throw Error(ErrorCode::kFailedPrecondition, "the backend '" + options.name + "' " + why);
+  throw Error(ErrorCode::kFailedPrecondition, "the backend '{}' {}", options.name, why);
 }
 
 std::string Listing(const std::set<std::string>& names) {
@@ -36,8 +38,10 @@ void RequireCapabilities(const RemoteOptions& options, const RemoteInfo& info) {
   for (const std::string& name : needed) {
     if (info.capabilities.contains(name)) continue;
     Refuse(options,
-           "does not claim " + name + " (it claims: " + Listing(info.capabilities) +
-               "); leave that input out or use another backend");
+           fmt::format("does not claim {} (it claims: {}); leave that input out or use another "
+                       "backend",
+                       name,
+                       Listing(info.capabilities)));
   }
 }
 
@@ -47,9 +51,10 @@ Image PictureToSend(const Image& luminance, const RemoteOptions& options, const 
   Image gray = luminance;
   if (info.max_pixels > 0 && pixels > info.max_pixels) {
     if (info.max_pixels < kMinPixels) {
-      Refuse(options,
-             "takes pictures of " + std::to_string(info.max_pixels) + " pixels at most; " +
-                 std::to_string(kMinPixels) + " are needed");
+      Refuse(
+          options,
+          fmt::format(
+              "takes pictures of {} pixels at most; {} are needed", info.max_pixels, kMinPixels));
     }
     const double scale =
         std::sqrt(static_cast<double>(info.max_pixels) / static_cast<double>(pixels));
@@ -83,9 +88,10 @@ std::vector<RemotePoint> PointsToSend(const Image& luminance,
     }
     if (!(hint.x_px >= 0.0 && hint.x_px < luminance.width && hint.y_px >= 0.0 &&
           hint.y_px < luminance.height)) {
-      throw InvalidArgument("the colour point at (" + std::to_string(hint.x_px) + ", " +
-                            std::to_string(hint.y_px) + ") lies outside the key view of " +
-                            SizeText(luminance) + " px");
+      throw InvalidArgument("the colour point at ({}, {}) lies outside the key view of {} px",
+                            hint.x_px,
+                            hint.y_px,
+                            SizeText(luminance));
     }
     const double l = luminance.At(0, static_cast<int>(hint.y_px), static_cast<int>(hint.x_px));
     points.push_back({hint.x_px * scale_x, hint.y_px * scale_y, HexOf(hint, l)});
@@ -122,7 +128,7 @@ Image ReadAnswer(const std::string& bytes, const Image& sent, const RemoteOption
   Image answer;
   try {
     const ImageInfo probe = ProbeImage(bytes, what, limits);
-    if (probe.format != ImageFormat::kPng) throw InvalidArgument(what + " is no PNG");
+    if (probe.format != ImageFormat::kPng) throw InvalidArgument("{} is no PNG", what);
     answer = DecodeImage(bytes, what);
   } catch (const Error& error) {
     Refuse(options, std::string("did not answer with a usable picture: ") + error.what());
@@ -139,24 +145,27 @@ Image ReadAnswer(const std::string& bytes, const Image& sent, const RemoteOption
   return answer;
 }
 
-void JudgeLuminance(const Image& luminance,
-                    const Image& answer,
-                    const RemoteOptions& options,
-                    RemoteSolution* solution) {
+void CheckAnswerLuminance(const Image& luminance,
+                          const Image& answer,
+                          const RemoteOptions& options,
+                          RemoteSolution* solution) {
   const LuminanceAgreement agreement =
       CompareLuminance(Resize(luminance, answer.width, answer.height), answer);
   solution->mean_luminance_difference = agreement.mean_difference;
   solution->luminance_correlation = agreement.correlation;
   if (!agreement.SameSubject()) {
     Refuse(options,
-           "answered with a picture of something else (correlation of luminances " +
-               std::to_string(agreement.correlation) + ", needed > " +
-               std::to_string(LuminanceAgreement::kMinCorrelation) + ")");
+           fmt::format("answered with a picture of something else (correlation "
+                       "of luminances {:.3g}, needed > {})",
+                       agreement.correlation,
+                       LuminanceAgreement::kMinCorrelation));
   }
   if (agreement.mean_difference > kNotableDifference) {
-    solution->warnings.push_back("the backend '" + options.name + "' changed the luminance by " +
-                                 std::to_string(agreement.mean_difference) +
-                                 " L units on average; the photo's own was put back");
+    solution->warnings.push_back(fmt::format(
+        "the backend '{}' changed the luminance by {:.3g} L units on average; the photo's "
+        "own was put back",
+        options.name,
+        agreement.mean_difference));
   }
 }
 
@@ -170,9 +179,12 @@ void ClearOutside(const Image& mask, Image* ab) {
 void CheckMask(const Image& luminance, const Image& mask) {
   if (mask.Empty()) return;
   if (mask.channels != 1 || mask.width != luminance.width || mask.height != luminance.height) {
-    throw InvalidArgument("the mask is " + SizeText(mask) + " px with " +
-                          std::to_string(mask.channels) + " channels, the key view " +
-                          SizeText(luminance) + " px; save it grey at the key view's size");
+    throw InvalidArgument(
+        "the mask is {} px with {} channels, the key view {} px; save it grey at the key view's "
+        "size",
+        SizeText(mask),
+        mask.channels,
+        SizeText(luminance));
   }
 }
 
@@ -198,16 +210,18 @@ RemoteSolution KeyColorFromRemote(const Image& luminance,
   const Image lab = LabFromSrgb(answer);
   Image ab(lab.width, lab.height, 2);
   std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-  JudgeLuminance(luminance, lab, options, &solution);
+  CheckAnswerLuminance(luminance, lab, options, &solution);
   const ChromaLevel chroma = MeasureChroma(lab);
   if (chroma.IsGray()) {
     Refuse(options,
-           "answered without colour (mean chroma " + std::to_string(chroma.mean) + " Lab units)");
+           fmt::format("answered without colour (mean chroma {:.3g} Lab units)", chroma.mean));
   }
   if (ab.width != luminance.width || ab.height != luminance.height) {
-    solution.warnings.push_back("the backend '" + options.name + "' coloured the photo at " +
-                                SizeText(ab) + " px; its colours were brought to " +
-                                SizeText(luminance) + " px");
+    solution.warnings.push_back(fmt::format(
+        "the backend '{}' coloured the photo at {} px; its colours were brought to {} px",
+        options.name,
+        SizeText(ab),
+        SizeText(luminance)));
     ab = ab.width < luminance.width ? UpsampleGuided(ab, luminance)
                                     : Resize(ab, luminance.width, luminance.height);
   }

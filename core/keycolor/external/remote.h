@@ -12,7 +12,7 @@
 #include "core/base/cancellation.h"
 #include "core/base/image.h"
 #include "core/base/progress.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 
 namespace color3d {
 

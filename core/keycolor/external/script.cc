@@ -1,5 +1,6 @@
 #include "core/keycolor/external/script.h"
 
+#include <fmt/format.h>
 #include <torch/script.h>
 
 #include <algorithm>
@@ -24,7 +25,7 @@ constexpr float kMaxChroma = 150.0f;
 constexpr float kRgbMargin = 0.1f;
 
 Error Refused(const std::filesystem::path& file, const std::string& why) {
-  return InvalidArgument("the TorchScript file " + file.filename().string() + " " + why);
+  return InvalidArgument("the TorchScript file {} {}", file.filename().string(), why);
 }
 
 // First line of what torch or the script says, without the backtrace.
@@ -71,10 +72,12 @@ Image CheckedAnswer(const torch::Tensor& answer, const std::filesystem::path& fi
                     answer.size(3) >= 1 && answer.size(2) <= kMaxAnswerSidePx &&
                     answer.size(3) <= kMaxAnswerSidePx;
   if (!fits || !answer.is_floating_point()) {
-    throw Refused(file,
-                  "returned a tensor of shape " + shape.str() + " and type " +
-                      std::string(answer.dtype().name()) +
-                      ", it must be [1,2,h,w] (ab) or [1,3,h,w] (sRGB) of floats");
+    throw Refused(
+        file,
+        fmt::format("returned a tensor of shape {} and type {}, it must be [1,2,h,w] (ab) "
+                    "or [1,3,h,w] (sRGB) of floats",
+                    shape.str(),
+                    std::string(answer.dtype().name())));
   }
   const torch::Tensor planar = answer[0].detach().to(torch::kCPU, torch::kFloat32).contiguous();
   Image image(static_cast<int>(planar.size(2)),
@@ -86,8 +89,7 @@ Image CheckedAnswer(const torch::Tensor& answer, const std::filesystem::path& fi
   for (float value : image.data) {
     if (value >= low && value <= high) continue;
     throw Refused(file,
-                  "returned the value " + std::to_string(value) + ", allowed are " +
-                      std::to_string(low) + " to " + std::to_string(high));
+                  fmt::format("returned the value {}, allowed are {} to {}", value, low, high));
   }
   return image;
 }
@@ -130,8 +132,8 @@ Image Cropped(const Image& answer, const Image& luminance) {
 
 ScriptColor KeyColorFromScript(const Image& luminance, const std::filesystem::path& torchscript) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+                          luminance.channels);
   }
   const Image small = FitWithin(luminance, kMaxSidePx);
   Image answer = Cropped(Run(small, torchscript), small);

@@ -1,5 +1,7 @@
 #include "core/keycolor/hints/hint_map.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,6 +9,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/color/lab.h"
 
 namespace color3d {
 namespace {
@@ -56,28 +59,30 @@ class HintDrawer {
         DrawLabel();
         break;
     }
-    if (drawn_ == 0) throw InvalidArgument(Name() + " holds no pixel of the key view");
+    if (drawn_ == 0) throw InvalidArgument("{} holds no pixel of the key view", Name());
   }
 
   void WarnOfContradictions(ProgressObserver& progress) const {
     if (contradictions_ == 0) return;
-    progress.OnWarning("colour hints: " + std::to_string(contradictions_) +
-                       " pixels are given two different colours, the later entry wins (first by " +
-                       std::to_string(first_pair_[0]) + " and " + std::to_string(first_pair_[1]) +
-                       ")");
+    progress.OnWarning(
+        fmt::format("colour hints: {} pixels are given two different colours, the later entry wins "
+                    "(first by {} and {})",
+                    contradictions_,
+                    first_pair_[0],
+                    first_pair_[1]));
   }
   HintMap Take() { return std::move(map_); }
 
  private:
-  std::string Name() const { return "colour hint " + std::to_string(entry_); }
+  std::string Name() const { return fmt::format("colour hint {}", entry_); }
 
   void CheckColor() const {
     if (!(std::abs(hint_->a) <= 128.0) || !(std::abs(hint_->b) <= 128.0)) {
-      throw InvalidArgument(Name() + " has a colour outside of -128..128 Lab units");
+      throw InvalidArgument("{} has a colour outside of -128..128 Lab units", Name());
     }
     if (hint_->fill == ColorHint::Fill::kAutomatic && pictures_.automatic_ab == nullptr) {
-      throw InvalidArgument(Name() +
-                            " keeps the automatic colours, but no automatic colourizer was run");
+      throw InvalidArgument("{} keeps the automatic colours, but no automatic colourizer was run",
+                            Name());
     }
   }
 
@@ -85,15 +90,13 @@ class HintDrawer {
     const bool inside = border_is_inside ? x >= 0.0 && x <= width_ && y >= 0.0 && y <= height_
                                          : x >= 0.0 && x < width_ && y >= 0.0 && y < height_;
     if (inside) return;
-    throw InvalidArgument(Name() + " at (" + std::to_string(x) + ", " + std::to_string(y) +
-                          ") lies outside of the key view of " + std::to_string(width_) + "x" +
-                          std::to_string(height_) + " px");
+    throw InvalidArgument(
+        "{} at ({}, {}) lies outside of the key view of {}x{} px", Name(), x, y, width_, height_);
   }
 
   void CheckRadius() const {
     if (!(hint_->radius_px >= 0.0) || !std::isfinite(hint_->radius_px)) {
-      throw InvalidArgument(Name() + " has the radius " + std::to_string(hint_->radius_px) +
-                            " px, it must be >= 0");
+      throw InvalidArgument("{} has the radius {} px, it must be >= 0", Name(), hint_->radius_px);
     }
   }
 
@@ -150,7 +153,7 @@ class HintDrawer {
   void DrawLine() {
     CheckRadius();
     const std::vector<Point>& points = hint_->points_px;
-    if (points.empty()) throw InvalidArgument(Name() + " is a line without points");
+    if (points.empty()) throw InvalidArgument("{} is a line without points", Name());
     for (const Point& point : points) CheckPoint(point[0], point[1], /*border_is_inside=*/true);
     for (size_t k = 0; k + 1 < points.size(); ++k) DrawSegment(points[k], points[k + 1]);
     if (points.size() == 1) DrawSegment(points[0], points[0]);
@@ -160,8 +163,8 @@ class HintDrawer {
   void DrawRegion() {
     const std::vector<Point>& points = hint_->points_px;
     if (points.size() < 3) {
-      throw InvalidArgument(Name() + " is a region of " + std::to_string(points.size()) +
-                            " points, it needs 3 at least");
+      throw InvalidArgument(
+          "{} is a region of {} points, it needs 3 at least", Name(), points.size());
     }
     for (const Point& point : points) CheckPoint(point[0], point[1], /*border_is_inside=*/true);
     std::vector<double> crossings;
@@ -185,8 +188,8 @@ class HintDrawer {
 
   void DrawLabel() {
     if (pictures_.labels == nullptr) {
-      throw InvalidArgument(Name() + " names the label " + std::to_string(hint_->label) +
-                            ", but there is no label picture");
+      throw InvalidArgument(
+          "{} names the label {}, but there is no label picture", Name(), hint_->label);
     }
     for (int y = 0; y < height_; ++y) {
       for (int x = 0; x < width_; ++x) {
@@ -210,11 +213,14 @@ class HintDrawer {
 void CheckPicture(const Image* picture, const char* what, int channels, int width, int height) {
   if (picture == nullptr) return;
   if (picture->width == width && picture->height == height && picture->channels == channels) return;
-  throw InvalidArgument(std::string(what) + " is " + std::to_string(picture->width) + "x" +
-                        std::to_string(picture->height) + " px with " +
-                        std::to_string(picture->channels) + " channels, the key view needs " +
-                        std::to_string(width) + "x" + std::to_string(height) + " px with " +
-                        std::to_string(channels));
+  throw InvalidArgument("{} is {}x{} px with {} channels, the key view needs {}x{} px with {}",
+                        what,
+                        picture->width,
+                        picture->height,
+                        picture->channels,
+                        width,
+                        height,
+                        channels);
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include "core/base/image.h"
 #include "core/base/progress.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 
 namespace color3d {
 

@@ -1,25 +1,27 @@
+#include "core/keycolor/hints/hints.h"
+
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/base/parallel.h"
 #include "core/base/range_check.h"
 #include "core/grid/edge_weights.h"
 #include "core/grid/grid_solver.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/hints/hint_map.h"
-#include "core/keycolor/keycolor.h"
 
 namespace color3d {
 namespace {
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+                          luminance.channels);
   }
   for (float value : luminance.data) {
     if (!std::isfinite(value)) {
@@ -54,25 +56,24 @@ HintMap Reduce(const HintMap& full, int width, int height) {
 HintSolution SolveAtSize(const Image& luminance,
                          HintMap hints,
                          const HintOptions& options,
-                         ProgressObserver& progress,
-                         const CancellationToken& cancel) {
-  ThreadPool pool(options.threads);
-  GridSystem system = SystemOfLuminance(luminance, options.sigma, pool);
+                         const RunControl& control) {
+  GridSystem system = SystemOfLuminance(luminance, options.sigma, control.pool);
   system.pinned = std::move(hints.hinted);
   GridSolution solved = SolveGridSystem(
       std::move(system),
       hints.ab.data,
       {options.tolerance, options.max_iterations},
-      pool,
+      control.pool,
       [&](int iteration, double residual) {
-        progress.OnError(iteration, "relative_residual", residual);
-        progress.OnProgress(iteration, 0, "spreading the colour hints");
+        control.progress.OnError(iteration, "relative_residual", residual);
+        control.progress.OnProgress(iteration, 0, "spreading the colour hints");
       },
-      cancel);
+      control.cancel);
   if (!solved.converged) {
-    progress.OnWarning(
-        "colour hints: the solver stopped after " + std::to_string(solved.iterations) +
-        " iterations at a relative residual of " + std::to_string(solved.relative_residual));
+    control.progress.OnWarning(fmt::format(
+        "colour hints: the solver stopped after {} iterations at a relative residual of {:.3g}",
+        solved.iterations,
+        solved.relative_residual));
   }
   HintSolution solution;
   solution.iterations = solved.iterations;
@@ -87,16 +88,14 @@ HintSolution SolveAtSize(const Image& luminance,
 HintSolution Solve(const Image& luminance,
                    HintMap hints,
                    const HintOptions& options,
-                   ProgressObserver& progress,
-                   const CancellationToken& cancel) {
+                   const RunControl& control) {
   const int64_t hinted = std::count(hints.hinted.begin(), hints.hinted.end(), 1);
   HintSolution solution;
   if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
-    solution = SolveAtSize(luminance, std::move(hints), options, progress, cancel);
+    solution = SolveAtSize(luminance, std::move(hints), options, control);
   } else {
     const Image small = FitWithin(luminance, options.max_side_px);
-    solution =
-        SolveAtSize(small, Reduce(hints, small.width, small.height), options, progress, cancel);
+    solution = SolveAtSize(small, Reduce(hints, small.width, small.height), options, control);
     solution.ab = UpsampleGuided(solution.ab, luminance);
     for (size_t i = 0; i < hints.hinted.size(); ++i) {
       if (!hints.hinted[i]) continue;
@@ -112,28 +111,28 @@ HintSolution Solve(const Image& luminance,
 
 void HintOptions::Validate() const {
   const RangeCheck check("hint option");
-  check("sigma", sigma, 1e-3, 1e3);
+  check("sigma", sigma, 0.1, 50.0);
   check("max_side_px", max_side_px, 64, 16384);
   check("tolerance", tolerance, 1e-6, 0.1);
   check("max_iterations", max_iterations, 1, 1000000);
-  check("threads", threads, 0, 1024);
 }
 
 HintSolution KeyColorFromStrokes(const Image& luminance,
                                  const Image& strokes,
                                  const HintOptions& options,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel) {
+                                 const RunControl& control) {
   options.Validate();
   CheckLuminance(luminance);
   if (strokes.width != luminance.width || strokes.height != luminance.height) {
-    throw InvalidArgument("the strokes picture is " + std::to_string(strokes.width) + "x" +
-                          std::to_string(strokes.height) + " px, the key view " +
-                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height));
+    throw InvalidArgument("the strokes picture is {}x{} px, the key view {}x{}",
+                          strokes.width,
+                          strokes.height,
+                          luminance.width,
+                          luminance.height);
   }
   if (strokes.channels != 3 && strokes.channels != 4) {
-    throw InvalidArgument("the strokes picture has " + std::to_string(strokes.channels) +
-                          " channels, it must have 3 (RGB) or 4 (RGBA)");
+    throw InvalidArgument("the strokes picture has {} channels, it must have 3 (RGB) or 4 (RGBA)",
+                          strokes.channels);
   }
   HintMap hints = HintsOfStrokes(strokes);
   if (std::find(hints.hinted.begin(), hints.hinted.end(), 1) == hints.hinted.end()) {
@@ -142,22 +141,22 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
             ? "the strokes picture hints no pixel (nowhere is alpha above 0.5)"
             : "the strokes picture hints no pixel (nowhere does chroma exceed 6 Lab units)");
   }
-  return Solve(luminance, std::move(hints), options, progress, cancel);
+  return Solve(luminance, std::move(hints), options, control);
 }
 
 HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
-                               ProgressObserver& progress,
-                               const CancellationToken& cancel,
+                               const RunControl& control,
                                const HintPictures& pictures) {
   options.Validate();
   CheckLuminance(luminance);
-  return Solve(luminance,
-               DrawHints(hints, pictures, luminance.width, luminance.height, progress, cancel),
-               options,
-               progress,
-               cancel);
+  return Solve(
+      luminance,
+      DrawHints(
+          hints, pictures, luminance.width, luminance.height, control.progress, control.cancel),
+      options,
+      control);
 }
 
 }  // namespace color3d

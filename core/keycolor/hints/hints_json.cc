@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -8,7 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 
 namespace color3d {
 namespace {
@@ -20,7 +22,7 @@ constexpr size_t kMaxPoints = 10000;
 
 double Number(const Json& entry, const char* field, const std::string& name) {
   if (!entry.contains(field) || !entry[field].is_number()) {
-    throw InvalidArgument(name + " lacks the number \"" + field + "\"");
+    throw InvalidArgument("{} lacks the number \"{}\"", name, field);
   }
   return entry[field].get<double>();
 }
@@ -32,8 +34,8 @@ LabColor ParseHexColor(const std::string& text, const std::string& name) {
     valid = std::isxdigit(static_cast<unsigned char>(text[i])) != 0;
   }
   if (!valid) {
-    throw InvalidArgument(name + " has the color \"" + text.substr(0, 32) +
-                          "\", it must look like \"#a0522d\"");
+    throw InvalidArgument(
+        "{} has the color \"{}\", it must look like \"#a0522d\"", name, text.substr(0, 32));
   }
   const unsigned long value = std::stoul(text.substr(1), nullptr, 16);
   return LabFromSrgb(RgbColor{static_cast<double>(value >> 16 & 255) / 255.0,
@@ -44,13 +46,12 @@ LabColor ParseHexColor(const std::string& text, const std::string& name) {
 std::vector<std::array<double, 2>> Points(const Json& points, const std::string& name) {
   const char* shape = "it must look like [[10, 20], [80, 25], ...]";
   if (!points.is_array() || points.empty() || points.size() > kMaxPoints) {
-    throw InvalidArgument(name + " has no list of 1 to " + std::to_string(kMaxPoints) +
-                          " points; " + shape);
+    throw InvalidArgument("{} has no list of 1 to {} points; {}", name, kMaxPoints, shape);
   }
   std::vector<std::array<double, 2>> result;
   for (const Json& point : points) {
     if (!point.is_array() || point.size() != 2 || !point[0].is_number() || !point[1].is_number()) {
-      throw InvalidArgument(name + " has a point that is no pair of numbers; " + shape);
+      throw InvalidArgument("{} has a point that is no pair of numbers; {}", name, shape);
     }
     result.push_back({point[0].get<double>(), point[1].get<double>()});
   }
@@ -70,7 +71,7 @@ void ParseShape(const Json& entry, const std::string& name, ColorHint& hint) {
     hint.shape = ColorHint::Shape::kLabel;
     const double label = Number(entry, "label", name);
     if (label != std::floor(label) || label < 0.0 || label > 255.0) {
-      throw InvalidArgument(name + " has a label that is no whole number of 0 to 255");
+      throw InvalidArgument("{} has a label that is no whole number of 0 to 255", name);
     }
     hint.label = static_cast<int>(label);
   } else {
@@ -79,22 +80,22 @@ void ParseShape(const Json& entry, const std::string& name, ColorHint& hint) {
     if (entry.contains("radius")) hint.radius_px = Number(entry, "radius", name);
   }
   if (hint.x_px < 0.0 || hint.y_px < 0.0 || hint.radius_px < 0.0) {
-    throw InvalidArgument(name + " has a negative coordinate, radius or width");
+    throw InvalidArgument("{} has a negative coordinate, radius or width", name);
   }
 }
 
 void ParseFill(const Json& entry, const std::string& name, ColorHint& hint) {
   if (entry.contains("keep")) {
     const std::string keep = entry["keep"].is_string() ? entry["keep"].get<std::string>() : "";
-    if (entry.contains("color")) throw InvalidArgument(name + " has both \"color\" and \"keep\"");
+    if (entry.contains("color")) throw InvalidArgument("{} has both \"color\" and \"keep\"", name);
     if (keep != "neutral" && keep != "auto") {
-      throw InvalidArgument(name + " has a \"keep\" that is neither \"neutral\" nor \"auto\"");
+      throw InvalidArgument("{} has a \"keep\" that is neither \"neutral\" nor \"auto\"", name);
     }
     hint.fill = keep == "auto" ? ColorHint::Fill::kAutomatic : ColorHint::Fill::kNeutral;
     return;
   }
   if (!entry.contains("color") || !entry["color"].is_string()) {
-    throw InvalidArgument(name + " lacks the text \"color\", such as \"#a0522d\"");
+    throw InvalidArgument("{} lacks the text \"color\", such as \"#a0522d\"", name);
   }
   const LabColor lab = ParseHexColor(entry["color"].get<std::string>(), name);
   hint.a = lab.a;
@@ -110,15 +111,17 @@ std::vector<std::string> FieldsOf(const Json& entry) {
 }
 
 ColorHint ParseHint(const Json& entry, const std::string& name) {
-  if (!entry.is_object()) throw InvalidArgument(name + " is not an object");
+  if (!entry.is_object()) throw InvalidArgument("{} is not an object", name);
   std::vector<std::string> fields = FieldsOf(entry);
   fields.insert(fields.end(), {"color", "keep"});
   for (const auto& [key, value] : entry.items()) {
     if (std::find(fields.begin(), fields.end(), key) != fields.end()) continue;
     std::string known;
     for (const std::string& field : fields) known += (known.empty() ? "" : ", ") + field;
-    throw InvalidArgument(name + " has the unknown field \"" + key.substr(0, 32) +
-                          "\"; known with this shape are " + known);
+    throw InvalidArgument("{} has the unknown field \"{}\"; known with this shape are {}",
+                          name,
+                          key.substr(0, 32),
+                          known);
   }
   ColorHint hint;
   ParseShape(entry, name, hint);
@@ -133,15 +136,14 @@ std::vector<ColorHint> ParseHintsJson(const std::string& json) {
   try {
     parsed = Json::parse(json);
   } catch (const Json::exception& error) {
-    throw InvalidArgument(std::string("the colour hints are not JSON: ") + error.what());
+    throw InvalidArgument("the colour hints are not JSON: {}", error.what());
   }
   if (!parsed.is_array() || parsed.empty() || parsed.size() > kMaxHints) {
-    throw InvalidArgument("the colour hints must be a JSON list of 1 to " +
-                          std::to_string(kMaxHints) + " entries");
+    throw InvalidArgument("the colour hints must be a JSON list of 1 to {} entries", kMaxHints);
   }
   std::vector<ColorHint> hints;
   for (size_t i = 0; i < parsed.size(); ++i) {
-    hints.push_back(ParseHint(parsed[i], "colour hint " + std::to_string(i)));
+    hints.push_back(ParseHint(parsed[i], fmt::format("colour hint {}", i)));
   }
   return hints;
 }

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 
 namespace color3d {
 namespace {

@@ -1,3 +1,5 @@
+#include "core/keycolor/hints/hints.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
-#include "core/keycolor/keycolor.h"
+#include "core/color/lab.h"
 
 namespace color3d {
 namespace {
@@ -24,9 +26,23 @@ struct Recorder : NullObserver {
 
 HintSolution Spread(const Image& luminance,
                     const std::vector<ColorHint>& hints,
-                    HintOptions options = {}) {
-  Recorder recorder;
-  return KeyColorFromHints(luminance, hints, options, recorder, {});
+                    const HintOptions& options = {},
+                    const HintPictures& pictures = {},
+                    Recorder* recorder = nullptr) {
+  ThreadPool pool;
+  NoCheckpoints none;
+  Recorder own;
+  const RunControl control{pool, none, recorder != nullptr ? *recorder : own, {}};
+  return KeyColorFromHints(luminance, hints, options, control, pictures);
+}
+
+HintSolution SpreadStrokes(const Image& luminance,
+                           const Image& strokes,
+                           const HintOptions& options = {}) {
+  ThreadPool pool;
+  NoCheckpoints none;
+  NullObserver silent;
+  return KeyColorFromStrokes(luminance, strokes, options, {pool, none, silent, {}});
 }
 
 // Left half dark, right half bright, with a sharp edge between.
@@ -38,7 +54,7 @@ Image TwoHalves(int width, int height) {
   return luminance;
 }
 
-TEST(HintsTest, ColourStopsAtALuminanceEdge) {
+TEST(HintsTest, ColorStopsAtALuminanceEdge) {
   const Image luminance = TwoHalves(80, 60);
   const HintSolution solution = Spread(luminance, {{10, 30, 2, 50, 20}, {70, 30, 2, -40, 10}});
   for (int y = 0; y < 60; ++y) {
@@ -53,8 +69,7 @@ TEST(HintsTest, ColourStopsAtALuminanceEdge) {
 
 TEST(HintsTest, ReportsTheResidual) {
   Recorder recorder;
-  const HintSolution solution =
-      KeyColorFromHints(TwoHalves(40, 40), {{10, 10, 2, 50, 20}}, {}, recorder, {});
+  const HintSolution solution = Spread(TwoHalves(40, 40), {{10, 10, 2, 50, 20}}, {}, {}, &recorder);
   EXPECT_NEAR(recorder.last_residual, solution.relative_residual, 1e-5);
 }
 
@@ -77,14 +92,14 @@ TEST(HintsTest, OppositeHintsOnePixelApartBothHold) {
 TEST(HintsTest, OfContradictingHintsTheLastWinsWithAWarning) {
   const Image luminance(9, 9, 1, 50.0f);
   Recorder recorder;
-  const HintSolution solution = KeyColorFromHints(
-      luminance, {{4.5, 4.5, 0, 60, 0}, {4.5, 4.5, 0, -20, 10}}, {}, recorder, {});
+  const HintSolution solution =
+      Spread(luminance, {{4.5, 4.5, 0, 60, 0}, {4.5, 4.5, 0, -20, 10}}, {}, {}, &recorder);
   EXPECT_EQ(solution.ab.At(0, 4, 4), -20.0f);
   EXPECT_EQ(solution.ab.At(1, 4, 4), 10.0f);
   EXPECT_NE(recorder.warning.find("1 pixels"), std::string::npos) << recorder.warning;
   EXPECT_NE(recorder.warning.find("0 and 1"), std::string::npos) << recorder.warning;
   Recorder agreeing;
-  KeyColorFromHints(luminance, {{4.5, 4.5, 0, 60, 0}, {4.5, 4.5, 3, 61, 0}}, {}, agreeing, {});
+  Spread(luminance, {{4.5, 4.5, 0, 60, 0}, {4.5, 4.5, 3, 61, 0}}, {}, {}, &agreeing);
   EXPECT_EQ(agreeing.warning, "");
 }
 
@@ -138,9 +153,7 @@ TEST(HintsTest, RegionsAreLockedExactly) {
       {"region": [[40, 2], [50, 2], [50, 12], [40, 12]], "keep": "neutral"},
       {"line": [[30, 30], [50, 30]], "width": 2, "keep": "auto"},
       {"label": 3, "color": "#0000ff"}])");
-  Recorder recorder;
-  const HintSolution solution =
-      KeyColorFromHints(luminance, hints, {}, recorder, {}, {&labels, &automatic});
+  const HintSolution solution = Spread(luminance, hints, {}, {&labels, &automatic});
   EXPECT_EQ(solution.ab.At(0, 7, 7), static_cast<float>(hints[0].a));
   EXPECT_EQ(solution.ab.At(1, 2, 2), static_cast<float>(hints[0].b));
   EXPECT_NE(solution.ab.At(1, 1, 1), static_cast<float>(hints[0].b));
@@ -153,9 +166,8 @@ TEST(HintsTest, RegionsAreLockedExactly) {
 TEST(HintsTest, LocksThatReferToNothingAreRefusedByName) {
   const Image luminance = TwoHalves(60, 40);
   const auto message_of = [&](const char* json, const HintPictures& pictures) -> std::string {
-    Recorder recorder;
     try {
-      KeyColorFromHints(luminance, ParseHintsJson(json), {}, recorder, {}, pictures);
+      Spread(luminance, ParseHintsJson(json), {}, pictures);
     } catch (const Error& error) {
       return error.what();
     }
@@ -236,8 +248,7 @@ TEST(StrokesTest, AlphaMarksTheHints) {
     strokes.At(1, y, 30) = 1.0f;  // green, but transparent
     strokes.At(3, y, 30) = 0.5f;
   }
-  Recorder recorder;
-  const HintSolution solution = KeyColorFromStrokes(luminance, strokes, {}, recorder, {});
+  const HintSolution solution = SpreadStrokes(luminance, strokes);
   EXPECT_EQ(solution.hinted_pixels, 40);
   const LabColor red = LabFromSrgb(RgbColor{1, 0, 0});
   const LabColor blue = LabFromSrgb(RgbColor{0, 0, 1});
@@ -249,8 +260,7 @@ TEST(StrokesTest, ChromaMarksTheHintsWithoutAlpha) {
   const Image luminance(40, 40, 1, 50.0f);
   Image strokes(40, 40, 3, 0.5f);
   strokes.At(0, 20, 20) = 0.9f;
-  Recorder recorder;
-  const HintSolution solution = KeyColorFromStrokes(luminance, strokes, {}, recorder, {});
+  const HintSolution solution = SpreadStrokes(luminance, strokes);
   EXPECT_EQ(solution.hinted_pixels, 1);
   EXPECT_GT(solution.ab.At(0, 2, 2), 20.0f);
 }
@@ -261,18 +271,16 @@ TEST(StrokesTest, ThinStrokesSurviveTheReduction) {
   for (int c : {0, 3}) strokes.At(c, 300, 300) = 1.0f;
   HintOptions options;
   options.max_side_px = 64;
-  Recorder recorder;
-  const HintSolution solution = KeyColorFromStrokes(luminance, strokes, options, recorder, {});
+  const HintSolution solution = SpreadStrokes(luminance, strokes, options);
   EXPECT_NEAR(solution.ab.At(0, 10, 10), LabFromSrgb(RgbColor{1, 0, 0}).a, 2.0);
 }
 
 TEST(StrokesTest, NoStrokeOrAnotherSizeIsRefused) {
   const Image luminance(40, 40, 1, 50.0f);
-  Recorder recorder;
-  EXPECT_THROW(KeyColorFromStrokes(luminance, Image(40, 40, 4, 0.0f), {}, recorder, {}), Error);
-  EXPECT_THROW(KeyColorFromStrokes(luminance, Image(40, 40, 3, 0.7f), {}, recorder, {}), Error);
-  EXPECT_THROW(KeyColorFromStrokes(luminance, Image(40, 41, 4, 1.0f), {}, recorder, {}), Error);
-  EXPECT_THROW(KeyColorFromStrokes(luminance, Image(40, 40, 1, 1.0f), {}, recorder, {}), Error);
+  EXPECT_THROW(SpreadStrokes(luminance, Image(40, 40, 4, 0.0f)), Error);
+  EXPECT_THROW(SpreadStrokes(luminance, Image(40, 40, 3, 0.7f)), Error);
+  EXPECT_THROW(SpreadStrokes(luminance, Image(40, 41, 4, 1.0f)), Error);
+  EXPECT_THROW(SpreadStrokes(luminance, Image(40, 40, 1, 1.0f)), Error);
 }
 
 }  // namespace

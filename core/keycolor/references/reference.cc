@@ -1,5 +1,8 @@
 #include "core/keycolor/references/reference.h"
 
+#include <fmt/format.h>
+#include <torch/torch.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,49 +12,54 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/encoder/image_tensors.h"
+#include "core/encoder/tap_encoder.h"
+#include "core/encoder/torch_errors.h"
+#include "core/encoder/torch_threads.h"
 #include "core/grid/edge_weights.h"
 #include "core/grid/grid_solver.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/picture_checks.h"
-#include "core/keycolor/references/cell_features.h"
-#include "core/keycolor/references/cell_matches.h"
+#include "core/keycolor/references/confidence.h"
+#include "core/matching/cell_features.h"
+#include "core/matching/whitening.h"
 
 namespace color3d {
 namespace {
 
 constexpr int kMinSidePx = 16;
 constexpr std::array<double, 3> kScales{0.75, 1.0, 1.33};  // of a reference: sizes of things differ
-constexpr Eigen::Index kScaleSample = 500;
+constexpr int64_t kScaleSample = 500;
+constexpr int kFirstTapStridePx = 2;  // of the embedded encoder
+// Of the vote among matches in other photos.
+constexpr double kTemperature = 0.3;
 constexpr int kLevels = 1024;  // of the histograms of L
-// Smallest weight of a match: regions without any get their neighbours' colour.
-constexpr float kLeastConfidence = 1e-4f;
+// Smallest weight of a match: regions without any get their neighbors' colour.
+constexpr float kMinConfidence = 1e-4f;
 
 void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+                          luminance.channels);
   }
   if (references.empty()) throw InvalidArgument("there is no reference picture; give at least one");
   for (size_t k = 0; k < references.size(); ++k) {
     const Image& picture = references[k];
-    const std::string name = "reference picture " + std::to_string(k);
+    const std::string name = fmt::format("reference picture {}", k);
     if (picture.channels != 3) {
-      throw InvalidArgument(name + " has no colour (" + std::to_string(picture.channels) +
-                            " channels, 3 are needed)");
+      throw InvalidArgument("{} has no colour ({} channels, 3 are needed)", name, picture.channels);
     }
     if (std::min(picture.width, picture.height) < kMinSidePx) {
-      throw InvalidArgument(name + " is " + std::to_string(picture.width) + "x" +
-                            std::to_string(picture.height) + " px, the least side is " +
-                            std::to_string(kMinSidePx) + " px");
+      throw InvalidArgument(
+          "{} is {} px, the least side is {} px", name, SizeText(picture), kMinSidePx);
     }
     for (float value : picture.data) {
-      if (!std::isfinite(value)) throw InvalidArgument(name + " holds a value that is not finite");
+      if (!std::isfinite(value)) throw InvalidArgument("{} holds a value that is not finite", name);
     }
   }
 }
@@ -82,64 +90,54 @@ Image MatchHistogram(const Image& luminance, const Image& key) {
   return matched;
 }
 
-struct RawBank {
-  std::vector<CellMatrix> blocks;
-  CellMatrix ab;
-  std::vector<int32_t> reference;
+// Cells of one picture, with the encoder's features.
+CellFeatures Describe(const TapEncoder& encoder, const Image& luminance) {
+  const ConvNextConfig& config = encoder.config();
+  const int multiple = config.Stride(config.StageCount() - 1);
+  const torch::Tensor l = TensorFromImage(luminance);
+  const int64_t right = (multiple - luminance.width % multiple) % multiple;
+  const int64_t bottom = (multiple - luminance.height % multiple) % multiple;
+  const torch::Tensor padded =
+      right > 0 || bottom > 0 ? torch::replication_pad2d(l, {0, right, 0, bottom}) : l;
+  return DescribeCells(config, encoder.Taps(encoder.Input(padded)), l);
+}
+
+// Cells of the references, before whitening.
+struct ReferenceCells {
+  std::vector<std::vector<torch::Tensor>> blocks;  // by kind of feature, then a part per picture
+  std::vector<torch::Tensor> colors;
+  std::vector<int32_t> reference;  // that each cell is from
 };
 
-void Append(CellMatrix& matrix, const CellMatrix& rows) {
-  const Eigen::Index before = matrix.rows();
-  matrix.conservativeResize(before + rows.rows(), rows.cols());
-  matrix.bottomRows(rows.rows()) = rows;
-}
-
-CellMatrix TakeRows(const CellMatrix& matrix, const std::vector<Eigen::Index>& rows) {
-  CellMatrix taken(static_cast<Eigen::Index>(rows.size()), matrix.cols());
-  for (size_t i = 0; i < rows.size(); ++i) {
-    taken.row(static_cast<Eigen::Index>(i)) = matrix.row(rows[i]);
-  }
-  return taken;
-}
-
-// Cells of one reference at one scale, at most `wanted` of them, drawn at random.
-void AddCells(const Encoder& encoder,
+// Of one reference at one scale, at most `wanted`, drawn at random.
+void AddCells(const TapEncoder& encoder,
               const Image& luminance,
               const Image& ab,
               int32_t reference,
               int64_t wanted,
               Random& random,
-              RawBank& bank) {
-  const CellFeatures cells = DescribeCells(encoder, luminance);
-  const CellMatrix colors = CellMeans(ab);
-  std::vector<Eigen::Index> rows(colors.rows());
-  std::iota(rows.begin(), rows.end(), Eigen::Index{0});
-  const auto count = static_cast<int64_t>(rows.size());
-  const int64_t taken = std::min(count, std::max<int64_t>(1, wanted));
-  for (int64_t i = 0; i < taken; ++i) {
-    std::swap(rows[i], rows[i + random.NextBelow(static_cast<uint32_t>(count - i))]);
-  }
-  rows.resize(taken);
-  bank.blocks.resize(cells.blocks.size());
-  for (size_t k = 0; k < cells.blocks.size(); ++k) {
-    Append(bank.blocks[k], TakeRows(cells.blocks[k], rows));
-  }
-  Append(bank.ab, TakeRows(colors, rows));
-  bank.reference.insert(bank.reference.end(), taken, reference);
+              ReferenceCells& cells) {
+  const CellFeatures features = Describe(encoder, luminance);
+  const torch::Tensor rows = SampleRows(features.Count(), std::max<int64_t>(1, wanted), random);
+  const std::vector<torch::Tensor> selected = SelectRows(features.blocks, rows);
+  cells.blocks.resize(selected.size());
+  for (size_t k = 0; k < selected.size(); ++k) cells.blocks[k].push_back(selected[k]);
+  cells.colors.push_back(CellMeans(TensorFromImage(ab)).index_select(0, rows));
+  cells.reference.insert(cells.reference.end(), rows.size(0), reference);
 }
 
-RawBank BuildBank(const std::vector<Image>& references,
-                  const Image& key_luminance,
-                  const Encoder& encoder,
-                  const ReferenceOptions& options,
-                  const CancellationToken& cancel) {
-  RawBank bank;
+ReferenceCells CellsOf(const std::vector<Image>& references,
+                       const Image& key_luminance,
+                       const TapEncoder& encoder,
+                       const ReferenceOptions& options,
+                       const CancellationToken& cancel) {
+  ReferenceCells cells;
   Random random(options.seed);
   const int64_t pictures = static_cast<int64_t>(references.size() * kScales.size());
   const int64_t wanted = (options.bank_size + pictures - 1) / pictures;
   for (size_t k = 0; k < references.size(); ++k) {
     const Image lab = LabFromSrgb(FitWithin(references[k], options.match_side_px));
-    ExpectColor(lab, ("reference picture " + std::to_string(k)).c_str());
+    ExpectColor(lab, fmt::format("reference picture {}", k).c_str());
     const Image luminance = MatchHistogram(LuminanceOfLab(lab), key_luminance);
     const Image ab = ChromaOfLab(lab);
     for (double scale : kScales) {
@@ -154,78 +152,123 @@ RawBank BuildBank(const std::vector<Image>& references,
                static_cast<int32_t>(k),
                wanted,
                random,
-               bank);
+               cells);
     }
   }
-  return bank;
+  return cells;
 }
 
-// Cells -> [rows, columns] picture of `channels` planes.
-Image PictureOfCells(const CellMatrix& values, int columns, int rows) {
-  Image picture(columns, rows, static_cast<int>(values.cols()));
-  for (int c = 0; c < picture.channels; ++c) {
-    for (Eigen::Index i = 0; i < values.rows(); ++i) picture.Plane(c)[i] = values(i, c);
+// What the references' cells say about those of the key view.
+struct KeyMatches {
+  Image ab;                        // a pixel per cell
+  Image confidence;                // 0..1, likewise
+  std::vector<int32_t> reference;  // that the nearest cell is from
+};
+
+KeyMatches Match(const std::vector<Image>& references,
+                 const Image& luminance,
+                 const TapEncoder& encoder,
+                 const ReferenceOptions& options,
+                 const RunControl& control) {
+  torch::NoGradGuard no_grad;
+  SetTorchThreads(control.pool.thread_count());
+  control.progress.OnProgress(0, 0, "describing the reference pictures");
+  const ReferenceCells known = CellsOf(references, luminance, encoder, options, control.cancel);
+  std::vector<torch::Tensor> blocks;
+  for (const std::vector<torch::Tensor>& parts : known.blocks) blocks.push_back(torch::cat(parts));
+  // The shares of the taps go by their order, also where the finest has a larger stride.
+  const Whitening whitening(blocks, kFirstTapStridePx, {});
+  const CellBank bank{whitening.Apply(blocks),
+                      torch::cat(known.colors),
+                      torch::ones({static_cast<int64_t>(known.reference.size())})};
+  const CellFeatures cells = Describe(encoder, luminance);
+  const double scale = DistanceScale(
+      bank.features.slice(0, 0, std::min(kScaleSample, bank.features.size(0))), bank.features);
+  control.progress.OnProgress(0, 0, "matching the reference pictures");
+  const CellMatches matches = MatchCells(whitening.Apply(cells.blocks),
+                                         bank,
+                                         {.temperature = kTemperature,
+                                          .distance_floor = kDistanceFloor,
+                                          .max_voters = options.neighbors},
+                                         control.cancel,
+                                         /*with_bank_distance=*/true);
+  const auto picture_of = [&](const torch::Tensor& by_cell) {
+    return ImageFromTensor(by_cell.t().reshape({-1, cells.rows, cells.columns}));
+  };
+  KeyMatches found{picture_of(matches.ab),
+                   picture_of(Confidence(matches, scale).unsqueeze(1)),
+                   std::vector<int32_t>(matches.nearest.size(0))};
+  const int64_t* nearest = matches.nearest.data_ptr<int64_t>();
+  for (size_t i = 0; i < found.reference.size(); ++i) {
+    found.reference[i] = known.reference[nearest[i]];
   }
-  return picture;
+  return found;
+}
+
+const TapEncoder& RequireTaps(const Encoder& encoder) {
+  const auto* network = dynamic_cast<const TapEncoder*>(&encoder);
+  if (network != nullptr) return *network;
+  throw InvalidArgument("the encoder ({}) has no feature maps; use a ConvNeXt or the embedded one",
+                        encoder.description());
 }
 
 // The matches, spread along the luminance by their confidences.
 void Spread(const Image& luminance,
-            const Image& cell_ab,
-            const Image& cell_confidence,
+            const KeyMatches& matches,
             const ReferenceOptions& options,
-            ThreadPool& pool,
-            ProgressObserver& progress,
-            const CancellationToken& cancel,
+            const RunControl& control,
             ReferenceSolution& solution) {
   const Image small = FitWithin(luminance, options.spread_side_px);
-  GridSystem system = SystemOfLuminance(small, options.sigma, pool);
-  const Image ab = Resize(cell_ab, small.width, small.height);
-  const Image confidence = Resize(cell_confidence, small.width, small.height);
+  GridSystem system = SystemOfLuminance(small, options.sigma, control.pool);
+  const Image ab = Resize(matches.ab, small.width, small.height);
+  const Image confidence = Resize(matches.confidence, small.width, small.height);
   for (int64_t i = 0; i < system.PixelCount(); ++i) {
     system.data[i] =
-        static_cast<float>(options.match_weight) * std::max(kLeastConfidence, confidence.data[i]);
+        static_cast<float>(options.match_weight) * std::max(kMinConfidence, confidence.data[i]);
   }
   GridSolution solved = SolveGridSystem(
       std::move(system),
       ab.data,
       {},
-      pool,
+      control.pool,
       [&](int iteration, double residual) {
-        progress.OnError(iteration, "relative_residual", residual);
-        progress.OnProgress(iteration, 0, "spreading the reference's colours");
+        control.progress.OnError(iteration, "relative_residual", residual);
+        control.progress.OnProgress(iteration, 0, "spreading the reference's colours");
       },
-      cancel);
+      control.cancel);
   solution.iterations = solved.iterations;
   solution.relative_residual = solved.relative_residual;
   Image spread(small.width, small.height, 2);
   spread.data = std::move(solved.u);
   const bool same = small.width == luminance.width && small.height == luminance.height;
   solution.ab = same ? std::move(spread) : UpsampleGuided(spread, luminance);
-  solution.confidence = Resize(cell_confidence, luminance.width, luminance.height);
+  solution.confidence = Resize(matches.confidence, luminance.width, luminance.height);
 }
 
-// Means, and chroma faded where the references say nothing about this picture.
-void Judge(const CellMatches& matches,
-           size_t references,
-           const ReferenceOptions& options,
-           ProgressObserver& progress,
-           ReferenceSolution& solution) {
+// Mean confidence and the share of each reference in it; chroma is faded where the references say
+// nothing about this picture.
+void WeighReferences(const KeyMatches& matches,
+                     size_t references,
+                     const ReferenceOptions& options,
+                     ProgressObserver& progress,
+                     ReferenceSolution& solution) {
+  const std::vector<float>& confidence = matches.confidence.data;
   solution.explained.assign(references, 0.0);
   double total = 0.0;
-  for (size_t i = 0; i < matches.confidence.size(); ++i) {
-    solution.explained[matches.reference[i]] += matches.confidence[i];
-    total += matches.confidence[i];
+  for (size_t i = 0; i < confidence.size(); ++i) {
+    solution.explained[matches.reference[i]] += confidence[i];
+    total += confidence[i];
   }
   for (double& share : solution.explained) share = total > 0.0 ? share / total : 0.0;
-  solution.mean_confidence = total / static_cast<double>(matches.confidence.size());
+  solution.mean_confidence = total / static_cast<double>(confidence.size());
   if (solution.mean_confidence >= options.low_confidence) return;
   const double fade = std::pow(solution.mean_confidence / options.low_confidence, 2);
-  progress.OnWarning("the reference pictures hardly resemble the key view (mean confidence " +
-                     std::to_string(solution.mean_confidence) + ", expected " +
-                     std::to_string(options.low_confidence) + " or more): chroma is faded to " +
-                     std::to_string(fade) +
-                     " of itself; give a picture of the same place or things");
+  progress.OnWarning(fmt::format(
+      "the reference pictures hardly resemble the key view (mean confidence {:.3g}, expected {} or "
+      "more): chroma is faded to {:.3g} of itself; give a picture of the same place or things",
+      solution.mean_confidence,
+      options.low_confidence,
+      fade));
   for (float& value : solution.ab.data) value *= static_cast<float>(fade);
 }
 
@@ -236,45 +279,27 @@ void ReferenceOptions::Validate() const {
   check("match_side_px", match_side_px, 64, 1024);
   check("spread_side_px", spread_side_px, 64, 8192);
   check("bank_size", bank_size, 100, 100000);
-  check("neighbours", neighbours, 1, 64);
+  check("neighbors", neighbors, 1, 64);
   check("sigma", sigma, 1e-3, 1e3);
   check("match_weight", match_weight, 1e-6, 1e3);
   check("low_confidence", low_confidence, 1e-6, 1.0);
-  check("threads", threads, 0, 1024);
 }
 
 ReferenceSolution KeyColorFromReferences(const Image& luminance,
                                          const std::vector<Image>& references_srgb,
                                          const Encoder& encoder,
                                          const ReferenceOptions& options,
-                                         ProgressObserver& progress,
-                                         const CancellationToken& cancel) {
+                                         const RunControl& control) {
   options.Validate();
   CheckInputs(luminance, references_srgb);
-  ThreadPool pool(options.threads);
-  const Image small = FitWithin(luminance, options.match_side_px);
-  progress.OnProgress(0, 0, "describing the reference pictures");
-  RawBank raw = BuildBank(references_srgb, small, encoder, options, cancel);
-  const Whitening whitening(raw.blocks);
-  const CellBank bank{whitening.Apply(raw.blocks), std::move(raw.ab), std::move(raw.reference)};
-  const CellFeatures cells = DescribeCells(encoder, small);
-  const double scale = DistanceScale(
-      bank.features.topRows(std::min(kScaleSample, bank.features.rows())), bank.features);
-  progress.OnProgress(0, 0, "matching the reference pictures");
-  const CellMatches matches =
-      MatchCells(whitening.Apply(cells.blocks), bank, options.neighbours, scale, pool, cancel);
+  const TapEncoder& taps = RequireTaps(encoder);
+  const KeyMatches matches = WithTorchErrors("matching of reference pictures", [&] {
+    return Match(
+        references_srgb, FitWithin(luminance, options.match_side_px), taps, options, control);
+  });
   ReferenceSolution solution;
-  const CellMatrix confidence = Eigen::Map<const CellMatrix>(
-      matches.confidence.data(), static_cast<Eigen::Index>(matches.confidence.size()), 1);
-  Spread(luminance,
-         PictureOfCells(matches.ab, cells.columns, cells.rows),
-         PictureOfCells(confidence, cells.columns, cells.rows),
-         options,
-         pool,
-         progress,
-         cancel,
-         solution);
-  Judge(matches, references_srgb.size(), options, progress, solution);
+  Spread(luminance, matches, options, control, solution);
+  WeighReferences(matches, references_srgb.size(), options, control.progress, solution);
   return solution;
 }
 

@@ -4,9 +4,8 @@
 
 #include <vector>
 
-#include "core/base/cancellation.h"
 #include "core/base/image.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/encoder/encoder.h"
 
 namespace color3d {
@@ -15,11 +14,10 @@ struct ReferenceOptions {
   int match_side_px = 448;      // longer side at which pictures are compared, 64..1024
   int spread_side_px = 1024;    // longer side at which matches are spread, 64..8192
   int bank_size = 12000;        // cells of all references that are compared with, 100..100000
-  int neighbours = 8;           // matches that are blended, 1..64
+  int neighbors = 8;            // matches that are blended, 1..64
   double sigma = 0.5;           // as HintOptions
   double match_weight = 0.1;    // of a certain match against the edges of flat regions (1), > 0
   double low_confidence = 0.1;  // mean confidence below which chroma fades and a warning is given
-  int threads = 0;              // 0: what the machine has; the result is the same for any number
   unsigned seed = 1;            // which cells enter the bank
   void Validate() const;
 };
@@ -40,12 +38,12 @@ struct ReferenceSolution {
 // best matches are blended. Confidence is high where the match is as close as cells within a
 // reference are to one another, is mutual, and its candidates agree on the colour. Matches then
 // spread along the luminance like soft hints. Throws Error{kInvalidArgument} naming a reference
-// without colour or too small; unrelated references give a warning with the mean confidence.
+// without colour or too small; unrelated references give a warning with the mean confidence. The
+// result is the same for any number of threads.
 ReferenceSolution KeyColorFromReferences(const Image& luminance,
                                          const std::vector<Image>& references_srgb,
                                          const Encoder& encoder,
                                          const ReferenceOptions& options,
-                                         ProgressObserver& progress,
-                                         const CancellationToken& cancel);
+                                         const RunControl& control);
 
 }  // namespace color3d

@@ -48,6 +48,18 @@ Image Stripes(int width, int height) {
   return lab;
 }
 
+ReferenceSolution Solve(const Image& luminance,
+                        const std::vector<Image>& references,
+                        const ReferenceOptions& options,
+                        Recorder& recorder,
+                        int threads = 0,
+                        const CancellationToken& cancel = {}) {
+  ThreadPool pool(threads);
+  NoCheckpoints none;
+  return KeyColorFromReferences(
+      luminance, references, *Encoder::Embedded(), options, {pool, none, recorder, cancel});
+}
+
 double MeanError(const Image& ab, const Image& lab) {
   double sum = 0.0;
   for (size_t i = 0; i < ab.PlaneSize(); ++i) {
@@ -56,15 +68,11 @@ double MeanError(const Image& ab, const Image& lab) {
   return sum / static_cast<double>(ab.PlaneSize());
 }
 
-TEST(ReferenceTest, ColoursFollowTexture) {
+TEST(ReferenceTest, ColorsFollowTexture) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
-  const ReferenceSolution solution = KeyColorFromReferences(LuminanceOfLab(key),
-                                                            {SrgbFromLab(Bands(420, 180, 0))},
-                                                            *Encoder::Embedded(),
-                                                            {},
-                                                            recorder,
-                                                            {});
+  const ReferenceSolution solution =
+      Solve(LuminanceOfLab(key), {SrgbFromLab(Bands(420, 180, 0))}, {}, recorder);
   ASSERT_EQ(solution.ab.width, 360);
   ASSERT_EQ(solution.ab.height, 160);
   const double gray = MeanError(Image(360, 160, 2), key);
@@ -80,12 +88,10 @@ TEST(ReferenceTest, OfSeveralReferencesTheAlikeOneExplains) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution =
-      KeyColorFromReferences(LuminanceOfLab(key),
-                             {SrgbFromLab(Stripes(64, 64)), SrgbFromLab(Bands(420, 180, 0))},
-                             *Encoder::Embedded(),
-                             {},
-                             recorder,
-                             {});
+      Solve(LuminanceOfLab(key),
+            {SrgbFromLab(Stripes(64, 64)), SrgbFromLab(Bands(420, 180, 0))},
+            {},
+            recorder);
   ASSERT_EQ(solution.explained.size(), 2u);
   EXPECT_NEAR(solution.explained[0] + solution.explained[1], 1.0, 1e-9);
   EXPECT_GT(solution.explained[1], 0.7);
@@ -96,12 +102,8 @@ TEST(ReferenceTest, AnUnrelatedReferenceWarnsAndFades) {
   ReferenceOptions options;
   options.low_confidence = 1.0;  // nothing is that certain
   Recorder recorder;
-  const ReferenceSolution solution = KeyColorFromReferences(LuminanceOfLab(key),
-                                                            {SrgbFromLab(Stripes(64, 64))},
-                                                            *Encoder::Embedded(),
-                                                            options,
-                                                            recorder,
-                                                            {});
+  const ReferenceSolution solution =
+      Solve(LuminanceOfLab(key), {SrgbFromLab(Stripes(64, 64))}, options, recorder);
   EXPECT_NE(recorder.warning.find("mean confidence"), std::string::npos) << recorder.warning;
   for (float value : solution.ab.data) ASSERT_LE(std::abs(value), 20.0f * 0.9f);
 }
@@ -111,11 +113,9 @@ TEST(ReferenceTest, TheNumberOfThreadsDoesNotChangeABit) {
   const std::vector<Image> references{SrgbFromLab(Bands(100, 70, 0))};
   std::vector<float> first;
   for (int threads : {1, 3}) {
-    ReferenceOptions options;
-    options.threads = threads;
     Recorder recorder;
-    const ReferenceSolution solution = KeyColorFromReferences(
-        LuminanceOfLab(key), references, *Encoder::Embedded(), options, recorder, {});
+    const ReferenceSolution solution =
+        Solve(LuminanceOfLab(key), references, {}, recorder, threads);
     if (first.empty()) first = solution.ab.data;
     EXPECT_EQ(first, solution.ab.data);
   }
@@ -127,7 +127,7 @@ TEST(ReferenceTest, ReferencesWithoutUseAreRefusedByNumber) {
   const auto message_of = [&](const std::vector<Image>& references) -> std::string {
     Recorder recorder;
     try {
-      KeyColorFromReferences(luminance, references, *Encoder::Embedded(), {}, recorder, {});
+      Solve(luminance, references, {}, recorder);
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::kInvalidArgument);
       return error.what();
@@ -143,8 +143,7 @@ TEST(ReferenceTest, ReferencesWithoutUseAreRefusedByNumber) {
   CancellationToken cancel;
   cancel.Cancel();
   Recorder recorder;
-  EXPECT_THROW(
-      KeyColorFromReferences(luminance, {good}, *Encoder::Embedded(), {}, recorder, cancel), Error);
+  EXPECT_THROW(Solve(luminance, {good}, {}, recorder, 0, cancel), Error);
 }
 
 }  // namespace

@@ -147,9 +147,9 @@ std::vector<std::string> KnownColorNames() {
 }
 
 Chroma ChromaAtLuminance(const LabColor& color, double l) {
-  constexpr double kLeastRange = 10.0;  // near-black and near-white names have no shadow to fall to
-  const double shadow = l / std::max(color.l, kLeastRange);
-  const double highlight = (100.0 - l) / std::max(100.0 - color.l, kLeastRange);
+  constexpr double kMinRange = 10.0;  // near-black and near-white names have no shadow to fall to
+  const double shadow = l / std::max(color.l, kMinRange);
+  const double highlight = (100.0 - l) / std::max(100.0 - color.l, kMinRange);
   const double share = std::clamp(std::min(shadow, highlight), 0.0, 1.0);
   return {share * color.a, share * color.b};
 }

@@ -11,8 +11,8 @@ namespace {
 
 // The picture is monochrome, and a sentence that says so fits it better.
 constexpr const char* kSentences[] = {"a black and white photo of ", "a photo of ", ""};
-constexpr int kMostWindowsPerSide = 16;  // bounds the work on very long pictures
-constexpr float kLeastWeight = 0.05f;    // of a window's border, so that the picture's own counts
+constexpr int kMaxWindowsPerSide = 16;  // bounds the work on very long pictures
+constexpr float kMinWeight = 0.05f;     // of a window's border, so that the picture's own counts
 
 void Normalise(std::vector<float>& vector) {
   double sum = 1e-30;
@@ -42,7 +42,7 @@ std::vector<Window> WindowsOf(const Image& picture, const std::vector<int>& wind
   const int shorter = std::min(picture.width, picture.height);
   const int longer = std::max(picture.width, picture.height);
   for (const int count : windows_per_side) {
-    const int side = std::max({1, shorter / count, longer / kMostWindowsPerSide});
+    const int side = std::max({1, shorter / count, longer / kMaxWindowsPerSide});
     const int width = std::min(side, picture.width);
     const int height = std::min(side, picture.height);
     for (const int top : Starts(picture.height, height)) {
@@ -71,8 +71,9 @@ Image Cosines(const Image& features, const std::vector<std::vector<float>>& text
   for (const std::vector<float>& text : texts) {
     if (static_cast<int>(text.size()) != features.channels) {
       throw Error(ErrorCode::kInternal,
-                  "the dense features have " + std::to_string(features.channels) +
-                      " channels, the texts " + std::to_string(text.size()));
+                  "the dense features have {} channels, the texts {}",
+                  features.channels,
+                  text.size());
     }
   }
   for (size_t i = 0; i < features.PlaneSize(); ++i) {
@@ -103,7 +104,7 @@ void Blend(const Image& cosines, const Window& window, double scale, Image& sum,
     for (int x = 0; x < width && left + x < sum.width; ++x) {
       const float border_x = static_cast<float>(std::min(x + 1, width - x)) / width;
       const float border_y = static_cast<float>(std::min(y + 1, height - y)) / height;
-      const float weight = kLeastWeight + 4.0f * border_x * border_y;
+      const float weight = kMinWeight + 4.0f * border_x * border_y;
       for (int c = 0; c < sum.channels; ++c) {
         sum.At(c, top + y, left + x) += weight * fine.At(c, y, x);
       }

@@ -1,5 +1,7 @@
 #include "core/keycolor/words/prompt.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -25,17 +27,20 @@ constexpr float kPatchGuideVarianceFloor = 30.0f;
 
 void CheckPictures(const Image& luminance, const Image& rest) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has " +
-                          std::to_string(luminance.channels));
+    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+                          luminance.channels);
   }
   const bool fits =
       rest.channels == 2 && rest.width == luminance.width && rest.height == luminance.height;
   if (!rest.Empty() && !fits) {
-    throw InvalidArgument("the colours of the rest are " + std::to_string(rest.width) + "x" +
-                          std::to_string(rest.height) + " px with " +
-                          std::to_string(rest.channels) + " channels, the key view has " +
-                          std::to_string(luminance.width) + "x" + std::to_string(luminance.height) +
-                          " px and needs 2");
+    throw InvalidArgument(
+        "the colours of the rest are {}x{} px with {} channels, the key view has {}x{} px and "
+        "needs 2",
+        rest.width,
+        rest.height,
+        rest.channels,
+        luminance.width,
+        luminance.height);
   }
 }
 
@@ -115,7 +120,7 @@ Leader LeaderAt(const Image& probabilities, size_t i, const std::vector<bool>& a
 
 std::vector<PromptRegion> RegionsOf(const std::vector<ColorPhrase>& phrases,
                                     const Image& probabilities,
-                                    double least_share) {
+                                    double min_share) {
   std::vector<PromptRegion> regions;
   const std::vector<bool> all(probabilities.channels, true);
   std::vector<size_t> pixels(probabilities.channels, 0);
@@ -130,7 +135,7 @@ std::vector<PromptRegion> RegionsOf(const std::vector<ColorPhrase>& phrases,
     std::copy_n(plane, region.mask.data.size(), region.mask.data.begin());
     region.score = *std::max_element(region.mask.data.begin(), region.mask.data.end());
     region.share = static_cast<double>(pixels[p]) / static_cast<double>(region.mask.data.size());
-    region.found = region.share >= least_share;
+    region.found = region.share >= min_share;
     regions.push_back(std::move(region));
   }
   return regions;
@@ -219,9 +224,10 @@ class HintPlacer {
 Error NothingFound(const std::vector<PromptRegion>& regions) {
   std::string text = "none of the prompt's things was found in the key view:";
   for (const PromptRegion& region : regions) {
-    text += " \"" + region.phrase.thing + "\" (best score " + std::to_string(region.score) + ")";
+    text += fmt::format(" \"{}\" (best score {:.3g})", region.phrase.thing, region.score);
   }
-  return Error(ErrorCode::kFailedPrecondition, text + "; name other things, or place colour hints");
+  return Error(
+      ErrorCode::kFailedPrecondition, "{}; name other things, or place colour hints", text);
 }
 
 }  // namespace
@@ -232,7 +238,7 @@ void PromptOptions::Validate() const {
   for (const int count : windows_per_side) check("windows_per_side", count, 1, 8);
   check("temperature", temperature, 1e-4, 10.0);
   check("seed_confidence", seed_confidence, 0.0, 1.0);
-  check("least_share", least_share, 0.0, 1.0);
+  check("min_share", min_share, 0.0, 1.0);
   check("map_side_px", map_side_px, 32, 1024);
   hints.Validate();
 }
@@ -242,22 +248,21 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
                                   const TextImageModel& model,
                                   const Image& rest,
                                   const PromptOptions& options,
-                                  ProgressObserver& progress,
-                                  const CancellationToken& cancel) {
+                                  const RunControl& control) {
   options.Validate();
   CheckPictures(luminance, rest);
   ParsedPrompt parsed = ParsePrompt(prompt);
   PromptSolution solution;
   solution.notes = std::move(parsed.notes);
   const Image probabilities =
-      Probabilities(luminance, parsed.phrases, model, options, progress, cancel);
-  solution.regions = RegionsOf(parsed.phrases, probabilities, options.least_share);
+      Probabilities(luminance, parsed.phrases, model, options, control.progress, control.cancel);
+  solution.regions = RegionsOf(parsed.phrases, probabilities, options.min_share);
   bool any = false;
   for (const PromptRegion& region : solution.regions) {
     any = any || region.found;
     if (region.found) continue;
-    solution.notes.push_back("\"" + region.phrase.thing +
-                             "\" was not found in the key view; its colour is not used");
+    solution.notes.push_back(fmt::format(
+        "\"{}\" was not found in the key view; its colour is not used", region.phrase.thing));
   }
   if (!any) throw NothingFound(solution.regions);
   const HintPlacer placer(
@@ -265,7 +270,7 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
   const std::vector<ColorHint> hints = placer.Place();
   if (hints.empty()) throw NothingFound(solution.regions);
   solution.confidence = placer.Confidence();
-  solution.spread = KeyColorFromHints(luminance, hints, options.hints, progress, cancel);
+  solution.spread = KeyColorFromHints(luminance, hints, options.hints, control);
   solution.ab = std::move(solution.spread.ab);
   return solution;
 }

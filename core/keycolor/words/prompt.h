@@ -5,11 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cancellation.h"
 #include "core/base/image.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/encoder/clip/clip.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 #include "core/keycolor/words/prompt_phrases.h"
 
 namespace color3d {
@@ -19,7 +18,7 @@ struct PromptOptions {
   std::vector<int> windows_per_side{1, 2, 3};
   double temperature = 0.01;     // of the softmax over phrases; CLIP was trained with 0.01. > 0
   double seed_confidence = 0.4;  // lead over the next phrase above which a pixel is a hint, 0..1
-  double least_share = 0.003;    // of the picture that a phrase must lead on to count as found
+  double min_share = 0.003;      // of the picture that a phrase must lead on to count as found
   int map_side_px = 192;         // longer side of the maps of regions, 32..1024
   HintOptions hints;
   void Validate() const;
@@ -51,7 +50,6 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
                                   const TextImageModel& model,
                                   const Image& rest,
                                   const PromptOptions& options,
-                                  ProgressObserver& progress,
-                                  const CancellationToken& cancel);
+                                  const RunControl& control);
 
 }  // namespace color3d

@@ -1,5 +1,7 @@
 #include "core/keycolor/words/prompt_phrases.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <set>
@@ -137,13 +139,13 @@ class PhraseCollector {
  private:
   void Add(const std::string& thing, const NamedColor& color) {
     if (thing.empty()) {
-      parsed_.notes.push_back("\"" + color.name + "\" names no thing to colour");
+      parsed_.notes.push_back(fmt::format("\"{}\" names no thing to colour", color.name));
       return;
     }
     for (const ColorPhrase& phrase : parsed_.phrases) {
       if (phrase.thing != thing) continue;
-      parsed_.notes.push_back("\"" + thing + "\" is " + phrase.color.name + " already; \"" +
-                              color.name + "\" is left out");
+      parsed_.notes.push_back(fmt::format(
+          "\"{}\" is {} already; \"{}\" is left out", thing, phrase.color.name, color.name));
       return;
     }
     parsed_.phrases.push_back({thing, color});
@@ -162,8 +164,8 @@ std::string ListOfColors() {
 
 ParsedPrompt ParsePrompt(const std::string& prompt) {
   if (prompt.size() > kMaxPromptBytes) {
-    throw InvalidArgument("the prompt has " + std::to_string(prompt.size()) +
-                          " bytes, at most 2000 are allowed; shorten it");
+    throw InvalidArgument("the prompt has {} bytes, at most 2000 are allowed; shorten it",
+                          prompt.size());
   }
   PhraseCollector collector;
   std::string previous;
@@ -176,12 +178,13 @@ ParsedPrompt ParsePrompt(const std::string& prompt) {
   if (parsed.phrases.empty()) {
     throw InvalidArgument(
         "the prompt names no coloured thing; write for example \"red roof, pale blue sky\" or "
-        "\"#4682b4 door\". Known colours: " +
-        ListOfColors() + "; with light, pale, dark, bright, muted and the like before them");
+        "\"#4682b4 door\". Known colours: {}; with light, pale, dark, bright, muted and the like "
+        "before them",
+        ListOfColors());
   }
   if (parsed.phrases.size() > kMaxPhrases) {
-    throw InvalidArgument("the prompt names " + std::to_string(parsed.phrases.size()) +
-                          " coloured things, at most 32 are allowed");
+    throw InvalidArgument("the prompt names {} coloured things, at most 32 are allowed",
+                          parsed.phrases.size());
   }
   return parsed;
 }

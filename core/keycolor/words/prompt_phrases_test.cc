@@ -24,7 +24,7 @@ Pairs Parse(const std::string& prompt) {
   return pairs;
 }
 
-TEST(PromptPhrasesTest, ColoursBeforeThings) {
+TEST(PromptPhrasesTest, ColorsBeforeThings) {
   EXPECT_EQ(Parse("Red brick castle, blue sky and green grass"),
             (Pairs{{"red", "brick castle"}, {"blue", "sky"}, {"green", "grass"}}));
   EXPECT_EQ(Parse("a golden autumn forest, blue sky & white clouds"),
@@ -36,7 +36,7 @@ TEST(PromptPhrasesTest, ColoursBeforeThings) {
   EXPECT_EQ(Parse("an orange on an orange table"), (Pairs{{"orange", "table"}}));
 }
 
-TEST(PromptPhrasesTest, ColoursAfterThings) {
+TEST(PromptPhrasesTest, ColorsAfterThings) {
   EXPECT_EQ(Parse("the sky is blue. Roses are red"), (Pairs{{"blue", "sky"}, {"red", "roses"}}));
   EXPECT_EQ(Parse("paint the roof red"), (Pairs{{"red", "roof"}}));
   EXPECT_EQ(Parse("the house in light yellow"), (Pairs{{"light yellow", "house"}}));
@@ -59,7 +59,7 @@ TEST(PromptPhrasesTest, SaysWhatWasLeftOut) {
   EXPECT_THAT(parsed.notes[1], testing::HasSubstr("green"));
 }
 
-TEST(PromptPhrasesTest, RefusesPromptsWithoutColour) {
+TEST(PromptPhrasesTest, RefusesPromptsWithoutColor) {
   for (const std::string prompt : {"", "a castle by the sea", "red", "#12345 wall", "\xff\xfe"}) {
     try {
       ParsePrompt(prompt);

@@ -52,13 +52,23 @@ Image Scene(int width, int height) {
   return l;
 }
 
-PromptSolution Solve(const Image& l, const std::string& prompt, const Image& rest = {}) {
+PromptSolution SolveWith(const PromptOptions& options,
+                         const Image& l,
+                         const std::string& prompt,
+                         const Image& rest,
+                         const CancellationToken& cancel = {}) {
+  ThreadPool pool;
+  NoCheckpoints none;
   NullObserver silent;
-  CancellationToken cancel;
-  return KeyColorFromPrompt(l, prompt, BrightnessModel(), rest, {}, silent, cancel);
+  return KeyColorFromPrompt(
+      l, prompt, BrightnessModel(), rest, options, {pool, none, silent, cancel});
 }
 
-TEST(PromptTest, PhrasesColourTheirRegions) {
+PromptSolution Solve(const Image& l, const std::string& prompt, const Image& rest = {}) {
+  return SolveWith({}, l, prompt, rest);
+}
+
+TEST(PromptTest, PhrasesColorTheirRegions) {
   const Image l = Scene(320, 240);
   const PromptSolution solution = Solve(l, "blue sky over green grass, and a red wall");
   ASSERT_EQ(solution.regions.size(), 3u);
@@ -94,7 +104,7 @@ TEST(PromptTest, AThingThatIsNotThereIsReportedAndNotForced) {
   }
 }
 
-TEST(PromptTest, WhatNoPhraseNamesTakesTheRestsColour) {
+TEST(PromptTest, WhatNoPhraseNamesTakesTheRestsColor) {
   // The model knows no unicorn: its text is near the "nothing" feature, which no patch shows.
   const Image l = Scene(320, 240);
   Image rest(320, 240, 2);
@@ -102,10 +112,7 @@ TEST(PromptTest, WhatNoPhraseNamesTakesTheRestsColour) {
   PromptOptions options;
   options.temperature = 0.5;  // the background takes its share where no phrase fits well
   options.seed_confidence = 0.02;
-  NullObserver silent;
-  CancellationToken cancel;
-  const PromptSolution solution =
-      KeyColorFromPrompt(l, "blue sky", BrightnessModel(), rest, options, silent, cancel);
+  const PromptSolution solution = SolveWith(options, l, "blue sky", rest);
   EXPECT_LT(solution.ab.At(1, 20, 80), 0.0f);
   EXPECT_GT(solution.ab.At(1, 220, 80), 15.0f);
   EXPECT_FLOAT_EQ(solution.confidence.At(0, 220, 80), 0.0f);
@@ -143,12 +150,9 @@ TEST(PromptTest, RefusesBadInput) {
 }
 
 TEST(PromptTest, StopsWhenCancelled) {
-  NullObserver silent;
   CancellationToken cancel;
   cancel.Cancel();
-  EXPECT_THROW(
-      KeyColorFromPrompt(Scene(100, 80), "blue sky", BrightnessModel(), {}, {}, silent, cancel),
-      Error);
+  EXPECT_THROW(SolveWith({}, Scene(100, 80), "blue sky", {}, cancel), Error);
 }
 
 }  // namespace

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
+#include <utility>
 
 #include "core/color/lab.h"
 #include "core/splat/chroma/chroma_targets.h"
-#include "core/splat/model/model_parameters.h"
 #include "core/splat/raster/pipeline.h"
+#include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/loss.h"
 #include "core/splat/training/training_guard.h"
 #include "core/splat/training/training_state.h"
@@ -23,55 +23,67 @@ constexpr int kErrorReports = 50;
 
 class ChromaTrainer {
  public:
-  ChromaTrainer(const ChromaRun& run, const std::vector<int>& colored, ChromaParameters& parameters)
-      : run_(run), colored_(colored), parameters_(parameters) {
+  ChromaTrainer(const ChromaFitting& fitting,
+                const std::vector<int>& colored,
+                ChromaParameters& parameters)
+      : fitting_(fitting),
+        options_(fitting.options),
+        run_(fitting.run),
+        colored_(colored),
+        parameters_(parameters) {
     state_.parameters = parameters.block;
     const int rows = state_.parameters.rows();
     const int64_t count = state_.parameters.count();
     state_.moments = {ParameterBlock(rows, count), ParameterBlock(rows, count)};
-    state_.random = Random(run.options.seed, 1);
+    state_.random = Random(options_.seed, 1);
   }
 
   void Train() {
-    TrainingGuard guard(run_.progress);
+    TrainingGuard<TrainingState> guard("chroma", run_.progress);
     Resume();
     const double earlier = state_.elapsed_seconds;
     guard.Keep(state_);
-    while (state_.iteration < run_.options.iterations && !run_.OutOfTime(state_.elapsed_seconds)) {
+    while (state_.iteration < options_.iterations && !fitting_.OutOfTime(state_.elapsed_seconds)) {
       run_.cancel.ThrowIfCancelled();
       if (!Step()) {
-        guard.Restore("chroma", state_);
+        guard.Restore(state_);
         continue;
       }
       ++state_.iteration;
-      state_.elapsed_seconds = earlier + run_.clock.Seconds();
+      state_.elapsed_seconds = earlier + fitting_.clock.Seconds();
       if (guard.IsDue(state_.iteration)) guard.Keep(state_);
       Report();
       if (run_.checkpoints.WantsSave()) {
-        run_.checkpoints.Save(SerializeTrainingState(state_, Fingerprint()));
+        CheckpointWriter writer(Fingerprint());
+        WriteState(state_, writer);
+        run_.checkpoints.Save(std::move(writer).Finish());
       }
     }
     parameters_.block = state_.parameters;
   }
 
  private:
+  // Everything that the course of training depends on, but for the targets themselves.
   std::string Fingerprint() const {
-    char text[128];
-    std::snprintf(text,
-                  sizeof(text),
-                  "chroma adam %d %d %g %llu %zu %lld",
-                  run_.options.iterations,
-                  run_.options.chroma_sh_degree,
-                  run_.options.ssim_weight,
-                  static_cast<unsigned long long>(run_.options.seed),
-                  run_.problem.training.size(),
-                  static_cast<long long>(state_.parameters.count()));
-    return text;
+    return fmt::format("chroma adam {} {} {} {} {} {} {}",
+                       options_.iterations,
+                       options_.chroma_sh_degree,
+                       options_.time_limit_seconds,
+                       options_.ssim_weight,
+                       options_.seed,
+                       fitting_.problem.training.size(),
+                       state_.parameters.count());
   }
 
   void Resume() {
     const std::optional<std::string> saved = run_.checkpoints.Load();
-    if (saved && !ParseTrainingState(*saved, Fingerprint(), state_)) {
+    if (!saved) return;
+    CheckpointReader reader(*saved, Fingerprint());
+    TrainingState read;
+    if (reader.ok()) ReadState(reader, read);
+    if (reader.ok()) {
+      state_ = std::move(read);
+    } else {
       run_.progress.OnWarning(
           "chroma: the checkpoint belongs to other options or is damaged; fitting starts afresh");
     }
@@ -80,8 +92,8 @@ class ChromaTrainer {
   // Share of the schedule that is over, by iterations or by time.
   double Done() const {
     const double by_count =
-        static_cast<double>(state_.iteration) / std::max(1, run_.options.iterations);
-    const double limit = run_.options.time_limit_seconds;
+        static_cast<double>(state_.iteration) / std::max(1, options_.iterations);
+    const double limit = options_.time_limit_seconds;
     return limit > 0.0 ? std::min(1.0, std::max(by_count, state_.elapsed_seconds / limit))
                        : by_count;
   }
@@ -99,10 +111,10 @@ class ChromaTrainer {
   }
 
   bool Step() {
-    const PosedCamera& view = run_.problem.training[static_cast<size_t>(
-        colored_[state_.NextView(static_cast<int>(colored_.size()))])];
+    const PosedCamera& view = fitting_.problem.training[static_cast<size_t>(
+        colored_[state_.order.Next(static_cast<int>(colored_.size()), state_.random)])];
     ChromaPlanes target;
-    if (!LoadChromaPlanes(run_.problem, view, &target)) return true;
+    if (!LoadChromaPlanes(fitting_.problem, view, &target)) return true;
     for (float& value : target.ab.data) value += kNeutralChroma;
     const RasterCamera camera = MakeRasterCamera(view.camera, view.cam_from_world);
     const float background[2] = {kNeutralChroma, kNeutralChroma};
@@ -110,7 +122,7 @@ class ChromaTrainer {
     ThreadPool& pool = run_.pool;
     pipeline_.Forward(state_.parameters, color, camera, background, false, pool);
     LossWeights weights;
-    weights.ssim = static_cast<float>(run_.options.ssim_weight);
+    weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
     weights.edge = 0.0f;
     const LossValue loss =
@@ -131,26 +143,27 @@ class ChromaTrainer {
   }
 
   void Report() {
-    const int64_t n = run_.options.iterations;
-    const double now = run_.clock.Seconds();
+    const int64_t n = options_.iterations;
+    const double now = fitting_.clock.Seconds();
     if (now - last_progress_ > 0.25 || state_.iteration == n) {
       last_progress_ = now;
       run_.progress.OnProgress(
-          state_.iteration,
-          n,
-          "chroma on " + std::to_string(state_.parameters.count()) + " Gaussians");
+          state_.iteration, n, fmt::format("chroma on {} Gaussians", state_.parameters.count()));
     }
     if (state_.iteration % std::max<int64_t>(1, n / kErrorReports) == 0 || state_.iteration == n) {
       run_.progress.OnError(state_.iteration, "train_l1_ab", 255.0 * state_.mean_error);
     }
-    if (run_.problem.snapshot && (state_.iteration >= next_snapshot_ || state_.iteration == n)) {
+    if (fitting_.problem.snapshot &&
+        (state_.iteration >= next_snapshot_ || state_.iteration == n)) {
       next_snapshot_ = state_.iteration * 3 / 2 + 5;
       parameters_.block = state_.parameters;
-      run_.Snapshot(state_.iteration, parameters_);
+      fitting_.Snapshot(state_.iteration, parameters_);
     }
   }
 
-  const ChromaRun& run_;
+  const ChromaFitting& fitting_;
+  const ChromaOptions& options_;
+  const RunControl& run_;
   const std::vector<int>& colored_;
   ChromaParameters& parameters_;
   TrainingState state_;
@@ -164,10 +177,10 @@ class ChromaTrainer {
 
 }  // namespace
 
-void TrainChromaWithAdam(const ChromaRun& run,
+void TrainChromaWithAdam(const ChromaFitting& fitting,
                          const std::vector<int>& colored,
                          ChromaParameters& parameters) {
-  ChromaTrainer(run, colored, parameters).Train();
+  ChromaTrainer(fitting, colored, parameters).Train();
 }
 
 }  // namespace color3d

@@ -4,13 +4,13 @@
 
 #include <vector>
 
-#include "core/splat/chroma/chroma_run.h"
+#include "core/splat/chroma/chroma_fitting.h"
 
 namespace color3d {
 
-// Improves `parameters` in place; `colored` are the positions in run.problem.training that have
+// Improves `parameters` in place; `colored` are the positions in fitting.problem.training that have
 // colours.
-void TrainChromaWithAdam(const ChromaRun& run,
+void TrainChromaWithAdam(const ChromaFitting& fitting,
                          const std::vector<int>& colored,
                          ChromaParameters& parameters);
 

@@ -1,21 +1,29 @@
 #include "core/splat/chroma/chroma_fit.h"
 
+#include <utility>
+
 #include "core/base/error.h"
 #include "core/splat/chroma/chroma_adam.h"
 #include "core/splat/chroma/chroma_solver.h"
 #include "core/splat/chroma/chroma_start.h"
 #include "core/splat/chroma/chroma_targets.h"
-#include "core/splat/model/model_parameters.h"
+#include "core/splat/raster/raster_camera.h"
 
 namespace color3d {
 
-GaussianModel FitChromaOn(const GaussianModel& geometry,
-                          const ChromaProblem& problem,
-                          const ChromaOptions& options,
-                          ThreadPool& pool,
-                          CheckpointStore& checkpoints,
-                          ProgressObserver& progress,
-                          const CancellationToken& cancel) {
+ChromaProblem ChromaProblemOf(const Scene& scene,
+                              const ViewImages& images,
+                              ChromaTargetSource targets) {
+  ChromaProblem problem;
+  problem.training = PosedCameras(scene, images, scene.TrainingViews());
+  problem.targets = std::move(targets);
+  return problem;
+}
+
+GaussianModel FitChroma(const GaussianModel& geometry,
+                        const ChromaProblem& problem,
+                        const ChromaOptions& options,
+                        const RunControl& run) {
   options.Validate();
   if (problem.training.empty()) {
     throw InvalidArgument("the scene has no training views; give at least one posed photo");
@@ -24,11 +32,11 @@ GaussianModel FitChromaOn(const GaussianModel& geometry,
   ChromaParameters parameters = ChromaParameters::From(geometry, options.chroma_sh_degree);
   const bool solve =
       options.solver == ChromaOptions::Solver::kConjugateGradients && options.iterations > 0;
-  ChromaSystem system(parameters.block, parameters.color, options.memory_budget_bytes, pool);
+  ChromaSystem system(parameters.block, parameters.color, options.memory_budget_bytes, run.pool);
   std::vector<int> colored;  // positions in problem.training
   bool all_confident = true;
   for (size_t k = 0; k < problem.training.size(); ++k) {
-    cancel.ThrowIfCancelled();
+    run.cancel.ThrowIfCancelled();
     const PosedCamera& view = problem.training[k];
     ChromaPlanes planes;
     if (!LoadChromaPlanes(problem, view, &planes)) continue;
@@ -39,18 +47,18 @@ GaussianModel FitChromaOn(const GaussianModel& geometry,
                    planes.weight,
                    planes.confidence,
                    solve);
-    progress.OnProgress(static_cast<int64_t>(k), 0, "chroma: reading the coloured views");
+    run.progress.OnProgress(static_cast<int64_t>(k), 0, "chroma: reading the coloured views");
   }
-  const std::vector<char> seen = SetClosedForm(system, pool, parameters);
-  const ChromaRun run{geometry, problem, options, pool, checkpoints, progress, cancel, clock};
-  run.Snapshot(0, parameters);
+  const std::vector<char> seen = SetClosedForm(system, run.pool, parameters);
+  const ChromaFitting fitting{geometry, problem, options, run, clock};
+  fitting.Snapshot(0, parameters);
   if (options.iterations > 0 && !colored.empty()) {
     if (solve) {
-      SolveChroma(run, seen, system, parameters);
+      SolveChroma(fitting, seen, system, parameters);
     } else {
-      TrainChromaWithAdam(run, colored, parameters);
+      TrainChromaWithAdam(fitting, colored, parameters);
     }
-    FillUnseen(seen, pool, parameters);
+    FillUnseen(seen, run.pool, parameters);
   }
   GaussianModel model = parameters.ToModel(geometry);
   model.confidence.clear();  // of an earlier chroma

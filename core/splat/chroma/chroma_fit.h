@@ -1,30 +1,58 @@
-// Chroma on fixed geometry, on plain inputs: the engine behind FitChroma. Internal to the splat
-// module.
+// Lab Gaussian reconstruction, second half: chroma on fixed geometry (METHOD.md "Stage 2").
+// Deterministic for a seed and a thread count.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
-#include "core/splat/geometry/geometry_trainer.h"
-#include "core/splat/training/trainer.h"
+#include "core/base/image.h"
+#include "core/base/run_control.h"
+#include "core/scene/scene.h"
+#include "core/scene/view_images.h"
+#include "core/splat/chroma/chroma_options.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/splat/training/posed_camera.h"
 
 namespace color3d {
 
+// Target chroma of one training view at the working size: 2 channels (Lab units), an optional
+// 1-channel weight 0..1 (empty: all 1), and how sure the colour is, 1 channel 0..1 (empty:
+// unknown).
+struct ChromaTarget {
+  Image ab;
+  Image weight;
+  Image confidence;
+};
+// May return null for a view that has no colours.
+using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
+
 struct ChromaProblem {
   std::vector<PosedCamera> training;
-  ChromaTargetSource targets;  // may return null for a view that has no colours
+  ChromaTargetSource targets;
   // For measurements, may be empty: called after the closed form, after every round of conjugate
   // gradients and at growing intervals of Adam, with a way to get the model of that moment.
   std::function<void(int64_t iteration, const std::function<GaussianModel()>& model)> snapshot;
 };
 
-// As FitChroma.
-GaussianModel FitChromaOn(const GaussianModel& geometry,
-                          const ChromaProblem& problem,
-                          const ChromaOptions& options,
-                          ThreadPool& pool,
-                          CheckpointStore& checkpoints,
-                          ProgressObserver& progress,
-                          const CancellationToken& cancel);
+// The training views of `scene` at the working size of `images`.
+ChromaProblem ChromaProblemOf(const Scene& scene,
+                              const ViewImages& images,
+                              ChromaTargetSource targets);
+
+// Expands a 1-channel model to L', a', b' and fits chroma with geometry fixed: closed form first
+// (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by
+// ordered-subsets sweeps and reweighted conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM).
+// Gaussians that no training view sees get their nearest seen neighbours' chroma. When all targets
+// say their confidence, the model's is its mean over the pixels that show the Gaussian, weighted as
+// in the closed form, and 0 for one that no view sees. Curves:
+// "train_l1_ab" (Lab units) and, of conjugate gradients, "chroma_residual" (relative). Throws
+// Error{kInvalidArgument} for targets of another size than the view's camera or with values that
+// are not finite, Error{kCancelled}.
+GaussianModel FitChroma(const GaussianModel& geometry,
+                        const ChromaProblem& problem,
+                        const ChromaOptions& options,
+                        const RunControl& run);
 
 }  // namespace color3d

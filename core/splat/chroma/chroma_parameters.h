@@ -9,8 +9,6 @@
 
 namespace color3d {
 
-inline constexpr float kShDc = 0.28209479177387814f;
-
 struct ChromaParameters {
   // Geometry rows, then the coefficients of a' and of b' where luminance stands in a full model.
   ParameterBlock block;

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
+#include <utility>
 
-#include "core/splat/training/training_state.h"
+#include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/training/checkpoint.h"
 
 namespace color3d {
 namespace {
@@ -21,56 +22,60 @@ constexpr double kMaxChroma = 128.0 / 255.0;
 
 class ChromaSolver {
  public:
-  ChromaSolver(const ChromaRun& run,
+  ChromaSolver(const ChromaFitting& fitting,
                const std::vector<char>& seen,
                ChromaSystem& system,
                ChromaParameters& parameters)
-      : run_(run), seen_(seen), system_(system), parameters_(parameters) {
+      : fitting_(fitting),
+        options_(fitting.options),
+        run_(fitting.run),
+        seen_(seen),
+        system_(system),
+        parameters_(parameters) {
     x_ = FromParameters();
     first_ = x_;
   }
 
   void Solve() {
     Resume();
-    while (position_.sweep < run_.options.sweeps && !Ended()) {
+    while (state_.sweep < options_.sweeps && !Ended()) {
       const double relaxation =
-          kFirstRelaxation * std::pow(kRelaxationDecay, static_cast<double>(position_.sweep));
-      const double l1 = system_.Sweep(
-          Robust(), relaxation, 1.0 / run_.options.tikhonov_rest, seen_, run_.cancel, x_);
+          kFirstRelaxation * std::pow(kRelaxationDecay, static_cast<double>(state_.sweep));
+      const double l1 =
+          system_.Sweep(Robust(), relaxation, 1.0 / options_.tikhonov_rest, seen_, run_.cancel, x_);
       ReportL1(l1);
-      ++position_.sweep;
-      ++position_.iteration;
+      ++state_.sweep;
+      ++state_.iteration;
       EndRound();
     }
-    while (position_.round < run_.options.rounds && !Ended()) {
+    while (state_.round < options_.rounds && !Ended()) {
       system_.Reweight(x_, Robust(), run_.cancel, residuals_);
       ReportL1(residuals_.mean_l1);
-      const double before = position_.last_l1;
-      position_.last_l1 = residuals_.mean_l1;
-      if (position_.round > 0 &&
-          before - residuals_.mean_l1 < run_.options.objective_tolerance * before) {
+      const double before = state_.last_l1;
+      state_.last_l1 = residuals_.mean_l1;
+      if (state_.round > 0 && before - residuals_.mean_l1 < options_.objective_tolerance * before) {
         break;
       }
       InvertBlocks();
       Iterate();
-      ++position_.round;
+      ++state_.round;
       EndRound();
     }
   }
 
  private:
-  struct Position {
-    int sweep = 0;
-    int round = 0;
+  // How far the solver is: with the coefficients, all that it has to remember between rounds.
+  struct State {
+    int32_t sweep = 0;      // sweeps that are done
+    int32_t round = 0;      // rounds of reweighting that are done
     int64_t iteration = 0;  // passes over all views
     double last_l1 = 0.0;   // of the round before
-    double earlier_seconds = 0.0;
   };
   using Pair = std::array<double, 2>;  // of a', b'
 
-  double Seconds() const { return position_.earlier_seconds + run_.clock.Seconds(); }
-  bool OutOfTime() const { return run_.OutOfTime(Seconds()); }
-  bool Ended() const { return position_.iteration >= run_.options.iterations || OutOfTime(); }
+  double Seconds() const { return earlier_seconds_ + fitting_.clock.Seconds(); }
+  bool OutOfTime() const { return fitting_.OutOfTime(Seconds()); }
+  bool Ended() const { return state_.iteration >= options_.iterations || OutOfTime(); }
 
   ChromaVector FromParameters() const {
     const int n = parameters_.coefficients();
@@ -101,25 +106,25 @@ class ChromaSolver {
 
   RobustWeights Robust() const {
     RobustWeights robust;
-    robust.on = run_.options.robust;
+    robust.on = options_.robust;
     return robust;
   }
 
   void ReportL1(double mean_l1) {
-    run_.progress.OnError(position_.iteration, "train_l1_ab", 255.0 * mean_l1);
-    run_.progress.OnProgress(position_.iteration,
-                             run_.options.iterations,
-                             "chroma on " + std::to_string(system_.count()) + " Gaussians");
+    run_.progress.OnError(state_.iteration, "train_l1_ab", 255.0 * mean_l1);
+    run_.progress.OnProgress(state_.iteration,
+                             options_.iterations,
+                             fmt::format("chroma on {} Gaussians", system_.count()));
   }
 
   void EndRound() {
     ToParameters();
-    run_.Snapshot(position_.iteration, parameters_);
+    fitting_.Snapshot(state_.iteration, parameters_);
     Save();
   }
 
   double Pull(int k) const {
-    return run_.options.tikhonov * kShDc * kShDc * (k == 0 ? 1.0 : run_.options.tikhonov_rest);
+    return options_.tikhonov * kShDc * kShDc * (k == 0 ? 1.0 : options_.tikhonov_rest);
   }
 
   // Inverse of the regularised diagonal blocks: block Jacobi.
@@ -173,13 +178,13 @@ class ChromaSolver {
     Pair rho = Precondition(r, z);
     const Pair start = rho;
     if (right[0] + right[1] > 0.0) {
-      run_.progress.OnError(position_.iteration,
+      run_.progress.OnError(state_.iteration,
                             "chroma_residual",
                             std::sqrt((rho[0] + rho[1]) / (right[0] + right[1])));
     }
     p = z;
-    const double stop = run_.options.residual_tolerance * run_.options.residual_tolerance;
-    for (int step = 0; step < run_.options.steps_per_round && !Ended(); ++step) {
+    const double stop = options_.residual_tolerance * options_.residual_tolerance;
+    for (int step = 0; step < options_.steps_per_round && !Ended(); ++step) {
       if (!(rho[0] > stop * start[0]) && !(rho[1] > stop * start[1])) break;
       system_.Multiply(p, run_.cancel, q);
       Pair curvature = {0.0, 0.0}, alpha, beta;
@@ -198,79 +203,82 @@ class ChromaSolver {
       for (int c = 0; c < 2; ++c) beta[c] = rho[c] > 0.0 ? next[c] / rho[c] : 0.0;
       for (size_t j = 0; j < size; ++j) p[j] = z[j] + beta[j % 2] * p[j];
       rho = next;
-      ++position_.iteration;
+      ++state_.iteration;
     }
   }
 
+  // Everything that the course of the fit depends on, but for the targets themselves.
   std::string Fingerprint() const {
-    const ChromaOptions& o = run_.options;
-    char text[256];
-    std::snprintf(text,
-                  sizeof(text),
-                  "chroma cg %d %d %g %g %g %g %d %d %d %d %zu %lld",
-                  o.iterations,
-                  o.chroma_sh_degree,
-                  o.residual_tolerance,
-                  o.objective_tolerance,
-                  o.tikhonov,
-                  o.tikhonov_rest,
-                  o.robust ? 1 : 0,
-                  o.sweeps,
-                  o.rounds,
-                  o.steps_per_round,
-                  run_.problem.training.size(),
-                  static_cast<long long>(system_.count()));
-    return text;
+    return fmt::format("chroma cg {} {} {} {} {} {} {} {} {} {} {} {}",
+                       options_.iterations,
+                       options_.chroma_sh_degree,
+                       options_.residual_tolerance,
+                       options_.objective_tolerance,
+                       options_.tikhonov,
+                       options_.tikhonov_rest,
+                       options_.robust,
+                       options_.sweeps,
+                       options_.rounds,
+                       options_.steps_per_round,
+                       fitting_.problem.training.size(),
+                       system_.count());
   }
 
-  // Between rounds only. `order` carries the sweeps and rounds that are done.
+  // Between rounds only.
   void Save() {
     if (!run_.checkpoints.WantsSave()) return;
-    TrainingState state;
-    state.parameters = parameters_.block;
-    state.iteration = position_.iteration;
-    state.order = {position_.sweep, position_.round};
-    state.mean_error = position_.last_l1;
-    state.elapsed_seconds = Seconds();
-    run_.checkpoints.Save(SerializeTrainingState(state, Fingerprint()));
+    CheckpointWriter writer(Fingerprint());
+    writer.Block(parameters_.block);
+    writer.Value(state_.sweep);
+    writer.Value(state_.round);
+    writer.Value(state_.iteration);
+    writer.Value(state_.last_l1);
+    writer.Value(Seconds());
+    run_.checkpoints.Save(std::move(writer).Finish());
   }
 
   void Resume() {
     const std::optional<std::string> saved = run_.checkpoints.Load();
     if (!saved) return;
-    TrainingState state;
-    if (!ParseTrainingState(*saved, Fingerprint(), state) || state.order.size() != 2 ||
-        state.parameters.rows() != parameters_.block.rows() ||
-        state.parameters.count() != parameters_.block.count()) {
+    CheckpointReader reader(*saved, Fingerprint());
+    ParameterBlock block = reader.Block();
+    State state;
+    state.sweep = reader.Value<int32_t>();
+    state.round = reader.Value<int32_t>();
+    state.iteration = reader.Value<int64_t>();
+    state.last_l1 = reader.Value<double>();
+    const double seconds = reader.Value<double>();
+    if (!reader.ok() || block.rows() != parameters_.block.rows() ||
+        block.count() != parameters_.block.count()) {
       run_.progress.OnWarning(
           "chroma: the checkpoint belongs to other options or is damaged; fitting starts afresh");
       return;
     }
-    parameters_.block = state.parameters;
+    parameters_.block = std::move(block);
+    state_ = state;
+    earlier_seconds_ = seconds;
     x_ = FromParameters();
-    position_.sweep = state.order[0];
-    position_.round = state.order[1];
-    position_.iteration = state.iteration;
-    position_.last_l1 = state.mean_error;
-    position_.earlier_seconds = state.elapsed_seconds;
   }
 
-  const ChromaRun& run_;
+  const ChromaFitting& fitting_;
+  const ChromaOptions& options_;
+  const RunControl& run_;
   const std::vector<char>& seen_;
   ChromaSystem& system_;
   ChromaParameters& parameters_;
-  Position position_;
-  ChromaVector x_, first_;
+  State state_;
+  double earlier_seconds_ = 0.0;  // in the attempts before this one
+  ChromaVector x_, first_;        // coefficients now, and of the closed form
   ChromaSystem::Residuals residuals_;
 };
 
 }  // namespace
 
-void SolveChroma(const ChromaRun& run,
+void SolveChroma(const ChromaFitting& fitting,
                  const std::vector<char>& seen,
                  ChromaSystem& system,
                  ChromaParameters& parameters) {
-  ChromaSolver(run, seen, system, parameters).Solve();
+  ChromaSolver(fitting, seen, system, parameters).Solve();
 }
 
 }  // namespace color3d

@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "core/splat/chroma/chroma_run.h"
+#include "core/splat/chroma/chroma_fitting.h"
 #include "core/splat/chroma/chroma_system.h"
 
 namespace color3d {
@@ -14,7 +14,7 @@ namespace color3d {
 // Improves `parameters` (the closed form) in place; Gaussians that are not `seen` are left alone.
 // Reports the curves "train_l1_ab" (Lab units, of single pixels) and "chroma_residual" (norm of the
 // gradient by that of the right side, in the preconditioner's metric).
-void SolveChroma(const ChromaRun& run,
+void SolveChroma(const ChromaFitting& fitting,
                  const std::vector<char>& seen,
                  ChromaSystem& system,
                  ChromaParameters& parameters);

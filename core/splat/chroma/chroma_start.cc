@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/splat/model/neighbors.h"
+#include "core/splat/model/spherical_harmonics.h"
 
 namespace color3d {
 namespace {

@@ -13,8 +13,7 @@ constexpr float kMaxChroma = 1000.0f;  // Lab units; real colours stay below 130
 constexpr float kWeightSlack = 1e-3f;
 
 std::string SizeOf(const Image& image) {
-  return std::to_string(image.width) + "x" + std::to_string(image.height) + "x" +
-         std::to_string(image.channels);
+  return fmt::format("{}x{}x{}", image.width, image.height, image.channels);
 }
 
 void CheckSizes(const ChromaTarget& target, const PosedCamera& view) {
@@ -27,10 +26,14 @@ void CheckSizes(const ChromaTarget& target, const PosedCamera& view) {
     return;
   }
   throw InvalidArgument(
-      "chroma target of view " + std::to_string(view.view) + " is " + SizeOf(target.ab) +
-      ", its weight " + SizeOf(target.weight) + ", its confidence " + SizeOf(target.confidence) +
-      "; " + std::to_string(view.camera.width) + "x" + std::to_string(view.camera.height) +
-      "x2 and the same size with one channel are needed");
+      "chroma target of view {} is {}, its weight {}, its confidence {}; {}x{}x2 and the same size "
+      "with one channel are needed",
+      view.view,
+      SizeOf(target.ab),
+      SizeOf(target.weight),
+      SizeOf(target.confidence),
+      view.camera.width,
+      view.camera.height);
 }
 
 // Comparisons that NaN fails.
@@ -39,11 +42,15 @@ void CheckValues(const Image& image, float low, float high, const char* what, in
     const float* plane = image.Plane(c);
     for (size_t i = 0; i < image.PlaneSize(); ++i) {
       if (plane[i] >= low && plane[i] <= high) continue;
-      throw InvalidArgument("chroma target of view " + std::to_string(view) + ": " + what +
-                            " at pixel (" + std::to_string(i % image.width) + ", " +
-                            std::to_string(i / image.width) + ") is " + std::to_string(plane[i]) +
-                            "; give a number from " + std::to_string(std::lround(low)) + " to " +
-                            std::to_string(std::lround(high)));
+      throw InvalidArgument(
+          "chroma target of view {}: {} at pixel ({}, {}) is {}; give a number from {} to {}",
+          view,
+          what,
+          i % image.width,
+          i / image.width,
+          plane[i],
+          std::lround(low),
+          std::lround(high));
     }
   }
 }

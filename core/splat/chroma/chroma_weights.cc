@@ -10,6 +10,7 @@
 #include <hwy/foreach_target.h>
 
 #include "core/simd/simd-inl.h"
+#include "core/splat/raster/raster_constants.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace color3d {
@@ -24,8 +25,6 @@ constexpr float kUnit = 1.0f / 65535.0f;
 // Entries whose weights sum to less than this many pixels are left out: a twentieth of the entries
 // of real scenes, 1e-4 of their light.
 constexpr float kMinStoredPixels = 1e-3f;
-constexpr float kLog2MinAlpha = -7.9943534f;
-constexpr float kSlackPx = 0.02f;  // the pixel test itself decides
 
 // Blocks of four cells from `first` to `last` that [center - reach, center + reach] meets.
 inline void BlockRange(float center, float reach, float origin, int* first, int* last) {
@@ -46,7 +45,7 @@ Box BoundingBlocks(const float* row, float tile_x, float tile_y) {
   const float tau = std::max(row[kLog2Opacity] - kLog2MinAlpha, 0.0f);
   const float var_y = 1.0f / row[kInvY];
   const float var_x = 1.0f / row[kInvX] + row[kSlope] * row[kSlope] * var_y;
-  float rx = std::sqrt(tau * var_x) + kSlackPx, ry = std::sqrt(tau * var_y) + kSlackPx;
+  float rx = std::sqrt(tau * var_x) + kBoundSlackPx, ry = std::sqrt(tau * var_y) + kBoundSlackPx;
   if (!(rx < 1e6f)) rx = 1e6f;
   if (!(ry < 1e6f)) ry = 1e6f;
   Box box;

@@ -13,11 +13,10 @@
 
 #include "core/splat/raster/binning.h"
 #include "core/splat/raster/projection.h"
+#include "core/splat/raster/raster_constants.h"
 
 namespace color3d {
 
-inline constexpr int kTileBlocks = 16;
-inline constexpr int kBlockPixels = 16;
 inline constexpr int kTilePixels = kTileBlocks * kBlockPixels;
 
 // One block that an entry touches: weight / 65535.

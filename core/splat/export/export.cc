@@ -16,7 +16,6 @@ namespace {
 constexpr double kMaxRoundingOfExtent = 1e-3;
 constexpr double kFloatHalfUlp = 0x1p-24;  // relative
 constexpr size_t kSplatBytes = 32;
-constexpr float kShDc = 0.28209479177387814f;
 
 // The shortest decimals that read back as the same doubles, each after a blank.
 std::string Numbers(const Eigen::Vector3d& v) {
@@ -36,14 +35,14 @@ std::string PlyHeader(size_t count,
                       const ExportFrame& frame) {
   std::string h = "ply\nformat binary_little_endian 1.0\n";
   if (!frame.left_out.isZero(0.0)) h += "comment offset" + Numbers(frame.left_out) + "\n";
-  h += "element vertex " + std::to_string(count) + "\n";
+  h += fmt::format("element vertex {}\n", count);
   const auto property = [&](const std::string& name) { h += "property float " + name + "\n"; };
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
-  for (int i = 0; i < 3; ++i) property("f_dc_" + std::to_string(i));
-  for (int i = 0; i < 3 * (coefficients - 1); ++i) property("f_rest_" + std::to_string(i));
+  for (int i = 0; i < 3; ++i) property(fmt::format("f_dc_{}", i));
+  for (int i = 0; i < 3 * (coefficients - 1); ++i) property(fmt::format("f_rest_{}", i));
   property("opacity");
-  for (int i = 0; i < 3; ++i) property("scale_" + std::to_string(i));
-  for (int i = 0; i < 4; ++i) property("rot_" + std::to_string(i));
+  for (int i = 0; i < 3; ++i) property(fmt::format("scale_{}", i));
+  for (int i = 0; i < 4; ++i) property(fmt::format("rot_{}", i));
   if (with_confidence) property("confidence");
   return h + "end_header\n";
 }
@@ -52,8 +51,9 @@ void CheckColors(const GaussianModel& model, const RgbHarmonics& rgb) {
   CheckModel(model);
   const size_t wanted = model.size() * static_cast<size_t>(ShCoefficients(rgb.degree)) * 3;
   if (rgb.sh.size() == wanted) return;
-  throw InvalidArgument("RGB harmonics have " + std::to_string(rgb.sh.size()) + " numbers, " +
-                        std::to_string(wanted) + " are needed; fit them to this model");
+  throw InvalidArgument("RGB harmonics have {} numbers, {} are needed; fit them to this model",
+                        rgb.sh.size(),
+                        wanted);
 }
 
 void FilePosition(const GaussianModel& model, const ExportFrame& frame, size_t i, float* out) {

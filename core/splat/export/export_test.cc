@@ -8,131 +8,15 @@
 #include <sstream>
 
 #include "core/base/error.h"
-#include "core/base/random.h"
-#include "core/color/lab.h"
-#include "core/splat/export/rgb_refine.h"
 #include "core/splat/model/spherical_harmonics.h"
-#include "core/splat/raster/render.h"
 #include "tests/support/random_model.h"
 #include "tests/support/splat_scene.h"
 
 namespace color3d {
 namespace {
 
-constexpr double kShDc = 0.28209479177387814;
-
 GaussianModel DullModel(size_t count, int degree, int chroma_degree) {
   return RandomModel({count, 3, degree, chroma_degree, /*chroma_size=*/0.03});
-}
-
-TEST(RgbHarmonicsTest, ReproduceTheColours) {
-  ThreadPool pool(2);
-  const GaussianModel m = DullModel(40, 2, 1);
-  const RgbHarmonicsFitter fitter(m.sh_degree);
-  const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
-  ASSERT_EQ(rgb.sh.size(), 40u * 9 * 3);
-  double worst = 0.0;
-  for (size_t i = 0; i < m.size(); ++i) {
-    const Eigen::MatrixX3d colors = fitter.Colors(m, i);
-    EXPECT_GE(colors.minCoeff(), 0.0);
-    EXPECT_LE(colors.maxCoeff(), 1.0);
-    Eigen::MatrixX3d sh(9, 3);
-    for (int k = 0; k < 9; ++k) {
-      for (int c = 0; c < 3; ++c) sh(k, c) = rgb.sh[(i * 9 + k) * 3 + c];
-    }
-    const Eigen::MatrixX3d back = ((fitter.Basis() * sh).array() + 0.5).matrix();
-    worst = std::max(worst, (back - colors).cwiseAbs().mean());
-  }
-  EXPECT_LT(worst, 0.05);
-  EXPECT_EQ(DegreeZero(rgb).sh.size(), 40u * 3);
-  EXPECT_EQ(DegreeZero(rgb).sh[3], rgb.sh[27]);
-}
-
-TEST(RgbHarmonicsTest, ADiffuseColourIsExact) {
-  ThreadPool pool(1);
-  GaussianModel m = DullModel(1, 0, 0);
-  m.sh_l = {0.3f};
-  m.sh_a = {0.1f};
-  m.sh_b = {-0.05f};
-  const RgbColor rgb = SrgbFromLab(
-      LabColor{100.0 * (0.5 + kShDc * 0.3f), 255.0 * kShDc * 0.1f, -255.0 * kShDc * 0.05f});
-  const RgbHarmonics fitted = FitRgbHarmonics(m, pool);
-  EXPECT_NEAR(0.5 + kShDc * fitted.sh[0], rgb.r, 1e-6);
-  EXPECT_NEAR(0.5 + kShDc * fitted.sh[1], rgb.g, 1e-6);
-  EXPECT_NEAR(0.5 + kShDc * fitted.sh[2], rgb.b, 1e-6);
-}
-
-// A wall of overlapping, half-transparent Gaussians of different chroma: where Lab and RGB blend
-// differently.
-GaussianModel MixedWall() {
-  GaussianModel m = DullModel(400, 1, 0);
-  Random random(9);
-  for (size_t i = 0; i < m.size(); ++i) {
-    m.position[3 * i] = static_cast<float>(random.NextUniform(-1.0, 1.0));
-    m.position[3 * i + 1] = static_cast<float>(random.NextUniform(-1.0, 1.0));
-    m.position[3 * i + 2] = static_cast<float>(random.NextUniform(2.5, 3.0));
-    for (int k = 0; k < 3; ++k) m.log_scale[3 * i + k] = -2.0f;
-    m.sh_a[i] *= 8.0f;
-    m.sh_b[i] *= 8.0f;
-  }
-  return m;
-}
-
-std::vector<RgbView> ThreeViews() {
-  std::vector<RgbView> views(3);
-  for (int i = 0; i < 3; ++i) {
-    views[i].camera = {64, 48, 60.0, 60.0, 32.0, 24.0};
-    views[i].cam_from_world.translation = {0.2 * (i - 1), 0.0, 0.0};
-  }
-  views[1].fitted = false;
-  return views;
-}
-
-TEST(RefineRgbHarmonicsTest, WinsBackWhatBlendingInRgbLoses) {
-  ThreadPool pool(2);
-  NullObserver silent;
-  const GaussianModel m = MixedWall();
-  const RgbHarmonics start = FitRgbHarmonics(m, pool);
-  RgbRefineOptions options;
-  options.epochs = 30;
-  const RgbRefinement refined =
-      RefineRgbHarmonics(m, start, ThreeViews(), options, pool, silent, CancellationToken());
-  std::printf("mixed wall: %.2f dB (worst %.2f) before, %.2f (%.2f) after refinement\n",
-              refined.before.mean_psnr_db,
-              refined.before.worst_psnr_db,
-              refined.after.mean_psnr_db,
-              refined.after.worst_psnr_db);
-  EXPECT_GT(refined.after.mean_psnr_db, refined.before.mean_psnr_db + 0.5);
-  EXPECT_LE(refined.after.worst_psnr_db, refined.after.mean_psnr_db);
-  EXPECT_EQ(refined.harmonics.sh.size(), start.sh.size());
-  const RgbRefinement again =
-      RefineRgbHarmonics(m, start, ThreeViews(), options, pool, silent, CancellationToken());
-  EXPECT_EQ(again.harmonics.sh, refined.harmonics.sh);
-  // Nothing to gain: the start comes back as it was.
-  options.epochs = 0;
-  const RgbRefinement none =
-      RefineRgbHarmonics(m, start, ThreeViews(), options, pool, silent, CancellationToken());
-  EXPECT_EQ(none.harmonics.sh, start.sh);
-  EXPECT_EQ(none.after.mean_psnr_db, none.before.mean_psnr_db);
-}
-
-TEST(RefineRgbHarmonicsTest, RefusesNonsenseAndCanBeCancelled) {
-  ThreadPool pool(1);
-  NullObserver silent;
-  const GaussianModel m = MixedWall();
-  const RgbHarmonics start = FitRgbHarmonics(m, pool);
-  const auto run = [&](const std::vector<RgbView>& views,
-                       const RgbRefineOptions& options,
-                       const CancellationToken& cancel) {
-    RefineRgbHarmonics(m, start, views, options, pool, silent, cancel);
-  };
-  RgbRefineOptions options;
-  EXPECT_THROW(run({}, options, {}), Error);
-  options.learning_rate = std::nan("");
-  EXPECT_THROW(run(ThreeViews(), options, {}), Error);
-  CancellationToken cancel;
-  cancel.Cancel();
-  EXPECT_THROW(run(ThreeViews(), {}, cancel), Error);
 }
 
 TEST(ExportTest, PlyHasTheStandardLayout) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "core/base/error.h"
 #include "core/base/random.h"
@@ -11,6 +10,7 @@
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/pipeline.h"
+#include "core/splat/raster/raster_camera.h"
 #include "core/splat/raster/render.h"
 #include "core/splat/training/adam.h"
 #include "core/splat/training/training_targets.h"
@@ -58,10 +58,10 @@ class Refiner {
           const RgbHarmonics& start,
           const std::vector<RgbView>& views,
           const RgbRefineOptions& options,
-          ThreadPool& pool)
+          const RunControl& run)
       : views_(views),
         options_(options),
-        pool_(pool),
+        run_(run),
         degree_(start.degree),
         parameters_(RgbParameters(model, start)) {
     const int coefficients = ShCoefficients(degree_);
@@ -74,21 +74,21 @@ class Refiner {
     }
   }
 
-  void RenderTargets(const GaussianModel& model, const CancellationToken& cancel) {
+  void RenderTargets(const GaussianModel& model) {
     for (const RgbView& view : views_) {
-      cancel.ThrowIfCancelled();
-      const RenderedView rendered = RenderView(model, view.camera, view.cam_from_world, pool_);
+      run_.cancel.ThrowIfCancelled();
+      const RenderedView rendered = RenderView(model, view.camera, view.cam_from_world, run_.pool);
       targets_.push_back(PlanesFromImage(SrgbFromLab(rendered.lab), 0.0f, 1.0f));
     }
   }
 
-  RgbLoss Measure(const CancellationToken& cancel) {
+  RgbLoss Measure() {
     RgbLoss loss;
     loss.worst_psnr_db = kBestPsnrDb;
     loss.worst_view = 0;
     for (size_t v = 0; v < views_.size(); ++v) {
-      cancel.ThrowIfCancelled();
-      pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, pool_);
+      run_.cancel.ThrowIfCancelled();
+      pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, run_.pool);
       const double psnr = Psnr(Residual(v));
       loss.mean_psnr_db += psnr / static_cast<double>(views_.size());
       if (psnr < loss.worst_psnr_db) {
@@ -100,7 +100,7 @@ class Refiner {
   }
 
   // False when a value was not finite.
-  bool Refine(ProgressObserver& progress, const CancellationToken& cancel) {
+  bool Refine() {
     std::vector<size_t> order;
     for (size_t v = 0; v < views_.size(); ++v) {
       if (views_[v].fitted) order.push_back(v);
@@ -115,19 +115,20 @@ class Refiner {
         std::swap(order[i - 1], order[random.NextBelow(static_cast<uint32_t>(i))]);
       }
       for (const size_t v : order) {
-        cancel.ThrowIfCancelled();
-        pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, pool_);
+        run_.cancel.ThrowIfCancelled();
+        pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, run_.pool);
         if (!std::isfinite(Residual(v))) return false;
         pipeline_.Backward(parameters_,
                            color_,
                            cameras_[v],
                            residual_,
                            GradientScope::kColorOnly,
-                           pool_,
+                           run_.pool,
                            gradient_);
         const double done = static_cast<double>(step) / static_cast<double>(total);
-        if (!AdamStep(gradient_, Rates(done), ++step, pool_, parameters_, moments)) return false;
-        progress.OnProgress(step, total, "refining the RGB colours of the export");
+        if (!AdamStep(gradient_, Rates(done), ++step, run_.pool, parameters_, moments))
+          return false;
+        run_.progress.OnProgress(step, total, "refining the RGB colours of the export");
       }
     }
     return true;
@@ -174,7 +175,7 @@ class Refiner {
 
   const std::vector<RgbView>& views_;
   const RgbRefineOptions& options_;
-  ThreadPool& pool_;
+  const RunControl& run_;
   int degree_;
   ParameterBlock parameters_;
   ColorSpec color_;
@@ -197,17 +198,15 @@ RgbRefinement RefineRgbHarmonics(const GaussianModel& model,
                                  RgbHarmonics start,
                                  const std::vector<RgbView>& views,
                                  const RgbRefineOptions& options,
-                                 ThreadPool& pool,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel) {
+                                 const RunControl& run) {
   options.Validate();
   if (views.empty()) throw InvalidArgument("RGB refinement needs at least one view");
-  Refiner refiner(model, start, views, options, pool);
-  refiner.RenderTargets(model, cancel);
+  Refiner refiner(model, start, views, options, run);
+  refiner.RenderTargets(model);
   RgbRefinement result;
-  result.before = refiner.Measure(cancel);
-  const bool finite = refiner.Refine(progress, cancel);
-  if (finite) result.after = refiner.Measure(cancel);
+  result.before = refiner.Measure();
+  const bool finite = refiner.Refine();
+  if (finite) result.after = refiner.Measure();
   if (finite && result.after.mean_psnr_db > result.before.mean_psnr_db) {
     result.harmonics = refiner.Result();
   } else {

@@ -4,9 +4,7 @@
 
 #include <vector>
 
-#include "core/base/cancellation.h"
-#include "core/base/parallel.h"
-#include "core/base/progress.h"
+#include "core/base/run_control.h"
 #include "core/scene/camera.h"
 #include "core/splat/export/rgb_harmonics.h"
 #include "core/splat/model/gaussian_model.h"
@@ -42,14 +40,12 @@ struct RgbRefinement {
 };
 
 // Adam on the coefficients with geometry fixed, squared error against our own renders of the fitted
-// views. Renders every view once and keeps the pictures (12 bytes a pixel). Throws
-// Error{kInvalidArgument} without views, Error{kCancelled}.
+// views. Renders every view once and keeps the pictures (12 bytes a pixel). Saves no checkpoints.
+// Throws Error{kInvalidArgument} without views, Error{kCancelled}.
 RgbRefinement RefineRgbHarmonics(const GaussianModel& model,
                                  RgbHarmonics start,
                                  const std::vector<RgbView>& views,
                                  const RgbRefineOptions& options,
-                                 ThreadPool& pool,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel);
+                                 const RunControl& run);
 
 }  // namespace color3d

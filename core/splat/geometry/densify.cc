@@ -7,8 +7,6 @@
 namespace color3d {
 namespace {
 
-constexpr int kMaxCopies = 50;
-
 double Sigmoid(double x) { return 1.0 / (1.0 + std::exp(-x)); }
 double Logit(double p) { return std::log(p / (1.0 - p)); }
 
@@ -111,76 +109,6 @@ void DensifyByGradient(const GradientDensifyOptions& options, DensifyTarget& t) 
   }
   Prune(options, t);
   t.statistics.Reset(t.parameters.count());
-}
-
-SplitShare ShareOf(double opacity, int copies) {
-  SplitShare share;
-  share.opacity = 1.0 - std::pow(1.0 - opacity, 1.0 / copies);
-  double sum = 0.0;
-  for (int i = 1; i <= copies; ++i) {
-    double binomial = 1.0, power = share.opacity;  // C(i - 1, k), o^(k + 1)
-    for (int k = 0; k < i; ++k) {
-      sum += (k % 2 == 0 ? binomial : -binomial) * power / std::sqrt(k + 1.0);
-      binomial *= static_cast<double>(i - 1 - k) / (k + 1);
-      power *= share.opacity;
-    }
-  }
-  share.scale = opacity / sum;
-  return share;
-}
-
-void Relocate(const RelocationOptions& options, DensifyTarget& t) {
-  ParameterBlock& p = t.parameters;
-  const int64_t old_count = p.count();
-  std::vector<int64_t> places;  // Gaussians to overwrite
-  std::vector<double> cumulative(old_count);
-  double sum = 0.0;
-  for (int64_t i = 0; i < old_count; ++i) {
-    const double opacity = OpacityOf(p, i);
-    if (!(opacity > options.dead_opacity)) {
-      places.push_back(i);
-    } else {
-      const double preference =
-          options.gradient_preference > 0.0
-              ? std::pow(MeanGradient(t.statistics, i), options.gradient_preference)
-              : 1.0;
-      sum += opacity * preference;
-    }
-    cumulative[i] = sum;
-  }
-  if (!(sum > 0.0) || !std::isfinite(sum)) return;
-  ResizeAll(t, std::max(old_count, options.target_count));
-  for (int64_t i = old_count; i < p.count(); ++i) places.push_back(i);
-  std::vector<std::vector<int64_t>> copies_of(old_count);
-  for (const int64_t place : places) {
-    const double at = t.random.NextUniform() * sum;
-    const int64_t source =
-        std::upper_bound(cumulative.begin(), cumulative.end(), at) - cumulative.begin();
-    auto& copies = copies_of[std::min(source, old_count - 1)];
-    if (static_cast<int>(copies.size()) + 1 < kMaxCopies) copies.push_back(place);
-  }
-  for (int64_t i = 0; i < old_count; ++i) {
-    if (copies_of[i].empty()) continue;
-    const double opacity = std::min(OpacityOf(p, i), 0.9999);
-    const SplitShare share = ShareOf(opacity, static_cast<int>(copies_of[i].size()) + 1);
-    p.Row(kOpacityRow)[i] = static_cast<float>(Logit(std::clamp(share.opacity, 0.005, 0.9999)));
-    for (int k = 0; k < 3; ++k) {
-      p.Row(kLogScaleRow + k)[i] += static_cast<float>(std::log(share.scale));
-    }
-    ForgetMoments(t.moments, i);
-    for (const int64_t place : copies_of[i]) {
-      p.CopyGaussian(i, place);
-      ForgetMoments(t.moments, place);
-    }
-  }
-  // Places beyond a source's limit of copies stay as they are: dead, or all zero. Make those dead.
-  for (int64_t i = old_count; i < p.count(); ++i) {
-    if (p.Row(kRotationRow)[i] == 0.0f && p.Row(kOpacityRow)[i] == 0.0f) {
-      p.Row(kRotationRow)[i] = 1.0f;
-      p.Row(kOpacityRow)[i] = -10.0f;
-    }
-  }
-  t.statistics.Reset(p.count());
 }
 
 void ResetOpacity(double max_opacity, DensifyTarget& t) {

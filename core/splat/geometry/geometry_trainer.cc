@@ -1,19 +1,21 @@
 #include "core/splat/geometry/geometry_trainer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <cstdio>
 
 #include "core/base/error.h"
 #include "core/splat/geometry/densify.h"
+#include "core/splat/geometry/geometry_state.h"
+#include "core/splat/geometry/held_out.h"
+#include "core/splat/geometry/regularize.h"
+#include "core/splat/geometry/training_schedule.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/pipeline.h"
-#include "core/splat/training/held_out.h"
+#include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/loss.h"
-#include "core/splat/training/regularize.h"
 #include "core/splat/training/training_guard.h"
-#include "core/splat/training/training_state.h"
 #include "core/splat/training/training_targets.h"
 
 namespace color3d {
@@ -36,7 +38,7 @@ ParameterBlock AtMost(int64_t count, ParameterBlock p) {
 
 // Spherical harmonics of `from`, channel by channel, cut or extended to `coefficients` each. A
 // single channel serves for all.
-ParameterBlock WithColours(const GaussianModel& from, int channels, int coefficients) {
+ParameterBlock WithColors(const GaussianModel& from, int channels, int coefficients) {
   const ParameterBlock given = ParametersFromModel(from);
   const int first = ShCoefficients(from.sh_degree), other = ShCoefficients(from.chroma_sh_degree);
   ParameterBlock p(kColorRow + channels * coefficients, given.count());
@@ -54,24 +56,22 @@ ParameterBlock WithColours(const GaussianModel& from, int channels, int coeffici
 class GeometryTrainer {
  public:
   GeometryTrainer(const GeometryProblem& problem,
-                  const GaussianModel& initial,
                   const GeometryOptions& options,
-                  const GeometryTuning& tuning,
-                  ThreadPool& pool,
-                  ProgressObserver& progress)
+                  const RunControl& run,
+                  TrainingTrace* trace)
       : problem_(problem),
         options_(options),
-        tuning_(tuning),
-        schedule_(options, tuning, problem.extent),
-        channels_(problem.colours ? 3 : 1),
-        pool_(pool),
-        progress_(progress),
-        targets_(problem.colours ? problem.colours : problem.luminance,
+        run_(run),
+        trace_(trace),
+        schedule_(options, problem.extent),
+        channels_(problem.colors ? 3 : 1),
+        targets_(problem.colors ? problem.colors : problem.luminance,
                  channels_,
-                 problem.colours ? 1.0f : 0.01f,
+                 problem.colors ? 1.0f : 0.01f,
                  kTargetBudgetBytes) {
-    state_.parameters = AtMost(options.max_gaussians,
-                               WithColours(initial, channels_, ShCoefficients(options.sh_degree)));
+    state_.parameters =
+        AtMost(options.max_gaussians,
+               WithColors(problem.initial, channels_, ShCoefficients(options.sh_degree)));
     const int rows = state_.parameters.rows();
     initial_count_ = state_.parameters.count();
     state_.moments = {ParameterBlock(rows, initial_count_), ParameterBlock(rows, initial_count_)};
@@ -80,20 +80,17 @@ class GeometryTrainer {
     pipeline_.set_clock(&clock_);
   }
 
-  GaussianModel Train(CheckpointStore& checkpoints,
-                      const CancellationToken& cancel,
-                      TrainingTrace* trace) {
-    trace_ = trace;
-    TrainingGuard guard(progress_);
-    Resume(checkpoints);
+  GaussianModel Train() {
+    TrainingGuard<GeometryState> guard("geometry", run_.progress);
+    Resume();
     guard.Keep(state_);
     earlier_seconds_ = state_.elapsed_seconds;
-    timed_from_ = state_.iteration;
+    last_round_.iteration = state_.iteration;
     fraction_ = FractionNow();
     while (fraction_ < 1.0) {
-      cancel.ThrowIfCancelled();
+      run_.cancel.ThrowIfCancelled();
       if (!Step()) {
-        guard.Restore("geometry", state_);
+        guard.Restore(state_);
         fraction_ = FractionNow();
         continue;
       }
@@ -105,9 +102,9 @@ class GeometryTrainer {
       clock_.Enter(Phase::kOther);
       if (guard.IsDue(state_.iteration)) guard.Keep(state_);
       Report(before);
-      if (checkpoints.WantsSave()) {
+      if (run_.checkpoints.WantsSave()) {
         state_.elapsed_seconds = earlier_seconds_ + clock_.TrainingSeconds();
-        checkpoints.Save(SerializeTrainingState(state_, Fingerprint()));
+        run_.checkpoints.Save(SerializeGeometryState(state_, Fingerprint()));
       }
     }
     FinishTrace();
@@ -120,33 +117,38 @@ class GeometryTrainer {
     return schedule_.Fraction(state_.iteration, earlier_seconds_ + clock_.TrainingSeconds());
   }
 
-  // Everything that the course of training depends on.
+  // Everything that the course of training depends on, but for the pictures themselves.
   std::string Fingerprint() const {
-    char text[256];
-    std::snprintf(text,
-                  sizeof(text),
-                  "geometry %d %d %d %d %d %g %g %g %g %g %llu %zu %zu %lld",
-                  channels_,
-                  static_cast<int>(options_.recipe),
-                  options_.iterations,
-                  options_.max_gaussians,
-                  options_.sh_degree,
-                  options_.time_limit_seconds,
-                  options_.ssim_weight,
-                  options_.edge_weight,
-                  options_.densify_gradient,
-                  options_.learning_rate_scale,
-                  static_cast<unsigned long long>(options_.seed),
-                  problem_.training.size(),
-                  problem_.held_out.size(),
-                  static_cast<long long>(initial_count_));
+    int64_t pixels = 0;
+    for (const PosedCamera& view : problem_.training) {
+      pixels += int64_t{view.camera.width} * view.camera.height;
+    }
+    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+                                   channels_,
+                                   options_.iterations,
+                                   options_.max_gaussians,
+                                   options_.sh_degree,
+                                   options_.time_limit_seconds,
+                                   options_.ssim_weight,
+                                   options_.edge_weight,
+                                   options_.densify_gradient,
+                                   options_.learning_rate_scale,
+                                   options_.seed,
+                                   problem_.training.size(),
+                                   problem_.held_out.size(),
+                                   pixels,
+                                   problem_.extent,
+                                   initial_count_);
+    VisitFields(schedule_.tuning(), [&](const char* name, const auto& value) {
+      text += fmt::format(" {}={}", name, value);
+    });
     return text;
   }
 
-  void Resume(CheckpointStore& checkpoints) {
-    const std::optional<std::string> saved = checkpoints.Load();
-    if (saved && !ParseTrainingState(*saved, Fingerprint(), state_)) {
-      progress_.OnWarning(
+  void Resume() {
+    const std::optional<std::string> saved = run_.checkpoints.Load();
+    if (saved && !ParseGeometryState(*saved, Fingerprint(), state_)) {
+      run_.progress.OnWarning(
           "geometry: the checkpoint belongs to other options or is damaged; training starts "
           "afresh");
     }
@@ -158,7 +160,7 @@ class GeometryTrainer {
                             view.cam_from_world);
   }
 
-  ColorSpec Colours() const {
+  ColorSpec Colors() const {
     ColorSpec spec;
     spec.channels = channels_;
     for (int c = 0; c < channels_; ++c) {
@@ -173,27 +175,27 @@ class GeometryTrainer {
   // One iteration. False when something was not finite.
   bool Step() {
     const PosedCamera& view =
-        problem_.training[state_.NextView(static_cast<int>(problem_.training.size()))];
+        problem_
+            .training[state_.order.Next(static_cast<int>(problem_.training.size()), state_.random)];
     const int level = schedule_.Level(fraction_, view.camera);
     const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, level);
     const RasterCamera camera = CameraAt(view, level);
-    const ColorSpec color = Colours();
-    pipeline_.Forward(state_.parameters, color, camera, kBackground, false, pool_);
+    const ColorSpec color = Colors();
+    pipeline_.Forward(state_.parameters, color, camera, kBackground, false, run_.pool);
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
     weights.edge = static_cast<float>(options_.edge_weight);
     clock_.Enter(Phase::kLoss);
     const LossValue loss =
-        loss_.Evaluate(pipeline_.color(), *target, nullptr, weights, pool_, d_color_);
+        loss_.Evaluate(pipeline_.color(), *target, nullptr, weights, run_.pool, d_color_);
     if (!std::isfinite(loss.total)) return false;
-    state_.statistics.absolute = tuning_.absolute_gradient;
     pipeline_.Backward(state_.parameters,
                        color,
                        camera,
                        d_color_,
                        GradientScope::kAll,
-                       pool_,
+                       run_.pool,
                        gradient_,
                        &state_.statistics);
     if (!Update()) return false;
@@ -203,35 +205,24 @@ class GeometryTrainer {
 
   // Parameters from the gradient. False when something was not finite.
   bool Update() {
+    const GeometryTuning& tuning = schedule_.tuning();
     clock_.Enter(Phase::kAdam);
-    if (tuning_.opacity_penalty > 0.0 || tuning_.scale_penalty > 0.0) {
+    if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
       AddPenaltyGradients(state_.parameters,
-                          static_cast<float>(tuning_.opacity_penalty),
-                          static_cast<float>(tuning_.scale_penalty / problem_.extent),
-                          pool_,
+                          static_cast<float>(tuning.opacity_penalty),
+                          static_cast<float>(tuning.scale_penalty / problem_.extent),
+                          run_.pool,
                           gradient_);
     }
     std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
-    if (!AdamStep(gradient_,
-                  rates,
-                  state_.iteration + 1,
-                  pool_,
-                  state_.parameters,
-                  state_.moments,
-                  tuning_.sparse_adam ? &pipeline_.depth_keys() : nullptr)) {
+    if (!AdamStep(
+            gradient_, rates, state_.iteration + 1, run_.pool, state_.parameters, state_.moments)) {
       return false;
     }
-    if (tuning_.max_needle_ratio > 0.0) {
+    if (tuning.max_needle_ratio > 0.0) {
       LimitNeedles(
-          static_cast<float>(std::log(tuning_.max_needle_ratio)), pool_, state_.parameters);
-    }
-    if (tuning_.strategy == GeometryTuning::Strategy::kRelocate && tuning_.noise > 0.0 &&
-        fraction_ < tuning_.densify_until) {
-      AddPositionNoise(static_cast<float>(tuning_.noise * rates[kPositionRow]),
-                       state_.random.NextUint32(),
-                       pool_,
-                       state_.parameters);
+          static_cast<float>(std::log(tuning.max_needle_ratio)), run_.pool, state_.parameters);
     }
     clock_.Enter(Phase::kOther);
     return true;
@@ -239,18 +230,14 @@ class GeometryTrainer {
 
   // How many Gaussians there may be after this round.
   int64_t CountAllowed() {
-    const double now = clock_.TrainingSeconds();
-    const double each = (now - densified_seconds_) /
-                        static_cast<double>(std::max<int64_t>(1, state_.iteration - timed_from_));
-    densified_seconds_ = now;
-    timed_from_ = state_.iteration;
+    const Moment now{clock_.TrainingSeconds(), state_.iteration};
+    const double each =
+        (now.seconds - last_round_.seconds) /
+        static_cast<double>(std::max<int64_t>(1, now.iteration - last_round_.iteration));
+    last_round_ = now;
     const int level = schedule_.Level(fraction_, problem_.training.front().camera);
-    const int64_t affordable = schedule_.AffordableCount(
+    return schedule_.AffordableCount(
         fraction_, state_.iteration, each, level, state_.parameters.count());
-    const bool scheduled =
-        tuning_.scheduled_cap || tuning_.strategy == GeometryTuning::Strategy::kRelocate;
-    return scheduled ? std::min(affordable, schedule_.TargetCount(fraction_, initial_count_))
-                     : affordable;
   }
 
   void Densify(double before) {
@@ -258,22 +245,15 @@ class GeometryTrainer {
     if (schedule_.DensifyDue(before, fraction_) &&
         state_.iteration - state_.densified_at >= kMinDensifyInterval) {
       state_.densified_at = state_.iteration;
-      const int64_t allowed = CountAllowed();
-      if (tuning_.strategy == GeometryTuning::Strategy::kRelocate) {
-        RelocationOptions relocation;
-        relocation.gradient_preference = tuning_.gradient_preference;
-        relocation.target_count = std::max(state_.parameters.count(), allowed);
-        Relocate(relocation, target);
-      } else {
-        GradientDensifyOptions densify;
-        densify.gradient_threshold = options_.densify_gradient;
-        densify.clone_below_scale = 0.01 * problem_.extent;
-        densify.max_gaussians = allowed;
-        if (tuning_.prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
-          densify.prune_scale = tuning_.prune_scale * problem_.extent;
-        }
-        DensifyByGradient(densify, target);
+      GradientDensifyOptions densify;
+      densify.gradient_threshold = options_.densify_gradient;
+      densify.clone_below_scale = 0.01 * problem_.extent;
+      densify.max_gaussians = CountAllowed();
+      const double prune_scale = schedule_.tuning().prune_scale;
+      if (prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
+        densify.prune_scale = prune_scale * problem_.extent;
       }
+      DensifyByGradient(densify, target);
     }
     if (schedule_.OpacityResetDue(before, fraction_)) ResetOpacity(0.01, target);
   }
@@ -288,15 +268,16 @@ class GeometryTrainer {
       last_progress_ = now;
       const Camera& camera = problem_.training.front().camera;
       const int level = schedule_.Level(fraction_, camera);
-      progress_.OnProgress(
+      run_.progress.OnProgress(
           state_.iteration,
           std::llround(static_cast<double>(state_.iteration) / std::max(fraction_, 1e-9)),
-          "geometry, " + std::to_string(state_.parameters.count()) + " Gaussians at " +
-              std::to_string(SizeAtLevel(camera.width, level)) + "x" +
-              std::to_string(SizeAtLevel(camera.height, level)) + " px");
+          fmt::format("geometry, {} Gaussians at {}x{} px",
+                      state_.parameters.count(),
+                      SizeAtLevel(camera.width, level),
+                      SizeAtLevel(camera.height, level)));
     }
     if (std::floor(fraction_ * kErrorReports) > std::floor(before * kErrorReports)) {
-      progress_.OnError(state_.iteration, Named("train_l1"), state_.mean_error);
+      run_.progress.OnError(state_.iteration, Named("train_l1"), state_.mean_error);
     }
     for (const double moment : kHeldOutMoments) {
       if (before < moment && fraction_ >= moment) {
@@ -318,9 +299,10 @@ class GeometryTrainer {
     const double each = 1.0 / static_cast<double>(problem_.held_out.size());
     for (const PosedCamera& view : problem_.held_out) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
-      pipeline_.Forward(state_.parameters, Colours(), CameraAt(view, 0), kBackground, false, pool_);
+      pipeline_.Forward(
+          state_.parameters, Colors(), CameraAt(view, 0), kBackground, false, run_.pool);
       PlaneBuffer drawn = pipeline_.color();
-      const PictureQuality quality = CompareClamped(*target, loss_, pool_, drawn);
+      const PictureQuality quality = CompareClamped(*target, loss_, run_.pool, drawn);
       point.psnr_db += each * quality.psnr_db;
       point.ssim += each * quality.ssim;
       point.l1 += each * quality.l1;
@@ -328,7 +310,7 @@ class GeometryTrainer {
         trace_->on_held_out_picture(view.view, ImageFromPlanes(drawn));
       }
     }
-    progress_.OnError(state_.iteration, Named("heldout_psnr", "_db"), point.psnr_db);
+    run_.progress.OnError(state_.iteration, Named("heldout_psnr", "_db"), point.psnr_db);
     if (trace_ != nullptr) trace_->held_out.push_back(point);
     clock_.Enter(Phase::kOther);
     pipeline_.set_clock(&clock_);
@@ -342,46 +324,43 @@ class GeometryTrainer {
     trace_->gaussians = state_.parameters.count();
   }
 
+  struct Moment {
+    double seconds = 0.0;  // on the clock
+    int64_t iteration = 0;
+  };
+
   const GeometryProblem& problem_;
   const GeometryOptions& options_;
-  const GeometryTuning& tuning_;
-  TrainingSchedule schedule_;
-  int channels_;
-  ThreadPool& pool_;
-  ProgressObserver& progress_;
+  const RunControl& run_;
+  TrainingTrace* const trace_;  // may be null
+  const TrainingSchedule schedule_;
+  const int channels_;
   TrainingTargets targets_;
-  TrainingState state_;
-  int64_t initial_count_ = 0;
-  double fraction_ = 0.0;  // of the schedule that is done
-  double earlier_seconds_ = 0.0;
-  PhaseClock clock_;
-  double densified_seconds_ = 0.0;  // on the clock, and the iteration, of the last round
-  int64_t timed_from_ = 0;
+  GeometryState state_;
+  int64_t initial_count_ = 0;     // Gaussians
+  double fraction_ = 0.0;         // of the schedule that is done
+  double earlier_seconds_ = 0.0;  // of training, in the attempts before this one
+  PhaseClock clock_;              // of this attempt
+  Moment last_round_;             // of densification
+  std::chrono::steady_clock::time_point last_progress_;
+  // Work space.
   SplatPipeline pipeline_;
   ImageLoss loss_;
   PlaneBuffer d_color_;
   ParameterBlock gradient_;
-  TrainingTrace* trace_ = nullptr;
-  std::chrono::steady_clock::time_point last_progress_;
 };
 
 }  // namespace
 
-GaussianModel TrainGeometryOn(const GeometryProblem& problem,
-                              const GaussianModel& initial,
-                              const GeometryOptions& options,
-                              const GeometryTuning& tuning,
-                              ThreadPool& pool,
-                              CheckpointStore& checkpoints,
-                              ProgressObserver& progress,
-                              const CancellationToken& cancel,
-                              TrainingTrace* trace) {
+GaussianModel TrainGeometry(const GeometryProblem& problem,
+                            const GeometryOptions& options,
+                            const RunControl& run,
+                            TrainingTrace* trace) {
   options.Validate();
   if (problem.training.empty()) {
     throw InvalidArgument("the scene has no training views; give at least one posed photo");
   }
-  GeometryTrainer trainer(problem, initial, options, tuning, pool, progress);
-  return trainer.Train(checkpoints, cancel, trace);
+  return GeometryTrainer(problem, options, run, trace).Train();
 }
 
 }  // namespace color3d

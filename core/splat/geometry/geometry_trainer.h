@@ -1,38 +1,19 @@
-// Geometry training on plain inputs (no files): the engine behind TrainGeometry. Internal
-// to the splat module.
+// Lab Gaussian reconstruction, first half: luminance geometry (the paper's warm-up, one channel;
+// METHOD.md "Stage 2"). Deterministic for a seed and a thread count.
 #pragma once
 
+#include <cstdint>
 #include <functional>
-#include <memory>
 #include <vector>
 
-#include "core/base/cancellation.h"
 #include "core/base/image.h"
-#include "core/base/parallel.h"
-#include "core/base/progress.h"
-#include "core/splat/geometry/training_schedule.h"
+#include "core/base/run_control.h"
+#include "core/splat/geometry/geometry_options.h"
+#include "core/splat/geometry/geometry_problem.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/raster/phase_clock.h"
-#include "core/splat/training/trainer.h"
 
 namespace color3d {
-
-struct PosedCamera {
-  int view = 0;  // what the luminance source is asked for
-  Camera camera;
-  Pose cam_from_world;
-};
-
-// A picture of the size of the view's camera.
-using PictureSource = std::function<std::shared_ptr<const Image>(int view)>;
-
-struct GeometryProblem {
-  std::vector<PosedCamera> training;
-  std::vector<PosedCamera> held_out;
-  PictureSource luminance;  // 1 channel, L in 0..100
-  PictureSource colours;    // 3 channels, sRGB 0..1; when set, trained on in place of luminance
-  double extent = 1.0;
-};
 
 // Quality over the held-out views, at a moment of training. Pictures are compared after clamping to
 // 0..1; each view counts the same.
@@ -56,30 +37,15 @@ struct TrainingTrace {
   std::vector<HeldOutPoint> held_out;
 };
 
-// As TrainGeometry. `initial` has 1 or 3 channels of any degree; its spherical harmonics are cut or
-// extended to the options' degree. On colours the result has 3 channels, and sh_l, sh_a, sh_b are
-// those of R, G, B, all around 0.5. `trace` may be null.
-GaussianModel TrainGeometryOn(const GeometryProblem& problem,
-                              const GaussianModel& initial,
-                              const GeometryOptions& options,
-                              const GeometryTuning& tuning,
-                              ThreadPool& pool,
-                              CheckpointStore& checkpoints,
-                              ProgressObserver& progress,
-                              const CancellationToken& cancel,
-                              TrainingTrace* trace = nullptr);
-
-// TrainGeometry with another schedule and on true colours if wanted, for measurements.
-enum class TrainingColours { kLuminance, kSrgb };
-GaussianModel TrainGeometryTuned(const Scene& scene,
-                                 const ViewImages& images,
-                                 const GeometryOptions& options,
-                                 const GeometryTuning& tuning,
-                                 TrainingColours colours,
-                                 ThreadPool& pool,
-                                 CheckpointStore& checkpoints,
-                                 ProgressObserver& progress,
-                                 const CancellationToken& cancel,
-                                 TrainingTrace* trace);
+// Reports curves "train_l1_l" (running mean of |L'-L'_true|) and "heldout_psnr_l_db" (when there
+// are held-out views, a few times). Resumes from and saves to the checkpoints. Non-finite values
+// never survive: the last good state is restored with a smaller step, and a warning tells. On
+// colours the curves are "train_l1_rgb" and "heldout_psnr_rgb_db", and the result has 3 channels:
+// sh_l, sh_a, sh_b are those of R, G, B, all around 0.5. `trace` may be null. Throws
+// Error{kInvalidArgument} without training views, Error{kCancelled}.
+GaussianModel TrainGeometry(const GeometryProblem& problem,
+                            const GeometryOptions& options,
+                            const RunControl& run,
+                            TrainingTrace* trace = nullptr);
 
 }  // namespace color3d

@@ -19,38 +19,7 @@ double StepsDone(double fraction, double from, double step) {
   return std::floor((fraction - from) / step);
 }
 
-// The schedule of Kerbl et al. 2023, whose times are iterations.
-GeometryTuning PaperTuning(int iterations) {
-  const double n = std::max(1, iterations);
-  GeometryTuning tuning;
-  tuning.half_size_until = 0.0;
-  tuning.densify_from = std::min(500.0 / n, 0.5);
-  tuning.densify_until = 0.5;
-  tuning.densify_rounds = std::max(1, static_cast<int>((0.5 * n - 500.0) / 100.0));
-  tuning.opacity_reset_every = 3000.0 / n;
-  tuning.prune_scale = 0.1;
-  tuning.max_needle_ratio = 0.0;
-  tuning.opacity_penalty = 0.0;
-  tuning.scale_penalty = 0.0;
-  tuning.position_rate_first = 1.6e-4;
-  tuning.position_rate_last = 1.6e-6;
-  tuning.dc_rate = 2.5e-3;
-  tuning.rest_divisor = 20.0;
-  tuning.opacity_rate = 0.05;
-  tuning.last_rate = 1.0;
-  tuning.scale_rate = 5e-3;
-  tuning.rotation_rate = 1e-3;
-  tuning.sh_from = 1000.0 / n;
-  tuning.sh_step = 1000.0 / n;
-  return tuning;
-}
-
 }  // namespace
-
-GeometryTuning TuningOf(const GeometryOptions& options) {
-  return options.recipe == GeometryOptions::Recipe::kPaper ? PaperTuning(options.iterations)
-                                                           : GeometryTuning();
-}
 
 double TrainingSchedule::Fraction(int64_t iteration, double elapsed_seconds) const {
   double fraction = options_.iterations > 0
@@ -63,9 +32,7 @@ double TrainingSchedule::Fraction(int64_t iteration, double elapsed_seconds) con
 }
 
 int TrainingSchedule::Level(double fraction, const Camera& camera) const {
-  int level = fraction < tuning_.quarter_size_until ? 2
-              : fraction < tuning_.half_size_until  ? 1
-                                                    : 0;
+  int level = fraction < tuning_.half_size_until ? 1 : 0;
   const int side = std::min(camera.width, camera.height);
   while (level > 0 && side >> level < kMinTrainingSidePx) --level;
   return level;
@@ -140,17 +107,6 @@ int64_t TrainingSchedule::AffordableCount(double fraction,
   const double affordable = static_cast<double>(count) * possible / wanted;
   return std::max(count,
                   static_cast<int64_t>(std::min<double>(affordable, options_.max_gaussians)));
-}
-
-int64_t TrainingSchedule::TargetCount(double fraction, int64_t initial_count) const {
-  const double progress =
-      std::clamp((fraction - tuning_.densify_from) /
-                     std::max(1e-9, tuning_.growth_until - tuning_.densify_from),
-                 0.0,
-                 1.0);
-  const double first = static_cast<double>(std::max<int64_t>(1, initial_count));
-  const double last = std::max<double>(first, options_.max_gaussians);
-  return static_cast<int64_t>(std::llround(first * std::pow(last / first, progress)));
 }
 
 }  // namespace color3d

@@ -41,15 +41,17 @@ void ForEachBuffer(Model& m, bool with_confidence, Visit&& visit) {
   if (with_confidence) visit("confidence", m.confidence, 1);
 }
 
-Error Refuse(const std::string& why) {
-  return InvalidArgument("not a usable Gaussian file: " + why);
+template <class... Parts>
+Error Refuse(fmt::format_string<Parts...> why, Parts&&... parts) {
+  return InvalidArgument("not a usable Gaussian file: " +
+                         fmt::format(why, std::forward<Parts>(parts)...));
 }
 
 // "position of Gaussian 7" for the first value that is not finite, or "".
 std::string FirstNotFinite(const char* name, const std::vector<float>& buffer, int width) {
   for (size_t i = 0; i < buffer.size(); ++i) {
     if (!std::isfinite(buffer[i])) {
-      return std::string(name) + " of Gaussian " + std::to_string(i / static_cast<size_t>(width));
+      return fmt::format("{} of Gaussian {}", name, i / static_cast<size_t>(width));
     }
   }
   return "";
@@ -58,19 +60,20 @@ std::string FirstNotFinite(const char* name, const std::vector<float>& buffer, i
 Header ReadHeader(std::string_view bytes) {
   Header h;
   if (bytes.size() < sizeof(h) + kDigestBytes) {
-    throw Refuse("it has only " + std::to_string(bytes.size()) + " bytes");
+    throw Refuse("it has only {} bytes", bytes.size());
   }
   std::memcpy(&h, bytes.data(), sizeof(h));
   if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) {
     throw Refuse("it does not begin with C3DGAUSS");
   }
   if (h.version != kPlainVersion && h.version != kConfidenceVersion) {
-    throw Refuse("version " + std::to_string(h.version) + "; this program reads versions " +
-                 std::to_string(kPlainVersion) + " and " + std::to_string(kConfidenceVersion) +
-                 ", update it");
+    throw Refuse("version {}; this program reads versions {} and {}, update it",
+                 h.version,
+                 kPlainVersion,
+                 kConfidenceVersion);
   }
   if ((h.channels != 1 && h.channels != 3) || h.sh_degree > 3 || h.chroma_sh_degree > 3) {
-    throw Refuse("channels " + std::to_string(h.channels) + " or a degree is out of range");
+    throw Refuse("channels {} or a degree is out of range", h.channels);
   }
   return h;
 }
@@ -91,8 +94,8 @@ std::string SerializeGaussians(const GaussianModel& model) {
   const auto append = [&](const char* name, const std::vector<float>& buffer, int width) {
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) {
-      throw Error(ErrorCode::kInternal,
-                  "a Gaussian model was to be saved whose " + place + " is not finite");
+      throw Error(
+          ErrorCode::kInternal, "a Gaussian model was to be saved whose {} is not finite", place);
     }
     bytes.append(reinterpret_cast<const char*>(buffer.data()), buffer.size() * sizeof(float));
   };
@@ -114,8 +117,8 @@ GaussianModel ParseGaussians(std::string_view bytes) {
   const size_t body = bytes.size() - sizeof(Header) - kDigestBytes;
   const size_t bytes_each = floats_each * sizeof(float);
   if (body % bytes_each != 0 || body / bytes_each != h.count) {
-    throw Refuse("it claims " + std::to_string(h.count) + " Gaussians but holds " +
-                 std::to_string(body) + " bytes of them; it may be truncated");
+    throw Refuse(
+        "it claims {} Gaussians but holds {} bytes of them; it may be truncated", h.count, body);
   }
   const std::string_view content = bytes.substr(0, bytes.size() - kDigestBytes);
   if (Sha256Hex(content) != bytes.substr(content.size())) throw Refuse("the checksum is wrong");
@@ -125,7 +128,7 @@ GaussianModel ParseGaussians(std::string_view bytes) {
     std::memcpy(buffer.data(), next, buffer.size() * sizeof(float));
     next += buffer.size() * sizeof(float);
     const std::string place = FirstNotFinite(name, buffer, width);
-    if (!place.empty()) throw Refuse("the " + place + " is not finite");
+    if (!place.empty()) throw Refuse("the {} is not finite", place);
   });
   CheckModel(model);
   return model;

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "core/base/error.h"
 #include "core/splat/model/gaussian_model.h"
@@ -21,8 +20,9 @@ GaussianModel InitialGaussians(const Scene& scene) {
   std::vector<NeighborTree::Point> points;
   for (const SparsePoint& point : scene.points) {
     if (!(point.position.cwiseAbs().maxCoeff() <= kMaxCoordinate)) {
-      throw InvalidArgument("sparse point " + std::to_string(&point - scene.points.data()) +
-                            " is not finite or absurdly far away; rerun structure-from-motion");
+      throw InvalidArgument(
+          "sparse point {} is not finite or absurdly far away; rerun structure-from-motion",
+          &point - scene.points.data());
     }
     points.push_back({static_cast<float>(point.position.x()),
                       static_cast<float>(point.position.y()),

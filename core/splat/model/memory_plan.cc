@@ -61,20 +61,24 @@ int64_t BytesWithPairs(int sh_degree) {
   return BytesPerGaussian(sh_degree) + kBytesPerPair * kPairsPerGaussian;
 }
 
-std::string MiB(int64_t bytes) { return std::to_string((bytes + kMiB - 1) / kMiB) + " MiB"; }
+std::string MiB(int64_t bytes) { return fmt::format("{} MiB", (bytes + kMiB - 1) / kMiB); }
 
 void ThrowTooLarge(const MemoryDemand& demand, int64_t budget) {
   const int64_t needed = GeometryBytes(demand, kSmallestSidePx, static_cast<int>(kFewestGaussians));
   std::string photo;
   for (const MemoryDemand::View& view : demand.views) {
     if (photo.empty() && 2 * kPhotoBytesPerPixel * Pixels(view.captured) > needed) {
-      photo = ", most of it for a photo of " + std::to_string(view.captured.width) + " x " +
-              std::to_string(view.captured.height) + " px";
+      photo = fmt::format(
+          ", most of it for a photo of {} x {} px", view.captured.width, view.captured.height);
     }
   }
-  throw Error(ErrorCode::kResourceExhausted,
-              "reconstruction needs at least " + MiB(needed) + " of memory" + photo + ", and " +
-                  MiB(budget) + " may be used; free memory or give smaller photos");
+  throw Error(
+      ErrorCode::kResourceExhausted,
+      "reconstruction needs at least {} of memory{}, and {} may be used; free memory or give "
+      "smaller photos",
+      MiB(needed),
+      photo,
+      MiB(budget));
 }
 
 }  // namespace
@@ -111,12 +115,15 @@ MemoryPlan PlanGeometryMemory(const MemoryDemand& demand, int64_t budget_bytes) 
                                      std::max<int64_t>(0, budget_bytes - least)});
   plan.estimated_bytes = least + plan.image_cache_bytes;
   if (plan.max_side_px != demand.max_side_px || plan.max_gaussians != demand.max_gaussians) {
-    plan.note = "memory: " + MiB(budget_bytes) + " may be used where " +
-                MiB(GeometryBytes(demand, demand.max_side_px, demand.max_gaussians)) +
-                " are wanted; reconstruction works at " + std::to_string(plan.max_side_px) +
-                " px instead of " + std::to_string(demand.max_side_px) + " with at most " +
-                std::to_string(plan.max_gaussians) + " Gaussians instead of " +
-                std::to_string(demand.max_gaussians);
+    plan.note = fmt::format(
+        "memory: {} may be used where {} are wanted; reconstruction works at {} px instead of {} "
+        "with at most {} Gaussians instead of {}",
+        MiB(budget_bytes),
+        MiB(GeometryBytes(demand, demand.max_side_px, demand.max_gaussians)),
+        plan.max_side_px,
+        demand.max_side_px,
+        plan.max_gaussians,
+        demand.max_gaussians);
   }
   return plan;
 }

@@ -1,8 +1,5 @@
 #include "core/splat/model/model_parameters.h"
 
-#include <cmath>
-#include <string>
-
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/splat/model/spherical_harmonics.h"
@@ -12,9 +9,10 @@ namespace {
 
 void CheckSize(const std::vector<float>& buffer, size_t rows, int width, const char* name) {
   if (buffer.size() == rows * static_cast<size_t>(width)) return;
-  throw InvalidArgument("Gaussian model: " + std::string(name) + " has " +
-                        std::to_string(buffer.size()) + " numbers, " +
-                        std::to_string(rows * static_cast<size_t>(width)) + " are needed");
+  throw InvalidArgument("Gaussian model: {} has {} numbers, {} are needed",
+                        name,
+                        buffer.size(),
+                        rows * static_cast<size_t>(width));
 }
 
 void ToPlanar(const std::vector<float>& from, int width, int row, ParameterBlock& to) {
@@ -37,14 +35,14 @@ std::vector<float> FromPlanar(const ParameterBlock& from, int row, int width) {
 
 void CheckModel(const GaussianModel& model) {
   if (model.channels != 1 && model.channels != 3) {
-    throw InvalidArgument("Gaussian model: " + std::to_string(model.channels) +
-                          " channels; 1 or 3 are possible");
+    throw InvalidArgument("Gaussian model: {} channels; 1 or 3 are possible", model.channels);
   }
   if (model.sh_degree < 0 || model.sh_degree > 3 || model.chroma_sh_degree < 0 ||
       model.chroma_sh_degree > 3) {
-    throw InvalidArgument("Gaussian model: spherical harmonics of degree " +
-                          std::to_string(model.sh_degree) + " and " +
-                          std::to_string(model.chroma_sh_degree) + "; 0 to 3 are possible");
+    throw InvalidArgument(
+        "Gaussian model: spherical harmonics of degree {} and {}; 0 to 3 are possible",
+        model.sh_degree,
+        model.chroma_sh_degree);
   }
   const size_t n = model.size();
   CheckSize(model.position, n, 3, "position");
@@ -57,8 +55,9 @@ void CheckModel(const GaussianModel& model) {
   if (!model.confidence.empty()) CheckSize(model.confidence, n, 1, "confidence");
   for (size_t i = 0; i < model.confidence.size(); ++i) {
     if (model.confidence[i] >= 0.0f && model.confidence[i] <= 1.0f) continue;
-    throw InvalidArgument("Gaussian model: confidence of Gaussian " + std::to_string(i) + " is " +
-                          std::to_string(model.confidence[i]) + "; it must be 0 to 1");
+    throw InvalidArgument("Gaussian model: confidence of Gaussian {} is {}; it must be 0 to 1",
+                          i,
+                          model.confidence[i]);
   }
 }
 
@@ -105,34 +104,6 @@ ColorSpec ColorSpecOf(int channels, int sh_degree, int chroma_sh_degree) {
   color.channel[1] = {kColorRow + luminance, chroma, kNeutralChroma, false};
   color.channel[2] = {kColorRow + luminance + chroma, chroma, kNeutralChroma, false};
   return color;
-}
-
-RasterCamera MakeRasterCamera(const Camera& camera, const Pose& cam_from_world) {
-  RasterCamera c;
-  c.width = camera.width;
-  c.height = camera.height;
-  c.fx = static_cast<float>(camera.fx);
-  c.fy = static_cast<float>(camera.fy);
-  c.cx = static_cast<float>(camera.cx);
-  c.cy = static_cast<float>(camera.cy);
-  if (c.width < 1 || c.height < 1 || !(c.fx > 0.0f) || !(c.fy > 0.0f) || !std::isfinite(c.fx) ||
-      !std::isfinite(c.fy) || !std::isfinite(c.cx) || !std::isfinite(c.cy)) {
-    throw InvalidArgument("camera of " + std::to_string(camera.width) + "x" +
-                          std::to_string(camera.height) + " px with focal lengths " +
-                          std::to_string(camera.fx) + ", " + std::to_string(camera.fy) +
-                          " px cannot be rendered; sizes and focal lengths must be positive");
-  }
-  const Eigen::Matrix3d rotation = cam_from_world.rotation.normalized().toRotationMatrix();
-  const Eigen::Vector3d center = -(rotation.transpose() * cam_from_world.translation);
-  if (!rotation.allFinite() || !center.allFinite()) {
-    throw InvalidArgument("camera pose is not finite; check the poses of the scene");
-  }
-  for (int a = 0; a < 3; ++a) {
-    for (int b = 0; b < 3; ++b) c.rotation[3 * a + b] = static_cast<float>(rotation(a, b));
-    c.translation[a] = static_cast<float>(cam_from_world.translation[a]);
-    c.center[a] = static_cast<float>(center[a]);
-  }
-  return c;
 }
 
 }  // namespace color3d

@@ -2,10 +2,8 @@
 // module. Stateless.
 #pragma once
 
-#include "core/scene/camera.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/model/parameter_block.h"
-#include "core/splat/raster/projection.h"
 
 namespace color3d {
 
@@ -23,7 +21,5 @@ GaussianModel ModelFromParameters(const ParameterBlock& parameters,
 
 // L' alone (channels 1) or L', a', b' of ParametersFromModel's layout.
 ColorSpec ColorSpecOf(int channels, int sh_degree, int chroma_sh_degree);
-
-RasterCamera MakeRasterCamera(const Camera& camera, const Pose& cam_from_world);
 
 }  // namespace color3d

@@ -1,10 +1,10 @@
 // The functions of spherical_harmonics.h, as text without a namespace: that header includes them
-// once, the kernels once per instruction set.
+// once, the kernels once per instruction set (after that header, whose constants they use).
 
 // basis[k] for k < coefficients (1, 4, 9 or 16); (x, y, z) is a unit vector.
 template <class T>
 inline void EvaluateSh(int coefficients, T x, T y, T z, T* basis) {
-  basis[0] = x * 0.0f + 0.28209479177387814f;
+  basis[0] = x * 0.0f + kShDc;
   if (coefficients <= 1) return;
   basis[1] = y * -0.4886025119029199f;
   basis[2] = z * 0.4886025119029199f;

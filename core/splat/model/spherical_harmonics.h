@@ -6,6 +6,8 @@
 namespace color3d {
 
 inline constexpr int kMaxShCoefficients = 16;
+// Y_0, the same in all directions: a coefficient of degree 0 adds this many times itself.
+inline constexpr float kShDc = 0.28209479177387814f;  // 1 / (2 sqrt(pi))
 constexpr int ShCoefficients(int degree) { return (degree + 1) * (degree + 1); }
 
 #include "core/splat/model/spherical_harmonics-inl.h"

@@ -285,10 +285,11 @@ void TileBinner::Bin(
     lists.first_pair[i] = static_cast<uint32_t>(total);
   }
   if (total > static_cast<uint64_t>(std::numeric_limits<int32_t>::max())) {
-    throw Error(ErrorCode::kResourceExhausted,
-                "the Gaussians cover " + std::to_string(total) +
-                    " (tile, Gaussian) pairs, more than 2^31; use fewer or smaller Gaussians, or "
-                    "a smaller picture");
+    throw Error(
+        ErrorCode::kResourceExhausted,
+        "the Gaussians cover {} (tile, Gaussian) pairs, more than 2^31; use fewer or smaller "
+        "Gaussians, or a smaller picture",
+        total);
   }
   lists.gaussian.resize(total);
   lists.pair.resize(total);

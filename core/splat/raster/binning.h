@@ -8,10 +8,9 @@
 
 #include "core/base/parallel.h"
 #include "core/splat/raster/projection.h"
+#include "core/splat/raster/raster_constants.h"
 
 namespace color3d {
-
-inline constexpr int kTileSide = 16;
 
 struct TileLists {
   int tiles_x = 0;

@@ -8,16 +8,13 @@
 #endif
 
 #include "core/simd/simd-inl.h"
+#include "core/splat/raster/raster_constants.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace color3d {
 namespace HWY_NAMESPACE {
 
 using simd::F32;
-
-inline constexpr float kLog2Of255 = 7.9943534f;
-// Bounds are widened by this much against rounding; the pixel test itself decides.
-inline constexpr float kBoundSlackPx = 0.02f;
 
 struct Ellipse {
   F32 slope, inv_y, width2, tau;  // e^2 <= (tau - inv_y dy^2) * width2 inside
@@ -31,7 +28,7 @@ HWY_INLINE Ellipse MakeEllipse(F32 inv_x, F32 slope, F32 inv_y, F32 log2_opacity
   e.slope = slope;
   e.inv_y = inv_y;
   e.width2 = simd::Reciprocal(inv_x);
-  e.tau = simd::Max(log2_opacity + (kLog2Of255 + 1e-4f), simd::Zero());
+  e.tau = simd::Max(log2_opacity + (1e-4f - kLog2MinAlpha), simd::Zero());
   const F32 var_y = simd::Reciprocal(inv_y);
   const F32 var_x = e.width2 + slope * slope * var_y;
   e.y_reach = simd::FastSqrt(e.tau * var_y);

@@ -29,9 +29,8 @@ void SplatPipeline::Backward(const ParameterBlock& parameters,
                              ThreadPool& pool,
                              ParameterBlock& gradient,
                              DensifyStatistics* statistics) {
-  const bool absolute = statistics != nullptr && statistics->absolute;
   Enter(Phase::kBackward);
-  RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, absolute, pool, pair_gradient_);
+  RasterizeBackward(splats_, lists_, block_masks_, color_, d_color, pool, pair_gradient_);
   Enter(Phase::kProjectionBackward);
   ProjectSplatsBackward(parameters,
                         color,

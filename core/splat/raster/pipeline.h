@@ -30,8 +30,6 @@ class SplatPipeline {
   const PlaneBuffer& color() const { return color_; }
   const PlaneBuffer& transmittance() const { return transmittance_; }
   size_t pair_count() const { return lists_.pair_count(); }
-  // Per Gaussian, 0 where the last Forward did not draw it.
-  const std::vector<uint32_t>& depth_keys() const { return splats_.depth_key; }
 
   // Gradient by the parameters of the last Forward (same arguments, no depth channel).
   void Backward(const ParameterBlock& parameters,

@@ -58,7 +58,7 @@ Mask VisibleLanes(const RasterCamera& c, const Projected& g, int64_t i, int64_t 
   Mask visible = simd::Less(simd::LaneIndex(), Broadcast(rest));
   visible = simd::And(visible, simd::Less(Broadcast(kNearPlane), g.z));
   // tau: the exponent (base 2) that is left above alpha = 1/255.
-  const F32 tau = g.log2_opacity + 7.9943534f;
+  const F32 tau = g.log2_opacity - kLog2MinAlpha;
   visible = simd::And(visible, simd::Less(Broadcast(0.0f), tau));
   const F32 reach = simd::Max(tau, Broadcast(0.0f)) * (1.0f / kHalfLog2E);
   const F32 ex = simd::Sqrt(reach * g.xx), ey = simd::Sqrt(reach * g.yy);
@@ -275,12 +275,8 @@ void ColorBackward(
 
 void UpdateStatistics(const BackwardContext& ctx, int64_t i, const Projected& g, const F32* sums) {
   DensifyStatistics& s = *ctx.statistics;
-  F32 du = g.inv_var_x * sums[kSumWE];
-  F32 dv = g.inv_var_y * sums[kSumWDy] - g.slope * du;
-  if (s.absolute) {
-    du = sums[AbsoluteColumn(ctx.color.channels)] * (1.0f / kHalfLog2E);
-    dv = sums[AbsoluteColumn(ctx.color.channels) + 1] * (1.0f / kHalfLog2E);
-  }
+  const F32 du = g.inv_var_x * sums[kSumWE];
+  const F32 dv = g.inv_var_y * sums[kSumWDy] - g.slope * du;
   const F32 nx = du * (0.5f * static_cast<float>(ctx.camera.width));
   const F32 ny = dv * (0.5f * static_cast<float>(ctx.camera.height));
   alignas(64) float norm[simd::kLanes], radius[simd::kLanes];
@@ -395,9 +391,8 @@ void ProjectSplatsBackward(const ParameterBlock& parameters,
   if (gradient.rows() != parameters.rows() || gradient.count() != parameters.count()) {
     gradient = ParameterBlock(parameters.rows(), parameters.count());
   }
-  const bool absolute = statistics != nullptr && statistics->absolute;
-  const BackwardContext ctx{GradientRowFloats(color.channels, absolute),
-                            kGradientColor + color.channels + (absolute ? 2 : 0),
+  const BackwardContext ctx{GradientRowFloats(color.channels),
+                            kGradientColor + color.channels,
                             parameters,
                             color,
                             camera,

@@ -8,32 +8,9 @@
 
 #include "core/base/parallel.h"
 #include "core/splat/model/parameter_block.h"
+#include "core/splat/raster/raster_camera.h"
 
 namespace color3d {
-
-inline constexpr float kNearPlane = 0.2f;
-inline constexpr float kCovarianceDilation = 0.3f;  // px^2
-inline constexpr float kFrustumMargin = 0.3f;       // J is clamped beyond 1.3 x the field of view
-inline constexpr float kMaxAlpha = 0.99f;
-inline constexpr float kMinAlpha = 1.0f / 255.0f;
-inline constexpr float kMinTransmittance = 1e-4f;
-inline constexpr float kMinLogScale = -30.0f;
-inline constexpr float kMaxLogScale = 16.0f;
-// Splats are shrunk to this size, so that no product overflows a float.
-inline constexpr float kMaxSplatVariancePx2 = 1e12f;
-
-// Pinhole camera in the kernels' form. Row-major rotation; x_cam = rotation * x + translation.
-struct RasterCamera {
-  int width = 0;
-  int height = 0;
-  float fx = 1.0f;
-  float fy = 1.0f;
-  float cx = 0.0f;
-  float cy = 0.0f;
-  float rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  float translation[3] = {0, 0, 0};
-  float center[3] = {0, 0, 0};
-};
 
 // Columns of a splat's row. log2(alpha at pixel p) = kLog2Opacity - kInvX * e^2 - kInvY * dy^2 with
 // d = p - (u, v) and e = dx - kSlope * dy: the LDL' form of the conic, a sum of squares that cannot
@@ -56,18 +33,13 @@ enum SplatGradientColumn {
   kSumWEE,
   kSumWEDy,
   kSumWDyDy,
-  kGradientColor,  // the colour channels follow, and the two below when asked for
+  kGradientColor,  // the colour channels follow
 };
-// With absolute gradients, behind the channels: sums over pixels of |w inv_x e| and of
-// |w (inv_y dy - slope inv_x e)|, which are |dL/du| and |dL/dv| of a pixel up to a factor.
-constexpr int AbsoluteColumn(int channels) { return kGradientColor + channels; }
 
 // 6 geometry columns and the channels, padded.
 constexpr int SplatRowFloats(int channels) { return channels <= 2 ? 8 : 12; }
 // A gradient row's columns, padded.
-constexpr int GradientRowFloats(int channels, bool absolute) {
-  return kGradientColor + channels + (absolute ? 2 : 0) <= 8 ? 8 : 12;
-}
+constexpr int GradientRowFloats(int channels) { return kGradientColor + channels <= 8 ? 8 : 12; }
 
 struct SplatBuffer {
   int channels = 0;  // colour channels, and one for depth when asked for
@@ -85,10 +57,7 @@ void ProjectSplats(const ParameterBlock& parameters,
 
 // Sums over the views since densification, per Gaussian.
 struct DensifyStatistics {
-  // What `gradient` sums up: |dL/d(u, v)|, or with `absolute` the length of (sum over pixels of
-  // |dL/du|, sum of |dL/dv|), which pulls of opposite sign do not cancel (AbsGS: Ye et al. 2024).
-  bool absolute = false;
-  AlignedFloats gradient;  // in NDC units
+  AlignedFloats gradient;  // |dL/d(u, v)|, NDC units
   AlignedFloats count;     // views that saw it
   AlignedFloats radius;    // largest standard deviation on the screen, fraction of the image width
   void Reset(int64_t gaussians);
@@ -97,8 +66,8 @@ struct DensifyStatistics {
 // Which parameters' gradients are wanted.
 enum class GradientScope { kAll, kColorOnly };
 
-// `pair_gradient` holds one gradient row of GradientRowFloats(channels, statistics->absolute) for
-// each (Gaussian, tile) pair; those of Gaussian i are [first_pair[i], first_pair[i + 1]).
+// `pair_gradient` holds one gradient row of GradientRowFloats(channels) for each (Gaussian, tile)
+// pair; those of Gaussian i are [first_pair[i], first_pair[i + 1]).
 // `gradient` gets the shape of `parameters`; rows out of scope and Gaussians that are not visible
 // get zeros. `statistics` may be null.
 void ProjectSplatsBackward(const ParameterBlock& parameters,

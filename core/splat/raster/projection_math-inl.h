@@ -10,6 +10,7 @@
 
 #include "core/simd/simd-inl.h"
 #include "core/splat/raster/projection.h"
+#include "core/splat/raster/raster_constants.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace color3d {

@@ -16,10 +16,6 @@
 namespace color3d {
 namespace {
 
-constexpr int kBlocks = 16;  // of 4x4 pixels in a tile: block b is at column b % 4, row b / 4
-constexpr float kLog2MinAlpha = -7.9943534f;
-constexpr float kLog2MaxAlpha = -0.014499569f;  // log2(0.99)
-
 alignas(64) constexpr float kLaneX[16] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
 alignas(64) constexpr float kLaneY[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
@@ -54,7 +50,6 @@ struct BackwardJob {
   const uint16_t* block_masks;
   const PlaneBuffer& color;
   const PlaneBuffer& d_color;
-  bool absolute;
   float* pair_gradient;
 };
 
@@ -147,7 +142,7 @@ void BlockMasks(const Chunk& chunk, const Tile& tile, uint16_t* masks) {
 
 uint32_t AliveBlocks(const F32* transmittance) {
   uint32_t alive = 0;
-  for (int b = 0; b < kBlocks; ++b) {
+  for (int b = 0; b < kTileBlocks; ++b) {
     const Mask m = simd::GreaterEqual(transmittance[b], Broadcast(kMinTransmittance));
     alive |= (simd::Any(m) ? 1u : 0u) << b;
   }
@@ -157,7 +152,7 @@ uint32_t AliveBlocks(const F32* transmittance) {
 // The blocks to visit, entry after entry, as 16 * entry + block. One flat list instead of nested
 // loops over rows and columns: mispredicted loop exits cost as much as the arithmetic.
 struct WorkList {
-  int32_t item[16 * kBlocks + 16];
+  int32_t item[16 * kTileBlocks + 16];
   int begin[17];  // of each entry's items
 };
 
@@ -186,8 +181,8 @@ void BuildWorkList(const Chunk& chunk, const uint16_t* masks, uint32_t alive, Wo
 // dy = LaneY() + dy_block[j][b].
 struct Offsets {
   F32 e_lane[16];
-  alignas(64) float e_block[16][kBlocks];
-  alignas(64) float dy_block[16][kBlocks];
+  alignas(64) float e_block[16][kTileBlocks];
+  alignas(64) float dy_block[16][kTileBlocks];
 };
 
 void ComputeOffsets(const Chunk& chunk, const Tile& tile, Offsets& o) {
@@ -204,8 +199,8 @@ void ComputeOffsets(const Chunk& chunk, const Tile& tile, Offsets& o) {
 
 template <int kChannels>
 void ForwardTile(const ForwardJob& job, const Tile& tile) {
-  F32 t[kBlocks], sum[kChannels][kBlocks];
-  for (int b = 0; b < kBlocks; ++b) {
+  F32 t[kTileBlocks], sum[kChannels][kTileBlocks];
+  for (int b = 0; b < kTileBlocks; ++b) {
     t[b] = InitialTransmittance(job.color.width, job.color.height, tile, b);
     for (int c = 0; c < kChannels; ++c) sum[c][b] = Broadcast(0.0f);
   }
@@ -237,7 +232,7 @@ void ForwardTile(const ForwardJob& job, const Tile& tile) {
       }
     }
   }
-  for (int b = 0; b < kBlocks; ++b) {
+  for (int b = 0; b < kTileBlocks; ++b) {
     for (int c = 0; c < kChannels; ++c) {
       StoreBlock(job.color, c, tile, b, sum[c][b] + t[b] * job.background[c]);
     }
@@ -248,12 +243,12 @@ void ForwardTile(const ForwardJob& job, const Tile& tile) {
 // A tile's pixels on the way front to back.
 template <int kChannels>
 struct BackwardPixels {
-  F32 t[kBlocks];             // transmittance before the next entry
-  F32 rest[kBlocks];          // dL/dC . (colour still to come)
-  F32 d[kChannels][kBlocks];  // dL/dC
+  F32 t[kTileBlocks];             // transmittance before the next entry
+  F32 rest[kTileBlocks];          // dL/dC . (colour still to come)
+  F32 d[kChannels][kTileBlocks];  // dL/dC
 
   BackwardPixels(const PlaneBuffer& color, const PlaneBuffer& d_color, const Tile& tile) {
-    for (int b = 0; b < kBlocks; ++b) {
+    for (int b = 0; b < kTileBlocks; ++b) {
       t[b] = InitialTransmittance(color.width, color.height, tile, b);
       rest[b] = Broadcast(0.0f);
       for (int c = 0; c < kChannels; ++c) {
@@ -265,15 +260,14 @@ struct BackwardPixels {
 };
 
 // One entry: its gradient row to `out`, and the pixels moved behind it.
-template <int kChannels, bool kAbsolute>
+template <int kChannels>
 HWY_INLINE void BackwardEntry(const Chunk& chunk,
                               const Offsets& offsets,
                               const WorkList& work,
                               int j,
                               BackwardPixels<kChannels>& pixels,
                               float* out) {
-  constexpr int kColumns = kGradientColor + kChannels + (kAbsolute ? 2 : 0);
-  F32 absolute_u = simd::Zero(), absolute_v = simd::Zero();
+  constexpr int kColumns = kGradientColor + kChannels;
   F32 w0 = simd::Zero(), we1 = w0, wy1 = w0, wee = w0, wey = w0, wyy = w0, wc[kChannels];
   for (int c = 0; c < kChannels; ++c) wc[c] = simd::Zero();
   const F32 inv_x = Broadcast(chunk.column[kInvX][j]), inv_y = Broadcast(chunk.column[kInvY][j]);
@@ -308,24 +302,15 @@ HWY_INLINE void BackwardEntry(const Chunk& chunk,
     wee = wee + we * e;
     wey = wey + we * dy;
     wyy = wyy + wy * dy;
-    if constexpr (kAbsolute) {
-      const F32 du = inv_x * we;
-      absolute_u = absolute_u + simd::Abs(du);
-      absolute_v = absolute_v + simd::Abs(inv_y * wy - chunk.column[kSlope][j] * du);
-    }
   }
   F32 sums[kColumns] = {w0, we1, wy1, wee, wey, wyy};
   for (int c = 0; c < kChannels; ++c) sums[kGradientColor + c] = wc[c];
-  if constexpr (kAbsolute) {
-    sums[AbsoluteColumn(kChannels)] = absolute_u;
-    sums[AbsoluteColumn(kChannels) + 1] = absolute_v;
-  }
   simd::HorizontalSums<kColumns>(sums, out);
 }
 
-template <int kChannels, bool kAbsolute>
+template <int kChannels>
 void BackwardTile(const BackwardJob& job, const Tile& tile) {
-  constexpr int kRow = GradientRowFloats(kChannels, kAbsolute);
+  constexpr int kRow = GradientRowFloats(kChannels);
   BackwardPixels<kChannels> pixels(job.color, job.d_color, tile);
   Chunk chunk;
   WorkList work;
@@ -339,7 +324,7 @@ void BackwardTile(const BackwardJob& job, const Tile& tile) {
     BuildWorkList(chunk, job.block_masks + begin, alive, work);
     ComputeOffsets(chunk, tile, offsets);
     for (int j = 0; j < count; ++j) {
-      BackwardEntry<kChannels, kAbsolute>(
+      BackwardEntry<kChannels>(
           chunk,
           offsets,
           work,
@@ -368,21 +353,16 @@ void ForwardTileAt(const ForwardJob& job, int64_t index) {
   }
 }
 
-template <bool kAbsolute>
-void BackwardTileOf(const BackwardJob& job, const Tile& tile) {
-  switch (job.splats.channels) {
-    case 1:
-      return BackwardTile<1, kAbsolute>(job, tile);
-    case 2:
-      return BackwardTile<2, kAbsolute>(job, tile);
-    default:
-      return BackwardTile<3, kAbsolute>(job, tile);
-  }
-}
-
 void BackwardTileAt(const BackwardJob& job, int64_t index) {
   const Tile tile = TileAt(job.lists, index);
-  return job.absolute ? BackwardTileOf<true>(job, tile) : BackwardTileOf<false>(job, tile);
+  switch (job.splats.channels) {
+    case 1:
+      return BackwardTile<1>(job, tile);
+    case 2:
+      return BackwardTile<2>(job, tile);
+    default:
+      return BackwardTile<3>(job, tile);
+  }
 }
 
 }  // namespace
@@ -415,12 +395,10 @@ void RasterizeBackward(const SplatBuffer& splats,
                        const std::vector<uint16_t>& block_masks,
                        const PlaneBuffer& color,
                        const PlaneBuffer& d_color,
-                       bool absolute,
                        ThreadPool& pool,
                        AlignedFloats& pair_gradient) {
-  pair_gradient.resize(lists.pair_count() * GradientRowFloats(splats.channels, absolute));
-  const BackwardJob job{
-      splats, lists, block_masks.data(), color, d_color, absolute, pair_gradient.data()};
+  pair_gradient.resize(lists.pair_count() * GradientRowFloats(splats.channels));
+  const BackwardJob job{splats, lists, block_masks.data(), color, d_color, pair_gradient.data()};
   const auto backward_tile = &COLOR3D_KERNEL(BackwardTileAt);
   pool.ForEach(lists.tile_count(), [&](int64_t index, int) {
     const ScopedFlushToZero flush;

@@ -25,13 +25,12 @@ void RasterizeForward(const SplatBuffer& splats,
                       std::vector<uint16_t>& block_masks);
 
 // `d_color` is dL/d(color); outside of the picture it must be zero. Channels 1..3. Fills one row of
-// GradientRowFloats(channels, absolute) per pair (columns: SplatGradientColumn, AbsoluteColumn).
+// GradientRowFloats(channels) per pair (columns: SplatGradientColumn).
 void RasterizeBackward(const SplatBuffer& splats,
                        const TileLists& lists,
                        const std::vector<uint16_t>& block_masks,
                        const PlaneBuffer& color,
                        const PlaneBuffer& d_color,
-                       bool absolute,
                        ThreadPool& pool,
                        AlignedFloats& pair_gradient);
 

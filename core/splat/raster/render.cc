@@ -3,6 +3,8 @@
 #include "core/color/lab.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/raster/pipeline.h"
+#include "core/splat/raster/raster_camera.h"
+#include "core/splat/raster/raster_constants.h"
 
 namespace color3d {
 

@@ -37,36 +37,24 @@ namespace HWY_NAMESPACE {
 namespace {
 
 using simd::F32;
-using simd::Mask;
 
-// One step of lanes [i, i + 16) where `changed`; the result is zero when all is finite (x * 0 is
-// NaN for infinities and NaN).
-HWY_INLINE F32 UpdateSixteen(const RowStep& s, int64_t i, bool all, Mask changed) {
-  // Clamped so that its square does not overflow; Adam does not depend on the gradient's size.
-  const F32 raw = simd::Load(s.g + i), p = simd::Load(s.p + i);
-  const F32 gradient = simd::Clamp(raw, simd::Broadcast(-1e18f), simd::Broadcast(1e18f));
-  const F32 m = simd::Load(s.m + i), v = simd::Load(s.v + i);
-  const F32 first = m + (1.0f - kAdamBeta1) * (gradient - m);
-  const F32 second = v + (1.0f - kAdamBeta2) * (gradient * gradient - v);
-  const F32 scale = simd::Sqrt(second) * s.root_correction + kAdamEpsilon;
-  const F32 updated = p - s.rate * first / scale;
-  simd::Store(s.m + i, all ? first : simd::Select(changed, first, m));
-  simd::Store(s.v + i, all ? second : simd::Select(changed, second, v));
-  simd::Store(s.p + i, all ? updated : simd::Select(changed, updated, p));
-  return updated * 0.0f + raw * 0.0f;
-}
-
-// Blocks [begin, end) of sixteen Gaussians; `lanes` (may be null) has each block's lanes that
-// change.
-float UpdateRow(const RowStep& s, const uint16_t* lanes, int64_t begin, int64_t end) {
+// Blocks [begin, end) of sixteen Gaussians. The result is zero when all is finite (x * 0 is NaN for
+// infinities and NaN).
+float UpdateRow(const RowStep& s, int64_t begin, int64_t end) {
   F32 poison = simd::Zero();
-  for (int64_t block = begin; block < end; ++block) {
-    const uint32_t bits = lanes == nullptr ? 0xFFFFu : lanes[block];
-    if (bits == 0) continue;
-    poison =
-        poison + (bits == 0xFFFFu
-                      ? UpdateSixteen(s, block * simd::kLanes, true, Mask{})
-                      : UpdateSixteen(s, block * simd::kLanes, false, simd::MaskFromBits(bits)));
+  for (int64_t i = begin * simd::kLanes; i < end * simd::kLanes; i += simd::kLanes) {
+    // Clamped so that its square does not overflow; Adam does not depend on the gradient's size.
+    const F32 raw = simd::Load(s.g + i), p = simd::Load(s.p + i);
+    const F32 gradient = simd::Clamp(raw, simd::Broadcast(-1e18f), simd::Broadcast(1e18f));
+    const F32 m = simd::Load(s.m + i), v = simd::Load(s.v + i);
+    const F32 first = m + (1.0f - kAdamBeta1) * (gradient - m);
+    const F32 second = v + (1.0f - kAdamBeta2) * (gradient * gradient - v);
+    const F32 scale = simd::Sqrt(second) * s.root_correction + kAdamEpsilon;
+    const F32 updated = p - s.rate * first / scale;
+    simd::Store(s.m + i, first);
+    simd::Store(s.v + i, second);
+    simd::Store(s.p + i, updated);
+    poison = poison + (updated * 0.0f + raw * 0.0f);
   }
   return simd::HorizontalSum(poison);
 }
@@ -80,15 +68,6 @@ HWY_AFTER_NAMESPACE();
 namespace color3d {
 namespace {
 HWY_EXPORT(UpdateRow);
-
-// Per block of sixteen Gaussians, those that were seen.
-std::vector<uint16_t> SeenLanes(const std::vector<uint32_t>& depth_keys) {
-  std::vector<uint16_t> lanes((depth_keys.size() + 15) / 16, 0);
-  for (size_t i = 0; i < depth_keys.size(); ++i) {
-    lanes[i / 16] = static_cast<uint16_t>(lanes[i / 16] | (depth_keys[i] != 0 ? 1u : 0u) << i % 16);
-  }
-  return lanes;
-}
 }  // namespace
 
 bool AdamStep(const ParameterBlock& gradient,
@@ -96,15 +75,11 @@ bool AdamStep(const ParameterBlock& gradient,
               int64_t step,
               ThreadPool& pool,
               ParameterBlock& parameters,
-              AdamMoments& moments,
-              const std::vector<uint32_t>* depth_keys) {
+              AdamMoments& moments) {
   const double bias1 = 1.0 - std::pow(static_cast<double>(kAdamBeta1), static_cast<double>(step));
   const double bias2 = 1.0 - std::pow(static_cast<double>(kAdamBeta2), static_cast<double>(step));
   const float root_correction = static_cast<float>(1.0 / std::sqrt(bias2));
   const auto update_row = &COLOR3D_KERNEL(UpdateRow);
-  const std::vector<uint16_t> seen =
-      depth_keys == nullptr ? std::vector<uint16_t>() : SeenLanes(*depth_keys);
-  const uint16_t* lanes = depth_keys == nullptr ? nullptr : seen.data();
   std::atomic<bool> finite{true};
   pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
     const ScopedFlushToZero flush;
@@ -116,7 +91,7 @@ bool AdamStep(const ParameterBlock& gradient,
                       moments.second.Row(row),
                       static_cast<float>(learning_rates[row] / bias1),
                       root_correction};
-      if (!(update_row(s, lanes, begin, end) == 0.0f)) finite = false;
+      if (!(update_row(s, begin, end) == 0.0f)) finite = false;
     }
   });
   return finite;

@@ -20,16 +20,13 @@ struct AdamMoments {
 };
 
 // One step; `step` counts from 1. Rows with learning rate 0 are left alone, and so are their
-// moments. With `depth_keys` (one per Gaussian, SplatPipeline::depth_keys()) only Gaussians whose
-// key is not 0 take part: the others keep parameters and moments, which then decay more slowly than
-// Adam's (sparse Adam: the usual step would still move them by their old moments). Returns false
-// when a gradient or a new parameter is not finite (the parameters are then spoilt: restore them).
+// moments. Returns false when a gradient or a new parameter is not finite (the parameters are then
+// spoilt: restore them).
 bool AdamStep(const ParameterBlock& gradient,
               const std::vector<float>& learning_rates,
               int64_t step,
               ThreadPool& pool,
               ParameterBlock& parameters,
-              AdamMoments& moments,
-              const std::vector<uint32_t>* depth_keys = nullptr);
+              AdamMoments& moments);
 
 }  // namespace color3d

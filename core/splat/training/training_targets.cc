@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "core/base/error.h"
 #include "core/image/codec.h"
@@ -28,10 +27,11 @@ void CheckFinite(const Image& image, int view) {
   for (size_t i = 0; i < image.data.size(); ++i) {
     if (std::isfinite(image.data[i])) continue;
     const size_t pixel = i % (static_cast<size_t>(image.width) * image.height);
-    throw InvalidArgument("view " + std::to_string(view) + ": the pixel at " +
-                          std::to_string(pixel % image.width) + ", " +
-                          std::to_string(pixel / image.width) +
-                          " is not a finite number; mend or leave out the photo");
+    throw InvalidArgument(
+        "view {}: the pixel at {}, {} is not a finite number; mend or leave out the photo",
+        view,
+        pixel % image.width,
+        pixel / image.width);
   }
 }
 
@@ -47,11 +47,14 @@ std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view,
   const std::shared_ptr<const Image> image = source_(view.view);
   if (image->channels != channels_ || image->width != view.camera.width ||
       image->height != view.camera.height) {
-    throw InvalidArgument(
-        "view " + std::to_string(view.view) + ": the picture is " + std::to_string(image->width) +
-        "x" + std::to_string(image->height) + "x" + std::to_string(image->channels) +
-        ", its camera " + std::to_string(view.camera.width) + "x" +
-        std::to_string(view.camera.height) + " px of " + std::to_string(channels_) + " channels");
+    throw InvalidArgument("view {}: the picture is {}x{}x{}, its camera {}x{} px of {} channels",
+                          view.view,
+                          image->width,
+                          image->height,
+                          image->channels,
+                          view.camera.width,
+                          view.camera.height,
+                          channels_);
   }
   CheckFinite(*image, view.view);
   auto planes = std::make_shared<const PlaneBuffer>(PlanesFromImage(

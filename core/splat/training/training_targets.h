@@ -3,14 +3,19 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <utility>
 
+#include "core/base/image.h"
 #include "core/simd/plane_buffer.h"
-#include "core/splat/geometry/geometry_trainer.h"
+#include "core/splat/training/posed_camera.h"
 
 namespace color3d {
+
+// A picture of the size of the view's camera.
+using PictureSource = std::function<std::shared_ptr<const Image>(int view)>;
 
 // Planes with value = (sample + offset) * scale.
 PlaneBuffer PlanesFromImage(const Image& image, float offset, float scale);

@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "core/base/files.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 
@@ -17,7 +17,7 @@ struct AugmentationsArguments {
   int threads = 2;
   uint64_t seed = 1;
   bool no_geometry = false;
-  GeometryOptions geometry;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
   AugmentationOptions options;
 };
 

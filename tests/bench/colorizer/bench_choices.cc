@@ -13,13 +13,11 @@
 #include "core/base/files.h"
 #include "core/color/lab_planes.h"
 #include "core/colorizer/scene_batch.h"
+#include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
-#include "core/stage/view_color.h"
-#include "core/stage/view_scores.h"
+#include "core/stage/formats/artifacts.h"
 #include "tests/bench/colorizer/bench_encoder.h"
 #include "tests/bench/colorizer/choice_results.h"
-#include "tests/bench/colorizer/warm_start.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 
@@ -28,7 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kNetwork[] = "network.ckpt";  // the default's, trained: for warm starts
 constexpr char kPrepared[] = "prepared.json";
 
 struct ChoicesArguments {
@@ -41,7 +38,6 @@ struct ChoicesArguments {
   int threads = 2;
   uint64_t seed = 1;
   double stop_after_seconds = 1e9;
-  bool keep_network = false;
   bool carry = true;
   std::vector<std::string> table_folders;
 };
@@ -54,14 +50,13 @@ struct Choice {
   std::string encoder = "embedded";
   std::string pictures;  // kind of generated ones, "all", or empty for none
   bool carry = true;
-  fs::path warm_start;  // folder of another scene's `choices`
 };
 
 double Number(const std::string& name, const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
   if (text.empty() || *end != '\0') {
-    throw InvalidArgument("the choice " + name + " is \"" + text + "\", which is no number");
+    throw InvalidArgument("the choice {} is \"{}\", which is no number", name, text);
   }
   return value;
 }
@@ -69,7 +64,7 @@ double Number(const std::string& name, const std::string& text) {
 ColorizerOptions::Precision PrecisionOf(const std::string& name) {
   if (name == "float32") return ColorizerOptions::Precision::kFloat32;
   if (name == "bfloat16") return ColorizerOptions::Precision::kBfloat16;
-  throw InvalidArgument("the precision \"" + name + "\" is neither float32 nor bfloat16");
+  throw InvalidArgument("the precision \"{}\" is neither float32 nor bfloat16", name);
 }
 
 using Setter = std::function<void(const std::string& value, Choice* choice)>;
@@ -105,11 +100,6 @@ const std::map<std::string, Setter>& Setters() {
          if (value != "off") throw InvalidArgument("geometry first is on by default, or \"off\"");
          c->carry = false;
        }},
-      {"warm_start",
-       [](const std::string& value, Choice* c) {
-         c->warm_start = value;
-         c->value = "another scene's network";
-       }},
   };
   return setters;
 }
@@ -118,7 +108,6 @@ const std::map<std::string, Setter>& Setters() {
 Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
   Choice choice;
   choice.options.max_side_px = args.max_side_px;
-  choice.options.threads = args.threads;
   choice.options.seed = args.seed;
   choice.carry = args.carry;
   if (text == kDefaultChoice) return choice;
@@ -128,7 +117,7 @@ Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
   if (equals == std::string::npos || setter == Setters().end()) {
     std::string known;
     for (const auto& [name, set] : Setters()) known += ", " + name + "=";
-    throw InvalidArgument("the choice \"" + text + "\" is none of default" + known);
+    throw InvalidArgument("the choice \"{}\" is none of default{}", text, known);
   }
   choice.value = text.substr(equals + 1);
   setter->second(choice.value, &choice);
@@ -183,27 +172,8 @@ class ChoiceBench {
                       .choice = choice.name,
                       .value = choice.value,
                       .iterations = iterations};
-    if (choice.warm_start.empty()) {
-      NoCheckpoints none;
-      Train(choice, options, none, &point);
-    } else {
-      GivenCheckpoint start(WarmStartState(ReadFile(fs::path(args_.out_folder) / kNetwork),
-                                           ReadFile(choice.warm_start / kNetwork),
-                                           options));
-      Train(choice, options, start, &point);
-    }
+    Train(choice, options, &point);
     return point;
-  }
-
-  // The default's network after `iterations`, a multiple of 25, for warm starts.
-  void KeepNetwork(int iterations) {
-    const Choice choice = ChoiceFrom(kDefaultChoice, args_);
-    ColorizerOptions options = choice.options;
-    options.iterations = iterations;
-    LastCheckpoint last;
-    ChoicePoint ignored;
-    Train(choice, options, last, &ignored);
-    WriteFileAtomic(fs::path(args_.out_folder) / kNetwork, last.state());
   }
 
   std::string SceneName() const {
@@ -212,10 +182,7 @@ class ChoiceBench {
 
  private:
   // Trains, and fills in what that took and how good the colours are.
-  void Train(const Choice& choice,
-             const ColorizerOptions& options,
-             CheckpointStore& checkpoints,
-             ChoicePoint* point) {
+  void Train(const Choice& choice, const ColorizerOptions& options, ChoicePoint* point) {
     const ScratchFolder folder;
     SceneBatch batch(args_.threads);
     const auto encoder = batch.SharedEncoder(kEncoder, [&] { return EncoderOf(choice); });
@@ -226,8 +193,9 @@ class ChoiceBench {
                               args_.threads,
                               args_.seed};
     setup.batch = &batch;
+    NoCheckpoints none;
     NullObserver silent;
-    StageContext context(setup, checkpoints, silent, cancel_);
+    StageContext context(setup, none, silent, cancel_);
     const auto start = std::chrono::steady_clock::now();
     const std::clock_t cpu_start = std::clock();
     RunPersonalize(options, context, kEncoder);
@@ -247,7 +215,8 @@ class ChoiceBench {
       const CarriedColor carried =
           ReadCarried(context, scene_.views[view], luminance.width, luminance.height);
       point->alone += ChromaError(truth, JoinLab(luminance, colorizer.Colorize(luminance)));
-      const FusedColor fused = ColorOfView(colorizer, luminance, carried, pool_, cancel_);
+      const FusedColor fused =
+          ColorOfView(luminance, carried, SourcesOf(colorizer), pool_, cancel_);
       point->delivered += ChromaError(truth, JoinLab(luminance, fused.ab));
       ++point->views;
     }
@@ -276,7 +245,7 @@ class ChoiceBench {
         wanted.push_back(sample);
       }
     }
-    if (wanted.empty()) throw InvalidArgument("no pictures of kind " + choice.pictures);
+    if (wanted.empty()) throw InvalidArgument("no pictures of kind {}", choice.pictures);
     facts["samples"] = wanted;
     const fs::path file = folder / artifact::kAugmentationFacts;
     WriteFileAtomic(file, facts.dump());
@@ -305,7 +274,6 @@ void MeasureAll(const ChoicesArguments& args) {
   ChoiceBench bench(args, pipeline);
   const fs::path file = fs::path(args.out_folder) / kChoicePoints;
   const std::vector<ChoicePoint> finished = ReadChoicePoints(file);
-  if (args.keep_network) bench.KeepNetwork(args.iterations.back());
   for (const std::string& text : args.choices) {
     const Choice choice = ChoiceFrom(text, args);
     for (const int iterations : args.iterations) {
@@ -360,8 +328,7 @@ void AddChoicesCommand(CLI::App& app) {
                       args->choices,
                       "default, encoder=random, encoder=squeezenet=FILE, adapter_stages=, "
                       "decoder_width=, crop=, precision=, learning_rate=, average_decay=, "
-                      "consistency=, recipe=paper, pictures=KIND, geometry_first=off, "
-                      "warm_start=another scene's --out; several");
+                      "consistency=, recipe=paper, pictures=KIND, geometry_first=off; several");
   command->add_option("--iterations", args->iterations, "of each choice, ascending")
       ->delimiter(',')
       ->capture_default_str();
@@ -374,10 +341,6 @@ void AddChoicesCommand(CLI::App& app) {
                     args->carry,
                     "the default has carried colours; without, it is what a scene gets in which "
                     "nothing could be carried (an --out of its own)");
-  command->add_flag("--keep-network",
-                    args->keep_network,
-                    "also leave the default's network after the last --iterations (a multiple of "
-                    "25), which warm starts need of both scenes");
   command->add_option("--table", args->table_folders, "--out folders: print tables, run nothing")
       ->excludes(scene);
   command->callback([args] {

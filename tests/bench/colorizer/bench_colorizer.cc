@@ -16,8 +16,8 @@
 #include "core/image/codec.h"
 #include "core/image/probe/probe.h"
 #include "core/report/curves.h"
-#include "core/stage/artifacts.h"
-#include "core/stage/training_pictures.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/training_pictures.h"
 #include "tests/bench/colorizer/bench_encoder.h"
 #include "tests/bench/colorizer/colorizer_memory.h"
 #include "tests/bench/commands.h"
@@ -35,6 +35,7 @@ struct ColorizerArguments {
   std::string out_folder;
   std::string json_file;
   int side_px = 400;
+  int threads = 0;  // 0: what the machine has
   bool paper = false;
   bool one_after_another = true;
   bool memory = false;
@@ -43,7 +44,7 @@ struct ColorizerArguments {
   std::string pictures_folder;
   std::string kinds;
   double picture_share = kGeneratedShare;
-  ColorizerOptions options;
+  ColorizerOptions options{.iterations = 800};
 };
 
 // A folder of colour photos, whose middle one (or `key`) is the key view.
@@ -53,7 +54,7 @@ struct Photos {
     for (const std::string& name : ListFiles(folder)) {
       if (HasImageExtension(name)) names.push_back(name);
     }
-    if (names.size() < 2) throw InvalidArgument(folder.string() + " holds fewer than 2 photos");
+    if (names.size() < 2) throw InvalidArgument("{} holds fewer than 2 photos", folder.string());
     key = wanted_key.empty() ? names[names.size() / 2] : wanted_key;
   }
   Image Lab(const std::string& name) const {
@@ -88,7 +89,7 @@ void Score(const Photos& photos,
            const std::string& out_folder,
            Json* result) {
   double error = 0.0;
-  double grey_error = 0.0;
+  double gray_error = 0.0;
   double seconds = 0.0;
   int count = 0;
   for (size_t i = 0; i < photos.names.size(); i += 8) {
@@ -99,7 +100,7 @@ void Score(const Photos& photos,
     const Image predicted = JoinLab(luminance, colorizer.Colorize(luminance));
     seconds += SecondsSince(start);
     error += MeanDeltaE00(predicted, truth);
-    grey_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
+    gray_error += MeanDeltaE00(JoinLab(luminance, Image(truth.width, truth.height, 2)), truth);
     ++count;
     if (!out_folder.empty()) {
       fs::create_directories(out_folder);
@@ -109,7 +110,7 @@ void Score(const Photos& photos,
   }
   (*result)["views"] = count;
   (*result)["delta_e00_chroma_2d"] = error / count;
-  (*result)["delta_e00_gray"] = grey_error / count;
+  (*result)["delta_e00_gray"] = gray_error / count;
   (*result)["seconds_per_view"] = seconds / count;
 }
 
@@ -139,8 +140,9 @@ Json RunOne(const ColorizerArguments& args) {
   CurveRecorder recorder("personalize", silent, none);
   std::vector<TrainingPicture> pictures = MorePictures(args);
   pictures.insert(pictures.begin(), photos.Key());
+  ThreadPool pool(args.threads);
   const auto colorizer = TrainColorizer(
-      BenchEncoder(args.encoder), pictures, OptionsFrom(args), recorder, recorder, cancel);
+      BenchEncoder(args.encoder), pictures, OptionsFrom(args), {pool, recorder, recorder, cancel});
   Json result{{"key", photos.key}, {"seconds_training", recorder.Seconds()}};
   Score(photos, *colorizer, args.out_folder, &result);
   result["colorizer_bytes"] = colorizer->Serialize().size();
@@ -174,12 +176,15 @@ Json RunAllInOne(const ColorizerArguments& args) {
     keys.push_back(scenes.back().Key());
   }
   const auto train = [&](size_t i, SceneBatch* batch) {
+    ThreadPool pool(args.threads);
     NullObserver silent;
     NoCheckpoints none;
+    const CancellationToken go_on;
+    const RunControl control{pool, none, silent, go_on};
     return batch != nullptr
                ? TrainColorizer(
-                     encoder, {keys[i]}, options, none, silent, {}, *batch, std::to_string(i))
-               : TrainColorizer(encoder, {keys[i]}, options, none, silent, {});
+                     encoder, {keys[i]}, options, control, BatchPlace{*batch, std::to_string(i)})
+               : TrainColorizer(encoder, {keys[i]}, options, control);
   };
   Json result{{"scenes", scenes.size()}};
   const int64_t before = ResidentMemoryBytes();
@@ -192,7 +197,7 @@ Json RunAllInOne(const ColorizerArguments& args) {
     result["mib_one_after_another"] = (PeakMemoryBytes() - before) >> 20;
   }
   ResetPeakMemory();
-  SceneBatch batch(options.threads);
+  SceneBatch batch(args.threads);
   std::vector<std::shared_ptr<const Colorizer>> together(scenes.size());
   start = std::chrono::steady_clock::now();
   std::vector<std::thread> threads;
@@ -224,6 +229,7 @@ Json RunAllInOne(const ColorizerArguments& args) {
 Json RunMemory(const ColorizerArguments& args) {
   MemorySubject subject;
   subject.options = OptionsFrom(args);
+  subject.threads = args.threads;
   for (const std::string& folder : args.all_in_one) {
     subject.keys.push_back(Photos(folder, "", args.side_px).Key());
   }
@@ -240,7 +246,7 @@ Json RunMemory(const ColorizerArguments& args) {
 }
 
 void RunColorizer(const ColorizerArguments& args) {
-  ShareMallocArenas(args.options.threads > 0 ? args.options.threads : 2);  // as the worker does
+  ShareMallocArenas(args.threads > 0 ? args.threads : 2);  // as the worker does
   const Json result = args.all_in_one.empty() ? RunOne(args)
                       : args.memory           ? RunMemory(args)
                                               : RunAllInOne(args);
@@ -272,7 +278,7 @@ void AddColorizerCommand(CLI::App& app) {
   command->add_option("--side", args->side_px, "px");
   command->add_option("--iterations", args->options.iterations);
   command->add_option("--time-limit", args->options.time_limit_seconds, "seconds");
-  command->add_option("--threads", args->options.threads);
+  command->add_option("--threads", args->threads);
   command
       ->add_option(
           "--encoder", args->encoder, "embedded, random, squeezenet=FILE.onnx, or a weight file")
@@ -286,7 +292,7 @@ void AddColorizerCommand(CLI::App& app) {
   command->add_option("--crop", args->options.crop_px, "px");
   command->add_option("--seed", args->options.seed);
   command->add_option("--average-decay", args->options.average_decay, "0: off");
-  command->add_option("--least-improvement", args->options.least_improvement, "0: no early stop");
+  command->add_option("--min-improvement", args->options.min_improvement, "0: no early stop");
   command->add_option("--precision", args->precision, "auto, float32 or bfloat16")
       ->check(CLI::IsMember({"auto", "float32", "bfloat16"}))
       ->capture_default_str();

@@ -154,7 +154,9 @@ std::vector<ChoicePoint> ReadChoiceFolders(const std::vector<std::string>& folde
     const std::filesystem::path file = folder / kChoicePoints;
     if (!std::filesystem::exists(file)) {
       throw Error(ErrorCode::kNotFound,
-                  folder.string() + " has no " + kChoicePoints + "; run choices for a scene first");
+                  "{} has no {}; run choices for a scene first",
+                  folder.string(),
+                  kChoicePoints);
     }
     const std::vector<ChoicePoint> more = ReadChoicePoints(file);
     points.insert(points.end(), more.begin(), more.end());

@@ -3,14 +3,13 @@
 #include <malloc.h>
 
 #include <algorithm>
-#include <cstring>
+#include <optional>
 #include <string>
 #include <thread>
 
 #include "core/base/memory.h"
-#include "core/colorizer/archive.h"
 #include "core/colorizer/scene_batch.h"
-#include "tests/bench/colorizer/warm_start.h"
+#include "core/colorizer/tensor_file.h"
 
 namespace color3d {
 namespace {
@@ -18,8 +17,15 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kMib = 1 << 20;
-constexpr size_t kMagicBytes = 8;
 constexpr int kCheckpointIterations = 25;  // the first checkpoint
+
+// Keeps the last state that training leaves.
+struct LastCheckpoint : CheckpointStore {
+  std::optional<std::string> Load() override { return std::nullopt; }
+  bool WantsSave() override { return true; }
+  void Save(const std::string& bytes) override { state = bytes; }
+  std::string state;
+};
 
 struct Line {
   double at_zero = 0.0;
@@ -39,21 +45,19 @@ Line FitLine(const std::vector<std::pair<double, double>>& points) {
 int64_t PeakOf(const MemorySubject& subject, size_t count) {
   ::malloc_trim(0);
   ResetPeakMemory();
-  SceneBatch batch(subject.options.threads);
+  SceneBatch batch(subject.threads);
   std::vector<std::shared_ptr<const Colorizer>> trained(count);
   std::vector<std::thread> threads;
   for (size_t i = 0; i < count; ++i) {
     threads.emplace_back([&, i] {
+      ThreadPool pool(subject.threads);
       NullObserver silent;
       NoCheckpoints none;
       trained[i] = TrainColorizer(subject.encoder,
                                   {subject.keys[i]},
                                   subject.options,
-                                  none,
-                                  silent,
-                                  {},
-                                  batch,
-                                  std::to_string(i));
+                                  {pool, none, silent, {}},
+                                  BatchPlace{batch, std::to_string(i)});
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -65,21 +69,18 @@ int64_t PeakOf(const MemorySubject& subject, size_t count) {
 Json TensorBytes(const MemorySubject& subject) {
   ColorizerOptions options = subject.options;
   options.iterations = kCheckpointIterations;
+  ThreadPool pool(subject.threads);
   LastCheckpoint last;
   NullObserver silent;
-  TrainColorizer(subject.encoder, {subject.keys.front()}, options, last, silent, {});
-  const std::string& state = last.state();
-  uint32_t version = 0;  // follows the magic
-  std::memcpy(&version, state.data() + kMagicBytes, sizeof(version));
-  const Archive archive =
-      ReadArchive(state, state.substr(0, kMagicBytes), version, "the checkpoint");
+  TrainColorizer(subject.encoder, {subject.keys.front()}, options, {pool, last, silent, {}});
+  const TensorFile file = ReadTensorFile(last.state, kCheckpointFormat, "the checkpoint");
   Json bytes{{"parameters", 0}, {"optimiser", 0}, {"average", 0}};
-  for (const auto& [name, array] : archive.arrays) {
+  for (const auto& [name, array] : file.arrays) {
     const bool moment = name.starts_with("m.") || name.starts_with("v.");
     const char* part = moment                         ? "optimiser"
                        : name.starts_with("average.") ? "average"
                                                       : "parameters";
-    bytes[part] = bytes[part].get<size_t>() + array.bytes.size();
+    bytes[part] = bytes[part].get<size_t>() + array.values.size() * sizeof(float);
   }
   return bytes;
 }

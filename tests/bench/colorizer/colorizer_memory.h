@@ -13,6 +13,7 @@ struct MemorySubject {
   std::shared_ptr<const Encoder> encoder;
   std::vector<TrainingPicture> keys;  // of one scene each
   ColorizerOptions options;
+  int threads = 0;  // 0: what the machine has
 };
 
 // Bytes of one scene's tensors by their purpose: parameters, optimiser, average (from a checkpoint

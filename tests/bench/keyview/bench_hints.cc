@@ -17,7 +17,7 @@
 #include "core/color/lab.h"
 #include "core/grid/edge_weights.h"
 #include "core/image/codec.h"
-#include "core/keycolor/keycolor.h"
+#include "core/keycolor/hints/hints.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
 
@@ -37,6 +37,7 @@ struct HintsArguments {
   bool quality = false;
   std::string pictures_folder;
   std::string json_file;
+  int threads = 0;
   HintOptions options;
 };
 
@@ -122,11 +123,12 @@ bool HintsHoldExactly(const Problem& problem, const Image& ab) {
   });
 }
 
-Json RunOurs(const Problem& problem, const HintOptions& options) {
+Json RunOurs(const Problem& problem, const HintOptions& options, ThreadPool& pool) {
+  NoCheckpoints none;
   ResidualCurve curve;
   const Clock clock;
   const HintSolution solution =
-      KeyColorFromHints(problem.luminance, problem.hints, options, curve, {});
+      KeyColorFromHints(problem.luminance, problem.hints, options, {pool, none, curve, {}});
   const double seconds = clock.Seconds();
   return {{"solver", "aggregation multigrid"},
           {"seconds", seconds},
@@ -217,7 +219,8 @@ Json RunSizes(const HintsArguments& args) {
                  {"width", problem.luminance.width},
                  {"height", problem.luminance.height},
                  {"points", args.points}};
-      entry["ours"] = RunOurs(problem, args.options);
+      ThreadPool pool(args.threads);
+      entry["ours"] = RunOurs(problem, args.options, pool);
       if (megapixels <= args.eigen_up_to_megapixels) entry["eigen"] = RunEigen(problem, args);
       results.push_back(entry);
     }
@@ -231,9 +234,11 @@ Json RunQuality(const HintsArguments& args) {
     const Image srgb = ReadImage(photo);
     for (const int count : args.counts) {
       const Problem problem = MakeProblem(srgb, count, 0.0);
+      ThreadPool pool(args.threads);
+      NoCheckpoints none;
       NullObserver ignore;
-      const HintSolution solution =
-          KeyColorFromHints(problem.luminance, problem.hints, args.options, ignore, {});
+      const HintSolution solution = KeyColorFromHints(
+          problem.luminance, problem.hints, args.options, {pool, none, ignore, {}});
       const Image colored = JoinLab(problem.luminance, solution.ab);
       const Image gray = JoinLab(problem.luminance, Image(srgb.width, srgb.height, 2));
       results.push_back({{"photo", photo},
@@ -263,7 +268,7 @@ void AddHintsCommand(CLI::App& app) {
   command->add_option("--eigen-seconds", args->eigen_seconds, "when Eigen is stopped");
   command->add_option("--tolerance", args->options.tolerance, "relative residual to reach");
   command->add_option("--sigma", args->options.sigma, "of the edge weights, L units");
-  command->add_option("--threads", args->options.threads, "0: what the machine has");
+  command->add_option("--threads", args->threads, "0: what the machine has");
   command->add_flag("--quality", args->quality, "colour error by number of hints instead");
   command->add_option("--counts", args->counts, "numbers of hints, with --quality");
   command->add_option("--pictures", args->pictures_folder, "PNGs go here, with --quality");

@@ -14,7 +14,7 @@
 #include "core/image/codec.h"
 #include "core/image/reduced.h"
 #include "core/scene/import.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
@@ -109,16 +109,14 @@ class ErrorOfKeys {
     ColorizerOptions options;
     options.iterations = 0;
     options.max_side_px = args_.side_px;
-    options.threads = args_.threads;
+    ThreadPool pool(args_.threads);
     NullObserver silent;
     NoCheckpoints none;
     const auto colorizer =
         TrainColorizer(encoder_,
                        {{"key view", LuminanceOfLab(truth_[key]), ChromaOfLab(truth_[key])}},
                        options,
-                       none,
-                       silent,
-                       {});
+                       {pool, none, silent, {}});
     double sum = 0.0;
     int count = 0;
     for (int test : tests_) {

@@ -22,6 +22,7 @@ struct ReferenceArguments {
   std::string picture_file;
   std::string json_file;
   int max_side_px = 800;
+  int threads = 0;
   ReferenceOptions options;
 };
 
@@ -31,10 +32,12 @@ void RunReference(const ReferenceArguments& args) {
   std::copy_n(truth.data.begin(), luminance.data.size(), luminance.data.begin());
   std::vector<Image> references;
   for (const std::string& file : args.references) references.push_back(ReadImage(file));
+  ThreadPool pool(args.threads);
+  NoCheckpoints none;
   NullObserver ignore;
   const auto start = std::chrono::steady_clock::now();
-  const ReferenceSolution solution =
-      KeyColorFromReferences(luminance, references, *Encoder::Embedded(), args.options, ignore, {});
+  const ReferenceSolution solution = KeyColorFromReferences(
+      luminance, references, *Encoder::Embedded(), args.options, {pool, none, ignore, {}});
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   const Image colored = JoinLab(luminance, solution.ab);
   const Image gray = JoinLab(luminance, Image(truth.width, truth.height, 2));
@@ -61,7 +64,7 @@ void AddReferenceCommand(CLI::App& app) {
   command->add_option("--max-side", args->max_side_px, "longer side of the key picture, px");
   command->add_option("--match-weight", args->options.match_weight, "see ReferenceOptions");
   command->add_option("--match-side", args->options.match_side_px, "see ReferenceOptions");
-  command->add_option("--threads", args->options.threads, "0: what the machine has");
+  command->add_option("--threads", args->threads, "0: what the machine has");
   command->add_option("--picture", args->picture_file, "PNG of the result");
   command->add_option("--json", args->json_file, "result file; standard output without");
   command->callback([args] { RunReference(*args); });

@@ -56,7 +56,7 @@ PhotoSet::PhotoSet(const std::vector<PhotoFolder>& folders) {
       photos_.push_back(std::move(photo));
     }
     const size_t count = photos_.size() - before;
-    if (count == 0) throw InvalidArgument(folder.path.string() + " holds no colour photographs");
+    if (count == 0) throw InvalidArgument("{} holds no colour photographs", folder.path.string());
     shares.insert(shares.end(), count, folder.weight / static_cast<double>(count));
   }
   double sum = 0.0;

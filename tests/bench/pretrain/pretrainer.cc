@@ -1,5 +1,6 @@
 #include "tests/bench/pretrain/pretrainer.h"
 
+#include <fmt/format.h>
 #include <torch/torch.h>
 
 #include <cmath>
@@ -7,14 +8,14 @@
 #include <numbers>
 
 #include "core/base/error.h"
-#include "core/colorizer/tensor_archive.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/encoder/image_tensors.h"
 #include "tests/support/random_features.h"
 
 namespace color3d {
 namespace {
 
-constexpr char kMagic[] = "C3PRETRN";
+constexpr TensorFormat kFormat = {"color3d.pretraining", 2, "C3PRETRN", "start afresh"};
 constexpr double kBeta1 = 0.9;
 constexpr double kBeta2 = 0.98;
 constexpr double kEpsilon = 1e-8;
@@ -190,8 +191,8 @@ PretrainLosses Pretrainer::Step() {
     bad_steps_ = 0;
   } else if (++bad_steps_ >= kMaxBadSteps) {
     throw Error(ErrorCode::kInternal,
-                "pre-training diverged at iteration " + std::to_string(iteration_) +
-                    ": lower --learning-rate");
+                "pre-training diverged at iteration {}: lower --learning-rate",
+                iteration_);
   }
   ++iteration_;
   return losses;
@@ -237,50 +238,40 @@ void Pretrainer::OptimiserStep() {
   }
 }
 
-std::string Pretrainer::Checkpoint(const std::string& notes_json) const {
-  Archive archive;
-  archive.header = nlohmann::json{{"iteration", iteration_},
-                                  {"random_state", random_.state().state},
-                                  {"random_increment", random_.state().increment},
-                                  {"notes", nlohmann::json::parse(notes_json)}}
-                       .dump();
-  const auto type = ArchiveArray::Type::kFloat32;
+NamedTensors Pretrainer::State() const {
+  NamedTensors state;
   for (size_t i = 0; i < parameters_.size(); ++i) {
     const std::string& name = parameters_[i].first;
-    archive.arrays["w." + name] = ArrayFromTensor(parameters_[i].second, type);
-    archive.arrays["m." + name] = ArrayFromTensor(first_[i], type);
-    archive.arrays["v." + name] = ArrayFromTensor(second_[i], type);
-    archive.arrays["average." + name] = ArrayFromTensor(average_[i], type);
+    state.emplace_back("w." + name, parameters_[i].second);
+    state.emplace_back("m." + name, first_[i]);
+    state.emplace_back("v." + name, second_[i]);
+    state.emplace_back("average." + name, average_[i]);
   }
   for (size_t i = 0; i < teacher_mean_.size(); ++i) {
-    archive.arrays["teacher.mean." + std::to_string(i)] = ArrayFromTensor(teacher_mean_[i], type);
-    archive.arrays["teacher.deviation." + std::to_string(i)] =
-        ArrayFromTensor(teacher_deviation_[i], type);
+    state.emplace_back(fmt::format("teacher.mean.{}", i), teacher_mean_[i]);
+    state.emplace_back(fmt::format("teacher.deviation.{}", i), teacher_deviation_[i]);
   }
-  return WriteArchive(archive, kMagic);
+  return state;
+}
+
+std::string Pretrainer::Checkpoint(const std::string& notes_json) const {
+  TensorFile file;
+  file.facts = {{"iteration", iteration_},
+                {"random_state", random_.state().state},
+                {"random_increment", random_.state().increment},
+                {"notes", nlohmann::json::parse(notes_json)}};
+  PutTensors(State(), "", StoredType::kFloat32, &file);
+  return WriteTensorFile(file, kFormat);
 }
 
 std::string Pretrainer::Restore(std::string_view bytes) {
   const std::string what = "the pre-training checkpoint";
-  Archive archive = ReadArchive(bytes, kMagic, 1, what);
-  const nlohmann::json header = nlohmann::json::parse(archive.header);
-  NamedTensors named;
-  for (size_t i = 0; i < parameters_.size(); ++i) {
-    const std::string& name = parameters_[i].first;
-    named.emplace_back("w." + name, parameters_[i].second);
-    named.emplace_back("m." + name, first_[i]);
-    named.emplace_back("v." + name, second_[i]);
-    named.emplace_back("average." + name, average_[i]);
-  }
-  for (size_t i = 0; i < teacher_mean_.size(); ++i) {
-    named.emplace_back("teacher.mean." + std::to_string(i), teacher_mean_[i]);
-    named.emplace_back("teacher.deviation." + std::to_string(i), teacher_deviation_[i]);
-  }
-  TakeTensors(named, "", what, archive);
-  iteration_ = header.at("iteration").get<int64_t>();
-  random_ = Random(Random::State{header.at("random_state").get<uint64_t>(),
-                                 header.at("random_increment").get<uint64_t>()});
-  return header.at("notes").dump();
+  TensorFile file = ReadTensorFile(bytes, kFormat, what);
+  TakeTensors(State(), "", what, &file);
+  iteration_ = file.facts.at("iteration").get<int64_t>();
+  random_ = Random(Random::State{file.facts.at("random_state").get<uint64_t>(),
+                                 file.facts.at("random_increment").get<uint64_t>()});
+  return file.facts.at("notes").dump();
 }
 
 WeightMap Pretrainer::AveragedWeights() const {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/random.h"
+#include "core/colorizer/named_tensors.h"
 #include "core/encoder/convnext/convnext.h"
 #include "core/keycolor/automatic/color_bins.h"
 #include "core/keycolor/automatic/color_head.h"
@@ -60,7 +61,8 @@ class Pretrainer {
   WeightMap AveragedWeights() const;
 
  private:
-  using NamedTensors = std::vector<std::pair<std::string, torch::Tensor>>;
+  // Everything that a checkpoint holds besides numbers; storage is shared.
+  NamedTensors State() const;
   PretrainLosses Losses(const std::vector<TrainingCrop>& crops, torch::Tensor& total);
   torch::Tensor ColorLoss(const std::vector<torch::Tensor>& taps, const torch::Tensor& ab) const;
   void Distill(const std::vector<torch::Tensor>& taps,

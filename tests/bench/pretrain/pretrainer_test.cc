@@ -62,7 +62,7 @@ TEST_F(PretrainerTest, AResumedRunEndsAsAnUninterruptedOne) {
     ASSERT_EQ(array.values, actual.at(name).values) << name;
 }
 
-TEST_F(PretrainerTest, WhatItWritesIsAnAutomaticColourizer) {
+TEST_F(PretrainerTest, WhatItWritesIsAnAutomaticColorizer) {
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   trainer.Step();
@@ -81,12 +81,12 @@ TEST_F(PretrainerTest, RefusesADamagedCheckpoint) {
   EXPECT_THROW(trainer.Restore(checkpoint), Error);
 }
 
-TEST_F(PretrainerTest, RefusesAFolderWithoutColour) {
+TEST_F(PretrainerTest, RefusesAFolderWithoutColor) {
   std::filesystem::create_directories(folder_ / "empty");
   EXPECT_THROW(PhotoSet({{folder_ / "empty", 1.0}}), Error);
 }
 
-TEST_F(PretrainerTest, CropsAreTrueColourAndDegradedLuminance) {
+TEST_F(PretrainerTest, CropsAreTrueColorAndDegradedLuminance) {
   const PhotoSet photos({{folder_, 1.0}});
   Random random(5);
   for (int i = 0; i < 20; ++i) {

@@ -101,7 +101,7 @@ SqueezeNet::SqueezeNet(const std::filesystem::path& onnx_file) {
     }
   }
   if (!weights_.contains("conv10_w_0")) {
-    throw InvalidArgument(onnx_file.string() + " holds no SqueezeNet 1.1 (no conv10_w_0)");
+    throw InvalidArgument("{} holds no SqueezeNet 1.1 (no conv10_w_0)", onnx_file.string());
   }
 }
 

@@ -15,8 +15,8 @@
 #include "core/color/lab.h"
 #include "core/metrics/quality.h"
 #include "core/splat/chroma/chroma_fit.h"
+#include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/raster/render.h"
-#include "core/splat/training/trainer.h"
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
@@ -38,8 +38,8 @@ struct ChromaArguments {
   int memory_budget_mib = 2048;
   std::string runs = "closed,cg,adam-preset,adam";
   std::vector<int> degrees = {0, 1};
-  GeometryOptions geometry;
-  ChromaOptions chroma;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
+  ChromaOptions chroma{.iterations = 600};
 };
 
 // Of all threads: what is left of a timing on a machine that others use too.
@@ -126,8 +126,9 @@ class ChromaBench {
     }
     NullObserver silent;
     NoCheckpoints none;
-    geometry_ = TrainGeometry(
-        imported_.scene, images, args_.geometry, pool_, none, silent, CancellationToken());
+    geometry_ = TrainGeometry(GeometryProblemOf(imported_.scene, images),
+                              args_.geometry,
+                              {pool_, none, silent, CancellationToken()});
     if (!args_.geometry_file.empty()) {
       WriteFileAtomic(args_.geometry_file, SerializeGaussians(geometry_));
     }
@@ -195,7 +196,7 @@ class ChromaBench {
     NoCheckpoints none;
     SolverCurves curves([&] { return since_start() - paused; });
     const GaussianModel model =
-        FitChromaOn(geometry_, problem_, options, pool_, none, curves, CancellationToken());
+        FitChroma(geometry_, problem_, options, {pool_, none, curves, CancellationToken()});
     const double seconds = since_start() - paused;
     const double cpu_seconds = CpuSeconds() - cpu_start - cpu_paused;
     Json last = Score(model);

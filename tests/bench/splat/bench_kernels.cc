@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "core/simd/instruction_set.h"
-#include "core/splat/training/regularize.h"
+#include "core/splat/geometry/regularize.h"
 #include "tests/bench/splat/synthetic_splats.h"
 
 namespace color3d {
@@ -35,13 +35,6 @@ void MeasurePenalties(benchmark::State& state) {
   for (auto _ : state) AddPenaltyGradients(p, 0.01f, 0.01f, pool, gradient);
 }
 
-void MeasureNoise(benchmark::State& state) {
-  ThreadPool pool(1);
-  ParameterBlock p(kColorRow + 16, state.range(0));
-  for (int64_t i = 0; i < p.count(); ++i) p.Row(kOpacityRow)[i] = -6.0f;
-  for (auto _ : state) AddPositionNoise(1e-9f, 1, pool, p);
-}
-
 void Loads(benchmark::internal::Benchmark* b) {
   b->Unit(benchmark::kMillisecond)->UseRealTime()->MinTime(0.2);
   b->ArgNames({"gaussians", "channels", "threads"});
@@ -59,7 +52,6 @@ BENCHMARK_CAPTURE(MeasureStep, project_backward, &SyntheticIteration::ProjectBac
     ->Apply(Loads);
 BENCHMARK_CAPTURE(MeasureStep, adam, &SyntheticIteration::Adam)->Apply(Loads);
 BENCHMARK(MeasurePenalties)->Unit(benchmark::kMillisecond)->MinTime(0.2)->Arg(50'000);
-BENCHMARK(MeasureNoise)->Unit(benchmark::kMillisecond)->MinTime(0.2)->Arg(50'000);
 
 }  // namespace
 }  // namespace color3d

@@ -1,4 +1,6 @@
 // color3d-bench rasterize: how the cost of a training iteration grows, on synthetic loads.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -129,7 +131,7 @@ Json MemoryPerGaussian(int channels) {
               {"splat_row", splat_bytes},
               {"binning", binning_bytes},
               {"total", 4 * row_bytes + statistics_bytes + splat_bytes + binning_bytes},
-              {"per_pair", 4 + 4 + 2 + 4 * GradientRowFloats(channels, false)}};
+              {"per_pair", 4 + 4 + 2 + 4 * GradientRowFloats(channels)}};
 }
 
 void PrintTable(const Json& report) {
@@ -152,7 +154,7 @@ void PrintTable(const Json& report) {
               "speed-up");
   for (const Json& r : report["cases"]) {
     const std::string size =
-        std::to_string(r["width_px"].get<int>()) + "x" + std::to_string(r["height_px"].get<int>());
+        fmt::format("{}x{}", r["width_px"].get<int>(), r["height_px"].get<int>());
     std::printf("%9d %10s %2d %2d %9lld %10.2f %9.2f %7.2f %8.2f %7.2f %8.2f %7.2f %7.2f %9.3f",
                 r["gaussians"].get<int>(),
                 size.c_str(),

@@ -21,82 +21,57 @@ struct ReconstructArguments {
   std::string scene_folder;
   std::string json_file;
   std::string pictures_folder;
-  std::string strategy;
   std::vector<std::string> settings;  // name=value of GeometryTuning
-  bool absolute_gradient = false;
-  bool sparse_adam = false;
   std::string preset = "none";
   int max_side_px = 500;
   int threads = 2;
-  TrainingColours colours = TrainingColours::kSrgb;
-  GeometryOptions geometry;
+  TrainingColors colors = TrainingColors::kSrgb;
+  GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
 };
 
 // The geometry values of a preset of the service.
 void UsePreset(const std::string& name, ReconstructArguments& args) {
-  const PresetValues values = ValuesOf(name == "best"    ? v1::PRESET_BEST
-                                       : name == "paper" ? v1::PRESET_PAPER
-                                                         : v1::PRESET_FAST);
+  const v1::ColorizeSceneSpec& options = OptionsOf(name == "best"    ? v1::PRESET_BEST
+                                                   : name == "paper" ? v1::PRESET_PAPER
+                                                                     : v1::PRESET_FAST);
   args.preset = name;
-  args.max_side_px = values.max_side_px;
-  args.geometry.iterations = values.geometry_iterations;
-  args.geometry.max_gaussians = values.max_gaussians;
-  args.geometry.sh_degree = values.sh_degree;
-  args.geometry.densify_gradient = values.densify_gradient;
-  if (values.geometry_recipe == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
+  args.max_side_px = options.max_side_px();
+  const v1::ReconstructGeometrySpec& geometry = options.reconstruct_geometry();
+  args.geometry.iterations = geometry.iterations();
+  args.geometry.max_gaussians = geometry.max_gaussians();
+  args.geometry.sh_degree = geometry.sh_degree();
+  args.geometry.densify_gradient = geometry.densify_gradient();
+  if (geometry.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     args.geometry.recipe = GeometryOptions::Recipe::kPaper;
   }
 }
 
 // "name=value", for measuring other schedules than the defaults.
-void Apply(const std::string& setting, GeometryTuning& t) {
-  const std::map<std::string, double*> fields{{"quarter_size_until", &t.quarter_size_until},
-                                              {"half_size_until", &t.half_size_until},
-                                              {"densify_from", &t.densify_from},
-                                              {"densify_until", &t.densify_until},
-                                              {"gradient_preference", &t.gradient_preference},
-                                              {"growth_until", &t.growth_until},
-                                              {"opacity_reset_every", &t.opacity_reset_every},
-                                              {"opacity_penalty", &t.opacity_penalty},
-                                              {"scale_penalty", &t.scale_penalty},
-                                              {"noise", &t.noise},
-                                              {"sh_from", &t.sh_from},
-                                              {"sh_step", &t.sh_step},
-                                              {"position_rate_first", &t.position_rate_first},
-                                              {"position_rate_last", &t.position_rate_last},
-                                              {"dc_rate", &t.dc_rate},
-                                              {"rest_divisor", &t.rest_divisor},
-                                              {"opacity_rate", &t.opacity_rate},
-                                              {"scale_rate", &t.scale_rate},
-                                              {"rotation_rate", &t.rotation_rate},
-                                              {"max_needle_ratio", &t.max_needle_ratio},
-                                              {"wanted_iterations", &t.wanted_iterations},
-                                              {"last_rate", &t.last_rate}};
+void Apply(const std::string& setting, GeometryTuning& tuning) {
   const size_t equals = setting.find('=');
   const std::string name = setting.substr(0, equals);
   char* end = nullptr;
   const double value =
       equals == std::string::npos ? 0.0 : std::strtod(setting.c_str() + equals + 1, &end);
-  const bool number = end != nullptr && *end == '\0' && end != setting.c_str() + equals + 1;
-  if (number && name == "densify_rounds") {
-    t.densify_rounds = static_cast<int>(value);
-  } else if (number && name == "scheduled_cap") {
-    t.scheduled_cap = value != 0.0;
-  } else if (number && fields.count(name) != 0) {
-    *fields.at(name) = value;
-  } else {
-    throw InvalidArgument("--set " + setting + ": give name=value with a field of GeometryTuning");
+  bool applied = false;
+  if (end != nullptr && *end == '\0' && end != setting.c_str() + equals + 1) {
+    VisitFields(tuning, [&](const char* field, auto& number) {
+      if (name != field) return;
+      number = static_cast<std::decay_t<decltype(number)>>(value);
+      applied = true;
+    });
+  }
+  if (!applied) {
+    throw InvalidArgument("--set {}: give name=value with a field of GeometryTuning", setting);
   }
 }
 
-GeometryTuning TuningFrom(const ReconstructArguments& args) {
-  GeometryTuning tuning = TuningOf(args.geometry);
-  if (args.strategy == "adaptive") tuning.strategy = GeometryTuning::Strategy::kAdaptive;
-  tuning.absolute_gradient = args.absolute_gradient;
-  tuning.sparse_adam = args.sparse_adam;
-  if (args.strategy == "relocate") tuning.strategy = GeometryTuning::Strategy::kRelocate;
-  for (const std::string& setting : args.settings) Apply(setting, tuning);
-  return tuning;
+GeometryOptions OptionsFrom(const ReconstructArguments& args) {
+  GeometryOptions options = args.geometry;
+  if (args.settings.empty()) return options;
+  options.tuning = TuningOf(options);
+  for (const std::string& setting : args.settings) Apply(setting, *options.tuning);
+  return options;
 }
 
 // The truth on the left, what was drawn on the right.
@@ -113,8 +88,8 @@ Image SideBySide(const Image& left, const Image& right) {
 }
 
 // 3 channels of sRGB, or L' 0..1 as grey of that lightness.
-Image Truth(const ViewImages& images, int view, TrainingColours colours) {
-  if (colours == TrainingColours::kSrgb) return images.Srgb(view);
+Image Truth(const ViewImages& images, int view, TrainingColors colors) {
+  if (colors == TrainingColors::kSrgb) return images.Srgb(view);
   Image luminance = *images.Luminance(view);
   for (float& v : luminance.data) v *= 0.01f;
   return luminance;
@@ -126,7 +101,7 @@ nlohmann::ordered_json ToJson(const ReconstructArguments& args, const TrainingTr
       {"scene", args.scene_folder},
       {"preset", args.preset},
       {"max_side_px", args.max_side_px},
-      {"colours", args.colours == TrainingColours::kSrgb ? "truth" : "luminance"},
+      {"colours", args.colors == TrainingColors::kSrgb ? "truth" : "luminance"},
       {"threads", args.threads},
       {"instruction_set", std::string(ActiveInstructionSet())},
       {"seconds", trace.seconds},
@@ -166,19 +141,13 @@ void RunReconstruct(ReconstructArguments args) {
     trace.on_held_out_picture = [&](int view, const Image& drawn) {
       WriteFileAtomic(
           std::filesystem::path(args.pictures_folder) / (imported.scene.views[view].name + ".png"),
-          EncodePng8(SideBySide(Truth(images, view, args.colours), drawn)));
+          EncodePng8(SideBySide(Truth(images, view, args.colors), drawn)));
     };
   }
-  TrainGeometryTuned(imported.scene,
-                     images,
-                     args.geometry,
-                     TuningFrom(args),
-                     args.colours,
-                     pool,
-                     recorder,
-                     recorder,
-                     cancel,
-                     &trace);
+  TrainGeometry(GeometryProblemOf(imported.scene, images, args.colors),
+                OptionsFrom(args),
+                {pool, recorder, recorder, cancel},
+                &trace);
   nlohmann::ordered_json result = ToJson(args, trace);
   for (const CurvePoint& p : recorder.points()) {
     if (p.error_name == "restored_non_finite") result["restored_at"].push_back(p.iteration);
@@ -202,9 +171,9 @@ void AddReconstructCommand(CLI::App& app) {
       ->check(CLI::IsMember({"fast", "best", "paper"}))
       ->trigger_on_parse();
   command->add_option("--threads", args->threads);
-  command->add_option("--colours", args->colours, "truth (RGB, the default) or luminance")
-      ->transform(CLI::Transformer(std::map<std::string, TrainingColours>{
-          {"truth", TrainingColours::kSrgb}, {"luminance", TrainingColours::kLuminance}}));
+  command->add_option("--colours", args->colors, "truth (RGB, the default) or luminance")
+      ->transform(CLI::Transformer(std::map<std::string, TrainingColors>{
+          {"truth", TrainingColors::kSrgb}, {"luminance", TrainingColors::kLuminance}}));
   CLI::Option* iterations = command->add_option("--iterations", args->geometry.iterations);
   command
       ->add_option("--seconds",
@@ -217,10 +186,6 @@ void AddReconstructCommand(CLI::App& app) {
   command->add_option("--edge-weight", args->geometry.edge_weight);
   command->add_option("--ssim-weight", args->geometry.ssim_weight);
   command->add_option("--seed", args->geometry.seed);
-  command->add_option("--strategy", args->strategy, "adaptive or relocate (3DGS-MCMC)")
-      ->check(CLI::IsMember({"adaptive", "relocate"}));
-  command->add_flag("--absolute-gradient", args->absolute_gradient, "densify as AbsGS");
-  command->add_flag("--sparse-adam", args->sparse_adam, "step only what the picture shows");
   command->add_option("--set", args->settings, "name=value of the schedule (GeometryTuning)");
   command->add_option("--pictures", args->pictures_folder, "held-out views: truth, drawn");
   command->add_option("--json", args->json_file, "default: standard output");

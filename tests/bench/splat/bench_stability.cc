@@ -97,7 +97,7 @@ void RunStability(const StabilityArguments& args) {
                     nlohmann::ordered_json{{"cases", rows}, {"failed", failed}}.dump(1) + "\n");
   }
   if (failed > 0) {
-    throw Error(ErrorCode::kInternal, std::to_string(failed) + " stability cases failed");
+    throw Error(ErrorCode::kInternal, "{} stability cases failed", failed);
   }
 }
 

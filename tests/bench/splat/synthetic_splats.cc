@@ -85,8 +85,7 @@ void SyntheticIteration::Loss() {
   loss_.Evaluate(picture_, target_, nullptr, LossWeights(), pool_, d_picture_);
 }
 void SyntheticIteration::Backward() {
-  RasterizeBackward(
-      splats_, lists_, block_masks_, picture_, d_picture_, false, pool_, pair_gradient_);
+  RasterizeBackward(splats_, lists_, block_masks_, picture_, d_picture_, pool_, pair_gradient_);
 }
 void SyntheticIteration::ProjectBackward() {
   ProjectSplatsBackward(parameters_,

@@ -1,0 +1,28 @@
+#include "client/lib/connection.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include "core/base/error.h"
+
+namespace color3d::client {
+namespace {
+
+TEST(Connection, SaysHowToStartAServer) {
+  const CancellationToken cancel;
+  const auto begun = std::chrono::steady_clock::now();
+  try {
+    Connection("127.0.0.1:1", cancel);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kUnavailable);
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("cannot reach a server at 127.0.0.1:1"));
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("color3d-server serve"));
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
+}
+
+}  // namespace
+}  // namespace color3d::client

@@ -1,0 +1,105 @@
+#include "client/lib/photos/gray_copies.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <vector>
+
+#include "core/base/files.h"
+#include "core/base/parallel.h"
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kJpegQuality = 97;
+constexpr int kChromaSidePx = 160;
+constexpr int kLuminanceBins = 16;
+// Toned film measures 0.7..1.0, scenes in colour 7.6 and more.
+constexpr double kMinFreeChroma = 2.0;
+
+std::string EncodeGray(const Image& srgb, ImageFormat format) {
+  Image gray = LuminanceFromSrgb(srgb);
+  for (float& value : gray.data) value = static_cast<float>(GrayFromLuminance(value));
+  return format == ImageFormat::kJpeg ? EncodeJpeg(gray, kJpegQuality) : EncodePng16(gray);
+}
+
+// First and second moments of the chroma of pixels of like luminance.
+struct ChromaBin {
+  double count = 0.0;
+  double a = 0.0;
+  double b = 0.0;
+  double square = 0.0;
+};
+
+}  // namespace
+
+double FreeChroma(const Image& srgb) {
+  if (srgb.channels != 3 || srgb.Empty()) return 0.0;
+  const Image lab = LabFromSrgb(FitWithin(srgb, kChromaSidePx));
+  std::array<ChromaBin, kLuminanceBins> bins;
+  for (size_t i = 0; i < lab.PlaneSize(); ++i) {
+    const int index = static_cast<int>(lab.Plane(0)[i] / 100.0f * kLuminanceBins);
+    ChromaBin& bin = bins[std::clamp(index, 0, kLuminanceBins - 1)];
+    const double a = lab.Plane(1)[i];
+    const double b = lab.Plane(2)[i];
+    bin.count += 1.0;
+    bin.a += a;
+    bin.b += b;
+    bin.square += a * a + b * b;
+  }
+  double sum = 0.0;
+  for (const ChromaBin& bin : bins) {
+    if (bin.count > 0.0) sum += bin.square - (bin.a * bin.a + bin.b * bin.b) / bin.count;
+  }
+  return std::sqrt(std::max(0.0, sum) / static_cast<double>(lab.PlaneSize()));
+}
+
+bool HasColor(const Image& srgb) { return FreeChroma(srgb) >= kMinFreeChroma; }
+
+ColorCount CountColorPhotos(const PhotoFolder& folder,
+                            int max_photos,
+                            const CancellationToken& cancel) {
+  ColorCount count;
+  count.photos = static_cast<int>(folder.photos.size());
+  count.looked_at = std::min(count.photos, max_photos);
+  std::atomic<int> in_color{0};
+  ThreadPool pool(2);
+  pool.ForEach(count.looked_at, [&](int64_t i, int) {
+    cancel.ThrowIfCancelled();
+    const LocalFile& photo = folder.photos[i * count.photos / count.looked_at];
+    if (HasColor(ReadImage(photo.file))) ++in_color;
+  });
+  count.in_color = in_color;
+  return count;
+}
+
+GrayCopies MakeGrayCopies(const PhotoFolder& folder,
+                          const fs::path& scratch,
+                          const CancellationToken& cancel) {
+  GrayCopies copies{folder, {}};
+  std::vector<char> in_color(folder.photos.size(), 0);
+  ThreadPool pool(2);
+  pool.ForEach(static_cast<int64_t>(folder.photos.size()), [&](int64_t i, int) {
+    cancel.ThrowIfCancelled();
+    const LocalFile& photo = folder.photos[i];
+    const std::string bytes = ReadFile(photo.file);
+    const std::string name = photo.file.string();
+    const Image image = DecodeImage(bytes, name);
+    in_color[i] = HasColor(image) ? 1 : 0;
+    const fs::path copy = scratch / photo.path;
+    std::error_code error;
+    fs::create_directories(copy.parent_path(), error);
+    WriteFileAtomic(copy, EncodeGray(image, ProbeImage(bytes, name).format));
+    copies.folder.photos[i].file = copy;
+  });
+  for (size_t i = 0; i < in_color.size(); ++i) {
+    if (in_color[i] != 0) copies.in_color.insert(folder.photos[i].path);
+  }
+  return copies;
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,249 @@
+#include "client/lib/photos/photo_folder.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "client/lib/names.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/utf8.h"
+#include "core/image/probe/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kMaxFiles = 10'000;
+constexpr size_t kMaxPathBytes = 1024;
+constexpr char kAugment[] = "augment";
+constexpr char kTransforms[] = "transforms.json";
+constexpr const char* kModelFolders[] = {"sparse/0", "sparse", ""};
+constexpr const char* kModelStems[] = {"cameras", "images", "points3D"};
+
+bool IsFile(const fs::path& path) {
+  std::error_code none;
+  return fs::is_regular_file(path, none);
+}
+bool IsFolder(const fs::path& path) {
+  std::error_code none;
+  return fs::is_directory(path, none);
+}
+
+void RequireFolder(const fs::path& root) {
+  if (IsFolder(root)) return;
+  if (!fs::exists(fs::status(root))) {
+    throw Error(ErrorCode::kNotFound,
+                "there is no folder {}; give the folder of the photographs",
+                root.string());
+  }
+  throw InvalidArgument("{} is not a folder; give the folder of the photographs", root.string());
+}
+
+// Adds `root`/`folder`'s photos, without going into its subfolders.
+void AddDirectPhotos(const fs::path& root, const std::string& folder, PhotoFolder* result) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(root / folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with('.') || !HasImageExtension(name) || !IsFile(entry.path())) continue;
+    result->photos.push_back({folder.empty() ? name : folder + "/" + name, entry.path()});
+  }
+  if (error) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot read the folder {}: {}",
+                (root / folder).string(),
+                error.message());
+  }
+}
+
+void AddPhotosBelow(const fs::path& root, const std::string& folder, PhotoFolder* result) {
+  if (!IsFolder(root / folder)) return;
+  for (const std::string& file : ListFiles(root / folder)) {
+    if (!HasImageExtension(file)) continue;
+    result->photos.push_back({folder + "/" + file, root / folder / file});
+  }
+}
+
+// Subfolders of `root` that hold photos which transforms.json names.
+std::set<std::string> NamedFolders(const fs::path& transforms) {
+  nlohmann::json root;
+  try {
+    root = nlohmann::json::parse(ReadFile(transforms));
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument("{} is not JSON: {}", transforms.string(), e.what());
+  }
+  std::set<std::string> folders;
+  if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
+    throw InvalidArgument("{} has no \"frames\"", transforms.string());
+  }
+  for (const nlohmann::json& frame : root["frames"]) {
+    if (!frame.is_object() || !frame.contains("file_path")) continue;
+    if (!frame["file_path"].is_string()) continue;
+    std::string path = frame["file_path"].get<std::string>();
+    while (path.starts_with("./")) path.erase(0, 2);
+    const size_t slash = path.rfind('/');
+    if (slash == std::string::npos) continue;
+    const std::string folder = path.substr(0, slash);
+    if (IsSafeRelativePath(folder)) folders.insert(folder);
+  }
+  return folders;
+}
+
+void CollectImages(const fs::path& root, PhotoFolder* result) {
+  AddPhotosBelow(root, "images", result);
+  if (!result->photos.empty()) return;
+  AddDirectPhotos(root, "", result);
+  if (!IsFile(root / kTransforms)) return;
+  for (const std::string& folder : NamedFolders(root / kTransforms)) {
+    if (IsFolder(root / folder)) AddDirectPhotos(root, folder, result);
+  }
+}
+
+void CollectModel(const fs::path& root, PhotoFolder* result) {
+  for (const std::string folder : kModelFolders) {
+    std::vector<std::vector<LocalFile>> kinds;  // .bin, .txt
+    for (const char* ending : {".bin", ".txt"}) {
+      std::vector<LocalFile>& files = kinds.emplace_back();
+      for (const char* stem : kModelStems) {
+        const std::string name = std::string(stem) + ending;
+        const std::string path = folder.empty() ? name : folder + "/" + name;
+        if (IsFile(root / path)) files.push_back({path, root / path});
+      }
+    }
+    // One whole model; parts of one go to the server too, which says what is missing.
+    const bool whole_binary = kinds[0].size() == std::size(kModelStems);
+    const bool whole_text = kinds[1].size() == std::size(kModelStems);
+    if (whole_binary || !whole_text) result->model_files = kinds[0];
+    if (!whole_binary) {
+      result->model_files.insert(result->model_files.end(), kinds[1].begin(), kinds[1].end());
+    }
+    if (whole_text && !whole_binary) result->model_files = kinds[1];
+    if (!result->model_files.empty()) break;
+  }
+  if (IsFile(root / kTransforms)) {
+    result->model_files.push_back({kTransforms, root / kTransforms});
+  }
+}
+
+// All files, so that one of the wrong kind is refused by name instead of being passed over.
+void CollectAugmentFiles(const fs::path& root, PhotoFolder* result) {
+  if (!IsFolder(root / kAugment)) return;
+  for (const std::string& file : ListFiles(root / kAugment)) {
+    const fs::path path = root / kAugment / file;
+    if (!HasImageExtension(file)) {
+      throw InvalidArgument(
+          "{} is no picture (JPEG, PNG or TIFF); augment/ is for pictures in colour that the "
+          "colorizer learns from: move it elsewhere",
+          path.string());
+    }
+    result->augment_files.push_back({std::string(kAugment) + "/" + file, path});
+  }
+}
+
+// A subfolder with photos, to name it in the error.
+std::string SubfolderWithPhotos(const fs::path& root) {
+  std::error_code none;
+  std::set<std::string> found;
+  for (const auto& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with('.') || !IsFolder(entry.path())) continue;
+    for (const auto& file : fs::directory_iterator(entry.path(), none)) {
+      if (HasImageExtension(file.path().filename().string())) found.insert(name);
+    }
+  }
+  return found.empty() ? "" : *found.begin();
+}
+
+void CheckCounts(const PhotoFolder& folder) {
+  const std::string root = folder.root.string();
+  if (folder.photos.empty()) {
+    const std::string sub = SubfolderWithPhotos(folder.root);
+    throw InvalidArgument(
+        "{} contains no photographs (JPEG, PNG or TIFF){}",
+        root,
+        sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?");
+  }
+  if (folder.photos.size() == 1) {
+    throw InvalidArgument("{} contains one photograph ({}); at least 3 that overlap are needed",
+                          root,
+                          folder.photos[0].path);
+  }
+  const size_t files = folder.AllFiles().size();
+  if (files > kMaxFiles) {
+    throw InvalidArgument(
+        "{} contains {} files; at most {} make up a scene", root, files, kMaxFiles);
+  }
+}
+
+void CheckName(const LocalFile& file) {
+  if (!IsUtf8(file.path)) {
+    throw InvalidArgument("the name of {} is not UTF-8; rename it", file.file.string());
+  }
+  if (!IsSafeRelativePath(file.path) || file.path.size() > kMaxPathBytes) {
+    throw InvalidArgument(
+        "the name of {} is too long or has a backslash or a control character; rename it",
+        file.file.string());
+  }
+}
+
+}  // namespace
+
+std::vector<LocalFile> PhotoFolder::AllFiles() const {
+  std::vector<LocalFile> all = photos;
+  all.insert(all.end(), model_files.begin(), model_files.end());
+  all.insert(all.end(), augment_files.begin(), augment_files.end());
+  return all;
+}
+
+PhotoFolder CollectPhotos(const fs::path& root) {
+  RequireFolder(root);
+  PhotoFolder result;
+  // "photos/." and "photos/" are "photos".
+  result.root = root.lexically_normal();
+  if (!result.root.has_filename() && result.root.has_relative_path()) {
+    result.root = result.root.parent_path();
+  }
+  CollectImages(result.root, &result);
+  CollectModel(result.root, &result);
+  CollectAugmentFiles(result.root, &result);
+  const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
+  std::sort(result.photos.begin(), result.photos.end(), by_path);
+  std::sort(result.model_files.begin(), result.model_files.end(), by_path);
+  std::sort(result.augment_files.begin(), result.augment_files.end(), by_path);
+  CheckCounts(result);
+  for (const LocalFile& file : result.AllFiles()) CheckName(file);
+  const fs::path parent = fs::absolute(result.root).parent_path();
+  if (result.model_files.empty() && IsFolder(parent / "sparse")) {
+    result.notes.push_back("the poses in " + (parent / "sparse").string() +
+                           " are not used; to use them, give " + parent.string());
+  }
+  return result;
+}
+
+std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
+  const std::string wanted = file.stem().string();
+  std::string found;
+  for (const LocalFile& photo : folder.photos) {
+    if (Stem(photo.path) != wanted) continue;
+    if (!found.empty()) return "";
+    found = photo.path.starts_with("images/") ? photo.path.substr(7) : photo.path;
+  }
+  return found;
+}
+
+void RequirePhoto(const PhotoFolder& folder, const std::string& name) {
+  std::string known;
+  for (size_t i = 0; i < folder.photos.size(); ++i) {
+    const std::string& path = folder.photos[i].path;
+    if (Stem(path) == Stem(name)) return;
+    if (i < 3) known += (i == 0 ? "" : ", ") + fs::path(path).filename().string();
+  }
+  throw Error(ErrorCode::kNotFound,
+              "no photo in {} is called '{}'; there are {}{}",
+              folder.root.string(),
+              name,
+              known,
+              folder.photos.size() > 3 ? ", ..." : "");
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,135 @@
+#include "client/lib/photos/photo_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+
+namespace color3d::client {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class PhotoFolderTest : public ::testing::Test {
+ protected:
+  void Write(const std::string& path, const std::string& bytes = "x") {
+    fs::create_directories((root() / path).parent_path());
+    WriteFileAtomic(root() / path, bytes);
+  }
+  fs::path root() const { return scratch_.path() / "scene"; }
+
+  static std::vector<std::string> Paths(const std::vector<LocalFile>& files) {
+    std::vector<std::string> paths;
+    for (const LocalFile& file : files) paths.push_back(file.path);
+    return paths;
+  }
+  std::string ErrorOf(const fs::path& path) {
+    try {
+      CollectPhotos(path);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  }
+
+ private:
+  ScratchFolder scratch_;
+};
+
+TEST_F(PhotoFolderTest, TakesPhotosOfTheFolderAndNothingElse) {
+  for (const char* name : {"b.JPG", "a.jpg", "c.tiff", "notes.txt", ".hidden.jpg", "sub/d.jpg"}) {
+    Write(name);
+  }
+  const PhotoFolder folder = CollectPhotos(root());
+  EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.JPG", "c.tiff"));
+  EXPECT_THAT(folder.model_files, IsEmpty());
+  EXPECT_THAT(folder.notes, IsEmpty());
+}
+
+TEST_F(PhotoFolderTest, ImagesFolderWinsAndIsReadAtAnyDepth) {
+  for (const char* name : {"preview.jpg", "images/a.jpg", "images/left/b.png"}) Write(name);
+  EXPECT_THAT(Paths(CollectPhotos(root()).photos),
+              ElementsAre("images/a.jpg", "images/left/b.png"));
+}
+
+TEST_F(PhotoFolderTest, PicturesInAugmentGoAlongAndAreNoPhotos) {
+  for (const char* name : {"a.jpg", "b.jpg", "augment/x.png", "augment/deep/y.jpg"}) Write(name);
+  const PhotoFolder folder = CollectPhotos(root());
+  EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.jpg"));
+  EXPECT_THAT(Paths(folder.augment_files), ElementsAre("augment/deep/y.jpg", "augment/x.png"));
+  EXPECT_EQ(folder.AllFiles().size(), 4u);
+  Write("augment/notes.txt");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("augment/notes.txt is no picture"));
+}
+
+TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {
+  for (const char* name : {"images/a.jpg", "images/b.jpg"}) Write(name);
+  for (const char* stem : {"cameras", "images", "points3D"}) {
+    Write(std::string("sparse/0/") + stem + ".txt");
+    Write(std::string("sparse/0/") + stem + ".bin");
+    Write(std::string("sparse/") + stem + ".txt");
+  }
+  Write("sparse/0/project.ini");
+  EXPECT_THAT(Paths(CollectPhotos(root()).model_files),
+              ElementsAre("sparse/0/cameras.bin", "sparse/0/images.bin", "sparse/0/points3D.bin"));
+  fs::remove(root() / "sparse/0/images.bin");
+  EXPECT_THAT(Paths(CollectPhotos(root()).model_files),
+              ElementsAre("sparse/0/cameras.txt", "sparse/0/images.txt", "sparse/0/points3D.txt"));
+  // Parts of a model go to the server, which says what is missing.
+  fs::remove(root() / "sparse/0/images.txt");
+  EXPECT_EQ(CollectPhotos(root()).model_files.size(), 4u);
+}
+
+TEST_F(PhotoFolderTest, TransformsNamesItsSubfolders) {
+  for (const char* name : {"train/a.png", "train/b.png", "other/c.png"}) Write(name);
+  Write("transforms.json", R"({"frames": [{"file_path": "./train/a"}, {"file_path": "../x/y"}]})");
+  const PhotoFolder folder = CollectPhotos(root());
+  EXPECT_THAT(Paths(folder.photos), ElementsAre("train/a.png", "train/b.png"));
+  EXPECT_THAT(Paths(folder.model_files), ElementsAre("transforms.json"));
+}
+
+TEST_F(PhotoFolderTest, SaysThatPosesBesideThePhotosAreNotUsed) {
+  for (const char* name : {"images/a.jpg", "images/b.jpg", "sparse/0/cameras.bin"}) Write(name);
+  const PhotoFolder folder = CollectPhotos(root() / "images/");
+  EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.jpg"));
+  EXPECT_THAT(folder.model_files, IsEmpty());
+  ASSERT_EQ(folder.notes.size(), 1u);
+  EXPECT_THAT(folder.notes[0], HasSubstr("sparse are not used"));
+}
+
+TEST_F(PhotoFolderTest, ErrorsNameTheFolder) {
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("there is no folder"));
+  Write("deep/a.jpg");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("contains no photographs (JPEG, PNG or TIFF)"));
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("did you mean"));
+  Write("one.jpg");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("one photograph"));
+  EXPECT_THAT(ErrorOf(root() / "one.jpg"), HasSubstr("is not a folder"));
+  Write("two.jpg");
+  EXPECT_EQ(ErrorOf(root()), "");
+  Write("transforms.json", "{");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("is not JSON"));
+}
+
+TEST_F(PhotoFolderTest, RefusesNamesThatAreNotText) {
+  for (const char* name : {"a.jpg", "b\xe9.jpg"}) Write(name);
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("not UTF-8"));
+}
+
+TEST_F(PhotoFolderTest, FindsThePhotoOfAColoredCopy) {
+  for (const char* name : {"images/a.jpg", "images/b.jpg", "images/x/b.jpg"}) Write(name);
+  const PhotoFolder folder = CollectPhotos(root());
+  EXPECT_EQ(PhotoOfSameStem(folder, "/elsewhere/a.png"), "a.jpg");
+  EXPECT_EQ(PhotoOfSameStem(folder, "b.png"), "");  // two have this stem
+  EXPECT_EQ(PhotoOfSameStem(folder, "key_view.png"), "");
+  EXPECT_NO_THROW(RequirePhoto(folder, "a"));
+  EXPECT_NO_THROW(RequirePhoto(folder, "x/b.jpg"));
+  EXPECT_THROW(RequirePhoto(folder, "c"), Error);
+}
+
+}  // namespace
+}  // namespace color3d::client

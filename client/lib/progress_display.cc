@@ -1,0 +1,98 @@
+#include "client/lib/progress_display.h"
+
+#include <fmt/core.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <iostream>
+
+#include "client/lib/job_watch.h"
+#include "client/lib/text.h"
+#include "core/catalogue/stages.h"
+
+namespace color3d::client {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kRedraw{100};
+constexpr std::chrono::seconds kPlainInterval{10};
+// Between two stages a worker needs a moment to take the next one.
+constexpr std::chrono::seconds kIdle{5};
+
+}  // namespace
+
+ProgressDisplay::ProgressDisplay(bool quiet)
+    : quiet_(quiet),
+      terminal_(::isatty(STDERR_FILENO) == 1),
+      last_(steady_clock::now()),
+      idle_since_(last_) {}
+
+ProgressDisplay::~ProgressDisplay() { Clear(); }
+
+int ProgressDisplay::Width() const {
+  winsize size{};
+  if (!terminal_) return 200;
+  if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col < 20) return 79;
+  return size.ws_col - 1;
+}
+
+void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
+  const v1::Job& job = event.job();
+  if (IsFinished(job.state())) {
+    bool& ended = ended_[job.name()];
+    // The last stage's failure only repeats the one that has been told.
+    const bool failed = job.state() == v1::Job::STATE_FAILED;
+    const bool repeated = failed && failure_told_ && job.kind() == kind::kColorizeScene;
+    if (!ended && !repeated) Say(EndLine(job));
+    failure_told_ = failure_told_ || failed;
+    ended = true;
+    if (unfinished_.erase(job.name()) > 0) idle_since_ = steady_clock::now();
+    return;
+  }
+  ended_.erase(job.name());
+  unfinished_[job.name()] = job.state();
+  if (job.state() == v1::Job::STATE_RUNNING) Draw(ProgressLine(job, Width()));
+}
+
+bool ProgressDisplay::SomethingRuns() const {
+  return std::any_of(unfinished_.begin(), unfinished_.end(), [](const auto& job) {
+    return job.second == v1::Job::STATE_RUNNING;
+  });
+}
+
+void ProgressDisplay::OnTick() {
+  if (unfinished_.empty() || SomethingRuns() || steady_clock::now() - idle_since_ < kIdle) return;
+  Draw(fmt::format("waiting for a worker ({} stages to go)", unfinished_.size()));
+}
+
+void ProgressDisplay::OnTransfer(const std::string& what, int64_t done, int64_t total) {
+  if (total > 0) Draw(fmt::format("{} {} of {}", what, HumanBytes(done), HumanBytes(total)));
+}
+
+void ProgressDisplay::Say(const std::string& line) {
+  if (quiet_) return;
+  Clear();
+  std::cerr << line << std::endl;
+  last_ = steady_clock::now();
+}
+
+void ProgressDisplay::Draw(const std::string& line) {
+  const auto interval = terminal_ ? steady_clock::duration(kRedraw) : kPlainInterval;
+  if (quiet_ || steady_clock::now() - last_ < interval) return;
+  last_ = steady_clock::now();
+  if (!terminal_) {
+    std::cerr << line << std::endl;
+    return;
+  }
+  std::cerr << "\r\033[K" << line << std::flush;
+  drawn_ = true;
+}
+
+void ProgressDisplay::Clear() {
+  if (drawn_) std::cerr << "\r\033[K" << std::flush;
+  drawn_ = false;
+}
+
+}  // namespace color3d::client

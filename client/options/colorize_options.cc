@@ -1,0 +1,260 @@
+#include "client/options/colorize_options.h"
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "client/options/option_fields.h"
+#include "client/options/preset_file.h"
+#include "core/base/error.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+// Options with a flag of their own; the rest is reached by --set.
+struct OptionFlag {
+  const char* flag;
+  const char* option;
+  const char* help;
+};
+constexpr OptionFlag kOptionFlags[] = {
+    {"--max-side", "max_side_px", "Longer side of the working pictures"},
+    {"--geometry-iterations", "reconstruct_geometry.iterations", "Of luminance Gaussians"},
+    {"--max-gaussians", "reconstruct_geometry.max_gaussians", "Hard cap"},
+    {"--colorizer-iterations", "personalize.iterations", "Of the scene's colorizer"},
+    {"--augment",
+     "generate_augmentations.samples",
+     "Pictures made from the key view that the colorizer learns from, too (the paper: 8); those in "
+     "PHOTOS/augment/ always count"},
+    {"--augment-backend", "generate_augmentations.backend", "Model server that makes them"},
+    {"--chroma-iterations", "solve_chroma.iterations", "After the closed-form start"},
+};
+
+// Why a setting cannot be made; empty: it can.
+std::string Complaint(const std::string& setting) {
+  v1::ColorizeSceneSpec spec;
+  try {
+    SetOption(setting, &spec);
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
+  for (const OptionFlag& flag : kOptionFlags) {
+    const std::string name = flag.option;
+    app.add_option_function<std::string>(
+           flag.flag,
+           [o, name](const std::string& value) { o->settings.push_back(name + "=" + value); },
+           fmt::format("{}: {}", flag.help, DescribeOption(name)))
+        ->check([name](const std::string& value) { return Complaint(name + "=" + value); });
+  }
+  app.add_option_function<std::vector<std::string>>(
+         "--set",
+         [o](const std::vector<std::string>& settings) {
+           o->settings.insert(o->settings.end(), settings.begin(), settings.end());
+         },
+         "STAGE.OPTION=VALUE: any option of a stage, e.g. carry_color.depth_tolerance=0.05; `--set "
+         "STAGE` names its options. May be repeated")
+      ->allow_extra_args(false)
+      ->check(Complaint);
+}
+
+// What preset, file and settings say, before the flags of this command.
+v1::ColorizeSceneSpec Chosen(const ColorizeOptions& options) {
+  v1::ColorizeSceneSpec spec = ReadPreset(options.preset);
+  for (const std::string& setting : options.settings) SetOption(setting, &spec);
+  return spec;
+}
+
+fs::path Canonical(const fs::path& path) {
+  std::error_code error;
+  const fs::path canonical = fs::weakly_canonical(fs::absolute(path), error);
+  return error ? fs::absolute(path) : canonical;
+}
+
+// "a/b/" and "a/b" are one folder.
+bool IsWithin(const fs::path& path, const fs::path& folder) {
+  const fs::path relative = path.lexically_relative(folder);
+  return !relative.empty() && *relative.begin() != "..";
+}
+
+}  // namespace
+
+void ColorizeOptions::Check() const {
+  if (photos.empty() == scene.empty()) {
+    throw InvalidArgument(photos.empty() ? "give a folder of photos, or --scene scenes/ID"
+                                         : "PHOTOS and --scene do not go together: the scene has "
+                                           "its photos already");
+  }
+  if (benchmark && photos.empty()) {
+    throw InvalidArgument("--benchmark needs the folder of the photos in colour, not --scene");
+  }
+  if (bound && !benchmark) {
+    throw InvalidArgument("--bound is a part of the score; it needs --benchmark");
+  }
+  Chosen(*this);  // the preset's file can be read
+  color.Check();
+  for (const std::string& text : more_keys) ParseMoreKey(text);
+  // What is drawn for a view that is known beforehand cannot be scored against that view.
+  const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
+  if (benchmark && for_one_view) {
+    throw InvalidArgument(
+        "--benchmark colours the key view with its own true colours, or by --auto, --prompt, "
+        "--reference, --backend or --script; leave out the picture of the key view");
+  }
+}
+
+MoreKey ParseMoreKey(const std::string& text) {
+  const size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
+    throw InvalidArgument(
+        "--more-key wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
+        "VIEW=POINTS.json, VIEW=auto); '{}' is not of that form",
+        text);
+  }
+  const std::string value = text.substr(equals + 1);
+  MoreKey key{text.substr(0, equals), {}};
+  if (value == "auto") {
+    key.color.automatic = true;
+  } else if (fs::path(value).extension() == ".json") {
+    key.color.hints = value;
+  } else {
+    key.color.image = value;
+  }
+  try {
+    key.color.Check();
+  } catch (const Error& e) {
+    throw Error(e.code(), "--more-key {}: {}", key.view, e.what());
+  }
+  return key;
+}
+
+void AddMoreKeys(Connection& connection,
+                 const ColorizeOptions& options,
+                 v1::ColorizeSceneSpec* spec) {
+  for (const std::string& text : options.more_keys) {
+    const MoreKey key = ParseMoreKey(text);
+    v1::FurtherKeyView* further = spec->mutable_carry_color()->add_further_key_views();
+    further->set_view(key.view);
+    *further->mutable_color() = UploadKeyColor(connection, key.color);
+  }
+}
+
+void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
+  app.add_option("PHOTOS",
+                 o->photos,
+                 "Folder of photos, or one with images/ and a COLMAP model (sparse/0), or with "
+                 "transforms.json and its photos");
+  app.add_option("--scene",
+                 o->scene,
+                 "In place of PHOTOS: a scene that the server holds, coloured from the key view "
+                 "that `color3d key accept` has accepted");
+  app.add_option("-o,--out", o->out, "Folder for the results")->required();
+  DeclareKeyColorFlags(app, &o->color);
+  app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");
+  app.add_option("--more-key",
+                 o->more_keys,
+                 "VIEW=COLOURED.png: a further key view, for what the first one does not show; its "
+                 "colours never replace those of the key views before it. May be repeated");
+  app.add_option("--preset",
+                 o->preset,
+                 fmt::format("How much time quality is worth: {}; or a file of your own (`color3d "
+                             "server presets NAME` prints one to start from)",
+                             PresetNames()))
+      ->capture_default_str();
+  app.add_option("--time-budget",
+                 o->time_budget_seconds,
+                 "Shorten the preset's schedules to end in about this time: 90s, 5m, 1h")
+      ->transform(CLI::AsNumberWithUnit(
+          std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}}));
+  app.add_flag(
+      "--benchmark", o->benchmark, "Photos in colour: drop their colour and score against it");
+  app.add_flag(
+      "--bound",
+      o->bound,
+      "With --benchmark: also score the same geometry under the true colours of all views");
+  app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
+  app.add_flag("--detach", o->detach, "Return when the job is submitted");
+  app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
+  app.add_option("--seed", o->seed, "Same seed, same machine: same result");
+  DeclareOptionFlags(app, o);
+}
+
+v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene) {
+  v1::JobSpec spec;
+  spec.set_scene(scene);
+  spec.set_seed(options.seed);
+  return spec;
+}
+
+v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene) {
+  v1::JobSpec spec = CommonSpec(options, scene);
+  v1::ImportSceneSpec* import_scene = spec.mutable_import_scene();
+  *import_scene = Chosen(options).import_scene();
+  if (options.hold_out || options.benchmark) import_scene->set_hold_out_every_eighth(true);
+  return spec;
+}
+
+v1::JobSpec SelectSpec(Connection& connection,
+                       const ColorizeOptions& options,
+                       const std::string& scene) {
+  const v1::ColorizeSceneSpec chosen = Chosen(options);
+  v1::JobSpec spec = CommonSpec(options, scene);
+  v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
+  // A job of one stage takes the default preset by itself.
+  if (chosen.preset() > v1::PRESET_FAST) {
+    const auto info = connection.Call(
+        &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+    for (const v1::PresetInfo& preset : info.presets()) {
+      if (preset.options().preset() == chosen.preset()) {
+        *select = preset.options().select_key_view();
+      }
+    }
+  }
+  select->MergeFrom(chosen.select_key_view());
+  if (!options.encoder.empty()) select->set_encoder(options.encoder);
+  if (!options.key_view.empty()) {
+    select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+    select->set_view(options.key_view);
+  }
+  return spec;
+}
+
+v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene) {
+  v1::JobSpec spec = CommonSpec(options, scene);
+  v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
+  *colorize = Chosen(options);
+  if (!options.encoder.empty()) {
+    colorize->mutable_select_key_view()->set_encoder(options.encoder);
+    colorize->mutable_personalize()->set_encoder(options.encoder);
+  }
+  if (options.time_budget_seconds > 0.0) {
+    colorize->set_time_budget_seconds(options.time_budget_seconds);
+  }
+  if (options.hold_out || options.benchmark) {
+    colorize->mutable_import_scene()->set_hold_out_every_eighth(true);
+  }
+  return spec;
+}
+
+void RequireOutBesidePhotos(const fs::path& out, const PhotoFolder& folder) {
+  const fs::path folder_out = Canonical(out);
+  bool inside = false;
+  for (const LocalFile& photo : folder.photos) {
+    inside = inside || Canonical(photo.file.parent_path()) == folder_out;
+    // images/ is read at any depth.
+    inside = inside || (photo.path.starts_with("images/") &&
+                        IsWithin(folder_out, Canonical(folder.root / "images")));
+    if (inside) break;
+  }
+  if (!inside) return;
+  throw InvalidArgument(
+      "-o {} is where the photographs are: the results would be taken for photos the next time; "
+      "name another folder",
+      out.string());
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,67 @@
+// Options of `color3d colorize`, their checks, and the job specs that they mean.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "client/lib/photos/photo_folder.h"
+#include "client/options/key_color_flags.h"
+#include "color3d/v1/job.pb.h"
+
+namespace color3d::client {
+
+struct ColorizeOptions {
+  std::string photos;  // folder; empty: `scene` is set
+  std::string scene;   // "scenes/ID", whose accepted key view is used
+  std::string out;
+  KeyColorFlags color;
+  std::vector<std::string> more_keys;  // "VIEW=COLOURED_PICTURE", in order of importance
+  std::string key_view;                // view name or stem; empty: selected
+  std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
+  std::string preset = "fast";  // of the server's, or a file of the user's own
+  bool benchmark = false;
+  bool bound = false;  // of the benchmark: upload all true colours, and score what they would give
+  bool detach = false;
+  bool hold_out = false;
+  uint64_t seed = 0;                  // 0: the server's default
+  double time_budget_seconds = 0.0;   // 0: none
+  std::vector<std::string> settings;  // "stage.field=value", over what the preset says
+
+  // What can be said without the server: throws Error when options do not go together or files
+  // cannot be read.
+  void Check() const;
+};
+
+// A further key view: the photo's name and where its colour comes from.
+struct MoreKey {
+  std::string view;
+  KeyColorFlags color;
+};
+// "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto". Throws Error{kInvalidArgument} for other
+// text, and what checking the file throws.
+MoreKey ParseMoreKey(const std::string& text);
+
+// Uploads the pictures of the further key views and names them in the spec.
+void AddMoreKeys(Connection& connection,
+                 const ColorizeOptions& options,
+                 v1::ColorizeSceneSpec* spec);
+
+void DeclareOptions(CLI::App& app, ColorizeOptions* options);
+
+// A spec with scene and seed, and no stage yet.
+v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene);
+v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene);
+// The key view by the preset's strategy, or `options.key_view`.
+v1::JobSpec SelectSpec(Connection& connection,
+                       const ColorizeOptions& options,
+                       const std::string& scene);
+// Everything but key view, key colour and truth. Throws what reading the preset's file throws.
+v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene);
+
+// Throws Error{kInvalidArgument} when results in `out` would be taken for photos by the next run.
+void RequireOutBesidePhotos(const std::filesystem::path& out, const PhotoFolder& folder);
+
+}  // namespace color3d::client

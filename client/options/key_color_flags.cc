@@ -1,0 +1,213 @@
+#include "client/options/key_color_flags.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "client/lib/blob_transfer.h"
+#include "client/lib/scene_upload.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/image/probe/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+void RequireImage(const std::string& option, const std::string& file) {
+  std::error_code none;
+  if (!fs::is_regular_file(file, none)) {
+    throw Error(ErrorCode::kNotFound, "{}: there is no file {}; give a picture", option, file);
+  }
+  try {
+    ProbeImage(ReadFile(file), file);
+  } catch (const Error& e) {
+    throw Error(e.code(), "{}: {}", option, e.what());
+  }
+}
+
+bool IsJson(const std::string& file) { return fs::path(file).extension() == ".json"; }
+
+void RequirePoints(const std::string& file) {
+  const std::string format = R"([{"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}, ...])";
+  const auto json = nlohmann::json::parse(ReadFile(file), nullptr, /*allow_exceptions=*/false);
+  if (!json.is_structured() || json.empty()) {
+    throw InvalidArgument("--hints: {} is not a JSON list of points: {}", file, format);
+  }
+}
+
+void CheckFiles(const KeyColorFlags& flags) {
+  if (!flags.image.empty()) RequireImage("--key-color", flags.image);
+  if (!flags.edit.empty()) RequireImage("--edit", flags.edit);
+  if (!flags.mask.empty()) RequireImage("--mask", flags.mask);
+  if (!flags.labels.empty()) RequireImage("--labels", flags.labels);
+  for (const std::string& file : flags.references) RequireImage("--reference", file);
+  if (flags.hints.empty()) return;
+  if (IsJson(flags.hints)) {
+    RequirePoints(flags.hints);
+  } else {
+    RequireImage("--hints", flags.hints);
+  }
+}
+
+// The flags that are sources by themselves; a backend takes some of them as its input.
+std::vector<std::string> Sources(const KeyColorFlags& flags) {
+  std::vector<std::string> sources;
+  const auto add = [&](bool given, const char* flag) {
+    if (given) sources.push_back(flag);
+  };
+  add(!flags.backend.empty(), "--backend");
+  add(!flags.image.empty(), "--key-color");
+  add(!flags.edit.empty(), "--edit");
+  add(flags.automatic, "--auto");
+  add(!flags.script.empty(), "--script");
+  if (!flags.backend.empty()) return sources;
+  add(!flags.hints.empty(), "--hints");
+  add(!flags.references.empty(), "--reference");
+  add(!flags.prompt.empty(), "--prompt");
+  return sources;
+}
+
+void CheckCombination(const KeyColorFlags& flags) {
+  const std::vector<std::string> sources = Sources(flags);
+  if (sources.size() > 1) {
+    throw InvalidArgument(
+        "{} and {} do not go together: the key view takes its colour from one source",
+        sources[0],
+        sources[1]);
+  }
+  const bool backend = !flags.backend.empty();
+  if (!flags.mask.empty() && flags.edit.empty() && !backend) {
+    throw InvalidArgument(
+        "--mask says where --edit or --backend may change colour; give one of them");
+  }
+  if (!flags.labels.empty() && (backend || flags.hints.empty() || !IsJson(flags.hints))) {
+    throw InvalidArgument(
+        "--labels goes with --hints points in a .json file, whose \"label\" entries "
+        "name its values; leave it out");
+  }
+  if (backend && !flags.hints.empty() && !IsJson(flags.hints)) {
+    throw InvalidArgument("--hints for a backend must be points (a .json file), not {}",
+                          flags.hints);
+  }
+  if (backend && flags.references.size() > 1) {
+    throw InvalidArgument("a backend takes one --reference, not {}", flags.references.size());
+  }
+  const bool takes_model =
+      !backend && (flags.automatic || !flags.prompt.empty() || !flags.references.empty());
+  if (!flags.model.empty() && !takes_model) {
+    throw InvalidArgument("--model goes with --auto, --prompt or --reference; leave it out");
+  }
+  if (!backend && !flags.prompt.empty() && flags.model.empty()) {
+    throw InvalidArgument(
+        "--prompt needs --model NAME: CLIP weights that the server was started with (`color3d "
+        "server info` lists them)");
+  }
+}
+
+// Collects what has to be sent, and the digests that stand for it.
+class Uploads {
+ public:
+  v1::Digest Add(const std::string& file) {
+    files_.push_back({file, DigestFile(file)});
+    return ToProto(files_.back().digest);
+  }
+  void Send(Connection& connection) const {
+    if (!files_.empty()) UploadMissing(connection, files_, [](int64_t, int64_t) {});
+  }
+
+ private:
+  std::vector<UploadFile> files_;
+};
+
+void FillBackend(const KeyColorFlags& flags, Uploads* uploads, v1::KeyColorSource* source) {
+  source->set_backend(flags.backend);
+  v1::BackendInput* input = source->mutable_backend_input();
+  input->set_prompt(flags.prompt);
+  if (!flags.hints.empty()) *input->mutable_points() = uploads->Add(flags.hints);
+  if (!flags.references.empty()) *input->mutable_reference() = uploads->Add(flags.references[0]);
+  if (!flags.mask.empty()) *input->mutable_mask() = uploads->Add(flags.mask);
+}
+
+v1::KeyColorSource MakeSource(const KeyColorFlags& flags, Uploads* uploads) {
+  v1::KeyColorSource source;
+  source.set_model(flags.model);
+  if (!flags.backend.empty()) {
+    FillBackend(flags, uploads, &source);
+  } else if (!flags.image.empty()) {
+    *source.mutable_image() = uploads->Add(flags.image);
+  } else if (!flags.edit.empty()) {
+    *source.mutable_edit()->mutable_image() = uploads->Add(flags.edit);
+    if (!flags.mask.empty()) *source.mutable_edit()->mutable_mask() = uploads->Add(flags.mask);
+  } else if (flags.automatic) {
+    source.set_automatic(true);
+  } else if (!flags.script.empty()) {
+    source.set_script(flags.script);
+  } else if (!flags.references.empty()) {
+    for (const std::string& file : flags.references) {
+      *source.mutable_references()->add_images() = uploads->Add(file);
+    }
+  } else if (!flags.prompt.empty()) {
+    source.set_prompt(flags.prompt);
+  } else if (IsJson(flags.hints)) {
+    *source.mutable_points() = uploads->Add(flags.hints);
+    if (!flags.labels.empty()) *source.mutable_labels() = uploads->Add(flags.labels);
+  } else {
+    *source.mutable_strokes() = uploads->Add(flags.hints);
+  }
+  return source;
+}
+
+}  // namespace
+
+bool KeyColorFlags::Given() const { return !Sources(*this).empty(); }
+
+std::string KeyColorFlags::FileOfView() const {
+  for (const std::string& file : {image, hints, edit}) {
+    if (!file.empty()) return file;
+  }
+  return "";
+}
+
+void KeyColorFlags::Check() const {
+  CheckCombination(*this);
+  CheckFiles(*this);
+}
+
+void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
+  const char* group = "Colour of the key view (one source)";
+  const auto text = [&](const char* name, std::string* value, const char* help) {
+    return app.add_option(name, *value, help)->group(group);
+  };
+  app.add_flag("--auto", flags->automatic, "Automatic colours: nothing else to do")->group(group);
+  text("--key-color,--image", &flags->image, "The key view, coloured (JPEG, PNG or TIFF)");
+  text("--hints,--strokes,--points",
+       &flags->hints,
+       "Colour strokes (PNG of the key view's size, transparent elsewhere), or points, lines and "
+       "regions (JSON)");
+  text("--labels", &flags->labels, "Grey PNG whose values the \"label\" entries of points name");
+  app.add_option("--reference",
+                 flags->references,
+                 "Coloured picture of something similar; repeatable: the best match wins")
+      ->allow_extra_args(false)
+      ->group(group);
+  text("--prompt", &flags->prompt, "Colours in words: \"red brick, green lawn\" (with --model)");
+  text("--edit", &flags->edit, "The key photo is in colour: an edited version of it");
+  text("--mask", &flags->mask, "White where --edit or --backend may change colour");
+  text("--backend",
+       &flags->backend,
+       "A model server that this server knows; takes --prompt, --points, --reference and --mask");
+  text("--script", &flags->script, "A TorchScript model that this server knows");
+  text("--model",
+       &flags->model,
+       "Weights that this server knows, for --auto, --prompt or --reference");
+}
+
+v1::KeyColorSource UploadKeyColor(Connection& connection, const KeyColorFlags& flags) {
+  Uploads uploads;
+  const v1::KeyColorSource source = MakeSource(flags, &uploads);
+  uploads.Send(connection);
+  return source;
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,155 @@
+#include "client/options/preset_file.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/io/tokenizer.h>
+#include <google/protobuf/text_format.h>
+
+#include <filesystem>
+#include <regex>
+#include <vector>
+
+#include "client/options/option_fields.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "proto/option_text.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+using google::protobuf::Descriptor;
+using google::protobuf::DescriptorPool;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::TextFormat;
+
+const std::string kPrefix = "PRESET_";
+
+std::string LowerCase(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+v1::Preset PresetNamed(const std::string& name) {
+  const auto* presets = v1::Preset_descriptor();
+  for (int i = 1; i < presets->value_count(); ++i) {
+    const auto* preset = presets->value(i);
+    if (LowerCase(preset->name().substr(kPrefix.size())) == name) {
+      return static_cast<v1::Preset>(preset->number());
+    }
+  }
+  return v1::PRESET_UNSPECIFIED;
+}
+
+[[noreturn]] void Complain(const std::string& file, int line, const std::string& what) {
+  throw InvalidArgument("--preset {}, line {}: {}", file, line + 1, what);
+}
+
+// The parser's words, and what to do: it says `has no field named "x"` without saying which there
+// are.
+std::string WithRemedy(const std::string& complaint) {
+  static const std::regex unknown("Message type \"([\\w.]+)\" has no field named \"(\\w+)\"\\.?");
+  std::smatch match;
+  if (std::regex_search(complaint, match, unknown)) {
+    const Descriptor* type = DescriptorPool::generated_pool()->FindMessageTypeByName(match[1]);
+    std::vector<std::string> names;
+    for (int i = 0; type != nullptr && i < type->field_count(); ++i) {
+      names.push_back(type->field(i)->name());
+    }
+    const std::string nearest = Nearest(match[2], names);
+    return fmt::format("there is no field '{}'; {}",
+                       match[2].str(),
+                       nearest.empty() ? fmt::format("there are {}", fmt::join(names, ", "))
+                                       : "did you mean " + nearest + "?");
+  }
+  return complaint + "; `color3d server presets fast` prints a preset that is right";
+}
+
+struct FirstComplaint : public google::protobuf::io::ErrorCollector {
+  void AddError(int at, google::protobuf::io::ColumnNumber, const std::string& what) override {
+    if (!text.empty()) return;
+    line = at;
+    text = what;
+  }
+  int line = 0;
+  std::string text;
+};
+
+// Ranges and unspecified enums, with the line where the value stands.
+void CheckValues(const Message& message,
+                 const TextFormat::ParseInfoTree& lines,
+                 const std::string& file) {
+  const auto* reflection = message.GetReflection();
+  std::vector<const FieldDescriptor*> fields;
+  reflection->ListFields(message, &fields);
+  for (const FieldDescriptor* field : fields) {
+    if (field->is_repeated()) continue;
+    double value = 0.0;
+    switch (field->cpp_type()) {
+      case FieldDescriptor::CPPTYPE_MESSAGE:
+        CheckValues(
+            reflection->GetMessage(message, field), *lines.GetTreeForNested(field, -1), file);
+        continue;
+      case FieldDescriptor::CPPTYPE_INT32:
+        value = reflection->GetInt32(message, field);
+        break;
+      case FieldDescriptor::CPPTYPE_DOUBLE:
+        value = reflection->GetDouble(message, field);
+        break;
+      default:
+        continue;
+    }
+    const std::string why = WhyRefused(field, value);
+    if (!why.empty()) Complain(file, lines.GetLocation(field, -1).line, field->name() + why);
+  }
+}
+
+void RequireNothingOfOneScene(const v1::ColorizeSceneSpec& spec, const std::string& file) {
+  const bool one_scene = !spec.key_view().empty() || spec.has_key_color() ||
+                         spec.colorize_key_view().has_source() || !spec.truth().empty() ||
+                         !spec.training_truth().empty();
+  if (!one_scene) return;
+  throw InvalidArgument(
+      "--preset {}: a preset is for any scene; leave key_view, key_color, source, truth and "
+      "training_truth out and give the key view and its colour by flags",
+      file);
+}
+
+}  // namespace
+
+std::string PresetNames() {
+  std::string names;
+  const auto* presets = v1::Preset_descriptor();
+  for (int i = 1; i < presets->value_count(); ++i) {
+    names += (i > 1 ? ", " : "") + LowerCase(presets->value(i)->name().substr(kPrefix.size()));
+  }
+  return names;
+}
+
+v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
+  v1::ColorizeSceneSpec spec;
+  const v1::Preset preset = PresetNamed(name_or_file);
+  if (preset != v1::PRESET_UNSPECIFIED) {
+    spec.set_preset(preset);
+    return spec;
+  }
+  std::error_code none;
+  if (!fs::is_regular_file(name_or_file, none)) {
+    throw Error(ErrorCode::kNotFound,
+                "--preset {}: there is no such preset (there are {}) and no such file",
+                name_or_file,
+                PresetNames());
+  }
+  FirstComplaint complaint;
+  TextFormat::ParseInfoTree lines;
+  TextFormat::Parser parser;
+  parser.RecordErrorsTo(&complaint);
+  parser.WriteLocationsTo(&lines);
+  if (!parser.ParseFromString(ReadFile(name_or_file), &spec)) {
+    Complain(name_or_file, complaint.line, WithRemedy(complaint.text));
+  }
+  CheckValues(spec, lines, name_or_file);
+  RequireNothingOfOneScene(spec, name_or_file);
+  return spec;
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,44 @@
+#include "core/base/utf8.h"
+
+#include <gtest/gtest.h>
+
+namespace color3d {
+namespace {
+
+TEST(IsUtf8, RefusesWhatRfc3629Refuses) {
+  EXPECT_TRUE(IsUtf8(""));
+  EXPECT_TRUE(IsUtf8("photo.jpg"));
+  EXPECT_TRUE(IsUtf8("\xc3\xa9t\xc3\xa9.jpg"));
+  EXPECT_TRUE(IsUtf8("\xe2\x82\xac"));
+  EXPECT_TRUE(IsUtf8("\xf0\x9f\x93\xb7"));
+  EXPECT_FALSE(IsUtf8("\xe9t\xe9.jpg"));     // Latin-1
+  EXPECT_FALSE(IsUtf8("\xc0\xaf"));          // overlong
+  EXPECT_FALSE(IsUtf8("\xe0\x80\xaf"));      // overlong
+  EXPECT_FALSE(IsUtf8("\xed\xa0\x80"));      // surrogate
+  EXPECT_FALSE(IsUtf8("\xf4\x90\x80\x80"));  // beyond U+10FFFF
+  EXPECT_FALSE(IsUtf8("\xe2\x82"));          // cut short
+}
+
+TEST(CleanUtf8, KeepsValidTextAndReplacesTheRest) {
+  EXPECT_EQ(CleanUtf8("plain"), "plain");
+  EXPECT_EQ(CleanUtf8("stra\xc3\x9f"
+                      "e \xe2\x82\xac \xf0\x9f\x98\x80"),
+            "stra\xc3\x9f"
+            "e \xe2\x82\xac \xf0\x9f\x98\x80");
+  EXPECT_EQ(CleanUtf8("a\xff"
+                      "b"),
+            "a?b");
+  EXPECT_EQ(CleanUtf8("\xc3"), "?") << "cut short";
+  EXPECT_EQ(CleanUtf8("\xc0\xaf"), "??") << "overlong";
+  EXPECT_EQ(CleanUtf8("\xed\xa0\x80"), "???") << "surrogate";
+  EXPECT_EQ(CleanUtf8("\xf5\x80\x80\x80"), "????") << "beyond U+10FFFF";
+}
+
+TEST(CleanUtf8, CutsBetweenCharacters) {
+  EXPECT_EQ(CleanUtf8("abc", 2), "ab");
+  EXPECT_EQ(CleanUtf8("a\xe2\x82\xac", 3), "a");
+  EXPECT_EQ(CleanUtf8("a\xe2\x82\xac", 4), "a\xe2\x82\xac");
+}
+
+}  // namespace
+}  // namespace color3d

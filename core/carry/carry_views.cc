@@ -1,0 +1,105 @@
+#include "core/carry/carry_views.h"
+
+#include <utility>
+
+#include "core/carry/stereo_views.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace {
+
+constexpr float kMinOpacity = 0.5f;    // of the Gaussians, for a depth to count
+constexpr size_t kEnoughTracked = 30;  // points of structure-from-motion that suffice
+constexpr int kSurfaceGridPx = 16;     // else: one rendered depth per so many px
+
+}  // namespace
+
+SurfaceMaker::SurfaceMaker(const Scene& scene,
+                           const ViewImages& images,
+                           const ViewImages& sweep_images,
+                           SurfaceRenderer render,
+                           int depth_sources,
+                           const PlaneSweepOptions& sweep,
+                           const CancellationToken& cancel)
+    : scene_(scene),
+      images_(images),
+      sweep_images_(sweep_images),
+      render_(std::move(render)),
+      depth_sources_(depth_sources),
+      sweep_(sweep),
+      cancel_(cancel),
+      training_(scene.TrainingViews()),
+      tracked_(scene.views.size()) {
+  for (const SparsePoint& point : scene.points) {
+    for (int view : point.views) tracked_[view].push_back(point.position);
+  }
+}
+
+ViewSurfaces SurfaceMaker::Make(int view) const {
+  const Pose& pose = scene_.views[view].cam_from_world;
+  const Camera camera = images_.WorkingCamera(view);
+  RenderedSurface surface = render_(camera, pose);
+  for (size_t i = 0; i < surface.depth.data.size(); ++i) {
+    if (surface.opacity.data[i] < kMinOpacity) surface.depth.data[i] = 0.0f;
+  }
+  ViewSurfaces surfaces;
+  surfaces.rendered = {camera, pose, *images_.Luminance(view), std::move(surface.depth)};
+  surfaces.swept = Sweep(view, surfaces.rendered);
+  return surfaces;
+}
+
+std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rendered) const {
+  const StereoPlan plan =
+      PlanStereo(scene_, view, PointsOf(view, rendered), training_, depth_sources_);
+  if (plan.sources.empty()) return std::nullopt;
+  std::vector<std::shared_ptr<const Image>> pictures;  // keeps them alive
+  const auto posed = [&](int index) {
+    pictures.push_back(sweep_images_.Luminance(index));
+    return PosedLuminance{sweep_images_.WorkingCamera(index),
+                          scene_.views[index].cam_from_world,
+                          pictures.back().get()};
+  };
+  std::vector<PosedLuminance> sources;
+  for (int index : plan.sources) sources.push_back(posed(index));
+  const DepthMap map =
+      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, sweep_, cancel_);
+  SurfaceView swept = rendered;
+  swept.depth = Resize(map.depth, rendered.camera.width, rendered.camera.height);
+  return swept;
+}
+
+// Points that the view sees: tracked ones, or the Gaussians' surface.
+std::vector<Eigen::Vector3d> SurfaceMaker::PointsOf(int view, const SurfaceView& rendered) const {
+  if (tracked_[view].size() >= kEnoughTracked) return tracked_[view];
+  std::vector<Eigen::Vector3d> points;
+  const Camera& camera = rendered.camera;
+  for (int y = kSurfaceGridPx / 2; y < camera.height; y += kSurfaceGridPx) {
+    for (int x = kSurfaceGridPx / 2; x < camera.width; x += kSurfaceGridPx) {
+      const double depth = rendered.depth.At(0, y, x);
+      if (!(depth > 0.0)) continue;
+      points.push_back(
+          rendered.cam_from_world.WorldFromCamera(depth * camera.Ray(x + 0.5, y + 0.5)));
+    }
+  }
+  return points;
+}
+
+CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
+                          const ViewSurfaces& target,
+                          const CarryOptions& options) {
+  const Camera& camera = target.rendered.camera;
+  CarriedColor all{Image(camera.width, camera.height, 2), Image(camera.width, camera.height, 1)};
+  for (const ColoredKeyView& key : keys) {
+    const auto carry = [&](const SurfaceView& from, const SurfaceView& to) {
+      return CarryColor(from, key.color.ab, key.color.confidence, to, options);
+    };
+    CarriedColor carried = carry(key.surfaces.rendered, target.rendered);
+    if (key.surfaces.swept && target.swept) {
+      TakeSurer(carry(*key.surfaces.swept, *target.swept), &carried);
+    }
+    FillFrom(carried, &all);
+  }
+  return all;
+}
+
+}  // namespace color3d

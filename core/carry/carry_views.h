@@ -1,0 +1,71 @@
+// Colour carried from all key views into a view. Where the surfaces of a view lie is asked twice,
+// of the Gaussians and of the photographs themselves, and per pixel the surer answer counts.
+// Thread-safe after construction.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/carry/carry.h"
+#include "core/carry/plane_sweep.h"
+#include "core/scene/scene.h"
+#include "core/scene/view_images.h"
+
+namespace color3d {
+
+struct ViewSurfaces {
+  SurfaceView rendered;              // depth of the Gaussians
+  std::optional<SurfaceView> swept;  // by plane sweep; none when no other view shows the same
+};
+
+// What a camera sees of the geometry: depth and opacity, 1 channel each.
+struct RenderedSurface {
+  Image depth;
+  Image opacity;
+};
+// Called from several threads at once.
+using SurfaceRenderer = std::function<RenderedSurface(const Camera&, const Pose& cam_from_world)>;
+
+class SurfaceMaker {
+ public:
+  // Surfaces have the size of `images`; planes are swept at the size of `sweep_images` with at most
+  // `depth_sources` training views each. The references must outlive the object.
+  SurfaceMaker(const Scene& scene,
+               const ViewImages& images,
+               const ViewImages& sweep_images,
+               SurfaceRenderer render,
+               int depth_sources,
+               const PlaneSweepOptions& sweep,
+               const CancellationToken& cancel);
+
+  ViewSurfaces Make(int view) const;
+
+ private:
+  std::optional<SurfaceView> Sweep(int view, const SurfaceView& rendered) const;
+  std::vector<Eigen::Vector3d> PointsOf(int view, const SurfaceView& rendered) const;
+
+  const Scene& scene_;
+  const ViewImages& images_;
+  const ViewImages& sweep_images_;
+  const SurfaceRenderer render_;
+  const int depth_sources_;
+  const PlaneSweepOptions sweep_;
+  const CancellationToken& cancel_;
+  const std::vector<int> training_;
+  std::vector<std::vector<Eigen::Vector3d>> tracked_;  // points by view
+};
+
+struct ColoredKeyView {
+  int view = 0;
+  ViewSurfaces surfaces;
+  CarriedColor color;
+};
+
+// Of a later key view's colours only those count that the ones before it have not given.
+CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
+                          const ViewSurfaces& target,
+                          const CarryOptions& options);
+
+}  // namespace color3d

@@ -1,0 +1,60 @@
+#include "core/carry/view_color.h"
+
+namespace color3d {
+namespace {
+
+constexpr double kWorthGuessing = 0.02;  // share of a view's pixels
+
+// Whether enough of the view is strange to the colorizer and was not carried either.
+bool WantsGuess(const CarriedColor& carried, const Image& distance, const FusionOptions& options) {
+  size_t strange = 0;
+  for (size_t i = 0; i < distance.data.size(); ++i) {
+    strange += distance.data[i] > options.guess_begins &&
+                       carried.confidence.data[i] <= options.min_confidence
+                   ? 1
+                   : 0;
+  }
+  return static_cast<double>(strange) >
+         kWorthGuessing * static_cast<double>(carried.confidence.PlaneSize());
+}
+
+// 1 where what was carried decides alone.
+Image SurelyCarried(const CarriedColor& carried) {
+  constexpr float kSure = 0.5f;
+  Image sure = carried.confidence;
+  for (float& value : sure.data) value = value > kSure ? 1.0f : 0.0f;
+  return sure;
+}
+
+// The colorizer is not asked about places that are known: what was carried there stands for its
+// answer, so that it does not pull towards anything else.
+void AnswerKnown(const CarriedColor& carried, const Image& known, Image* inferred_ab) {
+  for (size_t i = 0; i < known.data.size(); ++i) {
+    if (known.data[i] == 0.0f) continue;
+    for (int c = 0; c < 2; ++c) inferred_ab->Plane(c)[i] = carried.ab.Plane(c)[i];
+  }
+}
+
+}  // namespace
+
+FusedColor ColorOfView(const Image& luminance,
+                       const CarriedColor& carried,
+                       const ColorSources& sources,
+                       ThreadPool& pool,
+                       const CancellationToken& cancel) {
+  const FusionOptions options;
+  const Image known = SurelyCarried(carried);
+  InferredColor inferred = sources.infer(luminance, known);
+  AnswerKnown(carried, known, &inferred.ab);
+  const bool guess = WantsGuess(carried, inferred.distance, options);
+  return FuseColors(luminance,
+                    carried,
+                    inferred.ab,
+                    inferred.distance,
+                    guess ? sources.guess(luminance) : Image(),
+                    options,
+                    pool,
+                    cancel);
+}
+
+}  // namespace color3d

@@ -1,0 +1,199 @@
+#include "core/colorizer/feature_neighbors.h"
+
+#include <fmt/format.h>
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/colorizer/padding.h"
+#include "core/encoder/image_tensors.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace {
+
+constexpr char kPrefix[] = "neighbors.";
+
+// Places of a picture before projection.
+struct KnownCells {
+  std::vector<torch::Tensor> blocks;  // as CellFeatures
+  torch::Tensor colors;               // [n,2], Lab units
+  torch::Tensor weights;              // [n], 0..1
+};
+
+// Cells of a picture, resized.
+KnownCells CellsOf(const TapEncoder& encoder, const TrainingPicture& picture, double scale) {
+  const int multiple = encoder.config().Stride(encoder.config().StageCount() - 1);
+  const int width = std::max(1, static_cast<int>(std::lround(picture.luminance.width * scale)));
+  const int height = std::max(1, static_cast<int>(std::lround(picture.luminance.height * scale)));
+  const auto prepared = [&](const Image& image) {
+    return PadToMultiple(TensorFromImage(Resize(image, width, height)), multiple);
+  };
+  const torch::Tensor l = prepared(picture.luminance);
+  CellFeatures features = DescribeCells(encoder.config(), encoder.Taps(encoder.Input(l)), l);
+  const int64_t count = features.Count();
+  KnownCells cells;
+  cells.blocks = std::move(features.blocks);
+  cells.colors = CellMeans(prepared(picture.ab));
+  cells.weights = picture.weight.Empty()
+                      ? torch::ones({count})
+                      : CellMeans(prepared(picture.weight)).squeeze(1).contiguous();
+  return cells;
+}
+
+KnownCells Join(const std::vector<KnownCells>& parts) {
+  KnownCells all;
+  for (size_t i = 0; i < parts.front().blocks.size(); ++i) {
+    std::vector<torch::Tensor> blocks;
+    for (const KnownCells& part : parts) blocks.push_back(part.blocks[i]);
+    all.blocks.push_back(torch::cat(blocks));
+  }
+  std::vector<torch::Tensor> colors, weights;
+  for (const KnownCells& part : parts) {
+    colors.push_back(part.colors);
+    weights.push_back(part.weights);
+  }
+  all.colors = torch::cat(colors);
+  all.weights = torch::cat(weights);
+  return all;
+}
+
+KnownCells Select(const KnownCells& cells, const torch::Tensor& rows) {
+  return {SelectRows(cells.blocks, rows),
+          cells.colors.index_select(0, rows),
+          cells.weights.index_select(0, rows)};
+}
+
+// Cells of the key view at all scales.
+KnownCells KeyCells(const TapEncoder& encoder,
+                    const TrainingPicture& key,
+                    const FeatureNeighborsOptions& options,
+                    Random& random,
+                    const CancellationToken& cancel) {
+  std::vector<KnownCells> scales;
+  for (double scale : options.scales) {
+    cancel.ThrowIfCancelled();
+    scales.push_back(CellsOf(encoder, key, scale));
+  }
+  const KnownCells all = Join(scales);
+  return Select(all, SampleRows(all.weights.size(0), options.bank_size, random));
+}
+
+}  // namespace
+
+FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
+                                   std::span<const TrainingPicture> pictures,
+                                   const FeatureNeighborsOptions& options,
+                                   Random random,
+                                   const CancellationToken& cancel)
+    : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
+  torch::NoGradGuard no_grad;
+  const KnownCells key = KeyCells(encoder, pictures.front(), options, random, cancel);
+  whitening_ = Whitening(key.blocks, encoder.config().stem_stride, options.whitening);
+  std::vector<torch::Tensor> features{whitening_.Apply(key.blocks)};
+  std::vector<torch::Tensor> colors{key.colors}, weights{key.weights};
+  const auto further = static_cast<int64_t>(pictures.size()) - 1;
+  for (int64_t i = 1; i <= further; ++i) {
+    cancel.ThrowIfCancelled();
+    const KnownCells cells = CellsOf(encoder, pictures[i], 1.0);
+    const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
+    if (sure.size(0) == 0) continue;
+    const torch::Tensor rows =
+        sure.index_select(0, SampleRows(sure.size(0), options.further_bank_size / further, random));
+    const KnownCells taken = Select(cells, rows);
+    features.push_back(whitening_.Apply(taken.blocks));
+    colors.push_back(taken.colors);
+    weights.push_back(taken.weights);
+  }
+  // Rounded to half precision here, so that a colorizer read from its file answers the same.
+  const auto stored = [](const std::vector<torch::Tensor>& parts) {
+    return torch::cat(parts).to(torch::kHalf).to(torch::kFloat32).contiguous();
+  };
+  bank_ = {stored(features), stored(colors), stored(weights)};
+}
+
+FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
+                                   const FeatureNeighborsOptions& options,
+                                   Whitening whitening,
+                                   CellBank bank)
+    : encoder_(encoder.config()),
+      options_(options),
+      whitening_(std::move(whitening)),
+      bank_(std::move(bank)) {}
+
+void FeatureNeighbors::PutInto(TensorFile* file) const {
+  NamedTensors projections;
+  for (size_t i = 0; i < whitening_.projections().size(); ++i) {
+    const Whitening::Projection& projection = whitening_.projections()[i];
+    projections.emplace_back(fmt::format("mean.{}", i), projection.mean);
+    projections.emplace_back(fmt::format("matrix.{}", i), projection.matrix);
+  }
+  PutTensors(projections, kPrefix, StoredType::kFloat32, file);
+  PutTensors({{"bank", bank_.features}, {"colors", bank_.colors}, {"weights", bank_.weights}},
+             kPrefix,
+             StoredType::kFloat16,
+             file);
+}
+
+std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& encoder,
+                                                             const FeatureNeighborsOptions& options,
+                                                             const std::string& what,
+                                                             TensorFile* file) {
+  // Shapes that follow from the encoder; only the number of bank entries is the file's own.
+  std::vector<Whitening::Projection> projections;
+  NamedTensors tensors;
+  for (int i = 0; i <= encoder.config().StageCount(); ++i) {
+    const int64_t in =
+        i < encoder.config().StageCount() ? encoder.config().dims[i] : kLuminanceStatistics;
+    const int64_t out = std::min<int64_t>(options.whitening.dims_per_block, in);
+    projections.push_back({torch::empty({in}), torch::empty({in, out})});
+    tensors.emplace_back(fmt::format("mean.{}", i), projections.back().mean);
+    tensors.emplace_back(fmt::format("matrix.{}", i), projections.back().matrix);
+  }
+  Whitening whitening(std::move(projections));
+  const auto colors = file->arrays.find(std::string(kPrefix) + "colors");
+  if (colors == file->arrays.end() || colors->second.shape.empty() || colors->second.shape[0] < 1) {
+    throw InvalidArgument("{} lacks the colours of the feature neighbors", what);
+  }
+  const int64_t entries = colors->second.shape[0];
+  CellBank bank{torch::empty({entries, whitening.Columns()}),
+                torch::empty({entries, 2}),
+                torch::empty({entries})};
+  tensors.emplace_back("bank", bank.features);
+  tensors.emplace_back("colors", bank.colors);
+  tensors.emplace_back("weights", bank.weights);
+  TakeTensors(tensors, kPrefix, what, file);
+  return std::unique_ptr<FeatureNeighbors>(
+      new FeatureNeighbors(encoder, options, std::move(whitening), std::move(bank)));
+}
+
+NeighborColors FeatureNeighbors::Lookup(const std::vector<torch::Tensor>& taps,
+                                        const torch::Tensor& luminance,
+                                        const torch::Tensor& wanted) const {
+  torch::NoGradGuard no_grad;
+  const CellFeatures cells = DescribeCells(encoder_, taps, luminance);
+  const int64_t height = cells.rows, width = cells.columns;
+  torch::Tensor queries = whitening_.Apply(cells.blocks);
+  torch::Tensor rows;
+  if (wanted.defined()) {
+    rows = wanted.flatten().nonzero().squeeze(1);
+    queries = queries.index_select(0, rows);
+  }
+  torch::Tensor ab = torch::zeros({height * width, 2});
+  torch::Tensor distance = torch::zeros({height * width});
+  torch::Tensor variance = torch::zeros({height * width});
+  if (queries.size(0) > 0) {
+    const CellMatches matches = MatchCells(queries, bank_, options_.vote);
+    ab = rows.defined() ? ab.index_copy(0, rows, matches.ab) : matches.ab;
+    distance = rows.defined() ? distance.index_copy(0, rows, matches.distance) : matches.distance;
+    variance = rows.defined() ? variance.index_copy(0, rows, matches.variance) : matches.variance;
+  }
+  return {ab.t().reshape({2, height, width}),
+          distance.reshape({height, width}),
+          variance.reshape({height, width})};
+}
+
+}  // namespace color3d

@@ -1,0 +1,80 @@
+// Colours of the key view from hints (METHOD.md "Stage 1b"): strokes, points, lines and regions,
+// spread along the luminance. All pictures have the key photo's size as captured; the result is the
+// same for any number of threads.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/image.h"
+#include "core/base/run_control.h"
+
+namespace color3d {
+
+// Pixels whose colour is given: a disc, a line, a polygon, or a label of a label picture.
+struct ColorHint {
+  double x_px = 0.0;  // centre of a disc, px from the upper left corner of the photo
+  double y_px = 0.0;
+  double radius_px = 2.0;  // of a disc; half the width of a line
+  double a = 0.0;          // Lab units
+  double b = 0.0;
+
+  enum class Shape { kDisc, kLine, kRegion, kLabel };
+  // kNeutral: no colour (a = b = 0). kAutomatic: what the automatic colourizer says there.
+  enum class Fill { kColor, kNeutral, kAutomatic };
+  Shape shape = Shape::kDisc;
+  Fill fill = Fill::kColor;
+  std::vector<std::array<double, 2>> points_px = {};  // (x, y) of a line or region
+  int label = 0;                                      // 0..255
+};
+
+struct HintOptions {
+  double sigma = 0.5;       // L difference (0..100) at which two neighbours half agree, 0.1..50
+  int max_side_px = 8192;   // larger photos are solved at this size, then upsampled guided by L
+  double tolerance = 5e-4;  // relative residual of the conjugate gradients
+  int max_iterations = 200;
+  void Validate() const;
+  bool operator==(const HintOptions&) const = default;
+};
+
+struct HintSolution {
+  Image ab;  // 2 channels, Lab units, size of `luminance`; hinted pixels hold their hint exactly
+  int iterations = 0;
+  double relative_residual = 0.0;  // of the system without the hinted pixels
+  int64_t hinted_pixels = 0;
+};
+
+// Pictures of the key photo's size that hints may refer to.
+struct HintPictures {
+  const Image* labels = nullptr;        // 1 channel, value * 255 is the label
+  const Image* automatic_ab = nullptr;  // 2 channels, for Fill::kAutomatic
+};
+
+// Strokes as a picture of the key photo's size: 4 channels (pixels with alpha > 0.5 are hints), or
+// 3 channels (pixels whose chroma exceeds 6 Lab units are hints). Throws Error{kInvalidArgument}
+// when no pixel is hinted or the size is another.
+HintSolution KeyColorFromStrokes(const Image& luminance,
+                                 const Image& strokes,
+                                 const HintOptions& options,
+                                 const RunControl& control);
+
+// A JSON list of entries, each one of
+//   {"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}     a disc; radius 2 when left out
+//   {"line": [[10, 20], [80, 25]], "width": 4, "color": "#a0522d"}   width 4 when left out
+//   {"region": [[10, 20], [80, 25], [40, 90]], "color": "#a0522d"}   a polygon (even-odd)
+//   {"label": 3, "color": "#a0522d"}                         all pixels of that label
+// in px of the key photo. Instead of "color", "keep": "neutral" takes the colour away, and
+// "keep": "auto" keeps the automatic colourizer's. Throws Error{kInvalidArgument} naming the entry.
+std::vector<ColorHint> ParseHintsJson(const std::string& json);
+
+// Hints outside the picture, or that hold no pixel, are an error naming the entry. Where several
+// overlap, the last one wins; that they contradict each other is a warning.
+HintSolution KeyColorFromHints(const Image& luminance,
+                               const std::vector<ColorHint>& hints,
+                               const HintOptions& options,
+                               const RunControl& control,
+                               const HintPictures& pictures = {});
+
+}  // namespace color3d

@@ -1,0 +1,71 @@
+#include "core/matching/cell_matches.h"
+
+#include <gtest/gtest.h>
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+CellBank RandomBank() {
+  torch::manual_seed(1);
+  return {torch::rand({300, 16}), torch::rand({300, 2}) * 80.0, torch::rand({300})};
+}
+
+// By the definition, in float64.
+TEST(CellMatchesTest, TheNearestVote) {
+  const CellBank bank = RandomBank();
+  const torch::Tensor queries = torch::rand({200, 16});
+  const torch::Tensor all =
+      (queries.unsqueeze(1) - bank.features.unsqueeze(0)).to(torch::kFloat64).square().sum(2);
+  for (int max_voters : {0, 8}) {
+    const VoteOptions options{.temperature = 0.3, .distance_floor = 0.02, .max_voters = max_voters};
+    const CellMatches matches = MatchCells(queries, bank, options, {}, true);
+    for (int64_t q = 0; q < queries.size(0); ++q) {
+      const int64_t count = max_voters > 0 ? max_voters : 300;
+      const auto [d, rows] = all[q].topk(count, 0, /*largest=*/false);
+      const double best = d[0].item<double>();
+      EXPECT_EQ(matches.nearest[q].item<int64_t>(), rows[0].item<int64_t>());
+      EXPECT_NEAR(matches.distance[q].item<double>(), best, 1e-4);
+      torch::Tensor weight = torch::exp(-(d - best) / (0.3 * (best + 0.02)));
+      weight = weight * bank.weights.index_select(0, rows);
+      const torch::Tensor ab = bank.colors.index_select(0, rows).to(torch::kFloat64);
+      const torch::Tensor expected = torch::mv(ab.t(), weight) / weight.sum();
+      EXPECT_LT((matches.ab[q] - expected).abs().max().item<double>(), 1e-2);
+      const double variance =
+          (torch::mv((ab - expected).square().t(), weight) / weight.sum()).sum().item<double>();
+      EXPECT_NEAR(matches.variance[q].item<double>(), variance, 1e-2 * (1.0 + variance));
+    }
+    const auto from_bank = std::get<0>(all.min(0)).to(torch::kFloat32);
+    EXPECT_LT((matches.bank_distance - from_bank).abs().max().item<float>(), 1e-4f);
+  }
+}
+
+TEST(CellMatchesTest, CellsWithoutWeightGiveGray) {
+  CellBank bank = RandomBank();
+  bank.weights.zero_();
+  const CellMatches matches = MatchCells(bank.features, bank, {});
+  EXPECT_EQ(matches.ab.abs().max().item<float>(), 0.0f);
+  EXPECT_FALSE(matches.bank_distance.defined());
+}
+
+TEST(CellMatchesTest, StopsWhenCancelled) {
+  const CellBank bank = RandomBank();
+  CancellationToken cancel;
+  cancel.Cancel();
+  EXPECT_THROW(MatchCells(bank.features, bank, {}, cancel), Error);
+}
+
+TEST(CellMatchesTest, SquaredDistancesOfAllPairs) {
+  const torch::Tensor x = torch::rand({5, 8}), y = torch::rand({9, 8});
+  const torch::Tensor expected = (x.unsqueeze(1) - y.unsqueeze(0)).square().sum(2);
+  EXPECT_LT((SquaredDistances(x, y) - expected).abs().max().item<float>(), 1e-5f);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,118 @@
+#include "core/metrics/scene_consistency.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "core/color/lab.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kMaxPairs = 24;  // of each gap; with more views they are spread evenly
+constexpr int kStridePx = 3;   // some 20 000 matches a pair; the paper's protocol takes 5 000
+constexpr size_t kBatch = 8;   // pairs at once: bounds the pictures in memory
+
+struct ViewPictures {
+  PosedDepth geometry;
+  ColoredPicture rendered, colored, truth;  // truth may be empty
+};
+
+struct PairScores {
+  PairDifference rendered, colored, truth;
+};
+
+ColoredPicture PictureOfLab(Image lab) {
+  ColoredPicture picture;
+  picture.srgb = SrgbFromLab(lab);
+  picture.lab = std::move(lab);
+  return picture;
+}
+
+class Scorer {
+ public:
+  Scorer(const ConsistencySource& source, ThreadPool& pool, const CancellationToken& cancel)
+      : source_(source), pool_(pool), cancel_(cancel) {
+    match_.stride_px = kStridePx;
+  }
+
+  SceneConsistency Score() {
+    const auto pairs = ConsistencyPairs(source_.views, kMaxPairs);
+    with_truth_ = std::all_of(pairs.begin(), pairs.end(), [&](const ViewPair& pair) {
+      return source_.has_truth(pair.first) && source_.has_truth(pair.second);
+    });
+    ConsistencyMeter rendered, colored, truth;
+    for (size_t begin = 0; begin < pairs.size(); begin += kBatch) {
+      const std::vector<ViewPair> batch(pairs.begin() + begin,
+                                        pairs.begin() + std::min(begin + kBatch, pairs.size()));
+      Load(batch);
+      std::vector<PairScores> scores(batch.size());
+      pool_.ForEach(static_cast<int64_t>(batch.size()),
+                    [&](int64_t i, int) { scores[i] = Compare(batch[i]); });
+      for (size_t i = 0; i < batch.size(); ++i) {
+        rendered.Add(batch[i], scores[i].rendered);
+        colored.Add(batch[i], scores[i].colored);
+        truth.Add(batch[i], scores[i].truth);
+      }
+    }
+    SceneConsistency result{rendered.Result(), colored.Result(), std::nullopt};
+    if (with_truth_ && !pairs.empty()) result.truth = truth.Result();
+    return result;
+  }
+
+ private:
+  // Pairs come in order of their first view: what lies before it is not needed again.
+  void Load(const std::vector<ViewPair>& batch) {
+    views_.erase(views_.begin(), views_.lower_bound(batch.front().first));
+    std::vector<int> missing;
+    for (const ViewPair& pair : batch) {
+      for (const int view : {pair.first, pair.second}) {
+        if (views_.emplace(view, ViewPictures()).second) missing.push_back(view);
+      }
+    }
+    for (const int view : missing) {
+      cancel_.ThrowIfCancelled();
+      ConsistencySource::Rendered rendered = source_.render(view);
+      views_.at(view).geometry = std::move(rendered.geometry);
+      views_.at(view).rendered.lab = std::move(rendered.lab);
+    }
+    pool_.ForEach(static_cast<int64_t>(missing.size()),
+                  [&](int64_t i, int) { FetchPictures(missing[i], views_.at(missing[i])); });
+  }
+
+  void FetchPictures(int view, ViewPictures& pictures) const {
+    pictures.rendered = PictureOfLab(std::move(pictures.rendered.lab));
+    pictures.colored = PictureOfLab(source_.colored_lab(view));
+    if (!with_truth_) return;
+    pictures.truth.srgb = source_.true_srgb(view);
+    pictures.truth.lab = LabFromSrgb(pictures.truth.srgb);
+  }
+
+  PairScores Compare(const ViewPair& pair) const {
+    const ViewPictures& from = views_.at(pair.first);
+    const ViewPictures& to = views_.at(pair.second);
+    const auto matches = MatchByGeometry(from.geometry, to.geometry, match_);
+    PairScores scores;
+    scores.rendered = CompareMatches(from.rendered, to.rendered, matches);
+    scores.colored = CompareMatches(from.colored, to.colored, matches);
+    if (with_truth_) scores.truth = CompareMatches(from.truth, to.truth, matches);
+    return scores;
+  }
+
+  const ConsistencySource& source_;
+  ThreadPool& pool_;
+  const CancellationToken& cancel_;
+  MatchOptions match_;
+  bool with_truth_ = false;
+  std::map<int, ViewPictures> views_;
+};
+
+}  // namespace
+
+SceneConsistency MeasureConsistency(const ConsistencySource& source,
+                                    ThreadPool& pool,
+                                    const CancellationToken& cancel) {
+  return Scorer(source, pool, cancel).Score();
+}
+
+}  // namespace color3d

@@ -1,0 +1,47 @@
+// Scores of one held-out view against its true colours (METHOD.md "Metrics"). Pure, thread-safe.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/base/image.h"
+
+namespace color3d {
+
+using Scores = std::map<std::string, double>;
+
+inline constexpr int kColorSidePx = 400;  // colour differences are measured at this size
+
+// `true_srgb`: 3 channels; `rendered_lab`: of the same size; `view_ab`: any size. Means over the
+// view's pixels. PSNR and SSIM at full size, "delta_e00*" (CIEDE2000) at kColorSidePx: of the
+// render, of its chroma and of the view's own chroma under the true L, and of no chroma at all.
+Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image& view_ab);
+
+// CIEDE2000 of the chroma of `rendered_lab` under the true L, at kColorSidePx.
+double ChromaError(const Image& true_srgb, const Image& rendered_lab);
+
+// Whether confidence means anything: errors of the delivered colour by where it comes from. A plain
+// value.
+class SourceErrors {
+ public:
+  // `provenance`: the view's 3 channels, shares of guessed, seen and inferred colour that sum to 1,
+  // any size.
+  void Add(const Image& true_srgb, const Image& view_ab, const Image& provenance);
+  bool Empty() const { return errors_.empty(); }
+  // "share_X" of the pixels and their mean "delta_e00_X" for X = seen (share above half), inferred
+  // and guessed (whichever is the larger otherwise; no error for one that has no pixels), and
+  // "confidence_rank_correlation" of confidence = seen + inferred / 2 with the error: -1 is best.
+  Scores Result() const;
+
+ private:
+  std::vector<float> errors_;
+  std::vector<float> confidence_;
+  std::vector<char> source_;
+};
+
+// Colour of the pixel: index into kSourceNames.
+inline constexpr const char* kSourceNames[] = {"guessed", "seen", "inferred"};
+int SourceOf(float guessed, float seen, float inferred);
+
+}  // namespace color3d

@@ -1,0 +1,23 @@
+#include "core/splat/chroma/chroma_options.h"
+
+#include "core/base/range_check.h"
+
+namespace color3d {
+
+void ChromaOptions::Validate() const {
+  const RangeCheck check("chroma option");
+  check("iterations", iterations, 0, 100'000);
+  check("chroma_sh_degree", chroma_sh_degree, 0, 1);
+  check("ssim_weight", ssim_weight, 0.0, 1.0);
+  check("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
+  check("sweeps", sweeps, 0, 1000);
+  check("rounds", rounds, 0, 1000);
+  check("steps_per_round", steps_per_round, 1, 1000);
+  check("residual_tolerance", residual_tolerance, 0.0, 1.0);
+  check("objective_tolerance", objective_tolerance, 0.0, 1.0);
+  check("tikhonov", tikhonov, 1e-6, 1e6);
+  check("tikhonov_rest", tikhonov_rest, 1.0, 1e6);
+  check("memory_budget_bytes", static_cast<double>(memory_budget_bytes), 0.0, 1e15);
+}
+
+}  // namespace color3d

@@ -1,0 +1,38 @@
+// What a user may choose about fitting chroma. A plain value; the defaults are those of the
+// service's preset "fast".
+#pragma once
+
+#include <cstdint>
+
+namespace color3d {
+
+struct ChromaOptions {
+  enum class Solver { kConjugateGradients, kAdam };
+  Solver solver = Solver::kConjugateGradients;
+  // 0..100000. Of Adam; of conjugate gradients at most (they stop by themselves, see below). 0: the
+  // closed form alone.
+  int iterations = 300;
+  int chroma_sh_degree = 0;         // 0..1
+  double ssim_weight = 0.2;         // of Adam's loss, 0..1
+  double time_limit_seconds = 0.0;  // 0: none; 0..86400. Ends on time with the best so far
+  uint64_t seed = 1;                // of Adam
+
+  // Conjugate gradients. Least absolute residuals, by reweighting; false: least squares.
+  bool robust = true;
+  int sweeps = 3;                      // ordered-subsets sweeps before, 0..1000
+  int rounds = 6;                      // of reweighting, at most, 0..1000
+  int steps_per_round = 10;            // of conjugate gradients, at most, 1..1000
+  double residual_tolerance = 0.05;    // a round ends when its residual has shrunk to this, 0..1
+  double objective_tolerance = 0.025;  // ... and all when a round improves L1 by less, 0..1: later
+                                       // rounds fit noise that held-out views do not share
+  // Pull to the closed form, as strong as this many pixels of the Gaussian alone, 1e-6..1e6; for
+  // coefficients above degree 0, times tikhonov_rest, 1..1e6.
+  double tikhonov = 0.01;
+  double tikhonov_rest = 10.0;
+  int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..1e15
+
+  void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const ChromaOptions&) const = default;
+};
+
+}  // namespace color3d

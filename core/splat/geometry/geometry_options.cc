@@ -1,0 +1,56 @@
+#include "core/splat/geometry/geometry_options.h"
+
+#include <algorithm>
+
+#include "core/base/range_check.h"
+
+namespace color3d {
+namespace {
+
+// The schedule of Kerbl et al. 2023, whose times are iterations.
+GeometryTuning PaperTuning(int iterations) {
+  const double n = std::max(1, iterations);
+  GeometryTuning tuning;
+  tuning.half_size_until = 0.0;
+  tuning.densify_from = std::min(500.0 / n, 0.5);
+  tuning.densify_until = 0.5;
+  tuning.densify_rounds = std::max(1, static_cast<int>((0.5 * n - 500.0) / 100.0));
+  tuning.opacity_reset_every = 3000.0 / n;
+  tuning.prune_scale = 0.1;
+  tuning.max_needle_ratio = 0.0;
+  tuning.opacity_penalty = 0.0;
+  tuning.scale_penalty = 0.0;
+  tuning.position_rate_first = 1.6e-4;
+  tuning.position_rate_last = 1.6e-6;
+  tuning.dc_rate = 2.5e-3;
+  tuning.rest_divisor = 20.0;
+  tuning.opacity_rate = 0.05;
+  tuning.last_rate = 1.0;
+  tuning.scale_rate = 5e-3;
+  tuning.rotation_rate = 1e-3;
+  tuning.sh_from = 1000.0 / n;
+  tuning.sh_step = 1000.0 / n;
+  return tuning;
+}
+
+}  // namespace
+
+void GeometryOptions::Validate() const {
+  const RangeCheck check("geometry option");
+  check("iterations", iterations, 0, 100'000);
+  check("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
+  check("max_gaussians", max_gaussians, 1, 10'000'000);
+  check("sh_degree", sh_degree, 0, 3);
+  check("ssim_weight", ssim_weight, 0.0, 1.0);
+  check("edge_weight", edge_weight, 0.0, 10.0);
+  check("densify_gradient", densify_gradient, 1e-9, 1e9);
+  check("learning_rate_scale", learning_rate_scale, 1e-3, 1e3);
+}
+
+GeometryTuning TuningOf(const GeometryOptions& options) {
+  if (options.tuning) return *options.tuning;
+  return options.recipe == GeometryOptions::Recipe::kPaper ? PaperTuning(options.iterations)
+                                                           : GeometryTuning();
+}
+
+}  // namespace color3d

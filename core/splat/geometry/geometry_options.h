@@ -1,0 +1,87 @@
+// What a user may choose about training geometry, and how a schedule is spent. Plain values. The
+// defaults are those of the service's preset "fast".
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+namespace color3d {
+
+// How a training spends its schedule; times are fractions of it. The defaults are those of
+// Recipe::kColor3d, measured.
+struct GeometryTuning {
+  double half_size_until = 0.15;  // trains at half of the working size until then
+  double densify_from = 0.05;
+  double densify_until = 0.6;
+  int densify_rounds = 30;
+  double opacity_reset_every = 0.0;  // 0: never; while densifying
+  double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
+  double opacity_penalty = 0.005;    // times the mean opacity
+  double scale_penalty = 0.005;      // times the mean scale / extent
+  double max_needle_ratio = 10.0;    // longest to middle axis; 0: no limit
+  double sh_from = 0.15;             // degree 1 begins here
+  double sh_step = 0.15;             // and each further degree this much later
+  double position_rate_first = 6e-4;
+  double position_rate_last = 4e-5;
+  double dc_rate = 1e-2;
+  double rest_divisor = 10.0;
+  double opacity_rate = 0.1;
+  double scale_rate = 2e-2;
+  double rotation_rate = 4e-3;
+  // Under a time limit the number of Gaussians grows only while so many can be hoped for.
+  double wanted_iterations = 800;
+  double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
+
+  bool operator==(const GeometryTuning&) const = default;
+};
+
+// visit(name, value) for every field, in order.
+template <class Tuning, class Visit>
+void VisitFields(Tuning& tuning, Visit&& visit) {
+  visit("half_size_until", tuning.half_size_until);
+  visit("densify_from", tuning.densify_from);
+  visit("densify_until", tuning.densify_until);
+  visit("densify_rounds", tuning.densify_rounds);
+  visit("opacity_reset_every", tuning.opacity_reset_every);
+  visit("prune_scale", tuning.prune_scale);
+  visit("opacity_penalty", tuning.opacity_penalty);
+  visit("scale_penalty", tuning.scale_penalty);
+  visit("max_needle_ratio", tuning.max_needle_ratio);
+  visit("sh_from", tuning.sh_from);
+  visit("sh_step", tuning.sh_step);
+  visit("position_rate_first", tuning.position_rate_first);
+  visit("position_rate_last", tuning.position_rate_last);
+  visit("dc_rate", tuning.dc_rate);
+  visit("rest_divisor", tuning.rest_divisor);
+  visit("opacity_rate", tuning.opacity_rate);
+  visit("scale_rate", tuning.scale_rate);
+  visit("rotation_rate", tuning.rotation_rate);
+  visit("wanted_iterations", tuning.wanted_iterations);
+  visit("last_rate", tuning.last_rate);
+}
+
+struct GeometryOptions {
+  // kColor3d: coarse to fine, measured on CPUs. kPaper: the schedule of Kerbl et al. 2023.
+  enum class Recipe { kColor3d, kPaper };
+  Recipe recipe = Recipe::kColor3d;
+  int iterations = 1500;  // 0..100000
+  // Of training, 0: none, at most 86400. The whole schedule then fits into this time or the
+  // iterations, whichever is used up first; the same input gives similar results, not the same.
+  double time_limit_seconds = 0.0;
+  int max_gaussians = 40'000;        // hard cap, 1..10,000,000
+  int sh_degree = 2;                 // of luminance at the end, 0..3
+  double ssim_weight = 0.2;          // lambda of (1 - SSIM), 0..1
+  double edge_weight = 1.0;          // of the Charbonnier-Laplacian term, 0..10
+  double densify_gradient = 5e-5;    // NDC units, 1e-9..1e9 (3DGS: 2e-4, for 30k iterations)
+  double learning_rate_scale = 1.0;  // on all learning rates, 1e-3..1e3
+  uint64_t seed = 1;
+  std::optional<GeometryTuning> tuning;  // in place of the recipe's, for measurements
+
+  void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const GeometryOptions&) const = default;
+};
+
+// What these options train with: their own tuning, or the recipe's.
+GeometryTuning TuningOf(const GeometryOptions& options);
+
+}  // namespace color3d

@@ -1,0 +1,98 @@
+#include "core/splat/geometry/geometry_problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "core/base/error.h"
+#include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/raster/raster_constants.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kMaxSampledViews = 8;  // per sparse point
+
+// Pixel of a world point, or false when it is not in front of the camera or not in the picture.
+bool PixelOf(const PosedCamera& view, const Eigen::Vector3d& world, int* x, int* y) {
+  const Eigen::Vector3d p = view.cam_from_world.Apply(world);
+  if (!(p.z() > kNearPlane)) return false;
+  const Eigen::Vector2d pixel = view.camera.Project(p);
+  if (!view.camera.Contains(pixel)) return false;
+  *x = static_cast<int>(pixel.x());
+  *y = static_cast<int>(pixel.y());
+  return true;
+}
+
+// Colour of each sparse point where training views observe it, as a better start than grey. View by
+// view, so that each picture is read once. Returns how many points some training view has before
+// it.
+size_t SampleInitialColors(const Scene& scene, GeometryProblem& problem) {
+  const bool srgb = static_cast<bool>(problem.colors);
+  const int channels = srgb ? 3 : 1;
+  std::vector<double> sum(scene.points.size() * channels, 0.0);
+  std::vector<int> count(scene.points.size(), 0);
+  std::vector<char> in_front(scene.points.size(), 0);
+  for (const PosedCamera& view : problem.training) {
+    const std::shared_ptr<const Image> picture =
+        srgb ? problem.colors(view.view) : problem.luminance(view.view);
+    for (size_t i = 0; i < scene.points.size(); ++i) {
+      const SparsePoint& point = scene.points[i];
+      int x = 0, y = 0;
+      if (!PixelOf(view, point.position, &x, &y)) continue;
+      in_front[i] = 1;
+      if (count[i] >= kMaxSampledViews ||
+          !std::binary_search(point.views.begin(), point.views.end(), view.view)) {
+        continue;
+      }
+      for (int c = 0; c < channels; ++c) sum[i * channels + c] += picture->At(c, y, x);
+      ++count[i];
+    }
+  }
+  GaussianModel& model = problem.initial;
+  model.channels = channels;
+  if (srgb) model.sh_a = model.sh_b = model.sh_l;
+  std::vector<float>* const sh[3] = {&model.sh_l, &model.sh_a, &model.sh_b};
+  for (size_t i = 0; i < scene.points.size(); ++i) {
+    if (count[i] == 0) continue;
+    for (int c = 0; c < channels; ++c) {
+      const float value =
+          static_cast<float>((srgb ? 1.0 : 0.01) * sum[i * channels + c] / count[i]);
+      if (std::isfinite(value)) (*sh[c])[i] = (value - 0.5f) / kShDc;
+    }
+  }
+  return static_cast<size_t>(std::count(in_front.begin(), in_front.end(), 1));
+}
+
+}  // namespace
+
+GeometryProblem GeometryProblemOf(const Scene& scene,
+                                  const ViewImages& images,
+                                  TrainingColors colors) {
+  GeometryProblem problem;
+  problem.training = PosedCameras(scene, images, scene.TrainingViews());
+  problem.held_out = PosedCameras(scene, images, scene.HeldOutViews());
+  problem.luminance = [&images](int view) { return images.Luminance(view); };
+  if (colors == TrainingColors::kSrgb) {
+    // Decoded once; every level of the pyramid asks again.
+    problem.colors = [&images,
+                      kept = std::map<int, std::shared_ptr<const Image>>()](int view) mutable {
+      std::shared_ptr<const Image>& picture = kept[view];
+      if (picture == nullptr) picture = std::make_shared<const Image>(images.Srgb(view));
+      return picture;
+    };
+  }
+  problem.extent = scene.Extent();
+  problem.initial = InitialGaussians(scene);
+  if (SampleInitialColors(scene, problem) == 0) {
+    throw InvalidArgument(
+        "none of the {} sparse points lies in front of a training camera (nearer than {} world "
+        "units does not count); check the poses and the scene's scale",
+        scene.points.size(),
+        kNearPlane);
+  }
+  return problem;
+}
+
+}  // namespace color3d

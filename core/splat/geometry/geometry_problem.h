@@ -1,0 +1,34 @@
+// What geometry is trained on: cameras, pictures and the first Gaussians.
+#pragma once
+
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "core/scene/view_images.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/splat/training/posed_camera.h"
+#include "core/splat/training/training_targets.h"
+
+namespace color3d {
+
+struct GeometryProblem {
+  std::vector<PosedCamera> training;
+  std::vector<PosedCamera> held_out;
+  PictureSource luminance;  // 1 channel, L in 0..100
+  PictureSource colors;     // 3 channels, sRGB 0..1; when set, trained on in place of luminance
+  // 1 or 3 channels of any degree; its spherical harmonics are cut or extended to the options'
+  // degree.
+  GaussianModel initial;
+  double extent = 1.0;  // of the scene, world units
+};
+
+enum class TrainingColors { kLuminance, kSrgb };
+
+// The training views of `scene` at the working size of `images`, one Gaussian per sparse point, of
+// the colour that the views see there. `images` must outlive the problem. Throws
+// Error{kInvalidArgument} for a scene without points in front of any training camera.
+GeometryProblem GeometryProblemOf(const Scene& scene,
+                                  const ViewImages& images,
+                                  TrainingColors colors = TrainingColors::kLuminance);
+
+}  // namespace color3d

@@ -1,0 +1,33 @@
+#include "core/splat/geometry/geometry_state.h"
+
+#include <utility>
+
+namespace color3d {
+
+std::string SerializeGeometryState(const GeometryState& state, std::string_view fingerprint) {
+  CheckpointWriter writer(fingerprint);
+  WriteState(state, writer);
+  writer.Vector(state.statistics.gradient);
+  writer.Vector(state.statistics.count);
+  writer.Vector(state.statistics.radius);
+  writer.Value(state.densified_at);
+  return std::move(writer).Finish();
+}
+
+bool ParseGeometryState(std::string_view bytes,
+                        std::string_view fingerprint,
+                        GeometryState& state) {
+  CheckpointReader reader(bytes, fingerprint);
+  if (!reader.ok()) return false;
+  GeometryState read;
+  ReadState(reader, read);
+  read.statistics.gradient = reader.Vector();
+  read.statistics.count = reader.Vector();
+  read.statistics.radius = reader.Vector();
+  read.densified_at = reader.Value<int64_t>();
+  if (!reader.ok()) return false;
+  state = std::move(read);
+  return true;
+}
+
+}  // namespace color3d

@@ -1,0 +1,23 @@
+// All that the training of geometry has to remember. Internal to the splat module.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/splat/raster/projection.h"
+#include "core/splat/training/training_state.h"
+
+namespace color3d {
+
+struct GeometryState : TrainingState {
+  DensifyStatistics statistics;
+  int64_t densified_at = 0;  // iteration
+};
+
+// `fingerprint` says what the state belongs to (options, scene); a state is only read back with the
+// same one.
+std::string SerializeGeometryState(const GeometryState& state, std::string_view fingerprint);
+// False, and `state` unchanged, when the bytes are damaged or belong to something else.
+bool ParseGeometryState(std::string_view bytes, std::string_view fingerprint, GeometryState& state);
+
+}  // namespace color3d

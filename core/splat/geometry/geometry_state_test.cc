@@ -1,0 +1,25 @@
+#include "core/splat/geometry/geometry_state.h"
+
+#include <gtest/gtest.h>
+
+namespace color3d {
+namespace {
+
+TEST(GeometryStateTest, DamagedBytesAreRefusedAtEveryLength) {
+  GeometryState state;
+  state.parameters = ParameterBlock(12, 5);
+  state.moments = {ParameterBlock(12, 5), ParameterBlock(12, 5)};
+  state.statistics.Reset(5);
+  state.order.views = {2, 0, 1};
+  const std::string bytes = SerializeGeometryState(state, "a");
+  GeometryState read;
+  EXPECT_TRUE(ParseGeometryState(bytes, "a", read));
+  EXPECT_EQ(read.order.views, state.order.views);
+  EXPECT_FALSE(ParseGeometryState(bytes, "b", read));
+  for (size_t n = 0; n < bytes.size(); n += 7) {
+    EXPECT_FALSE(ParseGeometryState(bytes.substr(0, n), "a", read));
+  }
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,29 @@
+#include "core/splat/geometry/held_out.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace color3d {
+namespace {
+
+TEST(CompareClampedTest, ClampsBeforeItCompares) {
+  PlaneBuffer drawn(20, 18, 3), truth(20, 18, 3);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < 18; ++y) {
+      for (int x = 0; x < 20; ++x) {
+        drawn.Row(c, y)[x] = 1.5f;
+        truth.Row(c, y)[x] = c == 0 ? 0.9f : 1.0f;
+      }
+    }
+  }
+  ImageLoss loss;
+  ThreadPool pool(1);
+  const PictureQuality quality = CompareClamped(truth, loss, pool, drawn);
+  EXPECT_NEAR(quality.psnr_db, -10.0 * std::log10(0.01 / 3.0), 1e-3);
+  EXPECT_NEAR(quality.l1, 0.1 / 3.0, 1e-5);
+  EXPECT_EQ(drawn.Row(1, 3)[4], 1.0f);
+}
+
+}  // namespace
+}  // namespace color3d

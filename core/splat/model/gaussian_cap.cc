@@ -1,0 +1,23 @@
+#include "core/splat/model/gaussian_cap.h"
+
+#include <algorithm>
+
+namespace color3d {
+namespace {
+
+constexpr double kMaxGaussiansPerPixel = 0.02;
+constexpr int kMinCap = 5000;
+
+}  // namespace
+
+int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px) {
+  double pixels = 0.0;
+  for (const Camera& full : cameras) {
+    const Camera camera = full.FitWithin(max_side_px);
+    pixels += static_cast<double>(camera.width) * camera.height;
+  }
+  const double cap = std::max<double>(kMinCap, kMaxGaussiansPerPixel * pixels);
+  return static_cast<int>(std::min<double>(wanted, cap));
+}
+
+}  // namespace color3d

@@ -1,0 +1,14 @@
+// How many Gaussians the photos of a scene are worth. Pure function.
+#pragma once
+
+#include <vector>
+
+#include "core/scene/camera.h"
+
+namespace color3d {
+
+// `wanted`, or fewer for a small scene: more Gaussians than a share of the pixels trained on cost
+// time and fit noise. `cameras`: of the training views at full size.
+int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px);
+
+}  // namespace color3d

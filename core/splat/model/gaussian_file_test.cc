@@ -1,0 +1,92 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "tests/support/random_model.h"
+
+namespace color3d {
+namespace {
+
+TEST(GaussianFileTest, RoundTripsBitForBit) {
+  for (const auto& m :
+       {RandomModel({13, 1, 2, 0}), RandomModel({7, 3, 3, 1}), RandomModel({0, 1, 0, 0})}) {
+    const GaussianModel back = ParseGaussians(SerializeGaussians(m));
+    EXPECT_EQ(back.channels, m.channels);
+    EXPECT_EQ(back.position, m.position);
+    EXPECT_EQ(back.log_scale, m.log_scale);
+    EXPECT_EQ(back.rotation, m.rotation);
+    EXPECT_EQ(back.opacity_logit, m.opacity_logit);
+    EXPECT_EQ(back.sh_l, m.sh_l);
+    EXPECT_EQ(back.sh_a, m.sh_a);
+    EXPECT_EQ(back.sh_b, m.sh_b);
+  }
+}
+
+TEST(GaussianFileTest, ConfidenceIsKeptAndFilesWithoutItStayAsTheyWere) {
+  GaussianModel m = RandomModel({5, 3, 1, 0});
+  const std::string plain = SerializeGaussians(m);
+  EXPECT_EQ(plain[8], 1) << "version 1, which older programs read";
+  EXPECT_TRUE(ParseGaussians(plain).confidence.empty());
+  m.confidence = {0.0f, 0.25f, 0.5f, 0.75f, 1.0f};
+  const std::string bytes = SerializeGaussians(m);
+  EXPECT_EQ(bytes[8], 2);
+  EXPECT_EQ(bytes.size(), plain.size() + 5 * sizeof(float));
+  const GaussianModel back = ParseGaussians(bytes);
+  EXPECT_EQ(back.confidence, m.confidence);
+  EXPECT_EQ(back.sh_b, m.sh_b);
+  m.confidence[3] = 1.5f;
+  EXPECT_THROW(SerializeGaussians(m), Error);
+  m.confidence = {1.0f};
+  EXPECT_THROW(SerializeGaussians(m), Error);
+}
+
+void ExpectRefused(const std::string& bytes, const std::string& why) {
+  try {
+    ParseGaussians(bytes);
+    FAIL() << "accepted: " << why;
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(e.what(), testing::HasSubstr(why));
+  }
+}
+
+std::string Signed(std::string content) { return content + Sha256Hex(content); }
+
+TEST(GaussianFileTest, HostileBytesAreRefused) {
+  const std::string good = SerializeGaussians(RandomModel({13, 3, 1, 0}));
+  const std::string content = good.substr(0, good.size() - 64);
+  ExpectRefused("", "only 0 bytes");
+  for (size_t n = 0; n < good.size(); n += 11) {
+    EXPECT_THROW(ParseGaussians(std::string_view(good).substr(0, n)), Error);
+  }
+  std::string bytes = good;
+  bytes[0] = 'X';
+  ExpectRefused(bytes, "C3DGAUSS");
+  bytes = good;
+  bytes[8] = 99;
+  ExpectRefused(bytes, "version 99");
+  bytes = good;
+  bytes[100] ^= 1;
+  ExpectRefused(bytes, "checksum");
+  bytes = content;
+  bytes[8] = 2;  // without the confidence that version 2 has
+  ExpectRefused(Signed(bytes), "claims");
+  bytes = content;
+  const uint64_t huge = ~uint64_t{0} / 8;
+  std::memcpy(bytes.data() + 24, &huge, 8);
+  ExpectRefused(Signed(bytes), "claims");
+  bytes = content;
+  const float nan = std::nanf("");
+  std::memcpy(bytes.data() + 40, &nan, 4);
+  ExpectRefused(Signed(bytes), "position of Gaussian 0 is not finite");
+  bytes = content;
+  std::memcpy(bytes.data() + 32 + 4 * (13 * 6 + 4 * 5 + 1), &nan, 4);
+  ExpectRefused(Signed(bytes), "rotation of Gaussian 5 is not finite");
+}
+
+}  // namespace
+}  // namespace color3d

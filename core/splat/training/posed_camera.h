@@ -1,0 +1,22 @@
+// The cameras that trainings draw. Internal to the splat module.
+#pragma once
+
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "core/scene/view_images.h"
+
+namespace color3d {
+
+struct PosedCamera {
+  int view = 0;  // what sources of pictures are asked for
+  Camera camera;
+  Pose cam_from_world;
+};
+
+// These views of `scene` at the working size of `images`.
+std::vector<PosedCamera> PosedCameras(const Scene& scene,
+                                      const ViewImages& images,
+                                      const std::vector<int>& views);
+
+}  // namespace color3d

@@ -1,0 +1,216 @@
+// The stage carry_color on a painted wall whose geometry is known, and what comes of it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/color/lab.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/stages.h"
+#include "tests/support/stage_fixture.h"
+
+namespace color3d {
+namespace {
+using ::testing::HasSubstr;
+
+constexpr int kWidth = 128, kHeight = 96;
+constexpr double kFocal = 110.0, kDepth = 4.0;
+
+LabColor Wall(double x, double y) {
+  const double l = 50.0 + 12.0 * std::sin(4.0 * x + y) + 10.0 * std::sin(9.0 * y - 2.0 * x) +
+                   8.0 * std::sin(17.0 * x) * std::cos(13.0 * y);
+  return {l, 35.0 * std::sin(0.8 * x), 20.0 * std::cos(0.7 * y)};
+}
+
+class CarryStageTest : public StageTest {
+ protected:
+  // Five cameras along the wall, each half a picture further; the first one is held out.
+  CarryStageTest() {
+    for (int i = 0; i < 5; ++i) {
+      const double at = 1.2 * i;
+      Image lab(kWidth, kHeight, 3);
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          const LabColor color = Wall(at + kDepth * (x + 0.5 - kWidth / 2.0) / kFocal,
+                                      kDepth * (y + 0.5 - kHeight / 2.0) / kFocal);
+          lab.At(0, y, x) = static_cast<float>(color.l);
+          lab.At(1, y, x) = static_cast<float>(color.a);
+          lab.At(2, y, x) = static_cast<float>(color.b);
+        }
+      }
+      truth_.push_back(lab);
+      View view;
+      view.name = view.image_file = "p" + std::to_string(i) + ".png";
+      view.camera = {kWidth, kHeight, kFocal, kFocal, kWidth / 2.0, kHeight / 2.0};
+      view.captured_camera = view.camera;
+      view.cam_from_world.translation = {-at, 0.0, 0.0};
+      view.held_out = i == 0;
+      WriteFileAtomic(scratch_.path() / view.image_file, EncodePng16(SrgbFromLab(lab)));
+      scene_.views.push_back(view);
+    }
+    GaussianModel model;
+    for (int y = -20; y <= 20; ++y) {
+      for (int x = -30; x <= 70; ++x) {
+        model.position.insert(model.position.end(), {0.12f * x, 0.12f * y, 4.0f});
+        model.log_scale.insert(model.log_scale.end(), 3, std::log(0.08f));
+        model.rotation.insert(model.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
+        model.opacity_logit.push_back(4.0f);
+        model.sh_l.push_back(0.0f);
+      }
+    }
+    AddInput(artifact::kScene, SceneToJson(scene_));
+    AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
+    Image ab(kWidth, kHeight, 2);
+    std::copy_n(truth_[1].Plane(1), ab.data.size(), ab.data.begin());
+    AddInput(artifact::kKeyColor, EncodeAbPng(ab));
+    AddInput(artifact::kGeometry, SerializeGaussians(model));
+    options_.depth_side_px = kWidth;
+  }
+
+  nlohmann::json Run() {
+    StageContext context = MakeContext();
+    RunCarryColor(options_, context);
+    return nlohmann::json::parse(ReadFile(scratch_.path() / "out" / artifact::kCarryFacts));
+  }
+  AbMap Carried(int view) {
+    const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view], ".png");
+    return DecodeAbPng(ReadFile(scratch_.path() / "out" / name), name);
+  }
+  std::string Complaint() {
+    try {
+      Run();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "nothing";
+  }
+  FurtherKeyView Further(int view, const Image& srgb) {
+    FurtherKeyView further{scene_.views[view].name, {}};
+    further.color.source = ColorizeKeyViewOptions::Source::kImage;
+    further.color.file = scratch_.path() / ("further" + std::to_string(view) + ".png");
+    WriteFileAtomic(further.color.file, EncodePng16(srgb));
+    return further;
+  }
+
+  Scene scene_;
+  std::vector<Image> truth_;
+  CarryColorOptions options_;
+};
+
+TEST_F(CarryStageTest, EveryViewGetsWhatTheKeyViewShowsOfIt) {
+  const nlohmann::json facts = Run();
+  // Neighbours share about 74 % of the key view's width, the next ones 48 % and 22 %.
+  const double expected[] = {0.74, 1.0, 0.74, 0.48, 0.22};
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_NEAR(facts["views"][i]["coverage"], expected[i], 0.08) << i;
+    const AbMap map = Carried(i);
+    double error = 0.0;
+    int count = 0;
+    for (size_t p = 0; p < map.confidence.data.size(); ++p) {
+      if (map.confidence.data[p] < 0.5f) continue;
+      error += std::abs(map.ab.Plane(0)[p] - truth_[i].Plane(1)[p]);
+      ++count;
+    }
+    ASSERT_GT(count, 500) << i;
+    EXPECT_LT(error / count, 0.8) << i;
+  }
+  EXPECT_EQ(facts["key_views"], nlohmann::json({"p1.png"}));
+  EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(CarryStageTest, AFurtherKeyViewFillsTheRestAndContradictsNothing) {
+  // A second key view in another colour: only what the first does not show may be its.
+  Image other = truth_[4];
+  for (size_t i = 0; i < other.PlaneSize(); ++i) {
+    other.Plane(1)[i] = -20.0f;
+    other.Plane(2)[i] = 0.0f;
+  }
+  options_.further = {Further(4, SrgbFromLab(other))};
+  const nlohmann::json facts = Run();
+  EXPECT_EQ(facts["key_views"], nlohmann::json({"p1.png", "p4.png"}));
+  EXPECT_GT(facts["views"][3]["coverage"], 0.85);
+  const AbMap second = Carried(4);
+  int kept = 0, filled = 0;
+  for (int y = 10; y < kHeight - 10; ++y) {
+    // The left end of the fifth picture is seen by the first key view; the right one is not.
+    kept += std::abs(second.ab.At(0, y, 12) - truth_[4].At(1, y, 12)) < 8.0f;
+    filled += std::abs(second.ab.At(0, y, 110) + 20.0f) < 3.0f;
+  }
+  EXPECT_GT(kept, 60);
+  EXPECT_GT(filled, 70);
+}
+
+TEST_F(CarryStageTest, FurtherKeyViewsThatCannotBeAreRefused) {
+  options_.further = {Further(0, SrgbFromLab(truth_[0]))};
+  EXPECT_THAT(Complaint(), HasSubstr("held out"));
+  options_.further = {Further(1, SrgbFromLab(truth_[1]))};
+  EXPECT_THAT(Complaint(), HasSubstr("key view already"));
+  options_.further = {{"nowhere.png", {}}};
+  EXPECT_THAT(Complaint(), HasSubstr("nowhere.png"));
+  options_.further = {Further(3, Image(7, 5, 3, 0.4f))};
+  EXPECT_THAT(Complaint(), HasSubstr("7x5"));
+}
+
+TEST_F(CarryStageTest, AKeyViewThatShowsNothingOfTheOthersIsSaid) {
+  scene_.views[1].cam_from_world.translation = {40.0, 0.0, 0.0};
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  const nlohmann::json facts = Run();
+  EXPECT_LT(facts["coverage"], 0.01);
+  EXPECT_THAT(observer_.text, HasSubstr("0.0 % of what the other views show"));
+}
+
+TEST_F(CarryStageTest, TheSameBytesAgain) {
+  Run();
+  const std::string first = ReadFile(scratch_.path() / "out" / "carried/p2.png");
+  Run();
+  EXPECT_EQ(first, ReadFile(scratch_.path() / "out" / "carried/p2.png"));
+}
+
+// Keeps every state that it is given; the worker loses its lease at the third.
+class Dying : public CheckpointStore {
+ public:
+  std::optional<std::string> Load() override {
+    return states.empty() ? std::nullopt : std::optional(states.back());
+  }
+  bool WantsSave() override { return true; }
+  void Save(const std::string& state) override {
+    states.push_back(state);
+    if (states.size() == 3) throw Error(ErrorCode::kAborted, "the lease is lost");
+  }
+  std::vector<std::string> states;
+};
+
+TEST_F(CarryStageTest, AnotherWorkerGoesOnAndGivesTheSame) {
+  const nlohmann::json facts = Run();
+  std::vector<std::string> files;
+  const auto file = [&](int i) {
+    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[i], ".png");
+  };
+  for (int i = 0; i < 5; ++i) {
+    files.push_back(ReadFile(file(i)));
+    std::filesystem::remove(file(i));
+  }
+  Dying store;
+  checkpoints_ = &store;
+  EXPECT_THAT(Complaint(), HasSubstr("lease"));
+  EXPECT_EQ(Run(), facts);
+  EXPECT_EQ(store.states.size(), 5u) << "three views before, two after";
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(ReadFile(file(i)), files[i]) << i;
+}
+
+TEST_F(CarryStageTest, ADamagedCheckpointIsSaidAndIgnored) {
+  const nlohmann::json facts = Run();
+  // No CBOR; a view whose value is a number; nothing at all.
+  for (const char* state : {"nonsense", "\xa1\x66p2.png\x01", ""}) {
+    Dying store;
+    store.states = {"", "", "", state};
+    checkpoints_ = &store;
+    observer_.text.clear();
+    EXPECT_EQ(Run(), facts);
+    EXPECT_THAT(observer_.text, HasSubstr("starts afresh"));
+  }
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,222 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/catalogue/stages.h"
+#include "core/image/codec.h"
+#include "core/report/curves.h"
+#include "core/report/report_page.h"
+#include "core/report/scene_plan.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/report/color_sections.h"
+#include "core/stage/report/key_view_section.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kReportSidePx = 540;
+
+// A picture for the page: small enough to embed many.
+ReportPicture Picture(const StageContext& context, const std::string& name, std::string caption) {
+  const Image image = DecodeImage(context.ReadInput(name), name);
+  return {std::move(caption), EncodeJpeg(FitWithin(image, kReportSidePx), 88)};
+}
+
+// Keys in the order in which people read them.
+ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
+                            const ColorFacts& colors,
+                            StageContext& context) {
+  ordered_json metrics = ordered_json::object();
+  if (context.HasInput(artifact::kScores)) {
+    const auto mean = ReadJson(context, artifact::kScores).at("mean");
+    for (const char* name : {"psnr_rgb",
+                             "ssim_rgb",
+                             "psnr_l",
+                             "ab_rmse",
+                             "delta_e00",
+                             "delta_e00_chroma",
+                             "delta_e00_chroma_2d",
+                             "delta_e00_chroma_bound",
+                             "delta_e00_gray",
+                             "colorfulness",
+                             "colorfulness_truth",
+                             "colorfulness_ratio",
+                             "colorfulness_ratio_2d",
+                             "colorfulness_ratio_bound"}) {
+      if (mean.contains(name)) metrics[name] = mean.at(name);
+    }
+  }
+  for (const auto& [name, value] : colors.Metrics()) metrics[name] = value;
+  if (context.HasInput(artifact::kExportScores)) {
+    const auto scores = ReadJson(context, artifact::kExportScores);
+    for (const auto& [format, values] : scores.items()) {
+      metrics[format + "_psnr_db_vs_lab"] = values.at("psnr_db_vs_lab");
+      metrics[format + "_worst_psnr_db_vs_lab"] = values.at("worst_psnr_db_vs_lab");
+    }
+  }
+  if (context.HasInput(artifact::kModel)) {
+    metrics["gaussians"] = ParseGaussians(context.ReadInput(artifact::kModel)).size();
+  }
+  double total = 0.0;
+  int64_t peak = 0;
+  for (const StageSummary& s : stages) {
+    total += s.seconds;
+    peak = std::max(peak, s.peak_memory_bytes);
+  }
+  metrics["seconds_total"] = total;
+  for (const StageSummary& s : stages) {
+    if (s.state == "SUCCEEDED") metrics["seconds_" + s.kind] = s.seconds;
+  }
+  if (peak > 0) metrics["peak_memory_bytes"] = peak;
+  return metrics;
+}
+
+std::vector<CurvePoint> CollectCurves(const StageContext& context) {
+  std::vector<CurvePoint> curves;
+  for (const std::string& name : context.InputsBelow(artifact::kCurves)) {
+    const auto points = CurvesFromCsv(context.ReadInput(name));
+    curves.insert(curves.end(), points.begin(), points.end());
+  }
+  return curves;
+}
+
+double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kind) {
+  for (const StageSummary& s : stages) {
+    if (s.kind == kind && s.state == "SUCCEEDED") return s.seconds;
+  }
+  return -1.0;
+}
+
+std::vector<PlanStep> CollectPlan(const Scene& scene,
+                                  const std::vector<StageSummary>& stages,
+                                  bool has_truth,
+                                  const StageContext& context) {
+  const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
+  const auto key_view = ReadJson(context, artifact::kKeyView);
+  PlanFacts plan_facts;
+  plan_facts.has_poses = !facts.ran_structure_from_motion;
+  plan_facts.has_distortion = facts.undistorted;
+  plan_facts.has_sparse_points = !facts.random_points;
+  plan_facts.has_truth = has_truth;
+  plan_facts.key_view_given = key_view.at("strategy") == "manual";
+  plan_facts.views = static_cast<int>(scene.views.size());
+  const Camera camera = scene.views.at(0).camera.FitWithin(kReportSidePx);
+  plan_facts.megapixels_per_view = 1e-6 * camera.width * camera.height;
+  std::vector<PlanStep> plan = PlanScene(plan_facts);
+  for (PlanStep& step : plan) {
+    if (step.needed && !step.stage.empty()) step.measured_seconds = SecondsOf(stages, step.stage);
+  }
+  const auto add_reason = [&plan](const char* stage, const std::string& note) {
+    for (PlanStep& step : plan) {
+      if (step.stage == stage && !note.empty()) step.reason += "; " + note;
+    }
+  };
+  add_reason(kind::kImportScene, facts.sfm_plan);
+  if (context.HasInput(artifact::kMemoryPlan)) {
+    const auto memory = ReadJson(context, artifact::kMemoryPlan);
+    add_reason(kind::kReconstructGeometry, memory.at("note"));
+  }
+  if (context.HasInput(artifact::kAugmentationFacts)) {
+    const auto facts = ReadJson(context, artifact::kAugmentationFacts);
+    for (const auto& left_out : facts.at("left_out")) {
+      plan.push_back({.step = "augmentation_" + left_out.at("kind").get<std::string>(),
+                      .needed = false,
+                      .reason = left_out.at("reason")});
+    }
+  }
+  for (const StageSummary& s : stages) {
+    if (s.state == "SKIPPED") {
+      plan.push_back({.step = s.kind, .needed = false, .reason = s.skip_reason});
+    }
+  }
+  return plan;
+}
+
+std::string Summary(const Scene& scene, const ordered_json& metrics, const std::string& key) {
+  return fmt::format(
+      "{} views ({} held out), all colours from the key view {}. {} Gaussians in {} s of "
+      "computing.",
+      scene.views.size(),
+      scene.HeldOutViews().size(),
+      key,
+      metrics.value("gaussians", 0),
+      static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
+}
+
+std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context) {
+  std::vector<ReportRow> rows;
+  for (const View& view : scene.views) {
+    const std::string render = ViewArtifact(artifact::kRenders, view, ".png");
+    if (!context.HasInput(render)) continue;
+    ReportRow row{view.name + (view.held_out ? " (held out)" : ""), {}};
+    const std::string truth = ViewArtifact(artifact::kTruths, view, ".jpg");
+    const std::string direct = ViewArtifact(artifact::kColored2d, view, ".jpg");
+    if (context.HasInput(truth)) row.pictures.push_back(Picture(context, truth, "truth"));
+    row.pictures.push_back(Picture(context, render, "rendered from the coloured 3D scene"));
+    if (context.HasInput(direct)) {
+      row.pictures.push_back(Picture(context, direct, "the colorizer on the monochrome photo"));
+    }
+    rows.push_back(std::move(row));
+  }
+  if (context.HasInput(artifact::kAugmentationSheet)) {
+    rows.push_back({"Training pictures beside the key view",
+                    {Picture(context, artifact::kAugmentationSheet, "given, or made from it")}});
+  }
+  return rows;
+}
+
+void PassOnResults(StageContext& context) {
+  for (const Stage& stage : StageCatalogue()) {
+    for (const char* result : stage.results) {
+      if (context.HasInput(result)) context.PassOn(result);
+      if (!std::string_view(result).ends_with('/')) continue;
+      for (const std::string& name : context.InputsBelow(result)) context.PassOn(name);
+    }
+  }
+}
+
+}  // namespace
+
+void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
+  const Scene scene = ReadScene(context);
+  const int key = ReadKeyView(context, scene);
+  const ColorFacts colors(scene, context);
+  const ordered_json metrics = CollectMetrics(stages, colors, context);
+
+  ReportData data;
+  data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
+  data.summary = Summary(scene, metrics, scene.views[key].name);
+  data.key_view = ReportOfKeyView(
+      {scene.views[key].name,
+       {Picture(context, artifact::kKeyViewGray, "as captured"),
+        Picture(context, artifact::kKeyViewColored, "coloured: all colours come from here")}},
+      context);
+  const std::vector<CurvePoint> curves = CollectCurves(context);
+  std::vector<CurvePoint> personalization;
+  std::partition_copy(curves.begin(),
+                      curves.end(),
+                      std::back_inserter(personalization),
+                      std::back_inserter(data.curves),
+                      [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
+  data.sections = colors.Sections(std::move(personalization));
+  data.views = ViewRows(scene, context);
+  for (const auto& [name, value] : metrics.items()) {
+    data.metrics.emplace_back(name, value.get<double>());
+  }
+  data.plan = CollectPlan(scene, stages, metrics.contains("delta_e00"), context);
+  for (const StageSummary& s : stages) {
+    for (const std::string& w : s.warnings) data.warnings.push_back(s.kind + ": " + w);
+  }
+  context.WriteOutput(artifact::kMetrics, metrics.dump(1) + "\n");
+  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(curves));
+  context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));
+  context.WriteOutput(artifact::kReport, RenderReport(data));
+  PassOnResults(context);
+}
+
+}  // namespace color3d

@@ -1,0 +1,115 @@
+#include "core/stage/formats/artifacts.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/base/error.h"
+#include "core/image/codec.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+std::string ViewArtifact(std::string_view folder, const View& view, std::string_view extension) {
+  const std::filesystem::path stem = std::filesystem::path(view.name).replace_extension();
+  return std::string(folder) + stem.generic_string() + std::string(extension);
+}
+
+void CheckStemsAreUnique(const Scene& scene) {
+  std::map<std::string, std::string> seen;
+  for (const View& view : scene.views) {
+    const auto [found, fresh] = seen.emplace(ViewArtifact("", view, ""), view.name);
+    if (!fresh) {
+      throw InvalidArgument(
+          "{} and {} differ only in their extension; remove or rename one of them",
+          found->second,
+          view.name);
+    }
+  }
+}
+
+std::string ImportFactsToJson(const ImportFacts& f) {
+  return nlohmann::ordered_json{{"layout", f.layout},
+                                {"ran_structure_from_motion", f.ran_structure_from_motion},
+                                {"sfm_plan", f.sfm_plan},
+                                {"undistorted", f.undistorted},
+                                {"random_points", f.random_points},
+                                {"photos_found", f.photos_found},
+                                {"photos_registered", f.photos_registered}}
+             .dump(1) +
+         "\n";
+}
+
+ImportFacts ImportFactsFromJson(std::string_view json) {
+  try {
+    const auto value = nlohmann::json::parse(json);
+    ImportFacts f;
+    f.layout = value.at("layout");
+    f.ran_structure_from_motion = value.at("ran_structure_from_motion");
+    f.sfm_plan = value.at("sfm_plan");
+    f.undistorted = value.at("undistorted");
+    f.random_points = value.at("random_points");
+    f.photos_found = value.at("photos_found");
+    f.photos_registered = value.at("photos_registered");
+    return f;
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument("{} is damaged: {}", artifact::kImportFacts, e.what());
+  }
+}
+
+Scene ReadScene(const StageContext& context) {
+  return SceneFromJson(context.ReadInput(artifact::kScene));
+}
+
+int ReadKeyView(const StageContext& context, const Scene& scene) {
+  try {
+    const auto value = nlohmann::json::parse(context.ReadInput(artifact::kKeyView));
+    return scene.FindView(value.at("view").get<std::string>());
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument("{} is damaged: {}", artifact::kKeyView, e.what());
+  }
+}
+
+nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& name) {
+  try {
+    return nlohmann::ordered_json::parse(context.ReadInput(name));
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument("{} is damaged: {}", name, e.what());
+  }
+}
+
+CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height) {
+  const std::string name = ViewArtifact(artifact::kCarried, view, ".png");
+  if (!context.HasInput(name)) return {Image(width, height, 2), Image(width, height, 1)};
+  const AbMap map = DecodeAbPng(context.ReadInput(name), name);
+  if (map.ab.width == width && map.ab.height == height) return {map.ab, map.confidence};
+  return {Resize(map.ab, width, height), Resize(map.confidence, width, height)};
+}
+
+int ColoredSide(const StageContext& context, const View& view) {
+  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  const ImageInfo info = ProbeImage(context.ReadInput(name), name);
+  return std::max(info.width, info.height);
+}
+
+Image ReadViewAb(const StageContext& context, const View& view, int width, int height) {
+  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  AbMap map = DecodeAbPng(context.ReadInput(name), name);
+  if (map.ab.width == width && map.ab.height == height) return std::move(map.ab);
+  return Resize(map.ab, width, height);
+}
+
+Image ReadViewConfidence(const StageContext& context, const View& view, int width, int height) {
+  const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
+  if (!context.HasInput(name)) return {};
+  const Image shares = DecodeImage(context.ReadInput(name), name);
+  if (shares.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
+  Image confidence(shares.width, shares.height, 1);
+  for (size_t i = 0; i < confidence.data.size(); ++i) {
+    confidence.data[i] = std::min(1.0f, shares.Plane(1)[i] + 0.5f * shares.Plane(2)[i]);
+  }
+  return Resize(confidence, width, height);
+}
+
+}  // namespace color3d

@@ -1,0 +1,57 @@
+// Formats of what stages hand to each other; the names are in core/catalogue/artifacts.h.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+
+#include "core/base/image.h"
+#include "core/carry/carry.h"
+#include "core/catalogue/artifacts.h"
+#include "core/scene/scene.h"
+
+namespace color3d {
+
+class StageContext;
+
+// "views_ab/0001.png" for the view "0001.jpg", and so on. The import stage sees to it that stems
+// are unique (CheckStemsAreUnique).
+std::string ViewArtifact(std::string_view folder, const View& view, std::string_view extension);
+
+// Throws Error{kInvalidArgument} naming two photos that differ only in their file name extension:
+// the results of one would overwrite those of the other.
+void CheckStemsAreUnique(const Scene& scene);
+
+// What the import stage found out, for the plan and the report.
+struct ImportFacts {
+  std::string layout;  // "photos", "colmap", "transforms"
+  bool ran_structure_from_motion = false;
+  std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
+  bool undistorted = false;
+  bool random_points = false;
+  int photos_found = 0;
+  int photos_registered = 0;
+};
+std::string ImportFactsToJson(const ImportFacts& facts);
+ImportFacts ImportFactsFromJson(std::string_view json);
+
+Scene ReadScene(const StageContext& context);
+// Index of the chosen key view in the scene.
+int ReadKeyView(const StageContext& context, const Scene& scene);
+// Throws Error{kInvalidArgument} with the artifact's name when it is no JSON.
+nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& name);
+
+// What was carried into a view, resized; nothing where there is no such artifact.
+CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height);
+
+// Longer side at which a view was coloured, px.
+int ColoredSide(const StageContext& context, const View& view);
+
+// Colour map of one view from its artifact, resized to width x height px.
+Image ReadViewAb(const StageContext& context, const View& view, int width, int height);
+
+// How sure that colour is, from its provenance: 1 channel, seen + inferred / 2, 0..1, resized to
+// width x height px. Empty when the view has no provenance.
+Image ReadViewConfidence(const StageContext& context, const View& view, int width, int height);
+
+}  // namespace color3d

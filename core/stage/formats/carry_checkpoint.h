@@ -1,0 +1,39 @@
+// The views that carry_color has finished, kept in checkpoints so that a killed worker's successor
+// does not carry into them again. Thread-safe but for the constructor.
+#pragma once
+
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+class CarryCheckpoint {
+ public:
+  // Takes up the checkpoint, if there is one, and writes the outputs of its views. One that is
+  // damaged is reported as a warning and ignored. The references must outlive the object.
+  CarryCheckpoint(const Scene& scene, StageContext& context);
+
+  // The checkpoint has it: nothing is left to do for this view.
+  bool WasDone(int view) const { return was_done_[static_cast<size_t>(view)] != 0; }
+  // Writes the output, reports progress, saves a checkpoint when it is time. `coverage`: 0..1.
+  void Add(int view, double coverage, const std::string& png);
+  // By view; once all are there.
+  const std::vector<double>& coverage() const { return coverage_; }
+
+ private:
+  void Keep(size_t view, double coverage, const std::string& png);
+
+  const Scene& scene_;
+  StageContext& context_;
+  std::vector<char> was_done_;
+  std::mutex mutex_;
+  std::vector<double> coverage_;
+  nlohmann::json state_ = nlohmann::json::object();  // by view: {coverage, PNG}
+};
+
+}  // namespace color3d

@@ -1,0 +1,70 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/augmented_scene.h"
+
+namespace color3d {
+namespace {
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class PersonalizeStageTest : public AugmentationStageTest {
+ protected:
+  std::string Personalize() {
+    StageContext::Setup setup;
+    setup.scene_folder = scratch_.path() / "scene";
+    setup.inputs = inputs_;
+    setup.output_folder = scratch_.path() / "out";
+    std::filesystem::create_directories(setup.output_folder);
+    StageContext context(setup, none_, warnings_, cancel_);
+    ColorizerOptions options;
+    options.iterations = 2;
+    options.crop_px = options.max_side_px = 64;
+    RunPersonalize(options, context);
+    return Output(artifact::kColorizer);
+  }
+  struct Warnings : NullObserver {
+    void OnWarning(const std::string& message) override { text += message; }
+    std::string text;
+  };
+  Warnings warnings_;
+};
+
+TEST_F(PersonalizeStageTest, AKeyViewWithoutColourIsSaid) {
+  Personalize();
+  EXPECT_EQ(warnings_.text, "");
+  AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 0.3f)));
+  Personalize();
+  EXPECT_THAT(warnings_.text, AllOf(HasSubstr("hardly any colour"), HasSubstr("hints")));
+}
+
+TEST_F(PersonalizeStageTest, AKeyColourOfAnotherShapeIsRefused) {
+  AddInput(artifact::kKeyColor, EncodeAbPng(Image(kHeight, kWidth, 2, 30.0f)));
+  try {
+    Personalize();
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("72x96"), HasSubstr("64x48")));
+  }
+  AddInput(artifact::kKeyColor, EncodeAbPng(Image(2 * kWidth, 2 * kHeight, 2, 30.0f)));
+  EXPECT_FALSE(Personalize().empty()) << "another size of the same shape will do";
+}
+
+TEST_F(PersonalizeStageTest, GeneratedPicturesAreLearntFrom) {
+  const Image luminance = LuminanceOfLab(Painting(kWidth, kHeight));
+  const auto colors = [&] {
+    return LoadColorizer(Personalize(), Encoder::Embedded(), 1)->Colorize(luminance).data;
+  };
+  const std::vector<float> alone = colors();
+  Run();
+  for (const std::string& name : outputs_) AddInput(name, Output(name));
+  EXPECT_NE(colors(), alone);
+  AddInput(artifact::kAugmentationFacts, R"({"samples": []})");
+  EXPECT_EQ(colors(), alone);
+  AddInput(artifact::kAugmentationFacts, "[1]");
+  EXPECT_THROW(Personalize(), Error);
+}
+
+}  // namespace
+}  // namespace color3d

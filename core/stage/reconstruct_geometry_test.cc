@@ -1,0 +1,41 @@
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/stages.h"
+#include "tests/support/scene_writers.h"
+#include "tests/support/stage_fixture.h"
+
+namespace color3d {
+namespace {
+
+TEST_F(StageTest, PosesWithoutPointsReconstructAndLittleMemoryIsPlannedFor) {
+  WriteTransformsJson(RampScene(scratch_.path(), 48, 32), scratch_.path() / "transforms.json");
+  StageContext import = MakeContext();
+  RunImportScene({}, import);
+  EXPECT_TRUE(ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json")).random_points);
+  inputs_[artifact::kScene] = scratch_.path() / "out/scene.json";
+  GeometryOptions options;
+  options.iterations = 2;
+  StageContext plenty = MakeContext();
+  RunReconstructGeometry(options, 64, plenty);
+  auto plan = nlohmann::json::parse(ReadFile(scratch_.path() / "out/memory_plan.json"));
+  EXPECT_EQ(plan.at("note"), "");
+  EXPECT_EQ(plan.at("max_gaussians"), 5000);
+  observer_.text.clear();
+  memory_bytes_ = int64_t{101} << 20;
+  StageContext little = MakeContext();
+  RunReconstructGeometry(options, 64, little);
+  plan = nlohmann::json::parse(ReadFile(scratch_.path() / "out/memory_plan.json"));
+  EXPECT_LT(plan.at("max_gaussians"), 5000);
+  EXPECT_NE(observer_.text.find("memory: 101 MiB may be used"), std::string::npos);
+  EXPECT_LE(ParseGaussians(ReadFile(scratch_.path() / "out/geometry.c3g")).size(),
+            plan.at("max_gaussians").get<size_t>());
+  memory_bytes_ = 1 << 20;
+  StageContext none = MakeContext();
+  EXPECT_THROW(RunReconstructGeometry(options, 64, none), Error);
+}
+
+}  // namespace
+}  // namespace color3d

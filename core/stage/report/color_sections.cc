@@ -1,0 +1,278 @@
+#include "core/stage/report/color_sections.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/image/codec.h"
+#include "core/stage/formats/artifacts.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kPictureSidePx = 400;
+constexpr size_t kMaxRows = 20;     // of the table
+constexpr size_t kMaxPictures = 4;  // views shown with their provenance, of all certainties
+
+std::string Percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
+
+SourceShares SharesOf(const Image& provenance) {
+  double sum[3] = {0.0, 0.0, 0.0};
+  for (int c = 0; c < 3; ++c) {
+    const float* plane = provenance.Plane(c);
+    for (size_t i = 0; i < provenance.PlaneSize(); ++i) sum[c] += plane[i];
+  }
+  const double total = sum[0] + sum[1] + sum[2];
+  if (!(total > 0.0)) return {1.0, 0.0, 0.0};
+  return {sum[0] / total, sum[1] / total, sum[2] / total};
+}
+
+ReportPicture SmallPicture(const Image& image, std::string caption) {
+  return {std::move(caption), EncodeJpeg(FitWithin(image, kPictureSidePx), 88)};
+}
+
+}  // namespace
+
+ColorFacts::ColorFacts(const Scene& scene, const StageContext& context)
+    : scene_(scene), context_(context), carry_(ReadCarryFacts(context)) {
+  ReadProvenance();
+  if (context.HasInput(artifact::kScores)) ReadScores();
+}
+
+void ColorFacts::ReadProvenance() {
+  for (size_t i = 0; i < scene_.views.size(); ++i) {
+    const std::string name = ViewArtifact(artifact::kProvenance, scene_.views[i], ".png");
+    if (!context_.HasInput(name)) continue;
+    const Image image = DecodeImage(context_.ReadInput(name), name);
+    if (image.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
+    views_.push_back({static_cast<int>(i), SharesOf(image)});
+  }
+  for (const ViewFacts& view : views_) {
+    const double part = 1.0 / static_cast<double>(views_.size());
+    mean_.guessed += part * view.shares.guessed;
+    mean_.seen += part * view.shares.seen;
+    mean_.inferred += part * view.shares.inferred;
+  }
+}
+
+void ColorFacts::ReadScores() {
+  const ordered_json scores = ReadJson(context_, artifact::kScores);
+  try {
+    if (const auto found = scores.find("consistency"); found != scores.end()) {
+      const std::pair<const char*, const char*> rows[] = {
+          {"rendered", "rendered from the 3D scene"},
+          {"colored_views", "the photos in colour"},
+          {"truth", "the true colours"}};
+      for (const auto& [name, what] : rows) {
+        if (!found->contains(name)) continue;
+        Agreement row{what, {}};
+        for (const char* figure : {"me", "me_de00", "tc", "tc_short", "tc_long"}) {
+          row.figures[figure] = found->at(name).at(figure);
+        }
+        agreement_.push_back(std::move(row));
+      }
+    }
+    if (const auto found = scores.find("sources"); found != scores.end()) {
+      errors_by_source_ = found->get<std::map<std::string, double>>();
+    }
+  } catch (const ordered_json::exception& e) {
+    throw InvalidArgument("{} is damaged: {}", artifact::kScores, e.what());
+  }
+}
+
+std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
+  std::vector<std::pair<std::string, double>> metrics;
+  if (carry_.coverage) metrics.emplace_back("coverage", *carry_.coverage);
+  if (!views_.empty()) {
+    metrics.emplace_back("share_seen", mean_.seen);
+    metrics.emplace_back("share_inferred", mean_.inferred);
+    metrics.emplace_back("share_guessed", mean_.guessed);
+  }
+  for (const auto& [name, value] : errors_by_source_) {
+    if (!name.starts_with("share_")) metrics.emplace_back(name, value);
+  }
+  const char* suffixes[] = {"", "_2d", "_truth"};
+  for (size_t i = 0; i < agreement_.size(); ++i) {
+    for (const char* name : {"me", "me_de00", "tc"}) {
+      metrics.emplace_back(std::string(name) + suffixes[i], agreement_[i].figures.at(name));
+    }
+  }
+  return metrics;
+}
+
+std::string ColorFacts::SourceSummary() const {
+  std::string summary;
+  if (!views_.empty()) {
+    summary = fmt::format(
+        "{} of all pixels show what a key view shows, {} resemble something in it, and {} are a "
+        "guess. ",
+        Percent(mean_.seen),
+        Percent(mean_.inferred),
+        Percent(mean_.guessed));
+  }
+  if (carry_.coverage) {
+    summary += fmt::format("The key {} {} of the other views' pixels.",
+                           carry_.key_views.size() == 1 ? "view covers" : "views cover",
+                           Percent(*carry_.coverage));
+  }
+  return summary;
+}
+
+std::vector<ColorFacts::ViewFacts> ColorFacts::LeastCertainFirst() const {
+  std::vector<ViewFacts> views = views_;
+  std::stable_sort(views.begin(), views.end(), [](const ViewFacts& x, const ViewFacts& y) {
+    return x.shares.seen + 0.5 * x.shares.inferred < y.shares.seen + 0.5 * y.shares.inferred;
+  });
+  return views;
+}
+
+ReportTable ColorFacts::ShareTable() const {
+  const std::vector<ViewFacts> views = LeastCertainFirst();
+  ReportTable table{{"view, least certain first", "seen", "inferred", "guessed"}, {}};
+  for (size_t i = 0; i < std::min(views.size(), kMaxRows); ++i) {
+    const SourceShares& s = views[i].shares;
+    table.rows.push_back({scene_.views[views[i].view].name,
+                          Percent(s.seen),
+                          Percent(s.inferred),
+                          Percent(s.guessed)});
+  }
+  if (views.size() > kMaxRows) {
+    table.rows.push_back({fmt::format("and {} more", views.size() - kMaxRows)});
+  }
+  return table;
+}
+
+ReportTable ColorFacts::ErrorTable() const {
+  ReportTable table{{"held-out pixels", "share", "colour error, CIEDE2000"}, {}};
+  for (const char* source : {"seen", "inferred", "guessed"}) {
+    const auto share = errors_by_source_.find(std::string("share_") + source);
+    const auto error = errors_by_source_.find(std::string("delta_e00_") + source);
+    if (share == errors_by_source_.end() || error == errors_by_source_.end()) continue;
+    table.rows.push_back({source, Percent(share->second), fmt::format("{:.2f}", error->second)});
+  }
+  return table;
+}
+
+std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
+  const std::vector<ViewFacts> views = LeastCertainFirst();
+  const size_t wanted = std::min(views.size(), kMaxPictures);
+  std::vector<ReportRow> rows;
+  for (size_t k = 0; k < wanted; ++k) {
+    const View& view = scene_.views[views[k * views.size() / wanted].view];
+    ReportRow row{view.name, {}};
+    for (const std::string& name : {ViewArtifact(artifact::kColored2d, view, ".jpg"),
+                                    ViewArtifact(artifact::kRenders, view, ".png")}) {
+      if (!context_.HasInput(name)) continue;
+      row.pictures.push_back(
+          SmallPicture(DecodeImage(context_.ReadInput(name), name), "its colours"));
+      break;
+    }
+    const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
+    row.pictures.push_back(SmallPicture(DecodeImage(context_.ReadInput(name), name),
+                                        "green: seen, blue: inferred, red: guessed"));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+ReportSection ColorFacts::SourceSection() const {
+  ReportSection section;
+  section.title = "Where the colour comes from";
+  const std::string summary = SourceSummary();
+  if (!summary.empty()) section.notes.push_back(summary);
+  if (carry_.next) {
+    section.notes.push_back(fmt::format(
+        "To see more of it in its own colours, colour {} next: of the points that structure-from-"
+        "motion has tracked through the photos, the share that a key view shows then rises from {} "
+        "to {}.",
+        carry_.next->name,
+        Percent(carry_.next->coverage_now),
+        Percent(carry_.next->coverage_with)));
+  }
+  if (!views_.empty()) section.tables.push_back(ShareTable());
+  if (!errors_by_source_.empty()) section.tables.push_back(ErrorTable());
+  section.rows = ProvenanceRows();
+  return section;
+}
+
+ReportSection ColorFacts::AgreementSection() const {
+  ReportSection section;
+  section.title = "Do the views agree?";
+  if (agreement_.empty()) return section;
+  section.notes.push_back(
+      "Differences between pictures where two views show the same surface. ME: mean difference of "
+      "R, G, B (0 to 1), and in CIEDE2000. TC: mean squared difference between neighbouring views "
+      "and between views 7 apart. Lower is better; the true colours themselves differ by gloss and "
+      "exposure.");
+  ReportTable table{{"pictures", "ME", "ME, CIEDE2000", "TC", "TC, next view", "TC, 7 apart"}, {}};
+  for (const Agreement& row : agreement_) {
+    const auto& f = row.figures;
+    table.rows.push_back({row.what,
+                          fmt::format("{:.4f}", f.at("me")),
+                          fmt::format("{:.2f}", f.at("me_de00")),
+                          fmt::format("{:.5f}", f.at("tc")),
+                          fmt::format("{:.5f}", f.at("tc_short")),
+                          fmt::format("{:.5f}", f.at("tc_long"))});
+  }
+  section.tables.push_back(std::move(table));
+  return section;
+}
+
+namespace {
+
+// What the curves of personalization say, in words; nothing without two points of held-out error.
+std::vector<std::string> NotesOnPersonalization(const std::vector<CurvePoint>& curves) {
+  std::vector<CurvePoint> errors;
+  std::string stopped;
+  for (const CurvePoint& point : curves) {
+    if (point.error_name == "validation_delta_e00") errors.push_back(point);
+    if (point.error_name == "stopped_early_iteration") {
+      stopped = fmt::format(" Training ended at iteration {} because it hardly fell any more.",
+                            point.iteration);
+    }
+  }
+  if (errors.size() < 2) return {};
+  const CurvePoint &first = errors.front(), &last = errors.back();
+  return {fmt::format(
+      "Augmentations of the key view are kept from training; their colour error (CIEDE2000) went "
+      "from {:.1f} after {:.0f} s to {:.1f} after {:.0f} s.{}",
+      first.value,
+      first.seconds,
+      last.value,
+      last.seconds,
+      stopped)};
+}
+
+}  // namespace
+
+ReportSection ColorFacts::PersonalizationSection(std::vector<CurvePoint> curves) const {
+  ReportSection section;
+  section.title = "The personalized colorizer";
+  section.notes = NotesOnPersonalization(curves);
+  section.curves = std::move(curves);
+  if (context_.HasInput(artifact::kAugmentationSheet)) {
+    section.wide = {"what it learnt from besides the key view",
+                    context_.ReadInput(artifact::kAugmentationSheet)};
+  }
+  return section;
+}
+
+std::vector<ReportSection> ColorFacts::Sections(std::vector<CurvePoint> personalization) const {
+  std::vector<ReportSection> sections;
+  for (ReportSection& section :
+       std::vector<ReportSection>{SourceSection(),
+                                  AgreementSection(),
+                                  PersonalizationSection(std::move(personalization))}) {
+    if (section.notes.empty() && section.tables.empty() && section.curves.empty() &&
+        section.wide.bytes.empty()) {
+      continue;
+    }
+    sections.push_back(std::move(section));
+  }
+  return sections;
+}
+
+}  // namespace color3d

@@ -1,0 +1,69 @@
+// The report's chapters about the colour of all views: where it comes from, whether the views
+// agree, how the colorizer was personalized. For the report stage only.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/report/report_page.h"
+#include "core/scene/scene.h"
+#include "core/stage/formats/carry_facts.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+// Mean shares of the colour's sources over a view's pixels; they sum to 1.
+struct SourceShares {
+  double guessed = 0.0;
+  double seen = 0.0;
+  double inferred = 0.0;
+};
+
+// Read once from provenance/*, carry.json and scores.json, each of which may be absent.
+class ColorFacts {
+ public:
+  // Throws Error{kInvalidArgument} when one of them is damaged.
+  ColorFacts(const Scene& scene, const StageContext& context);
+
+  // For metrics.json, in the order in which people read them: coverage, share_*, me, tc, ... and
+  // the errors by source.
+  std::vector<std::pair<std::string, double>> Metrics() const;
+  // `personalization`: the curves of that stage. Chapters that would have nothing to tell are left
+  // out.
+  std::vector<ReportSection> Sections(std::vector<CurvePoint> personalization) const;
+
+ private:
+  struct ViewFacts {
+    int view = 0;
+    SourceShares shares;
+  };
+  // A row of the table: "me", "me_de00", "tc_short", "tc_long", "tc".
+  struct Agreement {
+    std::string what;
+    std::map<std::string, double> figures;
+  };
+
+  void ReadProvenance();
+  void ReadScores();
+  std::string SourceSummary() const;
+  std::vector<ViewFacts> LeastCertainFirst() const;
+  ReportTable ShareTable() const;
+  ReportTable ErrorTable() const;
+  std::vector<ReportRow> ProvenanceRows() const;
+  ReportSection SourceSection() const;
+  ReportSection AgreementSection() const;
+  ReportSection PersonalizationSection(std::vector<CurvePoint> curves) const;
+
+  const Scene& scene_;
+  const StageContext& context_;
+  std::vector<ViewFacts> views_;
+  SourceShares mean_;
+  CarryFacts carry_;
+  std::vector<Agreement> agreement_;
+  std::map<std::string, double> errors_by_source_;
+};
+
+}  // namespace color3d

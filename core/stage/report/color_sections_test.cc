@@ -1,0 +1,64 @@
+#include "core/stage/report/color_sections.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "tests/support/evaluated_scene.h"
+
+namespace color3d {
+namespace {
+
+using ColorSectionsTest = EvaluatedSceneTest;
+
+TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext) {
+  AddProvenance("p1.png", Halves({0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f}));
+  AddProvenance("p2.png", Halves({1.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f}));
+  AddInput(artifact::kCarryFacts,
+           R"({"coverage": 0.61, "key_views": ["p1.png"],
+               "next_key_view": {"name": "p0.png", "coverage_now": 0.61, "coverage_with": 0.83}})");
+  AddInput(artifact::kScores,
+           R"({"mean": {}, "consistency": {"rendered": {"me": 0.02, "me_de00": 1.5, "tc": 0.001,
+               "tc_short": 0.001, "tc_long": 0.001}}, "sources": {"share_seen": 0.6,
+               "delta_e00_seen": 1.25, "confidence_rank_correlation": -0.5}})");
+  const StageContext context = MakeContext();
+  const ColorFacts facts(scene_, context);
+  std::map<std::string, double> metrics;
+  for (const auto& [name, value] : facts.Metrics()) metrics[name] = value;
+  EXPECT_NEAR(metrics.at("share_seen"), 0.5, 0.01);
+  EXPECT_NEAR(metrics.at("share_inferred"), 0.25, 0.01);
+  EXPECT_NEAR(metrics.at("share_guessed"), 0.25, 0.01);
+  EXPECT_EQ(metrics.at("coverage"), 0.61);
+  EXPECT_EQ(metrics.at("me"), 0.02);
+  EXPECT_EQ(metrics.at("tc"), 0.001);
+  EXPECT_EQ(metrics.at("confidence_rank_correlation"), -0.5);
+  const auto sections = facts.Sections({{"personalize", 1.0, 1, "validation_delta_e00", 9.0},
+                                        {"personalize", 4.0, 60, "validation_delta_e00", 2.5},
+                                        {"personalize", 4.0, 60, "stopped_early_iteration", 60.0}});
+  ASSERT_EQ(sections.size(), 3u);
+  EXPECT_THAT(sections[0].notes.back(), testing::HasSubstr("colour p0.png next"));
+  EXPECT_THAT(sections[0].notes.back(), testing::HasSubstr("from 61 % to 83 %"));
+  ASSERT_EQ(sections[0].tables.size(), 2u);
+  EXPECT_EQ(sections[0].tables[0].rows[0][0], "p2.png") << "least certain first";
+  EXPECT_EQ(sections[0].rows.size(), 2u);
+  EXPECT_EQ(sections[1].tables[0].rows[0][1], "0.0200");
+  EXPECT_EQ(sections[2].curves.size(), 3u);
+  EXPECT_THAT(sections[2].notes.front(), testing::HasSubstr("from 9.0 after 1 s to 2.5 after 4 s"));
+  EXPECT_THAT(sections[2].notes.front(), testing::HasSubstr("ended at iteration 60"));
+}
+
+TEST_F(ColorSectionsTest, OldJobsHaveNoChaptersAndDamagedFactsAreRefused) {
+  {
+    const StageContext context = MakeContext();
+    EXPECT_TRUE(ColorFacts(scene_, context).Sections({}).empty());
+    EXPECT_TRUE(ColorFacts(scene_, context).Metrics().empty());
+    EXPECT_TRUE(ReadViewConfidence(context, scene_.views[0], 48, 32).Empty());
+  }
+  AddInput(artifact::kCarryFacts, R"({"next_key_view": {"name": 3}})");
+  const StageContext context = MakeContext();
+  EXPECT_THROW(ColorFacts(scene_, context), Error);
+}
+
+}  // namespace
+}  // namespace color3d

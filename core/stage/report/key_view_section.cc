@@ -1,0 +1,67 @@
+#include "core/stage/report/key_view_section.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/stage/formats/artifacts.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::ordered_json;
+
+// As people read it: no quotes and braces, numbers with four digits.
+std::string FactText(const ordered_json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) return fmt::format("{:.4g}", value.get<double>());
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  if (!value.is_structured()) return value.dump();
+  std::string text;
+  for (const auto& [name, part] : value.items()) {
+    if (!text.empty()) text += value.is_array() ? "; " : ", ";
+    text += (value.is_array() ? "" : name + " ") + FactText(part);
+  }
+  return text;
+}
+
+void AddChoice(const ordered_json& key_view, ReportKeyView* report) {
+  for (const char* field : {"description", "encoder"}) {
+    const auto found = key_view.find(field);
+    if (found == key_view.end() || !found->is_string()) continue;
+    const std::string text = *found;
+    report->notes.push_back(std::string(field) == "encoder" ? "Features: " + text + "." : text);
+  }
+}
+
+void AddColor(const ordered_json& facts, ReportKeyView* report) {
+  for (const auto& [name, value] : facts.items()) {
+    if (name == "view" || name == "warnings" || value.is_null()) continue;
+    std::string label = name;
+    for (char& c : label) c = c == '_' ? ' ' : c;
+    report->color_facts.emplace_back(label, FactText(value));
+  }
+}
+
+}  // namespace
+
+ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context) {
+  ReportKeyView report;
+  report.pictures = std::move(pictures);
+  if (context.HasInput(artifact::kKeyView)) {
+    AddChoice(ReadJson(context, artifact::kKeyView), &report);
+  }
+  if (context.HasInput(artifact::kKeyColorFacts)) {
+    AddColor(ReadJson(context, artifact::kKeyColorFacts), &report);
+  }
+  if (context.HasInput(artifact::kKeyColorRegions)) {
+    report.pictures.pictures.push_back({"what each colour of the prompt was taken for",
+                                        context.ReadInput(artifact::kKeyColorRegions)});
+  }
+  if (context.HasInput(artifact::kKeyViewRanking)) {
+    report.ranking = {"All candidates, best first", context.ReadInput(artifact::kKeyViewRanking)};
+  }
+  return report;
+}
+
+}  // namespace color3d

@@ -1,0 +1,57 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/stage/stages.h"
+#include "tests/support/evaluated_scene.h"
+
+namespace color3d {
+namespace {
+
+// The chroma stage's inputs, on top of the fixture's.
+class ConfidenceTest : public EvaluatedSceneTest {
+ protected:
+  void SetUp() override {
+    EvaluatedSceneTest::SetUp();
+    inputs_[artifact::kGeometry] = inputs_.at(artifact::kModel);
+    inputs_.erase(artifact::kModel);
+    AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
+    AddInput(artifact::kKeyColor, EncodeAbPng(Image(48, 32, 2, 5.0f)));
+  }
+  GaussianModel Solved() {
+    StageContext context = MakeContext();
+    RunSolveChroma({}, context);
+    return ParseGaussians(ReadFile(scratch_.path() / "out/model.c3g"));
+  }
+  std::string ExportedPly() {
+    inputs_[artifact::kModel] = scratch_.path() / "out/model.c3g";
+    StageContext context = MakeContext();
+    RunExport({.ply = true, .splat = false, .confidence = true}, context);
+    return ReadFile(scratch_.path() / "out/scene.ply");
+  }
+};
+
+TEST_F(ConfidenceTest, ReachesTheModelAndThePly) {
+  AddProvenance("p2.png", Halves({0.0f, 1.0f, 0.0f}, {1.0f, 0.0f, 0.0f}));
+  const GaussianModel model = Solved();
+  ASSERT_EQ(model.confidence.size(), model.size());
+  double left = 0.0, right = 0.0;  // columns of SmallModel: x = -0.3, 0, 0.3
+  for (size_t i = 0; i < model.size(); ++i) {
+    if (i % 3 == 0) left += model.confidence[i] / 3.0;
+    if (i % 3 == 2) right += model.confidence[i] / 3.0;
+  }
+  EXPECT_GT(left, right + 0.1);
+  EXPECT_GT(right, 0.3) << "the key view has no provenance of its own: it is seen everywhere";
+  EXPECT_THAT(ExportedPly(), testing::HasSubstr("property float confidence\nend_header"));
+  EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(ConfidenceTest, JobsWithoutProvenanceHaveNone) {
+  EXPECT_TRUE(Solved().confidence.empty());
+  EXPECT_THAT(ExportedPly(), testing::Not(testing::HasSubstr("confidence")));
+  EXPECT_THAT(observer_.text, testing::HasSubstr("has no confidence"));
+  StageContext context = MakeContext();
+  EXPECT_THROW(RunExport({.ply = false, .splat = true, .confidence = true}, context), Error);
+}
+
+}  // namespace
+}  // namespace color3d

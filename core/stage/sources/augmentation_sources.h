@@ -1,0 +1,43 @@
+// Training pictures beside the key view that others have made: the user's files, and a model server
+// of the user's. For the stage generate_augmentations, which makes the rest itself.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/augment/surrogates.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+
+// "outpaint", "animate", "novel_view": as in stage.proto and backend.proto.
+const char* AugmentationKindName(AugmentationKind kind);
+
+// "outpaint-1" for the first (index 0) of its kind: names an artifact.
+std::string AugmentationName(const std::string& kind, size_t index);
+
+struct Augmentation {
+  std::string name;    // of the artifact, without folder and ending
+  std::string kind;    // AugmentationKindName, or "file"
+  std::string source;  // "embedded", "backend NAME", or the file's name
+  GeneratedPicture picture;
+};
+
+// Photos in colour below augment/ of the scene's folder, sorted by name, at most `max_side_px`.
+// Throws Error{kInvalidArgument} naming a file that is no picture, has no colour or is too small,
+// or when there are too many.
+std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageContext& context);
+
+// `count` pictures of one kind by the generator `backend`, which must claim it, made from
+// `key_srgb` (3 channels, 0..1). Throws what RemoteColorizer throws; Error{kFailedPrecondition} for
+// answers that are no pictures in colour.
+std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
+                                                   RemoteColorizer& remote,
+                                                   const RemoteInfo& info,
+                                                   AugmentationKind kind,
+                                                   int count,
+                                                   const Image& key_srgb,
+                                                   int max_side_px,
+                                                   StageContext& context);
+
+}  // namespace color3d

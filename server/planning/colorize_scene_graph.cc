@@ -1,0 +1,162 @@
+#include "server/planning/colorize_scene_graph.h"
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+using v1::ColorizeSceneSpec;
+using v1::JobSpec;
+
+// The stages whose jobs a colorize_scene job may be given, in the order of the pipeline, and
+// whether its options ask for the stage as well.
+struct GivenStage {
+  const char* kind;
+  bool asked_for;
+};
+
+void CheckGivenJob(const JobRecord& job, bool asked_for, const std::string& missing) {
+  if (asked_for) {
+    throw InvalidArgument(
+        "the input {} is the {} job, but {} has options for that stage too; leave one of them out",
+        job.name,
+        job.kind,
+        kind::kColorizeScene);
+  }
+  if (!missing.empty()) {
+    throw InvalidArgument(
+        "the input {} ({}) comes without the {} job that it read; add that to spec.inputs",
+        job.name,
+        job.kind,
+        missing);
+  }
+  if (job.state != JobState::kSucceeded) {
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "INPUT_MISSING",
+                       "the input {} is {}, it must have succeeded",
+                       job.name,
+                       JobStateName(job.state));
+  }
+}
+
+// What a colorize_scene job may be given, and that its options do not ask for something else.
+void CheckGiven(const std::map<std::string, JobRecord>& given, const ColorizeSceneSpec& options) {
+  const bool colors_key_view = options.has_key_color() ||
+                               options.colorize_key_view().has_source() ||
+                               options.colorize_key_view().has_hint_sigma();
+  const GivenStage stages[] = {
+      {kind::kImportScene, options.has_import_scene()},
+      {kind::kSelectKeyView, !options.key_view().empty() || options.has_select_key_view()},
+      {kind::kColorizeKeyView, colors_key_view}};
+  std::string missing;  // the first stage before a given one that is not given
+  for (const auto& [kind, asked_for] : stages) {
+    const auto found = given.find(kind);
+    if (found != given.end()) {
+      CheckGivenJob(found->second, asked_for, missing);
+    } else if (missing.empty()) {
+      missing = kind;
+    }
+  }
+  for (const auto& entry : given) {
+    const JobRecord& job = entry.second;
+    const auto is_its_kind = [&](const GivenStage& stage) { return job.kind == stage.kind; };
+    if (std::any_of(std::begin(stages), std::end(stages), is_its_kind)) continue;
+    throw InvalidArgument(
+        "the input {} is a {} job; {} takes {}, {} and {} jobs and makes the rest itself",
+        job.name,
+        job.kind,
+        kind::kColorizeScene,
+        kind::kImportScene,
+        kind::kSelectKeyView,
+        kind::kColorizeKeyView);
+  }
+  if (!given.contains(kind::kColorizeKeyView) && !colors_key_view) {
+    throw InvalidArgument("key_color is required: no input is a {} job that would give it",
+                          kind::kColorizeKeyView);
+  }
+}
+
+// What the scene's options say of a stage outside of the field of its name.
+void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
+  switch (spec->stage_case()) {
+    case JobSpec::kSelectKeyView:
+      if (options.key_view().empty()) return;
+      spec->mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+      spec->mutable_select_key_view()->set_view(options.key_view());
+      return;
+    case JobSpec::kColorizeKeyView:
+      if (!options.has_key_color()) return;
+      *spec->mutable_colorize_key_view()->mutable_source() = options.key_color();
+      return;
+    case JobSpec::kGenerateAugmentations:
+      if (!options.has_generate_augmentations()) {  // the user's own files at most
+        spec->mutable_generate_augmentations()->set_samples(0);
+      } else if (!options.generate_augmentations().has_samples()) {
+        spec->mutable_generate_augmentations()->set_samples(kDefaultSamples);
+      }
+      return;
+    case JobSpec::kColorizeViews:
+      // The colorizer runs on the encoder that it was trained with.
+      spec->mutable_colorize_views()->set_encoder(options.personalize().encoder());
+      return;
+    case JobSpec::kExport:
+      spec->mutable_export_()->set_ply(true);
+      return;
+    case JobSpec::kEvaluate:
+      *spec->mutable_evaluate()->mutable_truth() = options.truth();
+      *spec->mutable_evaluate()->mutable_training_truth() = options.training_truth();
+      return;
+    default:
+      return;
+  }
+}
+
+// Why no colour is carried; empty when it is. `scene`: `given` over its preset.
+std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSceneSpec& scene) {
+  if (!scene.carry_color().skip()) return "";
+  return given.carry_color().has_skip() ? "carry_color.skip is set"
+                                        : "the preset carries no colour through geometry";
+}
+
+// Why no pictures are generated; empty when they are.
+std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
+  if (facts.augment_files > 0) return "";
+  if (!scene.has_generate_augmentations()) {
+    return "the preset learns from the key view alone, and augment/ holds no files";
+  }
+  // Whoever writes options wants the stage, unless they say 0.
+  const auto& spec = scene.generate_augmentations();
+  return spec.has_samples() && spec.samples() == 0
+             ? "no samples are asked for and augment/ holds no files"
+             : "";
+}
+
+}  // namespace
+
+void BuildColorizeSceneGraph(const JobSpec& submitted,
+                             const ColorizeSceneSpec& scene,
+                             const SceneFacts& facts,
+                             GraphBuilder* builder) {
+  const ColorizeSceneSpec& given = submitted.colorize_scene();
+  if (submitted.inputs_size() > 0) CheckGiven(builder->given(), given);
+  for (const Stage& stage : StageCatalogue()) {
+    const std::string kind = stage.kind;
+    if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
+    JobSpec spec = builder->StageSpec(kind);
+    TakeSceneOptions(scene, &spec);
+    std::string skip_reason;
+    if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);
+    if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
+    builder->Add(std::move(spec), skip_reason);
+  }
+  builder->AddParent();
+}
+
+}  // namespace color3d

@@ -1,0 +1,139 @@
+#include "server/planning/graph_builder.h"
+
+#include <set>
+#include <utility>
+
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
+#include "server/planning/spec_check.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+std::string ProviderOf(const std::string& artifact) {
+  const Stage* stage = StageThatLeaves(artifact);
+  if (stage == nullptr) throw Error(ErrorCode::kInternal, "no stage leaves '{}'", artifact);
+  return stage->kind;
+}
+
+// Equal submissions plan equal work.
+uint64_t SeedOf(const v1::JobSpec& submitted) {
+  return submitted.seed() != 0 ? submitted.seed() : 1;
+}
+
+}  // namespace
+
+GraphBuilder::GraphBuilder(const v1::JobSpec& submitted,
+                           const std::vector<JobRecord>& inputs,
+                           FillUnset fill_unset)
+    : submitted_(submitted),
+      submitted_kind_(KindOf(submitted)),
+      fill_unset_(std::move(fill_unset)) {
+  graph_.scene = submitted.scene();
+  for (const JobRecord& input : inputs) {
+    if (input.scene != submitted.scene()) {
+      throw InvalidArgument("the input {} belongs to '{}', the job to '{}'",
+                            input.name,
+                            input.scene,
+                            submitted.scene());
+    }
+    const auto [it, fresh] = given_.emplace(input.kind, input);
+    if (!fresh && it->second.name != input.name) {
+      throw InvalidArgument("both inputs {} and {} are {} jobs; give one of them",
+                            it->second.name,
+                            input.name,
+                            input.kind);
+    }
+  }
+}
+
+v1::JobSpec GraphBuilder::StageSpec(const std::string& kind) const {
+  v1::JobSpec spec;
+  spec.set_scene(submitted_.scene());
+  spec.set_seed(SeedOf(submitted_));
+  spec.set_skip_cache(submitted_.skip_cache());
+  MutableStage(&spec, kind);
+  return spec;
+}
+
+void GraphBuilder::Provide(const std::string& artifact, const std::string& for_kind, NewJob* job) {
+  const std::string provider = ProviderOf(artifact);
+  const auto planned = planned_.find(provider);
+  if (planned != planned_.end()) {
+    job->inputs.push_back(planned->second);
+    return;
+  }
+  const auto given = given_.find(provider);
+  if (given != given_.end()) {
+    const JobRecord& input = given->second;
+    if (IsFinished(input.state) && input.state != JobState::kSucceeded) {
+      throw ServiceError(ErrorCode::kFailedPrecondition,
+                         "INPUT_MISSING",
+                         "{} needs {}, but the input {} is {}; retry it first",
+                         for_kind,
+                         artifact,
+                         input.name,
+                         JobStateName(input.state));
+    }
+    job->input_jobs.push_back(input.name);
+    return;
+  }
+  if (!StageOf(submitted_kind_).brings_prerequisites) {
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "INPUT_MISSING",
+                       "{} needs {}; add the {} job of this scene to spec.inputs",
+                       for_kind,
+                       artifact,
+                       provider);
+  }
+  Add(StageSpec(provider));
+  job->inputs.push_back(planned_.at(provider));
+}
+
+void GraphBuilder::LinkIfThere(const std::string& provider, NewJob* job) const {
+  const auto planned = planned_.find(provider);
+  const auto given = given_.find(provider);
+  if (planned != planned_.end()) {
+    const int index = planned->second;
+    if (graph_.jobs[static_cast<size_t>(index)].skip_reason.empty()) job->inputs.push_back(index);
+  } else if (given != given_.end() &&
+             (!IsFinished(given->second.state) || given->second.state == JobState::kSucceeded)) {
+    job->input_jobs.push_back(given->second.name);
+  }
+}
+
+void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
+  NewJob job;
+  job.kind = KindOf(spec);
+  if (submitted_.has_colorize_scene() && given_.contains(job.kind)) return;
+  job.skip_reason = skip_reason;
+  const Stage& stage = StageOf(job.kind);
+  std::set<std::string> linked;  // a stage may read several artifacts of one other
+  for (const char* artifact : stage.needs) {
+    if (linked.insert(ProviderOf(artifact)).second) Provide(artifact, job.kind, &job);
+  }
+  for (const char* artifact : stage.reads) {
+    const std::string provider = ProviderOf(artifact);
+    if (linked.insert(provider).second) LinkIfThere(provider, &job);
+  }
+  fill_unset_(&spec);
+  job.spec = DeterministicBytes(spec);
+  for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
+  planned_[job.kind] = static_cast<int>(graph_.jobs.size());
+  graph_.jobs.push_back(std::move(job));
+}
+
+void GraphBuilder::AddParent() {
+  NewJob parent;
+  parent.kind = submitted_kind_;
+  v1::JobSpec spec = submitted_;
+  spec.set_seed(SeedOf(submitted_));
+  parent.spec = DeterministicBytes(spec);
+  for (size_t i = 0; i < graph_.jobs.size(); ++i) parent.inputs.push_back(static_cast<int>(i));
+  for (const auto& [kind, job] : given_) parent.input_jobs.push_back(job.name);
+  for (const FileDigest& digest : SpecBlobs(spec)) parent.blobs.push_back(digest.sha256);
+  graph_.jobs.push_back(std::move(parent));
+}
+
+}  // namespace color3d

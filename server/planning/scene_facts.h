@@ -1,0 +1,17 @@
+// What the planner knows of a scene before it is imported.
+#pragma once
+
+#include <string_view>
+
+namespace color3d {
+
+// Pictures in colour that the user gives for the colorizer to learn from: no photos of the scene.
+inline bool IsAugmentFile(std::string_view path) { return path.starts_with("augment/"); }
+
+struct SceneFacts {
+  int photos = 0;
+  bool has_poses = false;
+  int augment_files = 0;
+};
+
+}  // namespace color3d

@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include "tests/support/rpc_fixture.h"
+
+namespace color3d::testing {
+namespace {
+using ByteStreamServiceTest = RpcTest;
+
+TEST_F(ByteStreamServiceTest, UploadResumesAtAnOffset) {
+  const std::string content(100'000, 'x');
+  const v1::Digest digest = DigestOf(content);
+  const std::string resource =
+      "uploads/" + std::string(kUuid) + "/blobs/" + digest.sha256() + "/100000";
+  int64_t committed = 0;
+  ASSERT_TRUE(WriteAt(resource, 0, content.substr(0, 30'000), false, &committed).ok());
+  EXPECT_EQ(committed, 30'000);
+  grpc::ClientContext query_context;
+  google::bytestream::QueryWriteStatusRequest query;
+  query.set_resource_name(resource);
+  google::bytestream::QueryWriteStatusResponse status;
+  ASSERT_TRUE(client_->bytes->QueryWriteStatus(&query_context, query, &status).ok());
+  EXPECT_EQ(status.committed_size(), 30'000);
+  EXPECT_FALSE(status.complete());
+  EXPECT_EQ(ReasonOfStatus(WriteAt(resource, 0, "x", false)), "OFFSET_MISMATCH");
+  ASSERT_TRUE(WriteAt(resource, 30'000, content.substr(30'000), true, &committed).ok());
+  EXPECT_EQ(committed, 100'000);
+  EXPECT_EQ(client_->Download(digest), content);
+  ASSERT_TRUE(WriteAt(resource, 0, "x", false, &committed).ok()) << "it is there already";
+  EXPECT_EQ(committed, 100'000);
+}
+
+TEST_F(ByteStreamServiceTest, ReadsAnyRange) {
+  const v1::Digest digest = client_->Upload("0123456789");
+  const auto read = [&](int64_t offset, int64_t limit, std::string* content) {
+    grpc::ClientContext context;
+    google::bytestream::ReadRequest request;
+    request.set_resource_name("blobs/" + digest.sha256() + "/10");
+    request.set_read_offset(offset);
+    request.set_read_limit(limit);
+    auto stream = client_->bytes->Read(&context, request);
+    google::bytestream::ReadResponse response;
+    content->clear();
+    while (stream->Read(&response)) *content += response.data();
+    return stream->Finish();
+  };
+  std::string content;
+  EXPECT_TRUE(read(3, 4, &content).ok());
+  EXPECT_EQ(content, "3456");
+  EXPECT_TRUE(read(8, 0, &content).ok());
+  EXPECT_EQ(content, "89");
+  EXPECT_TRUE(read(10, 0, &content).ok());
+  EXPECT_EQ(content, "");
+  EXPECT_EQ(read(11, 0, &content).error_code(), grpc::StatusCode::OUT_OF_RANGE);
+  EXPECT_EQ(read(-1, 0, &content).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+TEST_F(ByteStreamServiceTest, CorruptUploadIsRefusedAndAbsent) {
+  const v1::Digest digest = DigestOf("right");
+  const std::string resource = "uploads/u/blobs/" + digest.sha256() + "/5";
+  const grpc::Status status = WriteAt(resource, 0, "wrong", true);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(ReasonOfStatus(status), "DIGEST_MISMATCH");
+  v1::FindMissingBlobsRequest request;
+  *request.add_digests() = digest;
+  *request.add_digests() = client_->Upload("there");
+  *request.add_digests() = digest;
+  grpc::ClientContext context;
+  v1::FindMissingBlobsResponse response;
+  ASSERT_TRUE(client_->blobs->FindMissingBlobs(&context, request, &response).ok());
+  ASSERT_EQ(response.missing_size(), 1) << "once, although named twice";
+  EXPECT_EQ(response.missing(0).sha256(), digest.sha256());
+}
+
+TEST_F(ByteStreamServiceTest, HostileResourceNames) {
+  for (const char* resource : {"", "uploads/../blobs/x/1", "blobs/x", "uploads/u/blobs/zz/-1"}) {
+    EXPECT_EQ(WriteAt(resource, 0, "x", false).error_code(), grpc::StatusCode::INVALID_ARGUMENT)
+        << resource;
+  }
+}
+
+}  // namespace
+}  // namespace color3d::testing

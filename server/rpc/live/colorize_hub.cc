@@ -1,0 +1,247 @@
+#include "server/rpc/live/colorize_hub.h"
+
+#include <deque>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "server/rpc/convert.h"
+#include "server/rpc/live/colorize_request.h"
+#include "server/service_error.h"
+
+namespace color3d {
+
+// One stream. What to do next is decided under the mutex and done outside it, for gRPC may call
+// back on the same thread; the flags `reading_`, `starting_read_`, `writing_` and `finished_` mark
+// what is decided.
+class ColorizeStream final
+    : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>,
+      public std::enable_shared_from_this<ColorizeStream> {
+ public:
+  ColorizeStream(ColorizeHub& hub, grpc::CallbackServerContext* context)
+      : hub_(hub), parts_(hub.parts_), deadline_(context->deadline()) {}
+
+  // Takes no more pictures, answers those that are here, then ends with `status`.
+  void End(const grpc::Status& status) {
+    {
+      std::lock_guard lock(mutex_);
+      if (!end_) end_ = status;
+    }
+    Pump();
+  }
+
+  void Pump() {
+    const auto self = shared_from_this();
+    while (true) {
+      switch (Decide()) {
+        case Step::kNothing:
+          return;
+        case Step::kRead: {
+          StartRead(&incoming_);
+          std::lock_guard lock(mutex_);
+          starting_read_ = false;
+          break;
+        }
+        case Step::kWrite:
+          StartWrite(&outgoing_);
+          break;
+        case Step::kFinish:
+          return Finish(last_status_);
+      }
+    }
+  }
+
+  void OnReadDone(bool ok) override {
+    std::shared_ptr<Picture> picture;
+    {
+      std::lock_guard lock(mutex_);
+      reading_ = false;
+      if (!ok) {
+        if (!end_) end_ = grpc::Status::OK;  // the client has sent all
+      } else if (!end_) {
+        picture = std::make_shared<Picture>();
+        picture->hold = hub_.client_.Hold();
+        picture->request.Swap(&incoming_);
+        pictures_.insert(picture);
+        ++hub_.pictures_;
+      }
+    }
+    if (picture) {
+      parts_.executor.Post([self = shared_from_this(), picture] { self->Forward(picture); });
+    }
+    Pump();
+  }
+
+  void OnWriteDone(bool ok) override {
+    {
+      std::lock_guard lock(mutex_);
+      writing_ = false;
+      --hub_.pictures_;
+    }
+    ok ? Pump() : Abandon();
+  }
+  void OnCancel() override { Abandon(); }
+  void OnDone() override { hub_.Unregister(this); }
+
+ private:
+  enum class Step { kNothing, kRead, kWrite, kFinish };
+  struct Picture {
+    std::shared_ptr<void> hold;  // on the worker, until the picture is answered
+    v1::ColorizeImagesRequest request;
+    v1::ColorizeImagesResponse response;
+    std::shared_ptr<InferenceClient::Call> call = std::make_shared<InferenceClient::Call>();
+  };
+
+  Step Decide() {
+    std::lock_guard lock(mutex_);
+    if (finished_) return Step::kNothing;
+    if (!writing_ && !replies_.empty()) {
+      outgoing_ = std::move(replies_.front());
+      replies_.pop_front();
+      writing_ = true;
+      return Step::kWrite;
+    }
+    if (end_ && !writing_ && !starting_read_ && pictures_.empty()) {
+      finished_ = true;
+      last_status_ = *end_;
+      return Step::kFinish;
+    }
+    const size_t held = pictures_.size() + replies_.size() + (writing_ ? 1 : 0);
+    const bool room = held == 0 || (held < static_cast<size_t>(hub_.limits_.window) &&
+                                    hub_.pictures_.load() < hub_.limits_.max_pictures);
+    if (end_ || reading_ || !room) return Step::kNothing;
+    reading_ = true;
+    starting_read_ = true;
+    return Step::kRead;
+  }
+
+  // On the executor.
+  void Forward(const std::shared_ptr<Picture>& picture) {
+    const grpc::Status status = Guard([&] {
+      ResolveColorizeRequest(
+          parts_, &picture->request, &picture->call->request, &picture->response);
+    });
+    if (!status.ok()) return Answer(picture, status);
+    hub_.client_.Start(
+        picture->call, deadline_, [self = shared_from_this(), picture](const grpc::Status& end) {
+          self->Answer(picture, end);
+        });
+  }
+
+  void Answer(const std::shared_ptr<Picture>& picture, const grpc::Status& status) {
+    v1::ColorizeImagesResponse& response = picture->response;
+    response.set_request_id(picture->request.request_id().substr(0, 128));
+    if (status.ok()) {
+      internal::v1::ColorizeImageResponse& answer = picture->call->response;
+      response.mutable_image()->swap(*answer.mutable_image());
+      if (!answer.image_sha256().empty()) {
+        *response.mutable_image_digest() =
+            ToProto(FileDigest{answer.image_sha256(), answer.image_size_bytes()});
+      }
+      response.set_encoder_digest(answer.encoder_digest());
+      response.set_batch_size(answer.batch_size());
+    } else if (!response.mutable_error()->ParseFromString(status.error_details()) ||
+               response.error().code() == 0) {
+      response.mutable_error()->set_code(status.error_code());
+      response.mutable_error()->set_message(status.error_message());
+    }
+    {
+      std::lock_guard lock(mutex_);
+      pictures_.erase(picture);
+      if (abandoned_) {
+        --hub_.pictures_;
+      } else {
+        replies_.push_back(std::move(response));
+      }
+    }
+    Pump();
+  }
+
+  // Nobody reads any more: what is under way is cancelled, what is done is thrown away.
+  void Abandon() {
+    std::vector<std::shared_ptr<Picture>> under_way;
+    {
+      std::lock_guard lock(mutex_);
+      abandoned_ = true;
+      end_ = grpc::Status::CANCELLED;
+      hub_.pictures_ -= static_cast<int>(replies_.size());
+      replies_.clear();
+      under_way.assign(pictures_.begin(), pictures_.end());
+    }
+    for (const auto& picture : under_way) picture->call->context.TryCancel();
+    Pump();
+  }
+
+  ColorizeHub& hub_;
+  const RpcParts& parts_;
+  const std::chrono::system_clock::time_point deadline_;
+  v1::ColorizeImagesRequest incoming_;
+  v1::ColorizeImagesResponse outgoing_;
+
+  std::mutex mutex_;
+  bool reading_ = false;
+  bool starting_read_ = false;
+  bool writing_ = false;
+  bool abandoned_ = false;
+  bool finished_ = false;
+  grpc::Status last_status_;         // set once, when finished_ is
+  std::optional<grpc::Status> end_;  // how the stream will end; no more pictures are taken
+  std::set<std::shared_ptr<Picture>> pictures_;  // under way
+  std::deque<v1::ColorizeImagesResponse> replies_;
+};
+
+namespace {
+
+// A stream that is over before it begins.
+class RefusedStream final
+    : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse> {
+ public:
+  explicit RefusedStream(const grpc::Status& status) { Finish(status); }
+  void OnDone() override { delete this; }
+};
+
+grpc::Status NoWorkerStatus() {
+  return ToGrpcStatus(ServiceError(ErrorCode::kFailedPrecondition,
+                                   "NO_INFERENCE_WORKER",
+                                   "this server has no inference worker: install color3d-worker "
+                                   "beside color3d-server and start it anew"));
+}
+
+}  // namespace
+
+ColorizeHub::ColorizeHub(const RpcParts& parts, InferenceLink link, ColorizeLimits limits)
+    : parts_(parts), client_(std::move(link)), limits_(limits) {}
+
+grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* ColorizeHub::Open(
+    grpc::CallbackServerContext* context) {
+  if (!client_.available()) return new RefusedStream(NoWorkerStatus());
+  client_.WarmUp();
+  const auto stream = std::make_shared<ColorizeStream>(*this, context);
+  {
+    std::lock_guard lock(mutex_);
+    if (draining_) return new RefusedStream(DrainingStatus());
+    if (streams_.size() >= static_cast<size_t>(limits_.max_streams)) {
+      return new RefusedStream(OverloadedStatus());
+    }
+    streams_.insert(stream);
+  }
+  stream->Pump();
+  return stream.get();
+}
+
+void ColorizeHub::Drain() {
+  std::set<std::shared_ptr<ColorizeStream>> streams;
+  {
+    std::lock_guard lock(mutex_);
+    draining_ = true;
+    streams = streams_;
+  }
+  for (const auto& stream : streams) stream->End(DrainingStatus());
+}
+
+void ColorizeHub::Unregister(ColorizeStream* stream) {
+  std::lock_guard lock(mutex_);
+  streams_.erase(stream->shared_from_this());
+}
+
+}  // namespace color3d

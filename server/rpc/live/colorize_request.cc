@@ -1,0 +1,120 @@
+#include "server/rpc/live/colorize_request.h"
+
+#include "core/base/utf8.h"
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
+#include "server/rpc/convert.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+constexpr size_t kMaxImageBytes = 3 << 20;
+constexpr size_t kMaxRequestIdBytes = 128;
+constexpr int kMinSidePx = 16;
+constexpr int kMaxSidePx = 8192;
+
+std::string RequireBlob(const RpcParts& parts, const v1::Digest& digest, const std::string& field) {
+  const FileDigest blob = FromProto(digest);
+  if (!parts.blobs.Touch(blob)) {
+    throw ServiceError(
+        ErrorCode::kNotFound,
+        "BLOB_MISSING",
+        "{} names the blob {}, which is not stored with {} bytes; upload it and try again",
+        field,
+        blob.sha256,
+        blob.size_bytes);
+  }
+  return blob.sha256;
+}
+
+void TakePicture(const RpcParts& parts,
+                 v1::ColorizeImagesRequest* request,
+                 internal::v1::ColorizeImageRequest* call) {
+  if (request->image().empty() == !request->has_image_digest()) {
+    throw InvalidArgument("a picture is given by one of image and image_digest");
+  }
+  if (request->image().size() > kMaxImageBytes) {
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "IMAGE_TOO_LARGE",
+                       "image has {} bytes, at most 3 MiB are allowed; upload it as a blob and "
+                       "send its image_digest",
+                       request->image().size());
+  }
+  if (request->has_image_digest()) {
+    call->set_image_sha256(RequireBlob(parts, request->image_digest(), "image_digest"));
+  } else {
+    call->mutable_image()->swap(*request->mutable_image());
+  }
+  const int side = request->max_side_px();
+  if (side != 0 && (side < kMinSidePx || side > kMaxSidePx)) {
+    throw InvalidArgument(
+        "max_side_px is {}; the range is 16 to 8192, or 0 for the picture's own size", side);
+  }
+  call->set_max_side_px(side);
+}
+
+ColorizerRecord NewestOf(const RpcParts& parts, const std::string& scene) {
+  CheckName(scene, "scenes");
+  const auto newest = parts.store.ListColorizers(scene, 0, 1);
+  if (!newest.empty()) return newest[0];
+  parts.store.GetScene(scene);  // says so when there is no such scene
+  throw ServiceError(
+      ErrorCode::kNotFound,
+      "COLORIZER_NOT_FOUND",
+      "{} has no colorizer yet: run a {} or a {} job of it first, or send a coloured "
+      "picture as `example`",
+      scene,
+      kind::kPersonalize,
+      kind::kColorizeScene);
+}
+
+ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesRequest& request) {
+  if (request.colorizer().empty()) return NewestOf(parts, request.scene());
+  CheckName(request.colorizer(), "colorizers");
+  ColorizerRecord record =
+      parts.store.GetColorizer(request.colorizer().substr(request.colorizer().find('/') + 1));
+  if (!request.scene().empty() && request.scene() != record.scene) {
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "OTHER_SCENE",
+                       "{} was made for {}, not for {}; leave out one of the two",
+                       request.colorizer(),
+                       record.scene,
+                       CleanUtf8(request.scene(), 200));
+  }
+  return record;
+}
+
+// Which weights it was trained with. They may have changed since: the worker compares digests.
+std::string EncoderOf(const RpcParts& parts, const ColorizerRecord& record) {
+  return ParseSpec(parts.store.GetJob(record.job).spec, record.job).personalize().encoder();
+}
+
+}  // namespace
+
+void ResolveColorizeRequest(const RpcParts& parts,
+                            v1::ColorizeImagesRequest* request,
+                            internal::v1::ColorizeImageRequest* call,
+                            v1::ColorizeImagesResponse* response) {
+  if (request->request_id().size() > kMaxRequestIdBytes) {
+    throw InvalidArgument("request_id has {} bytes; at most 128 are allowed",
+                          request->request_id().size());
+  }
+  response->set_request_id(request->request_id());
+  const bool trained = !request->colorizer().empty() || !request->scene().empty();
+  if (trained == request->has_example()) {
+    throw InvalidArgument("name what colours the picture: a colorizer, a scene, or an example");
+  }
+  TakePicture(parts, request, call);
+  if (request->has_example()) {
+    call->set_example_sha256(RequireBlob(parts, request->example(), "example"));
+    return;
+  }
+  const ColorizerRecord record = FindColorizer(parts, *request);
+  response->set_colorizer("colorizers/" + record.digest.sha256);
+  response->set_scene(record.scene);
+  call->set_colorizer_sha256(record.digest.sha256);
+  call->set_encoder(EncoderOf(parts, record));
+}
+
+}  // namespace color3d

@@ -1,0 +1,73 @@
+#include "server/rpc/live/inference_client.h"
+
+#include <fmt/core.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/rpc/error_mapping.h"
+#include "server/service_error.h"
+
+namespace color3d {
+namespace {
+
+using std::chrono::system_clock;
+
+std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // A worker takes a second or two to start: look for it often.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 100);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 300);
+  // A picture that kills the worker must not be sent to the next one by itself.
+  arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
+  return grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
+}
+
+// Statuses without details are the transport's, not the worker's.
+grpc::Status Explained(const grpc::Status& status, bool our_limit) {
+  if (status.ok() || !status.error_details().empty()) return status;
+  if (status.error_code() == grpc::StatusCode::CANCELLED) return status;
+  const bool late = status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
+  if (late && !our_limit) return status;
+  const std::string what =
+      late
+          ? "the inference worker did not answer in time (it is busy, or cannot start: see its log)"
+          : fmt::format("the inference worker ended before it had coloured this picture ({})",
+                        status.error_message());
+  return ToGrpcStatus(
+      ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", "{}; send the picture again", what));
+}
+
+}  // namespace
+
+InferenceClient::InferenceClient(InferenceLink link) : link_(std::move(link)) {
+  if (link_.target.empty()) return;
+  stub_ = internal::v1::InferenceService::NewStub(MakeChannel(link_.target));
+}
+
+void InferenceClient::WarmUp() const {
+  if (stub_ && link_.demand) link_.demand();
+}
+
+void InferenceClient::Start(const std::shared_ptr<Call>& call,
+                            system_clock::time_point deadline,
+                            std::function<void(const grpc::Status&)> done) const {
+  WarmUp();
+  const system_clock::time_point limit = system_clock::now() + link_.limit;
+  const bool our_limit = limit < deadline;
+  call->context.set_deadline(std::min(limit, deadline));
+  call->context.set_wait_for_ready(true);
+  stub_->async()->ColorizeImage(
+      &call->context,
+      &call->request,
+      &call->response,
+      [call, our_limit, done = std::move(done)](const grpc::Status& status) {
+        done(Explained(status, our_limit));
+      });
+}
+
+}  // namespace color3d

@@ -1,0 +1,30 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/ops/address.h"
+#include "tests/support/rpc_fixture.h"
+
+namespace color3d::testing {
+namespace {
+using ::testing::HasSubstr;
+using RpcServerTest = RpcTest;
+
+TEST_F(RpcServerTest, BusyAddressIsExplained) {
+  RpcServerOptions options;
+  options.listen = server_->address();
+  try {
+    RpcServer second(options, store_, blobs_, uploads_, SystemClock());
+    FAIL() << "two servers on one port";
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("in use"));
+    EXPECT_THAT(e.what(), HasSubstr("--listen"));
+  }
+  EXPECT_TRUE(IsLoopback("127.0.0.1:1"));
+  EXPECT_TRUE(IsLoopback("[::1]:1"));
+  EXPECT_TRUE(IsLoopback("unix:color3d.sock"));
+  EXPECT_FALSE(IsLoopback("0.0.0.0:1"));
+  EXPECT_THROW(IsLoopback("nonsense"), Error);
+}
+
+}  // namespace
+}  // namespace color3d::testing

@@ -1,0 +1,87 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/rpc_fixture.h"
+
+namespace color3d::testing {
+namespace {
+using ::testing::HasSubstr;
+using SceneValidationTest = RpcTest;
+
+TEST_F(SceneValidationTest, CommitChecksEveryFile) {
+  v1::Scene scene;
+  grpc::Status status = Commit({{"a.png", TinyPng()},
+                                {"b.jpg", "no image"},
+                                {"c.png", TinyPng().substr(0, 40)},
+                                {"d.tif", "missing"}},
+                               &scene);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(ReasonOfStatus(status), "SCENE_INVALID");
+  const google::rpc::BadRequest bad = BadRequestOf(status);
+  ASSERT_EQ(bad.field_violations_size(), 3);
+  EXPECT_EQ(bad.field_violations(0).field(), "b.jpg");
+  EXPECT_THAT(status.error_message(), HasSubstr("b.jpg"));
+  EXPECT_THAT(status.error_message(), HasSubstr("was not uploaded"));
+  status = Commit({{"a.png", TinyPng()}}, &scene);
+  EXPECT_THAT(status.error_message(), HasSubstr("one photograph"));
+  status = Commit({{"notes.txt", "hello"}}, &scene);
+  EXPECT_THAT(status.error_message(), HasSubstr("no photographs"));
+  EXPECT_EQ(Commit({{"../a.png", TinyPng()}}, &scene).error_code(),
+            grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(Commit({{"a", "1"}, {"a/b", "2"}}, &scene).error_code(),
+            grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+TEST_F(SceneValidationTest, ManyBadFilesFitIntoTheStatus) {
+  std::vector<std::pair<std::string, std::string>> files;
+  for (int i = 0; i < 300; ++i) {
+    files.push_back({"a/rather/long/path/for/a/photograph/" + std::to_string(i) + ".jpg", "bad"});
+  }
+  v1::Scene scene;
+  const grpc::Status status = Commit(files, &scene);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("and 297 more"));
+}
+
+TEST_F(SceneValidationTest, PicturesInAugmentAreCheckedButNoPhotos) {
+  v1::Scene scene;
+  ASSERT_TRUE(
+      Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"augment/c.png", TinyPng()}}, &scene)
+          .ok());
+  EXPECT_EQ(scene.photo_count(), 2);
+  const grpc::Status status = Commit({{"a.png", TinyPng()},
+                                      {"b.png", TinyPng()},
+                                      {"augment/c.png", "no image"},
+                                      {"augment/notes.txt", "hello"}},
+                                     &scene);
+  const google::rpc::BadRequest bad = BadRequestOf(status);
+  ASSERT_EQ(bad.field_violations_size(), 2);
+  EXPECT_EQ(bad.field_violations(1).field(), "augment/notes.txt");
+}
+
+TEST_F(SceneValidationTest, LayoutsAreRecognised) {
+  v1::Scene scene;
+  ASSERT_TRUE(Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);
+  EXPECT_EQ(scene.photo_count(), 2);
+  EXPECT_EQ(scene.state(), v1::Scene::STATE_ACTIVE);
+  std::vector<std::pair<std::string, std::string>> files = {{"images/a.png", TinyPng()},
+                                                            {"images/b.png", TinyPng()},
+                                                            {"sparse/0/cameras.bin", "1"},
+                                                            {"sparse/0/images.bin", "2"}};
+  const grpc::Status status = Commit(files, &scene);
+  EXPECT_THAT(status.error_message(), HasSubstr("not whole"));
+  files.push_back({"sparse/0/points3D.bin", "3"});
+  ASSERT_TRUE(Commit(files, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_COLMAP);
+  const std::string json = R"({"frames": [{"file_path": "a.png"}]})";
+  ASSERT_TRUE(
+      Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"transforms.json", json}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_TRANSFORMS);
+  EXPECT_THAT(Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"transforms.json", "{"}}, &scene)
+                  .error_message(),
+              HasSubstr("transforms.json"));
+}
+
+}  // namespace
+}  // namespace color3d::testing

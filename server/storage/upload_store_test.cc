@@ -1,0 +1,81 @@
+#include "server/storage/upload_store.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/storage_fixture.h"
+
+namespace color3d {
+namespace {
+using UploadStoreTest = StorageTest;
+
+TEST_F(UploadStoreTest, UploadResumesWhereItStopped) {
+  const UploadName name{"3f0c", DigestOf("hello world")};
+  EXPECT_EQ(uploads_.Status(name).committed_size, 0);
+  {
+    auto writer = uploads_.Open(name, 0);
+    writer->Append(0, "hello");
+  }  // the connection breaks
+  EXPECT_EQ(uploads_.Status(name).committed_size, 5);
+  EXPECT_EQ(ReasonThrown([&] { uploads_.Open(name, 0); }), "OFFSET_MISMATCH");
+  auto writer = uploads_.Open(name, 5);
+  writer->Append(5, " wor");
+  EXPECT_EQ(ReasonThrown([&] { writer->Append(8, "ld"); }), "OFFSET_MISMATCH");
+  EXPECT_EQ(ReasonThrown([&] { writer->Finish(); }), "SIZE_MISMATCH");
+  writer->Append(9, "ld");
+  EXPECT_EQ(ReasonThrown([&] { writer->Append(11, "!"); }), "SIZE_MISMATCH");
+  writer->Finish();
+  EXPECT_TRUE(uploads_.Status(name).complete);
+  EXPECT_EQ(ReadFile(blobs_.Fetch(name.digest.sha256)), "hello world");
+  EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());
+}
+
+TEST_F(UploadStoreTest, WrongBytesAreDropped) {
+  const UploadName name{"u", DigestOf("right")};
+  auto writer = uploads_.Open(name, 0);
+  writer->Append(0, "wrong");
+  EXPECT_EQ(ReasonThrown([&] { writer->Finish(); }), "DIGEST_MISMATCH");
+  writer.reset();
+  EXPECT_FALSE(blobs_.Touch(name.digest));
+  EXPECT_EQ(uploads_.Status(name).committed_size, 0) << "starts afresh";
+}
+
+TEST_F(UploadStoreTest, ReconnectedClientTakesItsUploadOver) {
+  const UploadName name{"u", DigestOf("abcdef")};
+  auto first = uploads_.Open(name, 0);
+  first->Append(0, "abc");
+  auto second = uploads_.Open(name, 3);
+  EXPECT_EQ(ReasonThrown([&] { first->Append(3, "xyz"); }), "UPLOAD_TAKEN_OVER");
+  first.reset();
+  second->Append(3, "def");
+  second->Finish();
+  EXPECT_TRUE(blobs_.Touch(name.digest));
+}
+
+TEST_F(UploadStoreTest, HostileNamesAndSizesAreRefused) {
+  EXPECT_THROW(uploads_.Open({"../../x", DigestOf("a")}, 0), Error);
+  EXPECT_THROW(uploads_.Open({"", DigestOf("a")}, 0), Error);
+  EXPECT_THROW(uploads_.Open({"u", {"zz", 1}}, 0), Error);
+  EXPECT_THROW(uploads_.Open({"u", {Sha256Hex("a"), -1}}, 0), Error);
+  EXPECT_THROW(uploads_.Open({"u", {Sha256Hex("a"), 1001}}, 0), Error);
+  EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());
+}
+
+TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
+  const UploadName name{"u", DigestOf("abc")};
+  uploads_.Open(name, 0)->Append(0, "a");
+  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)), 0);
+  for (const std::string& file : ListFiles(scratch_.path() / "uploads")) {
+    MakeOld(scratch_.path() / "uploads" / file, 25);
+  }
+  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)), 1);
+  EXPECT_EQ(uploads_.Status(name).committed_size, 0);
+}
+
+TEST_F(UploadStoreTest, EmptyBlobs) {
+  const UploadName name{"u", DigestOf("")};
+  uploads_.Open(name, 0)->Finish();
+  EXPECT_TRUE(uploads_.Status(name).complete);
+}
+
+}  // namespace
+}  // namespace color3d

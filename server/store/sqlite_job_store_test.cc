@@ -1,0 +1,161 @@
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "server/store/sqlite_db.h"
+#include "tests/support/job_store_fixture.h"
+
+namespace color3d {
+namespace {
+using SqliteJobStoreTest = JobStoreTest;
+
+TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
+  const RequestKey key{"CreateJob", "id-1", "body-1"};
+  const JobRecord first = CreateDiamond(key);
+  EXPECT_EQ(CreateDiamond(key).name, first.name);
+  EXPECT_EQ(store_->ListJobs({}, 0, 100).size(), 4u);
+  EXPECT_EQ(ReasonThrown([&] {
+              CreateDiamond({"CreateJob", "id-1", "other body"});
+            }),
+            "REQUEST_ID_REUSED");
+  EXPECT_NE(CreateDiamond({"CreateJob", "id-2", "body-1"}).name, first.name);
+  // A retry must not happen twice for one request.
+  const JobRecord import = ClaimOne();
+  FailWith(import, ErrorCode::kInternal);
+  const RequestKey retry{"RetryJob", "id-3", "b"};
+  store_->Retry(first.name, false, retry);
+  FailWith(ClaimOne(), ErrorCode::kInternal);
+  EXPECT_EQ(store_->Retry(first.name, false, retry).state, JobState::kFailed);
+}
+
+TEST_F(SqliteJobStoreTest, EqualRequestsAtOnceMakeOneJob) {
+  SqliteJobStore other(scratch_.path() / "jobs.db", [this] { return now_.load(); });
+  const RequestKey key{"CreateJob", "same", "body"};
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  graph.jobs = {Job("single")};
+  std::vector<std::string> names(8);
+  std::vector<std::thread> threads;
+  for (size_t i = 0; i < names.size(); ++i) {
+    threads.emplace_back([&, i] {
+      JobStore& store = i % 2 == 0 ? static_cast<JobStore&>(*store_) : other;
+      names[i] = store.CreateGraph(graph, key, kNoLimit).name;
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const std::string& name : names) EXPECT_EQ(name, names[0]);
+  EXPECT_EQ(store_->ListJobs({}, 0, 100).size(), 1u);
+}
+
+TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
+  const JobRecord root = CreateDiamond();
+  const JobRecord import = ClaimOne();
+  store_.reset();
+  Open();
+  EXPECT_EQ(Child(root, "import").state, JobState::kRunning);
+  Succeed(import);  // the worker lived on
+  EXPECT_EQ(Child(root, "left").state, JobState::kQueued);
+  EXPECT_GT(store_->NewestRevision(), 0);
+}
+
+TEST_F(SqliteJobStoreTest, NewerSchemaIsRefused) {
+  store_.reset();
+  SqliteDatabase(scratch_.path() / "jobs.db").Exec("update schema_version set version=99");
+  EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_VERSION");
+}
+
+// A data directory of version 1 goes on with its scenes.
+TEST_F(SqliteJobStoreTest, StoreOfVersion1IsBroughtUpToDate) {
+  store_.reset();
+  {
+    SqliteDatabase old(scratch_.path() / "jobs.db");
+    old.Exec("alter table scene drop column key_color_job");
+    old.Exec("update schema_version set version=1");
+  }
+  Open();
+  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "");
+  store_.reset();
+  Open();  // and is read as the new version from then on
+  EXPECT_EQ(store_->ListScenes(0, 10).size(), 1u);
+}
+
+TEST_F(SqliteJobStoreTest, GarbageFileIsReportedNotCrashed) {
+  store_.reset();
+  std::filesystem::remove(scratch_.path() / "jobs.db-wal");
+  WriteFileAtomic(scratch_.path() / "jobs.db", std::string(4096, 'x'));
+  EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_CORRUPT");
+}
+
+TEST_F(SqliteJobStoreTest, EventsResumeAndCoalesceProgress) {
+  const JobRecord job = CreateSingle();
+  const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
+  const JobRecord running = ClaimOne();
+  for (int step = 1; step <= 20; ++step) {
+    ProgressRecord progress;
+    progress.step = step;
+    store_->Heartbeat(LeaseOf(running), progress, {}, kLease);
+  }
+  const auto events = store_->EventsSince(0, ids, 100);
+  ASSERT_EQ(events.size(), 3u) << "QUEUED, RUNNING and only the newest progress";
+  EXPECT_EQ(events[0].state, JobState::kQueued);
+  EXPECT_EQ(events[1].state, JobState::kRunning);
+  EXPECT_EQ(events[2].kind, EventKind::kProgress);
+  EXPECT_EQ(store_->GetJob(job.name).revision, events[2].revision);
+  Succeed(running);
+  const auto later = store_->EventsSince(events[1].revision, ids, 100);
+  ASSERT_EQ(later.size(), 1u) << "progress is of no interest once the state has changed";
+  EXPECT_EQ(later[0].state, JobState::kSucceeded);
+  EXPECT_GT(later[0].revision, events[2].revision);
+}
+
+TEST_F(SqliteJobStoreTest, CompactedRevisionsAreReported) {
+  const JobRecord job = CreateSingle();
+  const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
+  Succeed(ClaimOne());
+  const int64_t newest = store_->NewestRevision();
+  store_->Compact(now_ + 1, now_ + 1);
+  EXPECT_EQ(ReasonThrown([&] { store_->EventsSince(0, ids, 10); }), "REVISION_COMPACTED");
+  EXPECT_TRUE(store_->EventsSince(newest, ids, 10).empty());
+  EXPECT_EQ(ReasonThrown([&] { store_->EventsSince(newest + 1, ids, 10); }), "REVISION_COMPACTED");
+  EXPECT_EQ(store_->NewestRevision(), newest);
+}
+
+TEST_F(SqliteJobStoreTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
+  const JobRecord root = CreateDiamond();
+  EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "WRONG_STATE");
+  EXPECT_EQ(ReasonThrown([&] { store_->DeleteScene("scenes/test", {}); }), "SCENE_IN_USE");
+  for (int i = 0; i < 4; ++i) Succeed(ClaimOne());
+  NewGraph reader;
+  reader.scene = "scenes/test";
+  reader.jobs = {Job("reader")};
+  reader.jobs[0].input_jobs = {Child(root, "left").name};
+  const JobRecord own = store_->CreateGraph(reader, {}, kNoLimit);
+  EXPECT_EQ(own.state, JobState::kQueued);
+  EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "WRONG_STATE");
+  Succeed(ClaimOne());
+  const std::string digest = store_->ListChildren(root.name)[1].artifacts.at(0).digest.sha256;
+  EXPECT_EQ(store_->ReferencedBlobs().count(digest), 1u);
+  store_->Delete(root.name, {"DeleteJob", "d", "b"});
+  store_->Delete(root.name, {"DeleteJob", "d", "b"});
+  EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "JOB_NOT_FOUND");
+  EXPECT_EQ(store_->ReferencedBlobs().count(digest), 0u);
+  EXPECT_EQ(store_->ListJobs({}, 0, 10).size(), 1u);
+  store_->DeleteScene("scenes/test", {});
+  EXPECT_EQ(ReasonThrown([&] { store_->GetScene("scenes/test"); }), "SCENE_NOT_FOUND");
+}
+
+TEST_F(SqliteJobStoreTest, ListsArePagedNewestFirst) {
+  const JobRecord root = CreateDiamond();
+  CreateSingle();
+  const auto first = store_->ListJobs({}, 0, 3);
+  ASSERT_EQ(first.size(), 3u);
+  const auto rest = store_->ListJobs({}, first.back().id, 3);
+  ASSERT_EQ(rest.size(), 2u);
+  EXPECT_GT(first.back().id, rest.front().id);
+  EXPECT_EQ(store_->ListJobs({root.name, ""}, 0, 10).size(), 3u);
+  EXPECT_EQ(store_->ListJobs({"", "scenes/test"}, 0, 10).size(), 5u);
+  EXPECT_TRUE(store_->ListJobs({"", "scenes/other"}, 0, 10).empty());
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,174 @@
+// The worker loop with scripted stages, in this process: which jobs run together, and that one's
+// end is not the others'.
+#include "server/worker/worker_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "color3d/v1/job.pb.h"
+#include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
+#include "server/storage/data_folder.h"
+#include "server/store/sqlite_job_store.h"
+
+namespace color3d {
+namespace {
+
+constexpr uint64_t kPoison = 666;
+
+// Each attempt waits a while for company, so that what may run together does.
+class MeetingRunner : public StageRunner {
+ public:
+  StageOutput Run(const StageRun& run,
+                  BlobSource&,
+                  CheckpointStore& checkpoints,
+                  ProgressObserver& progress,
+                  const CancellationToken& cancel) override {
+    std::unique_lock lock(mutex_);
+    ++running_;
+    most_ = std::max(most_, running_);
+    projects_[run.job_name] = run.project;
+    met_.notify_all();
+    met_.wait_for(lock, std::chrono::seconds(3), [&] { return running_ >= wanted; });
+    lock.unlock();
+    if (run.spec.seed() == kPoison) {
+      lock.lock();
+      --running_;
+      throw InvalidArgument("poisoned");
+    }
+    checkpoints.Save("half way of " + run.job_name);
+    progress.OnProgress(1, 1, "done");
+    cancel.ThrowIfCancelled();
+    WriteFileAtomic(run.output_folder / artifact::kColorizer, "of " + run.job_name);
+    lock.lock();
+    --running_;
+    return {{artifact::kColorizer}, {}};
+  }
+
+  int wanted = 3;
+  int most() const { return most_; }
+  const std::map<std::string, std::string>& projects() const { return projects_; }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable met_;
+  int running_ = 0;
+  int most_ = 0;
+  std::map<std::string, std::string> projects_;
+};
+
+class WorkerBatchTest : public testing::Test {
+ protected:
+  WorkerBatchTest() : store_(StoreIn(folder_.path()), SystemClock(), {}) {
+    SceneRecord scene;
+    scene.name = "scenes/test";
+    store_.CreateScene(scene, {});
+    store_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+    options_.data_folder = folder_.path();
+    options_.code_version = "test";
+    options_.poll = std::chrono::milliseconds(20);
+    options_.reserve_mib = 0;
+    options_.recycle_memory_bytes = int64_t{1} << 40;
+  }
+
+  static std::filesystem::path StoreIn(const std::filesystem::path& folder) {
+    PrepareDataFolder(DataPaths(folder));
+    return DataPaths(folder).Store();
+  }
+
+  // A graph of personalize jobs with these seeds (different work) and encoders.
+  JobRecord Submit(const std::vector<uint64_t>& seeds, const std::string& encoder = "") {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    NewJob root;
+    root.kind = kind::kPersonalizeScenes;
+    v1::JobSpec spec;
+    spec.mutable_personalize_scenes();
+    root.spec = spec.SerializeAsString();
+    for (uint64_t seed : seeds) {
+      spec.set_seed(seed);
+      spec.mutable_personalize()->set_encoder(encoder);
+      NewJob job;
+      job.kind = kind::kPersonalize;
+      job.spec = spec.SerializeAsString();
+      root.inputs.push_back(static_cast<int>(graph.jobs.size()));
+      graph.jobs.push_back(job);
+    }
+    graph.jobs.push_back(root);
+    return store_.CreateGraph(graph, {}, 1000);
+  }
+
+  // Runs a worker until the jobs of these graphs have ended.
+  void Work(const std::vector<JobRecord>& roots) {
+    std::atomic<bool> draining{false};
+    std::thread worker([&] { RunWorker(options_, runner_, draining); });
+    std::vector<std::string> names;
+    for (const JobRecord& root : roots) names.push_back(root.name);
+    const auto ids = store_.ResolveWatch(names);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!store_.AllFinished(ids) && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    draining = true;
+    worker.join();
+    EXPECT_TRUE(store_.AllFinished(ids));
+  }
+
+  ScratchFolder folder_;
+  SqliteJobStore store_;
+  WorkerOptions options_;
+  MeetingRunner runner_;
+};
+
+TEST_F(WorkerBatchTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
+  const JobRecord root = Submit({1, kPoison, 2});
+  Work({root});
+  EXPECT_EQ(runner_.most(), 3);
+  int succeeded = 0;
+  for (const JobRecord& job : store_.ListChildren(root.name)) {
+    EXPECT_EQ(runner_.projects().at(job.name), root.name);
+    if (job.state == JobState::kFailed) {
+      EXPECT_EQ(job.error->message, "poisoned");
+      continue;
+    }
+    ++succeeded;
+    EXPECT_EQ(job.state, JobState::kSucceeded);
+    ASSERT_EQ(job.artifacts.size(), 1u);
+    EXPECT_EQ(job.artifacts[0].digest.sha256, Sha256Hex("of " + job.name)) << "another's result";
+    EXPECT_GT(job.usage.peak_memory_bytes, 0);
+  }
+  EXPECT_EQ(succeeded, 2);
+}
+
+TEST_F(WorkerBatchTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
+  options_.batch_scenes = 2;
+  runner_.wanted = 2;
+  std::vector<uint64_t> seeds;
+  for (uint64_t i = 1; i <= 20; ++i) seeds.push_back(i);
+  const JobRecord root = Submit(seeds);
+  Work({root});
+  EXPECT_EQ(runner_.most(), 2);
+  EXPECT_EQ(store_.GetJob(root.name).state, JobState::kSucceeded);
+}
+
+TEST_F(WorkerBatchTest, LittleMemoryMeansNoCompany) {
+  options_.recycle_memory_bytes = 1;
+  runner_.wanted = 1;
+  const JobRecord root = Submit({1, 2});
+  std::atomic<bool> draining{false};
+  // The process would be recycled after each job: twice here, and once for the parent.
+  for (int i = 0; i < 3; ++i) RunWorker(options_, runner_, draining);
+  EXPECT_EQ(runner_.most(), 1);
+  EXPECT_EQ(store_.GetJob(root.name).state, JobState::kSucceeded);
+}
+
+}  // namespace
+}  // namespace color3d

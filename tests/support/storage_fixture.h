@@ -1,0 +1,44 @@
+// Fixture of the storage tests: stores of blobs and uploads in a scratch folder.
+#pragma once
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <ctime>
+#include <string>
+
+#include "core/base/files.h"
+#include "server/service_error.h"
+#include "server/storage/blob_store.h"
+#include "server/storage/upload_store.h"
+
+namespace color3d {
+
+template <typename Body>
+std::string ReasonThrown(const Body& body) {
+  try {
+    body();
+  } catch (const Error& e) {
+    return ReasonOf(e);
+  }
+  return "nothing";
+}
+
+inline void MakeOld(const std::filesystem::path& path, int hours) {
+  timespec times[2] = {};
+  times[0].tv_sec = times[1].tv_sec = ::time(nullptr) - hours * 3600;
+  ASSERT_EQ(::utimensat(AT_FDCWD, path.c_str(), times, 0), 0);
+}
+
+class StorageTest : public ::testing::Test {
+ protected:
+  FileDigest DigestOf(const std::string& text) {
+    return {Sha256Hex(text), static_cast<int64_t>(text.size())};
+  }
+  ScratchFolder scratch_;
+  BlobStore blobs_{scratch_.path() / "blobs", {0}};
+  UploadStore uploads_{scratch_.path() / "uploads", blobs_, 1000};
+};
+
+}  // namespace color3d
