@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/color/lab.h"
 #include "core/keycolor/hints/hints.h"
 
 namespace color3d {
