@@ -92,5 +92,44 @@ forbid 'grpc|google/protobuf|color3d/v1|sqlite3|spdlog' core
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base core/simd core/grid
 
+# public FOLDER HEADER...: what the product outside of FOLDER may include of it; the rest is its own.
+# (Tests and benchmarks look inside.)
+public() {
+  local folder=$1 known bad
+  shift
+  known=$(printf '%s|' "$@")
+  bad=$(grep -rnE "#include \"$folder/" core server client deploy --include='*.h' --include='*.cc' |
+    grep -vE "^($folder/|[^:]*_test\.cc:)" |
+    grep -vE "#include \"$folder/(${known%|})\.h\"" || true)
+  [ -z "$bad" ] || complain "these headers are $folder's own:" "$bad"
+}
+
+public core/augment augment outpaint surrogates
+public core/carry carry carry_views plane_sweep view_color
+public core/colorizer colorizer scene_batch scene_colorizers
+public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
+  weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
+  embedded/embedded_weights
+public core/grid edge_weights grid_solver
+public core/image codec draw guided_upsample local_features optical_flow plane_sampling reduced \
+  probe/focal_length probe/orientation probe/probe
+public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
+  external/script hints/hints references/reference words/prompt
+public core/keyview collect_features coverage next_key_view select tracks view_features
+public core/metrics scene_consistency view_scores
+public core/report contact_sheet curves report_page scene_plan
+public core/scene camera import scene view_images
+public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
+  geometry/geometry_options geometry/geometry_trainer chroma/chroma_fit chroma/chroma_options \
+  export/export export/rgb_refine
+public core/stage stages formats/artifacts
+public core/weights byte_source safetensors weight_file weight_map weight_reader
+public server/backends backend_address backend_prober grpc_colorizer
+public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
+public server/rpc error_mapping rpc_server
+public server/storage blob_store data_folder upload_store
+public server/store job job_store sqlite_job_store user_models
+public server/worker supervisor
+
 if [ "$failed" -ne 0 ]; then exit 1; fi
 echo "check_layers: ok"

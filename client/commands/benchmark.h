@@ -1,10 +1,10 @@
 // `color3d colorize --benchmark`: what happens before the colorize_scene job.
 #pragma once
 
-#include "client/commands/colorize_options.h"
 #include "client/commands/command.h"
 #include "client/lib/connection.h"
 #include "client/lib/progress_display.h"
+#include "client/options/colorize_options.h"
 
 namespace color3d::client {
 

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "client/commands/benchmark.h"
-#include "client/commands/colorize_options.h"
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
@@ -15,6 +14,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/text.h"
+#include "client/options/colorize_options.h"
 #include "core/catalogue/artifacts.h"
 
 namespace color3d::client {

@@ -8,12 +8,12 @@
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
-#include "client/commands/key_color_flags.h"
 #include "client/commands/key_jobs.h"
 #include "client/commands/results.h"
 #include "client/commands/scene_target.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
+#include "client/options/key_color_flags.h"
 #include "core/base/error.h"
 #include "core/catalogue/artifacts.h"
 

@@ -14,7 +14,6 @@
 namespace color3d {
 namespace {
 
-constexpr int kMinSidePx = 32;
 constexpr int kSearchSidePx = 160;     // the picture's longer side while patches are compared
 constexpr double kPatchShare = 0.12;   // of the longer side
 constexpr double kOverlapShare = 0.3;  // of the patch
@@ -352,10 +351,10 @@ GeneratedPicture OutpaintQuadrant(const Image& lab,
                                   Quadrant quadrant,
                                   uint64_t seed,
                                   const CancellationToken& cancel) {
-  if (lab.channels != 3 || std::min(lab.width, lab.height) < kMinSidePx) {
+  if (lab.channels != 3 || std::min(lab.width, lab.height) < kMinGeneratedSidePx) {
     throw InvalidArgument(
         "outpainting takes a Lab picture of at least {} px each way, got {}x{} with {} channels",
-        kMinSidePx,
+        kMinGeneratedSidePx,
         lab.width,
         lab.height,
         lab.channels);

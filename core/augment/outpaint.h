@@ -12,9 +12,12 @@
 
 namespace color3d {
 
+// Smaller pictures, each way, hold too few patches; nothing is generated from or taken for them.
+inline constexpr int kMinGeneratedSidePx = 32;
+
 enum class Quadrant { kUpperLeft, kUpperRight, kLowerLeft, kLowerRight };
 
-// `lab`: 3 channels, Lab units, at least 32 px each way. Weight 1 on the quadrant,
+// `lab`: 3 channels, Lab units, at least kMinGeneratedSidePx each way. Weight 1 on the quadrant,
 // kRearrangedWeight on what was added. Throws Error{kInvalidArgument} on another picture.
 GeneratedPicture OutpaintQuadrant(const Image& lab,
                                   Quadrant quadrant,

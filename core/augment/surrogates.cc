@@ -15,7 +15,6 @@
 namespace color3d {
 namespace {
 
-constexpr int kMinSidePx = 32;
 constexpr float kMinOpacity = 0.6f;    // below it the rendered depth means nothing
 constexpr double kMinCoverage = 0.25;  // of a picture by the key view
 // The film frame's camera, in median depths.
@@ -67,7 +66,7 @@ Surrogates::Surrogates(const KeyPicture& key,
 
 std::string Surrogates::Obstacle(AugmentationKind kind) const {
   const int width = key_.lab.width, height = key_.lab.height;
-  if (std::min(width, height) < kMinSidePx) {
+  if (std::min(width, height) < kMinGeneratedSidePx) {
     return fmt::format("the key view is too small ({}x{} px)", width, height);
   }
   if (kind != AugmentationKind::kNovelView || median_depth_ > 0.0) return "";

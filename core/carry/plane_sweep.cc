@@ -14,8 +14,7 @@ namespace {
 constexpr int kCensusRadius = 3;  // every second pixel of a 7x7 window
 constexpr int kCensusBits = 24;
 constexpr uint8_t kUnknownCost = 11;  // of a pixel that a source does not show: about chance
-constexpr size_t kMaxSources = 16;
-constexpr int kCostScale = 8;  // fixed point of aggregated costs
+constexpr int kCostScale = 8;         // fixed point of aggregated costs
 
 using Census = std::vector<uint32_t>;
 
@@ -65,7 +64,7 @@ uint8_t CountBits(uint32_t x) {
 
 // Sum of the `kept` smallest of the sources' costs at a pixel.
 int SumOfSmallest(const std::vector<std::vector<uint8_t>>& costs, size_t pixel, size_t kept) {
-  uint8_t smallest[kMaxSources];
+  uint8_t smallest[kMaxSweepSources];
   size_t filled = 0;
   for (const std::vector<uint8_t>& of_source : costs) {
     const uint8_t cost = of_source[pixel];
@@ -276,9 +275,10 @@ DepthMap SweepPlanes(const PosedLuminance& reference,
                      const PlaneSweepOptions& options,
                      const CancellationToken& cancel) {
   options.Validate();
-  if (sources.empty() || sources.size() > kMaxSources) {
-    throw InvalidArgument(
-        "plane sweep compares a view with 1 to {} others, not {}", kMaxSources, sources.size());
+  if (sources.empty() || static_cast<int>(sources.size()) > kMaxSweepSources) {
+    throw InvalidArgument("plane sweep compares a view with 1 to {} others, not {}",
+                          kMaxSweepSources,
+                          sources.size());
   }
   if (!(nearest > 0.0 && farthest > nearest && std::isfinite(farthest))) {
     throw InvalidArgument(

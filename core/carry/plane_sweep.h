@@ -17,6 +17,8 @@ struct PosedLuminance {
   const Image* luminance = nullptr;  // 1 channel, L 0..100
 };
 
+inline constexpr int kMaxSweepSources = 16;
+
 struct PlaneSweepOptions {
   int planes = 96;  // evenly spaced in inverse depth, 8..512
   // Penalties of semi-global matching for a change by one plane and by more, bits of the census;
@@ -33,7 +35,7 @@ struct DepthMap {
   Image confidence;  // 1 channel, 0..1: how clearly the best plane beats all others
 };
 
-// `nearest` and `farthest`: > 0, camera depth. `sources`: 1..16. Throws
+// `nearest` and `farthest`: > 0, camera depth. `sources`: 1..kMaxSweepSources. Throws
 // Error{kInvalidArgument} for an empty range or no source, Error{kCancelled}.
 DepthMap SweepPlanes(const PosedLuminance& reference,
                      const std::vector<PosedLuminance>& sources,

@@ -19,7 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kFeatureSidePx = 384;
-constexpr int kThumbnailSidePx = 260;
 constexpr int kThumbnailQuality = 85;
 constexpr int64_t kCacheBytes = int64_t{256} << 20;
 // Changes with everything that is computed here.

@@ -13,6 +13,8 @@
 
 namespace color3d {
 
+inline constexpr int kThumbnailSidePx = 260;
+
 struct ViewFeatures {
   // More cells tell hardly more; fewer keep 2000 views small.
   static constexpr int kMaxCells = 256;
@@ -23,7 +25,7 @@ struct ViewFeatures {
   // Deep features of up to kMaxCells cells as IEEE half precision, cell after cell. The cells come
   // in an order in which every beginning is spread evenly over the picture.
   std::vector<uint16_t> deep;
-  std::string thumbnail;  // JPEG, for people
+  std::string thumbnail;  // JPEG of at most kThumbnailSidePx, for people
 
   int Cells() const { return channels > 0 ? static_cast<int>(deep.size()) / channels : 0; }
   // Drops all cells but the first `count`.

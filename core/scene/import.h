@@ -33,7 +33,8 @@ struct ImportOptions {
 
 // What structure-from-motion did.
 struct SfmReport {
-  std::string plan;  // which pairs were matched and why, one line
+  std::string plan;           // which pairs were matched and why, one line
+  std::filesystem::path log;  // what COLMAP said, below the scratch folder
   int64_t pairs_tried = 0;
   bool exhaustive = false;  // all pairs were matched
   double photos_seconds = 0.0;

@@ -9,7 +9,7 @@
 #include "core/keyview/next_key_view.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/carry_facts.h"
 #include "core/stage/sources/key_color_sources.h"
@@ -20,6 +20,7 @@ namespace {
 
 constexpr float kCovered = 0.25f;        // confidence from which a pixel counts as covered
 constexpr double kSmallCoverage = 0.01;  // below, the user is told
+constexpr size_t kMaxFurtherKeyViews = 16;
 
 // The user's colours of a further key view, undistorted and reduced.
 CarriedColor ColorOfFurther(const FurtherKeyView& further,
@@ -115,11 +116,13 @@ void Conclude(const Scene& scene,
 
 void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
-  const RangeCheck check("carry_color option");
+  const RangeCheck check("carry option");
   check("depth_side_px", depth_side_px, 64, 2048);
-  check("depth_sources", depth_sources, 1, 16);
-  if (further.size() > 16) {
-    throw InvalidArgument("{} further key views were given; at most 16 are taken", further.size());
+  check("depth_sources", depth_sources, 1, kMaxSweepSources);
+  if (further.size() > kMaxFurtherKeyViews) {
+    throw InvalidArgument("{} further key views were given; at most {} are taken",
+                          further.size(),
+                          kMaxFurtherKeyViews);
   }
   sweep.Validate();
   carry.Validate();

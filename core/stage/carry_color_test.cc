@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/color/lab.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "tests/support/stage_fixture.h"
 

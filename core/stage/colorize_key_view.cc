@@ -1,7 +1,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/key_color_sources.h"
 #include "core/stage/stages.h"
 

@@ -4,7 +4,7 @@
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/key_color_sources.h"
 #include "core/stage/stages.h"
 #include "tests/support/stage_fixture.h"

@@ -9,7 +9,7 @@
 #include "core/report/report_page.h"
 #include "core/report/scene_plan.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
 #include "core/stage/stages.h"

@@ -1,7 +1,7 @@
 #include "core/image/codec.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {

@@ -12,7 +12,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {

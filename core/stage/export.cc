@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/splat/export/rgb_refine.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {

@@ -12,7 +12,7 @@
 #include "core/report/contact_sheet.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/carry_facts.h"
 #include "core/stage/sources/augmentation_sources.h"
 #include "core/stage/stages.h"

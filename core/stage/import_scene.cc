@@ -1,5 +1,5 @@
 #include "core/base/files.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -37,8 +37,9 @@ void RunImportScene(const ImportOptions& options, StageContext& context) {
       result.photos_found, "photos_without_pose", result.photos_found - result.photos_registered);
   context.WriteOutput(artifact::kScene, SceneToJson(result.scene));
   context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
-  const std::filesystem::path log = context.scratch_folder() / artifact::kSfmLog;
-  if (std::filesystem::exists(log)) context.WriteOutput(artifact::kSfmLog, ReadFile(log));
+  if (result.ran_structure_from_motion) {
+    context.WriteOutput(artifact::kSfmLog, ReadFile(result.sfm.log));
+  }
 }
 
 }  // namespace color3d

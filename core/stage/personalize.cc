@@ -8,7 +8,7 @@
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
 #include "core/scene/view_images.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/training_pictures.h"
 #include "core/stage/stages.h"
 

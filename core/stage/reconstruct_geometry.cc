@@ -4,7 +4,7 @@
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/memory_plan.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {

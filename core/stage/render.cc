@@ -5,7 +5,7 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {

@@ -8,14 +8,12 @@
 #include "core/keyview/collect_features.h"
 #include "core/keyview/coverage.h"
 #include "core/keyview/tracks.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/key_view_ranking.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
 namespace {
-
-constexpr int kThumbnailSidePx = 260;
 
 const char* StrategyName(KeyViewStrategy strategy) {
   switch (strategy) {

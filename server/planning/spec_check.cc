@@ -1,10 +1,12 @@
 #include "server/planning/spec_check.h"
 
+#include <fmt/core.h>
 #include <google/protobuf/message.h>
 
 #include <map>
 #include <set>
 
+#include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 #include "proto/option_text.h"
 #include "server/service_error.h"
@@ -175,10 +177,13 @@ void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
     case v1::KeyColorSource::SOURCE_NOT_SET:
       break;
   }
-  Reject(path,
-         " is required: where the key view's colour comes from (image, strokes, points, automatic, "
-         "...). To learn which photo is the key view, first run select_key_view and read its "
-         "artifact key_view.json; `automatic` needs nothing of the user");
+  Reject(
+      path,
+      fmt::format(" is required: where the key view's colour comes from (image, strokes, points, "
+                  "automatic, ...). To learn which photo is the key view, first run {} and read "
+                  "its artifact {}; `automatic` needs nothing of the user",
+                  StageThatLeaves(artifact::kKeyView)->kind,
+                  artifact::kKeyView));
 }
 
 void CheckTruth(const google::protobuf::RepeatedPtrField<v1::TruthImage>& truth,
@@ -218,10 +223,11 @@ void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
 }
 
 void CheckRoutes(const v1::PersonalizeScenesSpec& spec) {
-  if (spec.routes().empty()) Reject("personalize_scenes.routes", " is empty; name a scene");
+  const std::string routes = fmt::format("{}.routes", kind::kPersonalizeScenes);
+  if (spec.routes().empty()) Reject(routes, " is empty; name a scene");
   std::set<std::string> scenes;
   for (int i = 0; i < spec.routes_size(); ++i) {
-    const std::string path = fmt::format("personalize_scenes.routes[{}].scene", i);
+    const std::string path = fmt::format("{}[{}].scene", routes, i);
     const std::string& scene = spec.routes(i).scene();
     if (scene.empty()) Reject(path, " is empty; name a scene");
     if (!scenes.insert(scene).second) {
@@ -236,8 +242,8 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   if (!has_inputs || spec.has_key_color() || in_options) {
     CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
   }
-  if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), "select_key_view");
-  CheckCarryColor(spec.carry_color(), "carry_color");
+  if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
+  CheckCarryColor(spec.carry_color(), kind::kCarryColor);
   CheckTruth(spec.truth(), "truth");
   CheckTraining(spec.training_truth(), !spec.truth().empty(), "training_truth");
 }
@@ -248,7 +254,7 @@ std::string KindOf(const v1::JobSpec& spec) {
   const google::protobuf::OneofDescriptor* stage = spec.GetDescriptor()->FindOneofByName("stage");
   const FieldDescriptor* field = spec.GetReflection()->GetOneofFieldDescriptor(spec, stage);
   if (field == nullptr) {
-    throw InvalidArgument("spec has no stage; set one, e.g. spec.colorize_scene");
+    throw InvalidArgument("spec has no stage; set one, e.g. spec.{}", kind::kColorizeScene);
   }
   return field->name();
 }
@@ -264,16 +270,16 @@ void CheckSpec(const v1::JobSpec& spec) {
   CheckMessage(spec, "");
   if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene(), spec.inputs_size() > 0);
   if (spec.has_colorize_key_view()) {
-    CheckKeyColor(spec.colorize_key_view().source(), "colorize_key_view.source");
+    CheckKeyColor(spec.colorize_key_view().source(), kind + ".source");
   }
-  if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), "carry_color");
-  if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), "select_key_view");
+  if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), kind);
+  if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), kind);
   if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
   if (spec.has_evaluate()) {
-    CheckTruth(spec.evaluate().truth(), "evaluate.truth");
+    CheckTruth(spec.evaluate().truth(), kind + ".truth");
     CheckTraining(spec.evaluate().training_truth(),
                   !spec.evaluate().truth().empty(),
-                  "evaluate.training_truth");
+                  kind + ".training_truth");
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/catalogue/stages.h"
 #include "proto/option_text.h"
 #include "server/service_error.h"
 
@@ -44,7 +45,8 @@ TimeBudget DivideTimeBudget(double seconds, const SceneFacts& facts) {
             std::ceil(fixed),
             facts.has_poses ? "" : " (finding their poses among them)",
             std::ceil(fixed + kMinScheduledSeconds)),
-        {{"spec.colorize_scene.time_budget_seconds", "too short for this scene"}});
+        {{fmt::format("spec.{}.time_budget_seconds", kind::kColorizeScene),
+          "too short for this scene"}});
   }
   return {kGeometryShare * rest, kPersonalizeShare * rest, kChromaShare * rest};
 }

@@ -1,6 +1,5 @@
 #include "server/rpc/info_services.h"
 
-
 #include "core/base/memory.h"
 #include "core/base/utf8.h"
 #include "core/catalogue/stages.h"

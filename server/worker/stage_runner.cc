@@ -5,7 +5,7 @@
 #include "core/catalogue/stages.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/report/curves.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "server/backends/grpc_colorizer.h"
 #include "server/planning/spec_check.h"

@@ -1,5 +1,7 @@
 // The worker loop with scripted stages, in this process: which jobs run together, and that one's
 // end is not the others'.
+#include "server/worker/worker_loop.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +18,6 @@
 #include "core/catalogue/stages.h"
 #include "server/storage/data_folder.h"
 #include "server/store/sqlite_job_store.h"
-#include "server/worker/worker_loop.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 

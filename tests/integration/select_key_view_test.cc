@@ -10,7 +10,7 @@
 #include "core/image/codec.h"
 #include "core/image/reduced.h"
 #include "core/scene/import.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "tests/support/procedural_scene.h"
 #include "tests/support/quiet_run.h"

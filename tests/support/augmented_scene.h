@@ -16,7 +16,7 @@
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {

@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
 #include "server/rpc/rpc_server.h"
 #include "server/store/sqlite_job_store.h"
 #include "tests/support/rpc_support.h"
@@ -37,7 +39,7 @@ class RpcTest : public ::testing::Test {
     while (const auto job = store_.Claim("test-worker", 60'000)) {
       Publication publication;
       publication.artifacts = {{job->kind + ".txt", blobs_.PutBytes(job->name), "text/plain"}};
-      if (job->kind == "personalize") publication.artifacts[0].name = "colorizer.c3c";
+      if (job->kind == kind::kPersonalize) publication.artifacts[0].name = artifact::kColorizer;
       store_.Publish({job->id, job->lease_epoch}, publication);
       ++done;
     }

@@ -121,7 +121,7 @@ TEST_F(TransformsFile, MissingPhotosAreLeftOutWithAWarning) {
                "{\"file_path\":\"images/gone.png\",\"transform_matrix\":[]},");
   WriteFileAtomic(file(), text);
   std::vector<std::string> warnings;
-  EXPECT_EQ(LoadTransformsJson(file(), folder_.path(), &warnings).views.size(), 2u);
+  EXPECT_EQ(ReadTransformsJson(file(), folder_.path(), &warnings).views.size(), 2u);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_THAT(warnings[0], HasSubstr("1 of the 3 photos"));
   EXPECT_THAT(warnings[0], HasSubstr("images/gone.png"));

@@ -264,8 +264,9 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const RunControl& run) {
   RemoveEarlierRun(scratch_folder);
   const SfmWorkspace work{scratch_folder};
-  ColmapProcess colmap(scratch_folder / "sfm.log", options.sfm_timeout, run);
   SfmReport report;
+  report.log = scratch_folder / "sfm.log";
+  ColmapProcess colmap(report.log, options.sfm_timeout, run);
   FeatureImages copies;
   PairPlan plan;
   {

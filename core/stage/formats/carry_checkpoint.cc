@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "core/catalogue/stages.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 
 namespace color3d {
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/image/codec.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 
 namespace color3d {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 
 namespace color3d {
 namespace {

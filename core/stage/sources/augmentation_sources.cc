@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/augment/outpaint.h"
 #include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
@@ -15,7 +16,6 @@ namespace {
 
 constexpr char kFolder[] = "augment/";
 constexpr size_t kMaxFiles = 64;
-constexpr int kMinSidePx = 32;
 constexpr int64_t kMaxAnswerPixels = 16'000'000;
 
 GeneratedPicture PictureOf(const Image& lab) {
@@ -24,9 +24,11 @@ GeneratedPicture PictureOf(const Image& lab) {
 
 // Lab of a picture that must be in colour and of some size.
 Image CheckedLab(const Image& srgb, int max_side_px, const std::string& what) {
-  if (std::min(srgb.width, srgb.height) < kMinSidePx) {
-    throw InvalidArgument(
-        "{} is {} px; at least {} px each way are needed", what, SizeText(srgb), kMinSidePx);
+  if (std::min(srgb.width, srgb.height) < kMinGeneratedSidePx) {
+    throw InvalidArgument("{} is {} px; at least {} px each way are needed",
+                          what,
+                          SizeText(srgb),
+                          kMinGeneratedSidePx);
   }
   if (srgb.channels != 3) throw InvalidArgument("{} is grey, without any colour to learn", what);
   Image lab = LabFromSrgb(FitWithin(srgb, max_side_px));

@@ -14,7 +14,7 @@
 #include "core/image/codec.h"
 #include "core/image/reduced.h"
 #include "core/scene/import.h"
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"

@@ -1,4 +1,4 @@
-#include "client/commands/key_color_flags.h"
+#include "client/options/key_color_flags.h"
 
 #include <filesystem>
 #include <nlohmann/json.hpp>

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "client/commands/key_color_flags.h"
 #include "client/lib/photos/photo_folder.h"
+#include "client/options/key_color_flags.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {

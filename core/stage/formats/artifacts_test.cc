@@ -1,4 +1,4 @@
-#include "core/stage/artifacts.h"
+#include "core/stage/formats/artifacts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "client/commands/option_fields.h"
+#include "client/options/option_fields.h"
 
 #include <fmt/format.h>
 

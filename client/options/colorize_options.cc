@@ -1,11 +1,11 @@
-#include "client/commands/colorize_options.h"
+#include "client/options/colorize_options.h"
 
 #include <fmt/format.h>
 
 #include <map>
 
-#include "client/commands/option_fields.h"
-#include "client/commands/preset_file.h"
+#include "client/options/option_fields.h"
+#include "client/options/preset_file.h"
 #include "core/base/error.h"
 
 namespace color3d::client {

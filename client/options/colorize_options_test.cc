@@ -1,12 +1,12 @@
-#include "client/commands/colorize_options.h"
+#include "client/options/colorize_options.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "client/commands/option_fields.h"
-#include "client/commands/preset_file.h"
+#include "client/options/option_fields.h"
+#include "client/options/preset_file.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 

@@ -1,4 +1,4 @@
-#include "client/commands/preset_file.h"
+#include "client/options/preset_file.h"
 
 #include <fmt/format.h>
 #include <google/protobuf/io/tokenizer.h>
@@ -8,7 +8,7 @@
 #include <regex>
 #include <vector>
 
-#include "client/commands/option_fields.h"
+#include "client/options/option_fields.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "proto/option_text.h"
