@@ -130,6 +130,7 @@ CellMatches MatchCells(const torch::Tensor& queries,
         } else {
           for (int64_t j = 0; j < entries; ++j) add(j);
         }
+        if (nearest[i] == entries) nearest[i] = 0;  // features that are no numbers
         vote.Store(ab + 2 * i, variance + i);
       }
     });

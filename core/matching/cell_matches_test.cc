@@ -3,9 +3,8 @@
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
-#include <algorithm>
-#include <cmath>
-#include <vector>
+#include <cstdint>
+#include <tuple>
 
 #include "core/base/error.h"
 
