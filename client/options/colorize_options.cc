@@ -48,7 +48,7 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
     app.add_option_function<std::string>(
            flag.flag,
            [o, name](const std::string& value) { o->settings.push_back(name + "=" + value); },
-           fmt::format("{}: {}", flag.help, DescribeOption(name)))
+           fmt::format("{} ({})", flag.help, DescribeOption(name)))
         ->check([name](const std::string& value) { return Complaint(name + "=" + value); });
   }
   app.add_option_function<std::vector<std::string>>(
