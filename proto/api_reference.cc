@@ -224,7 +224,9 @@ class Reference {
     }
     for (int i = 0; i < message->enum_type_count(); ++i) {
       const EnumDescriptor* values = message->enum_type(i);
-      text += fmt::format("\n{}: {}\n\n{}", values->name(), Comment(values), Values(values));
+      const std::string comment = Comment(values);
+      text += fmt::format(
+          "\n{}:{}{}\n\n{}", values->name(), comment.empty() ? "" : " ", comment, Values(values));
     }
     for (int i = 0; i < message->nested_type_count(); ++i) {
       text += Section("", message->nested_type(i));

@@ -150,7 +150,7 @@ TEST_F(SqliteJobLeaseTest, JobsOfABatchDoNotOvertakeOtherKinds) {
   EXPECT_TRUE(store_->ClaimForBatch("w", kLease, "personalize", kAnyJob));
 }
 
-TEST_F(SqliteJobLeaseTest, AJobThatAWorkerWasLostWithGetsNoCompany) {
+TEST_F(SqliteJobLeaseTest, AJobThatAWorkerWasLostWithIsNotBatched) {
   store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
   ClaimOne();
   now_ += kLease + 1;

@@ -81,7 +81,7 @@ struct SizedGeometry {
 const std::map<std::string, Method>& Methods() {
   static const std::map<std::string, Method> methods = {
       {"import_scene",
-       MakeMethod<v1::ImportSceneSpec>([](const auto& s) { return ImportOptionsFrom(s, 1); })},
+       MakeMethod<v1::ImportSceneSpec>([](const auto& s) { return ImportOptionsFrom(s); })},
       {"select_key_view", MakeMethod<v1::SelectKeyViewSpec>([](const auto& s) {
          return SelectOptionsFrom(s).selection;
        })},

@@ -1,6 +1,6 @@
-// The seam between the worker loop (leases, blobs, heartbeats) and the method library: the loop
-// prepares files, the runner turns the job's spec into one core stage and leaves its results as
-// files. The only folder of the server that links the method library is server/worker.
+// What the worker loop (leases, blobs, heartbeats) asks of the method library: the loop prepares
+// files, the runner turns the job's spec into one core stage and leaves its results as files. The
+// only folder of the server that links the method library is server/worker.
 #pragma once
 
 #include <filesystem>

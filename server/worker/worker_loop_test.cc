@@ -24,7 +24,7 @@ namespace {
 
 constexpr uint64_t kPoison = 666;
 
-// Each attempt waits a while for company, so that what may run together does.
+// Each attempt waits a while for others, so that what may run together does.
 class MeetingRunner : public StageRunner {
  public:
   StageOutput Run(const StageRun& run,
@@ -65,9 +65,9 @@ class MeetingRunner : public StageRunner {
   std::map<std::string, std::string> projects_;
 };
 
-class WorkerBatchTest : public testing::Test {
+class WorkerLoopTest : public testing::Test {
  protected:
-  WorkerBatchTest() : store_(StoreIn(folder_.path()), SystemClock(), {}) {
+  WorkerLoopTest() : store_(StoreIn(folder_.path()), SystemClock(), {}) {
     SceneRecord scene;
     scene.name = "scenes/test";
     store_.CreateScene(scene, {});
@@ -128,7 +128,7 @@ class WorkerBatchTest : public testing::Test {
   MeetingRunner runner_;
 };
 
-TEST_F(WorkerBatchTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
+TEST_F(WorkerLoopTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
   const JobRecord root = Submit({1, kPoison, 2});
   Work({root});
   EXPECT_EQ(runner_.most(), 3);
@@ -148,7 +148,7 @@ TEST_F(WorkerBatchTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
   EXPECT_EQ(succeeded, 2);
 }
 
-TEST_F(WorkerBatchTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
+TEST_F(WorkerLoopTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
   options_.batch_scenes = 2;
   runner_.wanted = 2;
   std::vector<uint64_t> seeds;
@@ -159,7 +159,7 @@ TEST_F(WorkerBatchTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
   EXPECT_EQ(store_.GetJob(root.name).state, JobState::kSucceeded);
 }
 
-TEST_F(WorkerBatchTest, LittleMemoryMeansNoCompany) {
+TEST_F(WorkerLoopTest, LittleMemoryMeansOneAtATime) {
   options_.recycle_memory_bytes = 1;
   runner_.wanted = 1;
   const JobRecord root = Submit({1, 2});

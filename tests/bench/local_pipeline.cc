@@ -68,7 +68,12 @@ void LocalPipeline::Run(const std::string& kind, const std::function<void(StageC
   CurveRecorder recorder(kind, observer, none);
   CancellationToken cancel;
   const ScratchFolder scratch;
-  StageContext context({scene_folder_, artifacts_, out_folder_, scratch.path(), threads_, seed_},
+  StageContext context({.scene_folder = scene_folder_,
+                        .inputs = artifacts_,
+                        .output_folder = out_folder_,
+                        .scratch_folder = scratch.path(),
+                        .threads = threads_,
+                        .seed = seed_},
                        recorder,
                        recorder,
                        cancel);

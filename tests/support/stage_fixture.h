@@ -23,15 +23,13 @@ class StageTest : public ::testing::Test {
  protected:
   StageContext MakeContext() {
     std::filesystem::create_directories(scratch_.path() / "out");
-    return StageContext({scratch_.path(),
-                         inputs_,
-                         scratch_.path() / "out",
-                         scratch_.path(),
-                         1,
-                         1,
-                         memory_bytes_,
-                         models_,
-                         remote_},
+    return StageContext({.scene_folder = scratch_.path(),
+                         .inputs = inputs_,
+                         .output_folder = scratch_.path() / "out",
+                         .scratch_folder = scratch_.path(),
+                         .memory_bytes = memory_bytes_,
+                         .models = models_,
+                         .remote_colorizers = remote_},
                         *checkpoints_,
                         observer_,
                         cancel_);

@@ -1,5 +1,4 @@
-// How many Gaussians a scene is worth, what training them takes in memory, and how to stay within
-// what there is. Pure functions.
+// What training geometry takes in memory, and how to stay within what there is. Pure functions.
 //
 // Per Gaussian, in floats, with R = 11 + (degree + 1)^2 parameters: parameters and two Adam moments
 // (3R), the last good state (3R), the gradient (R), one copy while densifying (R), a checkpoint
