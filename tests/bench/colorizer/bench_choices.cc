@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
+#include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/metrics/view_scores.h"
