@@ -31,15 +31,6 @@ forbid() {
   bad=$(grep -rnE "#include [<\"]($pattern)" "$@" --include='*.h' --include='*.cc' || true)
   [ -z "$bad" ] || complain "not allowed here:" "$bad"
 }
-# exposes FOLDER REGEX: the product's sources outside of FOLDER include only these headers of it, without
-# their ".h". Tests and benchmarks may look inside.
-exposes() {
-  local bad
-  bad=$(grep -rnE "#include \"$1/" core server client --include='*.h' --include='*.cc' |
-    grep -vE "^$1/|^[^:]*_test\.cc:|#include \"$1/($2)\.h\"" || true)
-  [ -z "$bad" ] || complain "$1 keeps to itself:" "$bad"
-}
-
 allow core/base 'core/base'
 allow core/catalogue 'core/(base|catalogue)'
 allow core/simd 'core/(base|simd)'
@@ -77,13 +68,6 @@ allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(store|planning|storage|ops|rpc)'
 allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
-
-exposes core/colorizer 'colorizer|scene_batch|scene_colorizers'
-exposes core/keycolor/hints 'hints'
-exposes core/keycolor/references 'reference'
-exposes core/keycolor/words 'prompt|prompt_phrases'
-exposes core/keycolor/automatic 'automatic'
-exposes core/keycolor/external 'remote|script'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/stage server client \
