@@ -1,4 +1,5 @@
-// What the door says to sources of key colour, and how names of models enter plans and cache keys.
+// What the check of a spec says to sources of key colour, and how names of models enter plans and
+// cache keys.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

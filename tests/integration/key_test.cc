@@ -37,8 +37,7 @@ TEST_F(KeyTest, SelectColorLookAcceptAndColorTheSceneWithoutDoingItAgain) {
   const ProcessResult select = Client({"key", "select", Path("room").string(), "-o", out});
   ASSERT_EQ(select.exit_code, 0) << select.out << select.err;
   EXPECT_NE(select.out.find("Best of "), std::string::npos) << select.out;
-  EXPECT_NE(select.out.find("key colour scenes/"), std::string::npos)
-      << "it does not say what next";
+  EXPECT_NE(select.out.find("key color scenes/"), std::string::npos) << "it does not say what next";
   EXPECT_TRUE(IsGray(ReadImage(Path("key") / "key_view.png")));
   EXPECT_EQ(ReadImage(Path("key") / "key_view_ranking.jpg").width, 1600);
 
@@ -120,7 +119,7 @@ TEST_F(KeyTest, RefusalsSayWhatToDo) {
   const std::string room = Path("room").string();
   ExpectRefusal(Client({"key", "color", room}), 2, {"--auto", "--image"});
   const std::string scene = RunJson({"key", "show", room}).at("scene");
-  ExpectRefusal(Client({"key", "accept", scene}), 2, {"key colour"});
+  ExpectRefusal(Client({"key", "accept", scene}), 2, {"key color"});
   ExpectRefusal(
       Client({"colorize", "--scene", scene, "-o", Path("out").string()}), 2, {"key accept"});
   ExpectRefusal(Client({"key", "select", room, "--view", "view999", "-o", Path("k").string()}),

@@ -110,7 +110,7 @@ TEST_F(LiveTest, RefusalsSayWhatToDo) {
                 2,
                 {"has no colour"});
   const std::string scene = RunJson({"scene", "create", room}).at("name");
-  ExpectRefusal(Client({"preview", scene, "-o", out}), 2, {"key colour"});
+  ExpectRefusal(Client({"preview", scene, "-o", out}), 2, {"key color"});
   ExpectRefusal(
       Client({"colorizer", "apply", scene, room, "-o", out}), 2, {"has no colorizer yet"});
   // One bad photo among good ones: the others are there.
