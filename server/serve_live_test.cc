@@ -9,8 +9,8 @@
 #include <thread>
 
 #include "core/base/files.h"
-#include "tests/support/processes.h"
-#include "tests/support/server_process.h"
+#include "tests/support/service/processes.h"
+#include "tests/support/service/server_process.h"
 
 namespace color3d {
 namespace {

@@ -15,8 +15,8 @@
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "server/store/sqlite_db.h"
-#include "tests/support/rpc_support.h"
-#include "tests/support/server_process.h"
+#include "tests/support/service/rpc_support.h"
+#include "tests/support/service/server_process.h"
 
 namespace color3d {
 namespace {

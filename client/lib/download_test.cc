@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "client/lib/blob_transfer.h"
-#include "tests/support/breaking_server.h"
+#include "tests/support/service/breaking_server.h"
 
 namespace color3d::client {
 namespace {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/breaking_server.h"
+#include "tests/support/service/breaking_server.h"
 
 namespace color3d::client {
 namespace {

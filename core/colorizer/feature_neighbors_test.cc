@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "tests/support/small_colorizer.h"
+#include "tests/support/networks/small_colorizer.h"
 
 namespace color3d {
 namespace {

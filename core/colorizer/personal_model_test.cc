@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
-#include "tests/support/small_colorizer.h"
+#include "tests/support/networks/small_colorizer.h"
 
 namespace color3d {
 namespace {

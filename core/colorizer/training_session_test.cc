@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "tests/support/small_colorizer.h"
+#include "tests/support/networks/small_colorizer.h"
 
 namespace color3d {
 namespace {

@@ -13,7 +13,7 @@
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "core/weights/safetensors.h"
-#include "tests/support/synthetic_networks.h"
+#include "tests/support/networks/synthetic_networks.h"
 
 namespace color3d {
 namespace {

@@ -6,9 +6,9 @@
 #include <algorithm>
 
 #include "tests/support/quiet_run.h"
-#include "tests/support/scene_writers.h"
-#include "tests/support/test_exif.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/scene_writers.h"
+#include "tests/support/scenes/test_exif.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

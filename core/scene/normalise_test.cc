@@ -8,8 +8,8 @@
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "tests/support/quiet_run.h"
-#include "tests/support/scene_writers.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/scene_writers.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

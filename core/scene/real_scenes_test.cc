@@ -13,7 +13,7 @@
 #include "core/scene/lens.h"
 #include "core/scene/view_images.h"
 #include "tests/support/quiet_run.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

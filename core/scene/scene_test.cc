@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "core/color/lab.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

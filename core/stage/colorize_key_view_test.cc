@@ -7,7 +7,7 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/key_color_sources.h"
 #include "core/stage/stages.h"
-#include "tests/support/stage_fixture.h"
+#include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/stage/stages.h"
-#include "tests/support/evaluated_scene.h"
+#include "tests/support/stages/evaluated_scene.h"
 
 namespace color3d {
 namespace {

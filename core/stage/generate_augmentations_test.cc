@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "tests/support/augmented_scene.h"
+#include "tests/support/stages/augmented_scene.h"
 
 namespace color3d {
 namespace {

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/augmented_scene.h"
+#include "tests/support/stages/augmented_scene.h"
 
 namespace color3d {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
-#include "tests/support/scene_writers.h"
-#include "tests/support/stage_fixture.h"
+#include "tests/support/scenes/scene_writers.h"
+#include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 namespace {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "core/stage/stages.h"
-#include "tests/support/evaluated_scene.h"
+#include "tests/support/stages/evaluated_scene.h"
 
 namespace color3d {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
-#include "tests/support/stage_fixture.h"
+#include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/weights/weight_file.h"
-#include "tests/support/weight_files.h"
+#include "tests/support/networks/weight_files.h"
 
 namespace color3d {
 namespace {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "tests/support/rpc_fixture.h"
+#include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <set>
 
-#include "tests/support/rpc_fixture.h"
+#include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
 namespace {

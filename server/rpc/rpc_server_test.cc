@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "server/ops/address.h"
-#include "tests/support/rpc_fixture.h"
+#include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
 namespace {

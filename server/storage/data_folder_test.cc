@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/storage_fixture.h"
+#include "tests/support/service/storage_fixture.h"
 
 namespace color3d {
 namespace {

@@ -5,7 +5,7 @@
 #include <set>
 #include <thread>
 
-#include "tests/support/job_store_fixture.h"
+#include "tests/support/service/job_store_fixture.h"
 
 namespace color3d {
 namespace {

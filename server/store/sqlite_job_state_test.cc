@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/job_store_fixture.h"
+#include "tests/support/service/job_store_fixture.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 #include <thread>
 
 #include "server/store/sqlite_db.h"
-#include "tests/support/job_store_fixture.h"
+#include "tests/support/service/job_store_fixture.h"
 
 namespace color3d {
 namespace {

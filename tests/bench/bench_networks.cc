@@ -14,7 +14,7 @@
 #include "core/keycolor/automatic/ddcolor.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
-#include "tests/support/synthetic_networks.h"
+#include "tests/support/networks/synthetic_networks.h"
 
 namespace color3d {
 namespace {

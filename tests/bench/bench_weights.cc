@@ -17,7 +17,7 @@
 #include "core/weights/weight_file.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
-#include "tests/support/weight_files.h"
+#include "tests/support/networks/weight_files.h"
 
 namespace color3d {
 namespace {

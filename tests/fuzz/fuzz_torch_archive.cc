@@ -4,7 +4,7 @@
 #include "core/weights/weight_file.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/weight_checks.h"
-#include "tests/support/weight_files.h"
+#include "tests/support/networks/weight_files.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   return color3d::ReadOrRefuse([&] {

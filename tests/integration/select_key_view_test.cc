@@ -12,8 +12,8 @@
 #include "core/scene/import.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
-#include "tests/support/procedural_scene.h"
 #include "tests/support/quiet_run.h"
+#include "tests/support/scenes/procedural_scene.h"
 
 namespace color3d {
 namespace {

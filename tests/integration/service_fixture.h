@@ -15,8 +15,8 @@
 #include "color3d/v1/scene.grpc.pb.h"
 #include "color3d/v1/server.grpc.pb.h"
 #include "core/base/files.h"
-#include "tests/support/procedural_scene.h"
-#include "tests/support/processes.h"
+#include "tests/support/scenes/procedural_scene.h"
+#include "tests/support/service/processes.h"
 
 namespace color3d {
 

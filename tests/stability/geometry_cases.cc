@@ -8,7 +8,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "tests/stability/tiny_problem.h"
-#include "tests/support/procedural_scene.h"
+#include "tests/support/scenes/procedural_scene.h"
 
 namespace color3d {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/random.h"
 #include "core/encoder/clip/clip.h"
-#include "tests/support/synthetic_networks.h"
+#include "tests/support/networks/synthetic_networks.h"
 
 namespace color3d {
 namespace {

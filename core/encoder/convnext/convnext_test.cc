@@ -15,7 +15,7 @@
 #include "core/encoder/encoder.h"
 #include "core/encoder/image_tensors.h"
 #include "core/weights/weight_file.h"
-#include "tests/support/random_features.h"
+#include "tests/support/networks/random_features.h"
 
 namespace color3d {
 namespace {

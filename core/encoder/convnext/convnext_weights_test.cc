@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
-#include "tests/support/random_features.h"
+#include "tests/support/networks/random_features.h"
 
 namespace color3d {
 namespace {

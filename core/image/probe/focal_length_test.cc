@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/image/codec.h"
-#include "tests/support/test_exif.h"
+#include "tests/support/scenes/test_exif.h"
 
 namespace color3d {
 namespace {

@@ -14,7 +14,7 @@
 #include "core/base/random.h"
 #include "core/keycolor/automatic/folded_norms.h"
 #include "core/weights/weight_file.h"
-#include "tests/support/synthetic_networks.h"
+#include "tests/support/networks/synthetic_networks.h"
 
 namespace color3d {
 namespace {

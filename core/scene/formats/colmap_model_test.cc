@@ -10,8 +10,8 @@
 
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/photos.h"
-#include "tests/support/scene_writers.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/scene_writers.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

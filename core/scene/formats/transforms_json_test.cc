@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "core/scene/formats/scene_readers.h"
-#include "tests/support/scene_writers.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/scene_writers.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

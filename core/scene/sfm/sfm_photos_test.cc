@@ -10,8 +10,8 @@
 #include "core/base/files.h"
 #include "core/image/codec.h"
 #include "tests/support/quiet_run.h"
-#include "tests/support/test_exif.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/test_exif.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

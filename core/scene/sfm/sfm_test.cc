@@ -12,8 +12,8 @@
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
 #include "tests/support/quiet_run.h"
-#include "tests/support/test_exif.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/scenes/test_exif.h"
+#include "tests/support/scenes/test_scenes.h"
 
 namespace color3d {
 namespace {

@@ -12,8 +12,8 @@
 #include "core/base/error.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/render.h"
-#include "tests/support/chroma_problems.h"
-#include "tests/support/splat_scene.h"
+#include "tests/support/scenes/chroma_problems.h"
+#include "tests/support/scenes/splat_scene.h"
 
 namespace color3d {
 namespace {

@@ -13,7 +13,7 @@
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/raster_camera.h"
 #include "tests/reference/splat.h"
-#include "tests/support/chroma_problems.h"
+#include "tests/support/scenes/chroma_problems.h"
 
 namespace color3d {
 namespace {

@@ -7,8 +7,8 @@
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
-#include "tests/support/chroma_problems.h"
 #include "tests/support/instruction_set_testing.h"
+#include "tests/support/scenes/chroma_problems.h"
 
 namespace color3d {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "core/base/error.h"
 #include "core/splat/model/spherical_harmonics.h"
-#include "tests/support/random_model.h"
-#include "tests/support/splat_scene.h"
+#include "tests/support/scenes/random_model.h"
+#include "tests/support/scenes/splat_scene.h"
 
 namespace color3d {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "core/color/lab.h"
 #include "core/splat/model/spherical_harmonics.h"
-#include "tests/support/random_model.h"
+#include "tests/support/scenes/random_model.h"
 
 namespace color3d {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
-#include "tests/support/random_model.h"
+#include "tests/support/scenes/random_model.h"
 
 namespace color3d {
 namespace {

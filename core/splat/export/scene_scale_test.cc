@@ -9,7 +9,7 @@
 #include "core/scene/normalise.h"
 #include "core/splat/export/export.h"
 #include "core/splat/geometry/geometry_trainer.h"
-#include "tests/support/splat_scene.h"
+#include "tests/support/scenes/splat_scene.h"
 
 namespace color3d {
 namespace {

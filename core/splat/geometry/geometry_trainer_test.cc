@@ -12,7 +12,7 @@
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/splat/raster/render.h"
-#include "tests/support/splat_scene.h"
+#include "tests/support/scenes/splat_scene.h"
 
 namespace color3d {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
-#include "tests/support/random_model.h"
+#include "tests/support/scenes/random_model.h"
 
 namespace color3d {
 namespace {

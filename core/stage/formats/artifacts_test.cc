@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/evaluated_scene.h"
-#include "tests/support/stage_fixture.h"
+#include "tests/support/stages/evaluated_scene.h"
+#include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <map>
 
-#include "tests/support/evaluated_scene.h"
+#include "tests/support/stages/evaluated_scene.h"
 
 namespace color3d {
 namespace {

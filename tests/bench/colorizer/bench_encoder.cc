@@ -6,7 +6,7 @@
 #include "core/encoder/convnext/convnext.h"
 #include "core/encoder/image_tensors.h"
 #include "tests/bench/pretrain/squeezenet.h"
-#include "tests/support/random_features.h"
+#include "tests/support/networks/random_features.h"
 
 namespace color3d {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/base/error.h"
 #include "core/colorizer/named_tensors.h"
 #include "core/encoder/image_tensors.h"
-#include "tests/support/random_features.h"
+#include "tests/support/networks/random_features.h"
 
 namespace color3d {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/support/weight_files.h"
+#include "tests/support/networks/weight_files.h"
 
 #include <bit>
 #include <cstring>

@@ -25,7 +25,7 @@ struct SyntheticDdcolor {
 };
 
 // Norms are as stored: spectral ones unfolded, with u and v of the leading singular vectors. The
-// encoder holds structured random features (tests/support/random_features.h).
+// encoder holds structured random features (tests/support/networks/random_features.h).
 WeightMap SyntheticDdcolorWeights(const SyntheticDdcolor& sizes, uint64_t seed);
 
 struct SyntheticClip {

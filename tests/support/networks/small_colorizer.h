@@ -13,7 +13,7 @@
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
 #include "core/encoder/image_tensors.h"
-#include "tests/support/random_features.h"
+#include "tests/support/networks/random_features.h"
 
 namespace color3d {
 

@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "tests/support/rpc_support.h"
+#include "tests/support/service/rpc_support.h"
 
 namespace color3d::testing {
 

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "tests/support/procedural_scene.h"
+#include "tests/support/scenes/procedural_scene.h"
 
 int main(int argc, char** argv) {
   using Poses = color3d::ProceduralSceneOptions::Poses;

@@ -1,4 +1,4 @@
-#include "tests/support/room.h"
+#include "tests/support/scenes/room.h"
 
 #include <algorithm>
 #include <cmath>

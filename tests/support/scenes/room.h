@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/room_materials.h"
+#include "tests/support/scenes/room_materials.h"
 
 namespace color3d {
 

@@ -1,4 +1,4 @@
-#include "tests/support/splat_scene.h"
+#include "tests/support/scenes/splat_scene.h"
 
 #include <cmath>
 

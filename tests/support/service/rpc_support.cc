@@ -1,4 +1,4 @@
-#include "tests/support/rpc_support.h"
+#include "tests/support/service/rpc_support.h"
 
 #include <chrono>
 #include <stdexcept>

@@ -15,7 +15,7 @@
 #include "core/catalogue/stages.h"
 #include "server/rpc/rpc_server.h"
 #include "server/store/sqlite_job_store.h"
-#include "tests/support/rpc_support.h"
+#include "tests/support/service/rpc_support.h"
 
 namespace color3d::testing {
 

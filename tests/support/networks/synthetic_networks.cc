@@ -1,4 +1,4 @@
-#include "tests/support/synthetic_networks.h"
+#include "tests/support/networks/synthetic_networks.h"
 
 #include <fmt/core.h>
 
@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/base/random.h"
-#include "tests/support/random_features.h"
+#include "tests/support/networks/random_features.h"
 
 namespace color3d {
 namespace {

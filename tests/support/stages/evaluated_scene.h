@@ -8,7 +8,7 @@
 #include "core/color/lab.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
-#include "tests/support/stage_fixture.h"
+#include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 

@@ -1,4 +1,4 @@
-#include "tests/support/procedural_scene.h"
+#include "tests/support/scenes/procedural_scene.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "tests/support/chroma_problems.h"
+#include "tests/support/scenes/chroma_problems.h"
 
 #include <algorithm>
 #include <memory>

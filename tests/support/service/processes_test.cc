@@ -1,4 +1,4 @@
-#include "tests/support/processes.h"
+#include "tests/support/service/processes.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>

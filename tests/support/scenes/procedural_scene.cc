@@ -1,4 +1,4 @@
-#include "tests/support/procedural_scene.h"
+#include "tests/support/scenes/procedural_scene.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "tests/support/room.h"
-#include "tests/support/scene_writers.h"
+#include "tests/support/scenes/room.h"
+#include "tests/support/scenes/scene_writers.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

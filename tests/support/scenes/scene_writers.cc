@@ -1,4 +1,4 @@
-#include "tests/support/scene_writers.h"
+#include "tests/support/scenes/scene_writers.h"
 
 #include <fmt/core.h>
 

@@ -1,4 +1,4 @@
-#include "tests/support/random_features.h"
+#include "tests/support/networks/random_features.h"
 
 #include <fmt/core.h>
 

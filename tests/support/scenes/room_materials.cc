@@ -1,4 +1,4 @@
-#include "tests/support/room_materials.h"
+#include "tests/support/scenes/room_materials.h"
 
 #include <algorithm>
 #include <cmath>
