@@ -1,6 +1,6 @@
 #include "core/colorizer/adam.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cmath>
 

@@ -1,7 +1,7 @@
 #include "core/colorizer/feature_neighbors.h"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <vector>
 

@@ -1,6 +1,6 @@
 #include "core/colorizer/named_tensors.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <cmath>

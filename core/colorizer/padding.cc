@@ -1,6 +1,6 @@
 #include "core/colorizer/padding.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 namespace color3d {
 

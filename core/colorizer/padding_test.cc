@@ -1,7 +1,7 @@
 #include "core/colorizer/padding.h"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <vector>
 

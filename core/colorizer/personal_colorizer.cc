@@ -1,6 +1,6 @@
 #include "core/colorizer/personal_colorizer.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>

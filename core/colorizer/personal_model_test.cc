@@ -1,7 +1,7 @@
 #include "core/colorizer/personal_model.h"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include "tests/support/networks/small_colorizer.h"
 

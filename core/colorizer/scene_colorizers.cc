@@ -1,6 +1,6 @@
 #include "core/colorizer/scene_colorizers.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <map>

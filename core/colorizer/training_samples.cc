@@ -1,6 +1,6 @@
 #include "core/colorizer/training_samples.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

@@ -1,6 +1,6 @@
 #include "core/matching/cell_features.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <numeric>

@@ -1,7 +1,7 @@
 #include "core/matching/cell_features.h"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <vector>

@@ -1,7 +1,7 @@
 #include "core/matching/cell_matches.h"
 
 #include <ATen/Parallel.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "core/base/error.h"
-#include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
@@ -95,24 +93,6 @@ std::string PlanToJson(const std::vector<PlanStep>& steps) {
     array.push_back(std::move(entry));
   }
   return array.dump(1) + "\n";
-}
-
-std::vector<PlanStep> PlanFromJson(std::string_view json) {
-  try {
-    std::vector<PlanStep> steps;
-    for (const auto& entry : nlohmann::json::parse(json)) {
-      PlanStep s;
-      s.step = entry.at("step");
-      s.needed = entry.at("needed");
-      s.reason = entry.at("reason");
-      s.estimated_seconds = entry.at("estimated_seconds");
-      s.measured_seconds = entry.value("measured_seconds", -1.0);
-      steps.push_back(std::move(s));
-    }
-    return steps;
-  } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument("{} is damaged: {}", artifact::kPlan, e.what());
-  }
 }
 
 }  // namespace color3d

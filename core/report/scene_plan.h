@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace color3d {
@@ -35,7 +34,5 @@ struct PlanFacts {
 std::vector<PlanStep> PlanScene(const PlanFacts& facts);
 
 std::string PlanToJson(const std::vector<PlanStep>& steps);
-// Throws Error{kInvalidArgument}.
-std::vector<PlanStep> PlanFromJson(std::string_view json);
 
 }  // namespace color3d

@@ -1,6 +1,6 @@
 #include "core/keycolor/automatic/color_head.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cmath>
 

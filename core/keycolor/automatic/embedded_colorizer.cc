@@ -1,7 +1,7 @@
 // The automatic colourizer that is part of the program: the frozen encoder and a colour head that
 // answers with a distribution over colour bins.
 #include <fmt/format.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <cmath>

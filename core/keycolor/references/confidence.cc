@@ -1,6 +1,6 @@
 #include "core/keycolor/references/confidence.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <cmath>

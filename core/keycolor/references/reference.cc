@@ -1,7 +1,7 @@
 #include "core/keycolor/references/reference.h"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 #include "tests/bench/colorizer/bench_encoder.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include "core/color/lab.h"
 #include "core/encoder/convnext/convnext.h"

@@ -1,7 +1,7 @@
 #include "tests/bench/pretrain/pretrainer.h"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -14,8 +14,8 @@
 #include "core/base/random.h"
 #include "core/colorizer/named_tensors.h"
 #include "core/encoder/convnext/convnext.h"
-#include "core/keycolor/automatic/color_bins.h"
 #include "core/keycolor/automatic/color_head.h"
+#include "tests/bench/pretrain/color_bins.h"
 #include "tests/bench/pretrain/photo_set.h"
 #include "tests/bench/pretrain/squeezenet.h"
 

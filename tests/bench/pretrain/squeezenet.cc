@@ -1,6 +1,6 @@
 #include "tests/bench/pretrain/squeezenet.h"
 
-#include <torch/torch.h>
+#include <torch/types.h>
 
 #include <cstring>
 #include <string_view>

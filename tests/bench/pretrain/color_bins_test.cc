@@ -1,4 +1,4 @@
-#include "core/keycolor/automatic/color_bins.h"
+#include "tests/bench/pretrain/color_bins.h"
 
 #include <gtest/gtest.h>
 

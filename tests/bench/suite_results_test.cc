@@ -1,7 +1,8 @@
+#include "tests/bench/suite_results.h"
+
 #include <gtest/gtest.h>
 
 #include "core/base/files.h"
-#include "tests/bench/suite_results.h"
 
 namespace color3d {
 namespace {

@@ -1,12 +1,13 @@
 // What the check of a spec says to sources of key colour, and how names of models enter plans and
 // cache keys.
+#include "server/planning/spec_check.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <map>
 
 #include "server/planning/planner.h"
-#include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
 #include "server/planning/stage_key.h"
 #include "server/service_error.h"

@@ -1,0 +1,34 @@
+#include "core/report/scene_plan.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace color3d {
+namespace {
+
+TEST(ScenePlan, LeavesOutWhatTheSceneDoesNotNeed) {
+  PlanFacts facts;
+  facts.has_poses = true;
+  facts.views = 20;
+  const auto plan = PlanScene(facts);
+  const auto json = nlohmann::json::parse(PlanToJson(plan));
+  ASSERT_EQ(json.size(), plan.size());
+  int left_out = 0;
+  for (const PlanStep& s : plan) {
+    EXPECT_FALSE(s.reason.empty()) << s.step;
+    EXPECT_TRUE(s.step != "structure_from_motion" || !s.needed);
+    EXPECT_TRUE(s.step != "luminance_geometry" || s.needed);
+    left_out += !s.needed;
+    const auto& told = json[static_cast<size_t>(&s - plan.data())];
+    EXPECT_EQ(told.at("step"), s.step);
+    EXPECT_EQ(told.at("needed"), s.needed);
+    EXPECT_EQ(told.at("reason"), s.reason);
+  }
+  EXPECT_GE(left_out, 5);
+  facts.has_poses = false;
+  EXPECT_TRUE(PlanScene(facts)[0].needed);
+}
+
+}  // namespace
+}  // namespace color3d
