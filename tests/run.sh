@@ -23,5 +23,6 @@ tests/check_docs.sh
 tests/check_proto.sh "$build"
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCOLOR3D_TESTS=ON
 cmake --build "$build"
+tests/check_tidy.sh "$build"
 # One test at a time: most of them use every core.
 ctest --test-dir "$build" --output-on-failure --timeout 900 "${label_args[@]}"

@@ -1,7 +1,8 @@
-#include "core/report/plot.h"
 #include "core/report/report_page.h"
 
 #include <gtest/gtest.h>
+
+#include "core/report/plot.h"
 
 namespace color3d {
 namespace {

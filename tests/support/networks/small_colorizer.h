@@ -2,6 +2,7 @@
 // tested on, in milliseconds.
 #pragma once
 
+#include <ATen/Parallel.h>
 #include <gtest/gtest.h>
 #include <torch/types.h>
 
