@@ -3,25 +3,14 @@
 
 #include <cmath>
 
-#include "core/base/random.h"
 #include "tests/support/instruction_set_testing.h"
+#include "tests/support/random_block.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kRows = kColorRow + 1;
-constexpr int kCount = 53;  // not a multiple of the vector
-
-ParameterBlock RandomBlock(uint64_t seed, double scale) {
-  Random random(seed);
-  ParameterBlock p(kRows, kCount);
-  for (int r = 0; r < kRows; ++r) {
-    for (int i = 0; i < kCount; ++i) {
-      p.Row(r)[i] = static_cast<float>(scale * random.NextNormal());
-    }
-  }
-  return p;
-}
+constexpr int kRows = kBlockRows;
+constexpr int kCount = kBlockCount;
 
 using RegularizeTest = InstructionSetTest<int>;  // of thread counts
 
