@@ -14,7 +14,7 @@ namespace color3d {
 struct AutomaticColor {
   Image ab;          // 2 channels, Lab units, size of the input
   Image confidence;  // 1 channel, 0..1: 1 where the answer is surely right, 1/2 where it is
-                     // expected to be some 15 Lab units beside the true colour
+                     // expected to be some 20 Lab units beside the true colour
 };
 
 class AutomaticColorizer {

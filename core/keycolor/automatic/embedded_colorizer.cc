@@ -28,7 +28,7 @@ constexpr int kWorkingSidesPx[] = {320, 224};
 // picture at its working size, not cells of several px. Not measured against the default.
 constexpr float kFineGridVarianceFloor = 4.0f;
 // Expected distance to the true colour (Lab units) at which the confidence is one half.
-constexpr double kHalfConfidenceDistance = 15.0;
+constexpr double kHalfConfidenceDistance = 20.0;
 constexpr int kMedianSteps = 6;
 constexpr double kMedianRounding = 3.0;  // Lab units; a third of the spacing of the bins
 // A median of directions that disagree lies nearer to grey than the colours in question: chosen on
