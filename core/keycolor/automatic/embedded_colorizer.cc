@@ -31,9 +31,6 @@ constexpr float kFineGridVarianceFloor = 4.0f;
 constexpr double kHalfConfidenceDistance = 20.0;
 constexpr int kMedianSteps = 6;
 constexpr double kMedianRounding = 3.0;  // Lab units; a third of the spacing of the bins
-// A median of directions that disagree lies nearer to grey than the colours in question: chosen on
-// half of the validation photographs, where 1.0 has a higher error and a paler picture.
-constexpr double kMedianGain = 1.2;
 
 WeightMap WithPrefix(const WeightMap& weights, const std::string& prefix) {
   WeightMap part;
@@ -49,7 +46,7 @@ int RoundTo(double value, int multiple) {
 }
 
 // Of rows [n,K] of probabilities of the colours `bins` [K,2]: the answer with the least expected
-// distance to the truth (Weiszfeld), a little more colourful. Unlike the mean it is one of the
+// distance to the truth (Weiszfeld). Unlike the mean it is one of the
 // colours in question, or near one, and grey where grey is the likeliest.
 torch::Tensor MedianColors(const torch::Tensor& rows, const torch::Tensor& bins) {
   torch::Tensor colors = torch::mm(rows, bins);
@@ -57,7 +54,7 @@ torch::Tensor MedianColors(const torch::Tensor& rows, const torch::Tensor& bins)
     const torch::Tensor weights = rows / (torch::cdist(colors, bins) + kMedianRounding);
     colors = torch::mm(weights, bins) / weights.sum(1, /*keepdim=*/true);
   }
-  return kMedianGain * colors;
+  return colors;
 }
 
 class EmbeddedColorizer : public AutomaticColorizer {
