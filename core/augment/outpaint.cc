@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/augment/fill_holes.h"
+#include "core/image/fill_holes.h"
 #include "core/base/error.h"
 #include "core/base/random.h"
 
