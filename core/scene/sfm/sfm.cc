@@ -15,6 +15,7 @@
 #include "core/scene/lens.h"
 #include "core/scene/sfm/colmap_process.h"
 #include "core/scene/sfm/pair_planner.h"
+#include "core/scene/sfm/parallax.h"
 #include "core/scene/sfm/sfm_mapper.h"
 #include "core/scene/sfm/sfm_matching.h"
 #include "core/scene/sfm/sfm_photos.h"
@@ -29,8 +30,7 @@ constexpr size_t kExhaustiveLimit = 60;
 constexpr int kMaxLocalFeatures = 300;
 constexpr int kMinLocalFeatures = 100;
 
-int LocalFeatureCount(const ImportOptions& options, size_t photos) {
-  if (options.sfm_pairs == SfmPairs::kExhaustive) return 0;
+int LocalFeatureCount(size_t photos) {
   return std::clamp(
       static_cast<int>(100 * kMaxLocalFeatures / photos), kMinLocalFeatures, kMaxLocalFeatures);
 }
@@ -178,12 +178,29 @@ class Solver {
   bool is_loose_ = false;
 };
 
+// Before anything that takes minutes.
+void RequireParallax(const std::vector<LocalFeatures>& features,
+                     const ColmapProcess& colmap,
+                     const RunControl& run) {
+  const ParallaxEvidence evidence = LookForParallax(features, run.pool, run.cancel);
+  colmap.Note(Describe(evidence));
+  if (!evidence.IsFromOnePlace()) return;
+  throw InvalidArgument(
+      "the photos were taken from one place, so that no depth can follow: {}. Take photos from "
+      "different places, a step to the side for each (a tenth of the distance to what you "
+      "photograph, or more); turning the camera or letting it stand does not help; log: {}",
+      Describe(evidence),
+      colmap.log().filename().string());
+}
+
 PairPlan Plan(const std::vector<Photo>& photos,
               const FeatureImages& copies,
               const ImportOptions& options,
               const RunControl& run) {
   const int count = static_cast<int>(photos.size());
-  if (copies.features.empty()) return {AllPairs(count), "all pairs, as asked for"};
+  if (options.sfm_pairs == SfmPairs::kExhaustive) {
+    return {AllPairs(count), "all pairs, as asked for"};
+  }
   std::vector<std::string> names;
   for (const Photo& photo : photos) names.push_back(photo.name);
   return PlanPairs(CompareAll(copies.features, run.pool, run.cancel),
@@ -275,8 +292,9 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                 scene_folder,
                                 work.images(),
                                 options.sfm_max_image_side_px,
-                                LocalFeatureCount(options, photos.size()),
+                                LocalFeatureCount(photos.size()),
                                 run);
+    RequireParallax(copies.features, colmap, run);
     plan = Plan(photos, copies, options, run);
   }
   report.plan = plan.reason;
