@@ -71,6 +71,14 @@ class Solver {
     if (planned) {
       SolvePlanned(plan);
       if (PlannedIsEnough()) return std::move(*best_);
+      if (IsHopeless(plan)) {
+        colmap_.Note(
+            fmt::format("{} of {} photos look like another one; comparing all pairs, which "
+                        "takes much longer, would find no more",
+                        plan.related,
+                        Count()));
+        return ColmapModel{};
+      }
       Say(
           fmt::format("{} of {} photos hang together by the planned pairs; comparing all pairs, "
                       "which takes longer",
@@ -94,6 +102,11 @@ class Solver {
   bool PlannedIsEnough() const {
     return AreNearlyAllPlaced() ||
            (IsHalfPlaced() && (!has_coarse_features_ || copies_.names.size() > kExhaustiveLimit));
+  }
+
+  // The most similar pairs gave nothing, and they are not similar.
+  bool IsHopeless(const PairPlan& plan) const {
+    return Placed() == 0 && plan.related < static_cast<int>(kMinPlaced);
   }
 
   void Say(const std::string& warning) {
@@ -125,7 +138,7 @@ class Solver {
     Extract(FeatureDetail::kCoarse);
     Match(plan.pairs);
     Attempt("planned", Strictness::kDefault);
-    if (Placed() == copies_.names.size()) return;
+    if (Placed() == copies_.names.size() || IsHopeless(plan)) return;
     const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
     if (AreWorthMatching(more)) {
       colmap_.Note(
@@ -199,7 +212,7 @@ PairPlan Plan(const std::vector<Photo>& photos,
               const RunControl& run) {
   const int count = static_cast<int>(photos.size());
   if (options.sfm_pairs == SfmPairs::kExhaustive) {
-    return {AllPairs(count), "all pairs, as asked for"};
+    return {AllPairs(count), "all pairs, as asked for", count};
   }
   std::vector<std::string> names;
   for (const Photo& photo : photos) names.push_back(photo.name);

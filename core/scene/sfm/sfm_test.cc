@@ -195,6 +195,20 @@ TEST_F(Sfm, PhotosThatShareNothingAreRefusedInOneLine) {
   EXPECT_EQ(said.find('\n'), std::string::npos);
 }
 
+// Many: comparing all pairs would take minutes and find nothing.
+TEST_F(Sfm, ManyPhotosThatShareNothingAreNotComparedForLong) {
+  for (int i = 0; i < 24; ++i) {
+    Random random(static_cast<uint64_t>(i + 1));
+    Image coarse(32, 24, 1);
+    for (float& v : coarse.data) v = static_cast<float>(random.NextUniform());
+    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(Resize(coarse, 320, 240)));
+  }
+  options_.sfm_neighbors = 3;
+  EXPECT_THAT(Refusal([&] { Run(); }), HasSubstr("none of 24 photos could be placed"));
+  EXPECT_EQ(progress_.messages.find("blocks of photos"), std::string::npos);
+  EXPECT_EQ(progress_.messages.find("widened"), std::string::npos);
+}
+
 // A film of a fixed camera: noise, and something that passes by. COLMAP has not even started.
 TEST_F(Sfm, ACameraThatStandsStillIsRefusedAtOnce) {
   const Image background = RenderRoom(kRoomCamera, RoomPoses(3)[1]);
