@@ -176,7 +176,8 @@ class GuardTest : public ServiceTest {
                                                                  "view003"} +
                                         QuickOptions());
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
-    for (const v1::Artifact& artifact : NewestJob("solve_chroma").artifacts()) {
+    const v1::Job job = NewestJob("solve_chroma");
+    for (const v1::Artifact& artifact : job.artifacts()) {
       if (artifact.name() == "model.c3g") return artifact.digest().sha256();
     }
     ADD_FAILURE() << "no model";
