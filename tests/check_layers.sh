@@ -99,7 +99,7 @@ public core/image codec draw fill_holes guided_upsample local_features optical_f
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hints references/reference words/prompt
-public core/keyview collect_features coverage next_key_view select tracks view_features
+public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
 public core/scene camera import scene view_images
