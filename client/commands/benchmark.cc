@@ -1,7 +1,9 @@
 #include "client/commands/benchmark.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +11,7 @@
 #include "client/commands/results.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/job_watch.h"
+#include "client/lib/names.h"
 #include "client/lib/photos/gray_copies.h"
 #include "client/lib/scene_upload.h"
 #include "core/base/files.h"
@@ -40,9 +43,15 @@ std::vector<BenchmarkView> ParseViews(const std::string& scene_json) {
   }
 }
 
-std::string ParseKeyView(const std::string& key_view_json) {
+// The first one first.
+std::vector<std::string> ParseKeyViews(const std::string& key_view_json) {
   try {
-    return nlohmann::json::parse(key_view_json).at("view");
+    const auto json = nlohmann::json::parse(key_view_json);
+    std::vector<std::string> names;
+    for (const auto& chosen : json.value("key_views", nlohmann::json::array())) {
+      names.push_back(chosen.at("view"));
+    }
+    return names.empty() ? std::vector<std::string>{json.at("view")} : names;
   } catch (const nlohmann::json::exception& e) {
     throw Error(ErrorCode::kDataLoss,
                 "{} from the server cannot be read: {}",
@@ -53,7 +62,11 @@ std::string ParseKeyView(const std::string& key_view_json) {
 
 struct Selection {
   std::vector<BenchmarkView> views;
-  std::string key_view;
+  std::vector<std::string> key_views;  // the first one first
+
+  bool IsKey(const std::string& view) const {
+    return std::find(key_views.begin(), key_views.end(), view) != key_views.end();
+  }
 };
 
 Selection SelectKeyView(Connection& connection,
@@ -62,10 +75,19 @@ Selection SelectKeyView(Connection& connection,
                         const std::string& scene,
                         ProgressDisplay& display) {
   const v1::Job import_job = SubmitJob(connection, ImportSpec(options, scene));
+  std::vector<std::string> jobs = {import_job.name()};
   v1::JobSpec spec = SelectSpec(connection, options, scene);
   spec.add_inputs(import_job.name());
+  // Several are chosen by what they see. A time budget would make another geometry.
+  if (options.keys > 1 && options.time_budget_seconds == 0.0) {
+    v1::JobSpec geometry = GeometrySpec(connection, options, scene);
+    geometry.add_inputs(import_job.name());
+    jobs.push_back(SubmitJob(connection, geometry).name());
+    spec.add_inputs(jobs.back());
+  }
   const v1::Job select_job = SubmitJob(connection, spec);
-  if (!Follow(connection, {import_job.name(), select_job.name()}, context, display)) {
+  jobs.push_back(select_job.name());
+  if (!Follow(connection, jobs, context, display)) {
     throw CommandFailure(ExitCode::kDetached,
                          "interrupted before the benchmark's colouring was submitted; run the same "
                          "command again (finished stages are not repeated)");
@@ -75,10 +97,40 @@ Selection SelectKeyView(Connection& connection,
   const v1::Job selected = GetJob(connection, select_job.name());
   RequireSuccess(connection, context, selected);
   return {ParseViews(ReadArtifact(connection, imported, artifact::kScene)),
-          ParseKeyView(ReadArtifact(connection, selected, artifact::kKeyView))};
+          ParseKeyViews(ReadArtifact(connection, selected, artifact::kKeyView))};
 }
 
-// The originals of the key view and of the views that are scored against, as the scene's options.
+// By name, or by stem where no name fits; none: the server says what is wrong.
+const BenchmarkView* FindView(const std::vector<BenchmarkView>& views, const std::string& wanted) {
+  for (const BenchmarkView& view : views) {
+    if (view.name == wanted) return &view;
+  }
+  for (const BenchmarkView& view : views) {
+    if (Stem(view.name) == Stem(wanted)) return &view;
+  }
+  return nullptr;
+}
+
+// What carry_color would say, but not before the geometry has been made.
+void CheckMoreKeys(const ColorizeOptions& options, const Selection& selection) {
+  for (const std::string& text : options.more_keys) {
+    const std::string wanted = ParseMoreKey(text).view;
+    const BenchmarkView* view = FindView(selection.views, wanted);
+    if (view == nullptr) continue;
+    if (view->held_out) {
+      throw InvalidArgument(
+          "--more-key {}: the view {} is held out for evaluation and cannot be a key view",
+          wanted,
+          view->name);
+    }
+    if (selection.IsKey(view->name)) {
+      throw InvalidArgument(
+          "--more-key {}: the view {} is the key view already; name each once", wanted, view->name);
+    }
+  }
+}
+
+// The originals of the key views and of the views that are scored against, as the scene's options.
 // Returns the files to upload.
 std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
                                       const PhotoFolder& folder,
@@ -88,9 +140,10 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
   std::map<std::string, const LocalFile*> originals;
   for (const LocalFile& photo : folder.photos) originals[photo.path] = &photo;
   std::vector<UploadFile> uploads;
+  std::map<std::string, v1::Digest> of_further_key;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);
-    const bool is_key = view.name == selection.key_view && !options.color.Given();
+    const bool is_key = selection.IsKey(view.name) && !options.color.Given();
     const bool is_bound = options.bound && !view.held_out;
     if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
     if (!copies.in_color.contains(view.image_file)) {
@@ -106,11 +159,20 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
     }
     uploads.push_back({original->second->file, DigestFile(original->second->file)});
     const v1::Digest digest = ToProto(uploads.back().digest);
-    if (is_key) *colorize->mutable_key_color()->mutable_image() = digest;
+    if (is_key && view.name == selection.key_views[0]) {
+      *colorize->mutable_key_color()->mutable_image() = digest;
+    } else if (is_key) {
+      of_further_key[view.name] = digest;
+    }
     if (!view.held_out && !is_bound) continue;
     v1::TruthImage* truth = view.held_out ? colorize->add_truth() : colorize->add_training_truth();
     truth->set_view(view.name);
     *truth->mutable_image() = digest;
+  }
+  for (size_t i = 1; i < selection.key_views.size(); ++i) {
+    v1::FurtherKeyView* further = colorize->mutable_carry_color()->add_further_key_views();
+    further->set_view(selection.key_views[i]);
+    *further->mutable_color()->mutable_image() = of_further_key.at(selection.key_views[i]);
   }
   return uploads;
 }
@@ -150,9 +212,10 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
       [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
   const Selection selection = SelectKeyView(connection, context, options, scene.name(), display);
 
+  CheckMoreKeys(options, selection);
   v1::JobSpec spec = ColorizeSpec(options, scene.name());
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
-  colorize->set_key_view(selection.key_view);
+  colorize->set_key_view(selection.key_views[0]);
   if (options.color.Given()) {
     *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
   }
@@ -161,8 +224,10 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);
   });
-  display.Say(fmt::format(
-      "key view {}; {} views are held out and scored", selection.key_view, colorize->truth_size()));
+  display.Say(fmt::format("key {} {}; {} views are held out and scored",
+                          selection.key_views.size() == 1 ? "view" : "views",
+                          fmt::join(selection.key_views, ", "),
+                          colorize->truth_size()));
   return spec;
 }
 

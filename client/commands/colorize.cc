@@ -31,7 +31,24 @@ class Colorize {
     if (!options_.scene.empty()) return RunStored();
     folder_ = CollectPhotos(options_.photos);
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
+    for (const std::string& text : options_.more_keys) {
+      const MoreKey key = ParseMoreKey(text);
+      RequirePhoto(folder_, key.view);
+      if (fs::path(key.view).replace_extension() ==
+          fs::path(options_.key_view).replace_extension()) {
+        throw InvalidArgument("--more-key {}: it is the key view already", key.view);
+      }
+    }
     RequireOutBesidePhotos(out_, folder_);
+    RequireAugmentFiles(options_, folder_);
+    if (!WantsAugmentFiles(options_) && !folder_.augment_files.empty()) {
+      folder_.notes.push_back(
+          fmt::format("the {} pictures in augment/ are not learnt from; to use them, add "
+                      "--augment-files",
+                      folder_.augment_files.size()));
+      // Colours that nobody asked for have no business in a benchmark.
+      if (options_.benchmark) folder_.augment_files.clear();
+    }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);
     Connect();

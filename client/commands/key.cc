@@ -1,5 +1,6 @@
 // `color3d key`: choose, colour, look at and accept the key view before the long job starts.
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <memory>
@@ -29,6 +30,7 @@ struct KeyOptions {
   std::string encoder;   // weights by name in the server's configuration
   std::string features;  // CLIP weights, likewise
   std::string job;
+  int count = 1;  // key views that are chosen together
   bool hold_out = false;
   KeyColorFlags color;
 };
@@ -97,6 +99,7 @@ v1::Job Key::SubmitSelection(const std::string& scene) {
   } else if (options_.strategy == "coverage") {
     select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_COVERAGE);
   }
+  if (options_.count > 1) select->set_count(options_.count);
   select->set_encoder(options_.encoder);
   select->set_features(options_.features);
   if (options_.hold_out) {
@@ -123,12 +126,25 @@ ExitCode Key::Select() {
     PrintJson({{"scene", scene},
                {"job", job.name()},
                {"key_view", choice.view},
+               {"key_views", choice.views},
                {"description", choice.description},
                {"out", options_.out},
                {"files", files}});
     return ExitCode::kOk;
   }
   const fs::path out(options_.out);
+  if (choice.views.size() > 1) {
+    std::vector<std::string> command = {"colorize", "--scene", scene, "-o", "OUT"};
+    command.insert(command.end(), {"--key-view", choice.view, "--key-color", "COLOURED.png"});
+    for (size_t i = 1; i < choice.views.size(); ++i) {
+      command.insert(command.end(), {"--more-key", choice.views[i] + "=COLOURED.png"});
+    }
+    PrintText(fmt::format("key views  {}\n           {}\nColour each, and give them together\n{}",
+                          fmt::join(choice.views, ", "),
+                          choice.description,
+                          Command(command)));
+    return ExitCode::kOk;
+  }
   PrintText(fmt::format("key view   {}\n           {}\nto colour  {}\nranking    {}\n{}",
                         choice.view,
                         choice.description,
@@ -279,6 +295,11 @@ void AddKeyCommands(CLI::App& app, Context& context) {
   AddView(select, options.get());
   select->add_option("--strategy", options->strategy, "coverage (default), tracks or entropy")
       ->check(CLI::IsMember({"coverage", "tracks", "entropy"}));
+  select
+      ->add_option("--count",
+                   options->count,
+                   "So many photos, chosen together for the least error that is expected")
+      ->check(CLI::Range(1, 17));
   select->add_option(
       "--encoder", options->encoder, "Weights that this server knows, to compare by");
   select->add_option("--features", options->features, "CLIP weights that this server knows");

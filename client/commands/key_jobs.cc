@@ -60,7 +60,12 @@ KeyViewChoice ReadChoice(Connection& connection, const v1::Job& job) {
     const auto json = nlohmann::json::parse(
         ReadArtifact(connection, input, artifact::kKeyView), nullptr, /*allow_exceptions=*/false);
     if (!json.is_object()) break;
-    return {json.value("view", ""), json.value("description", "")};
+    KeyViewChoice choice{json.value("view", ""), json.value("description", ""), {}};
+    for (const auto& chosen : json.value("key_views", nlohmann::json::array())) {
+      choice.views.push_back(chosen.value("view", ""));
+    }
+    if (choice.views.empty()) choice.views = {choice.view};
+    return choice;
   }
   throw Error(ErrorCode::kNotFound,
               "{} read no key view: its {} job is gone; select again",

@@ -28,7 +28,8 @@ std::vector<std::string> WithItsInputs(Connection& connection, const v1::Job& jo
 // key_view.json of a select_key_view job, or of the one that a colorize_key_view job read.
 struct KeyViewChoice {
   std::string view;
-  std::string description;  // how it was chosen and how clearly; may be empty
+  std::string description;         // how it was chosen and how clearly; may be empty
+  std::vector<std::string> views;  // all that were chosen together, `view` first
 };
 KeyViewChoice ReadChoice(Connection& connection, const v1::Job& job);
 

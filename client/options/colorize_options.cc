@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 
 #include "client/options/option_fields.h"
@@ -25,8 +26,7 @@ constexpr OptionFlag kOptionFlags[] = {
     {"--colorizer-iterations", "personalize.iterations", "Of the scene's colorizer"},
     {"--augment",
      "generate_augmentations.samples",
-     "Pictures made from the key view that the colorizer learns from, too (the paper: 8); those in "
-     "PHOTOS/augment/ always count"},
+     "Pictures made from the key view that the colorizer learns from, too (the paper: 8)"},
     {"--augment-backend", "generate_augmentations.backend", "Model server that makes them"},
     {"--chroma-iterations", "solve_chroma.iterations", "After the closed-form start"},
 };
@@ -51,6 +51,10 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
            fmt::format("{} ({})", flag.help, DescribeOption(name)))
         ->check([name](const std::string& value) { return Complaint(name + "=" + value); });
   }
+  app.add_flag_callback(
+      "--augment-files",
+      [o] { o->settings.push_back("generate_augmentations.files=true"); },
+      "The colorizer learns from the coloured pictures in PHOTOS/augment/, too");
   app.add_option_function<std::vector<std::string>>(
          "--set",
          [o](const std::vector<std::string>& settings) {
@@ -61,6 +65,8 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
       ->allow_extra_args(false)
       ->check(Complaint);
 }
+
+constexpr size_t kMaxMoreKeys = 16;
 
 // What preset, file and settings say, before the flags of this command.
 v1::ColorizeSceneSpec Chosen(const ColorizeOptions& options) {
@@ -97,6 +103,19 @@ void ColorizeOptions::Check() const {
   }
   Chosen(*this);  // the preset's file can be read
   color.Check();
+  if (keys > 1 && !benchmark) {
+    throw InvalidArgument(
+        "--keys is a part of the score, where photos have true colours; it needs --benchmark. To "
+        "colour several photos, see `color3d key select --count` and --more-key");
+  }
+  if (keys > 1 && (!more_keys.empty() || color.Given())) {
+    throw InvalidArgument("--keys chooses the key views and takes their true colours; leave out {}",
+                          more_keys.empty() ? "the other source of colour" : "--more-key");
+  }
+  if (more_keys.size() > kMaxMoreKeys) {
+    throw InvalidArgument(
+        "--more-key is given {} times; at most {} are taken", more_keys.size(), kMaxMoreKeys);
+  }
   for (const std::string& text : more_keys) ParseMoreKey(text);
   // What is drawn for a view that is known beforehand cannot be scored against that view.
   const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
@@ -143,6 +162,18 @@ void AddMoreKeys(Connection& connection,
   }
 }
 
+bool WantsAugmentFiles(const ColorizeOptions& options) {
+  return Chosen(options).generate_augmentations().files();
+}
+
+void RequireAugmentFiles(const ColorizeOptions& options, const PhotoFolder& folder) {
+  if (!WantsAugmentFiles(options) || !folder.augment_files.empty()) return;
+  throw InvalidArgument(
+      "--augment-files: there is no picture in {}; put coloured pictures of the scene there, or "
+      "leave the flag out",
+      (folder.root / "augment").string());
+}
+
 void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("PHOTOS",
                  o->photos,
@@ -172,6 +203,11 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
           std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}}));
   app.add_flag(
       "--benchmark", o->benchmark, "Photos in colour: drop their colour and score against it");
+  app.add_option("--keys",
+                 o->keys,
+                 "With --benchmark: so many key views, chosen together, each in its true colours")
+      ->check(CLI::Range(1, static_cast<int>(kMaxMoreKeys) + 1))
+      ->capture_default_str();
   app.add_flag(
       "--bound",
       o->bound,
@@ -198,6 +234,32 @@ v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene)
   return spec;
 }
 
+v1::ColorizeSceneSpec OverItsPreset(Connection& connection, const ColorizeOptions& options) {
+  const v1::ColorizeSceneSpec chosen = Chosen(options);
+  v1::ColorizeSceneSpec spec;
+  const auto info = connection.Call(
+      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+  for (const v1::PresetInfo& preset : info.presets()) {
+    if (preset.options().preset() == std::max(chosen.preset(), v1::PRESET_FAST)) {
+      spec = preset.options();
+    }
+  }
+  spec.MergeFrom(chosen);
+  return spec;
+}
+
+v1::JobSpec GeometrySpec(Connection& connection,
+                         const ColorizeOptions& options,
+                         const std::string& scene) {
+  const v1::ColorizeSceneSpec chosen = OverItsPreset(connection, options);
+  v1::JobSpec spec = CommonSpec(options, scene);
+  *spec.mutable_reconstruct_geometry() = chosen.reconstruct_geometry();
+  if (!chosen.reconstruct_geometry().has_max_side_px()) {
+    spec.mutable_reconstruct_geometry()->set_max_side_px(chosen.max_side_px());
+  }
+  return spec;
+}
+
 v1::JobSpec SelectSpec(Connection& connection,
                        const ColorizeOptions& options,
                        const std::string& scene) {
@@ -205,17 +267,10 @@ v1::JobSpec SelectSpec(Connection& connection,
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
   // A job of one stage takes the default preset by itself.
-  if (chosen.preset() > v1::PRESET_FAST) {
-    const auto info = connection.Call(
-        &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
-    for (const v1::PresetInfo& preset : info.presets()) {
-      if (preset.options().preset() == chosen.preset()) {
-        *select = preset.options().select_key_view();
-      }
-    }
-  }
-  select->MergeFrom(chosen.select_key_view());
+  *select = chosen.preset() > v1::PRESET_FAST ? OverItsPreset(connection, options).select_key_view()
+                                              : chosen.select_key_view();
   if (!options.encoder.empty()) select->set_encoder(options.encoder);
+  if (options.keys > 1) select->set_count(options.keys);
   if (!options.key_view.empty()) {
     select->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
     select->set_view(options.key_view);

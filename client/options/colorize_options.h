@@ -23,6 +23,7 @@ struct ColorizeOptions {
   std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";  // of the server's, or a file of the user's own
   bool benchmark = false;
+  int keys = 1;        // of the benchmark: key views in their true colours, chosen together
   bool bound = false;  // of the benchmark: upload all true colours, and score what they would give
   bool detach = false;
   bool hold_out = false;
@@ -49,12 +50,21 @@ void AddMoreKeys(Connection& connection,
                  const ColorizeOptions& options,
                  v1::ColorizeSceneSpec* spec);
 
+// Whether the pictures in PHOTOS/augment/ are asked for, by flag, setting or preset file.
+bool WantsAugmentFiles(const ColorizeOptions& options);
+// Throws Error{kInvalidArgument} when they are and there are none.
+void RequireAugmentFiles(const ColorizeOptions& options, const PhotoFolder& folder);
+
 void DeclareOptions(CLI::App& app, ColorizeOptions* options);
 
 // A spec with scene and seed, and no stage yet.
 v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene);
 v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene);
-// The key view by the preset's strategy, or `options.key_view`.
+// The geometry that the scene's own job will make, so that it finds it made.
+v1::JobSpec GeometrySpec(Connection& connection,
+                         const ColorizeOptions& options,
+                         const std::string& scene);
+// The key view by the preset's strategy, or `options.key_view`; `options.keys` of them.
 v1::JobSpec SelectSpec(Connection& connection,
                        const ColorizeOptions& options,
                        const std::string& scene);

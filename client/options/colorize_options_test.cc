@@ -72,6 +72,26 @@ TEST_F(ColorizeOptionsTest, FlagsAndSettingsReachTheirFields) {
   EXPECT_TRUE(spec.select_key_view().exclude_self());
 }
 
+TEST_F(ColorizeOptionsTest, PicturesInAugmentCountWhenTheyAreAskedFor) {
+  EXPECT_FALSE(Spec({"--augment=4"}).generate_augmentations().files());
+  const v1::ColorizeSceneSpec spec = Spec({"--augment-files"});
+  EXPECT_TRUE(spec.generate_augmentations().files());
+  EXPECT_FALSE(spec.generate_augmentations().has_samples());
+  ColorizeOptions options;
+  PhotoFolder folder;
+  folder.root = "photos";
+  EXPECT_NO_THROW(RequireAugmentFiles(options, folder));
+  options.settings = {"generate_augmentations.files=true"};
+  try {
+    RequireAugmentFiles(options, folder);
+    FAIL() << "there are none";
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("photos/augment"));
+  }
+  folder.augment_files.push_back({"augment/a.png", "a.png"});
+  EXPECT_NO_THROW(RequireAugmentFiles(options, folder));
+}
+
 TEST_F(ColorizeOptionsTest, AWrongValueIsToldWithTheRange) {
   EXPECT_THAT(Complaint({"--max-side=12"}),
               AllOf(HasSubstr("max_side_px is '12'"), HasSubstr("64 to 4096 px")));

@@ -193,7 +193,7 @@ CarriedColor CarryColor(const SurfaceView& source,
       const double structure = d.structure / options.structure_tolerance;
       double c = visible * std::exp(-offset * offset - structure * structure);
       if (!confidence.Empty()) c *= Read(confidence, 0, sx, sy);
-      out.confidence.At(0, y, x) = static_cast<float>(c);
+      out.confidence.At(0, y, x) = std::min(1.0f, static_cast<float>(c));
       for (int k = 0; k < 2; ++k) out.ab.At(k, y, x) = Read(ab, k, sx, sy);
     }
   }
@@ -218,7 +218,7 @@ void FillFrom(const CarriedColor& other, CarriedColor* color) {
       float& ab = color->ab.Plane(c)[i];
       ab = (first * ab + second * other.ab.Plane(c)[i]) / sum;
     }
-    color->confidence.data[i] = sum;
+    color->confidence.data[i] = std::min(1.0f, sum);  // rounding may take it a hair above
   }
 }
 

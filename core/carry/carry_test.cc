@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/random.h"
 #include "core/carry/fusion.h"
 #include "core/carry/plane_sweep.h"
 #include "core/carry/stereo_views.h"
+#include "core/image/codec.h"
 
 namespace color3d {
 namespace {
@@ -153,6 +155,34 @@ TEST(Carry, ASecondSourceFillsButNeverAverages) {
   EXPECT_EQ(first.ab.At(0, 0, 1), -50.0f);
   EXPECT_EQ(first.confidence.data[0], 1.0f);
   EXPECT_EQ(first.confidence.data[1], 0.5f);
+}
+
+// What personalization refuses a scene for.
+TEST(Carry, ConfidencesOfManyKeyViewsStayWithinOneAtEverySize) {
+  Random random(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    const int width = 1 + static_cast<int>(random.NextUniform(0, 60));
+    const int height = 1 + static_cast<int>(random.NextUniform(0, 60));
+    CarriedColor all{Image(width, height, 2), Image(width, height, 1)};
+    for (int key = 0; key < 1 + trial % 5; ++key) {
+      CarriedColor one = all;
+      for (float& value : one.confidence.data) {
+        const double draw = random.NextUniform(0.0, 1.0);
+        value = draw < 0.2 ? 1.0f : static_cast<float>(draw);
+      }
+      // A picture that is sure everywhere comes at another size.
+      one.confidence = Resize(one.confidence, 3 * width / 2 + 1, height);
+      one.confidence = Resize(one.confidence, width, height);
+      FillFrom(one, &all);
+    }
+    const Image small = FitWithin(all.confidence, 1 + static_cast<int>(random.NextUniform(0, 60)));
+    for (const Image* map : {&std::as_const(all.confidence), &small}) {
+      for (const float value : map->data) {
+        ASSERT_GE(value, 0.0f) << trial;
+        ASSERT_LE(value, 1.0f) << trial;
+      }
+    }
+  }
 }
 
 TEST(PlaneSweep, FindsTheDepthOfAWallAndOfWhatStandsBeforeIt) {

@@ -11,7 +11,7 @@ const std::vector<Stage>& StageCatalogue() {
       {.kind = kind::kImportScene, .leaves = {kScene, kImportFacts, kSfmLog}, .results = {kSfmLog}},
       {.kind = kind::kSelectKeyView,
        .needs = {kScene},
-       .reads = {kImportFacts},
+       .reads = {kImportFacts, kGeometry},  // geometry of an earlier job, if it is given one
        .leaves = {kKeyView, kKeyViewGray, kKeyViewRanking},
        .results = {kKeyView, kKeyViewGray, kKeyViewRanking},
        .brings_prerequisites = true},

@@ -16,7 +16,9 @@ TEST(StageCatalogueTest, WhatAStageReadsIsMadeByOneBeforeIt) {
   for (const Stage& stage : StageCatalogue()) {
     for (const auto* list : {&stage.needs, &stage.reads}) {
       for (const char* name : *list) {
-        EXPECT_TRUE(made.contains(name)) << stage.kind << " reads " << name;
+        const bool of_an_earlier_job = stage.kind == std::string_view(kind::kSelectKeyView) &&
+                                       name == std::string_view(artifact::kGeometry);
+        EXPECT_TRUE(made.contains(name) || of_an_earlier_job) << stage.kind << " reads " << name;
       }
     }
     made.insert(stage.leaves.begin(), stage.leaves.end());

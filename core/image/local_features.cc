@@ -47,6 +47,11 @@ LocalFeatures DetectLocalFeatures(const Image& gray, int max_count) {
     cv::Mat descriptors;
     sift->compute(picture, points, descriptors);
     features.descriptors.reserve(static_cast<size_t>(descriptors.rows) * kDimensions);
+    features.side_px = std::max(gray.width, gray.height);
+    for (const cv::KeyPoint& point : points) {
+      features.positions.push_back(point.pt.x - 0.5f * static_cast<float>(gray.width - 1));
+      features.positions.push_back(point.pt.y - 0.5f * static_cast<float>(gray.height - 1));
+    }
     for (int i = 0; i < descriptors.rows; ++i) {
       const float* row = descriptors.ptr<float>(i);
       float sum = 1e-9f;

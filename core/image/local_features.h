@@ -12,6 +12,8 @@ namespace color3d {
 struct LocalFeatures {
   static constexpr int kDimensions = 128;
   std::vector<float> descriptors;
+  std::vector<float> positions;  // x, y of feature i from the picture's centre, px
+  int side_px = 0;               // the picture's longer side
   int count() const { return static_cast<int>(descriptors.size()) / kDimensions; }
 };
 

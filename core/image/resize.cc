@@ -10,6 +10,17 @@
 namespace color3d {
 namespace {
 
+// A mean lies between the least and the largest value, but its weights are rounded: those of a
+// white plane sum up to a hair above 1.
+void KeepRange(const float* from, size_t from_count, float* to, size_t to_count) {
+  float least = from[0], largest = from[0];
+  for (size_t i = 1; i < from_count; ++i) {
+    least = std::min(least, from[i]);
+    largest = std::max(largest, from[i]);
+  }
+  for (size_t i = 0; i < to_count; ++i) to[i] = std::clamp(to[i], least, largest);
+}
+
 Image ResizeWith(const Image& image, int width, int height, int interpolation) {
   Image out(width, height, image.channels);
   try {
@@ -17,6 +28,7 @@ Image ResizeWith(const Image& image, int width, int height, int interpolation) {
       const cv::Mat from(image.height, image.width, CV_32F, const_cast<float*>(image.Plane(c)));
       cv::Mat to(height, width, CV_32F, out.Plane(c));
       cv::resize(from, to, to.size(), 0, 0, interpolation);
+      KeepRange(image.Plane(c), image.PlaneSize(), out.Plane(c), out.PlaneSize());
     }
   } catch (const cv::Exception& e) {
     throw Error(ErrorCode::kInternal, "resizing failed: {}", e.err);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/base/random.h"
 #include "core/image/codec.h"
 
 namespace color3d {
@@ -49,6 +50,32 @@ TEST(Resize, OneSideDownOtherUpKeepsTheMean) {
   for (float v : image.data) before += v / image.data.size();
   for (float v : out.data) after += v / out.data.size();
   EXPECT_NEAR(before, after, 1e-5);
+}
+
+// Confidences are checked against 0..1 by those who read them.
+TEST(Resize, NoValueLeavesTheRangeOfThePicture) {
+  Random random(7);
+  for (int trial = 0; trial < 400; ++trial) {
+    Image image(1 + static_cast<int>(random.NextUniform(0, 90)),
+                1 + static_cast<int>(random.NextUniform(0, 70)),
+                2);
+    const bool white = trial % 2 == 0;  // one value, where the weights alone decide
+    const auto value = static_cast<float>(trial % 4 == 0 ? 1.0 : random.NextUniform(0.0, 1.0));
+    for (float& v : image.data) {
+      v = white ? value : static_cast<float>(random.NextUniform(-1.0, 1.0));
+    }
+    for (int c = 0; c < 2; ++c) image.Plane(c)[0] = value;
+    const Image out = Resize(image,
+                             1 + static_cast<int>(random.NextUniform(0, 120)),
+                             1 + static_cast<int>(random.NextUniform(0, 100)));
+    for (int c = 0; c < 2; ++c) {
+      const auto range = std::minmax_element(image.Plane(c), image.Plane(c) + image.PlaneSize());
+      for (size_t i = 0; i < out.PlaneSize(); ++i) {
+        ASSERT_GE(out.Plane(c)[i], *range.first) << trial;
+        ASSERT_LE(out.Plane(c)[i], *range.second) << trial;
+      }
+    }
+  }
 }
 
 TEST(FitWithin, KeepsAspectAndNeverEnlarges) {

@@ -118,24 +118,21 @@ Queries GatherQueries(const std::vector<Eigen::MatrixXf>& cells, int per_view) {
   return queries;
 }
 
-// Mean over the other views' queries of the distance to the nearest column of `bank`.
-double MeanNearest(const Eigen::MatrixXf& bank, const Queries& queries, int self, size_t views) {
-  if (views < 2) return 0.0;
+// From each query to the nearest column of `bank`.
+std::vector<float> Nearest(const Eigen::MatrixXf& bank, const Queries& queries) {
   const Eigen::VectorXf bank_squares = bank.colwise().squaredNorm().transpose();
   const Eigen::MatrixXf minus_two_bank = -2.0f * bank.transpose();
-  double sum = 0.0;
+  std::vector<float> nearest(queries.owner.size());
   for (Eigen::Index begin = 0; begin < queries.cells.cols(); begin += kBatch) {
     const Eigen::Index count = std::min<Eigen::Index>(kBatch, queries.cells.cols() - begin);
     Eigen::MatrixXf distances = minus_two_bank * queries.cells.middleCols(begin, count);
     distances.colwise() += bank_squares;
     for (Eigen::Index j = 0; j < count; ++j) {
-      const size_t query = static_cast<size_t>(begin + j);
-      if (queries.owner[query] == self) continue;
       const float squared = distances.col(j).minCoeff() + queries.squares[begin + j];
-      sum += queries.weight[query] * std::sqrt(std::max(0.0f, squared));
+      nearest[static_cast<size_t>(begin + j)] = std::sqrt(std::max(0.0f, squared));
     }
   }
-  return sum / static_cast<double>(views - 1);
+  return nearest;
 }
 
 std::vector<const ViewFeatures*> KeptViews(const std::vector<ViewFeatures>& views,
@@ -164,9 +161,9 @@ int CellsForCoverage(size_t views, int channels) {
   return std::max(counts.bank, counts.queries);
 }
 
-std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
-                                         const std::vector<bool>& kept,
-                                         const RunControl& run) {
+NearestDistances FindNearestDistances(const std::vector<ViewFeatures>& views,
+                                      const std::vector<bool>& kept,
+                                      const RunControl& run) {
   std::vector<int> indices;
   const std::vector<const ViewFeatures*> chosen = KeptViews(views, kept, &indices);
   const int64_t n = static_cast<int64_t>(chosen.size());
@@ -178,7 +175,10 @@ std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
   run.pool.ForEach(n,
                    [&](int64_t i, int) { cells[i] = projection.Apply(Cells(*chosen[i], taken)); });
   const Queries queries = GatherQueries(cells, counts.queries);
-  std::vector<double> means(views.size(), 0.0);
+  NearestDistances result;
+  result.weight = queries.weight;
+  for (const int owner : queries.owner) result.owner.push_back(indices[owner]);
+  result.from.resize(views.size());
   // In rounds, so that cancellation and progress stay on the calling thread.
   const int64_t round = 4 * run.pool.thread_count();
   for (int64_t begin = 0; begin < n; begin += round) {
@@ -186,10 +186,26 @@ std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
     run.pool.ForEach(std::min(round, n - begin), [&](int64_t k, int) {
       const int64_t i = begin + k;
       const Eigen::Index bank = std::min<Eigen::Index>(counts.bank, cells[i].cols());
-      means[indices[i]] =
-          MeanNearest(cells[i].leftCols(bank), queries, static_cast<int>(i), chosen.size());
+      result.from[indices[i]] = Nearest(cells[i].leftCols(bank), queries);
     });
     run.progress.OnProgress(std::min(n, begin + round), n, "comparing views");
+  }
+  return result;
+}
+
+std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
+                                         const std::vector<bool>& kept,
+                                         const RunControl& run) {
+  const NearestDistances nearest = FindNearestDistances(views, kept, run);
+  const auto count = std::count(kept.begin(), kept.end(), true);
+  std::vector<double> means(views.size(), 0.0);
+  for (size_t i = 0; i < views.size() && count > 1; ++i) {
+    for (size_t q = 0; q < nearest.from[i].size(); ++q) {
+      if (nearest.owner[q] != static_cast<int>(i)) {
+        means[i] += nearest.weight[q] * nearest.from[i][q];
+      }
+    }
+    means[i] /= static_cast<double>(count - 1);
   }
   return means;
 }

@@ -20,6 +20,17 @@ std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
                                          const std::vector<bool>& kept,
                                          const RunControl& run);
 
+// For key views that are chosen together: by view i and query q, the distance from the cell q to
+// the nearest cell of view i, as above.
+struct NearestDistances {
+  std::vector<int> owner;                // view of each query; views that are not kept own none
+  std::vector<double> weight;            // of each query; those of one view sum to 1
+  std::vector<std::vector<float>> from;  // by view, by query; empty for views that are not kept
+};
+NearestDistances FindNearestDistances(const std::vector<ViewFeatures>& views,
+                                      const std::vector<bool>& kept,
+                                      const RunControl& run);
+
 // How many cells of each view MeanFeatureDistances looks at, at most.
 int CellsForCoverage(size_t views, int channels);
 

@@ -168,7 +168,9 @@ void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
 }  // namespace
 
 void KeyViewOptions::Validate() const {
-  RangeCheck("key view option")("temperature", temperature, 1e-6, 1e6);
+  const RangeCheck check("key view option");
+  check("temperature", temperature, 1e-6, 1e6);
+  check("count", count, 1, 17);
 }
 
 std::vector<bool> GuardedViews::Kept() const {

@@ -6,7 +6,6 @@
 #include "core/carry/carry_views.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/keyview/next_key_view.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
@@ -99,9 +98,6 @@ void Conclude(const Scene& scene,
   }
   const double mean = MeanCoverage(coverage, key_views);
   facts.coverage = mean;
-  if (const auto next = NextKeyView(scene, key_views)) {
-    facts.next = {scene.views[next->view].name, next->covered_now, next->covered_with};
-  }
   context.progress().OnError(0, "coverage", mean);
   if (mean < kSmallCoverage) {
     context.progress().OnWarning(
@@ -137,7 +133,7 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   const SurfaceRenderer render = [&](const Camera& camera, const Pose& pose) {
     ThreadPool one(1);
     RenderedView view = RenderView(geometry, camera, pose, one);
-    return RenderedSurface{std::move(view.depth), std::move(view.opacity)};
+    return RenderedSurface{std::move(view.median_depth), std::move(view.opacity)};
   };
   const SurfaceMaker maker(
       scene, images, sweep_images, render, options.depth_sources, options.sweep, context.cancel());

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -29,6 +30,8 @@ ReportPicture Picture(const StageContext& context, const std::string& name, std:
 
 // Keys in the order in which people read them.
 ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
+                            const std::vector<std::string>& keys,
+                            const std::optional<NextKeyViewFacts>& next,
                             const ColorFacts& colors,
                             StageContext& context) {
   ordered_json metrics = ordered_json::object();
@@ -51,6 +54,13 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
       if (mean.contains(name)) metrics[name] = mean.at(name);
     }
   }
+  metrics["key_views"] = keys;
+  if (next) {
+    metrics["next_key_view"] = next->name;
+    metrics["expected_error_now"] = next->error_now;
+    metrics["expected_error_with_next"] = next->error_with;
+  }
+  metrics["augmentations"] = colors.augmentations();
   for (const auto& [name, value] : colors.Metrics()) metrics[name] = value;
   if (context.HasInput(artifact::kExportScores)) {
     const auto scores = ReadJson(context, artifact::kExportScores);
@@ -137,13 +147,16 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   return plan;
 }
 
-std::string Summary(const Scene& scene, const ordered_json& metrics, const std::string& key) {
+std::string Summary(const Scene& scene,
+                    const ordered_json& metrics,
+                    const std::vector<std::string>& keys) {
   return fmt::format(
-      "{} views ({} held out), all colours from the key view {}. {} Gaussians in {} s of "
+      "{} views ({} held out), all colours from the key {} {}. {} Gaussians in {} s of "
       "computing.",
       scene.views.size(),
       scene.HeldOutViews().size(),
-      key,
+      keys.size() == 1 ? "view" : "views",
+      fmt::join(keys, ", "),
       metrics.value("gaussians", 0),
       static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
 }
@@ -185,12 +198,15 @@ void PassOnResults(StageContext& context) {
 void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
-  const ColorFacts colors(scene, context);
-  const ordered_json metrics = CollectMetrics(stages, colors, context);
+  std::vector<std::string> keys = ReadCarryFacts(context).key_views;
+  if (keys.empty()) keys = {scene.views[key].name};
+  const auto next = AdviseNextKeyView(scene, keys, context);
+  const ColorFacts colors(scene, context, next);
+  const ordered_json metrics = CollectMetrics(stages, keys, next, colors, context);
 
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
-  data.summary = Summary(scene, metrics, scene.views[key].name);
+  data.summary = Summary(scene, metrics, keys);
   data.key_view = ReportOfKeyView(
       {scene.views[key].name,
        {Picture(context, artifact::kKeyViewGray, "as captured"),
@@ -206,7 +222,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   data.sections = colors.Sections(std::move(personalization));
   data.views = ViewRows(scene, context);
   for (const auto& [name, value] : metrics.items()) {
-    data.metrics.emplace_back(name, value.get<double>());
+    if (value.is_number()) data.metrics.emplace_back(name, value.get<double>());
   }
   data.plan = CollectPlan(scene, stages, metrics.contains("delta_e00"), context);
   for (const StageSummary& s : stages) {

@@ -228,7 +228,14 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
   const Scene scene = ReadScene(context);
   const int key_index = ReadKeyView(context, scene);
   Outcome outcome;
-  outcome.made = AugmentationsFromFiles(options.max_side_px, context);
+  if (options.files) {
+    outcome.made = AugmentationsFromFiles(options.max_side_px, context);
+    if (outcome.made.empty()) {
+      throw InvalidArgument(
+          "the user's own pictures are asked for, but the scene has none in augment/; add some or "
+          "leave the option `files` out");
+    }
+  }
   const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);
   std::map<Kind, int> counts = Deal(options);
   LeaveOutNeedless(options, context, &counts, &outcome);

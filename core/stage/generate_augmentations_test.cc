@@ -102,6 +102,8 @@ TEST_F(AugmentationStageTest, TheSameSeedGivesTheSameBytes) {
 
 TEST_F(AugmentationStageTest, TheUsersOwnPicturesAreTakenAtWorkingSize) {
   options_.samples = 0;
+  options_.files = true;
+  EXPECT_THAT(Complaint(), HasSubstr("none in augment/"));
   Write("augment/sub/wide.jpg", EncodeJpeg(SrgbFromLab(Painting(300, 100))));
   Write("augment/a.png", EncodePng16(SrgbFromLab(Painting(64, 80))));
   const auto facts = Run();
@@ -109,10 +111,13 @@ TEST_F(AugmentationStageTest, TheUsersOwnPicturesAreTakenAtWorkingSize) {
   EXPECT_EQ(facts.at("samples")[0].at("source"), "augment/a.png");
   EXPECT_EQ(facts.at("samples")[1].at("width"), kWidth);
   EXPECT_EQ(facts.at("samples")[1].at("height"), kWidth / 3);
+  options_.files = false;
+  EXPECT_THAT(Names(Run()), IsEmpty()) << "nobody asked for them";
 }
 
 TEST_F(AugmentationStageTest, FilesThatDoNotBelongInAugmentAreRefusedByName) {
   options_.samples = 0;
+  options_.files = true;
   const auto complaint = [&](const std::string& name, const std::string& bytes) {
     Write("augment/" + name, bytes);
     const std::string text = Complaint();

@@ -7,9 +7,11 @@
 #include "core/image/codec.h"
 #include "core/keyview/collect_features.h"
 #include "core/keyview/coverage.h"
+#include "core/keyview/expected_error.h"
 #include "core/keyview/tracks.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/key_view_ranking.h"
+#include "core/stage/sources/seen_samples.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -73,7 +75,41 @@ void ChooseManually(const std::string& name,
                           scene.views[view].name);
   }
   ranking->selection.index = static_cast<int>(found - candidates.begin());
-  ranking->selection.ranking = {{ranking->selection.index, 0.0, 0.0, ""}};
+  if (ranking->selection.ranking.empty()) {
+    ranking->selection.ranking = {{ranking->selection.index, 0.0, 0.0, ""}};
+  }
+}
+
+// Several at once; a view that the user names stays the first. What the views see of each other
+// comes from geometry where a job has made some.
+void ChooseTogether(const SelectKeyViewOptions& options,
+                    const Scene& scene,
+                    const std::vector<int>& candidates,
+                    const std::vector<bool>& kept,
+                    StageContext& context,
+                    KeyViewRanking* ranking) {
+  int first = -1;
+  if (options.selection.strategy == KeyViewStrategy::kManual) {
+    ChooseManually(options.view, scene, candidates, ranking);
+    first = ranking->selection.index;
+  }
+  const NearestDistances distances =
+      FindNearestDistances(ranking->features, kept, context.control());
+  const SeenSamples seen =
+      context.HasInput(artifact::kGeometry)
+          ? SeenByGeometry(scene,
+                           candidates,
+                           ParseGaussians(context.ReadInput(artifact::kGeometry)),
+                           GridFor(static_cast<int>(candidates.size())),
+                           context.pool(),
+                           context.cancel())
+      : TracksOf(scene, candidates, context).empty()
+          ? SeenSamples(static_cast<int>(candidates.size()), 0)
+          : SeenByPoints(scene, candidates);
+  ChosenKeyViews chosen = ChooseKeyViews(seen, distances, kept, options.selection.count, first);
+  ranking->selection.index = chosen.views[0];
+  ranking->together = std::move(chosen.views);
+  ranking->expected_error = std::move(chosen.error);
 }
 
 void ChooseByScore(const SelectKeyViewOptions& stage_options,
@@ -101,7 +137,9 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   }
   GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents), options);
   const std::vector<bool> kept = guarded.Kept();
-  KeyViewStrategy strategy = options.strategy;
+  // A view that the user names is the first of several; the others stand in the sheet by coverage.
+  KeyViewStrategy strategy =
+      options.strategy == KeyViewStrategy::kManual ? KeyViewStrategy::kCoverage : options.strategy;
   std::vector<double> scores;
   if (strategy == KeyViewStrategy::kTracks) {
     const auto tracks = TracksOf(scene, candidates, context);
@@ -122,6 +160,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   }
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);
+  if (options.count > 1) ChooseTogether(stage_options, scene, candidates, kept, context, ranking);
 }
 
 // The views that the guard set aside, by the names that the user knows.
@@ -144,10 +183,15 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   const Scene scene = ReadScene(context);
   // A held-out view must never lend its colour.
   const std::vector<int> candidates = scene.TrainingViews();
+  if (options.selection.count > static_cast<int>(candidates.size())) {
+    throw InvalidArgument("{} key views are asked for; the scene has {} training views",
+                          options.selection.count,
+                          candidates.size());
+  }
   KeyViewRanking ranking;
   ranking.strategy = StrategyName(options.selection.strategy);
   for (int view : candidates) ranking.names.push_back(scene.views[view].name);
-  if (options.selection.strategy == KeyViewStrategy::kManual) {
+  if (options.selection.strategy == KeyViewStrategy::kManual && options.selection.count == 1) {
     ChooseManually(options.view, scene, candidates, &ranking);
   } else {
     ChooseByScore(options, scene, candidates, context, &ranking);

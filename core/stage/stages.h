@@ -32,8 +32,8 @@ struct SelectKeyViewOptions {
   std::string encoder;   // weights by name in StageContext::Model; empty: the embedded encoder
   std::string features;  // CLIP weights by name; empty: the encoder's features
 };
-// The photo that the user should colour. Only training views can win. Features of photos that were
-// seen before come from the context's cache folder.
+// The photo that the user should colour, or several. Only training views can win. Features of
+// photos that were seen before come from the context's cache folder.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
 struct ColorizeKeyViewOptions {
@@ -79,12 +79,12 @@ struct CarryColorOptions {
   void Validate() const;
   bool operator==(const CarryColorOptions&) const = default;
 };
-// The key views' own colours in every view, as far as it shows the same; how much that is, and the
-// view to colour next.
+// The key views' own colours in every view, as far as it shows the same, and how much that is.
 void RunCarryColor(const CarryColorOptions& options, StageContext& context);
 
 struct AugmentationOptions {
-  int samples = 8;  // 0..64, besides the user's own files; 8: the paper's 4 + 1 + 3
+  bool files = false;  // the user's own, below augment/ of the scene's folder
+  int samples = 8;     // 0..64, besides the user's own files; 8: the paper's 4 + 1 + 3
   bool outpaint = true;
   bool animate = true;
   bool novel_views = true;
@@ -93,8 +93,8 @@ struct AugmentationOptions {
   void Validate() const;
   bool operator==(const AugmentationOptions&) const = default;
 };
-// Training pictures beside the key view: the files below augment/ of the scene's folder, a
-// generator's, and ours. Novel views need the geometry among the inputs.
+// Training pictures beside the key view: the files below augment/ of the scene's folder if they are
+// asked for, a generator's, and ours. Novel views need the geometry among the inputs.
 void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context);
 
 // The scene's colorizer, trained on the key view, what was carried and what was generated. Warns

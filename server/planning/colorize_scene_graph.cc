@@ -96,11 +96,8 @@ void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
       *spec->mutable_colorize_key_view()->mutable_source() = options.key_color();
       return;
     case JobSpec::kGenerateAugmentations:
-      if (!options.has_generate_augmentations()) {  // the user's own files at most
-        spec->mutable_generate_augmentations()->set_samples(0);
-      } else if (!options.generate_augmentations().has_samples()) {
-        spec->mutable_generate_augmentations()->set_samples(kDefaultSamples);
-      }
+      spec->mutable_generate_augmentations()->set_samples(
+          options.has_generate_augmentations() ? SamplesOf(options.generate_augmentations()) : 0);
       return;
     case JobSpec::kColorizeViews:
       // The colorizer runs on the encoder that it was trained with.
@@ -125,17 +122,24 @@ std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSc
                                         : "the preset carries no colour through geometry";
 }
 
-// Why no pictures are generated; empty when they are.
+// Why no pictures are generated; empty when they are. What lies in augment/ has to be asked for.
 std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
-  if (facts.augment_files > 0) return "";
+  const auto& spec = scene.generate_augmentations();
+  if (spec.files() && facts.augment_files == 0) {
+    throw InvalidArgument(
+        "generate_augmentations.files is true, but the scene has no pictures in augment/; add some "
+        "or leave it out");
+  }
+  if (spec.files()) return "";
+  const std::string unused =
+      facts.augment_files > 0 ? "; augment/ holds " + std::to_string(facts.augment_files) +
+                                    " files, which count where generate_augmentations.files is true"
+                              : "";
   if (!scene.has_generate_augmentations()) {
-    return "the preset learns from the key view alone, and augment/ holds no files";
+    return "the preset learns from the key view alone" + unused;
   }
   // Whoever writes options wants the stage, unless they say 0.
-  const auto& spec = scene.generate_augmentations();
-  return spec.has_samples() && spec.samples() == 0
-             ? "no samples are asked for and augment/ holds no files"
-             : "";
+  return SamplesOf(spec) == 0 ? "no samples are asked for" + unused : "";
 }
 
 }  // namespace
@@ -145,6 +149,13 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
                              const SceneFacts& facts,
                              GraphBuilder* builder) {
   const ColorizeSceneSpec& given = submitted.colorize_scene();
+  if (scene.select_key_view().count() > 1) {
+    throw InvalidArgument(
+        "select_key_view.count is {}, but this job colours one key view; select several by a {} "
+        "job, and name all but the first in carry_color.further_key_views",
+        scene.select_key_view().count(),
+        kind::kSelectKeyView);
+  }
   if (submitted.inputs_size() > 0) CheckGiven(builder->given(), given);
   for (const Stage& stage : StageCatalogue()) {
     const std::string kind = stage.kind;

@@ -10,6 +10,11 @@ namespace color3d {
 
 // Of generate_augmentations, where somebody asks for it without a number.
 inline constexpr int kDefaultSamples = 8;
+// What unset samples mean: who asks for pictures of their own wants those alone.
+inline int SamplesOf(const v1::GenerateAugmentationsSpec& spec) {
+  if (spec.has_samples()) return spec.samples();
+  return spec.files() ? 0 : kDefaultSamples;
+}
 
 // Adds all jobs to the builder, which fills in the options of each stage from `scene`: what was
 // submitted, over its preset. Throws Error for inputs that the submitted options contradict, or

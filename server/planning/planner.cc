@@ -26,8 +26,8 @@ void TakeEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
 void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
   v1::JobSpec spec = submitted;
   if (spec.seed() == 0) spec.set_seed(1);
-  if (spec.has_generate_augmentations() && !spec.generate_augmentations().has_samples()) {
-    spec.mutable_generate_augmentations()->set_samples(kDefaultSamples);
+  if (spec.has_generate_augmentations()) {
+    spec.mutable_generate_augmentations()->set_samples(SamplesOf(spec.generate_augmentations()));
   }
   TakeEncoderOfColorizer(*builder, &spec);
   const bool nothing_to_do = spec.has_export_() && spec.export_().has_ply() &&

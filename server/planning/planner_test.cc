@@ -272,15 +272,24 @@ TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
   SceneFacts with_files = kTwentyPhotos;
   with_files.augment_files = 2;
   graph = PlanJob(spec, {}, with_files);
+  EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
+              HasSubstr("2 files, which count where generate_augmentations.files"))
+      << "nobody asked for them";
+  EXPECT_THAT(InputKinds(graph, "personalize"), Not(Contains("generate_augmentations")));
+
+  spec.mutable_colorize_scene()->mutable_generate_augmentations()->set_files(true);
+  graph = PlanJob(spec, {}, with_files);
   EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
   EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 0)
       << "only the user's own";
   EXPECT_THAT(InputKinds(graph, "personalize"), Contains("generate_augmentations"));
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("no pictures in augment/"));
 
-  spec.mutable_colorize_scene()->mutable_generate_augmentations();
+  spec.mutable_colorize_scene()->mutable_generate_augmentations()->set_files(false);
   graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
   EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
+  EXPECT_FALSE(SpecOf(graph, "generate_augmentations").generate_augmentations().files());
   EXPECT_THAT(InputKinds(graph, "generate_augmentations"), Contains("reconstruct_geometry"));
 
   spec.mutable_colorize_scene()->mutable_generate_augmentations()->set_samples(0);
@@ -293,6 +302,19 @@ TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
   graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_EQ(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason, "");
   EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
+}
+
+TEST(Planner, SeveralKeyViewsAreSelectedBeforeTheSceneIsColored) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->mutable_select_key_view()->set_count(3);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("further_key_views"));
+  EXPECT_EQ(PlanError(spec).code, ErrorCode::kInvalidArgument);
+  v1::JobSpec select;
+  select.set_scene("scenes/test");
+  select.mutable_select_key_view()->set_count(3);
+  EXPECT_EQ(PlanError(select).message, "");
+  select.mutable_select_key_view()->set_count(18);
+  EXPECT_THAT(PlanError(select).message, HasSubstr("1 to 17"));
 }
 
 TEST(Planner, AugmentationOptionsAreChecked) {

@@ -52,6 +52,7 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
   if (spec.has_temperature()) options.selection.temperature = spec.temperature();
   if (spec.has_exclude_self()) options.selection.exclude_self = spec.exclude_self();
   if (spec.has_outlier_guard()) options.selection.outlier_guard = spec.outlier_guard();
+  if (spec.has_count()) options.selection.count = spec.count();
   return options;
 }
 
@@ -67,6 +68,7 @@ AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec&
   options.backend = spec.backend();
   if (spec.has_samples()) options.samples = spec.samples();
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  options.files = spec.files();
   if (spec.kinds().empty()) return options;
   options.outpaint = options.animate = options.novel_views = false;
   for (const int kind : spec.kinds()) {

@@ -1,11 +1,15 @@
 // color3d-bench pipeline: a colour scene end to end in benchmark mode, without server.
+#include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
+#include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
 #include "core/stage/formats/artifacts.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
+#include "tests/bench/training_scores.h"
 
 namespace color3d {
 namespace {
@@ -25,6 +29,9 @@ struct PipelineArguments {
   bool bound = false;
   bool rescore = false;
   std::string geometry_file;
+  std::string earlier_folder;
+  std::string from_stage;
+  bool score_training = false;
 };
 
 // The scene folder has the true colours of all views.
@@ -39,6 +46,28 @@ void Evaluate(const PipelineArguments& args, const Scene& scene, StageContext& c
   RunEvaluate(options, context);
 }
 
+// Whether the stage comes before the one to begin with; then what it left in the earlier run is
+// taken.
+bool TakeEarlier(const PipelineArguments& args, const char* kind, LocalPipeline* pipeline) {
+  if (args.earlier_folder.empty()) return false;
+  const std::vector<Stage>& stages = StageCatalogue();
+  const auto place = [&](std::string_view name) {
+    return std::find_if(
+        stages.begin(), stages.end(), [&](const Stage& stage) { return name == stage.kind; });
+  };
+  if (place(args.from_stage) == stages.end()) {
+    throw InvalidArgument("--from: there is no stage '{}'", args.from_stage);
+  }
+  if (place(kind) >= place(args.from_stage)) return false;
+  for (const std::string& name : ListFiles(args.earlier_folder)) {
+    const Stage* stage = StageThatLeaves(name);
+    if (stage != nullptr && std::string_view(kind) == stage->kind) {
+      pipeline->Take(name, std::filesystem::path(args.earlier_folder) / name);
+    }
+  }
+  return true;
+}
+
 void RunPipeline(const PipelineArguments& args) {
   LocalPipeline pipeline(
       args.scene_folder, args.out_folder, args.threads, args.seed, [](const std::string& text) {
@@ -51,28 +80,30 @@ void RunPipeline(const PipelineArguments& args) {
     std::printf("%s", ReadFile(pipeline.ArtifactPath(artifact::kScores)).c_str());
     return;
   }
-  pipeline.ImportScene();
-  pipeline.Run(kind::kSelectKeyView, [&](StageContext& c) {
+  const auto run = [&](const char* kind, const std::function<void(StageContext&)>& stage) {
+    if (!TakeEarlier(args, kind, &pipeline)) pipeline.Run(kind, stage);
+  };
+  if (!TakeEarlier(args, kind::kImportScene, &pipeline)) pipeline.ImportScene();
+  run(kind::kSelectKeyView, [&](StageContext& c) {
     SelectKeyViewOptions options;
     options.view = args.key_view;
     if (!args.key_view.empty()) options.selection.strategy = KeyViewStrategy::kManual;
     RunSelectKeyView(options, c);
   });
   const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
-  pipeline.Run(kind::kColorizeKeyView, [&](StageContext& c) {
+  run(kind::kColorizeKeyView, [&](StageContext& c) {
     ColorizeKeyViewOptions options;
     options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;
     RunColorizeKeyView(options, c);
   });
   if (args.geometry_file.empty()) {
-    pipeline.Run(kind::kReconstructGeometry, [&](StageContext& c) {
-      RunReconstructGeometry(args.geometry, args.max_side_px, c);
-    });
+    run(kind::kReconstructGeometry,
+        [&](StageContext& c) { RunReconstructGeometry(args.geometry, args.max_side_px, c); });
   } else {
     pipeline.Take(artifact::kGeometry, args.geometry_file);
   }
   if (args.carry) {
-    pipeline.Run(kind::kCarryColor, [&](StageContext& c) {
+    run(kind::kCarryColor, [&](StageContext& c) {
       CarryColorOptions options;
       options.max_side_px = args.max_side_px;
       RunCarryColor(options, c);
@@ -80,10 +111,15 @@ void RunPipeline(const PipelineArguments& args) {
   }
   ColorizerOptions colorizer = args.colorizer;
   if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
-  pipeline.Run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
-  pipeline.Run(kind::kColorizeViews,
-               [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
-  pipeline.Run(kind::kSolveChroma, [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
+  run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
+  run(kind::kColorizeViews, [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
+  run(kind::kSolveChroma, [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
+  if (args.score_training) {
+    pipeline.Run("score_training", [&](StageContext& c) {
+      std::printf("%s\n", ScoreTrainingViews(c).dump(1).c_str());
+    });
+    return;
+  }
   pipeline.Run(kind::kExport, [&](StageContext& c) { RunExport({}, c); });
   pipeline.Run(kind::kRender, [&](StageContext& c) {
     RenderOptions options;
@@ -121,6 +157,15 @@ void AddPipelineCommand(CLI::App& app) {
       ->check(CLI::ExistingFile);
   command->add_flag(
       "--rescore", args->rescore, "run evaluation alone, on what an earlier run left in --out");
+  CLI::Option* from =
+      command->add_option("--from", args->from_stage, "begin with this stage, e.g. colorize_views");
+  command->add_option("--earlier", args->earlier_folder, "run that the stages before it left")
+      ->check(CLI::ExistingDirectory)
+      ->needs(from);
+  command->add_flag("--score-training",
+                    args->score_training,
+                    "errors of the training views that are not the key view, to choose constants "
+                    "by; nothing is exported");
   command->add_flag(
       "--bound", args->bound, "also score the same geometry under the true colours of all views");
   command->callback([args] { RunPipeline(*args); });

@@ -8,10 +8,12 @@ namespace color3d {
 void AddAugmentationsCommand(CLI::App& app);
 void AddAutomaticCommand(CLI::App& app);
 void AddChoicesCommand(CLI::App& app);
+void AddFloorCommand(CLI::App& app);
 void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
 void AddNetworksCommand(CLI::App& app);
 void AddHintsCommand(CLI::App& app);
+void AddNextKeyCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);

@@ -10,9 +10,11 @@ int main(int argc, char** argv) {
   color3d::AddAugmentationsCommand(app);
   color3d::AddAutomaticCommand(app);
   color3d::AddChoicesCommand(app);
+  color3d::AddFloorCommand(app);
   color3d::AddGoldenCommand(app);
   color3d::AddMakeWeightsCommand(app);
   color3d::AddNetworksCommand(app);
+  color3d::AddNextKeyCommand(app);
   color3d::AddPipelineCommand(app);
   color3d::AddRasterizeCommand(app);
   color3d::AddReconstructCommand(app);

@@ -113,6 +113,22 @@ std::vector<PhotoPair> AllPairs(int count) {
   return pairs;
 }
 
+namespace {
+
+// Photos of which another one shows the same: unrelated ones match by chance, a few times.
+int CountRelated(const SimilarityTable& similarity) {
+  constexpr float kRelated = 10.0f;
+  int related = 0;
+  for (int i = 0; i < similarity.count(); ++i) {
+    float best = 0.0f;
+    for (int j = 0; j < similarity.count(); ++j) best = std::max(best, similarity.At(i, j));
+    related += best >= kRelated ? 1 : 0;
+  }
+  return related;
+}
+
+}  // namespace
+
 PairPlan PlanPairs(const SimilarityTable& similarity,
                    const std::vector<int>& sequence,
                    int neighbors) {
@@ -124,14 +140,17 @@ PairPlan PlanPairs(const SimilarityTable& similarity,
   const size_t all = count * (count - 1) / 2;
   constexpr double kMaxShareOfPairs = 0.7;
   if (static_cast<double>(pairs.size()) >= kMaxShareOfPairs * static_cast<double>(all)) {
-    return {AllPairs(similarity.count()), fmt::format("all {} pairs: few photos", all)};
+    return {AllPairs(similarity.count()),
+            fmt::format("all {} pairs: few photos", all),
+            CountRelated(similarity)};
   }
   return {{pairs.begin(), pairs.end()},
           fmt::format("{} of {} pairs: the {} most similar photos of each, {}two spanning trees",
                       pairs.size(),
                       all,
                       neighbors,
-                      sequence.empty() ? "" : "neighbours in the sequence of names, ")};
+                      sequence.empty() ? "" : "neighbours in the sequence of names, "),
+          CountRelated(similarity)};
 }
 
 std::vector<PhotoPair> PairsOfUnplaced(const std::vector<bool>& placed,

@@ -22,6 +22,8 @@ std::optional<std::vector<int>> SequenceOrder(const std::vector<std::string>& na
 struct PairPlan {
   std::vector<PhotoPair> pairs;  // sorted, no repetitions
   std::string reason;            // one line: what was chosen and why
+  // Photos that are clearly similar to another one; all of them where nothing was compared.
+  int related = 0;
 };
 
 // All n (n - 1) / 2 pairs.

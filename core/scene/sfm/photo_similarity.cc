@@ -37,8 +37,9 @@ struct Nearest {
 
 }  // namespace
 
-int CountMutualMatches(const LocalFeatures& a, const LocalFeatures& b) {
-  if (a.count() == 0 || b.count() == 0) return 0;
+std::vector<std::pair<int, int>> MutualMatches(const LocalFeatures& a, const LocalFeatures& b) {
+  std::vector<std::pair<int, int>> matches;
+  if (a.count() == 0 || b.count() == 0) return matches;
   const Table cosines = RowsOf(a) * RowsOf(b).transpose();
   std::vector<Nearest> of_a(a.count()), of_b(b.count());
   for (int i = 0; i < a.count(); ++i) {
@@ -47,12 +48,15 @@ int CountMutualMatches(const LocalFeatures& a, const LocalFeatures& b) {
       of_b[j].Offer(i, cosines(i, j));
     }
   }
-  int matches = 0;
   for (int i = 0; i < a.count(); ++i) {
     const int j = of_a[i].index;
-    if (of_a[i].Clear() && of_b[j].index == i && of_b[j].Clear()) ++matches;
+    if (of_a[i].Clear() && of_b[j].index == i && of_b[j].Clear()) matches.emplace_back(i, j);
   }
   return matches;
+}
+
+int CountMutualMatches(const LocalFeatures& a, const LocalFeatures& b) {
+  return static_cast<int>(MutualMatches(a, b).size());
 }
 
 SimilarityTable CompareAll(const std::vector<LocalFeatures>& photos,

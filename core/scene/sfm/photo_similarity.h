@@ -2,6 +2,7 @@
 // thread-safe. For this folder only.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "core/base/cancellation.h"
@@ -27,8 +28,9 @@ class SimilarityTable {
   std::vector<float> values_;
 };
 
-// Features of a and b that are each other's nearest and clearly nearer than the second (Lowe's
-// ratio 0.8).
+// Features of a and b, by index, that are each other's nearest and clearly nearer than the second
+// (Lowe's ratio 0.8).
+std::vector<std::pair<int, int>> MutualMatches(const LocalFeatures& a, const LocalFeatures& b);
 int CountMutualMatches(const LocalFeatures& a, const LocalFeatures& b);
 
 // Matches of every pair, as pre-emptive matching does it (Wu 2013, "Towards linear-time incremental

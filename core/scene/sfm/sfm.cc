@@ -15,6 +15,7 @@
 #include "core/scene/lens.h"
 #include "core/scene/sfm/colmap_process.h"
 #include "core/scene/sfm/pair_planner.h"
+#include "core/scene/sfm/parallax.h"
 #include "core/scene/sfm/sfm_mapper.h"
 #include "core/scene/sfm/sfm_matching.h"
 #include "core/scene/sfm/sfm_photos.h"
@@ -29,8 +30,7 @@ constexpr size_t kExhaustiveLimit = 60;
 constexpr int kMaxLocalFeatures = 300;
 constexpr int kMinLocalFeatures = 100;
 
-int LocalFeatureCount(const ImportOptions& options, size_t photos) {
-  if (options.sfm_pairs == SfmPairs::kExhaustive) return 0;
+int LocalFeatureCount(size_t photos) {
   return std::clamp(
       static_cast<int>(100 * kMaxLocalFeatures / photos), kMinLocalFeatures, kMaxLocalFeatures);
 }
@@ -71,6 +71,14 @@ class Solver {
     if (planned) {
       SolvePlanned(plan);
       if (PlannedIsEnough()) return std::move(*best_);
+      if (IsHopeless(plan)) {
+        colmap_.Note(
+            fmt::format("{} of {} photos look like another one; comparing all pairs, which "
+                        "takes much longer, would find no more",
+                        plan.related,
+                        Count()));
+        return ColmapModel{};
+      }
       Say(
           fmt::format("{} of {} photos hang together by the planned pairs; comparing all pairs, "
                       "which takes longer",
@@ -94,6 +102,11 @@ class Solver {
   bool PlannedIsEnough() const {
     return AreNearlyAllPlaced() ||
            (IsHalfPlaced() && (!has_coarse_features_ || copies_.names.size() > kExhaustiveLimit));
+  }
+
+  // The most similar pairs gave nothing, and they are not similar.
+  bool IsHopeless(const PairPlan& plan) const {
+    return Placed() == 0 && plan.related < static_cast<int>(kMinPlaced);
   }
 
   void Say(const std::string& warning) {
@@ -125,7 +138,7 @@ class Solver {
     Extract(FeatureDetail::kCoarse);
     Match(plan.pairs);
     Attempt("planned", Strictness::kDefault);
-    if (Placed() == copies_.names.size()) return;
+    if (Placed() == copies_.names.size() || IsHopeless(plan)) return;
     const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
     if (AreWorthMatching(more)) {
       colmap_.Note(
@@ -178,12 +191,29 @@ class Solver {
   bool is_loose_ = false;
 };
 
+// Before anything that takes minutes.
+void RequireParallax(const std::vector<LocalFeatures>& features,
+                     const ColmapProcess& colmap,
+                     const RunControl& run) {
+  const ParallaxEvidence evidence = LookForParallax(features, run.pool, run.cancel);
+  colmap.Note(Describe(evidence));
+  if (!evidence.IsFromOnePlace()) return;
+  throw InvalidArgument(
+      "the photos were taken from one place, so that no depth can follow: {}. Take photos from "
+      "different places, a step to the side for each (a tenth of the distance to what you "
+      "photograph, or more); turning the camera or letting it stand does not help; log: {}",
+      Describe(evidence),
+      colmap.log().filename().string());
+}
+
 PairPlan Plan(const std::vector<Photo>& photos,
               const FeatureImages& copies,
               const ImportOptions& options,
               const RunControl& run) {
   const int count = static_cast<int>(photos.size());
-  if (copies.features.empty()) return {AllPairs(count), "all pairs, as asked for"};
+  if (options.sfm_pairs == SfmPairs::kExhaustive) {
+    return {AllPairs(count), "all pairs, as asked for", count};
+  }
   std::vector<std::string> names;
   for (const Photo& photo : photos) names.push_back(photo.name);
   return PlanPairs(CompareAll(copies.features, run.pool, run.cancel),
@@ -275,8 +305,9 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                 scene_folder,
                                 work.images(),
                                 options.sfm_max_image_side_px,
-                                LocalFeatureCount(options, photos.size()),
+                                LocalFeatureCount(photos.size()),
                                 run);
+    RequireParallax(copies.features, colmap, run);
     plan = Plan(photos, copies, options, run);
   }
   report.plan = plan.reason;

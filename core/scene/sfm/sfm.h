@@ -23,9 +23,9 @@ struct SfmResult {
 // with all. While fewer than nine tenths of the photos find a place, tries a straight lens and a
 // small first angle; then, with coarse features and not very many photos, all pairs of fine ones.
 // While fewer than half find a place: all pairs in any case, and loose thresholds last. Models with
-// too few points or an absurd lens do not count. Throws Error: fewer than 3 placed
-// (kInvalidArgument), COLMAP not installed (kFailedPrecondition), too slow (kDeadlineExceeded),
-// cancelled.
+// too few points or an absurd lens do not count. Throws Error: photos that were all taken from one
+// place, which is found out first, fewer than 3 placed (kInvalidArgument), COLMAP not installed
+// (kFailedPrecondition), too slow (kDeadlineExceeded), cancelled.
 SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& scratch_folder,

@@ -5,12 +5,15 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <thread>
 
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/import.h"
+#include "core/scene/sfm/parallax.h"
+#include "core/scene/sfm/sfm_photos.h"
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/test_exif.h"
 #include "tests/support/scenes/test_scenes.h"
@@ -192,6 +195,44 @@ TEST_F(Sfm, PhotosThatShareNothingAreRefusedInOneLine) {
   EXPECT_EQ(said.find('\n'), std::string::npos);
 }
 
+// Many: comparing all pairs would take minutes and find nothing.
+TEST_F(Sfm, ManyPhotosThatShareNothingAreNotComparedForLong) {
+  for (int i = 0; i < 24; ++i) {
+    Random random(static_cast<uint64_t>(i + 1));
+    Image coarse(32, 24, 1);
+    for (float& v : coarse.data) v = static_cast<float>(random.NextUniform());
+    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(Resize(coarse, 320, 240)));
+  }
+  options_.sfm_neighbors = 3;
+  EXPECT_THAT(Refusal([&] { Run(); }), HasSubstr("none of 24 photos could be placed"));
+  EXPECT_EQ(progress_.messages.find("blocks of photos"), std::string::npos);
+  EXPECT_EQ(progress_.messages.find("widened"), std::string::npos);
+}
+
+// A film of a fixed camera: noise, and something that passes by. COLMAP has not even started.
+TEST_F(Sfm, ACameraThatStandsStillIsRefusedAtOnce) {
+  const Image background = RenderRoom(kRoomCamera, RoomPoses(3)[1]);
+  Random random(4);
+  for (int i = 0; i < 40; ++i) {
+    Image photo = background;
+    for (int y = 90; y < 210; ++y) {
+      for (int x = 8 * i; x < 8 * i + 60; ++x) {
+        photo.At(0, y, x) = Texture(0.02 * (x - 8 * i), 0.02 * y, 7);
+      }
+    }
+    for (float& v : photo.data) v += 0.02f * static_cast<float>(random.NextNormal());
+    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(photo));
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const std::string said = Refusal([&] { Run(); });
+  EXPECT_THAT(said, HasSubstr("taken from one place"));
+  EXPECT_THAT(said, HasSubstr("pairs of photos"));
+  EXPECT_THAT(said, HasSubstr("a step to the side"));
+  EXPECT_EQ(said.find('\n'), std::string::npos);
+  EXPECT_EQ(ReadFile(scratch_.path() / "sfm.log").find("Processed file"), std::string::npos);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+}
+
 TEST_F(Sfm, FlatPhotosAndTwoPhotosAreRefused) {
   for (int i = 0; i < 2; ++i) {
     WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(Image(64, 48, 1, 0.5f)));
@@ -210,6 +251,37 @@ TEST_F(Sfm, CancellationStopsTheChild) {
   });
   EXPECT_THAT(Refusal([&] { Run(); }), HasSubstr("cancelled"));
   canceller.join();
+}
+
+std::vector<LocalFeatures> FeaturesOf(const fs::path& folder) {
+  std::vector<LocalFeatures> features;
+  for (const std::string& name : ListFiles(folder)) {
+    features.push_back(DetectLocalFeatures(FeatureImage(ReadImage(folder / name), 384), 300));
+  }
+  return features;
+}
+
+TEST(Parallax, RealCapturesAreToldFromAFixedCamera) {
+  const fs::path data = COLOR3D_SHARED_DATA;
+  if (!fs::exists(data / "scenes/fern/images")) GTEST_SKIP() << "no " << data;
+  ThreadPool pool(2);
+  for (const char* folder : {"scenes/banana/images",
+                             "scenes/fern/images",
+                             "scenes/fox/images",
+                             "scenes/head/images",
+                             "scenes/sceaux/images",
+                             "scenes/street/images",
+                             "video/lady_running",
+                             "video/man_walking",
+                             "video/athlete4cam/cam01",
+                             "video/athlete4cam/cam03"}) {
+    if (!fs::exists(data / folder)) continue;
+    const bool fixed = std::string(folder).find("athlete") != std::string::npos;
+    const ParallaxEvidence evidence = LookForParallax(FeaturesOf(data / folder), pool, {});
+    EXPECT_EQ(evidence.IsFromOnePlace(), fixed) << folder << ": " << Describe(evidence);
+    const double share = evidence.matched > 0 ? 1.0 * evidence.turned / evidence.matched : 0.0;
+    EXPECT_TRUE(fixed ? share > 0.95 : share < 0.75) << folder << ": " << Describe(evidence);
+  }
 }
 
 TEST_F(Sfm, RealPhotosAgreeWithTheirModel) {

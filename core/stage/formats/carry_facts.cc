@@ -17,10 +17,6 @@ CarryFacts ReadCarryFacts(const StageContext& context) {
     const auto json = ordered_json::parse(context.ReadInput(artifact::kCarryFacts));
     if (json.contains("coverage")) facts.coverage = json.at("coverage").get<double>();
     if (json.contains("key_views")) json.at("key_views").get_to(facts.key_views);
-    const auto next = json.find("next_key_view");
-    if (next != json.end() && next->is_object()) {
-      facts.next = {next->at("name"), next->at("coverage_now"), next->at("coverage_with")};
-    }
   } catch (const ordered_json::exception& e) {
     throw InvalidArgument(
         "{} is damaged: {}; run {} again", artifact::kCarryFacts, e.what(), kind::kCarryColor);
@@ -37,11 +33,6 @@ void WriteCarryFacts(const CarryFacts& facts,
     json["views"].push_back({{"view", scene.views[i].name}, {"coverage", coverage[i]}});
   }
   if (facts.coverage) json["coverage"] = *facts.coverage;
-  if (facts.next) {
-    json["next_key_view"] = {{"name", facts.next->name},
-                             {"coverage_now", facts.next->coverage_now},
-                             {"coverage_with", facts.next->coverage_with}};
-  }
   context.WriteOutput(artifact::kCarryFacts, json.dump(1) + "\n");
 }
 

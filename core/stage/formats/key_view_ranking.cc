@@ -37,6 +37,19 @@ Image Thumbnail(const KeyViewRanking& ranking, int index) {
 
 std::string DescribeKeyView(const KeyViewRanking& ranking) {
   const auto& ranked = ranking.selection.ranking;
+  if (!ranking.together.empty()) {
+    std::string names;
+    for (const int view : ranking.together) {
+      names += (names.empty() ? "" : ", ") + ranking.names[view];
+    }
+    return fmt::format(
+        "Chosen together: {}; the colour error (CIEDE2000) that is expected of all views falls "
+        "from "
+        "{:.1f} with the first to {:.1f}.",
+        names,
+        ranking.expected_error.front(),
+        ranking.expected_error.back());
+  }
   if (ranking.strategy == "manual") return "Chosen by the user.";
   const size_t kept = static_cast<size_t>(std::count_if(
       ranked.begin(), ranked.end(), [](const RankedView& view) { return view.set_aside.empty(); }));
@@ -64,6 +77,10 @@ std::string KeyViewToJson(const KeyViewRanking& ranking) {
                               {"margin", ranking.selection.margin},
                               {"decisiveness", ranking.selection.decisiveness},
                               {"description", DescribeKeyView(ranking)}};
+  for (size_t i = 0; i < ranking.together.size(); ++i) {
+    json["key_views"].push_back({{"view", ranking.names[ranking.together[i]]},
+                                 {"expected_error", ranking.expected_error[i]}});
+  }
   if (!ranking.fallback.empty()) json["fallback"] = ranking.fallback;
   if (!ranking.encoder.empty()) json["encoder"] = ranking.encoder;
   for (const RankedView& ranked : ranking.selection.ranking) {
@@ -87,7 +104,9 @@ std::string KeyViewSheetJpeg(const KeyViewRanking& ranking, const Image& chosen_
       ++(aside ? sheet.set_aside_left_out : sheet.ranked_left_out);
       continue;
     }
-    const bool chosen = ranked.index == ranking.selection.index;
+    const bool chosen = ranked.index == ranking.selection.index ||
+                        std::find(ranking.together.begin(), ranking.together.end(), ranked.index) !=
+                            ranking.together.end();
     Image thumbnail = Thumbnail(ranking, ranked.index);
     if (thumbnail.Empty() && chosen) thumbnail = chosen_thumbnail;
     const std::string note = aside ? ranked.set_aside

@@ -16,6 +16,10 @@ struct KeyViewRanking {
   std::string strategy;                // that was used: "coverage", "entropy", "tracks", "manual"
   std::string fallback;                // why another one than was asked for; empty: as asked for
   std::string encoder;                 // description; empty when no features were used
+  // Where several were chosen together: all of them, best first, and the error that is expected
+  // with the first, the first two, ... Else empty.
+  std::vector<int> together;
+  std::vector<double> expected_error;
 
   const std::string& Chosen() const { return names[selection.index]; }
 };

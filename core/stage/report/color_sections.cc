@@ -1,9 +1,11 @@
 #include "core/stage/report/color_sections.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/image/codec.h"
 #include "core/stage/formats/artifacts.h"
@@ -36,10 +38,13 @@ ReportPicture SmallPicture(const Image& image, std::string caption) {
 
 }  // namespace
 
-ColorFacts::ColorFacts(const Scene& scene, const StageContext& context)
-    : scene_(scene), context_(context), carry_(ReadCarryFacts(context)) {
+ColorFacts::ColorFacts(const Scene& scene,
+                       const StageContext& context,
+                       std::optional<NextKeyViewFacts> next)
+    : scene_(scene), context_(context), carry_(ReadCarryFacts(context)), next_(std::move(next)) {
   ReadProvenance();
   if (context.HasInput(artifact::kScores)) ReadScores();
+  if (context.HasInput(artifact::kAugmentationFacts)) ReadAugmentations();
 }
 
 void ColorFacts::ReadProvenance() {
@@ -48,13 +53,38 @@ void ColorFacts::ReadProvenance() {
     if (!context_.HasInput(name)) continue;
     const Image image = DecodeImage(context_.ReadInput(name), name);
     if (image.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
-    views_.push_back({static_cast<int>(i), SharesOf(image)});
+    const bool scored = context_.HasInput(ViewArtifact(artifact::kTruths, scene_.views[i], ".jpg"));
+    views_.push_back({static_cast<int>(i), scored, SharesOf(image)});
   }
+}
+
+// All 0 without such views.
+SourceShares ColorFacts::MeanShares(bool scored_only) const {
+  SourceShares mean;
+  double count = 0.0;
   for (const ViewFacts& view : views_) {
-    const double part = 1.0 / static_cast<double>(views_.size());
-    mean_.guessed += part * view.shares.guessed;
-    mean_.seen += part * view.shares.seen;
-    mean_.inferred += part * view.shares.inferred;
+    if (scored_only && !view.scored) continue;
+    mean.guessed += view.shares.guessed;
+    mean.seen += view.shares.seen;
+    mean.inferred += view.shares.inferred;
+    count += 1.0;
+  }
+  if (count == 0.0) return mean;
+  return {mean.guessed / count, mean.seen / count, mean.inferred / count};
+}
+
+void ColorFacts::ReadAugmentations() {
+  const ordered_json facts = ReadJson(context_, artifact::kAugmentationFacts);
+  try {
+    for (const auto& sample : facts.at("samples")) {
+      const std::string source = sample.at("source");
+      augmentations_.push_back(
+          sample.at("kind") == "file"
+              ? source
+              : fmt::format("{} ({})", sample.at("name").get<std::string>(), source));
+    }
+  } catch (const ordered_json::exception& e) {
+    throw InvalidArgument("{} is damaged: {}", artifact::kAugmentationFacts, e.what());
   }
 }
 
@@ -87,9 +117,16 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
   std::vector<std::pair<std::string, double>> metrics;
   if (carry_.coverage) metrics.emplace_back("coverage", *carry_.coverage);
   if (!views_.empty()) {
-    metrics.emplace_back("share_seen", mean_.seen);
-    metrics.emplace_back("share_inferred", mean_.inferred);
-    metrics.emplace_back("share_guessed", mean_.guessed);
+    const SourceShares mean = MeanShares(/*scored_only=*/false);
+    metrics.emplace_back("share_seen", mean.seen);
+    metrics.emplace_back("share_inferred", mean.inferred);
+    metrics.emplace_back("share_guessed", mean.guessed);
+  }
+  if (std::any_of(views_.begin(), views_.end(), [](const ViewFacts& v) { return v.scored; })) {
+    const SourceShares mean = MeanShares(/*scored_only=*/true);
+    metrics.emplace_back("share_seen_scored", mean.seen);
+    metrics.emplace_back("share_inferred_scored", mean.inferred);
+    metrics.emplace_back("share_guessed_scored", mean.guessed);
   }
   for (const auto& [name, value] : errors_by_source_) {
     if (!name.starts_with("share_")) metrics.emplace_back(name, value);
@@ -106,12 +143,23 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
 std::string ColorFacts::SourceSummary() const {
   std::string summary;
   if (!views_.empty()) {
+    const SourceShares mean = MeanShares(/*scored_only=*/false);
     summary = fmt::format(
         "{} of all pixels show what a key view shows, {} resemble something in it, and {} are a "
         "guess. ",
-        Percent(mean_.seen),
-        Percent(mean_.inferred),
-        Percent(mean_.guessed));
+        Percent(mean.seen),
+        Percent(mean.inferred),
+        Percent(mean.guessed));
+  }
+  const auto scored =
+      std::count_if(views_.begin(), views_.end(), [](const ViewFacts& v) { return v.scored; });
+  if (scored > 0) {
+    const SourceShares mean = MeanShares(/*scored_only=*/true);
+    summary += fmt::format("In the {} scored views these are {}, {} and {}. ",
+                           scored,
+                           Percent(mean.seen),
+                           Percent(mean.inferred),
+                           Percent(mean.guessed));
   }
   if (carry_.coverage) {
     summary += fmt::format("The key {} {} of the other views' pixels.",
@@ -183,14 +231,17 @@ ReportSection ColorFacts::SourceSection() const {
   section.title = "Where the colour comes from";
   const std::string summary = SourceSummary();
   if (!summary.empty()) section.notes.push_back(summary);
-  if (carry_.next) {
-    section.notes.push_back(fmt::format(
-        "To see more of it in its own colours, colour {} next: of the points that structure-from-"
-        "motion has tracked through the photos, the share that a key view shows then rises from {} "
-        "to {}.",
-        carry_.next->name,
-        Percent(carry_.next->coverage_now),
-        Percent(carry_.next->coverage_with)));
+  if (!augmentations_.empty()) {
+    section.notes.push_back(fmt::format("Beside the key views, the colorizer learnt from {}.",
+                                        fmt::join(augmentations_, ", ")));
+  }
+  if (next_) {
+    section.notes.push_back(
+        fmt::format("To see more of it in its own colours, colour {} next (--more-key): the colour "
+                    "error (CIEDE2000) that is expected of all views falls from {:.1f} to {:.1f}.",
+                    next_->name,
+                    next_->error_now,
+                    next_->error_with));
   }
   if (!views_.empty()) section.tables.push_back(ShareTable());
   if (!errors_by_source_.empty()) section.tables.push_back(ErrorTable());

@@ -11,6 +11,7 @@
 #include "core/report/report_page.h"
 #include "core/scene/scene.h"
 #include "core/stage/formats/carry_facts.h"
+#include "core/stage/report/next_key_view.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -25,12 +26,16 @@ struct SourceShares {
 // Read once from provenance/*, carry.json and scores.json, each of which may be absent.
 class ColorFacts {
  public:
-  // Throws Error{kInvalidArgument} when one of them is damaged.
-  ColorFacts(const Scene& scene, const StageContext& context);
+  // `next`: the view to colour next. Throws Error{kInvalidArgument} when one of them is damaged.
+  ColorFacts(const Scene& scene,
+             const StageContext& context,
+             std::optional<NextKeyViewFacts> next = std::nullopt);
 
-  // For metrics.json, in the order in which people read them: coverage, share_*, me, tc, ... and
-  // the errors by source.
+  // For metrics.json, in the order in which people read them: coverage, share_* over all views and
+  // share_*_scored over those that are scored, me, tc, ... and the errors by source.
   std::vector<std::pair<std::string, double>> Metrics() const;
+  // What the colorizer learnt from beside key views: "augment/a.png", "outpaint-1 (embedded)".
+  const std::vector<std::string>& augmentations() const { return augmentations_; }
   // `personalization`: the curves of that stage. Chapters that would have nothing to tell are left
   // out.
   std::vector<ReportSection> Sections(std::vector<CurvePoint> personalization) const;
@@ -38,6 +43,7 @@ class ColorFacts {
  private:
   struct ViewFacts {
     int view = 0;
+    bool scored = false;
     SourceShares shares;
   };
   // A row of the table: "me", "me_de00", "tc_short", "tc_long", "tc".
@@ -48,6 +54,8 @@ class ColorFacts {
 
   void ReadProvenance();
   void ReadScores();
+  void ReadAugmentations();
+  SourceShares MeanShares(bool scored_only) const;
   std::string SourceSummary() const;
   std::vector<ViewFacts> LeastCertainFirst() const;
   ReportTable ShareTable() const;
@@ -60,8 +68,9 @@ class ColorFacts {
   const Scene& scene_;
   const StageContext& context_;
   std::vector<ViewFacts> views_;
-  SourceShares mean_;
   CarryFacts carry_;
+  std::optional<NextKeyViewFacts> next_;
+  std::vector<std::string> augmentations_;
   std::vector<Agreement> agreement_;
   std::map<std::string, double> errors_by_source_;
 };

@@ -15,20 +15,25 @@ using ColorSectionsTest = EvaluatedSceneTest;
 TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext) {
   AddProvenance("p1.png", Halves({0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f}));
   AddProvenance("p2.png", Halves({1.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f}));
-  AddInput(artifact::kCarryFacts,
-           R"({"coverage": 0.61, "key_views": ["p1.png"],
-               "next_key_view": {"name": "p0.png", "coverage_now": 0.61, "coverage_with": 0.83}})");
+  AddInput(artifact::kCarryFacts, R"({"coverage": 0.61, "key_views": ["p1.png"]})");
   AddInput(artifact::kScores,
            R"({"mean": {}, "consistency": {"rendered": {"me": 0.02, "me_de00": 1.5, "tc": 0.001,
                "tc_short": 0.001, "tc_long": 0.001}}, "sources": {"share_seen": 0.6,
                "delta_e00_seen": 1.25, "confidence_rank_correlation": -0.5}})");
+  AddInput(ViewArtifact(artifact::kTruths, scene_.views[scene_.FindView("p1.png")], ".jpg"), "");
+  AddInput(artifact::kAugmentationFacts,
+           R"({"samples": [{"name": "file-1", "kind": "file", "source": "augment/a.png"},
+               {"name": "animate-1", "kind": "animate", "source": "embedded"}]})");
   const StageContext context = MakeContext();
-  const ColorFacts facts(scene_, context);
+  const ColorFacts facts(scene_, context, NextKeyViewFacts{"p0.png", 5.5, 3.25});
   std::map<std::string, double> metrics;
   for (const auto& [name, value] : facts.Metrics()) metrics[name] = value;
   EXPECT_NEAR(metrics.at("share_seen"), 0.5, 0.01);
   EXPECT_NEAR(metrics.at("share_inferred"), 0.25, 0.01);
   EXPECT_NEAR(metrics.at("share_guessed"), 0.25, 0.01);
+  EXPECT_NEAR(metrics.at("share_seen_scored"), 1.0, 0.01);
+  EXPECT_NEAR(metrics.at("share_inferred_scored"), 0.0, 0.01);
+  EXPECT_THAT(facts.augmentations(), testing::ElementsAre("augment/a.png", "animate-1 (embedded)"));
   EXPECT_EQ(metrics.at("coverage"), 0.61);
   EXPECT_EQ(metrics.at("me"), 0.02);
   EXPECT_EQ(metrics.at("tc"), 0.001);
@@ -38,7 +43,7 @@ TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext)
                                         {"personalize", 4.0, 60, "stopped_early_iteration", 60.0}});
   ASSERT_EQ(sections.size(), 3u);
   EXPECT_THAT(sections[0].notes.back(), testing::HasSubstr("colour p0.png next"));
-  EXPECT_THAT(sections[0].notes.back(), testing::HasSubstr("from 61 % to 83 %"));
+  EXPECT_THAT(sections[0].notes.back(), testing::HasSubstr("from 5.5 to 3.2"));
   ASSERT_EQ(sections[0].tables.size(), 2u);
   EXPECT_EQ(sections[0].tables[0].rows[0][0], "p2.png") << "least certain first";
   EXPECT_EQ(sections[0].rows.size(), 2u);
@@ -55,7 +60,7 @@ TEST_F(ColorSectionsTest, OldJobsHaveNoChaptersAndDamagedFactsAreRefused) {
     EXPECT_TRUE(ColorFacts(scene_, context).Metrics().empty());
     EXPECT_TRUE(ReadViewConfidence(context, scene_.views[0], 48, 32).Empty());
   }
-  AddInput(artifact::kCarryFacts, R"({"next_key_view": {"name": 3}})");
+  AddInput(artifact::kCarryFacts, R"({"key_views": [3]})");
   const StageContext context = MakeContext();
   EXPECT_THROW(ColorFacts(scene_, context), Error);
 }

@@ -1,0 +1,228 @@
+// color3d-bench next-key: is the advice on which view to colour next right? On the training views
+// of a scene that has been coloured with one key view: the error that each of several second key
+// views leaves, against what was expected of them.
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "core/base/files.h"
+#include "core/catalogue/stages.h"
+#include "core/color/difference.h"
+#include "core/color/lab.h"
+#include "core/color/lab_planes.h"
+#include "core/image/codec.h"
+#include "core/keyview/collect_features.h"
+#include "core/scene/view_images.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/report/next_key_view.h"
+#include "core/stage/sources/seen_samples.h"
+#include "tests/bench/commands.h"
+#include "tests/bench/local_pipeline.h"
+
+namespace color3d {
+namespace {
+
+struct Arguments {
+  std::string scene_folder, run_folder, out_folder;
+  int candidates = 5;
+  int side_px = 300;
+  int iterations = 0;  // of personalization; 0: neighbours alone
+  int threads = 2;
+};
+
+// Training views that are not key views, in the order of the scene.
+struct Problem {
+  Scene scene;
+  int key = 0;
+  std::vector<int> candidates;
+};
+
+Problem ReadProblem(const Arguments& args) {
+  const std::filesystem::path run = args.run_folder;
+  Problem problem;
+  problem.scene = SceneFromJson(ReadFile(run / artifact::kScene));
+  problem.key = problem.scene.FindView(
+      nlohmann::json::parse(ReadFile(run / artifact::kKeyView)).at("view").get<std::string>());
+  std::vector<int> others = problem.scene.TrainingViews();
+  std::erase(others, problem.key);
+  const size_t count = std::min<size_t>(args.candidates, others.size());
+  for (size_t k = 0; k < count; ++k) {
+    problem.candidates.push_back(others[(2 * k + 1) * others.size() / (2 * count)]);
+  }
+  return problem;
+}
+
+// Colours all views from the key view and `second` (-1: none) and leaves them in the pipeline.
+void ColorAll(const Arguments& args, const Problem& problem, int second, LocalPipeline* pipeline) {
+  pipeline->Run(kind::kCarryColor, [&](StageContext& c) {
+    CarryColorOptions options;
+    options.max_side_px = args.side_px;
+    if (second >= 0) {
+      const View& view = problem.scene.views[second];
+      options.further.push_back({view.name, {}});
+      options.further.back().color.file = c.scene_folder() / view.image_file;
+    }
+    RunCarryColor(options, c);
+  });
+  pipeline->Run(kind::kPersonalize, [&](StageContext& c) {
+    ColorizerOptions options;
+    options.iterations = args.iterations;
+    options.max_side_px = args.side_px;
+    RunPersonalize(options, c);
+  });
+  pipeline->Run(kind::kColorizeViews, [&](StageContext& c) { RunColorizeViews(args.side_px, c); });
+}
+
+// Mean CIEDE2000 of the photos' colours under their true L, over all training views.
+double TrainingError(const Arguments& args, const Problem& problem, const LocalPipeline& pipeline) {
+  const ViewImages images(problem.scene, args.scene_folder, args.side_px, 0);
+  double sum = 0.0;
+  const std::vector<int> training = problem.scene.TrainingViews();
+  for (const int index : training) {
+    const View& view = problem.scene.views[index];
+    const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+    const AbMap map = DecodeAbPng(ReadFile(pipeline.ArtifactPath(name)), name);
+    const Image truth = LabFromSrgb(images.Undistort(
+        index, ReadImage(std::filesystem::path(args.scene_folder) / view.image_file)));
+    sum += MeanDeltaE00(truth,
+                        JoinLab(LuminanceOfLab(truth), Resize(map.ab, truth.width, truth.height)));
+  }
+  return sum / static_cast<double>(training.size());
+}
+
+// By the points of structure-from-motion that the key view does not see, each counted as often as
+// views see it: what was advised before there were expected errors.
+double PointsGained(const Problem& problem, int second) {
+  double gained = 0.0;
+  for (const SparsePoint& point : problem.scene.points) {
+    const auto sees = [&](int view) {
+      return std::find(point.views.begin(), point.views.end(), view) != point.views.end();
+    };
+    if (sees(second) && !sees(problem.key)) gained += static_cast<double>(point.views.size());
+  }
+  return gained;
+}
+
+// What the report expects each candidate to save, from the coloured views' provenance.
+std::vector<double> ReportedSavings(const Arguments& args,
+                                    const Problem& problem,
+                                    const LocalPipeline& pipeline,
+                                    ThreadPool& pool) {
+  const SampleGrid grid = GridFor(static_cast<int>(problem.scene.views.size()));
+  std::vector<int> all(problem.scene.views.size());
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<std::vector<float>> errors;
+  for (const int view : all) {
+    const std::string name = ViewArtifact(artifact::kProvenance, problem.scene.views[view], ".png");
+    errors.push_back(
+        view == problem.key
+            ? std::vector<float>(grid.samples(), 0.0f)
+            : ExpectedErrorsOf(DecodeImage(ReadFile(pipeline.ArtifactPath(name)), name), grid));
+  }
+  const GaussianModel geometry =
+      ParseGaussians(ReadFile(std::filesystem::path(args.run_folder) / artifact::kGeometry));
+  return ExpectedSavings(
+      SeenByGeometry(problem.scene, all, geometry, grid, pool, {}), errors, problem.candidates);
+}
+
+// What the selection of several views expects of the key view with each candidate.
+std::vector<double> SelectionErrors(const Arguments& args,
+                                    const Problem& problem,
+                                    ThreadPool& pool) {
+  const std::vector<int> training = problem.scene.TrainingViews();
+  std::vector<std::filesystem::path> photos;
+  for (const int view : training) {
+    photos.push_back(std::filesystem::path(args.scene_folder) /
+                     problem.scene.views[view].image_file);
+  }
+  NoCheckpoints none;
+  NullObserver silent;
+  const CancellationToken cancel;
+  const RunControl run{pool, none, silent, cancel};
+  const auto encoder = Encoder::Embedded();
+  const auto features = CollectViewFeatures(*encoder, *encoder, photos, "", run);
+  const NearestDistances distances =
+      FindNearestDistances(features, std::vector<bool>(training.size(), true), run);
+  const GaussianModel geometry =
+      ParseGaussians(ReadFile(std::filesystem::path(args.run_folder) / artifact::kGeometry));
+  const SeenSamples seen = SeenByGeometry(
+      problem.scene, training, geometry, GridFor(static_cast<int>(training.size())), pool, cancel);
+  const auto place = [&](int view) {
+    return static_cast<int>(std::find(training.begin(), training.end(), view) - training.begin());
+  };
+  std::vector<double> errors;
+  for (const int candidate : problem.candidates) {
+    errors.push_back(ExpectedError(seen, distances, {place(problem.key), place(candidate)}));
+  }
+  return errors;
+}
+
+// Pairs of candidates whose order `worth` (more is better) tells, of those whose errors differ by
+// more than 1 %.
+nlohmann::ordered_json Order(const std::vector<double>& errors, const std::vector<double>& worth) {
+  int right = 0, pairs = 0;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    for (size_t j = i + 1; j < errors.size(); ++j) {
+      if (std::abs(errors[i] - errors[j]) < 0.01 * std::min(errors[i], errors[j])) continue;
+      ++pairs;
+      right += (errors[i] < errors[j]) == (worth[i] > worth[j]) ? 1 : 0;
+    }
+  }
+  const size_t best = std::max_element(worth.begin(), worth.end()) - worth.begin();
+  return {{"right", right}, {"pairs", pairs}, {"error_of_its_best", errors[best]}};
+}
+
+void Run(const Arguments& args) {
+  const Problem problem = ReadProblem(args);
+  LocalPipeline pipeline(args.scene_folder, args.out_folder, args.threads, 1, {});
+  for (const char* name :
+       {artifact::kScene, artifact::kKeyView, artifact::kKeyColor, artifact::kGeometry}) {
+    pipeline.Take(name, std::filesystem::path(args.run_folder) / name);
+  }
+  ThreadPool pool(args.threads);
+  ColorAll(args, problem, -1, &pipeline);
+  const double alone = TrainingError(args, problem, pipeline);
+  const std::vector<double> reported = ReportedSavings(args, problem, pipeline, pool);
+  std::vector<double> selected = SelectionErrors(args, problem, pool);
+  for (double& error : selected) error = -error;
+  std::vector<double> errors, points;
+  nlohmann::ordered_json json{{"key_view", problem.scene.views[problem.key].name},
+                              {"error_alone", alone}};
+  for (size_t k = 0; k < problem.candidates.size(); ++k) {
+    const int candidate = problem.candidates[k];
+    ColorAll(args, problem, candidate, &pipeline);
+    errors.push_back(TrainingError(args, problem, pipeline));
+    points.push_back(PointsGained(problem, candidate));
+    json["candidates"].push_back({{"view", problem.scene.views[candidate].name},
+                                  {"error", errors.back()},
+                                  {"saved", alone - errors.back()},
+                                  {"points", points.back()},
+                                  {"expected_saving", reported[k]},
+                                  {"selection_error", -selected[k]}});
+    std::fprintf(stderr, "%s\n", json["candidates"].back().dump().c_str());
+  }
+  json["order_by_points"] = Order(errors, points);
+  json["order_by_report"] = Order(errors, reported);
+  json["order_by_selection"] = Order(errors, selected);
+  std::printf("%s\n", json.dump(1).c_str());
+}
+
+}  // namespace
+
+void AddNextKeyCommand(CLI::App& app) {
+  auto args = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand(
+      "next-key",
+      "second key views: the training views' error with each, against what is expected");
+  command->add_option("--scene", args->scene_folder, "folder of photos in colour")->required();
+  command->add_option("--run", args->run_folder, "what `pipeline` has left")->required();
+  command->add_option("--out", args->out_folder, "where artifacts go")->required();
+  command->add_option("--candidates", args->candidates);
+  command->add_option("--side", args->side_px, "px");
+  command->add_option("--iterations", args->iterations, "of personalization");
+  command->add_option("--threads", args->threads);
+  command->callback([args] { Run(*args); });
+}
+
+}  // namespace color3d
