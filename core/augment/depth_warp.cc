@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/augment/fill_holes.h"
+#include "core/image/fill_holes.h"
 #include "core/image/plane_sampling.h"
 
 namespace color3d {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/augment/fill_holes.h"
+#include "core/image/fill_holes.h"
 
 namespace color3d {
 namespace {

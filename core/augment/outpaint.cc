@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/augment/fill_holes.h"
 #include "core/base/error.h"
 #include "core/base/random.h"
+#include "core/image/fill_holes.h"
 
 namespace color3d {
 namespace {

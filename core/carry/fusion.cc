@@ -81,11 +81,12 @@ FusedColor FuseColors(const Image& luminance,
     const double pull =
         (1.0 - seen) * options.inferred_weight / (1.0 + strangeness * strangeness) + kMinPull;
     const double total = seen + pull;
+    const double scale = options.relative_chroma.Scale(luminance.data[i]);
     for (int c = 0; c < 2; ++c) {
       const double guess_ab = guessed.Empty() ? 0.0 : options.guess_chroma * guessed.Plane(c)[i];
       const double prior = (1.0 - guess) * inferred.Plane(c)[i] + guess * guess_ab;
       target[c * pixels + i] =
-          static_cast<float>((seen * carried.ab.Plane(c)[i] + pull * prior) / total);
+          static_cast<float>((seen * carried.ab.Plane(c)[i] + pull * prior) / (total * scale));
     }
     system.data[static_cast<int64_t>(i)] = static_cast<float>(total);
     const double share_seen = seen / total;
@@ -98,6 +99,7 @@ FusedColor FuseColors(const Image& luminance,
   const auto ignore = [](int, double) {};
   GridSolution solved = SolveGridSystem(std::move(system), target, solve, pool, ignore, cancel);
   out.ab.data = std::move(solved.u);
+  out.ab = FromRelative(options.relative_chroma, luminance, std::move(out.ab));
   return out;
 }
 

@@ -7,6 +7,7 @@
 #include "core/base/image.h"
 #include "core/base/parallel.h"
 #include "core/carry/carry.h"
+#include "core/color/relative_chroma.h"
 
 namespace color3d {
 
@@ -24,8 +25,9 @@ struct FusionOptions {
   // inferred colour and where it has its full share.
   double guess_begins = 3.5;
   double guess_ends = 7.0;
-  double max_guessed = 0.6;   // that full share, 0..1
-  double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
+  double max_guessed = 0.6;        // that full share, 0..1
+  double guess_chroma = 0.7;       // of the guess's chroma that is kept: faded, 0..1
+  RelativeChroma relative_chroma;  // what is alike under another light has chroma of this relation
   void Validate() const;
 };
 
@@ -35,7 +37,7 @@ struct FusedColor {
 };
 
 // `inferred`: 2 channels; `distance`: 1 channel or empty (nothing is guessed then); `guessed`: 2
-// channels or empty (the guess is grey then). All of the luminance's size. Solves the screened
+// channels or empty (the guess is grey then); All of the luminance's size. Solves the screened
 // system of hints.h on the view's own luminance, so that small gaps of what was carried are filled
 // from around them.
 FusedColor FuseColors(const Image& luminance,

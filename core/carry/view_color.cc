@@ -42,7 +42,8 @@ FusedColor ColorOfView(const Image& luminance,
                        const ColorSources& sources,
                        ThreadPool& pool,
                        const CancellationToken& cancel) {
-  const FusionOptions options;
+  FusionOptions options;
+  options.relative_chroma = sources.relative_chroma;
   const Image known = SurelyCarried(carried);
   InferredColor inferred = sources.infer(luminance, known);
   AnswerKnown(carried, known, &inferred.ab);

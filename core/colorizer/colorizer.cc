@@ -21,6 +21,7 @@
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
+#include "core/image/weighted_resize.h"
 
 namespace color3d {
 namespace {
@@ -94,8 +95,13 @@ bool HasBfloat16Products() {
 
 void FitWithin(int max_side_px, TrainingPicture* picture) {
   picture->luminance = FitWithin(picture->luminance, max_side_px);
-  picture->ab = FitWithin(picture->ab, max_side_px);
-  if (!picture->weight.Empty()) picture->weight = FitWithin(picture->weight, max_side_px);
+  const int width = picture->luminance.width, height = picture->luminance.height;
+  if (picture->weight.Empty()) {
+    picture->ab = Resize(picture->ab, width, height);
+    return;
+  }
+  picture->ab = ResizeWeighted(picture->ab, picture->weight, width, height);
+  picture->weight = Resize(picture->weight, width, height);
 }
 
 std::shared_ptr<const TapEncoder> RequireTaps(const std::shared_ptr<const Encoder>& encoder) {
@@ -183,11 +189,11 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
   const TrainingPicture& key = pictures.front();
   SetTorchThreads(1);
   if (recipe.neighbors) {
-    parts.neighbors = std::make_unique<FeatureNeighbors>(*parts.encoder,
-                                                         pictures,
-                                                         recipe.neighbor_options,
-                                                         Random(options.seed, /*stream=*/3),
-                                                         cancel);
+    parts.relative_chroma = FitRelativeChroma(key.luminance, key.ab);
+    FeatureNeighborsOptions neighbors = recipe.neighbor_options;
+    neighbors.relative_chroma = parts.relative_chroma;
+    parts.neighbors = std::make_unique<FeatureNeighbors>(
+        *parts.encoder, pictures, neighbors, Random(options.seed, /*stream=*/3), cancel);
   }
   Random start(options.seed, /*stream=*/0);
   parts.model =

@@ -11,6 +11,7 @@
 
 #include "core/base/image.h"
 #include "core/base/run_control.h"
+#include "core/color/relative_chroma.h"
 #include "core/encoder/encoder.h"
 
 namespace color3d {
@@ -80,6 +81,8 @@ class Colorizer {
   // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
   // than the training size are coloured at that size and upsampled guided by L.
   virtual Image Colorize(const Image& luminance) const = 0;
+  // How the scene's chroma depends on luminance, as the key view shows it.
+  virtual RelativeChroma relative_chroma() const = 0;
   // Colorizer file: versioned header, encoder digest, adapters, decoder, training curve.
   virtual std::string Serialize() const = 0;
 };

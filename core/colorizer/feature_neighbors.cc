@@ -11,11 +11,13 @@
 #include "core/colorizer/padding.h"
 #include "core/encoder/image_tensors.h"
 #include "core/image/codec.h"
+#include "core/image/weighted_resize.h"
 
 namespace color3d {
 namespace {
 
 constexpr char kPrefix[] = "neighbors.";
+constexpr double kLeastWeight = 1e-6;
 
 // Places of a picture before projection.
 struct KnownCells {
@@ -25,7 +27,10 @@ struct KnownCells {
 };
 
 // Cells of a picture, resized.
-KnownCells CellsOf(const TapEncoder& encoder, const TrainingPicture& picture, double scale) {
+KnownCells CellsOf(const TapEncoder& encoder,
+                   const TrainingPicture& picture,
+                   const RelativeChroma& relative,
+                   double scale) {
   const int multiple = encoder.config().Stride(encoder.config().StageCount() - 1);
   const int width = std::max(1, static_cast<int>(std::lround(picture.luminance.width * scale)));
   const int height = std::max(1, static_cast<int>(std::lround(picture.luminance.height * scale)));
@@ -37,10 +42,19 @@ KnownCells CellsOf(const TapEncoder& encoder, const TrainingPicture& picture, do
   const int64_t count = features.Count();
   KnownCells cells;
   cells.blocks = std::move(features.blocks);
-  cells.colors = CellMeans(prepared(picture.ab));
-  cells.weights = picture.weight.Empty()
-                      ? torch::ones({count})
-                      : CellMeans(prepared(picture.weight)).squeeze(1).contiguous();
+  const Image color = ToRelative(relative, picture.luminance, picture.ab);
+  if (picture.weight.Empty()) {
+    cells.colors = CellMeans(prepared(color));
+    cells.weights = torch::ones({count});
+    return cells;
+  }
+  // Each pixel counts by its weight.
+  const torch::Tensor weight = prepared(picture.weight);
+  const torch::Tensor mean_weight = CellMeans(weight);
+  const torch::Tensor known = PadToMultiple(
+      TensorFromImage(ResizeWeighted(color, picture.weight, width, height)), multiple);
+  cells.colors = CellMeans(known * weight) / mean_weight.clamp_min(kLeastWeight);
+  cells.weights = mean_weight.squeeze(1).contiguous();
   return cells;
 }
 
@@ -76,7 +90,7 @@ KnownCells KeyCells(const TapEncoder& encoder,
   std::vector<KnownCells> scales;
   for (double scale : options.scales) {
     cancel.ThrowIfCancelled();
-    scales.push_back(CellsOf(encoder, key, scale));
+    scales.push_back(CellsOf(encoder, key, options.relative_chroma, scale));
   }
   const KnownCells all = Join(scales);
   return Select(all, SampleRows(all.weights.size(0), options.bank_size, random));
@@ -98,7 +112,7 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
   const auto further = static_cast<int64_t>(pictures.size()) - 1;
   for (int64_t i = 1; i <= further; ++i) {
     cancel.ThrowIfCancelled();
-    const KnownCells cells = CellsOf(encoder, pictures[i], 1.0);
+    const KnownCells cells = CellsOf(encoder, pictures[i], options.relative_chroma, 1.0);
     const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
     if (sure.size(0) == 0) continue;
     const torch::Tensor rows =

@@ -12,6 +12,7 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/random.h"
+#include "core/color/relative_chroma.h"
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/named_tensors.h"
 #include "core/encoder/tap_encoder.h"
@@ -29,11 +30,12 @@ struct FeatureNeighborsOptions {
   int further_bank_size = 6000;                // cells of all other pictures together
   double min_weight = 0.25;                    // cells of other pictures that are surer than this
   WhiteningOptions whitening;
-  VoteOptions vote;
+  VoteOptions vote{.median_steps = 5};
+  RelativeChroma relative_chroma;  // that the bank's colours are kept relative to
 };
 
 struct NeighborColors {
-  torch::Tensor ab;        // [2,h,w], Lab units, a value per cell
+  torch::Tensor ab;        // [2,h,w], relative chroma, Lab units at L = 50, a value per cell
   torch::Tensor distance;  // [h,w], mean squared distance per dimension of the best match
   torch::Tensor variance;  // [h,w], of the matches' ab, Lab units squared: how far they disagree
 };

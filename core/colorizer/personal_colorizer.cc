@@ -77,8 +77,11 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
   const NeighborColors found = parts_.neighbors->Lookup(taps, luminance, wanted);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
+  const Image coarse_luminance = ImageFromTensor(guide);
   const torch::Tensor near =
-      TensorFromImage(UpsampleGuided(ImageFromTensor(found.ab), ImageFromTensor(guide)));
+      TensorFromImage(FromRelative(parts_.relative_chroma,
+                                   coarse_luminance,
+                                   UpsampleGuided(ImageFromTensor(found.ab), coarse_luminance)));
   if (!decode) return {near, found.distance};
   return {torch::lerp(near, decoded, DecoderShare(found.variance, decoded)), found.distance};
 }
@@ -166,6 +169,7 @@ std::string PersonalColorizer::Serialize() const {
     file.facts = {{"encoder", parts_.encoder->digest()},
                   {"options", JsonFromOptions(parts_.options)},
                   {"neighbors", parts_.neighbors != nullptr},
+                  {"relative_chroma", parts_.relative_chroma.power},
                   {"curve", JsonFromCurve(parts_.curve)}};
     PutTensors(parts_.model->parameters(), kModel, StoredType::kFloat16, &file);
     PutTensors(parts_.model->statistics(), kModel, StoredType::kFloat32, &file);
@@ -189,6 +193,7 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
     }
     parts.options = OptionsFromJson(file.facts.at("options"));
     has_neighbors = file.facts.at("neighbors");
+    parts.relative_chroma.power = file.facts.at("relative_chroma");
     parts.curve = CurveFromJson(file.facts.at("curve"));
   } catch (const nlohmann::json::exception& error) {
     throw InvalidArgument("{} has a damaged header: {}", kWhat, error.what());
@@ -203,7 +208,9 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
   TakeTensors(parts.model->parameters(), kModel, kWhat, &file);
   TakeTensors(parts.model->statistics(), kModel, kWhat, &file);
   if (has_neighbors) {
-    parts.neighbors = FeatureNeighbors::TakeFrom(*encoder, recipe.neighbor_options, kWhat, &file);
+    FeatureNeighborsOptions options = recipe.neighbor_options;
+    options.relative_chroma = parts.relative_chroma;
+    parts.neighbors = FeatureNeighbors::TakeFrom(*encoder, options, kWhat, &file);
   }
   if (!file.arrays.empty()) {
     throw InvalidArgument(

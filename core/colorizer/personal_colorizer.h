@@ -22,6 +22,7 @@ class PersonalColorizer : public Colorizer {
     ColorizerOptions options;
     std::unique_ptr<PersonalModel> model;         // refers to *encoder
     std::unique_ptr<FeatureNeighbors> neighbors;  // may be null
+    RelativeChroma relative_chroma;
     std::vector<TrainingPoint> curve;
     int threads = 0;  // that torch answers on; 0: what the machine has
   };
@@ -30,6 +31,7 @@ class PersonalColorizer : public Colorizer {
 
   Image Colorize(const Image& luminance) const override;
   ColorPrediction Predict(const Image& luminance, const Image& known = {}) const override;
+  RelativeChroma relative_chroma() const override { return parts_.relative_chroma; }
   std::string Serialize() const override;
 
   // The steps of Predict, for whoever runs the encoder over many pictures at once: frozen taps

@@ -24,7 +24,7 @@ struct TensorFormat {
 
 // Version 4: safetensors.
 inline constexpr TensorFormat kColorizerFormat = {
-    "color3d.colorizer", 4, "C3DCOLR1", "personalize the scene again"};
+    "color3d.colorizer", 5, "C3DCOLR1", "personalize the scene again"};
 // Version 3: safetensors. One that cannot be read costs the time of training, no more.
 inline constexpr TensorFormat kCheckpointFormat = {
     "color3d.colorizer-training", 3, "C3DCKPT1", "training starts afresh"};

@@ -22,32 +22,59 @@ torch::Tensor RelativeDistances(const torch::Tensor& x,
   return torch::addmm(y_squares, x, transposed_y, /*beta=*/1.0, /*alpha=*/-2.0);
 }
 
+constexpr double kMedianSoftness = 0.5;  // Lab units: nearer voters than this count as one
+
 // The colours of a query's matches, weighted.
 class Vote {
  public:
   Vote(const float* colors, const float* weights) : colors_(colors), weights_(weights) {}
 
+  void Clear() { voters_.clear(); }
   void Add(int64_t row, float closeness) {
-    const double w = weights_[row] * closeness;
-    sum_ += w;
-    const double a = colors_[2 * row], b = colors_[2 * row + 1];
-    a_ += w * a;
-    b_ += w * b;
-    squares_ += w * (a * a + b * b);
+    const float w = weights_[row] * closeness;
+    if (w > 0.0f) voters_.push_back({w, colors_[2 * row], colors_[2 * row + 1]});
   }
-  void Store(float* ab, float* variance) const {
+  void Store(int median_steps, float* ab, float* variance) const {
+    double sum = 0.0, a = 0.0, b = 0.0, squares = 0.0;
+    for (const Voter& v : voters_) {
+      const double w = v.weight;
+      sum += w;
+      a += w * v.a;
+      b += w * v.b;
+      squares += w * (static_cast<double>(v.a) * v.a + static_cast<double>(v.b) * v.b);
+    }
     // Where nothing has weight nothing is known: grey.
-    const double scale = sum_ > 0.0 ? 1.0 / sum_ : 0.0;
-    const double a = a_ * scale, b = b_ * scale;
+    const double scale = sum > 0.0 ? 1.0 / sum : 0.0;
+    a *= scale;
+    b *= scale;
+    *variance = static_cast<float>(std::max(squares * scale - a * a - b * b, 0.0));
+    for (int step = 0; step < median_steps && voters_.size() > 1; ++step) WeiszfeldStep(&a, &b);
     ab[0] = static_cast<float>(a);
     ab[1] = static_cast<float>(b);
-    *variance = static_cast<float>(std::max(squares_ * scale - a * a - b * b, 0.0));
   }
 
  private:
+  struct Voter {
+    float weight, a, b;
+  };
+
+  // Weiszfeld 1937: the mean under weight / distance from where it was.
+  void WeiszfeldStep(double* a, double* b) const {
+    double sum = 0.0, next_a = 0.0, next_b = 0.0;
+    for (const Voter& v : voters_) {
+      const double da = v.a - *a, db = v.b - *b;
+      const double w = v.weight / std::sqrt(da * da + db * db + kMedianSoftness * kMedianSoftness);
+      sum += w;
+      next_a += w * v.a;
+      next_b += w * v.b;
+    }
+    *a = next_a / sum;
+    *b = next_b / sum;
+  }
+
   const float* colors_;
   const float* weights_;
-  double sum_ = 0.0, a_ = 0.0, b_ = 0.0, squares_ = 0.0;
+  std::vector<Voter> voters_;
 };
 
 // Rows of the `count` smallest of `distances`, ascending; of equal ones the first.
@@ -110,6 +137,7 @@ CellMatches MatchCells(const torch::Tensor& queries,
     int64_t* nearest = matches.nearest.data_ptr<int64_t>() + begin;
     at::parallel_for(0, end - begin, /*grain_size=*/16, [&](int64_t first, int64_t last) {
       std::vector<std::pair<float, int64_t>> voters;
+      Vote vote(colors, weights);
       for (int64_t i = first; i < last; ++i) {
         const float* row = distances + i * entries;
         const float best = best_of_query[i];
@@ -117,7 +145,7 @@ CellMatches MatchCells(const torch::Tensor& queries,
         const auto inverse_width = static_cast<float>(
             1.0 / (options.temperature * (distance[i] + options.distance_floor)));
         const float farthest = best + kNegligible / inverse_width;
-        Vote vote(colors, weights);
+        vote.Clear();
         nearest[i] = entries;
         const auto add = [&](int64_t j) {
           if (row[j] > farthest) return;
@@ -131,7 +159,7 @@ CellMatches MatchCells(const torch::Tensor& queries,
           for (int64_t j = 0; j < entries; ++j) add(j);
         }
         if (nearest[i] == entries) nearest[i] = 0;  // features that are no numbers
-        vote.Store(ab + 2 * i, variance + i);
+        vote.Store(options.median_steps, ab + 2 * i, variance + i);
       }
     });
   }

@@ -23,6 +23,9 @@ struct VoteOptions {
   double temperature = 0.1;
   double distance_floor = 0.1;
   int max_voters = 0;  // the nearest so many vote; 0: all that have any weight
+  // The answer: 0: the voters' weighted mean; else their geometric median, by so many steps of
+  // Weiszfeld's algorithm from there, which keeps to one of two hues instead of their grey middle.
+  int median_steps = 0;
 };
 
 struct CellMatches {

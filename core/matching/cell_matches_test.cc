@@ -45,6 +45,27 @@ TEST(CellMatchesTest, TheNearestVote) {
   }
 }
 
+// Seven cells of one hue, five of another, all alike to the query.
+TEST(CellMatchesTest, TheMedianChoosesBetweenTwoHues) {
+  CellBank bank{torch::zeros({12, 8}), torch::zeros({12, 2}), torch::ones({12})};
+  for (int64_t i = 0; i < 12; ++i) bank.colors[i][i < 7 ? 0 : 1] = 60.0;
+  const torch::Tensor query = torch::zeros({1, 8});
+  const CellMatches mean = MatchCells(query, bank, {});
+  EXPECT_NEAR(mean.ab[0][0].item<float>(), 35.0f, 1e-3f);
+  const CellMatches median = MatchCells(query, bank, {.median_steps = 50});
+  EXPECT_GT(median.ab[0][0].item<float>(), 55.0f);
+  EXPECT_LT(median.ab[0][1].item<float>(), 5.0f);
+  // The spread is that of the voters, whatever the answer.
+  EXPECT_EQ(median.variance[0].item<float>(), mean.variance[0].item<float>());
+}
+
+TEST(CellMatchesTest, TheMedianOfAgreeingCellsIsTheirColor) {
+  CellBank bank = RandomBank();
+  bank.colors.fill_(-31.5f);
+  const CellMatches matches = MatchCells(bank.features, bank, {.median_steps = 5});
+  EXPECT_LT((matches.ab + 31.5f).abs().max().item<float>(), 1e-4f);
+}
+
 TEST(CellMatchesTest, CellsWithoutWeightGiveGray) {
   CellBank bank = RandomBank();
   bank.weights.zero_();

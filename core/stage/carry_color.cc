@@ -133,7 +133,7 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   const SurfaceRenderer render = [&](const Camera& camera, const Pose& pose) {
     ThreadPool one(1);
     RenderedView view = RenderView(geometry, camera, pose, one);
-    return RenderedSurface{std::move(view.depth), std::move(view.opacity)};
+    return RenderedSurface{std::move(view.median_depth), std::move(view.opacity)};
   };
   const SurfaceMaker maker(
       scene, images, sweep_images, render, options.depth_sources, options.sweep, context.cancel());

@@ -7,13 +7,13 @@
 namespace color3d {
 
 ColorSources SourcesOf(const Colorizer& colorizer) {
-  return {[&colorizer](const Image& luminance, const Image& known) {
-            ColorPrediction predicted = colorizer.Predict(luminance, known);
-            return InferredColor{std::move(predicted.ab), std::move(predicted.distance)};
-          },
-          [](const Image& luminance) {
-            return AutomaticColorizer::Embedded()->Colorize(luminance).ab;
-          }};
+  return {
+      [&colorizer](const Image& luminance, const Image& known) {
+        ColorPrediction predicted = colorizer.Predict(luminance, known);
+        return InferredColor{std::move(predicted.ab), std::move(predicted.distance)};
+      },
+      [](const Image& luminance) { return AutomaticColorizer::Embedded()->Colorize(luminance).ab; },
+      colorizer.relative_chroma()};
 }
 
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder) {

@@ -1,5 +1,8 @@
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "core/carry/dense_points.h"
 #include "core/scene/view_images.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_cap.h"
@@ -9,6 +12,9 @@
 
 namespace color3d {
 namespace {
+
+// A start on the surfaces: of the most Gaussians that there may be, this share at the most.
+constexpr double kDenseShare = 0.5;
 
 std::vector<Camera> TrainingCameras(const Scene& scene) {
   std::vector<Camera> cameras;
@@ -26,6 +32,18 @@ MemoryPlan PlanMemory(const GeometryOptions& options,
   demand.max_gaussians = options.max_gaussians;
   demand.sh_degree = options.sh_degree;
   return PlanGeometryMemory(demand, budget_bytes);
+}
+
+// `scene` with points of the surfaces that several photos agree on.
+Scene WithDensePoints(Scene scene,
+                      const ViewImages& images,
+                      int max_gaussians,
+                      const RunControl& run) {
+  DensePointsOptions options;
+  options.max_points = static_cast<int>(kDenseShare * max_gaussians);
+  std::vector<SparsePoint> points = DensePoints(scene, images, options, run);
+  std::move(points.begin(), points.end(), std::back_inserter(scene.points));
+  return scene;
 }
 
 std::string MemoryPlanToJson(const MemoryPlan& plan) {
@@ -48,13 +66,21 @@ void RunReconstructGeometry(const GeometryOptions& options,
   const Scene scene = ReadScene(context);
   GeometryOptions planned = options;
   planned.max_gaussians = GaussianCap(options.max_gaussians, TrainingCameras(scene), max_side_px);
+  if (options.recipe == GeometryOptions::Recipe::kColor3d) {
+    planned.iterations =
+        IterationCap(options.iterations, static_cast<int>(scene.TrainingViews().size()));
+  }
   const MemoryPlan memory = PlanMemory(planned, max_side_px, scene, context.MemoryBytes());
   planned.max_gaussians = memory.max_gaussians;
   if (!memory.note.empty()) context.progress().OnWarning(memory.note);
   const ViewImages images(
       scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
-  const GaussianModel model =
-      TrainGeometry(GeometryProblemOf(scene, images), planned, context.control());
+  const Scene start =
+      options.recipe == GeometryOptions::Recipe::kPaper
+          ? scene
+          : WithDensePoints(scene, images, planned.max_gaussians, context.control());
+  const GeometryProblem problem = GeometryProblemOf(start, images);
+  const GaussianModel model = TrainGeometry(problem, planned, context.control());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));
   context.WriteOutput(artifact::kMemoryPlan, MemoryPlanToJson(memory));
 }

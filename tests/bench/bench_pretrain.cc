@@ -1,4 +1,6 @@
 // color3d-bench pretrain: trains the embedded encoder and automatic colourizer, resumable.
+#include <torch/cuda.h>
+
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -18,6 +20,9 @@ namespace {
 
 struct PretrainArguments {
   std::vector<std::string> photos;
+  std::vector<std::string> clips;
+  std::string start_file;
+  std::string device = "auto";
   std::string validate_folder;
   std::string teacher_file;
   std::string checkpoint_file;
@@ -26,8 +31,9 @@ struct PretrainArguments {
   int validate_photos = 40;
   int max_side_px = 256;
   int threads = 2;
+  double seconds = 0.0;
   double stop_after_seconds = 0.0;
-  double temperature = 0.6;
+  double temperature = 1.0;
   PretrainOptions options;
 };
 
@@ -57,14 +63,39 @@ nlohmann::ordered_json Validate(const PretrainArguments& args, const WeightMap& 
           {"colorfulness_truth", mean.true_colorfulness}};
 }
 
+std::vector<PhotoFolder> ParseFolders(const std::vector<std::string>& texts) {
+  std::vector<PhotoFolder> folders;
+  for (const std::string& text : texts) folders.push_back(ParseFolder(text));
+  return folders;
+}
+
+torch::Device DeviceOf(const std::string& name) {
+  const bool cuda = torch::cuda::is_available();
+  if (name == "cuda" && !cuda) {
+    throw Error(ErrorCode::kFailedPrecondition, "this LibTorch knows no CUDA device");
+  }
+  return name == "cpu" || !cuda ? torch::kCPU : torch::kCUDA;
+}
+
+PretrainLosses Sum(const PretrainLosses& x, const PretrainLosses& y) {
+  return {x.color + y.color,
+          x.distillation + y.distillation,
+          x.copy + y.copy,
+          x.contrast + y.contrast,
+          x.logits + y.logits};
+}
+
 void RunPretrain(const PretrainArguments& args) {
   SetTorchThreads(args.threads);
-  std::vector<PhotoFolder> folders;
-  for (const std::string& text : args.photos) folders.push_back(ParseFolder(text));
-  const PhotoSet photos(folders);
+  const PhotoSet photos(ParseFolders(args.photos), ParseFolders(args.clips));
   std::optional<SqueezeNet> teacher;
   if (!args.teacher_file.empty()) teacher.emplace(args.teacher_file);
-  Pretrainer trainer(args.options, photos, std::move(teacher));
+  PretrainOptions options = args.options;
+  options.device = DeviceOf(args.device);
+  WeightMap start_weights;
+  if (!args.start_file.empty()) start_weights = ParseSafetensors(ReadFile(args.start_file));
+  Pretrainer trainer(
+      options, photos, std::move(teacher), args.start_file.empty() ? nullptr : &start_weights);
   nlohmann::ordered_json notes{{"photos", photos.size()}, {"seconds", 0.0}};
   notes["curve"] = nlohmann::ordered_json::array();
   if (std::filesystem::exists(args.checkpoint_file)) {
@@ -72,32 +103,40 @@ void RunPretrain(const PretrainArguments& args) {
   }
   const double before = notes["seconds"].get<double>();
   const double start = Seconds();
-  PretrainLosses mean;
+  PretrainLosses sum;
   int averaged = 0;
   const auto save = [&] {
     notes["seconds"] = before + Seconds() - start;
     WriteFileAtomic(args.checkpoint_file, trainer.Checkpoint(notes.dump()));
     WeightMap weights = trainer.AveragedWeights();
     weights["color_temperature"] = {{1}, {static_cast<float>(args.temperature)}};
+    const double count = std::max(1, averaged);
     nlohmann::ordered_json point{{"iteration", trainer.iteration()},
                                  {"seconds", notes["seconds"]},
-                                 {"loss_color", mean.color / std::max(1, averaged)},
-                                 {"loss_distillation", mean.distillation / std::max(1, averaged)},
-                                 {"loss_logits", mean.logits / std::max(1, averaged)}};
+                                 {"loss_color", sum.color / count},
+                                 {"loss_distillation", sum.distillation / count},
+                                 {"loss_logits", sum.logits / count}};
+    if (options.copy_weight > 0.0) {
+      point["loss_copy"] = sum.copy / count;
+      point["loss_contrast"] = sum.contrast / count;
+    }
     if (!args.validate_folder.empty()) point.update(Validate(args, weights));
     notes["curve"].push_back(point);
     std::printf("%s\n", point.dump().c_str());
     std::fflush(stdout);
     WriteFileAtomic(args.out_file,
                     SerializeSafetensors(weights, true, {{"curve", notes["curve"].dump()}}));
-    mean = {};
+    sum = {};
     averaged = 0;
   };
-  while (trainer.iteration() < args.options.iterations) {
-    const PretrainLosses losses = trainer.Step();
-    mean.color += losses.color;
-    mean.distillation += losses.distillation;
-    mean.logits += losses.logits;
+  // Of the schedule, where it goes by time.
+  const auto progress = [&]() -> std::optional<double> {
+    if (args.seconds <= 0.0) return std::nullopt;
+    return (before + Seconds() - start) / args.seconds;
+  };
+  while (progress().value_or(0.0) < 1.0 &&
+         (args.seconds > 0.0 || trainer.iteration() < options.iterations)) {
+    sum = Sum(sum, trainer.Step(progress()));
     ++averaged;
     if (trainer.iteration() % args.validate_every == 0) save();
     if (args.stop_after_seconds > 0.0 && Seconds() - start > args.stop_after_seconds) break;
@@ -112,6 +151,8 @@ void AddPretrainCommand(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "pretrain", "train the embedded encoder and automatic colourizer on colour photographs");
   command->add_option("--photos", args->photos, "FOLDER or FOLDER=WEIGHT, repeatable")->required();
+  command->add_option("--clips", args->clips, "FOLDER[=WEIGHT] of folders of frames, repeatable");
+  command->add_option("--start", args->start_file, "weights to go on from, else random ones");
   command->add_option("--validate", args->validate_folder, "photographs never trained on");
   command->add_option("--validate-every", args->validate_every, "iterations")
       ->check(CLI::Range(1, 1000000));
@@ -121,6 +162,23 @@ void AddPretrainCommand(CLI::App& app) {
   command->add_option("-o,--out", args->out_file, "weights, safetensors, half precision")
       ->required();
   command->add_option("--iterations", args->options.iterations)->check(CLI::Range(1, 100000000));
+  command->add_option("--seconds", args->seconds, "of training in all, in place of --iterations")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--copy-weight", args->options.copy_weight, "of copied colours; 0: off")
+      ->check(CLI::Range(0.0, 100.0));
+  command
+      ->add_option("--contrast-weight", args->options.contrast_weight, "of cells being told apart")
+      ->check(CLI::Range(0.0, 100.0));
+  command->add_option("--distillation-weight", args->options.distillation_weight)
+      ->check(CLI::Range(0.0, 100.0));
+  command->add_option("--rebalancing", args->options.rebalancing_power, "of rare colours, 0..1")
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--prior", args->options.prior_share, "share of that undone in guesses, 0..1")
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--seed", args->options.seed);
+  command->add_option("--device", args->device, "auto: a GPU where LibTorch knows one")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}));
+  command->add_flag("--half", args->options.half_precision, "networks in bfloat16 on the CPU");
   command->add_option("--batch", args->options.batch)->check(CLI::Range(1, 4096));
   command->add_option("--size", args->options.size_px, "px, first half")
       ->check(CLI::Range(64, 512));

@@ -25,7 +25,11 @@ constexpr int kDeepStridePx = 16;
 torch::Tensor ChannelNorm(const torch::Tensor& x,
                           const torch::Tensor& weight,
                           const torch::Tensor& bias) {
-  return torch::layer_norm(x.permute({0, 2, 3, 1}), {x.size(1)}, weight, bias, kNormEpsilon)
+  return torch::layer_norm(x.permute({0, 2, 3, 1}).to(weight.scalar_type()),
+                           {x.size(1)},
+                           weight,
+                           bias,
+                           kNormEpsilon)
       .permute({0, 3, 1, 2});
 }
 
@@ -135,8 +139,10 @@ torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {
 }
 
 torch::Tensor ConvNext::NormaliseInput(const torch::Tensor& rgb) {
-  const torch::Tensor mean = torch::tensor({0.485f, 0.456f, 0.406f}).view({1, 3, 1, 1});
-  const torch::Tensor deviation = torch::tensor({0.229f, 0.224f, 0.225f}).view({1, 3, 1, 1});
+  const torch::Tensor mean =
+      torch::tensor({0.485f, 0.456f, 0.406f}).view({1, 3, 1, 1}).to(rgb.device());
+  const torch::Tensor deviation =
+      torch::tensor({0.229f, 0.224f, 0.225f}).view({1, 3, 1, 1}).to(rgb.device());
   return ((rgb - mean) / deviation).contiguous(at::MemoryFormat::ChannelsLast);
 }
 
@@ -148,8 +154,11 @@ torch::Tensor ConvNext::RunBlock(const Block& block,
   torch::Tensor y = torch::conv2d(
       x, block.dwconv_weight, block.dwconv_bias, /*stride=*/1, /*padding=*/3, /*dilation=*/1, c);
   if (adapted.defined()) y = y + adapted;
-  y = torch::layer_norm(
-      y.permute({0, 2, 3, 1}), {c}, block.norm_weight, block.norm_bias, kNormEpsilon);
+  y = torch::layer_norm(y.permute({0, 2, 3, 1}).to(block.norm_weight.scalar_type()),
+                        {c},
+                        block.norm_weight,
+                        block.norm_bias,
+                        kNormEpsilon);
   const auto type = products.first.scalar_type();
   y = torch::gelu(torch::linear(y.to(type), products.first, block.pwconv1_bias.to(type)));
   y = torch::linear(y, products.second, block.pwconv2_bias.to(type)) * block.gamma;

@@ -13,7 +13,8 @@ namespace color3d {
 
 struct AutomaticColor {
   Image ab;          // 2 channels, Lab units, size of the input
-  Image confidence;  // 1 channel, 0..1: 1 where only one colour came into question
+  Image confidence;  // 1 channel, 0..1: 1 where the answer is surely right, 1/2 where it is
+                     // expected to be some 20 Lab units beside the true colour
 };
 
 class AutomaticColorizer {
@@ -29,8 +30,9 @@ class AutomaticColorizer {
   // Our own, pre-trained; its weights are part of the program.
   static std::shared_ptr<const AutomaticColorizer> Embedded();
   // The same network with other weights, as `color3d-bench pretrain` writes them: "encoder.*",
-  // "color_head.*", "color_bins" [K,2] and "color_temperature" [1]. Throws Error{kInvalidArgument}
-  // naming what is missing or misshapen.
+  // "color_head.*", "color_bins" [K,2], "color_temperature" [1] and, where there is one,
+  // "color_weights" [K], above 0: how much more often than it is each colour was counted. Throws
+  // Error{kInvalidArgument} naming what is missing or misshapen.
   static std::shared_ptr<const AutomaticColorizer> FromPretrained(const WeightMap& weights);
   // DDColor's published weights, any size.
   static std::shared_ptr<const AutomaticColorizer> FromWeightFile(

@@ -97,6 +97,23 @@ TEST(AutomaticColorizerTest, NamesAMissingOrMisshapenWeight) {
   EXPECT_THROW(AutomaticColorizer::FromPretrained(weights), Error);
 }
 
+TEST(AutomaticColorizerTest, ColorsCountedTooOftenAreGuessedLess) {
+  WeightMap weights = EmbeddedWeights("");
+  const auto bins = static_cast<size_t>(weights["color_bins"].shape[0]);
+  std::vector<float> counted(bins, 1.0f);
+  const std::vector<float>& centers = weights["color_bins"].values;
+  for (size_t i = 0; i < bins; ++i) {
+    if (std::hypot(centers[2 * i], centers[2 * i + 1]) > 1.0f) counted[i] = 1e6f;
+  }
+  weights["color_weights"] = {{static_cast<int64_t>(bins)}, counted};
+  const AutomaticColor gray =
+      AutomaticColorizer::FromPretrained(weights)->Colorize(Texture(64, 64));
+  for (float v : gray.ab.data) ASSERT_NEAR(v, 0.0f, 0.5f);
+  for (float v : gray.confidence.data) ASSERT_GT(v, 0.95f);
+  weights["color_weights"].shape = {1, 2};
+  EXPECT_THROW(AutomaticColorizer::FromPretrained(weights), Error);
+}
+
 TEST(EmbeddedWeightsTest, AreSmallEnoughToShip) {
   EXPECT_LE(EmbeddedWeightFile().size(), 12'000'000u);
   EXPECT_FALSE(EmbeddedWeights("encoder.").empty());

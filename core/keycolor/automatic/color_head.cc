@@ -68,10 +68,12 @@ torch::Tensor ColorHead::Forward(const std::vector<torch::Tensor>& taps) const {
     }
     x = torch::gelu(torch::conv2d(y, level.fuse, level.fuse_bias, /*stride=*/1, /*padding=*/1));
   }
-  const torch::Tensor normed =
-      torch::layer_norm(
-          x.permute({0, 2, 3, 1}), {x.size(1)}, norm_weight_, norm_bias_, kNormEpsilon)
-          .permute({0, 3, 1, 2});
+  const torch::Tensor normed = torch::layer_norm(x.permute({0, 2, 3, 1}).to(torch::kFloat32),
+                                                 {x.size(1)},
+                                                 norm_weight_,
+                                                 norm_bias_,
+                                                 kNormEpsilon)
+                                   .permute({0, 3, 1, 2});
   return torch::conv2d(normed, out_, out_bias_);
 }
 

@@ -17,6 +17,8 @@ GeometryTuning PaperTuning(int iterations) {
   tuning.densify_rounds = std::max(1, static_cast<int>((0.5 * n - 500.0) / 100.0));
   tuning.opacity_reset_every = 3000.0 / n;
   tuning.prune_scale = 0.1;
+  tuning.last_drop_rate = 0.0;
+  tuning.exposure_rate = 0.0;
   tuning.max_needle_ratio = 0.0;
   tuning.opacity_penalty = 0.0;
   tuning.scale_penalty = 0.0;

@@ -18,9 +18,15 @@ struct GeometryTuning {
   double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
   double opacity_penalty = 0.005;    // times the mean opacity
   double scale_penalty = 0.005;      // times the mean scale / extent
-  double max_needle_ratio = 10.0;    // longest to middle axis; 0: no limit
-  double sh_from = 0.15;             // degree 1 begins here
-  double sh_step = 0.15;             // and each further degree this much later
+  // Of Gaussians left out at random, growing from 0, where there are at most sparse_views views;
+  // in inverse proportion to their square where there are more.
+  double last_drop_rate = 0.2;
+  double sparse_views = 12.0;
+  double exposure_rate = 0.005;    // learning rate of each photo's gain and offset; 0: none
+  double exposure_prior = 5.0;     // times the sum of their squares
+  double max_needle_ratio = 10.0;  // longest to middle axis; 0: no limit
+  double sh_from = 0.15;           // degree 1 begins here
+  double sh_step = 0.15;           // and each further degree this much later
   double position_rate_first = 6e-4;
   double position_rate_last = 4e-5;
   double dc_rate = 1e-2;
@@ -46,6 +52,10 @@ void VisitFields(Tuning& tuning, Visit&& visit) {
   visit("prune_scale", tuning.prune_scale);
   visit("opacity_penalty", tuning.opacity_penalty);
   visit("scale_penalty", tuning.scale_penalty);
+  visit("last_drop_rate", tuning.last_drop_rate);
+  visit("sparse_views", tuning.sparse_views);
+  visit("exposure_rate", tuning.exposure_rate);
+  visit("exposure_prior", tuning.exposure_prior);
   visit("max_needle_ratio", tuning.max_needle_ratio);
   visit("sh_from", tuning.sh_from);
   visit("sh_step", tuning.sh_step);

@@ -11,6 +11,8 @@ std::string SerializeGeometryState(const GeometryState& state, std::string_view 
   writer.Vector(state.statistics.count);
   writer.Vector(state.statistics.radius);
   writer.Value(state.densified_at);
+  writer.Value<uint64_t>(state.exposures.size());
+  for (const PhotoExposure& exposure : state.exposures) writer.Value(exposure);
   return std::move(writer).Finish();
 }
 
@@ -25,6 +27,8 @@ bool ParseGeometryState(std::string_view bytes,
   read.statistics.count = reader.Vector();
   read.statistics.radius = reader.Vector();
   read.densified_at = reader.Value<int64_t>();
+  read.exposures.resize(reader.Count(sizeof(PhotoExposure)));
+  for (PhotoExposure& exposure : read.exposures) exposure = reader.Value<PhotoExposure>();
   if (!reader.ok()) return false;
   state = std::move(read);
   return true;

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/splat/geometry/exposure.h"
 #include "core/splat/raster/projection.h"
 #include "core/splat/training/training_state.h"
 
@@ -12,6 +13,7 @@ namespace color3d {
 struct GeometryState : TrainingState {
   DensifyStatistics statistics;
   int64_t densified_at = 0;  // iteration
+  Exposures exposures;       // of the training views, in their order; empty: none are fitted
 };
 
 // `fingerprint` says what the state belongs to (options, scene); a state is only read back with the

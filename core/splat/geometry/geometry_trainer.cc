@@ -77,6 +77,7 @@ class GeometryTrainer {
     state_.moments = {ParameterBlock(rows, initial_count_), ParameterBlock(rows, initial_count_)};
     state_.statistics.Reset(initial_count_);
     state_.random = Random(options.seed);
+    if (schedule_.tuning().exposure_rate > 0.0) state_.exposures.resize(problem.training.size());
     pipeline_.set_clock(&clock_);
   }
 
@@ -174,22 +175,33 @@ class GeometryTrainer {
 
   // One iteration. False when something was not finite.
   bool Step() {
-    const PosedCamera& view =
-        problem_
-            .training[state_.order.Next(static_cast<int>(problem_.training.size()), state_.random)];
+    const int drawn = state_.order.Next(static_cast<int>(problem_.training.size()), state_.random);
+    const PosedCamera& view = problem_.training[drawn];
     const int level = schedule_.Level(fraction_, view.camera);
     const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, level);
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
-    pipeline_.Forward(state_.parameters, color, camera, kBackground, false, run_.pool);
+    pipeline_.Forward(
+        state_.parameters, color, camera, kBackground, false, run_.pool, DroppingNow());
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
     weights.edge = static_cast<float>(options_.edge_weight);
     clock_.Enter(Phase::kLoss);
-    const LossValue loss =
-        loss_.Evaluate(pipeline_.color(), *target, nullptr, weights, run_.pool, d_color_);
+    const bool exposed = !state_.exposures.empty();
+    if (exposed) Expose(state_.exposures[drawn], pipeline_.color(), run_.pool, exposed_);
+    const LossValue loss = loss_.Evaluate(
+        exposed ? exposed_ : pipeline_.color(), *target, nullptr, weights, run_.pool, d_color_);
     if (!std::isfinite(loss.total)) return false;
+    if (exposed) {
+      FitExposure(pipeline_.color(),
+                  schedule_.tuning().exposure_rate * (1.0 - fraction_),
+                  schedule_.tuning().exposure_prior,
+                  run_.pool,
+                  d_color_,
+                  state_.exposures[drawn]);
+      Recenter(state_.exposures);
+    }
     pipeline_.Backward(state_.parameters,
                        color,
                        camera,
@@ -201,6 +213,12 @@ class GeometryTrainer {
     if (!Update()) return false;
     state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
     return true;
+  }
+
+  // As this iteration's number says, so that a resumed training drops the same.
+  SplatDropping DroppingNow() const {
+    return {schedule_.DropRate(fraction_, static_cast<int>(problem_.training.size())),
+            options_.seed + (static_cast<uint64_t>(state_.iteration) << 20u)};
   }
 
   // Parameters from the gradient. False when something was not finite.
@@ -290,14 +308,20 @@ class GeometryTrainer {
   // Means over the held-out views; no part of training's time.
   void ReportHeldOut() {
     if (problem_.held_out.empty()) return;
+    const HeldOutPoint point = Score(problem_.held_out);
+    run_.progress.OnError(state_.iteration, Named("heldout_psnr", "_db"), point.psnr_db);
+    if (trace_ != nullptr) trace_->held_out.push_back(point);
+  }
+
+  HeldOutPoint Score(const std::vector<PosedCamera>& views) {
     HeldOutPoint point;
     point.seconds = earlier_seconds_ + clock_.TrainingSeconds();
     point.iteration = state_.iteration;
     point.gaussians = state_.parameters.count();
     pipeline_.set_clock(nullptr);
     clock_.Enter(Phase::kEvaluation);
-    const double each = 1.0 / static_cast<double>(problem_.held_out.size());
-    for (const PosedCamera& view : problem_.held_out) {
+    const double each = 1.0 / static_cast<double>(views.size());
+    for (const PosedCamera& view : views) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
       pipeline_.Forward(
           state_.parameters, Colors(), CameraAt(view, 0), kBackground, false, run_.pool);
@@ -306,14 +330,14 @@ class GeometryTrainer {
       point.psnr_db += each * quality.psnr_db;
       point.ssim += each * quality.ssim;
       point.l1 += each * quality.l1;
-      if (fraction_ >= 1.0 && trace_ != nullptr && trace_->on_held_out_picture) {
+      if (&views == &problem_.held_out && fraction_ >= 1.0 && trace_ != nullptr &&
+          trace_->on_held_out_picture) {
         trace_->on_held_out_picture(view.view, ImageFromPlanes(drawn));
       }
     }
-    run_.progress.OnError(state_.iteration, Named("heldout_psnr", "_db"), point.psnr_db);
-    if (trace_ != nullptr) trace_->held_out.push_back(point);
     clock_.Enter(Phase::kOther);
     pipeline_.set_clock(&clock_);
+    return point;
   }
 
   void FinishTrace() {
@@ -322,6 +346,7 @@ class GeometryTrainer {
     trace_->phases = clock_.seconds();
     trace_->iterations = state_.iteration;
     trace_->gaussians = state_.parameters.count();
+    if (trace_->score_training) trace_->training = Score(problem_.training);
   }
 
   struct Moment {
@@ -346,6 +371,7 @@ class GeometryTrainer {
   // Work space.
   SplatPipeline pipeline_;
   ImageLoss loss_;
+  PlaneBuffer exposed_;
   PlaneBuffer d_color_;
   ParameterBlock gradient_;
 };

@@ -35,6 +35,8 @@ struct TrainingTrace {
   int64_t gaussians = 0;
   PhaseSeconds phases{};
   std::vector<HeldOutPoint> held_out;
+  bool score_training = false;  // asks for the next one
+  HeldOutPoint training;        // the same over the training views, at the end
 };
 
 // Reports curves "train_l1_l" (running mean of |L'-L'_true|) and "heldout_psnr_l_db" (when there

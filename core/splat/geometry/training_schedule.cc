@@ -49,6 +49,12 @@ double TrainingSchedule::PositionRate(double fraction) const {
                             fraction * std::log(tuning_.position_rate_last));
 }
 
+double TrainingSchedule::DropRate(double fraction, int views) const {
+  const double sparsity =
+      std::min(1.0, tuning_.sparse_views / std::max(1.0, static_cast<double>(views)));
+  return tuning_.last_drop_rate * fraction * sparsity * sparsity;
+}
+
 std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels) const {
   const int coefficients = ShCoefficients(options_.sh_degree);
   const int active = ShCoefficients(ActiveDegree(fraction));

@@ -24,6 +24,8 @@ class TrainingSchedule {
   int Level(double fraction, const Camera& camera) const;
   int ActiveDegree(double fraction) const;
   double PositionRate(double fraction) const;
+  // Of Gaussians left out of one picture, training on so many views.
+  double DropRate(double fraction, int views) const;
   // One per parameter row, for `channels` colour channels of degree options.sh_degree.
   std::vector<float> LearningRates(double fraction, int channels) const;
   // True when a round of densification falls into (before, now].

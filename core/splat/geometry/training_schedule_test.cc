@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/parameter_block.h"
 
 namespace color3d {
@@ -39,6 +40,26 @@ TEST(TrainingScheduleTest, EndsAtFullSizeWithTheLastRatesAndAllHarmonics) {
   EXPECT_GT(rates.back(), 0.0f);
   camera.width = camera.height = 90;  // too small to be halved
   EXPECT_EQ(schedule.Level(0.0, camera), 0);
+}
+
+TEST(TrainingScheduleTest, DropsMoreTheFewerViewsThereAreAndNothingInThePapersRecipe) {
+  GeometryOptions options;
+  const TrainingSchedule schedule(options, 1.0);
+  EXPECT_EQ(schedule.DropRate(0.0, 9), 0.0);
+  EXPECT_DOUBLE_EQ(schedule.DropRate(0.5, 9), 0.5 * schedule.DropRate(1.0, 9));
+  EXPECT_DOUBLE_EQ(schedule.DropRate(1.0, 9), 0.2);
+  EXPECT_DOUBLE_EQ(schedule.DropRate(1.0, 24), 0.05);
+  EXPECT_DOUBLE_EQ(schedule.DropRate(1.0, 0), 0.2);
+  options.recipe = GeometryOptions::Recipe::kPaper;
+  EXPECT_EQ(TrainingSchedule(options, 1.0).DropRate(1.0, 9), 0.0);
+}
+
+TEST(IterationCapTest, GrowsWithTheViewsAndNeverBindsTheDefault) {
+  EXPECT_EQ(IterationCap(1500, 3), 1500);
+  EXPECT_EQ(IterationCap(5000, 3), 1500);
+  EXPECT_EQ(IterationCap(5000, 12), 1800);
+  EXPECT_EQ(IterationCap(5000, 50), 5000);
+  EXPECT_EQ(IterationCap(100'000, 1'000'000'000), 100'000);
 }
 
 TEST(TrainingScheduleTest, ThePapersTimesAreIterations) {

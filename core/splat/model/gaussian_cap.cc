@@ -1,12 +1,15 @@
 #include "core/splat/model/gaussian_cap.h"
 
 #include <algorithm>
+#include <cstdint>
 
 namespace color3d {
 namespace {
 
 constexpr double kMaxGaussiansPerPixel = 0.02;
 constexpr int kMinCap = 5000;
+constexpr int64_t kIterationsPerView = 150;
+constexpr int64_t kMinIterationCap = 1500;
 
 }  // namespace
 
@@ -18,6 +21,11 @@ int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px)
   }
   const double cap = std::max<double>(kMinCap, kMaxGaussiansPerPixel * pixels);
   return static_cast<int>(std::min<double>(wanted, cap));
+}
+
+int IterationCap(int wanted, int training_views) {
+  const int64_t cap = std::max(kMinIterationCap, kIterationsPerView * training_views);
+  return static_cast<int>(std::min<int64_t>(wanted, cap));
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// How many Gaussians the photos of a scene are worth. Pure function.
+// How many Gaussians, and how long a training, the photos of a scene are worth. Pure functions.
 #pragma once
 
 #include <vector>
@@ -10,5 +10,9 @@ namespace color3d {
 // `wanted`, or fewer for a small scene: more Gaussians than a share of the pixels trained on cost
 // time and fit noise. `cameras`: of the training views at full size.
 int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px);
+
+// `wanted`, or fewer where training views are few: seeing each of them again and again teaches no
+// more.
+int IterationCap(int wanted, int training_views);
 
 }  // namespace color3d

@@ -7,17 +7,27 @@ void SplatPipeline::Forward(const ParameterBlock& parameters,
                             const RasterCamera& camera,
                             const float* background,
                             bool depth_channel,
-                            ThreadPool& pool) {
+                            ThreadPool& pool,
+                            const SplatDropping& dropping) {
   Enter(Phase::kProjection);
   ProjectSplats(parameters, color, depth_channel, camera, pool, splats_);
+  if (dropping.rate > 0.0) DropSplats(dropping, pool, splats_);
   Enter(Phase::kBinning);
   binner_.Bin(splats_, camera.width, camera.height, pool, lists_);
   Enter(Phase::kForward);
   color_.Reset(camera.width, camera.height, splats_.channels);
   transmittance_.Reset(camera.width, camera.height, 1);
+  if (depth_channel) median_depth_.Reset(camera.width, camera.height, 1);
   float behind[4] = {0.0f, 0.0f, 0.0f, 0.0f};
   for (int c = 0; c < color.channels; ++c) behind[c] = background[c];
-  RasterizeForward(splats_, lists_, behind, pool, color_, &transmittance_, block_masks_);
+  RasterizeForward(splats_,
+                   lists_,
+                   behind,
+                   pool,
+                   color_,
+                   &transmittance_,
+                   depth_channel ? &median_depth_ : nullptr,
+                   block_masks_);
   Enter(Phase::kOther);
 }
 

@@ -20,15 +20,19 @@ class SplatPipeline {
   void set_clock(PhaseClock* clock) { clock_ = clock; }
 
   // Draws `parameters`; `background` has one number per channel. With `depth_channel` a last
-  // channel holds sum(alpha T depth).
+  // channel holds sum(alpha T depth). A Gaussian dropped is as if it were not there.
   void Forward(const ParameterBlock& parameters,
                const ColorSpec& color,
                const RasterCamera& camera,
                const float* background,
                bool depth_channel,
-               ThreadPool& pool);
+               ThreadPool& pool,
+               const SplatDropping& dropping = {});
   const PlaneBuffer& color() const { return color_; }
   const PlaneBuffer& transmittance() const { return transmittance_; }
+  // With the depth channel only: depth of the Gaussian at which the opacity so far reaches 0.5; 0
+  // where it never does.
+  const PlaneBuffer& median_depth() const { return median_depth_; }
   size_t pair_count() const { return lists_.pair_count(); }
 
   // Gradient by the parameters of the last Forward (same arguments, no depth channel).
@@ -54,6 +58,7 @@ class SplatPipeline {
   AlignedFloats pair_gradient_;
   PlaneBuffer color_;
   PlaneBuffer transmittance_;
+  PlaneBuffer median_depth_;
 };
 
 }  // namespace color3d

@@ -55,6 +55,15 @@ void ProjectSplats(const ParameterBlock& parameters,
                    ThreadPool& pool,
                    SplatBuffer& splats);
 
+// Leaves out Gaussians at random (DropGaussian: Park et al. 2025); those that stay have
+// 1 / (1 - rate) times their opacity, before alpha's cap. Their gradients follow as ever, because
+// ln(opacity) only gains a constant.
+struct SplatDropping {
+  double rate = 0.0;  // 0..0.9
+  uint64_t seed = 0;  // chooses which
+};
+void DropSplats(const SplatDropping& dropping, ThreadPool& pool, SplatBuffer& splats);
+
 // Sums over the views since densification, per Gaussian.
 struct DensifyStatistics {
   AlignedFloats gradient;  // |dL/d(u, v)|, NDC units

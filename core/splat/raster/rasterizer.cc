@@ -41,6 +41,7 @@ struct ForwardJob {
   const float* background;
   PlaneBuffer& color;
   PlaneBuffer* transmittance;
+  PlaneBuffer* median_depth;
   uint16_t* block_masks;
 };
 
@@ -197,11 +198,13 @@ void ComputeOffsets(const Chunk& chunk, const Tile& tile, Offsets& o) {
   }
 }
 
-template <int kChannels>
+// With kMedian the last channel is depth.
+template <int kChannels, bool kMedian>
 void ForwardTile(const ForwardJob& job, const Tile& tile) {
-  F32 t[kTileBlocks], sum[kChannels][kTileBlocks];
+  F32 t[kTileBlocks], sum[kChannels][kTileBlocks], median[kMedian ? kTileBlocks : 1];
   for (int b = 0; b < kTileBlocks; ++b) {
     t[b] = InitialTransmittance(job.color.width, job.color.height, tile, b);
+    if constexpr (kMedian) median[b] = Broadcast(0.0f);
     for (int c = 0; c < kChannels; ++c) sum[c][b] = Broadcast(0.0f);
   }
   Chunk chunk;
@@ -226,6 +229,12 @@ void ForwardTile(const ForwardJob& job, const Tile& tile) {
       const F32 alpha =
           simd::SelectOrZero(live, simd::Min(simd::Exp2(exponent), Broadcast(kMaxAlpha)));
       const F32 weight = alpha * t[b];
+      if constexpr (kMedian) {
+        const Mask crossed = simd::And(simd::GreaterEqual(t[b], Broadcast(0.5f)),
+                                       simd::Less(t[b] - weight, Broadcast(0.5f)));
+        median[b] = simd::Select(
+            crossed, Broadcast(chunk.column[kSplatColor + kChannels - 1][j]), median[b]);
+      }
       t[b] = t[b] - weight;
       for (int c = 0; c < kChannels; ++c) {
         sum[c][b] = sum[c][b] + weight * chunk.column[kSplatColor + c][j];
@@ -237,6 +246,7 @@ void ForwardTile(const ForwardJob& job, const Tile& tile) {
       StoreBlock(job.color, c, tile, b, sum[c][b] + t[b] * job.background[c]);
     }
     if (job.transmittance != nullptr) StoreBlock(*job.transmittance, 0, tile, b, t[b]);
+    if constexpr (kMedian) StoreBlock(*job.median_depth, 0, tile, b, median[b]);
   }
 }
 
@@ -339,17 +349,26 @@ void BackwardTile(const BackwardJob& job, const Tile& tile) {
   }
 }
 
-void ForwardTileAt(const ForwardJob& job, int64_t index) {
-  const Tile tile = TileAt(job.lists, index);
+template <bool kMedian>
+void ForwardTileOf(const ForwardJob& job, const Tile& tile) {
   switch (job.splats.channels) {
     case 1:
-      return ForwardTile<1>(job, tile);
+      return ForwardTile<1, kMedian>(job, tile);
     case 2:
-      return ForwardTile<2>(job, tile);
+      return ForwardTile<2, kMedian>(job, tile);
     case 3:
-      return ForwardTile<3>(job, tile);
+      return ForwardTile<3, kMedian>(job, tile);
     default:
-      return ForwardTile<4>(job, tile);
+      return ForwardTile<4, kMedian>(job, tile);
+  }
+}
+
+void ForwardTileAt(const ForwardJob& job, int64_t index) {
+  const Tile tile = TileAt(job.lists, index);
+  if (job.median_depth != nullptr) {
+    ForwardTileOf<true>(job, tile);
+  } else {
+    ForwardTileOf<false>(job, tile);
   }
 }
 
@@ -383,9 +402,11 @@ void RasterizeForward(const SplatBuffer& splats,
                       ThreadPool& pool,
                       PlaneBuffer& color,
                       PlaneBuffer* transmittance,
+                      PlaneBuffer* median_depth,
                       std::vector<uint16_t>& block_masks) {
   block_masks.resize(lists.pair_count() + 16);
-  const ForwardJob job{splats, lists, background, color, transmittance, block_masks.data()};
+  const ForwardJob job{
+      splats, lists, background, color, transmittance, median_depth, block_masks.data()};
   const auto forward_tile = &COLOR3D_KERNEL(ForwardTileAt);
   pool.ForEach(lists.tile_count(), [&](int64_t index, int) { forward_tile(job, index); });
 }

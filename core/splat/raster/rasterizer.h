@@ -14,14 +14,17 @@
 namespace color3d {
 
 // `color` has splats.channels channels (1..4) and the picture's size; `background` has as many
-// numbers. `transmittance` (1 channel) may be null. `block_masks` gets the 4x4 blocks that each
-// list entry touches, for RasterizeBackward.
+// numbers. `transmittance` (1 channel) may be null. `median_depth` (1 channel, may be null) gets
+// the last channel's number of the splat behind which less than half of the light comes through, 0
+// where there is none. `block_masks` gets the 4x4 blocks that each list entry touches, for
+// RasterizeBackward.
 void RasterizeForward(const SplatBuffer& splats,
                       const TileLists& lists,
                       const float* background,
                       ThreadPool& pool,
                       PlaneBuffer& color,
                       PlaneBuffer* transmittance,
+                      PlaneBuffer* median_depth,
                       std::vector<uint16_t>& block_masks);
 
 // `d_color` is dL/d(color); outside of the picture it must be zero. Channels 1..3. Fills one row of

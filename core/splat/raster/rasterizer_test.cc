@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "core/base/random.h"
 #include "core/splat/raster/pipeline.h"
@@ -165,6 +167,87 @@ TEST_P(RasterTest, GradientsAgreeWithFiniteDifferencesOfTheReference) {
       }
     }
     EXPECT_LE(worst, 1e-3 * scale) << "row " << row << " Gaussian " << worst_index;
+  }
+}
+
+// The Gaussians that `dropping` keeps, with its factor on their opacity.
+ReferenceParameters Kept(const ParameterBlock& p,
+                         const SplatDropping& dropping,
+                         ThreadPool& pool,
+                         std::vector<int>& kept) {
+  SplatBuffer all;
+  all.row_floats = SplatRowFloats(1);
+  all.depth_key.assign(p.count(), 1u);
+  all.rows.assign(p.count() * all.row_floats, 0.0f);
+  DropSplats(dropping, pool, all);
+  ParameterBlock block = p;
+  std::vector<uint32_t> source;
+  for (int i = 0; i < p.count(); ++i) {
+    if (all.depth_key[i] == 0) continue;
+    kept.push_back(i);
+    source.push_back(static_cast<uint32_t>(i));
+  }
+  block.Gather(source);
+  ReferenceParameters r = ReferenceParameters::From(block);
+  for (int i = 0; i < r.count; ++i) {
+    const double opacity = 1.0 / (1.0 + std::exp(-r.At(kOpacityRow, i))) / (1.0 - dropping.rate);
+    r.At(kOpacityRow, i) = std::log(opacity / (1.0 - opacity));
+  }
+  return r;
+}
+
+TEST_P(RasterTest, DroppedGaussiansAreAsIfTheyWereNotThere) {
+  ThreadPool pool(2);
+  const int channels = TestCase(), width = 37, height = 29;
+  const RasterCamera camera = TestCamera(width, height);
+  ParameterBlock p = RandomGaussians(40, 11);
+  for (int i = 0; i < p.count(); ++i)
+    p.Row(kOpacityRow)[i] -= 2.0f;  // so that 1.33 times stays < 1
+  const ColorSpec color = TestColor(channels);
+  const SplatDropping dropping{0.25, 7};
+  std::vector<int> kept;
+  const ReferenceParameters r = Kept(p, dropping, pool, kept);
+  ASSERT_GT(kept.size(), 20u);
+  ASSERT_LT(kept.size(), 38u);
+  const PlaneBuffer weights = RandomWeights(width, height, channels, 5);
+  SplatPipeline pipeline;
+  pipeline.Forward(p, color, camera, kBackground, false, pool, dropping);
+  const ReferenceImage image = ReferenceRender(r, color, camera, kBackground64);
+  std::vector<ReferencePixel> pixels;
+  std::vector<std::array<double, 3>> d_color;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      ReferencePixel pixel;
+      pixel.x = x;
+      pixel.y = y;
+      pixels.push_back(pixel);
+      d_color.push_back({});
+      for (int c = 0; c < channels; ++c) {
+        d_color.back()[c] = weights.Row(c, y)[x];
+        EXPECT_NEAR(pipeline.color().Row(c, y)[x], image.color[c][y * width + x], 2e-5);
+      }
+    }
+  }
+  ParameterBlock gradient;
+  pipeline.Backward(p, color, camera, weights, GradientScope::kAll, pool, gradient);
+  ReferenceParameters expected =
+      ReferenceGradient(r, color, camera, kBackground64, pixels, d_color);
+  for (int k = 0; k < r.count; ++k) {  // by the logit before the factor
+    const double before = 1.0 / (1.0 + std::exp(-p.Row(kOpacityRow)[kept[k]]));
+    const double after = before / (1.0 - dropping.rate);
+    expected.At(kOpacityRow, k) *= (1.0 - before) / (1.0 - after);
+  }
+  for (int row = 0; row < kTestRows; ++row) {
+    double scale = 0.0, worst = 0.0, sum_kept = 0.0, sum_all = 0.0;
+    for (int k = 0; k < r.count; ++k) {
+      const double got = gradient.Row(row)[kept[k]];
+      scale = std::max(scale, std::abs(expected.At(row, k)));
+      worst = std::max(worst, std::abs(got - expected.At(row, k)));
+      sum_kept += std::abs(got);
+    }
+    for (int i = 0; i < p.count(); ++i) sum_all += std::abs(gradient.Row(row)[i]);
+    EXPECT_LE(worst, 1e-3 * scale) << "row " << row;
+    EXPECT_DOUBLE_EQ(sum_all, sum_kept) << "row " << row;  // what is dropped learns nothing
   }
 }
 

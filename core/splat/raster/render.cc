@@ -22,13 +22,16 @@ RenderedView RenderView(const GaussianModel& model,
   RenderedView view;
   view.lab = Image(camera.width, camera.height, model.channels);
   view.depth = Image(camera.width, camera.height, 1);
+  view.median_depth = Image(camera.width, camera.height, 1);
   view.opacity = Image(camera.width, camera.height, 1);
   for (int y = 0; y < camera.height; ++y) {
     const float* transmittance = pipeline.transmittance().Row(0, y);
+    const float* median = pipeline.median_depth().Row(0, y);
     const float* depth = pipeline.color().Row(model.channels, y);
     for (int x = 0; x < camera.width; ++x) {
       const float opacity = 1.0f - transmittance[x];
       view.opacity.At(0, y, x) = opacity;
+      view.median_depth.At(0, y, x) = median[x];
       view.depth.At(0, y, x) = opacity > kMinTransmittance ? depth[x] / opacity : 0.0f;
     }
     for (int c = 0; c < model.channels; ++c) {

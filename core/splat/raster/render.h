@@ -9,9 +9,10 @@
 namespace color3d {
 
 struct RenderedView {
-  Image lab;      // 3 channels in Lab units (L 0..100, a, b); 1 channel (L) for channels == 1
-  Image depth;    // 1 channel: alpha-weighted mean camera depth, world units; 0 where empty
-  Image opacity;  // 1 channel, accumulated alpha 0..1
+  Image lab;           // 3 channels in Lab units (L 0..100, a, b); 1 channel (L) for channels == 1
+  Image depth;         // 1 channel: alpha-weighted mean camera depth, world units; 0 where empty
+  Image median_depth;  // 1 channel: that of the Gaussian at which opacity reaches 0.5; 0: none does
+  Image opacity;       // 1 channel, accumulated alpha 0..1
 };
 
 // Background: L' = background_l, neutral chroma.

@@ -7,6 +7,8 @@
 
 #include "core/base/error.h"
 #include "core/image/codec.h"
+#include "core/image/fill_holes.h"
+#include "core/image/weighted_resize.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -82,9 +84,10 @@ nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& 
 CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height) {
   const std::string name = ViewArtifact(artifact::kCarried, view, ".png");
   if (!context.HasInput(name)) return {Image(width, height, 2), Image(width, height, 1)};
-  const AbMap map = DecodeAbPng(context.ReadInput(name), name);
-  if (map.ab.width == width && map.ab.height == height) return {map.ab, map.confidence};
-  return {Resize(map.ab, width, height), Resize(map.confidence, width, height)};
+  AbMap map = DecodeAbPng(context.ReadInput(name), name);
+  FillHoles(map.confidence, &map.ab);
+  return {ResizeWeighted(map.ab, map.confidence, width, height),
+          Resize(map.confidence, width, height)};
 }
 
 int ColoredSide(const StageContext& context, const View& view) {

@@ -12,8 +12,13 @@
 namespace color3d {
 namespace {
 
-constexpr double kMinArea = 0.3;        // of the photo, in a crop
-constexpr double kMaxAspect = 4.0 / 3;  // of a crop before it is made square
+constexpr WindowOptions kAlone;  // of a crop for itself
+// Of a pair: the first is what colours are copied from.
+constexpr WindowOptions kFirst = {.min_area = 0.3, .max_turn = 0.15};
+constexpr WindowOptions kSecond = {.min_area = 0.15, .max_aspect = 1.6, .max_turn = 0.25};
+constexpr double kMirroredPairs = 0.15;
+constexpr int64_t kMaxFramesApart = 20;
+constexpr int kCellPx = 4;
 
 // What separates a film scan from the grey of a modern photo: tone curve, softness, grain.
 void Degrade(Image& luminance, Random& random) {
@@ -33,63 +38,111 @@ void Degrade(Image& luminance, Random& random) {
   }
 }
 
+TrainingCrop CropOf(const BytePhoto& photo, const CropWindow& window, int size_px, Random& random) {
+  TrainingCrop crop;
+  crop.srgb = SampleWindow(photo, window, size_px);
+  const Image lab = LabFromSrgb(crop.srgb);
+  crop.luminance = LuminanceOfLab(lab);
+  crop.ab = ChromaOfLab(lab);
+  Degrade(crop.luminance, random);
+  return crop;
+}
+
+std::vector<std::filesystem::path> PicturesBelow(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file() && HasImageExtension(entry.path().string())) {
+      files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// Where the cells of `second` lie in `first`, both windows of one photo.
+Image Matches(const CropWindow& first, const CropWindow& second, int size_px) {
+  const int cells = size_px / kCellPx;
+  Image matches(cells, cells, 2, -1.0f);
+  for (int i = 0; i < cells; ++i) {
+    for (int j = 0; j < cells; ++j) {
+      const auto uv = first.Inverse(second.At((j + 0.5) / cells, (i + 0.5) / cells));
+      if (std::min(uv[0], uv[1]) < 0.0 || std::max(uv[0], uv[1]) >= 1.0) continue;
+      matches.At(0, i, j) = static_cast<float>(uv[0] * size_px);
+      matches.At(1, i, j) = static_cast<float>(uv[1] * size_px);
+    }
+  }
+  return matches;
+}
+
 }  // namespace
 
-PhotoSet::PhotoSet(const std::vector<PhotoFolder>& folders) {
+PhotoSet::PhotoSet(const std::vector<PhotoFolder>& folders, const std::vector<PhotoFolder>& clips) {
   std::vector<double> shares;
-  for (const PhotoFolder& folder : folders) {
-    std::vector<std::filesystem::path> files;
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path)) {
-      if (entry.is_regular_file() && HasImageExtension(entry.path().string())) {
-        files.push_back(entry.path());
-      }
-    }
-    std::sort(files.begin(), files.end());
-    const size_t before = photos_.size();
-    for (const std::filesystem::path& file : files) {
-      const Image image = ReadImage(file);
-      if (image.channels != 3 || IsGray(image)) continue;
-      Photo photo{image.width, image.height, {}};
-      photo.data.reserve(image.data.size());
-      for (float v : image.data)
-        photo.data.push_back(static_cast<uint8_t>(std::lround(255.0f * v)));
-      photos_.push_back(std::move(photo));
-    }
-    const size_t count = photos_.size() - before;
-    if (count == 0) throw InvalidArgument("{} holds no colour photographs", folder.path.string());
+  const auto add = [&](const PhotoFolder& folder, bool of_clips) {
+    const size_t count = AddFolder(folder.path, of_clips);
     shares.insert(shares.end(), count, folder.weight / static_cast<double>(count));
-  }
+  };
+  for (const PhotoFolder& folder : folders) add(folder, false);
+  for (const PhotoFolder& folder : clips) add(folder, true);
   double sum = 0.0;
   for (double share : shares) upper_.push_back(sum += share);
 }
 
-TrainingCrop PhotoSet::Crop(int size_px, Random& random) const {
-  const double pick = random.NextUniform() * upper_.back();
-  const size_t index = std::upper_bound(upper_.begin(), upper_.end() - 1, pick) - upper_.begin();
-  const Photo& photo = photos_[index];
-  const double area = random.NextUniform(kMinArea, 1.0) * photo.width * photo.height;
-  const double aspect = std::exp(random.NextUniform(-1.0, 1.0) * std::log(kMaxAspect));
-  const int width = std::clamp(static_cast<int>(std::sqrt(area * aspect)), 8, photo.width);
-  const int height = std::clamp(static_cast<int>(std::sqrt(area / aspect)), 8, photo.height);
-  const int x0 = static_cast<int>(random.NextBelow(photo.width - width + 1));
-  const int y0 = static_cast<int>(random.NextBelow(photo.height - height + 1));
-  const bool mirror = random.NextUniform() < 0.5;
-  Image crop(width, height, 3);
-  for (int c = 0; c < 3; ++c) {
-    for (int y = 0; y < height; ++y) {
-      const uint8_t* row =
-          &photo.data[(static_cast<size_t>(c) * photo.height + y0 + y) * photo.width + x0];
-      float* out = crop.Plane(c) + static_cast<size_t>(y) * width;
-      for (int x = 0; x < width; ++x) out[x] = row[mirror ? width - 1 - x : x] / 255.0f;
+size_t PhotoSet::AddFolder(const std::filesystem::path& folder, bool clips) {
+  const size_t before = groups_.size();
+  std::filesystem::path clip;
+  for (const std::filesystem::path& file : PicturesBelow(folder)) {
+    const Image image = ReadImage(file);
+    if (image.channels != 3 || IsGray(image)) continue;
+    BytePhoto photo{image.width, image.height, {}};
+    photo.data.reserve(image.data.size());
+    for (float v : image.data) photo.data.push_back(static_cast<uint8_t>(std::lround(255.0f * v)));
+    photos_.push_back(std::move(photo));
+    if (clips && groups_.size() > before && file.parent_path() == clip) {
+      ++groups_.back().count;
+    } else {
+      groups_.push_back({photos_.size() - 1, 1});
+      clip = file.parent_path();
     }
   }
-  TrainingCrop result;
-  result.srgb = Resize(crop, size_px, size_px);
-  const Image lab = LabFromSrgb(result.srgb);
-  result.luminance = LuminanceOfLab(lab);
-  result.ab = ChromaOfLab(lab);
-  Degrade(result.luminance, random);
-  return result;
+  if (groups_.size() == before) {
+    throw InvalidArgument("{} holds no colour photographs", folder.string());
+  }
+  return groups_.size() - before;
+}
+
+const PhotoSet::Group& PhotoSet::PickGroup(Random& random) const {
+  const double pick = random.NextUniform() * upper_.back();
+  return groups_[std::upper_bound(upper_.begin(), upper_.end() - 1, pick) - upper_.begin()];
+}
+
+TrainingCrop PhotoSet::Crop(int size_px, Random& random) const {
+  const Group& group = PickGroup(random);
+  const BytePhoto& photo =
+      photos_[group.first + random.NextBelow(static_cast<uint32_t>(group.count))];
+  return CropOf(photo, RandomWindow(photo, kAlone, random), size_px, random);
+}
+
+TrainingPair PhotoSet::Pair(int size_px, Random& random) const {
+  const Group& group = PickGroup(random);
+  const auto count = static_cast<int64_t>(group.count);
+  const int64_t one = random.NextBelow(static_cast<uint32_t>(count));
+  const int64_t from = std::max<int64_t>(0, one - kMaxFramesApart);
+  const int64_t to = std::min(count - 1, one + kMaxFramesApart);
+  const int64_t other = from + random.NextBelow(static_cast<uint32_t>(to - from + 1));
+  const BytePhoto& first = photos_[group.first + one];
+  const BytePhoto& second = photos_[group.first + other];
+  const CropWindow first_window = RandomWindow(first, kFirst, random);
+  WindowOptions options = kSecond;
+  options.mirror_probability = first_window.Mirrored() ? 1.0 - kMirroredPairs : kMirroredPairs;
+  const CropWindow second_window = RandomWindow(second, options, random);
+  TrainingPair pair;
+  pair.first = CropOf(first, first_window, size_px, random);
+  pair.second = CropOf(second, second_window, size_px, random);
+  const int cells = size_px / kCellPx;
+  pair.matches =
+      one == other ? Matches(first_window, second_window, size_px) : Image(cells, cells, 2, -1.0f);
+  return pair;
 }
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// Colour photographs for pre-training, kept in memory as bytes, and random crops of them. Immutable
-// after construction, thread-safe.
+// Colour photographs and frames of clips for pre-training, kept in memory as bytes, and random
+// crops of them. Immutable after construction, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 
 #include "core/base/image.h"
 #include "core/base/random.h"
+#include "tests/bench/pretrain/crop_window.h"
 
 namespace color3d {
 
@@ -23,23 +24,42 @@ struct TrainingCrop {
   Image ab;         // 2 channels, Lab units, the truth
 };
 
+// Two views of the same things: parts of one photo at scales of their own, or of two frames.
+struct TrainingPair {
+  TrainingCrop first;
+  TrainingCrop second;
+  // 2 channels at 1/4 of the crops' size: where in `first` (px, x and y) the middle of each cell of
+  // `second` lies. -1 where `first` does not show it, or nobody knows (another frame).
+  Image matches;
+};
+
 class PhotoSet {
  public:
-  // Grey photographs are left out. Throws Error{kInvalidArgument} for a folder without photographs.
-  explicit PhotoSet(const std::vector<PhotoFolder>& folders);
+  // Each folder below one of `clips` that holds pictures is a clip, its frames in the order of
+  // their names. Grey photographs are left out. Throws Error{kInvalidArgument} for a folder without
+  // photographs.
+  explicit PhotoSet(const std::vector<PhotoFolder>& folders,
+                    const std::vector<PhotoFolder>& clips = {});
 
-  size_t size() const { return photos_.size(); }
+  size_t size() const { return photos_.size(); }  // of clips: frames
   // A random part of a random photo at random scale, size_px x size_px, maybe mirrored.
   TrainingCrop Crop(int size_px, Random& random) const;
+  // `size_px`: a multiple of 4.
+  TrainingPair Pair(int size_px, Random& random) const;
 
  private:
-  struct Photo {
-    int width = 0;
-    int height = 0;
-    std::vector<uint8_t> data;  // planar RGB
+  // A photo, or the frames of a clip.
+  struct Group {
+    size_t first = 0;
+    size_t count = 1;
   };
-  std::vector<Photo> photos_;
-  std::vector<double> upper_;  // cumulative share of the photos
+  // Groups with the same folder as parent or, for photos, one each. Returns how many.
+  size_t AddFolder(const std::filesystem::path& folder, bool clips);
+  const Group& PickGroup(Random& random) const;
+
+  std::vector<BytePhoto> photos_;
+  std::vector<Group> groups_;
+  std::vector<double> upper_;  // cumulative share of the groups
 };
 
 }  // namespace color3d

@@ -1,6 +1,7 @@
 // Pre-training of the embedded encoder and its colour head: automatic colourization as
 // classification (Zhang, Isola & Efros 2016), beside distillation of a teacher's features into the
-// taps. Torch in the interface. Not thread-safe.
+// taps and a loss that makes the taps good at copying colours (copy_loss.h). Torch in the
+// interface. Not thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -16,6 +17,7 @@
 #include "core/encoder/convnext/convnext.h"
 #include "core/keycolor/automatic/color_head.h"
 #include "tests/bench/pretrain/color_bins.h"
+#include "tests/bench/pretrain/copy_loss.h"
 #include "tests/bench/pretrain/photo_set.h"
 #include "tests/bench/pretrain/squeezenet.h"
 
@@ -30,26 +32,40 @@ struct PretrainOptions {
   double weight_decay = 0.02;
   double distillation_weight = 1.0;
   double rebalancing_power = 0.5;
+  double prior_share = 1.0;  // of the rebalancing that is taken back when colours are guessed
   double min_bin_share = 2e-5;
+  // Above 0 a batch is made of pairs of views. Contrast tells the net which cell is the right one,
+  // copying only which colour.
+  double copy_weight = 0.0;
+  double contrast_weight = 0.0;
+  CopyLossOptions copying;
+  bool half_precision = false;  // networks run in bfloat16, weights and losses stay float32
+  torch::Device device = torch::kCPU;
   uint64_t seed = 1;
 };
 
 struct PretrainLosses {
   double color = 0.0;         // cross entropy, nats
   double distillation = 0.0;  // mean squared error of standardised features, over the three levels
-  double logits = 0.0;        // Kullback-Leibler divergence to the teacher's classes, nats
+  double copy = 0.0;          // CopyLosses, the mean over the pairs
+  double contrast = 0.0;
+  double logits = 0.0;  // Kullback-Leibler divergence to the teacher's classes, nats
 };
 
 class Pretrainer {
  public:
-  // `photos` must outlive it; without a teacher there is no distillation.
+  // `photos` must outlive it; without a teacher there is no distillation. `start`: weights as
+  // AveragedWeights gives them, in place of random ones; throws Error{kInvalidArgument} when they
+  // do not fit.
   Pretrainer(const PretrainOptions& options,
              const PhotoSet& photos,
-             std::optional<SqueezeNet> teacher);
+             std::optional<SqueezeNet> teacher,
+             const WeightMap* start = nullptr);
 
   int64_t iteration() const { return iteration_; }
-  // One optimiser step. Throws Error{kInternal} when the loss is not finite ten times running.
-  PretrainLosses Step();
+  // One optimiser step. `progress`: share of the schedule that is over, 0..1; else it follows from
+  // the iteration. Throws Error{kInternal} when the loss is not finite ten times running.
+  PretrainLosses Step(std::optional<double> progress = std::nullopt);
 
   // The whole state, and back: a resumed run goes on as if it had never stopped.
   std::string Checkpoint(const std::string& notes_json) const;
@@ -57,20 +73,37 @@ class Pretrainer {
   // network.
   std::string Restore(std::string_view bytes);
 
-  // Averaged weights as they are shipped: "encoder.*", "color_head.*", "color_bins" [K,2].
+  // Averaged weights as they are shipped: "encoder.*", "color_head.*", "color_bins" [K,2] and
+  // "color_weights" [K].
   WeightMap AveragedWeights() const;
 
  private:
   // Everything that a checkpoint holds besides numbers; storage is shared.
   NamedTensors State() const;
-  PretrainLosses Losses(const std::vector<TrainingCrop>& crops, torch::Tensor& total);
-  torch::Tensor ColorLoss(const std::vector<torch::Tensor>& taps, const torch::Tensor& ab) const;
+  // A batch; of pairs, the first views and then the second ones.
+  struct Batch {
+    std::vector<TrainingCrop> crops;
+    std::vector<Image> matches;  // empty without pairs
+  };
+  Batch NextBatch(double progress);
+  PretrainLosses Losses(const Batch& batch, torch::Tensor& total);
+  torch::Tensor Stack(const std::vector<TrainingCrop>& crops, Image TrainingCrop::*member) const;
+  // Shares of the bins for the mean colour of each cell, which is one of the head's too:
+  // [B, cells, K].
+  torch::Tensor SoftBins(const torch::Tensor& ab) const;
+  torch::Tensor ColorLoss(const torch::Tensor& logits, const torch::Tensor& colors) const;
+  void Copy(const std::vector<torch::Tensor>& taps,
+            const torch::Tensor& luminance,
+            const torch::Tensor& colors,
+            const std::vector<Image>& matches,
+            torch::Tensor& total,
+            PretrainLosses& losses);
   void Distill(const std::vector<torch::Tensor>& taps,
                const torch::Tensor& srgb,
                torch::Tensor& total,
                PretrainLosses& losses);
   torch::Tensor NewStudentHead(const std::string& name, std::vector<int64_t> shape);
-  void OptimiserStep();
+  void OptimiserStep(double progress);
 
   PretrainOptions options_;
   const PhotoSet& photos_;
@@ -84,6 +117,7 @@ class Pretrainer {
   NamedTensors parameters_;
   std::vector<torch::Tensor> first_, second_, average_;
   std::vector<torch::Tensor> teacher_mean_, teacher_deviation_;  // running, per level
+  bool started_ = false;                                         // from weights
   int64_t iteration_ = 0;
   int bad_steps_ = 0;
 };

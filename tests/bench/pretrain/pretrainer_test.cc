@@ -1,5 +1,6 @@
 #include "tests/bench/pretrain/pretrainer.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,23 +44,83 @@ class PretrainerTest : public testing::Test {
   PretrainOptions options_;
 };
 
-TEST_F(PretrainerTest, AResumedRunEndsAsAnUninterruptedOne) {
-  const PhotoSet photos({{folder_, 1.0}});
-  Pretrainer straight(options_, photos, std::nullopt);
-  std::string checkpoint;
-  for (int i = 0; i < 4; ++i) {
-    if (i == 2) checkpoint = straight.Checkpoint(R"({"seconds": 7})");
-    EXPECT_TRUE(std::isfinite(straight.Step().color));
-  }
-  Pretrainer resumed(options_, photos, std::nullopt);
-  EXPECT_EQ(resumed.Restore(checkpoint), R"({"seconds":7})");
-  EXPECT_EQ(resumed.iteration(), 2);
-  for (int i = 0; i < 2; ++i) resumed.Step();
-  const WeightMap expected = straight.AveragedWeights();
-  const WeightMap actual = resumed.AveragedWeights();
+void ExpectEqual(const WeightMap& expected, const WeightMap& actual) {
   ASSERT_EQ(expected.size(), actual.size());
   for (const auto& [name, array] : expected)
     ASSERT_EQ(array.values, actual.at(name).values) << name;
+}
+
+TEST_F(PretrainerTest, AResumedRunEndsAsAnUninterruptedOne) {
+  const PhotoSet photos({{folder_, 1.0}});
+  for (double copy_weight : {0.0, 1.0}) {
+    options_.copy_weight = options_.contrast_weight = copy_weight;
+    options_.half_precision = copy_weight > 0.0;
+    Pretrainer straight(options_, photos, std::nullopt);
+    std::string checkpoint;
+    for (int i = 0; i < 4; ++i) {
+      if (i == 2) checkpoint = straight.Checkpoint(R"({"seconds": 7})");
+      const PretrainLosses losses = straight.Step();
+      EXPECT_TRUE(std::isfinite(losses.color));
+      EXPECT_EQ(losses.copy > 0.0, copy_weight > 0.0);
+    }
+    Pretrainer resumed(options_, photos, std::nullopt);
+    EXPECT_EQ(resumed.Restore(checkpoint), R"({"seconds":7})");
+    EXPECT_EQ(resumed.iteration(), 2);
+    for (int i = 0; i < 2; ++i) resumed.Step();
+    ExpectEqual(straight.AveragedWeights(), resumed.AveragedWeights());
+  }
+}
+
+TEST_F(PretrainerTest, GoesOnFromWeights) {
+  const PhotoSet photos({{folder_, 1.0}});
+  Pretrainer trainer(options_, photos, std::nullopt);
+  trainer.Step();
+  const WeightMap weights = trainer.AveragedWeights();
+  options_.seed = 2;
+  Pretrainer other(options_, photos, std::nullopt, &weights);
+  EXPECT_EQ(other.iteration(), 0);
+  ExpectEqual(weights, other.AveragedWeights());
+  other.Step();
+  EXPECT_NE(weights.at("encoder.norm0.bias").values,
+            other.AveragedWeights().at("encoder.norm0.bias").values);
+}
+
+TEST_F(PretrainerTest, NamesWhatWeightsToStartFromLack) {
+  const PhotoSet photos({{folder_, 1.0}});
+  const WeightMap good = Pretrainer(options_, photos, std::nullopt).AveragedWeights();
+  const auto expect_refused = [&](const WeightMap& weights, const std::string& name) {
+    try {
+      Pretrainer(options_, photos, std::nullopt, &weights);
+      FAIL() << name;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr(name));
+    }
+  };
+  for (const char* name : {"color_bins", "encoder.norm1.weight", "color_head.out.bias"}) {
+    WeightMap weights = good;
+    weights.erase(name);
+    expect_refused(weights, name);
+    weights[name] = {{1, 3}, {1.0f, 2.0f, 3.0f}};
+    expect_refused(weights, name);
+  }
+  WeightMap weights = good;
+  weights["encoder.norm1.weight"].values[0] = NAN;
+  expect_refused(weights, "encoder.norm1.weight");
+}
+
+TEST_F(PretrainerTest, TheScheduleMayGoByTime) {
+  const PhotoSet photos({{folder_, 1.0}});
+  const auto change = [&](double progress) {
+    Pretrainer trainer(options_, photos, std::nullopt);
+    const WeightMap before = trainer.AveragedWeights();
+    trainer.Step(progress);
+    const std::vector<float>& x = before.at("color_head.out.bias").values;
+    const std::vector<float> y = trainer.AveragedWeights().at("color_head.out.bias").values;
+    double sum = 0.0;
+    for (size_t i = 0; i < x.size(); ++i) sum += std::abs(x[i] - y[i]);
+    return sum;
+  };
+  EXPECT_LT(change(1.0), 0.05 * change(0.0));
 }
 
 TEST_F(PretrainerTest, WhatItWritesIsAnAutomaticColorizer) {
@@ -79,25 +140,6 @@ TEST_F(PretrainerTest, RefusesADamagedCheckpoint) {
   std::string checkpoint = trainer.Checkpoint("{}");
   checkpoint[checkpoint.size() / 2] ^= 1;
   EXPECT_THROW(trainer.Restore(checkpoint), Error);
-}
-
-TEST_F(PretrainerTest, RefusesAFolderWithoutColor) {
-  std::filesystem::create_directories(folder_ / "empty");
-  EXPECT_THROW(PhotoSet({{folder_ / "empty", 1.0}}), Error);
-}
-
-TEST_F(PretrainerTest, CropsAreTrueColorAndDegradedLuminance) {
-  const PhotoSet photos({{folder_, 1.0}});
-  Random random(5);
-  for (int i = 0; i < 20; ++i) {
-    const TrainingCrop crop = photos.Crop(64, random);
-    ASSERT_EQ(crop.srgb.width, 64);
-    ASSERT_EQ(crop.ab.channels, 2);
-    for (float v : crop.luminance.data) {
-      ASSERT_GE(v, 0.0f);
-      ASSERT_LE(v, 100.0f);
-    }
-  }
 }
 
 }  // namespace

@@ -105,6 +105,10 @@ SqueezeNet::SqueezeNet(const std::filesystem::path& onnx_file) {
   }
 }
 
+void SqueezeNet::MoveTo(torch::Device device) {
+  for (auto& [name, tensor] : weights_) tensor = tensor.to(device);
+}
+
 torch::Tensor SqueezeNet::Convolve(const std::string& name,
                                    const torch::Tensor& x,
                                    int padding) const {
@@ -121,7 +125,8 @@ torch::Tensor SqueezeNet::Fire(int index, const torch::Tensor& x) const {
 }
 
 torch::Tensor SqueezeNet::Input(const torch::Tensor& srgb) {
-  const torch::Tensor mean = torch::tensor({103.94f, 116.78f, 123.68f}).view({1, 3, 1, 1});
+  const torch::Tensor mean =
+      torch::tensor({103.94f, 116.78f, 123.68f}).view({1, 3, 1, 1}).to(srgb.device());
   return (255.0 * srgb.flip(1) - mean).contiguous(at::MemoryFormat::ChannelsLast);
 }
 

@@ -1,5 +1,5 @@
 // SqueezeNet 1.1 (Iandola et al. 2016) trained on ImageNet, from its ONNX file: the teacher in
-// pre-training and a peer in comparisons. Torch in the interface; immutable, thread-safe.
+// pre-training and a peer in comparisons. Torch in the interface; thread-safe but for MoveTo.
 #pragma once
 
 #include <torch/types.h>
@@ -16,6 +16,8 @@ class SqueezeNet {
   // Reads the initialisers (float16 or float32) of the file; its graph is not looked at. Throws
   // Error{kInvalidArgument} when one is missing or the file is no ONNX model.
   explicit SqueezeNet(const std::filesystem::path& onnx_file);
+
+  void MoveTo(torch::Device device);
 
   struct Features {
     torch::Tensor conv1;   // [B,64,.,.]  cell i is centred on pixel 2 i + 1

@@ -1,14 +1,20 @@
 // color3d-bench reconstruct: geometry alone, on true colours or on luminance; quality of held-out
 // views against seconds of training, and where the seconds go.
+#include <chrono>
+#include <cmath>
+#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/carry/dense_points.h"
 #include "core/image/codec.h"
+#include "core/metrics/quality.h"
 #include "core/report/curves.h"
 #include "core/simd/instruction_set.h"
 #include "core/splat/geometry/geometry_trainer.h"
+#include "core/splat/model/gaussian_cap.h"
 #include "core/stage/stages.h"
 #include "server/planning/presets.h"
 #include "tests/bench/commands.h"
@@ -26,6 +32,13 @@ struct ReconstructArguments {
   int max_side_px = 500;
   int threads = 2;
   TrainingColors colors = TrainingColors::kSrgb;
+  std::string imported_file;  // scene.json of an earlier import
+  std::string geometry_file;  // gets the model
+  int score_side_px = 500;    // beside the size trained on
+  std::string set_aside;      // "K/N"
+  bool capped = false;        // as the service caps
+  double dense = 0.0;         // share of the Gaussians to begin with
+  DensePointsOptions dense_points;
   GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
 };
 
@@ -112,6 +125,9 @@ nlohmann::ordered_json ToJson(const ReconstructArguments& args, const TrainingTr
     if (static_cast<Phase>(p) == Phase::kEvaluation) continue;
     result["ms_per_iteration_by_phase"][kPhaseNames[p]] = 1000.0 * trace.phases[p] / n;
   }
+  result["training"] = {{"psnr_db", trace.training.psnr_db},
+                        {"ssim", trace.training.ssim},
+                        {"l1", trace.training.l1}};
   for (const HeldOutPoint& p : trace.held_out) {
     result["held_out"].push_back({{"seconds", p.seconds},
                                   {"iteration", p.iteration},
@@ -123,32 +139,116 @@ nlohmann::ordered_json ToJson(const ReconstructArguments& args, const TrainingTr
   return result;
 }
 
+Scene SceneOf(const ReconstructArguments& args, const RunControl& run) {
+  if (!args.imported_file.empty()) return SceneFromJson(ReadFile(args.imported_file));
+  const ScratchFolder scratch;
+  ImportOptions import_options;
+  import_options.hold_out_every_eighth = true;
+  return ImportScene(args.scene_folder, scratch.path(), import_options, run).scene;
+}
+
+// "K/N": every N-th training view from the K-th on is held out in place of the scene's own
+// held-out views, which nobody sees then. Constants are chosen on such views.
+void SetAside(const std::string& fold, Scene& scene) {
+  int k = 0, n = 0;
+  if (std::sscanf(fold.c_str(), "%d/%d", &k, &n) != 2 || k < 0 || k >= n) {
+    throw InvalidArgument("--hold-out-training {}: give K/N with K from 0 to N - 1", fold);
+  }
+  Scene kept = scene;
+  kept.views.clear();
+  std::vector<int> renumbered(scene.views.size(), -1);
+  int number = 0;
+  for (size_t v = 0; v < scene.views.size(); ++v) {
+    if (scene.views[v].held_out) continue;
+    renumbered[v] = static_cast<int>(kept.views.size());
+    kept.views.push_back(scene.views[v]);
+    kept.views.back().held_out = number++ % n == k;
+  }
+  for (SparsePoint& point : kept.points) {
+    std::vector<int> views;
+    for (const int v : point.views) {
+      if (renumbered[v] >= 0) views.push_back(renumbered[v]);
+    }
+    point.views = views;
+  }
+  scene = std::move(kept);
+}
+
+std::vector<Camera> TrainingCameras(const Scene& scene) {
+  std::vector<Camera> cameras;
+  for (const int view : scene.TrainingViews()) cameras.push_back(scene.views[view].camera);
+  return cameras;
+}
+
+// Mean over pictures drawn at the size trained on, after both were reduced to `side_px`: presets of
+// different sizes are comparable so.
+class ReducedScore {
+ public:
+  explicit ReducedScore(int side_px) : side_px_(side_px) {}
+
+  void Add(const Image& truth, const Image& drawn) {
+    const double scale =
+        std::min(1.0, side_px_ / static_cast<double>(std::max(truth.width, truth.height)));
+    const int width = static_cast<int>(std::lround(scale * truth.width));
+    const int height = static_cast<int>(std::lround(scale * truth.height));
+    sum_psnr_ += Psnr(Resize(truth, width, height), Resize(drawn, width, height), 1.0);
+    sum_ssim_ += Ssim(Resize(truth, width, height), Resize(drawn, width, height), 1.0);
+    ++views_;
+  }
+  nlohmann::ordered_json ToJson() const {
+    return {{"side_px", side_px_}, {"psnr_db", sum_psnr_ / views_}, {"ssim", sum_ssim_ / views_}};
+  }
+
+ private:
+  int side_px_;
+  int views_ = 0;
+  double sum_psnr_ = 0.0;
+  double sum_ssim_ = 0.0;
+};
+
 void RunReconstruct(ReconstructArguments args) {
   NullObserver silent;
   NoCheckpoints none;
   CancellationToken cancel;
-  const ScratchFolder scratch;
-  ImportOptions import_options;
-  import_options.hold_out_every_eighth = true;
   ThreadPool pool(args.threads);
-  const ImportResult imported =
-      ImportScene(args.scene_folder, scratch.path(), import_options, {pool, none, silent, cancel});
-  const ViewImages images(imported.scene, args.scene_folder, args.max_side_px);
+  Scene scene = SceneOf(args, {pool, none, silent, cancel});
+  if (!args.set_aside.empty()) SetAside(args.set_aside, scene);
+  if (args.capped) {
+    args.geometry.max_gaussians =
+        GaussianCap(args.geometry.max_gaussians, TrainingCameras(scene), args.max_side_px);
+    args.geometry.iterations =
+        IterationCap(args.geometry.iterations, static_cast<int>(scene.TrainingViews().size()));
+  }
+  const ViewImages images(scene, args.scene_folder, args.max_side_px);
+  for (const int view : scene.TrainingViews()) images.Luminance(view);  // not in the times
+  const auto begin = std::chrono::steady_clock::now();
+  if (args.dense > 0.0) {
+    args.dense_points.max_points = static_cast<int>(args.dense * args.geometry.max_gaussians);
+    const std::vector<SparsePoint> points =
+        DensePoints(scene, images, args.dense_points, {pool, none, silent, cancel});
+    scene.points.insert(scene.points.end(), points.begin(), points.end());
+  }
+  const double dense_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  GeometryProblem problem = GeometryProblemOf(scene, images, args.colors);
   CurveRecorder recorder("reconstruct_geometry", silent, none);
   TrainingTrace trace;
-  if (!args.pictures_folder.empty()) {
-    std::filesystem::create_directories(args.pictures_folder);
-    trace.on_held_out_picture = [&](int view, const Image& drawn) {
-      WriteFileAtomic(
-          std::filesystem::path(args.pictures_folder) / (imported.scene.views[view].name + ".png"),
-          EncodePng8(SideBySide(Truth(images, view, args.colors), drawn)));
-    };
-  }
-  TrainGeometry(GeometryProblemOf(imported.scene, images, args.colors),
-                OptionsFrom(args),
-                {pool, recorder, recorder, cancel},
-                &trace);
+  trace.score_training = true;
+  ReducedScore reduced(args.score_side_px);
+  if (!args.pictures_folder.empty()) std::filesystem::create_directories(args.pictures_folder);
+  trace.on_held_out_picture = [&](int view, const Image& drawn) {
+    const Image truth = Truth(images, view, args.colors);
+    reduced.Add(truth, drawn);
+    if (args.pictures_folder.empty()) return;
+    WriteFileAtomic(std::filesystem::path(args.pictures_folder) / (scene.views[view].name + ".png"),
+                    EncodePng8(SideBySide(truth, drawn)));
+  };
+  const GaussianModel model =
+      TrainGeometry(problem, OptionsFrom(args), {pool, recorder, recorder, cancel}, &trace);
+  if (!args.geometry_file.empty()) WriteFileAtomic(args.geometry_file, SerializeGaussians(model));
   nlohmann::ordered_json result = ToJson(args, trace);
+  result["dense_seconds"] = dense_seconds;
+  result["reduced"] = reduced.ToJson();
   for (const CurvePoint& p : recorder.points()) {
     if (p.error_name == "restored_non_finite") result["restored_at"].push_back(p.iteration);
   }
@@ -171,6 +271,22 @@ void AddReconstructCommand(CLI::App& app) {
       ->check(CLI::IsMember({"fast", "best", "paper"}))
       ->trigger_on_parse();
   command->add_option("--threads", args->threads);
+  command->add_option("--imported", args->imported_file, "scene.json of an earlier import");
+  command->add_option("--geometry", args->geometry_file, "gets the model");
+  command->add_option(
+      "--score-side", args->score_side_px, "px; scores at this size, too, of reduced pictures");
+  command->add_option("--hold-out-training",
+                      args->set_aside,
+                      "K/N: scores every N-th training view, from the K-th on, and trains on the "
+                      "others; the scene's held-out views are left out");
+  command->add_option("--dense", args->dense, "share of the Gaussians that plane sweeps give");
+  command->add_option("--depth-side", args->dense_points.depth_side_px, "px, of the plane sweeps");
+  command->add_option("--depth-tolerance", args->dense_points.tolerance, "relative");
+  command->add_option("--depth-agreeing", args->dense_points.agreeing);
+  command->add_option("--depth-sources", args->dense_points.depth_sources);
+  command->add_option("--depth-planes", args->dense_points.sweep.planes);
+  command->add_flag(
+      "--cap", args->capped, "Gaussians and iterations by the photos, as the service");
   command->add_option("--colours", args->colors, "truth (RGB, the default) or luminance")
       ->transform(CLI::Transformer(std::map<std::string, TrainingColors>{
           {"truth", TrainingColors::kSrgb}, {"luminance", TrainingColors::kLuminance}}));

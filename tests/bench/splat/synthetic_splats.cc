@@ -79,7 +79,8 @@ void SyntheticIteration::Bin() {
   binner_.Bin(splats_, camera_.width, camera_.height, pool_, lists_);
 }
 void SyntheticIteration::Forward() {
-  RasterizeForward(splats_, lists_, kBlack, pool_, picture_, &transmittance_, block_masks_);
+  RasterizeForward(
+      splats_, lists_, kBlack, pool_, picture_, &transmittance_, nullptr, block_masks_);
 }
 void SyntheticIteration::Loss() {
   loss_.Evaluate(picture_, target_, nullptr, LossWeights(), pool_, d_picture_);

@@ -1,4 +1,4 @@
-#include "core/augment/fill_holes.h"
+#include "core/image/fill_holes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,145 @@
+#include "core/carry/dense_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <utility>
+
+#include "core/carry/stereo_views.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace {
+
+struct SweptView {
+  Camera camera;
+  Pose pose;
+  Image luminance;           // of the size of the camera
+  std::vector<int> sources;  // views
+  Image depth;               // empty when no other view shows the same
+};
+
+// At most so many, evenly spaced.
+template <class T>
+std::vector<T> EvenlyOf(std::vector<T> all, int64_t most) {
+  const int64_t found = static_cast<int64_t>(all.size());
+  if (found <= most) return all;
+  std::vector<T> kept;
+  for (int64_t i = 0; i < most; ++i) kept.push_back(std::move(all[i * found / most]));
+  return kept;
+}
+
+// Positions by view that observes them.
+std::vector<std::vector<Eigen::Vector3d>> TrackedPoints(const Scene& scene) {
+  std::vector<std::vector<Eigen::Vector3d>> tracked(scene.views.size());
+  for (const SparsePoint& point : scene.points) {
+    for (const int view : point.views) tracked[view].push_back(point.position);
+  }
+  return tracked;
+}
+
+SweptView Reduced(const Scene& scene, int view, const ViewImages& images, int side_px) {
+  SweptView swept;
+  swept.camera = images.WorkingCamera(view).FitWithin(side_px);
+  swept.pose = scene.views[view].cam_from_world;
+  swept.luminance = Resize(*images.Luminance(view), swept.camera.width, swept.camera.height);
+  return swept;
+}
+
+// Depth of swept[view], by as many others of `candidates` as there may be.
+void Sweep(const Scene& scene,
+           int view,
+           const std::vector<int>& candidates,
+           const std::vector<Eigen::Vector3d>& tracked,
+           const DensePointsOptions& options,
+           const CancellationToken& cancel,
+           std::vector<SweptView>& swept) {
+  const StereoPlan plan = PlanStereo(scene, view, tracked, candidates, options.depth_sources);
+  if (plan.sources.empty()) return;
+  const auto posed = [&](int index) {
+    return PosedLuminance{swept[index].camera, swept[index].pose, &swept[index].luminance};
+  };
+  std::vector<PosedLuminance> sources;
+  for (const int index : plan.sources) sources.push_back(posed(index));
+  swept[view].depth =
+      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, options.sweep, cancel).depth;
+  swept[view].sources = plan.sources;
+}
+
+// How much farther, relatively, `view` itself says that its surface lies than `point`; NaN where it
+// says nothing.
+double Farther(const SweptView& view, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d p = view.pose.Apply(point);
+  if (view.depth.data.empty() || !(p.z() > 0.0)) return std::nan("");
+  const Eigen::Vector2d pixel = view.camera.Project(p);
+  if (!view.camera.Contains(pixel)) return std::nan("");
+  const double depth = view.depth.At(0, static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
+  return depth > 0.0 ? depth / p.z() - 1.0 : std::nan("");
+}
+
+// The points that `view` adds to those of the views before it.
+std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
+                                  int view,
+                                  const DensePointsOptions& options) {
+  std::vector<SparsePoint> points;
+  const SweptView& own = swept[view];
+  if (own.depth.data.empty()) return points;
+  const int needed = std::min<int>(options.agreeing, static_cast<int>(own.sources.size()));
+  for (int y = 0; y < own.camera.height; ++y) {
+    for (int x = 0; x < own.camera.width; ++x) {
+      const double depth = own.depth.At(0, y, x);
+      if (!(depth > 0.0)) continue;
+      const Eigen::Vector3d ray = own.camera.Ray(x + 0.5, y + 0.5);
+      const Eigen::Vector3d world = own.pose.WorldFromCamera(depth * ray);
+      SparsePoint point;
+      point.views = {view};
+      double sum = 0.0;
+      bool given = false;
+      for (const int source : own.sources) {
+        const double farther = Farther(swept[source], world);
+        if (!(std::abs(farther) < options.tolerance)) continue;
+        given = given || source < view;
+        sum += farther;
+        point.views.push_back(source);
+      }
+      if (given || static_cast<int>(point.views.size()) <= needed) continue;
+      const double mean = sum / static_cast<double>(point.views.size());
+      point.position = own.pose.WorldFromCamera(depth * (1.0 + mean) * ray);
+      point.reprojection_error_px = -1.0;
+      std::sort(point.views.begin(), point.views.end());
+      points.push_back(std::move(point));
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+std::vector<SparsePoint> DensePoints(const Scene& scene,
+                                     const ViewImages& images,
+                                     const DensePointsOptions& options,
+                                     const RunControl& run) {
+  const std::vector<std::vector<Eigen::Vector3d>> tracked = TrackedPoints(scene);
+  const std::vector<int> training = EvenlyOf(scene.TrainingViews(), options.max_views);
+  std::vector<SweptView> swept(scene.views.size());
+  const auto for_each_view = [&](const std::function<void(int view)>& work) {
+    run.pool.ForEach(static_cast<int64_t>(training.size()), [&](int64_t k, int) {
+      run.cancel.ThrowIfCancelled();
+      work(training[k]);
+    });
+  };
+  for_each_view(
+      [&](int view) { swept[view] = Reduced(scene, view, images, options.depth_side_px); });
+  for_each_view(
+      [&](int view) { Sweep(scene, view, training, tracked[view], options, run.cancel, swept); });
+  std::vector<std::vector<SparsePoint>> by_view(scene.views.size());
+  for_each_view([&](int view) { by_view[view] = PointsOf(swept, view, options); });
+  std::vector<SparsePoint> all;
+  for (std::vector<SparsePoint>& points : by_view) {
+    std::move(points.begin(), points.end(), std::back_inserter(all));
+  }
+  return EvenlyOf(std::move(all), options.max_points);
+}
+
+}  // namespace color3d

@@ -1,0 +1,106 @@
+#include "core/carry/dense_points.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/files.h"
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "tests/support/quiet_run.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kWidth = 128, kHeight = 96;
+constexpr double kFocal = 110.0, kDepth = 4.0;
+
+// Lightness of a painted wall, where cameras look from z = 0 to z = kDepth.
+double Wall(double x, double y) {
+  return 50.0 + 12.0 * std::sin(4.0 * x + y) + 10.0 * std::sin(9.0 * y - 2.0 * x) +
+         8.0 * std::sin(17.0 * x) * std::cos(13.0 * y);
+}
+
+class DensePointsTest : public testing::Test {
+ protected:
+  // Six cameras along the wall; the first one is held out.
+  DensePointsTest() {
+    for (int i = 0; i < 6; ++i) {
+      const double at = 0.4 * i;
+      Image lab(kWidth, kHeight, 3);
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          lab.At(0, y, x) = static_cast<float>(Wall(at + kDepth * (x + 0.5 - kWidth / 2.0) / kFocal,
+                                                    kDepth * (y + 0.5 - kHeight / 2.0) / kFocal));
+        }
+      }
+      View view;
+      view.name = view.image_file = "p" + std::to_string(i) + ".png";
+      view.camera = {kWidth, kHeight, kFocal, kFocal, kWidth / 2.0, kHeight / 2.0};
+      view.captured_camera = view.camera;
+      view.cam_from_world.translation = {-at, 0.0, 0.0};
+      view.held_out = i == 0;
+      WriteFileAtomic(scratch_.path() / view.image_file, EncodePng16(SrgbFromLab(lab)));
+      scene_.views.push_back(view);
+    }
+    for (int i = 0; i < 40; ++i) {
+      SparsePoint point;
+      point.position = {0.05 * i, 0.5 * std::sin(i), kDepth};
+      point.views = {0, 1, 2, 3, 4, 5};
+      scene_.points.push_back(point);
+    }
+  }
+
+  std::vector<SparsePoint> Points(int threads, const DensePointsOptions& options) {
+    QuietRun run(threads);
+    const ViewImages images(scene_, scratch_.path(), kWidth);
+    return DensePoints(scene_, images, options, run.control());
+  }
+
+  ScratchFolder scratch_;
+  Scene scene_;
+};
+
+TEST_F(DensePointsTest, LieOnTheWallAndOnlyOnce) {
+  const std::vector<SparsePoint> points =
+      Points(2, {.depth_side_px = kWidth, .max_points = 1'000'000});
+  // One picture of the wall, and what the last camera shows beyond it.
+  EXPECT_GT(points.size(), 0.8 * kWidth * kHeight);
+  EXPECT_LT(points.size(), 2.0 * kWidth * kHeight);
+  double squares = 0.0;
+  for (const SparsePoint& point : points) {
+    squares += std::pow(point.position.z() - kDepth, 2);
+    ASSERT_GE(point.views.size(), 3u);  // itself and two that agree
+    ASSERT_GT(point.views.front(), 0);  // the held-out one is not looked at
+    ASSERT_TRUE(std::is_sorted(point.views.begin(), point.views.end()));
+  }
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(points.size())), 0.02 * kDepth);
+}
+
+TEST_F(DensePointsTest, AreThinnedEvenlyAndTheSameForEveryThreadCount) {
+  const std::vector<SparsePoint> one = Points(1, {.depth_side_px = kWidth, .max_points = 500});
+  const std::vector<SparsePoint> three = Points(3, {.depth_side_px = kWidth, .max_points = 500});
+  ASSERT_EQ(one.size(), 500u);
+  ASSERT_EQ(three.size(), 500u);
+  double lowest = 1e9, highest = -1e9;
+  for (size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i].position, three[i].position);
+    EXPECT_EQ(one[i].views, three[i].views);
+    lowest = std::min(lowest, one[i].position.y());
+    highest = std::max(highest, one[i].position.y());
+  }
+  EXPECT_LT(lowest, -1.2);
+  EXPECT_GT(highest, 1.2);
+}
+
+TEST_F(DensePointsTest, ThereAreNoneWithoutNeighboursOrPoints) {
+  Scene lonely = scene_;
+  lonely.points.clear();
+  QuietRun run(1);
+  const ViewImages images(lonely, scratch_.path(), kWidth);
+  EXPECT_TRUE(DensePoints(lonely, images, {}, run.control()).empty());
+}
+
+}  // namespace
+}  // namespace color3d
