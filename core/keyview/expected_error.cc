@@ -152,40 +152,25 @@ double ExpectedError(const SeenSamples& seen,
   return Expectation(seen, distances).Of(keys);
 }
 
-std::vector<double> ExpectedSavings(const SeenSamples& seen,
-                                    const std::vector<std::vector<float>>& errors,
-                                    const std::vector<int>& candidates) {
-  std::vector<double> savings;
-  const double total = static_cast<double>(seen.views()) * seen.samples();
-  for (const int candidate : candidates) {
-    double sum = 0.0;
-    for (int view = 0; view < seen.views(); ++view) {
-      for (int s = 0; s < seen.samples(); ++s) {
-        if (view != candidate && !seen.IsSeen(candidate, view, s)) continue;
-        sum += std::max(0.0, errors.at(view).at(s) - (view == candidate ? 0.0 : kErrorSeen));
-      }
-    }
-    savings.push_back(total > 0.0 ? sum / total : 0.0);
-  }
-  return savings;
-}
-
 std::optional<NextKeyViewAdvice> NextKeyView(const SeenSamples& seen,
-                                             const std::vector<std::vector<float>>& errors,
-                                             const std::vector<int>& candidates) {
-  const std::vector<double> savings = ExpectedSavings(seen, errors, candidates);
-  const auto best = std::max_element(savings.begin(), savings.end());
-  constexpr double kWorthTelling = 0.05;
-  if (best == savings.end() || *best < kWorthTelling) return std::nullopt;
-  double now = 0.0, count = 0.0;
-  for (const auto& view : errors) {
-    for (const float error : view) {
-      now += error;
-      count += 1.0;
-    }
+                                             const NearestDistances& distances,
+                                             const std::vector<int>& keys) {
+  const Expectation expectation(seen, distances);
+  NextKeyViewAdvice advice;
+  advice.error_now = advice.error_with = expectation.Of(keys);
+  std::vector<int> with = keys;
+  with.push_back(0);
+  for (int view = 0; view < seen.views(); ++view) {
+    if (Contains(keys, view)) continue;
+    with.back() = view;
+    const double error = expectation.Of(with);
+    if (error >= advice.error_with) continue;
+    advice.view = view;
+    advice.error_with = error;
   }
-  now /= count;
-  return NextKeyViewAdvice{candidates[best - savings.begin()], now, now - *best};
+  constexpr double kWorthTelling = 0.02;
+  if (advice.error_now - advice.error_with < kWorthTelling) return std::nullopt;
+  return advice;
 }
 
 }  // namespace color3d

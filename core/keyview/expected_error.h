@@ -60,19 +60,13 @@ double ExpectedError(const SeenSamples& seen,
 
 struct NextKeyViewAdvice {
   int view = 0;
-  double error_now = 0.0;   // expected, mean over all samples
+  double error_now = 0.0;   // expected with the key views that there are
   double error_with = 0.0;  // ... with this view coloured, too
 };
 
-// The view of `candidates` that saves most of the error that is expected now: `errors[v][s]` at the
-// samples of `seen`. A view shows all of itself. Nothing when none saves any.
+// The view to colour after `keys`. Nothing when none saves anything worth telling.
 std::optional<NextKeyViewAdvice> NextKeyView(const SeenSamples& seen,
-                                             const std::vector<std::vector<float>>& errors,
-                                             const std::vector<int>& candidates);
-
-// What each candidate would save, in the same units.
-std::vector<double> ExpectedSavings(const SeenSamples& seen,
-                                    const std::vector<std::vector<float>>& errors,
-                                    const std::vector<int>& candidates);
+                                             const NearestDistances& distances,
+                                             const std::vector<int>& keys);
 
 }  // namespace color3d

@@ -51,11 +51,6 @@ std::vector<std::vector<int>> TracksOf(const Scene& scene,
   return tracks;
 }
 
-std::filesystem::path FeatureCache(const StageContext& context) {
-  const std::filesystem::path& folder = context.cache_folder();
-  return folder.empty() ? folder : folder / "view_features";
-}
-
 std::vector<double> CoverageScores(const std::vector<ViewFeatures>& features,
                                    const std::vector<bool>& kept,
                                    StageContext& context) {

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
 
 #include "core/base/parallel.h"
 #include "core/base/random.h"
@@ -105,51 +107,69 @@ TEST_F(KeyViewsTest, ABenchmarkChoosesSeveralAndTheGeometryIsMadeOnce) {
 }
 
 // What the service is given of a photo in a benchmark: its L, in 16 bits.
-float GrayLevel(const Image& srgb) {
-  return static_cast<float>(GrayFromLuminance(LuminanceFromSrgb(srgb).data[0]));
+std::vector<float> GrayLevels(const Image& srgb) {
+  std::vector<float> levels;
+  for (const float l : LuminanceFromSrgb(srgb).data) {
+    levels.push_back(std::round(static_cast<float>(GrayFromLuminance(l)) * 65535.0f));
+  }
+  return levels;
 }
 
-// A pixel of another chroma whose L is the same to the last of 16 bits, rounding included.
-std::array<float, 3> SameLuminance(const std::array<float, 3>& from, Random* random) {
-  Image pixel(1, 1, 3);
-  const auto gray_of = [&](const std::array<float, 3>& rgb) {
-    std::copy(rgb.begin(), rgb.end(), pixel.data.begin());
-    return GrayLevel(pixel);
+// A pixel of 16 bits with random chroma whose grey level is `level`; nothing when none is found.
+std::optional<std::array<float, 3>> RandomColor(float luminance, float level, Random* random) {
+  const auto gray = [](const Image& pixel) {
+    return static_cast<float>(GrayFromLuminance(LuminanceFromSrgb(pixel).data[0])) * 65535.0f;
   };
-  const float wanted = std::round(gray_of(from) * 65535.0f) / 65535.0f;
-  for (int attempt = 0; attempt < 50; ++attempt) {
+  for (int attempt = 0; attempt < 30; ++attempt) {
     Image lab(1, 1, 3);
-    std::copy(from.begin(), from.end(), pixel.data.begin());
-    lab.data[0] = LuminanceFromSrgb(pixel).data[0];
-    for (int c = 1; c < 3; ++c) lab.data[c] = static_cast<float>(random->NextUniform(-50, 50));
-    const Image made = SrgbFromLab(lab);
-    std::array<float, 3> rgb = {made.data[0], made.data[1], made.data[2]};
-    // Green, then blue, which has a tenth of its weight, to the middle of the rounding interval.
-    for (const int channel : {1, 1, 2, 2, 2, 2}) {
-      const float weight = channel == 1 ? 0.7f : 0.07f;
-      rgb[channel] += (wanted - gray_of(rgb)) / weight;
-      for (float& value : rgb) {
-        value = std::clamp(std::round(value * 65535.0f) / 65535.0f, 0.0f, 1.0f);
+    lab.data = {luminance,
+                static_cast<float>(random->NextUniform(-50, 50)),
+                static_cast<float>(random->NextUniform(-50, 50))};
+    Image pixel = SrgbFromLab(lab);
+    for (float& value : pixel.data) value = std::round(value * 65535.0f) / 65535.0f;
+    // The largest green, then blue, which has a tenth of its weight, that stays below.
+    for (const int channel : {1, 2}) {
+      int low = 0, high = 65535;
+      while (low < high) {
+        const int middle = (low + high + 1) / 2;
+        pixel.data[channel] = static_cast<float>(middle) / 65535.0f;
+        if (gray(pixel) <= level + 0.1f) {
+          low = middle;
+        } else {
+          high = middle - 1;
+        }
       }
-      if (std::abs(gray_of(rgb) - wanted) < 0.3f / 65535.0f) return rgb;
+      pixel.data[channel] = static_cast<float>(low) / 65535.0f;
+    }
+    // Well within the interval that is rounded to the level.
+    if (std::abs(gray(pixel) - level) < 0.3f) {
+      return std::array<float, 3>{pixel.data[0], pixel.data[1], pixel.data[2]};
     }
   }
-  return from;
+  return std::nullopt;
 }
 
 // Random chroma in every pixel of a photo, the same grey copy.
 Image Repainted(const Image& photo, uint64_t seed) {
+  const std::vector<float> levels = GrayLevels(photo);
+  const Image luminance = LuminanceFromSrgb(photo);
   Image out = photo;
-  ThreadPool pool(2);
-  pool.ForEach(photo.height, [&](int64_t y, int) {
-    Random random(seed, static_cast<uint64_t>(y));
-    for (int x = 0; x < photo.width; ++x) {
-      const int row = static_cast<int>(y);
-      const auto rgb =
-          SameLuminance({photo.At(0, row, x), photo.At(1, row, x), photo.At(2, row, x)}, &random);
-      for (int c = 0; c < 3; ++c) out.At(c, row, x) = rgb[c];
-    }
-  });
+  std::vector<char> wrong(levels.size(), 1);
+  // Rounding depends a little on where a pixel stands in its picture, so what came out is checked.
+  for (uint64_t pass = 0; pass < 8; ++pass) {
+    ThreadPool pool(2);
+    pool.ForEach(photo.height, [&](int64_t y, int) {
+      Random random(seed + 1000 * pass, static_cast<uint64_t>(y));
+      for (int x = 0; x < photo.width; ++x) {
+        const size_t i = static_cast<size_t>(y) * photo.width + x;
+        if (wrong[i] == 0) continue;
+        const auto color = RandomColor(luminance.data[i], levels[i], &random);
+        for (int c = 0; c < 3; ++c) out.Plane(c)[i] = color ? (*color)[c] : photo.Plane(c)[i];
+      }
+    });
+    const std::vector<float> now = GrayLevels(out);
+    for (size_t i = 0; i < levels.size(); ++i) wrong[i] = now[i] != levels[i] ? 1 : 0;
+  }
   return out;
 }
 
@@ -196,17 +216,18 @@ TEST_F(GuardTest, ColoursOfOtherPhotosDoNotReachTheModel) {
   WriteProceduralScene(Path("first"), options);
   WriteProceduralScene(Path("second"), options);
   for (int i = 0; i < options.views; ++i) {
+    if (i == 3) continue;  // the key view
     const std::string name = "images/view00" + std::to_string(i) + ".png";
     const Image photo = ReadImage(Path("first") / name);
-    const Image other = i == 3 ? photo : Repainted(photo, static_cast<uint64_t>(i + 1));
-    WriteFileAtomic(Path("second") / name, EncodePng16(other));
+    WriteFileAtomic(Path("second") / name,
+                    EncodePng16(Repainted(photo, static_cast<uint64_t>(i + 1))));
     const Image written = ReadImage(Path("second") / name);
-    ASSERT_EQ(GrayCopy(written), GrayCopy(photo)) << name << ": not the same L";
+    ASSERT_TRUE(GrayCopy(written) == GrayCopy(photo)) << name << ": not the same L";
     size_t changed = 0;
     for (size_t k = 0; k < photo.data.size(); ++k) {
       changed += std::abs(written.data[k] - photo.data[k]) > 0.02f ? 1 : 0;
     }
-    EXPECT_EQ(i != 3, changed > photo.data.size() / 2) << name;
+    EXPECT_GT(changed, photo.data.size() / 2) << name;
   }
   // Pictures in colour that nobody asks for.
   for (const char* room : {"first", "second"}) {

@@ -5,9 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/image.h"
 #include "core/scene/scene.h"
-#include "core/stage/sources/seen_samples.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -18,12 +16,9 @@ struct NextKeyViewFacts {
   double error_with = 0.0;  // ... with this view coloured, too
 };
 
-// What is expected of places of a view (seen_samples.h), by where its colour comes from: `shares`
-// has the 3 channels of its provenance.
-std::vector<float> ExpectedErrorsOf(const Image& shares, const SampleGrid& grid);
-
-// From the model's geometry and the views' provenance. Nothing when one of them is not among the
-// inputs, there are more than 500 views, or no view would save anything. `key_views`: names.
+// From the model's geometry and the photos' features (kept from the selection of the key view, or
+// found again). Nothing without a model, with more than 500 training views, or when no view would
+// save anything. `key_views`: names.
 std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
                                                   const std::vector<std::string>& key_views,
                                                   StageContext& context);

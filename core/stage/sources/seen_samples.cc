@@ -83,6 +83,11 @@ SeenSamples SeenByGeometry(const Scene& scene,
   return seen;
 }
 
+std::filesystem::path FeatureCache(const StageContext& context) {
+  const std::filesystem::path& folder = context.cache_folder();
+  return folder.empty() ? folder : folder / "view_features";
+}
+
 SeenSamples SeenByPoints(const Scene& scene, const std::vector<int>& views) {
   std::vector<int> index_of(scene.views.size(), -1);
   for (size_t k = 0; k < views.size(); ++k) index_of[views[k]] = static_cast<int>(k);

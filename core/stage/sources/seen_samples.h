@@ -2,12 +2,14 @@
 // their threads are the pool's.
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "core/base/run_control.h"
 #include "core/keyview/expected_error.h"
 #include "core/scene/scene.h"
 #include "core/splat/model/gaussian_model.h"
+#include "core/stage/stage.h"
 
 namespace color3d {
 
@@ -34,5 +36,8 @@ SeenSamples SeenByGeometry(const Scene& scene,
 
 // Without geometry: the samples of a view are tracked points that it sees, and who else sees them.
 SeenSamples SeenByPoints(const Scene& scene, const std::vector<int>& views);
+
+// Where features of photos are kept between jobs; empty: nowhere.
+std::filesystem::path FeatureCache(const StageContext& context);
 
 }  // namespace color3d

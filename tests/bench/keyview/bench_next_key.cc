@@ -1,10 +1,10 @@
 // color3d-bench next-key: is the advice on which view to colour next right? On the training views
 // of a scene that has been coloured with one key view: the error that each of several second key
 // views leaves, against what was expected of them.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
@@ -15,7 +15,6 @@
 #include "core/keyview/collect_features.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
-#include "core/stage/report/next_key_view.h"
 #include "core/stage/sources/seen_samples.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
@@ -104,32 +103,10 @@ double PointsGained(const Problem& problem, int second) {
   return gained;
 }
 
-// What the report expects each candidate to save, from the coloured views' provenance.
-std::vector<double> ReportedSavings(const Arguments& args,
-                                    const Problem& problem,
-                                    const LocalPipeline& pipeline,
-                                    ThreadPool& pool) {
-  const SampleGrid grid = GridFor(static_cast<int>(problem.scene.views.size()));
-  std::vector<int> all(problem.scene.views.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::vector<std::vector<float>> errors;
-  for (const int view : all) {
-    const std::string name = ViewArtifact(artifact::kProvenance, problem.scene.views[view], ".png");
-    errors.push_back(
-        view == problem.key
-            ? std::vector<float>(grid.samples(), 0.0f)
-            : ExpectedErrorsOf(DecodeImage(ReadFile(pipeline.ArtifactPath(name)), name), grid));
-  }
-  const GaussianModel geometry =
-      ParseGaussians(ReadFile(std::filesystem::path(args.run_folder) / artifact::kGeometry));
-  return ExpectedSavings(
-      SeenByGeometry(problem.scene, all, geometry, grid, pool, {}), errors, problem.candidates);
-}
-
-// What the selection of several views expects of the key view with each candidate.
-std::vector<double> SelectionErrors(const Arguments& args,
-                                    const Problem& problem,
-                                    ThreadPool& pool) {
+// What is expected of the key view with each candidate, and of the key view alone (last).
+std::vector<double> ExpectedErrors(const Arguments& args,
+                                   const Problem& problem,
+                                   ThreadPool& pool) {
   const std::vector<int> training = problem.scene.TrainingViews();
   std::vector<std::filesystem::path> photos;
   for (const int view : training) {
@@ -155,6 +132,7 @@ std::vector<double> SelectionErrors(const Arguments& args,
   for (const int candidate : problem.candidates) {
     errors.push_back(ExpectedError(seen, distances, {place(problem.key), place(candidate)}));
   }
+  errors.push_back(ExpectedError(seen, distances, {place(problem.key)}));
   return errors;
 }
 
@@ -183,28 +161,26 @@ void Run(const Arguments& args) {
   ThreadPool pool(args.threads);
   ColorAll(args, problem, -1, &pipeline);
   const double alone = TrainingError(args, problem, pipeline);
-  const std::vector<double> reported = ReportedSavings(args, problem, pipeline, pool);
-  std::vector<double> selected = SelectionErrors(args, problem, pool);
-  for (double& error : selected) error = -error;
-  std::vector<double> errors, points;
+  const std::vector<double> expected = ExpectedErrors(args, problem, pool);
+  std::vector<double> errors, points, savings;
   nlohmann::ordered_json json{{"key_view", problem.scene.views[problem.key].name},
-                              {"error_alone", alone}};
+                              {"error_alone", alone},
+                              {"expected_alone", expected.back()}};
   for (size_t k = 0; k < problem.candidates.size(); ++k) {
     const int candidate = problem.candidates[k];
     ColorAll(args, problem, candidate, &pipeline);
     errors.push_back(TrainingError(args, problem, pipeline));
     points.push_back(PointsGained(problem, candidate));
+    savings.push_back(expected.back() - expected[k]);
     json["candidates"].push_back({{"view", problem.scene.views[candidate].name},
                                   {"error", errors.back()},
                                   {"saved", alone - errors.back()},
                                   {"points", points.back()},
-                                  {"expected_saving", reported[k]},
-                                  {"selection_error", -selected[k]}});
+                                  {"expected_error", expected[k]}});
     std::fprintf(stderr, "%s\n", json["candidates"].back().dump().c_str());
   }
   json["order_by_points"] = Order(errors, points);
-  json["order_by_report"] = Order(errors, reported);
-  json["order_by_selection"] = Order(errors, selected);
+  json["order_by_expected_error"] = Order(errors, savings);
   std::printf("%s\n", json.dump(1).c_str());
 }
 
