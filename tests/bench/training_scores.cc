@@ -16,8 +16,10 @@ nlohmann::ordered_json ScoreTrainingViews(StageContext& context) {
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
-  const ViewImages images(
-      scene, context.scene_folder(), ColoredSide(context, scene.views[key]), /*cache_bytes=*/0);
+  const ViewImages images(scene,
+                          context.scene_folder(),
+                          ColoredSide(context, scene.views[key]),
+                          /*cache_budget_bytes=*/0);
   Scores sum;
   SourceErrors photos, renders;
   double views = 0.0;
