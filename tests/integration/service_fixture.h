@@ -28,9 +28,9 @@ std::string ClientProgram();
 // and throws Error{kUnavailable} with the server's last words when it does not.
 class TestServer {
  public:
-  TestServer(const std::filesystem::path& folder,
-             const std::vector<std::string>& more_flags = {},
-             const std::string& listen = "127.0.0.1:0");
+  explicit TestServer(const std::filesystem::path& folder,
+                      const std::vector<std::string>& more_flags = {},
+                      const std::string& listen = "127.0.0.1:0");
   ~TestServer();
 
   const std::string& address() const { return address_; }
