@@ -9,8 +9,7 @@
 #include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
-#include "server/planning/time_budget.h"
-#include "server/service_error.h"
+#include "tests/support/service/planned_graphs.h"
 
 namespace color3d {
 namespace {
@@ -18,115 +17,6 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-v1::Digest SomeDigest(const std::string& text) {
-  v1::Digest digest;
-  digest.set_sha256(Sha256Hex(text));
-  digest.set_size_bytes(10);
-  return digest;
-}
-
-constexpr SceneFacts kTwentyPhotos = {.photos = 20, .has_poses = true};
-
-v1::JobSpec SceneSpec() {
-  v1::JobSpec spec;
-  spec.set_scene("scenes/test");
-  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = SomeDigest("key");
-  return spec;
-}
-
-int IndexOf(const NewGraph& graph, const std::string& kind) {
-  for (size_t i = 0; i < graph.jobs.size(); ++i) {
-    if (graph.jobs[i].kind == kind) return static_cast<int>(i);
-  }
-  ADD_FAILURE() << "no " << kind;
-  return 0;
-}
-
-v1::JobSpec SpecOf(const NewGraph& graph, const std::string& kind) {
-  v1::JobSpec spec;
-  EXPECT_TRUE(spec.ParseFromString(graph.jobs[IndexOf(graph, kind)].spec));
-  return spec;
-}
-
-std::vector<std::string> InputKinds(const NewGraph& graph, const std::string& kind) {
-  std::vector<std::string> kinds;
-  for (const int input : graph.jobs[IndexOf(graph, kind)].inputs) {
-    kinds.push_back(graph.jobs[input].kind);
-  }
-  return kinds;
-}
-
-struct Thrown {
-  std::string reason = "nothing";
-  std::string message;
-  ErrorCode code = ErrorCode::kInternal;
-};
-Thrown PlanError(const v1::JobSpec& spec, const std::vector<JobRecord>& inputs = {}) {
-  try {
-    PlanJob(spec, inputs, kTwentyPhotos);
-  } catch (const Error& e) {
-    return {ReasonOf(e), e.what(), e.code()};
-  }
-  return {};
-}
-
-TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
-  v1::JobSpec spec = SceneSpec();
-  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
-  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
-  const double geometry =
-      SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().time_limit_seconds();
-  const double personalize = SpecOf(graph, "personalize").personalize().time_limit_seconds();
-  const double chroma = SpecOf(graph, "solve_chroma").solve_chroma().time_limit_seconds();
-  EXPECT_GT(geometry, 5.0);
-  EXPECT_GT(personalize, geometry);
-  EXPECT_GT(chroma, 1.0);
-  EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
-}
-
-TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
-  v1::JobSpec spec = SceneSpec();
-  spec.mutable_colorize_scene()->set_time_budget_seconds(604'800);
-  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
-  for (const char* kind : {"reconstruct_geometry", "personalize", "solve_chroma"}) {
-    EXPECT_NO_THROW(CheckSpec(SpecOf(graph, kind))) << kind;
-  }
-}
-
-TEST(Planner, ExactlyTheStagesThatKeepATimeLimitGetAShareOfTheBudget) {
-  v1::JobSpec spec = SceneSpec();
-  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
-  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
-  for (const Stage& stage : StageCatalogue()) {
-    if (std::string_view(stage.kind) == kind::kPersonalizeScenes) continue;
-    v1::JobSpec planned = SpecOf(graph, stage.kind);
-    const google::protobuf::Message* options = MutableStage(&planned, stage.kind);
-    const auto* limit = options->GetDescriptor()->FindFieldByName("time_limit_seconds");
-    const bool limited = limit != nullptr && options->GetReflection()->HasField(*options, limit);
-    EXPECT_EQ(limited, stage.keeps_time_limit) << stage.kind;
-  }
-}
-
-TEST(Planner, AStagesOwnTimeLimitWinsOverTheBudget) {
-  v1::JobSpec spec = SceneSpec();
-  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
-  spec.mutable_colorize_scene()->mutable_reconstruct_geometry()->set_time_limit_seconds(3);
-  EXPECT_EQ(SpecOf(PlanJob(spec, {}, kTwentyPhotos), "reconstruct_geometry")
-                .reconstruct_geometry()
-                .time_limit_seconds(),
-            3.0);
-}
-
-TEST(Planner, RefusesABudgetThatTheSceneCannotMeetAndNamesTheLeast) {
-  v1::JobSpec spec = SceneSpec();
-  spec.mutable_colorize_scene()->set_time_budget_seconds(20);
-  const Thrown thrown = PlanError(spec);
-  EXPECT_EQ(thrown.code, ErrorCode::kInvalidArgument);
-  EXPECT_EQ(thrown.reason, "BAD_OPTION");
-  EXPECT_THAT(thrown.message, HasSubstr("20 photos"));
-  EXPECT_THAT(thrown.message, HasSubstr("at least"));
-}
 
 TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
   const NewGraph graph = PlanJob(SceneSpec(), {}, kTwentyPhotos);
