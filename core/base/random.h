@@ -7,6 +7,14 @@
 
 namespace color3d {
 
+// Evenly spread bits (SplitMix64, Steele et al. 2014): neighbouring numbers give unrelated ones.
+inline uint64_t MixedBits(uint64_t x) {
+  x += 0x9e3779b97f4a7c15ULL;
+  x = (x ^ (x >> 30u)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27u)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31u);
+}
+
 class Random {
  public:
   // The whole state, so that a checkpoint can carry it.

@@ -29,11 +29,7 @@ SurfaceMaker::SurfaceMaker(const Scene& scene,
       sweep_(sweep),
       cancel_(cancel),
       training_(scene.TrainingViews()),
-      tracked_(scene.views.size()) {
-  for (const SparsePoint& point : scene.points) {
-    for (int view : point.views) tracked_[view].push_back(point.position);
-  }
-}
+      tracked_(TrackedPoints(scene)) {}
 
 ViewSurfaces SurfaceMaker::Make(int view) const {
   const Pose& pose = scene_.views[view].cam_from_world;

@@ -30,15 +30,6 @@ std::vector<T> EvenlyOf(std::vector<T> all, int64_t most) {
   return kept;
 }
 
-// Positions by view that observes them.
-std::vector<std::vector<Eigen::Vector3d>> TrackedPoints(const Scene& scene) {
-  std::vector<std::vector<Eigen::Vector3d>> tracked(scene.views.size());
-  for (const SparsePoint& point : scene.points) {
-    for (const int view : point.views) tracked[view].push_back(point.position);
-  }
-  return tracked;
-}
-
 SweptView Reduced(const Scene& scene, int view, const ViewImages& images, int side_px) {
   SweptView swept;
   swept.camera = images.WorkingCamera(view).FitWithin(side_px);

@@ -25,9 +25,10 @@ struct FusionOptions {
   // inferred colour and where it has its full share.
   double guess_begins = 3.5;
   double guess_ends = 7.0;
-  double max_guessed = 0.6;        // that full share, 0..1
-  double guess_chroma = 0.7;       // of the guess's chroma that is kept: faded, 0..1
-  RelativeChroma relative_chroma;  // what is alike under another light has chroma of this relation
+  double max_guessed = 0.6;   // that full share, 0..1
+  double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
+  // What spreads over the picture is chroma relative to luminance.
+  RelativeChroma relative_chroma;
   void Validate() const;
 };
 
@@ -37,7 +38,7 @@ struct FusedColor {
 };
 
 // `inferred`: 2 channels; `distance`: 1 channel or empty (nothing is guessed then); `guessed`: 2
-// channels or empty (the guess is grey then); All of the luminance's size. Solves the screened
+// channels or empty (the guess is grey then). All of the luminance's size. Solves the screened
 // system of hints.h on the view's own luminance, so that small gaps of what was carried are filled
 // from around them.
 FusedColor FuseColors(const Image& luminance,

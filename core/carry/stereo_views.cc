@@ -31,6 +31,14 @@ double AngleWeight(const Eigen::Vector3d& to_first, const Eigen::Vector3d& to_se
 
 }  // namespace
 
+std::vector<std::vector<Eigen::Vector3d>> TrackedPoints(const Scene& scene) {
+  std::vector<std::vector<Eigen::Vector3d>> tracked(scene.views.size());
+  for (const SparsePoint& point : scene.points) {
+    for (const int view : point.views) tracked[view].push_back(point.position);
+  }
+  return tracked;
+}
+
 StereoPlan PlanStereo(const Scene& scene,
                       int view,
                       const std::vector<Eigen::Vector3d>& surface,

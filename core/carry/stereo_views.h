@@ -13,6 +13,9 @@ struct StereoPlan {
   double farthest = 0.0;
 };
 
+// Positions (scene frame) of the tracked points that each view sees, by view.
+std::vector<std::vector<Eigen::Vector3d>> TrackedPoints(const Scene& scene);
+
 // `surface`: points (scene frame) that `view` sees. Sources are those of `candidates` that see many
 // of them under angles of some degrees: enough parallax to measure depth, not so much that pictures
 // differ. No sources when no candidate sees any.

@@ -20,7 +20,7 @@ struct ColorSources {
   std::function<InferredColor(const Image& luminance, const Image& known)> infer;
   // The automatic colorizer, 2 channels. Asked only when enough of a view is strange to the other.
   std::function<Image(const Image& luminance)> guess;
-  RelativeChroma relative_chroma;
+  RelativeChroma relative_chroma;  // of the scene
 };
 
 // `luminance`: 1 channel, L 0..100; `carried`: of its size, confidence 0 where nothing was carried.

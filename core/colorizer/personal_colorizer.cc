@@ -208,9 +208,7 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
   TakeTensors(parts.model->parameters(), kModel, kWhat, &file);
   TakeTensors(parts.model->statistics(), kModel, kWhat, &file);
   if (has_neighbors) {
-    FeatureNeighborsOptions options = recipe.neighbor_options;
-    options.relative_chroma = parts.relative_chroma;
-    parts.neighbors = FeatureNeighbors::TakeFrom(*encoder, options, kWhat, &file);
+    parts.neighbors = FeatureNeighbors::TakeFrom(*encoder, recipe.neighbor_options, kWhat, &file);
   }
   if (!file.arrays.empty()) {
     throw InvalidArgument(

@@ -22,7 +22,7 @@ struct TensorFormat {
   std::string_view remedy;       // what the user does about a file that is not read
 };
 
-// Version 4: safetensors.
+// Version 5: safetensors, colours relative to luminance.
 inline constexpr TensorFormat kColorizerFormat = {
     "color3d.colorizer", 5, "C3DCOLR1", "personalize the scene again"};
 // Version 3: safetensors. One that cannot be read costs the time of training, no more.

@@ -19,13 +19,7 @@ int CropFor(const Image& picture, int wanted) {
   return std::max(kCropMultiple, side / kCropMultiple * kCropMultiple);
 }
 
-// SplitMix64's finaliser (Steele et al. 2014): neighboring numbers give unrelated seeds.
-uint64_t Mix(uint64_t seed, uint64_t number) {
-  uint64_t z = seed + 0x9e3779b97f4a7c15ULL * (number + 1);
-  z = (z ^ (z >> 30u)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27u)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31u);
-}
+constexpr uint64_t kSeedStep = 0x9e3779b97f4a7c15ULL;  // SplitMix64's own
 
 std::string_view BytesOf(const Image& image) {
   return {reinterpret_cast<const char*>(image.data.data()), image.data.size() * sizeof(float)};
@@ -78,7 +72,7 @@ TrainingSample TrainingSamples::Make(const TrainingPicture& picture,
 }
 
 TrainingSample TrainingSamples::Draw(int64_t number) const {
-  Random random(Mix(seed_, static_cast<uint64_t>(number)), /*stream=*/1);
+  Random random(MixedBits(seed_ + kSeedStep * static_cast<uint64_t>(number)), /*stream=*/1);
   const TrainingPicture& picture = Choose(random);
   return Make(picture, augment_, random);
 }

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "core/base/error.h"
-#include "core/keyview/median.h"
+#include "core/base/median.h"
 
 namespace color3d {
 namespace {
@@ -14,7 +14,11 @@ constexpr double kMaxTable = 5e7;  // entries of SeenSamples
 // just like a cell of a key view this.
 constexpr double kErrorAlike = 4.0;
 
-// The expected error of a set of key views, grown view by view.
+bool Contains(const std::vector<int>& keys, int view) {
+  return std::find(keys.begin(), keys.end(), view) != keys.end();
+}
+
+// The expected error of a set of key views.
 class Expectation {
  public:
   Expectation(const SeenSamples& seen, const NearestDistances& distances)
@@ -56,7 +60,7 @@ class Expectation {
   }
 
   double SeenShare(const std::vector<int>& keys, int view) const {
-    if (std::find(keys.begin(), keys.end(), view) != keys.end()) return 1.0;
+    if (Contains(keys, view)) return 1.0;
     if (seen_.samples() == 0) return 0.0;
     int shown = 0;
     for (int s = 0; s < seen_.samples(); ++s) {
@@ -70,10 +74,6 @@ class Expectation {
   const NearestDistances& distances_;
   double median_;
 };
-
-bool Contains(const std::vector<int>& keys, int view) {
-  return std::find(keys.begin(), keys.end(), view) != keys.end();
-}
 
 // The best view in place of keys[place]; keys may grow by one.
 void PutBest(const Expectation& expectation,

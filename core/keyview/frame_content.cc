@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
-#include "core/keyview/median.h"
+#include "core/base/median.h"
 
 namespace color3d {
 namespace {

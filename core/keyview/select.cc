@@ -8,9 +8,9 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/base/median.h"
 #include "core/base/parallel.h"
 #include "core/base/range_check.h"
-#include "core/keyview/median.h"
 
 namespace color3d {
 namespace {

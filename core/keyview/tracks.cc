@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/base/error.h"
-#include "core/keyview/median.h"
+#include "core/base/median.h"
 
 namespace color3d {
 namespace {

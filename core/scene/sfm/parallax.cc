@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/base/median.h"
 #include "core/base/random.h"
 #include "core/scene/sfm/photo_similarity.h"
 
@@ -99,13 +100,6 @@ int MostExplained(const Matched& points, double focal, Random* random) {
   return static_cast<int>(std::max(best.size(), Explained(points, from, refined, focal).size()));
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<int64_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Which photos turned pairs tie together.
 class Groups {
  public:
@@ -192,7 +186,7 @@ ParallaxEvidence LookForParallax(const std::vector<LocalFeatures>& photos,
     ++evidence.turned;
     places.Join(pairs[k].first, pairs[k].second);
   }
-  evidence.median_shift = Median(std::move(shifts));
+  if (!shifts.empty()) evidence.median_shift = Median(std::move(shifts));
   evidence.largest_place = places.Largest();
   return evidence;
 }

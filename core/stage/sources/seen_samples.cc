@@ -20,13 +20,10 @@ struct Surface {
 };
 
 bool Shows(const Surface& view, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d p = view.pose.rotation * point + view.pose.translation;
+  const Eigen::Vector3d p = view.pose.Apply(point);
   if (!(p.z() > 1e-6)) return false;
   const Eigen::Vector2d pixel = view.camera.Project(p);
-  if (!(pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < view.camera.width &&
-        pixel.y() < view.camera.height)) {
-    return false;
-  }
+  if (!view.camera.Contains(pixel)) return false;
   // One agreeing neighbour is enough: edges are a blend of two depths.
   for (int dy = -1; dy <= 0; ++dy) {
     for (int dx = -1; dx <= 0; ++dx) {
