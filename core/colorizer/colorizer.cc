@@ -31,6 +31,12 @@ constexpr int kMaxAdapterStages = 8;  // more than any encoder has: all
 
 std::string SizeOf(const Image& image) { return fmt::format("{}x{}", image.width, image.height); }
 
+void CheckFinite(const Image& map, const std::string& name) {
+  for (float value : map.data) {
+    if (!std::isfinite(value)) throw InvalidArgument("{} holds a value that is not finite", name);
+  }
+}
+
 void CheckPicture(const TrainingPicture& picture) {
   const std::string& name = picture.name;
   if (picture.luminance.channels != 1 || picture.ab.channels != 2 || picture.luminance.Empty()) {
@@ -49,11 +55,17 @@ void CheckPicture(const TrainingPicture& picture) {
                             map == &picture.ab ? "ab" : "weight",
                             SizeOf(*map));
     }
-    for (float value : map->data) {
-      if (!std::isfinite(value)) {
-        throw InvalidArgument("{} holds a value that is not finite", name);
-      }
+    CheckFinite(*map, name);
+  }
+  if (!picture.position.Empty()) {
+    if (picture.position.channels != 4 || SizeOf(picture.position) != SizeOf(picture.luminance)) {
+      throw InvalidArgument("the positions of {} are {} px with {} channels, wanted {} with 4",
+                            name,
+                            SizeOf(picture.position),
+                            picture.position.channels,
+                            SizeOf(picture.luminance));
     }
+    CheckFinite(picture.position, name);
   }
   for (float value : picture.ab.data) {
     // Far beyond every colour; what is stored in half precision would overflow.
@@ -96,6 +108,7 @@ bool HasBfloat16Products() {
 void FitWithin(int max_side_px, TrainingPicture* picture) {
   picture->luminance = FitWithin(picture->luminance, max_side_px);
   const int width = picture->luminance.width, height = picture->luminance.height;
+  if (!picture->position.Empty()) picture->position = Resize(picture->position, width, height);
   if (picture->weight.Empty()) {
     picture->ab = Resize(picture->ab, width, height);
     return;

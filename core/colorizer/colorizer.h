@@ -32,7 +32,7 @@ struct ColorizerOptions {
   };
   Recipe recipe = Recipe::kColor3d;
   Precision precision = Precision::kAuto;
-  int iterations = 300;  // 0..100000
+  int iterations = 150;  // 0..100000
   // > 0: the schedule is shortened to end after so many seconds of computing, at most 86400 (in a
   // batch a scene also waits for its turns, which does not count).
   double time_limit_seconds = 0.0;
@@ -61,6 +61,15 @@ struct ColorPrediction {
   Image distance;
 };
 
+// What is known of a picture beside its luminance: maps of its size, or empty.
+struct PictureFacts {
+  // 1 channel: places above 0 need no answer; what they get means nothing, and costs less.
+  Image known = Image();
+  // 4 channels: where in the scene each pixel's surface lies, x y z in units of the scene's radius,
+  // and 1 where that is known, else 0.
+  Image position = Image();
+};
+
 // One picture to learn from.
 struct TrainingPicture {
   std::string name;        // for messages
@@ -68,16 +77,15 @@ struct TrainingPicture {
   Image ab;                // 2 channels, Lab units, same size
   Image weight = Image();  // 1 channel, 0..1: how far each pixel's colour is to be learnt; empty: 1
   double share = 1.0;      // >= 0: relative probability of being drawn
+  Image position = Image();  // as PictureFacts'; empty: not known
 };
 
 // Immutable once trained; thread-safe to use.
 class Colorizer {
  public:
   virtual ~Colorizer() = default;
-  // As Colorize, with how far each place is from anything that was seen. `known` (1 channel of the
-  // same size, or empty): places above 0 need no answer; what they get means nothing, and costs
-  // less.
-  virtual ColorPrediction Predict(const Image& luminance, const Image& known = {}) const = 0;
+  // As Colorize, with how far each place is from anything that was seen.
+  virtual ColorPrediction Predict(const Image& luminance, const PictureFacts& facts = {}) const = 0;
   // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
   // than the training size are coloured at that size and upsampled guided by L.
   virtual Image Colorize(const Image& luminance) const = 0;

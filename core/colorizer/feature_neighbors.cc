@@ -18,13 +18,32 @@ namespace {
 
 constexpr char kPrefix[] = "neighbors.";
 constexpr double kLeastWeight = 1e-6;
+constexpr double kMostlyKnown = 0.5;  // share of a cell whose position is known
 
 // Places of a picture before projection.
 struct KnownCells {
   std::vector<torch::Tensor> blocks;  // as CellFeatures
   torch::Tensor colors;               // [n,2], Lab units
   torch::Tensor weights;              // [n], 0..1
+  torch::Tensor positions;            // [n,4], as CellBank's
 };
+
+// [count,4] of a picture's cells, as CellBank's: means over what is known of each.
+torch::Tensor PlacesOf(const Image& position, int width, int height, int multiple, int64_t count) {
+  if (position.Empty()) return torch::zeros({count, 4});
+  Image weighted = position;
+  for (int c = 0; c < 3; ++c) {
+    for (size_t i = 0; i < position.PlaneSize(); ++i) {
+      weighted.Plane(c)[i] *= position.Plane(3)[i];
+    }
+  }
+  const torch::Tensor cells =
+      CellMeans(PadToMultiple(TensorFromImage(Resize(weighted, width, height)), multiple));
+  const torch::Tensor share = cells.slice(1, 3, 4);
+  return torch::cat({cells.slice(1, 0, 3) / share.clamp_min(kMostlyKnown),
+                     (share > kMostlyKnown).to(torch::kFloat32)},
+                    1);
+}
 
 // Cells of a picture, resized.
 KnownCells CellsOf(const TapEncoder& encoder,
@@ -42,6 +61,7 @@ KnownCells CellsOf(const TapEncoder& encoder,
   const int64_t count = features.Count();
   KnownCells cells;
   cells.blocks = std::move(features.blocks);
+  cells.positions = PlacesOf(picture.position, width, height, multiple, count);
   const Image color = ToRelative(relative, picture.luminance, picture.ab);
   if (picture.weight.Empty()) {
     cells.colors = CellMeans(prepared(color));
@@ -65,20 +85,23 @@ KnownCells Join(const std::vector<KnownCells>& parts) {
     for (const KnownCells& part : parts) blocks.push_back(part.blocks[i]);
     all.blocks.push_back(torch::cat(blocks));
   }
-  std::vector<torch::Tensor> colors, weights;
+  std::vector<torch::Tensor> colors, weights, positions;
   for (const KnownCells& part : parts) {
+    positions.push_back(part.positions);
     colors.push_back(part.colors);
     weights.push_back(part.weights);
   }
   all.colors = torch::cat(colors);
   all.weights = torch::cat(weights);
+  all.positions = torch::cat(positions);
   return all;
 }
 
 KnownCells Select(const KnownCells& cells, const torch::Tensor& rows) {
   return {SelectRows(cells.blocks, rows),
           cells.colors.index_select(0, rows),
-          cells.weights.index_select(0, rows)};
+          cells.weights.index_select(0, rows),
+          cells.positions.index_select(0, rows)};
 }
 
 // Cells of the key view at all scales.
@@ -108,7 +131,7 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
   const KnownCells key = KeyCells(encoder, pictures.front(), options, random, cancel);
   whitening_ = Whitening(key.blocks, encoder.config().stem_stride, options.whitening);
   std::vector<torch::Tensor> features{whitening_.Apply(key.blocks)};
-  std::vector<torch::Tensor> colors{key.colors}, weights{key.weights};
+  std::vector<torch::Tensor> colors{key.colors}, weights{key.weights}, positions{key.positions};
   const auto further = static_cast<int64_t>(pictures.size()) - 1;
   for (int64_t i = 1; i <= further; ++i) {
     cancel.ThrowIfCancelled();
@@ -121,12 +144,13 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
     features.push_back(whitening_.Apply(taken.blocks));
     colors.push_back(taken.colors);
     weights.push_back(taken.weights);
+    positions.push_back(taken.positions);
   }
   // Rounded to half precision here, so that a colorizer read from its file answers the same.
   const auto stored = [](const std::vector<torch::Tensor>& parts) {
     return torch::cat(parts).to(torch::kHalf).to(torch::kFloat32).contiguous();
   };
-  bank_ = {stored(features), stored(colors), stored(weights)};
+  bank_ = {stored(features), stored(colors), stored(weights), stored(positions)};
 }
 
 FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
@@ -146,7 +170,10 @@ void FeatureNeighbors::PutInto(TensorFile* file) const {
     projections.emplace_back(fmt::format("matrix.{}", i), projection.matrix);
   }
   PutTensors(projections, kPrefix, StoredType::kFloat32, file);
-  PutTensors({{"bank", bank_.features}, {"colors", bank_.colors}, {"weights", bank_.weights}},
+  PutTensors({{"bank", bank_.features},
+              {"colors", bank_.colors},
+              {"weights", bank_.weights},
+              {"positions", bank_.positions}},
              kPrefix,
              StoredType::kFloat16,
              file);
@@ -175,10 +202,12 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
   const int64_t entries = colors->second.shape[0];
   CellBank bank{torch::empty({entries, whitening.Columns()}),
                 torch::empty({entries, 2}),
-                torch::empty({entries})};
+                torch::empty({entries}),
+                torch::empty({entries, 4})};
   tensors.emplace_back("bank", bank.features);
   tensors.emplace_back("colors", bank.colors);
   tensors.emplace_back("weights", bank.weights);
+  tensors.emplace_back("positions", bank.positions);
   TakeTensors(tensors, kPrefix, what, file);
   return std::unique_ptr<FeatureNeighbors>(
       new FeatureNeighbors(encoder, options, std::move(whitening), std::move(bank)));
@@ -186,20 +215,26 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
 
 NeighborColors FeatureNeighbors::Lookup(const std::vector<torch::Tensor>& taps,
                                         const torch::Tensor& luminance,
-                                        const torch::Tensor& wanted) const {
+                                        const torch::Tensor& wanted,
+                                        const Image& position) const {
   torch::NoGradGuard no_grad;
   const CellFeatures cells = DescribeCells(encoder_, taps, luminance);
   const int64_t height = cells.rows, width = cells.columns;
-  torch::Tensor queries = whitening_.Apply(cells.blocks);
+  CellQueries queries{whitening_.Apply(cells.blocks), {}};
+  if (!position.Empty()) {
+    queries.positions =
+        PlacesOf(position, position.width, position.height, kPadMultiple, cells.Count());
+  }
   torch::Tensor rows;
   if (wanted.defined()) {
     rows = wanted.flatten().nonzero().squeeze(1);
-    queries = queries.index_select(0, rows);
+    queries.features = queries.features.index_select(0, rows);
+    if (!position.Empty()) queries.positions = queries.positions.index_select(0, rows);
   }
   torch::Tensor ab = torch::zeros({height * width, 2});
   torch::Tensor distance = torch::zeros({height * width});
   torch::Tensor variance = torch::zeros({height * width});
-  if (queries.size(0) > 0) {
+  if (queries.features.size(0) > 0) {
     const CellMatches matches = MatchCells(queries, bank_, options_.vote);
     ab = rows.defined() ? ab.index_copy(0, rows, matches.ab) : matches.ab;
     distance = rows.defined() ? distance.index_copy(0, rows, matches.distance) : matches.distance;

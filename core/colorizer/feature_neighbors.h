@@ -26,11 +26,11 @@ namespace color3d {
 // them.
 struct FeatureNeighborsOptions {
   std::vector<double> scales{0.8, 1.0, 1.25};  // of the key view, so that sizes may differ
-  int bank_size = 12000;                       // cells, drawn at random from all scales
-  int further_bank_size = 6000;                // cells of all other pictures together
+  int bank_size = 6000;                        // cells, drawn at random from all scales
+  int further_bank_size = 3000;                // cells of all other pictures together
   double min_weight = 0.25;                    // cells of other pictures that are surer than this
   WhiteningOptions whitening;
-  VoteOptions vote{.median_steps = 5};
+  VoteOptions vote{.median_steps = 5, .position_weight = 1.5};
   RelativeChroma relative_chroma;  // that the bank's colours are kept relative to
 };
 
@@ -52,9 +52,11 @@ class FeatureNeighbors {
 
   // `taps` of a padded picture [1,*,*,*] and its L [1,1,H,W]; H, W multiples of kCellPx. `wanted`
   // [h,w] (bool): cells that need an answer, the others get grey at distance 0; undefined: all.
+  // `position`: PictureFacts', of the size before padding.
   NeighborColors Lookup(const std::vector<torch::Tensor>& taps,
                         const torch::Tensor& luminance,
-                        const torch::Tensor& wanted = {}) const;
+                        const torch::Tensor& wanted = {},
+                        const Image& position = {}) const;
 
   const CellBank& bank() const { return bank_; }
 

@@ -24,6 +24,10 @@ constexpr char kWhat[] = "the colorizer file";
 constexpr char kModel[] = "model.";  // before the names of the network's arrays
 constexpr double kMaxAb = 128.0;     // Lab units; sRGB spans about -108..98
 
+Image FitTo(const Image& image, int width, int height) {
+  return image.Empty() ? Image() : Resize(image, width, height);
+}
+
 Image CropTo(const Image& image, int width, int height) {
   Image out(width, height, image.channels);
   for (int c = 0; c < image.channels; ++c) {
@@ -63,7 +67,8 @@ torch::Tensor PersonalColorizer::DecoderShare(const torch::Tensor& neighbor_vari
 // `taps`: with adapters the adapted ones.
 PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> taps,
                                                    const torch::Tensor& luminance,
-                                                   const torch::Tensor& wanted) const {
+                                                   const torch::Tensor& wanted,
+                                                   const Image& position) const {
   const bool decode = !parts_.neighbors || trust_ > 0.0;
   const PersonalModel& model = *parts_.model;
   torch::Tensor decoded;
@@ -74,7 +79,7 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
   }
   if (!parts_.neighbors) return {decoded, {}};
   if (model.config().HasAdapters()) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
-  const NeighborColors found = parts_.neighbors->Lookup(taps, luminance, wanted);
+  const NeighborColors found = parts_.neighbors->Lookup(taps, luminance, wanted, position);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
   const Image coarse_luminance = ImageFromTensor(guide);
@@ -119,8 +124,11 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
                                                    const torch::Tensor& padded,
                                                    const Image& small,
                                                    const Image& luminance,
-                                                   const Image& known) const {
-  const Answer answer = Blend(taps, padded, WantedCells(known, small));
+                                                   const PictureFacts& facts) const {
+  const Answer answer = Blend(taps,
+                              padded,
+                              WantedCells(facts.known, small),
+                              FitTo(facts.position, small.width, small.height));
   const Image fine = UpsampleGuided(ImageFromTensor(answer.ab), ImageFromTensor(padded));
   ColorPrediction prediction;
   prediction.ab = CropTo(fine, small.width, small.height);
@@ -152,14 +160,15 @@ torch::Tensor PersonalColorizer::WantedCells(const Image& known, const Image& sm
 
 Image PersonalColorizer::Colorize(const Image& luminance) const { return Predict(luminance).ab; }
 
-ColorPrediction PersonalColorizer::Predict(const Image& luminance, const Image& known) const {
+ColorPrediction PersonalColorizer::Predict(const Image& luminance,
+                                           const PictureFacts& facts) const {
   Check(luminance);
   return WithTorchErrors("colorizer", [&] {
     torch::NoGradGuard no_grad;
     SetThreads();
     const Image small = AtTrainingSize(luminance);
     const torch::Tensor padded = Padded(small);
-    return PredictFromTaps(parts_.model->Taps(padded), padded, small, luminance, known);
+    return PredictFromTaps(parts_.model->Taps(padded), padded, small, luminance, facts);
   });
 }
 

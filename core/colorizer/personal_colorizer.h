@@ -30,7 +30,7 @@ class PersonalColorizer : public Colorizer {
   explicit PersonalColorizer(Parts parts);
 
   Image Colorize(const Image& luminance) const override;
-  ColorPrediction Predict(const Image& luminance, const Image& known = {}) const override;
+  ColorPrediction Predict(const Image& luminance, const PictureFacts& facts = {}) const override;
   RelativeChroma relative_chroma() const override { return parts_.relative_chroma; }
   std::string Serialize() const override;
 
@@ -47,7 +47,7 @@ class PersonalColorizer : public Colorizer {
                                   const torch::Tensor& padded,
                                   const Image& small,
                                   const Image& luminance,
-                                  const Image& known = {}) const;
+                                  const PictureFacts& facts = {}) const;
 
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
                                                       std::shared_ptr<const TapEncoder> encoder,
@@ -61,7 +61,8 @@ class PersonalColorizer : public Colorizer {
   // Of a padded L [1,1,H,W].
   Answer Blend(std::vector<torch::Tensor> taps,
                const torch::Tensor& luminance,
-               const torch::Tensor& wanted) const;
+               const torch::Tensor& wanted,
+               const Image& position) const;
   torch::Tensor DecoderShare(const torch::Tensor& neighbor_variance,
                              const torch::Tensor& decoded) const;
   // Cells of the neighbors' grid that answers are wanted for, with a margin for interpolation.

@@ -22,9 +22,9 @@ struct TensorFormat {
   std::string_view remedy;       // what the user does about a file that is not read
 };
 
-// Version 5: safetensors, colours relative to luminance.
+// Version 6: safetensors, colours relative to luminance, positions in space.
 inline constexpr TensorFormat kColorizerFormat = {
-    "color3d.colorizer", 5, "C3DCOLR1", "personalize the scene again"};
+    "color3d.colorizer", 6, "C3DCOLR1", "personalize the scene again"};
 // Version 3: safetensors. One that cannot be read costs the time of training, no more.
 inline constexpr TensorFormat kCheckpointFormat = {
     "color3d.colorizer-training", 3, "C3DCKPT1", "training starts afresh"};

@@ -1,14 +1,35 @@
 #include "core/encoder/torch_threads.h"
 
 #include <ATen/Parallel.h>
+#include <dlfcn.h>
 
 #include <algorithm>
+#include <atomic>
 #include <thread>
 
 namespace color3d {
+namespace {
+
+// OpenBLAS has threads of its own, which torch does not know: they spin while they wait, and
+// callers on several threads wait for each other. Null with another BLAS.
+using SetBlasThreads = void (*)(int);
+SetBlasThreads FindSetBlasThreads() {
+  return reinterpret_cast<SetBlasThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
+}
+
+int Present(int threads) {
+  return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+}  // namespace
 
 void SetTorchThreads(int threads) {
-  if (threads <= 0) threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  threads = Present(threads);
+  static const SetBlasThreads set_blas_threads = FindSetBlasThreads();
+  static std::atomic<int> blas_threads = 0;
+  if (set_blas_threads != nullptr && blas_threads.exchange(threads) != threads) {
+    set_blas_threads(threads);
+  }
   if (at::get_num_threads() != threads) at::set_num_threads(threads);
 }
 

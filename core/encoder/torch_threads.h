@@ -1,4 +1,5 @@
-// How many threads torch may use in the calling thread's operations.
+// How many threads torch may use in the calling thread's operations, and OpenBLAS (which has
+// threads of its own) in the process's: threads that run torch side by side all set 1.
 #pragma once
 
 namespace color3d {

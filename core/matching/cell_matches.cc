@@ -3,17 +3,43 @@
 #include <ATen/Parallel.h>
 #include <torch/types.h>
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 #include <vector>
 
 namespace color3d {
 namespace {
 
-constexpr int64_t kQueriesAtOnce = 128;  // distances to the whole bank stay in the cache
-constexpr float kNegligible = 16.0f;     // exp(-16) of the best match's weight
+constexpr int64_t kQueriesAtOnce = 64;  // distances to the whole bank stay in the cache
+constexpr float kNegligible = 8.0f;     // exp(-8) of the best match's weight
+
+constexpr int64_t kStep = 16;  // entries that are skipped together
+
+float Smallest(const float* values, int64_t count) {
+  float smallest = values[0];
+  for (int64_t i = 1; i < count; ++i) smallest = values[i] < smallest ? values[i] : smallest;
+  return smallest;
+}
+
+// exp(x) for x in -80..0, relative error 2e-7: 2^n p(f), n the nearest integer to x / ln 2, p the
+// interpolant of simd-inl.h.
+float NegativeExp(float x) {
+  x *= std::numbers::log2e_v<float>;
+  const float shifted = x + 12582912.0f;
+  const float f = x - (shifted - 12582912.0f);
+  float p = f * 1.3390863e-3f + 9.6760319e-3f;
+  p = p * f + 5.5503571e-2f;
+  p = p * f + 2.4022107e-1f;
+  p = p * f + 6.9314719e-1f;
+  p = p * f + 1.0000001f;
+  return std::bit_cast<float>(std::bit_cast<uint32_t>(p) +
+                              (std::bit_cast<uint32_t>(shifted) << 23));
+}
 
 // |x - y|^2 without |x|^2, which is the same for all y.
 torch::Tensor RelativeDistances(const torch::Tensor& x,
@@ -23,42 +49,61 @@ torch::Tensor RelativeDistances(const torch::Tensor& x,
 }
 
 constexpr double kMedianSoftness = 0.5;  // Lab units: nearer voters than this count as one
-// Voters are gathered by color first, so that their median costs little more than their mean.
+// Voters are gathered by colour first, so that their median costs little more than their mean.
 constexpr float kBinSide = 3.0f;  // Lab units
 constexpr int kBins = 128;        // a side; what lies beyond is gathered in the outermost
+
+// Which entries of a bank are gathered: those of about the same colour.
+struct ColorBins {
+  std::vector<int32_t> of_entry;
+  int32_t count = 0;  // of the bins that hold an entry
+
+  explicit ColorBins(const torch::Tensor& colors) {
+    const float* ab = colors.data_ptr<float>();
+    const auto place = [](float value) {
+      return std::clamp(static_cast<int>(value / kBinSide + 0.5f * kBins), 0, kBins - 1);
+    };
+    std::vector<int32_t> numbers(kBins * kBins, -1);
+    of_entry.reserve(colors.size(0));
+    for (int64_t row = 0; row < colors.size(0); ++row) {
+      int32_t& number = numbers[place(ab[2 * row]) * kBins + place(ab[2 * row + 1])];
+      if (number < 0) number = count++;
+      of_entry.push_back(number);
+    }
+  }
+};
 
 // The colours of a query's matches, weighted.
 class Vote {
  public:
-  Vote(const float* colors, const float* weights)
-      : colors_(colors), weights_(weights), bins_(kBins * kBins) {}
+  Vote(const CellBank& bank, const ColorBins& bins)
+      : colors_(bank.colors.data_ptr<float>()),
+        weights_(bank.weights.data_ptr<float>()),
+        bin_of_(bins.of_entry.data()),
+        bins_(bins.count) {}
 
   void Clear() {
-    for (int bin : filled_) bins_[bin] = {};
-    filled_.clear();
+    std::fill(bins_.begin(), bins_.end(), Bin{});
     squares_ = 0.0;
   }
   void Add(int64_t row, float closeness) {
-    const float w = weights_[row] * closeness;
-    if (!(w > 0.0f)) return;
-    const float a = colors_[2 * row], b = colors_[2 * row + 1];
-    const int index = Place(a) * kBins + Place(b);
-    Bin& bin = bins_[index];
-    if (bin.weight == 0.0) filled_.push_back(index);
+    const double w = weights_[row] * closeness;
+    const double a = colors_[2 * row], b = colors_[2 * row + 1];
+    Bin& bin = bins_[bin_of_[row]];
     bin.weight += w;
-    bin.a += static_cast<double>(w) * a;
-    bin.b += static_cast<double>(w) * b;
-    squares_ += w * (static_cast<double>(a) * a + static_cast<double>(b) * b);
+    bin.a += w * a;
+    bin.b += w * b;
+    squares_ += w * (a * a + b * b);
   }
   void Store(int median_steps, float* ab, float* variance) {
     double sum = 0.0, a = 0.0, b = 0.0;
-    for (int index : filled_) {
-      Bin& bin = bins_[index];
+    filled_.clear();
+    for (const Bin& bin : bins_) {
+      if (!(bin.weight > 0.0)) continue;
       sum += bin.weight;
       a += bin.a;
       b += bin.b;
-      bin.a /= bin.weight;
-      bin.b /= bin.weight;
+      filled_.push_back({bin.weight, bin.a / bin.weight, bin.b / bin.weight});
     }
     // Where nothing has weight nothing is known: grey.
     const double scale = sum > 0.0 ? 1.0 / sum : 0.0;
@@ -75,15 +120,10 @@ class Vote {
     double weight = 0.0, a = 0.0, b = 0.0;
   };
 
-  static int Place(float value) {
-    return std::clamp(static_cast<int>(value / kBinSide + 0.5f * kBins), 0, kBins - 1);
-  }
-
   // Weiszfeld 1937: the mean under weight / distance from where it was.
   void WeiszfeldStep(double* a, double* b) const {
     double sum = 0.0, next_a = 0.0, next_b = 0.0;
-    for (int index : filled_) {
-      const Bin& bin = bins_[index];
+    for (const Bin& bin : filled_) {
       const double da = bin.a - *a, db = bin.b - *b;
       const double w =
           bin.weight / std::sqrt(da * da + db * db + kMedianSoftness * kMedianSoftness);
@@ -97,9 +137,52 @@ class Vote {
 
   const float* colors_;
   const float* weights_;
-  std::vector<Bin> bins_;
-  std::vector<int> filled_;
+  const int32_t* bin_of_;
+  std::vector<Bin> bins_;    // sums
+  std::vector<Bin> filled_;  // means
   double squares_ = 0.0;
+};
+
+// What positions add to the squared distances of features.
+class Apartness {
+ public:
+  Apartness(const CellQueries& queries, const CellBank& bank, const VoteOptions& options)
+      : weight_(static_cast<float>(options.position_weight)),
+        inverse_reach_(static_cast<float>(1.0 / options.position_reach)) {
+    if (!queries.positions.defined() || !bank.positions.defined() || !(weight_ > 0.0f)) return;
+    if (!(bank.positions.select(1, 3).sum().item<float>() > 0.0f)) return;
+    // Columns whose products are |x|^2 - 2 x y + |y|^2 where both are known, else what an unknown
+    // entry gets, else 0.
+    const torch::Tensor x = queries.positions.slice(1, 0, 3) * queries.positions.slice(1, 3, 4);
+    const torch::Tensor y = bank.positions.slice(1, 0, 3) * bank.positions.slice(1, 3, 4);
+    const auto square = [](const torch::Tensor& v) { return v.square().sum(1, true); };
+    queries_ = torch::cat({-2.0 * x, square(x), torch::ones_like(square(x))}, 1) *
+               queries.positions.slice(1, 3, 4);
+    const torch::Tensor known = bank.positions.slice(1, 3, 4);
+    entries_ = torch::cat({y, known, square(y) + (1.0 - known) * kUnknownApart}, 1).t();
+  }
+
+  bool Counts() const { return queries_.defined(); }
+
+  void AddTo(int64_t begin, int64_t end, torch::Tensor* distances) const {
+    using Values = Eigen::Map<Eigen::ArrayXf>;
+    const torch::Tensor squares = torch::mm(queries_.slice(0, begin, end), entries_);
+    const int64_t entries = squares.size(1);
+    at::parallel_for(0, end - begin, /*grain_size=*/16, [&](int64_t first, int64_t last) {
+      const int64_t count = (last - first) * entries;
+      const Values s(squares.data_ptr<float>() + first * entries, count);
+      Values d(distances->data_ptr<float>() + first * entries, count);
+      d += weight_ * s.max(0.0f) / (1.0f + inverse_reach_ * s.max(0.0f));
+    });
+  }
+
+ private:
+  static constexpr double kUnknownApart = 1.0;
+
+  float weight_;
+  float inverse_reach_;
+  torch::Tensor queries_;  // [q,5]
+  torch::Tensor entries_;  // [5,n]
 };
 
 // Rows of the `count` smallest of `distances`, ascending; of equal ones the first.
@@ -125,16 +208,16 @@ torch::Tensor SquaredDistances(const torch::Tensor& x, const torch::Tensor& y) {
   return (d + x.square().sum(1).unsqueeze(1)).clamp_min(0.0);
 }
 
-CellMatches MatchCells(const torch::Tensor& queries,
+CellMatches MatchCells(const CellQueries& queries,
                        const CellBank& bank,
                        const VoteOptions& options,
                        const CancellationToken& cancel,
                        bool with_bank_distance) {
-  const int64_t count = queries.size(0), entries = bank.features.size(0);
+  const int64_t count = queries.features.size(0), entries = bank.features.size(0);
   const torch::Tensor transposed = bank.features.t();
   const torch::Tensor bank_squares = bank.features.square().sum(1);
-  const float* colors = bank.colors.data_ptr<float>();
-  const float* weights = bank.weights.data_ptr<float>();
+  const Apartness apartness(queries, bank, options);
+  const ColorBins bins(bank.colors);
   CellMatches matches{torch::empty({count, 2}),
                       torch::empty({count}),
                       torch::empty({count}),
@@ -143,16 +226,22 @@ CellMatches MatchCells(const torch::Tensor& queries,
   for (int64_t begin = 0; begin < count; begin += kQueriesAtOnce) {
     cancel.ThrowIfCancelled();
     const int64_t end = std::min(begin + kQueriesAtOnce, count);
-    const torch::Tensor q = queries.slice(0, begin, end);
+    const torch::Tensor q = queries.features.slice(0, begin, end);
     const torch::Tensor q_squares = q.square().sum(1).contiguous();
-    const torch::Tensor d = RelativeDistances(q, transposed, bank_squares);
-    const torch::Tensor smallest = d.amin(1);
+    torch::Tensor d = RelativeDistances(q, transposed, bank_squares);
+    const torch::Tensor nearest_features = d.amin(1);
+    torch::Tensor smallest = nearest_features;
     if (with_bank_distance) {
       const torch::Tensor to_bank = (d + q_squares.unsqueeze(1)).amin(0).clamp_min(0.0);
       matches.bank_distance = matches.bank_distance.defined()
                                   ? torch::minimum(matches.bank_distance, to_bank)
                                   : to_bank;
     }
+    if (apartness.Counts()) {
+      apartness.AddTo(begin, end, &d);
+      smallest = d.amin(1);
+    }
+    const float* nearest_of_query = nearest_features.data_ptr<float>();
     const float* distances = d.data_ptr<float>();
     const float* best_of_query = smallest.data_ptr<float>();
     const float* squares = q_squares.data_ptr<float>();
@@ -162,26 +251,31 @@ CellMatches MatchCells(const torch::Tensor& queries,
     int64_t* nearest = matches.nearest.data_ptr<int64_t>() + begin;
     at::parallel_for(0, end - begin, /*grain_size=*/32, [&](int64_t first, int64_t last) {
       std::vector<std::pair<float, int64_t>> voters;
-      Vote vote(colors, weights);
+      Vote vote(bank, bins);
       for (int64_t i = first; i < last; ++i) {
         const float* row = distances + i * entries;
         const float best = best_of_query[i];
-        distance[i] = std::max(best + squares[i], 0.0f);
-        const auto inverse_width = static_cast<float>(
-            1.0 / (options.temperature * (distance[i] + options.distance_floor)));
+        distance[i] = std::max(nearest_of_query[i] + squares[i], 0.0f);
+        const float apart = std::max(best + squares[i], 0.0f);
+        const auto inverse_width =
+            static_cast<float>(1.0 / (options.temperature * (apart + options.distance_floor)));
         const float farthest = best + kNegligible / inverse_width;
         vote.Clear();
         nearest[i] = entries;
         const auto add = [&](int64_t j) {
           if (row[j] > farthest) return;
           if (row[j] == best) nearest[i] = std::min(nearest[i], j);
-          vote.Add(j, std::exp((best - row[j]) * inverse_width));
+          vote.Add(j, NegativeExp((best - row[j]) * inverse_width));
         };
         if (options.max_voters > 0) {
           NearestRows(row, entries, static_cast<size_t>(options.max_voters), &voters);
           for (const auto& [unused, j] : voters) add(j);
         } else {
-          for (int64_t j = 0; j < entries; ++j) add(j);
+          for (int64_t j = 0; j < entries; j += kStep) {
+            const int64_t stop = std::min(j + kStep, entries);
+            if (Smallest(row + j, stop - j) > farthest) continue;
+            for (int64_t k = j; k < stop; ++k) add(k);
+          }
         }
         if (nearest[i] == entries) nearest[i] = 0;  // features that are no numbers
         vote.Store(options.median_steps, ab + 2 * i, variance + i);

@@ -7,6 +7,7 @@
 
 #include "core/color/lab.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/view_positions.h"
 #include "core/stage/stages.h"
 #include "tests/support/stages/stage_fixture.h"
 
@@ -210,6 +211,34 @@ TEST_F(CarryStageTest, ADamagedCheckpointIsSaidAndIgnored) {
     EXPECT_EQ(Run(), facts);
     EXPECT_THAT(observer_.text, HasSubstr("starts afresh"));
   }
+}
+
+// The wall is a plane: the same place of it has the same position in all views, and half a picture
+// further is as far in units of the median distance of the Gaussians.
+TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
+  const StageContext context = MakeContext();
+  const ViewPositions positions(scene_, context);
+  const Camera& camera = scene_.views[1].camera;
+  const Image first = positions.Of(1, camera), second = positions.Of(2, camera);
+  ASSERT_EQ(first.channels, 4);
+  const int shift = static_cast<int>(std::lround(1.2 * kFocal / kDepth));  // px
+  for (int y = 20; y < kHeight - 20; y += 10) {
+    for (int x = shift + 10; x < kWidth - 10; x += 10) {
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(first.At(c, y, x), second.At(c, y, x - shift), 0.02) << x << " " << y;
+      }
+      EXPECT_EQ(first.At(3, y, x), 1.0f);
+    }
+  }
+  // Columns of Gaussians reach from -3.6 to 8.4, rows from -2.4 to 2.4: bounded, and not small.
+  EXPECT_GT(std::abs(first.At(0, 48, 100) - first.At(0, 48, 10)), 0.3f);
+  for (float value : first.data) EXPECT_LE(std::abs(value), 3.0f);
+}
+
+TEST_F(CarryStageTest, WithoutGeometryNoPositionIsKnown) {
+  inputs_.erase(artifact::kGeometry);
+  const StageContext context = MakeContext();
+  EXPECT_TRUE(ViewPositions(scene_, context).Of(1, scene_.views[1].camera).Empty());
 }
 
 }  // namespace

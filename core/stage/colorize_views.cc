@@ -1,15 +1,19 @@
+#include <mutex>
+#include <utility>
+
 #include "core/image/codec.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/view_positions.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
 
-ColorSources SourcesOf(const Colorizer& colorizer) {
+ColorSources SourcesOf(const Colorizer& colorizer, Image position) {
   return {
-      [&colorizer](const Image& luminance, const Image& known) {
-        ColorPrediction predicted = colorizer.Predict(luminance, known);
+      [&colorizer, position = std::move(position)](const Image& luminance, const Image& known) {
+        ColorPrediction predicted = colorizer.Predict(luminance, {known, position});
         return InferredColor{std::move(predicted.ab), std::move(predicted.distance)};
       },
       [](const Image& luminance) { return AutomaticColorizer::Embedded()->Colorize(luminance).ab; },
@@ -19,24 +23,31 @@ ColorSources SourcesOf(const Colorizer& colorizer) {
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder) {
   CheckMaxSide(max_side_px);
   const Scene scene = ReadScene(context);
-  const auto colorizer = LoadColorizer(context.ReadInput(artifact::kColorizer),
-                                       context.LoadEncoder(encoder),
-                                       context.pool().thread_count());
-  const ColorSources sources = SourcesOf(*colorizer);
+  // Views are coloured side by side, each on one thread.
+  const auto colorizer = LoadColorizer(
+      context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
+  const ViewPositions positions(scene, context);
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
   const auto total = static_cast<int64_t>(scene.views.size());
-  for (int64_t i = 0; i < total; ++i) {
+  std::mutex outputs;
+  int64_t done = 0;
+  context.pool().ForEach(total, [&](int64_t index, int) {
     context.cancel().ThrowIfCancelled();
-    const View& view = scene.views[static_cast<size_t>(i)];
-    const auto luminance = images.Luminance(static_cast<int>(i));
+    const auto number = static_cast<int>(index);
+    const View& view = scene.views[index];
+    const auto luminance = images.Luminance(number);
     const CarriedColor carried = ReadCarried(context, view, luminance->width, luminance->height);
-    const FusedColor fused =
-        ColorOfView(*luminance, carried, sources, context.pool(), context.cancel());
-    context.WriteOutput(ViewArtifact(artifact::kViewsAb, view, ".png"), EncodeAbPng(fused.ab));
-    context.WriteOutput(ViewArtifact(artifact::kProvenance, view, ".png"),
-                        EncodePng8(fused.provenance));
-    context.progress().OnProgress(i + 1, total, "colouring " + view.name);
-  }
+    const ColorSources sources =
+        SourcesOf(*colorizer, positions.Of(number, images.WorkingCamera(number)));
+    ThreadPool one(1);
+    const FusedColor fused = ColorOfView(*luminance, carried, sources, one, context.cancel());
+    const std::string ab = EncodeAbPng(fused.ab);
+    const std::string provenance = EncodePng8(fused.provenance);
+    const std::lock_guard lock(outputs);
+    context.WriteOutput(ViewArtifact(artifact::kViewsAb, view, ".png"), ab);
+    context.WriteOutput(ViewArtifact(artifact::kProvenance, view, ".png"), provenance);
+    context.progress().OnProgress(++done, total, "colouring " + view.name);
+  });
 }
 
 }  // namespace color3d

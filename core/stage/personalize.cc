@@ -10,6 +10,7 @@
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/training_pictures.h"
+#include "core/stage/sources/view_positions.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -89,6 +90,8 @@ void RunPersonalize(const ColorizerOptions& options,
   const auto luminance = images.Luminance(key);
   std::vector<TrainingPicture> pictures = {
       {"the key view", *luminance, KeyAb(*luminance, context)}};
+  const ViewPositions positions(scene, context);
+  pictures[0].position = positions.Of(key, images.WorkingCamera(key));
   if (context.HasInput(artifact::kAugmentationFacts)) {
     for (TrainingPicture& picture : TrainingPicturesFrom(
              context.ReadInput(artifact::kAugmentationFacts),
@@ -98,6 +101,8 @@ void RunPersonalize(const ColorizerOptions& options,
     }
   }
   for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
+    const int view = scene.FindView(picture.name);
+    picture.position = positions.Of(view, images.WorkingCamera(view));
     pictures.push_back(std::move(picture));
   }
   SceneBatch alone(context.pool().thread_count());

@@ -108,7 +108,7 @@ void RunPersonalize(const ColorizerOptions& options,
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
 // Whom it asks for colours: the scene's colorizer, which must outlive the answer, and the embedded
 // automatic one.
-ColorSources SourcesOf(const Colorizer& colorizer);
+ColorSources SourcesOf(const Colorizer& colorizer, Image position = {});
 
 // Gaussians of luminance, trained at max_side_px (64..4096). With little memory the size and the
 // number of Gaussians are smaller, and a warning says so.

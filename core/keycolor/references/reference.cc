@@ -185,7 +185,7 @@ KeyMatches Match(const std::vector<Image>& references,
   const double scale = DistanceScale(
       bank.features.slice(0, 0, std::min(kScaleSample, bank.features.size(0))), bank.features);
   control.progress.OnProgress(0, 0, "matching the reference pictures");
-  const CellMatches matches = MatchCells(whitening.Apply(cells.blocks),
+  const CellMatches matches = MatchCells({whitening.Apply(cells.blocks)},
                                          bank,
                                          {.temperature = kTemperature,
                                           .distance_floor = kDistanceFloor,

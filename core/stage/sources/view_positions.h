@@ -1,0 +1,29 @@
+// Where in space the surfaces lie that a view shows, for colours that are joined in space.
+#pragma once
+
+#include <optional>
+
+#include "core/scene/scene.h"
+#include "core/scene/view_images.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+// Thread-safe.
+class ViewPositions {
+ public:
+  // Without geometry among the inputs nothing is known.
+  ViewPositions(const Scene& scene, const StageContext& context);
+
+  // TrainingPicture::position, of the size of `camera`; empty without geometry.
+  Image Of(int view, const Camera& camera) const;
+
+ private:
+  const Scene& scene_;
+  std::optional<GaussianModel> geometry_;
+  Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
+  double radius_ = 1.0;
+};
+
+}  // namespace color3d
