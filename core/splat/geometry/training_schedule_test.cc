@@ -54,6 +54,17 @@ TEST(TrainingScheduleTest, DropsMoreTheFewerViewsThereAreAndNothingInThePapersRe
   EXPECT_EQ(TrainingSchedule(options, 1.0).DropRate(1.0, 9), 0.0);
 }
 
+// 2 % of the pixels, counted at up to 500 px.
+TEST(GaussianCapTest, FollowsTheViewsAndNotTheirSize) {
+  const std::vector<Camera> nine(9, Camera{4000, 3000, 3000.0, 3000.0, 2000.0, 1500.0});
+  EXPECT_EQ(GaussianCap(40'000, nine, 500), 33'750);
+  EXPECT_EQ(GaussianCap(120'000, nine, 800), 33'750);
+  EXPECT_EQ(GaussianCap(120'000, nine, 0), 33'750);
+  EXPECT_EQ(GaussianCap(120'000, nine, 250), 8437);
+  EXPECT_EQ(GaussianCap(20'000, nine, 500), 20'000);
+  EXPECT_EQ(GaussianCap(40'000, {nine[0]}, 100), 5000);
+}
+
 TEST(IterationCapTest, GrowsWithTheViewsAndNeverBindsTheDefault) {
   EXPECT_EQ(IterationCap(1500, 3), 1500);
   EXPECT_EQ(IterationCap(5000, 3), 1500);

@@ -7,6 +7,8 @@ namespace color3d {
 namespace {
 
 constexpr double kMaxGaussiansPerPixel = 0.02;
+// Sharper pictures of the same few places do not tell where more surfaces lie.
+constexpr int kCountedSidePx = 500;
 constexpr int kMinCap = 5000;
 constexpr int64_t kIterationsPerView = 150;
 constexpr int64_t kMinIterationCap = 1500;
@@ -14,9 +16,10 @@ constexpr int64_t kMinIterationCap = 1500;
 }  // namespace
 
 int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px) {
+  const int side_px = max_side_px > 0 ? std::min(max_side_px, kCountedSidePx) : kCountedSidePx;
   double pixels = 0.0;
   for (const Camera& full : cameras) {
-    const Camera camera = full.FitWithin(max_side_px);
+    const Camera camera = full.FitWithin(side_px);
     pixels += static_cast<double>(camera.width) * camera.height;
   }
   const double cap = std::max<double>(kMinCap, kMaxGaussiansPerPixel * pixels);

@@ -18,8 +18,7 @@ Eigen::Vector3d Bounded(const Eigen::Vector3d& v) {
 
 }  // namespace
 
-ViewPositions::ViewPositions(const Scene& scene, const StageContext& context)
-    : scene_(scene) {
+ViewPositions::ViewPositions(const Scene& scene, const StageContext& context) : scene_(scene) {
   if (!context.HasInput(artifact::kGeometry)) return;
   geometry_ = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const auto count = static_cast<int64_t>(geometry_->size());
@@ -33,9 +32,8 @@ ViewPositions::ViewPositions(const Scene& scene, const StageContext& context)
     center_[axis] = Median(values);
   }
   for (int64_t i = 0; i < count; ++i) {
-    const Eigen::Vector3d x(geometry_->position[3 * i],
-                            geometry_->position[3 * i + 1],
-                            geometry_->position[3 * i + 2]);
+    const Eigen::Vector3d x(
+        geometry_->position[3 * i], geometry_->position[3 * i + 1], geometry_->position[3 * i + 2]);
     values[i] = (x - center_).norm();
   }
   radius_ = std::max(Median(values), 1e-9);
