@@ -26,12 +26,16 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
   EXPECT_THAT(InputKinds(graph, "select_key_view"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "reconstruct_geometry"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "personalize"),
-              ElementsAre("import_scene", "select_key_view", "colorize_key_view", "carry_color"));
+              ElementsAre("import_scene",
+                          "select_key_view",
+                          "colorize_key_view",
+                          "carry_color",
+                          "reconstruct_geometry"));
   EXPECT_THAT(
       InputKinds(graph, "carry_color"),
       ElementsAre("import_scene", "select_key_view", "colorize_key_view", "reconstruct_geometry"));
   EXPECT_THAT(InputKinds(graph, "colorize_views"),
-              ElementsAre("import_scene", "personalize", "carry_color"));
+              ElementsAre("import_scene", "personalize", "carry_color", "reconstruct_geometry"));
   EXPECT_THAT(InputKinds(graph, "solve_chroma"),
               ElementsAre("import_scene",
                           "select_key_view",

@@ -60,7 +60,7 @@ TEST(GaussianCapTest, FollowsTheViewsAndNotTheirSize) {
   EXPECT_EQ(GaussianCap(40'000, nine, 500), 33'750);
   EXPECT_EQ(GaussianCap(120'000, nine, 800), 33'750);
   EXPECT_EQ(GaussianCap(120'000, nine, 0), 33'750);
-  EXPECT_EQ(GaussianCap(120'000, nine, 250), 8437);
+  EXPECT_EQ(GaussianCap(120'000, nine, 250), 8460);
   EXPECT_EQ(GaussianCap(20'000, nine, 500), 20'000);
   EXPECT_EQ(GaussianCap(40'000, {nine[0]}, 100), 5000);
 }
