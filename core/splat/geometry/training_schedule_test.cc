@@ -54,13 +54,16 @@ TEST(TrainingScheduleTest, DropsMoreTheFewerViewsThereAreAndNothingInThePapersRe
   EXPECT_EQ(TrainingSchedule(options, 1.0).DropRate(1.0, 9), 0.0);
 }
 
-// 2 % of the pixels, counted at up to 500 px.
-TEST(GaussianCapTest, FollowsTheViewsAndNotTheirSize) {
+// 2 % of the pixels, of few views counted at up to 500 px.
+TEST(GaussianCapTest, FollowsTheViewsWhereTheyAreFew) {
   const std::vector<Camera> nine(9, Camera{4000, 3000, 3000.0, 3000.0, 2000.0, 1500.0});
   EXPECT_EQ(GaussianCap(40'000, nine, 500), 33'750);
   EXPECT_EQ(GaussianCap(120'000, nine, 800), 33'750);
   EXPECT_EQ(GaussianCap(120'000, nine, 0), 33'750);
   EXPECT_EQ(GaussianCap(120'000, nine, 250), 8460);
+  const std::vector<Camera> many(24, nine[0]);  // a quarter counts at 500 px
+  EXPECT_EQ(GaussianCap(400'000, many, 800), 195'300);
+  EXPECT_EQ(GaussianCap(400'000, many, 500), 90'000);
   EXPECT_EQ(GaussianCap(20'000, nine, 500), 20'000);
   EXPECT_EQ(GaussianCap(40'000, {nine[0]}, 100), 5000);
 }

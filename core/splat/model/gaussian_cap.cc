@@ -7,8 +7,19 @@ namespace color3d {
 namespace {
 
 constexpr double kMaxGaussiansPerPixel = 0.02;
-// Sharper pictures of the same few places do not tell where more surfaces lie.
-constexpr int kCountedSidePx = 500;
+// Sharper pictures of the same few places do not tell where more surfaces lie: those of so many
+// views or fewer count at this size, those of more by and by at their own.
+constexpr int kSparseSidePx = 500;
+constexpr double kSparseViews = 12.0;
+
+double Pixels(const std::vector<Camera>& cameras, int max_side_px) {
+  double pixels = 0.0;
+  for (const Camera& full : cameras) {
+    const Camera camera = full.FitWithin(max_side_px);
+    pixels += static_cast<double>(camera.width) * camera.height;
+  }
+  return pixels;
+}
 constexpr int kMinCap = 5000;
 constexpr int64_t kIterationsPerView = 150;
 constexpr int64_t kMinIterationCap = 1500;
@@ -16,12 +27,12 @@ constexpr int64_t kMinIterationCap = 1500;
 }  // namespace
 
 int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px) {
-  const int side_px = max_side_px > 0 ? std::min(max_side_px, kCountedSidePx) : kCountedSidePx;
-  double pixels = 0.0;
-  for (const Camera& full : cameras) {
-    const Camera camera = full.FitWithin(side_px);
-    pixels += static_cast<double>(camera.width) * camera.height;
-  }
+  const int sparse_side_px = max_side_px > 0 ? std::min(max_side_px, kSparseSidePx) : kSparseSidePx;
+  const double ratio =
+      std::min(1.0, kSparseViews / std::max(1.0, static_cast<double>(cameras.size())));
+  const double sparsity = ratio * ratio;
+  const double pixels =
+      sparsity * Pixels(cameras, sparse_side_px) + (1.0 - sparsity) * Pixels(cameras, max_side_px);
   const double cap = std::max<double>(kMinCap, kMaxGaussiansPerPixel * pixels);
   return static_cast<int>(std::min<double>(wanted, cap));
 }

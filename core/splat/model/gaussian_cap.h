@@ -7,8 +7,8 @@
 
 namespace color3d {
 
-// `wanted`, or fewer for a small scene: more Gaussians than a share of the pixels trained on (each
-// picture counted at 500 px or less) cost time and fit noise. `cameras`: of the training views at
+// `wanted`, or fewer for a small scene: more Gaussians than a share of the pixels trained on (at
+// 500 px or less where views are few) cost time and fit noise. `cameras`: of the training views at
 // full size.
 int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px);
 
