@@ -66,7 +66,7 @@ struct PictureFacts {
   // 1 channel: places above 0 need no answer; what they get means nothing, and costs less.
   Image known = Image();
   // 4 channels: where in the scene each pixel's surface lies, x y z in units of the scene's radius,
-  // and 1 where that is known, else 0.
+  // and 1; where that is not known all are 0.
   Image position = Image();
 };
 

@@ -12,6 +12,7 @@
 #include "core/encoder/image_tensors.h"
 #include "core/image/codec.h"
 #include "core/image/weighted_resize.h"
+#include "core/matching/view_noise.h"
 
 namespace color3d {
 namespace {
@@ -31,14 +32,8 @@ struct KnownCells {
 // [count,4] of a picture's cells, as CellBank's: means over what is known of each.
 torch::Tensor PlacesOf(const Image& position, int width, int height, int multiple, int64_t count) {
   if (position.Empty()) return torch::zeros({count, 4});
-  Image weighted = position;
-  for (int c = 0; c < 3; ++c) {
-    for (size_t i = 0; i < position.PlaneSize(); ++i) {
-      weighted.Plane(c)[i] *= position.Plane(3)[i];
-    }
-  }
   const torch::Tensor cells =
-      CellMeans(PadToMultiple(TensorFromImage(Resize(weighted, width, height)), multiple));
+      CellMeans(PadToMultiple(TensorFromImage(Resize(position, width, height)), multiple));
   const torch::Tensor share = cells.slice(1, 3, 4);
   return torch::cat({cells.slice(1, 0, 3) / share.clamp_min(kMostlyKnown),
                      (share > kMostlyKnown).to(torch::kFloat32)},
@@ -87,9 +82,9 @@ KnownCells Join(const std::vector<KnownCells>& parts) {
   }
   std::vector<torch::Tensor> colors, weights, positions;
   for (const KnownCells& part : parts) {
-    positions.push_back(part.positions);
     colors.push_back(part.colors);
     weights.push_back(part.weights);
+    positions.push_back(part.positions);
   }
   all.colors = torch::cat(colors);
   all.weights = torch::cat(weights);
@@ -119,6 +114,36 @@ KnownCells KeyCells(const TapEncoder& encoder,
   return Select(all, SampleRows(all.weights.size(0), options.bank_size, random));
 }
 
+// Of each picture but the first cells whose colours are sure. What the features of one place differ
+// by from picture to picture goes to `view_noise`.
+std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
+                                     std::span<const TrainingPicture> pictures,
+                                     const FeatureNeighborsOptions& options,
+                                     Random& random,
+                                     const CancellationToken& cancel,
+                                     ViewNoise* view_noise) {
+  std::vector<KnownCells> found;
+  if (pictures.size() < 2) return found;
+  const auto further = static_cast<int64_t>(pictures.size()) - 1;
+  const auto placed = [](const KnownCells& cells) {
+    return PlacedCells{cells.blocks, cells.positions};
+  };
+  const KnownCells key = CellsOf(encoder, pictures.front(), options.relative_chroma, 1.0);
+  KnownCells previous = key;
+  for (const TrainingPicture& picture : pictures.subspan(1)) {
+    cancel.ThrowIfCancelled();
+    KnownCells cells = CellsOf(encoder, picture, options.relative_chroma, 1.0);
+    view_noise->Add(placed(key), placed(cells), random);
+    if (!found.empty()) view_noise->Add(placed(previous), placed(cells), random);
+    const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
+    const torch::Tensor rows =
+        sure.index_select(0, SampleRows(sure.size(0), options.further_bank_size / further, random));
+    found.push_back(Select(cells, rows));
+    previous = std::move(cells);
+  }
+  return found;
+}
+
 }  // namespace
 
 FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
@@ -129,28 +154,22 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
     : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
   torch::NoGradGuard no_grad;
   const KnownCells key = KeyCells(encoder, pictures.front(), options, random, cancel);
-  whitening_ = Whitening(key.blocks, encoder.config().stem_stride, options.whitening);
-  std::vector<torch::Tensor> features{whitening_.Apply(key.blocks)};
-  std::vector<torch::Tensor> colors{key.colors}, weights{key.weights}, positions{key.positions};
-  const auto further = static_cast<int64_t>(pictures.size()) - 1;
-  for (int64_t i = 1; i <= further; ++i) {
-    cancel.ThrowIfCancelled();
-    const KnownCells cells = CellsOf(encoder, pictures[i], options.relative_chroma, 1.0);
-    const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
-    if (sure.size(0) == 0) continue;
-    const torch::Tensor rows =
-        sure.index_select(0, SampleRows(sure.size(0), options.further_bank_size / further, random));
-    const KnownCells taken = Select(cells, rows);
-    features.push_back(whitening_.Apply(taken.blocks));
-    colors.push_back(taken.colors);
-    weights.push_back(taken.weights);
-    positions.push_back(taken.positions);
+  std::vector<KnownCells> parts{key};
+  ViewNoise view_noise;
+  for (KnownCells& taken : FurtherCells(encoder, pictures, options, random, cancel, &view_noise)) {
+    parts.push_back(std::move(taken));
   }
+  whitening_ = Whitening(
+      key.blocks, encoder.config().stem_stride, options.whitening, view_noise.Covariances());
+  const KnownCells all = Join(parts);
   // Rounded to half precision here, so that a colorizer read from its file answers the same.
-  const auto stored = [](const std::vector<torch::Tensor>& parts) {
-    return torch::cat(parts).to(torch::kHalf).to(torch::kFloat32).contiguous();
+  const auto stored = [](const torch::Tensor& exact) {
+    return exact.to(torch::kHalf).to(torch::kFloat32).contiguous();
   };
-  bank_ = {stored(features), stored(colors), stored(weights), stored(positions)};
+  bank_ = {stored(whitening_.Apply(all.blocks)),
+           stored(all.colors),
+           stored(all.weights),
+           stored(all.positions)};
 }
 
 FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,

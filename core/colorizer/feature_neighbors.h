@@ -43,7 +43,8 @@ struct NeighborColors {
 class FeatureNeighbors {
  public:
   // Pictures at training size, the key view first: the feature space is its, the others add cells
-  // whose colours are known (weight).
+  // whose colours are known (weight) and, where positions are known, what features differ by
+  // between views of one place.
   FeatureNeighbors(const TapEncoder& encoder,
                    std::span<const TrainingPicture> pictures,
                    const FeatureNeighborsOptions& options,

@@ -5,10 +5,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -24,21 +22,6 @@ float Smallest(const float* values, int64_t count) {
   float smallest = values[0];
   for (int64_t i = 1; i < count; ++i) smallest = values[i] < smallest ? values[i] : smallest;
   return smallest;
-}
-
-// exp(x) for x in -80..0, relative error 2e-7: 2^n p(f), n the nearest integer to x / ln 2, p the
-// interpolant of simd-inl.h.
-float NegativeExp(float x) {
-  x *= std::numbers::log2e_v<float>;
-  const float shifted = x + 12582912.0f;
-  const float f = x - (shifted - 12582912.0f);
-  float p = f * 1.3390863e-3f + 9.6760319e-3f;
-  p = p * f + 5.5503571e-2f;
-  p = p * f + 2.4022107e-1f;
-  p = p * f + 6.9314719e-1f;
-  p = p * f + 1.0000001f;
-  return std::bit_cast<float>(std::bit_cast<uint32_t>(p) +
-                              (std::bit_cast<uint32_t>(shifted) << 23));
 }
 
 // |x - y|^2 without |x|^2, which is the same for all y.
@@ -265,7 +248,7 @@ CellMatches MatchCells(const CellQueries& queries,
         const auto add = [&](int64_t j) {
           if (row[j] > farthest) return;
           if (row[j] == best) nearest[i] = std::min(nearest[i], j);
-          vote.Add(j, NegativeExp((best - row[j]) * inverse_width));
+          vote.Add(j, std::exp((best - row[j]) * inverse_width));
         };
         if (options.max_voters > 0) {
           NearestRows(row, entries, static_cast<size_t>(options.max_voters), &voters);

@@ -3,6 +3,7 @@
 #include <torch/types.h>
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace color3d {
 namespace {
 
 constexpr double kEigenvalueFloor = 0.02;  // share of the largest eigenvalue
+constexpr double kNoiseFloor = 0.005;      // share of the mean variance of the noise
 constexpr double kVarianceFloor = 1e-8;    // a constant channel is divided by this, not by 0
 constexpr double kScaleFloor = 1e-12;
 constexpr int64_t kVectorColumns = 8;
@@ -20,26 +22,63 @@ double ShareOfTap(const WhiteningOptions& options, int stride_px) {
   return options.tap_shares[octave];
 }
 
-// Whitening to the leading principal components, in float64. `share` scales the block so that each
-// kind of feature takes the share of the distance that it is given.
-Whitening::Projection Fit(const torch::Tensor& samples, int64_t dims, double share) {
+// The `dims` last columns.
+torch::Tensor Leading(const torch::Tensor& ascending, int64_t dims) {
+  const int64_t columns = ascending.size(-1);
+  return ascending.slice(-1, columns - dims, columns);
+}
+
+// Leading principal components, each with the same variance: [C,D].
+torch::Tensor PrincipalDirections(const torch::Tensor& covariance, int64_t dims) {
+  torch::Tensor values, vectors;
+  std::tie(values, vectors) = torch::linalg_eigh(covariance);  // ascending
+  values = Leading(values, dims);
+  const torch::Tensor floor = values.max() * kEigenvalueFloor;
+  const torch::Tensor scale =
+      1.0 / static_cast<double>(dims) / (values.clamp_min(0.0) + floor + kScaleFloor);
+  return Leading(vectors, dims) * scale.sqrt();
+}
+
+// Directions in which places differ most against the noise, in units of the noise, scaled so that
+// the variances add up to 1: [C,D].
+torch::Tensor DistinctiveDirections(const torch::Tensor& covariance,
+                                    const torch::Tensor& noise,
+                                    int64_t dims) {
+  const int64_t channels = covariance.size(0);
+  const double mean = noise.diagonal().mean().item<double>();
+  const torch::Tensor softened =
+      noise + (kNoiseFloor * mean + kScaleFloor) * torch::eye(channels, noise.options());
+  torch::Tensor values, vectors;
+  std::tie(values, vectors) = torch::linalg_eigh(softened);
+  const torch::Tensor in_noise = torch::mm(vectors * values.rsqrt(), vectors.t());
+  std::tie(values, vectors) =
+      torch::linalg_eigh(torch::mm(torch::mm(in_noise, covariance), in_noise));
+  const torch::Tensor total = Leading(values, dims).clamp_min(0.0).sum() + kScaleFloor;
+  return torch::mm(in_noise, Leading(vectors, dims)) / total.sqrt();
+}
+
+// In float64. `share` scales the block so that each kind of feature takes the share of the distance
+// that it is given. `noise`: [C,C], or undefined.
+Whitening::Projection Fit(const torch::Tensor& samples,
+                          int64_t dims,
+                          double share,
+                          const torch::Tensor& noise) {
   const torch::Tensor x = samples.to(torch::kFloat64);
   const torch::Tensor mean = x.mean(0);
   const torch::Tensor inverse_deviation = (x.var(0, /*unbiased=*/false) + kVarianceFloor).rsqrt();
   const torch::Tensor standardised = (x - mean) * inverse_deviation;
   const torch::Tensor covariance =
       torch::mm(standardised.t(), standardised) / static_cast<double>(x.size(0));
-  torch::Tensor values, vectors;
-  std::tie(values, vectors) = torch::linalg_eigh(covariance);  // ascending
   dims = std::min<int64_t>(dims, x.size(1));
-  values = values.slice(0, x.size(1) - dims);
-  vectors = vectors.slice(1, x.size(1) - dims);
-  const torch::Tensor floor = values.max() * kEigenvalueFloor;
-  const torch::Tensor scale =
-      share / static_cast<double>(dims) / (values.clamp_min(0.0) + floor + kScaleFloor);
+  const torch::Tensor directions =
+      noise.defined()
+          ? DistinctiveDirections(
+                covariance, noise * torch::outer(inverse_deviation, inverse_deviation), dims)
+          : PrincipalDirections(covariance, dims);
   Whitening::Projection projection;
   projection.mean = mean.to(torch::kFloat32);
-  projection.matrix = (inverse_deviation.unsqueeze(1) * vectors * scale.sqrt()).to(torch::kFloat32);
+  projection.matrix =
+      (inverse_deviation.unsqueeze(1) * directions * std::sqrt(share)).to(torch::kFloat32);
   return projection;
 }
 
@@ -53,12 +92,14 @@ int64_t ColumnsOf(const std::vector<Whitening::Projection>& projections) {
 
 Whitening::Whitening(const std::vector<torch::Tensor>& blocks,
                      int first_stride_px,
-                     const WhiteningOptions& options) {
+                     const WhiteningOptions& options,
+                     const std::vector<torch::Tensor>& view_noise) {
   for (size_t i = 0; i < blocks.size(); ++i) {
     const bool is_tap = i + 1 < blocks.size();
     const double share =
         is_tap ? ShareOfTap(options, first_stride_px << i) : options.luminance_share;
-    projections_.push_back(Fit(blocks[i], options.dims_per_block, share));
+    const torch::Tensor noise = view_noise.empty() ? torch::Tensor() : view_noise[i];
+    projections_.push_back(Fit(blocks[i], options.dims_per_block, share, noise));
   }
   columns_ = ColumnsOf(projections_);
 }

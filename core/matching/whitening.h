@@ -13,7 +13,7 @@ namespace color3d {
 // Defaults measured on three scenes (true colours of held-out views); the error is flat around
 // them.
 struct WhiteningOptions {
-  int dims_per_block = 16;  // leading principal components that are kept
+  int dims_per_block = 16;  // leading directions that are kept
   // Shares of the distance for taps at strides 2, 4, 8, 16, 32: fine taps tell texture, coarse ones
   // tell things.
   std::array<double, 5> tap_shares{0.3, 0.5, 1.0, 1.0, 1.0};
@@ -24,13 +24,16 @@ class Whitening {
  public:
   struct Projection {
     torch::Tensor mean;    // [C]
-    torch::Tensor matrix;  // [C, D]: standardise, rotate, whiten
+    torch::Tensor matrix;  // [C, D]: standardise, rotate, scale
   };
 
-  // From a sample of cells: CellFeatures' blocks, whose finest tap has this stride.
+  // From a sample of cells: CellFeatures' blocks, whose finest tap has this stride. With
+  // ViewNoise's covariances distances are measured in that noise, along the directions that stand
+  // out of it most (Mikolajczyk & Matas 2007); without, along the principal components.
   Whitening(const std::vector<torch::Tensor>& blocks,
             int first_stride_px,
-            const WhiteningOptions& options);
+            const WhiteningOptions& options,
+            const std::vector<torch::Tensor>& view_noise = {});
   // From projections().
   explicit Whitening(std::vector<Projection> projections);
 

@@ -11,6 +11,9 @@ constexpr double kMaxGaussiansPerPixel = 0.02;
 // views or fewer count at this size, those of more by and by at their own.
 constexpr int kSparseSidePx = 500;
 constexpr double kSparseViews = 12.0;
+constexpr int kMinCap = 5000;
+constexpr int64_t kIterationsPerView = 150;
+constexpr int64_t kMinIterationCap = 1500;
 
 double Pixels(const std::vector<Camera>& cameras, int max_side_px) {
   double pixels = 0.0;
@@ -20,9 +23,6 @@ double Pixels(const std::vector<Camera>& cameras, int max_side_px) {
   }
   return pixels;
 }
-constexpr int kMinCap = 5000;
-constexpr int64_t kIterationsPerView = 150;
-constexpr int64_t kMinIterationCap = 1500;
 
 }  // namespace
 
