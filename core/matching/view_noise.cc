@@ -11,8 +11,8 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kCellsOfPair = 1000;
-constexpr double kReach = 0.03;       // radii of the scene, about a cell
-constexpr int64_t kMinPairs = 2000;   // some times the channels of a block
+constexpr double kReach = 0.03;      // radii of the scene, about a cell
+constexpr int64_t kMinPairs = 2000;  // some times the channels of a block
 
 torch::Tensor PlacedRows(const torch::Tensor& positions) {
   return (positions.select(1, 3) > 0.5).nonzero().squeeze(1);

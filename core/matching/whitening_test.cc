@@ -40,21 +40,19 @@ TEST_F(WhiteningTest, EachKindOfFeatureTakesItsShareOfTheDistance) {
 TEST_F(WhiteningTest, DistancesAreMeasuredInTheNoiseOfViews) {
   const auto blocks = Blocks();
   const torch::Tensor mixing = torch::randn({6, 6}, torch::kFloat64);
-  const torch::Tensor noise =
-      torch::mm(mixing, mixing.t()) + 0.5 * torch::eye(6, torch::kFloat64);
+  const torch::Tensor noise = torch::mm(mixing, mixing.t()) + 0.5 * torch::eye(6, torch::kFloat64);
   const Whitening whitening(blocks, kStridePx, {}, {noise, torch::eye(2, torch::kFloat64)});
-  const torch::Tensor deviation =
-      blocks[0].to(torch::kFloat64).var(0, /*unbiased=*/false).sqrt();
+  const torch::Tensor deviation = blocks[0].to(torch::kFloat64).var(0, /*unbiased=*/false).sqrt();
   const torch::Tensor standardised = noise / torch::outer(deviation, deviation);
   const torch::Tensor softened =
       standardised + 0.005 * standardised.diagonal().mean() * torch::eye(6, torch::kFloat64);
   const torch::Tensor inverse = torch::inverse(softened);
   std::vector<double> ratios;
   for (int64_t i = 0; i < 20; ++i) {
-    const torch::Tensor apart =
-        (blocks[0][i] - blocks[0][i + 20]).to(torch::kFloat64) / deviation;
+    const torch::Tensor apart = (blocks[0][i] - blocks[0][i + 20]).to(torch::kFloat64) / deviation;
     const double expected = torch::dot(apart, torch::mv(inverse, apart)).item<double>();
-    const torch::Tensor found = whitening.Apply({blocks[0].slice(0, i, i + 21), torch::zeros({21, 2})});
+    const torch::Tensor found =
+        whitening.Apply({blocks[0].slice(0, i, i + 21), torch::zeros({21, 2})});
     ratios.push_back((found[0] - found[20]).square().sum().item<double>() / expected);
   }
   for (const double ratio : ratios) EXPECT_NEAR(ratio / ratios.front(), 1.0, 1e-4);
@@ -63,12 +61,13 @@ TEST_F(WhiteningTest, DistancesAreMeasuredInTheNoiseOfViews) {
 TEST_F(WhiteningTest, DirectionsThatStandOutOfTheNoiseAreKept) {
   // The first channel varies most, but as much from view to view as from place to place.
   const torch::Tensor tap = torch::randn({kCells, 3}) * torch::tensor({10.0f, 1.0f, 1.0f});
-  const torch::Tensor noise =
-      torch::diag(torch::tensor({100.0, 1.0, 0.01}, torch::kFloat64));
+  const torch::Tensor noise = torch::diag(torch::tensor({100.0, 1.0, 0.01}, torch::kFloat64));
   WhiteningOptions options;
   options.dims_per_block = 1;
-  const Whitening whitening(
-      {tap, torch::randn({kCells, 2})}, kStridePx, options, {noise, torch::eye(2, torch::kFloat64)});
+  const Whitening whitening({tap, torch::randn({kCells, 2})},
+                            kStridePx,
+                            options,
+                            {noise, torch::eye(2, torch::kFloat64)});
   const torch::Tensor kept = whitening.projections()[0].matrix.select(1, 0).abs();
   EXPECT_GT(kept[2].item<double>(), 20.0 * kept[1].item<double>());
   EXPECT_GT(kept[2].item<double>(), 20.0 * 10.0 * kept[0].item<double>());

@@ -24,6 +24,7 @@ std::vector<StabilityCase> StabilityCases() {
   AddAdamCases(cases);
   AddGeometryCases(cases);
   AddChromaCases(cases);
+  AddMatchingCases(cases);
   AddColorizerCases(cases);
   return cases;
 }
