@@ -4,14 +4,11 @@
 #include <torch/types.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/colorizer/padding.h"
 #include "core/encoder/image_tensors.h"
-#include "core/image/codec.h"
-#include "core/image/weighted_resize.h"
 #include "core/matching/view_noise.h"
 
 namespace color3d {
@@ -29,46 +26,39 @@ struct KnownCells {
   torch::Tensor positions;            // [n,4], as CellBank's
 };
 
+torch::Tensor Padded(const Image& image) {
+  return PadToMultiple(TensorFromImage(image), kPadMultiple);
+}
+
 // [count,4] of a picture's cells, as CellBank's: means over what is known of each.
-torch::Tensor PlacesOf(const Image& position, int width, int height, int multiple, int64_t count) {
+torch::Tensor PlacesOf(const Image& position, int64_t count) {
   if (position.Empty()) return torch::zeros({count, 4});
-  const torch::Tensor cells =
-      CellMeans(PadToMultiple(TensorFromImage(Resize(position, width, height)), multiple));
+  const torch::Tensor cells = CellMeans(Padded(position));
   const torch::Tensor share = cells.slice(1, 3, 4);
   return torch::cat({cells.slice(1, 0, 3) / share.clamp_min(kMostlyKnown),
                      (share > kMostlyKnown).to(torch::kFloat32)},
                     1);
 }
 
-// Cells of a picture, resized.
 KnownCells CellsOf(const TapEncoder& encoder,
                    const TrainingPicture& picture,
-                   const RelativeChroma& relative,
-                   double scale) {
-  const int multiple = encoder.config().Stride(encoder.config().StageCount() - 1);
-  const int width = std::max(1, static_cast<int>(std::lround(picture.luminance.width * scale)));
-  const int height = std::max(1, static_cast<int>(std::lround(picture.luminance.height * scale)));
-  const auto prepared = [&](const Image& image) {
-    return PadToMultiple(TensorFromImage(Resize(image, width, height)), multiple);
-  };
-  const torch::Tensor l = prepared(picture.luminance);
+                   const RelativeChroma& relative) {
+  const torch::Tensor l = Padded(picture.luminance);
   CellFeatures features = DescribeCells(encoder.config(), encoder.Taps(encoder.Input(l)), l);
   const int64_t count = features.Count();
   KnownCells cells;
   cells.blocks = std::move(features.blocks);
-  cells.positions = PlacesOf(picture.position, width, height, multiple, count);
+  cells.positions = PlacesOf(picture.position, count);
   const Image color = ToRelative(relative, picture.luminance, picture.ab);
   if (picture.weight.Empty()) {
-    cells.colors = CellMeans(prepared(color));
+    cells.colors = CellMeans(Padded(color));
     cells.weights = torch::ones({count});
     return cells;
   }
   // Each pixel counts by its weight.
-  const torch::Tensor weight = prepared(picture.weight);
+  const torch::Tensor weight = Padded(picture.weight);
   const torch::Tensor mean_weight = CellMeans(weight);
-  const torch::Tensor known = PadToMultiple(
-      TensorFromImage(ResizeWeighted(color, picture.weight, width, height)), multiple);
-  cells.colors = CellMeans(known * weight) / mean_weight.clamp_min(kLeastWeight);
+  cells.colors = CellMeans(Padded(color) * weight) / mean_weight.clamp_min(kLeastWeight);
   cells.weights = mean_weight.squeeze(1).contiguous();
   return cells;
 }
@@ -99,40 +89,24 @@ KnownCells Select(const KnownCells& cells, const torch::Tensor& rows) {
           cells.positions.index_select(0, rows)};
 }
 
-// Cells of the key view at all scales.
-KnownCells KeyCells(const TapEncoder& encoder,
-                    const TrainingPicture& key,
-                    const FeatureNeighborsOptions& options,
-                    Random& random,
-                    const CancellationToken& cancel) {
-  std::vector<KnownCells> scales;
-  for (double scale : options.scales) {
-    cancel.ThrowIfCancelled();
-    scales.push_back(CellsOf(encoder, key, options.relative_chroma, scale));
-  }
-  const KnownCells all = Join(scales);
-  return Select(all, SampleRows(all.weights.size(0), options.bank_size, random));
-}
-
-// Of each picture but the first cells whose colours are sure. What the features of one place differ
-// by from picture to picture goes to `view_noise`.
+// Of each picture but the first, the key view with the cells `key`, those whose colours are sure.
+// What the features of one place differ by from picture to picture goes to `view_noise`.
 std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
                                      std::span<const TrainingPicture> pictures,
+                                     const KnownCells& key,
                                      const FeatureNeighborsOptions& options,
                                      Random& random,
                                      const CancellationToken& cancel,
                                      ViewNoise* view_noise) {
   std::vector<KnownCells> found;
-  if (pictures.size() < 2) return found;
   const auto further = static_cast<int64_t>(pictures.size()) - 1;
   const auto placed = [](const KnownCells& cells) {
     return PlacedCells{cells.blocks, cells.positions};
   };
-  const KnownCells key = CellsOf(encoder, pictures.front(), options.relative_chroma, 1.0);
-  KnownCells previous = key;
+  KnownCells previous;
   for (const TrainingPicture& picture : pictures.subspan(1)) {
     cancel.ThrowIfCancelled();
-    KnownCells cells = CellsOf(encoder, picture, options.relative_chroma, 1.0);
+    KnownCells cells = CellsOf(encoder, picture, options.relative_chroma);
     view_noise->Add(placed(key), placed(cells), random);
     if (!found.empty()) view_noise->Add(placed(previous), placed(cells), random);
     const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
@@ -153,10 +127,12 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
                                    const CancellationToken& cancel)
     : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
   torch::NoGradGuard no_grad;
-  const KnownCells key = KeyCells(encoder, pictures.front(), options, random, cancel);
-  std::vector<KnownCells> parts{key};
+  const KnownCells key = CellsOf(encoder, pictures.front(), options.relative_chroma);
+  std::vector<KnownCells> parts{
+      Select(key, SampleRows(key.weights.size(0), options.bank_size, random))};
   ViewNoise view_noise;
-  for (KnownCells& taken : FurtherCells(encoder, pictures, options, random, cancel, &view_noise)) {
+  for (KnownCells& taken :
+       FurtherCells(encoder, pictures, key, options, random, cancel, &view_noise)) {
     parts.push_back(std::move(taken));
   }
   whitening_ = Whitening(
@@ -241,8 +217,7 @@ NeighborColors FeatureNeighbors::Lookup(const std::vector<torch::Tensor>& taps,
   const int64_t height = cells.rows, width = cells.columns;
   CellQueries queries{whitening_.Apply(cells.blocks), {}};
   if (!position.Empty()) {
-    queries.positions =
-        PlacesOf(position, position.width, position.height, kPadMultiple, cells.Count());
+    queries.positions = PlacesOf(position, cells.Count());
   }
   torch::Tensor rows;
   if (wanted.defined()) {

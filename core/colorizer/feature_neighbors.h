@@ -25,10 +25,9 @@ namespace color3d {
 // Defaults measured on three scenes (true colours of held-out views); the error is flat around
 // them.
 struct FeatureNeighborsOptions {
-  std::vector<double> scales{0.8, 1.0, 1.25};  // of the key view, so that sizes may differ
-  int bank_size = 6000;                        // cells, drawn at random from all scales
-  int further_bank_size = 3000;                // cells of all other pictures together
-  double min_weight = 0.25;                    // cells of other pictures that are surer than this
+  int bank_size = 6000;          // cells of the key view, drawn at random
+  int further_bank_size = 3000;  // cells of all other pictures together
+  double min_weight = 0.25;      // cells of other pictures that are surer than this
   WhiteningOptions whitening;
   VoteOptions vote{.median_steps = 5, .position_weight = 1.5};
   RelativeChroma relative_chroma;  // that the bank's colours are kept relative to

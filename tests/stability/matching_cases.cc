@@ -38,9 +38,9 @@ torch::Tensor SquaredDistance64(const torch::Tensor& x, const torch::Tensor& y) 
 }
 
 torch::Tensor Vote64(const Problem& p) {
-  const torch::Tensor s = SquaredDistance64(p.queries.positions.slice(1, 0, 3),
-                                            p.bank.positions.slice(1, 0, 3)) *
-                          Exact(p.queries.positions.slice(1, 3, 4));
+  const torch::Tensor s =
+      SquaredDistance64(p.queries.positions.slice(1, 0, 3), p.bank.positions.slice(1, 0, 3)) *
+      Exact(p.queries.positions.slice(1, 3, 4));
   const torch::Tensor d = SquaredDistance64(p.queries.features, p.bank.features) +
                           p.options.position_weight * s / (1.0 + s / p.options.position_reach);
   const torch::Tensor best = std::get<0>(d.min(1, /*keepdim=*/true));
@@ -128,7 +128,9 @@ void AddMatchingCases(std::vector<StabilityCase>& cases) {
                        return RunWhitening(torch::randn({500, 24}), noise(), condition);
                      }});
   };
-  whitening("views that do not differ", 1.0, [] { return torch::zeros({24, 24}, torch::kFloat64); });
+  whitening("views that do not differ", 1.0, [] {
+    return torch::zeros({24, 24}, torch::kFloat64);
+  });
   whitening("views that differ by one channel", HUGE_VAL, [] {
     torch::Tensor noise = torch::zeros({24, 24}, torch::kFloat64);
     noise[3][3] = 1.0;
