@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/color/lab.h"
+#include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/view_positions.h"
 #include "core/stage/stages.h"
@@ -219,7 +220,12 @@ TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
   const StageContext context = MakeContext();
   const ViewPositions positions(scene_, context);
   const Camera& camera = scene_.views[1].camera;
-  const Image first = positions.Of(1, camera), second = positions.Of(2, camera);
+  const auto shown = [&](int view) {
+    ThreadPool pool(1);
+    const GaussianModel wall = ParseGaussians(context.ReadInput(artifact::kGeometry));
+    return RenderView(wall, camera, scene_.views[view].cam_from_world, pool).lab;
+  };
+  const Image first = positions.Of(1, camera, shown(1)), second = positions.Of(2, camera, shown(2));
   ASSERT_EQ(first.channels, 4);
   const int shift = static_cast<int>(std::lround(1.2 * kFocal / kDepth));  // px
   for (int y = 20; y < kHeight - 20; y += 10) {
@@ -233,12 +239,22 @@ TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
   // Columns of Gaussians reach from -3.6 to 8.4, rows from -2.4 to 2.4: bounded, and not small.
   EXPECT_GT(std::abs(first.At(0, 48, 100) - first.At(0, 48, 10)), 0.3f);
   for (float value : first.data) EXPECT_LE(std::abs(value), 3.0f);
+  // Where the photo shows something else.
+  Image other = shown(1);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth / 2; ++x) other.At(0, y, x) += 40.0f;
+  }
+  const Image half = positions.Of(1, camera, other);
+  for (int c = 0; c < 4; ++c) EXPECT_EQ(half.At(c, kHeight / 2, kWidth / 4), 0.0f);
+  EXPECT_EQ(half.At(3, kHeight / 2, 3 * kWidth / 4), 1.0f);
 }
 
 TEST_F(CarryStageTest, WithoutGeometryNoPositionIsKnown) {
   inputs_.erase(artifact::kGeometry);
   const StageContext context = MakeContext();
-  EXPECT_TRUE(ViewPositions(scene_, context).Of(1, scene_.views[1].camera).Empty());
+  EXPECT_TRUE(ViewPositions(scene_, context)
+                  .Of(1, scene_.views[1].camera, Image(kWidth, kHeight, 1))
+                  .Empty());
 }
 
 }  // namespace

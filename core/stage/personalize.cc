@@ -91,7 +91,7 @@ void RunPersonalize(const ColorizerOptions& options,
   std::vector<TrainingPicture> pictures = {
       {"the key view", *luminance, KeyAb(*luminance, context)}};
   const ViewPositions positions(scene, context);
-  pictures[0].position = positions.Of(key, images.WorkingCamera(key));
+  pictures[0].position = positions.Of(key, images.WorkingCamera(key), *luminance);
   if (context.HasInput(artifact::kAugmentationFacts)) {
     for (TrainingPicture& picture : TrainingPicturesFrom(
              context.ReadInput(artifact::kAugmentationFacts),
@@ -102,7 +102,7 @@ void RunPersonalize(const ColorizerOptions& options,
   }
   for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
     const int view = scene.FindView(picture.name);
-    picture.position = positions.Of(view, images.WorkingCamera(view));
+    picture.position = positions.Of(view, images.WorkingCamera(view), picture.luminance);
     pictures.push_back(std::move(picture));
   }
   SceneBatch alone(context.pool().thread_count());

@@ -16,6 +16,21 @@ Eigen::Vector3d Bounded(const Eigen::Vector3d& v) {
   return v / std::sqrt(1.0 + v.squaredNorm() / 9.0);
 }
 
+constexpr double kMaxDifference = 15.0;  // L units; photos of one surface are exposed differently
+constexpr int kWindowRadius = 2;
+
+// Whether two pictures of the same size agree around a pixel: by the mean of |difference|.
+bool Agree(const Image& x, const Image& y, int column, int row) {
+  const int left = std::max(0, column - kWindowRadius), top = std::max(0, row - kWindowRadius);
+  const int right = std::min(x.width - 1, column + kWindowRadius);
+  const int bottom = std::min(x.height - 1, row + kWindowRadius);
+  double sum = 0.0;
+  for (int r = top; r <= bottom; ++r) {
+    for (int c = left; c <= right; ++c) sum += std::abs(x.At(0, r, c) - y.At(0, r, c));
+  }
+  return sum <= kMaxDifference * (right - left + 1) * (bottom - top + 1);
+}
+
 }  // namespace
 
 ViewPositions::ViewPositions(const Scene& scene, const StageContext& context) : scene_(scene) {
@@ -39,7 +54,7 @@ ViewPositions::ViewPositions(const Scene& scene, const StageContext& context) : 
   radius_ = std::max(Median(values), 1e-9);
 }
 
-Image ViewPositions::Of(int view, const Camera& camera) const {
+Image ViewPositions::Of(int view, const Camera& camera, const Image& luminance) const {
   if (!geometry_) return {};
   const Pose& pose = scene_.views[view].cam_from_world;
   ThreadPool one(1);
@@ -48,7 +63,7 @@ Image ViewPositions::Of(int view, const Camera& camera) const {
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const double depth = rendered.median_depth.At(0, y, x);
-      if (!(depth > 0.0)) continue;
+      if (!(depth > 0.0) || !Agree(rendered.lab, luminance, x, y)) continue;
       const Eigen::Vector3d world = pose.WorldFromCamera(depth * camera.Ray(x + 0.5, y + 0.5));
       const Eigen::Vector3d v = Bounded((world - center_) / radius_);
       for (int c = 0; c < 3; ++c) position.At(c, y, x) = static_cast<float>(v[c]);

@@ -16,8 +16,10 @@ class ViewPositions {
   // Without geometry among the inputs nothing is known.
   ViewPositions(const Scene& scene, const StageContext& context);
 
-  // TrainingPicture::position, of the size of `camera`; empty without geometry.
-  Image Of(int view, const Camera& camera) const;
+  // PictureFacts::position, of the size of `luminance`, the view's as `camera` takes it. Known
+  // where the geometry is rendered as the view shows it: elsewhere it stands for something else.
+  // Empty without geometry.
+  Image Of(int view, const Camera& camera, const Image& luminance) const;
 
  private:
   const Scene& scene_;
