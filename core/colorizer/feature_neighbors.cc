@@ -128,13 +128,11 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
     : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
   torch::NoGradGuard no_grad;
   const KnownCells key = CellsOf(encoder, pictures.front(), options.relative_chroma);
-  std::vector<KnownCells> parts{
-      Select(key, SampleRows(key.weights.size(0), options.bank_size, random))};
+  const KnownCells of_key = Select(key, SampleRows(key.weights.size(0), options.bank_size, random));
   ViewNoise view_noise;
-  for (KnownCells& taken :
-       FurtherCells(encoder, pictures, key, options, random, cancel, &view_noise)) {
-    parts.push_back(std::move(taken));
-  }
+  std::vector<KnownCells> parts =
+      FurtherCells(encoder, pictures, key, options, random, cancel, &view_noise);
+  parts.insert(parts.begin(), of_key);
   whitening_ = Whitening(
       key.blocks, encoder.config().stem_stride, options.whitening, view_noise.Covariances());
   const KnownCells all = Join(parts);

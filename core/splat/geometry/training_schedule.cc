@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/parameter_block.h"
 #include "core/splat/model/spherical_harmonics.h"
 
@@ -50,9 +51,7 @@ double TrainingSchedule::PositionRate(double fraction) const {
 }
 
 double TrainingSchedule::DropRate(double fraction, int views) const {
-  const double sparsity =
-      std::min(1.0, tuning_.sparse_views / std::max(1.0, static_cast<double>(views)));
-  return tuning_.last_drop_rate * fraction * sparsity * sparsity;
+  return tuning_.last_drop_rate * fraction * Sparsity(tuning_.sparse_views, views);
 }
 
 std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels) const {

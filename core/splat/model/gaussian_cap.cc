@@ -26,11 +26,14 @@ double Pixels(const std::vector<Camera>& cameras, int max_side_px) {
 
 }  // namespace
 
+double Sparsity(double sparse_views, int views) {
+  const double ratio = std::min(1.0, sparse_views / std::max(1.0, static_cast<double>(views)));
+  return ratio * ratio;
+}
+
 int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px) {
   const int sparse_side_px = max_side_px > 0 ? std::min(max_side_px, kSparseSidePx) : kSparseSidePx;
-  const double ratio =
-      std::min(1.0, kSparseViews / std::max(1.0, static_cast<double>(cameras.size())));
-  const double sparsity = ratio * ratio;
+  const double sparsity = Sparsity(kSparseViews, static_cast<int>(cameras.size()));
   const double pixels =
       sparsity * Pixels(cameras, sparse_side_px) + (1.0 - sparsity) * Pixels(cameras, max_side_px);
   const double cap = std::max<double>(kMinCap, kMaxGaussiansPerPixel * pixels);

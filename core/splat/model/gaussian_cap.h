@@ -7,6 +7,10 @@
 
 namespace color3d {
 
+// How far few views decide what a scene can hold: 1 with at most `sparse_views` of them, with more
+// (sparse_views / views)^2.
+double Sparsity(double sparse_views, int views);
+
 // `wanted`, or fewer for a small scene: more Gaussians than a share of the pixels trained on (at
 // 500 px or less where views are few) cost time and fit noise. `cameras`: of the training views at
 // full size.
