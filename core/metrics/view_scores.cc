@@ -15,6 +15,12 @@ Image UnderTrueL(const Image& true_lab, const Image& ab) {
   return JoinLab(LuminanceOfLab(true_lab), Resize(ab, true_lab.width, true_lab.height));
 }
 
+// In two steps, whatever the size of the picture: a truth that is reduced in one holds detail that
+// one reduced in two does not.
+Image AtColorSide(const Image& image) {
+  return FitWithin(FitWithin(image, kScoreSidePx), kColorSidePx);
+}
+
 LabColor Pixel(const Image& lab, size_t i) {
   return {lab.Plane(0)[i], lab.Plane(1)[i], lab.Plane(2)[i]};
 }
@@ -23,29 +29,31 @@ LabColor Pixel(const Image& lab, size_t i) {
 
 Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image& view_ab) {
   Scores v;
-  const Image true_lab = LabFromSrgb(true_srgb);
-  const Image rendered_srgb = SrgbFromLab(rendered_lab);
-  v["psnr_rgb"] = Psnr(rendered_srgb, true_srgb, 1.0);
-  v["ssim_rgb"] = Ssim(rendered_srgb, true_srgb, 1.0);
-  v["psnr_l"] = Psnr(LuminanceOfLab(rendered_lab), LuminanceOfLab(true_lab), 100.0);
-  v["ab_rmse"] = AbRmse(rendered_lab, true_lab);
+  const Image true_lab = FitWithin(LabFromSrgb(true_srgb), kScoreSidePx);
+  const Image lab = FitWithin(rendered_lab, kScoreSidePx);
+  const Image truth_srgb = SrgbFromLab(true_lab);
+  const Image rendered_srgb = SrgbFromLab(lab);
+  v["psnr_rgb"] = Psnr(rendered_srgb, truth_srgb, 1.0);
+  v["ssim_rgb"] = Ssim(rendered_srgb, truth_srgb, 1.0);
+  v["psnr_l"] = Psnr(LuminanceOfLab(lab), LuminanceOfLab(true_lab), 100.0);
+  v["ab_rmse"] = AbRmse(lab, true_lab);
   v["colorfulness"] = Colorfulness(rendered_srgb);
   v["colorfulness_2d"] = Colorfulness(SrgbFromLab(UnderTrueL(true_lab, view_ab)));
-  v["colorfulness_truth"] = Colorfulness(true_srgb);
+  v["colorfulness_truth"] = Colorfulness(truth_srgb);
 
   const Image truth = FitWithin(true_lab, kColorSidePx);
-  const Image rendered = FitWithin(rendered_lab, kColorSidePx);
+  const Image rendered = FitWithin(lab, kColorSidePx);
   v["delta_e00"] = MeanDeltaE00(rendered, truth);
   v["delta_e00_chroma"] = MeanDeltaE00(UnderTrueL(truth, ChromaOfLab(rendered)), truth);
   v["delta_e00_chroma_2d"] =
-      MeanDeltaE00(UnderTrueL(truth, FitWithin(view_ab, kColorSidePx)), truth);
+      MeanDeltaE00(UnderTrueL(truth, AtColorSide(view_ab)), truth);
   v["delta_e00_gray"] = MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
   return v;
 }
 
 double ChromaError(const Image& true_srgb, const Image& rendered_lab) {
-  const Image truth = FitWithin(LabFromSrgb(true_srgb), kColorSidePx);
-  const Image rendered = FitWithin(rendered_lab, kColorSidePx);
+  const Image truth = AtColorSide(LabFromSrgb(true_srgb));
+  const Image rendered = AtColorSide(rendered_lab);
   return MeanDeltaE00(UnderTrueL(truth, ChromaOfLab(rendered)), truth);
 }
 
@@ -56,8 +64,8 @@ int SourceOf(float guessed, float seen, float inferred) {
 }
 
 void SourceErrors::Add(const Image& true_srgb, const Image& view_ab, const Image& provenance) {
-  const Image truth = FitWithin(LabFromSrgb(true_srgb), kColorSidePx);
-  const Image delivered = UnderTrueL(truth, FitWithin(view_ab, kColorSidePx));
+  const Image truth = AtColorSide(LabFromSrgb(true_srgb));
+  const Image delivered = UnderTrueL(truth, AtColorSide(view_ab));
   const Image shares = Resize(provenance, truth.width, truth.height);
   for (size_t i = 0; i < truth.PlaneSize(); ++i) {
     const float guessed = shares.Plane(0)[i], seen = shares.Plane(1)[i],

@@ -11,10 +11,13 @@ namespace color3d {
 
 using Scores = std::map<std::string, double>;
 
-inline constexpr int kColorSidePx = 400;  // colour differences are measured at this size
+// Pictures are scored at this size, so that figures of all presets can be compared, and colour
+// differences at the smaller one. Smaller pictures are scored as they are.
+inline constexpr int kScoreSidePx = 500;
+inline constexpr int kColorSidePx = 400;
 
 // `true_srgb`: 3 channels; `rendered_lab`: of the same size; `view_ab`: any size. Means over the
-// view's pixels. PSNR and SSIM at full size, "delta_e00*" (CIEDE2000) at kColorSidePx: of the
+// view's pixels. PSNR, SSIM and colourfulness at kScoreSidePx, "delta_e00*" (CIEDE2000) at kColorSidePx: of the
 // render, of its chroma and of the view's own chroma under the true L, and of no chroma at all.
 Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image& view_ab);
 

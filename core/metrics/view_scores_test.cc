@@ -3,6 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+
+#include "core/color/lab.h"
+#include "core/color/lab_planes.h"
+#include "core/image/codec.h"
 
 namespace color3d {
 namespace {
@@ -16,6 +21,34 @@ Image Halves(const std::array<float, 3>& left, const std::array<float, 3>& right
     }
   }
   return shares;
+}
+
+// Fine coloured stripes, `width` px wide pictures of the same scene.
+Image Stripes(int width, float shift) {
+  Image srgb(width, width * 3 / 4, 3);
+  for (int y = 0; y < srgb.height; ++y) {
+    for (int x = 0; x < srgb.width; ++x) {
+      const double phase = 400.0 * (x + 0.5) / width + 100.0 * (y + 0.5) / srgb.height;
+      srgb.At(0, y, x) = static_cast<float>(0.5 + 0.3 * std::sin(phase));
+      srgb.At(1, y, x) = 0.4f + shift;
+      srgb.At(2, y, x) = static_cast<float>(0.5 - 0.3 * std::sin(phase));
+    }
+  }
+  return srgb;
+}
+
+// Figures of a preset that works on sharper pictures are those of the pictures at the common size.
+TEST(ScoreView, LargerPicturesAreScoredAtTheCommonSize) {
+  const Image truth = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.0f));
+  const Image wrong = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.1f));
+  const Scores large = ScoreView(SrgbFromLab(truth), wrong, ChromaOfLab(wrong));
+  const Image reduced = FitWithin(wrong, kScoreSidePx);
+  const Scores small =
+      ScoreView(SrgbFromLab(FitWithin(truth, kScoreSidePx)), reduced, ChromaOfLab(reduced));
+  for (const auto& [name, value] : small) {
+    EXPECT_NEAR(large.at(name), value, 1e-3 * std::abs(value) + 1e-4) << name;
+  }
+  EXPECT_GT(small.at("delta_e00_chroma"), 1.0);
 }
 
 TEST(SourceErrors, ConfidenceThatKnowsTheErrorsCorrelatesWithThem) {
