@@ -1,8 +1,10 @@
 #include "core/carry/plane_sweep.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 #include "core/base/error.h"
@@ -15,6 +17,7 @@ constexpr int kCensusRadius = 3;  // every second pixel of a 7x7 window
 constexpr int kCensusBits = 24;
 constexpr uint8_t kUnknownCost = 11;  // of a pixel that a source does not show: about chance
 constexpr int kCostScale = 8;         // fixed point of aggregated costs
+constexpr size_t kBlock = 256;        // pixels whose costs are sorted together
 
 using Census = std::vector<uint32_t>;
 
@@ -62,20 +65,30 @@ uint8_t CountBits(uint32_t x) {
   return static_cast<uint8_t>(x + (x >> 8) + (x >> 16));
 }
 
-// Sum of the `kept` smallest of the sources' costs at a pixel.
-int SumOfSmallest(const std::vector<std::vector<uint8_t>>& costs, size_t pixel, size_t kept) {
-  uint8_t smallest[kMaxSweepSources];
-  size_t filled = 0;
+// Of `count` pixels from `first` on, the sum of the `kept` smallest of the sources' costs: each
+// source's cost sinks through the sorted ones, for all pixels of a block at once.
+void SumSmallest(const std::vector<std::vector<uint8_t>>& costs,
+                 size_t first,
+                 size_t count,
+                 size_t kept,
+                 std::array<uint16_t, kBlock>* sums) {
+  std::array<std::array<uint8_t, kBlock>, kMaxSweepSources> smallest;
+  for (size_t k = 0; k < kept; ++k) smallest[k].fill(std::numeric_limits<uint8_t>::max());
   for (const std::vector<uint8_t>& of_source : costs) {
-    const uint8_t cost = of_source[pixel];
-    if (filled == kept && cost >= smallest[kept - 1]) continue;
-    size_t at = filled < kept ? filled++ : kept - 1;
-    for (; at > 0 && smallest[at - 1] > cost; --at) smallest[at] = smallest[at - 1];
-    smallest[at] = cost;
+    std::array<uint8_t, kBlock> sinking;
+    std::copy_n(of_source.data() + first, count, sinking.data());
+    for (size_t k = 0; k < kept; ++k) {
+      for (size_t i = 0; i < count; ++i) {
+        const uint8_t least = std::min(smallest[k][i], sinking[i]);
+        sinking[i] = std::max(smallest[k][i], sinking[i]);
+        smallest[k][i] = least;
+      }
+    }
   }
-  int sum = 0;
-  for (size_t i = 0; i < kept; ++i) sum += smallest[i];
-  return sum;
+  sums->fill(0);
+  for (size_t k = 0; k < kept; ++k) {
+    for (size_t i = 0; i < count; ++i) (*sums)[i] += smallest[k][i];
+  }
 }
 
 // The source seen through the plane at this depth of the reference camera. `valid` is 0 outside.
@@ -101,22 +114,28 @@ void WarpThroughPlane(const PosedLuminance& reference,
   const int width = r.width, height = r.height;
   const float max_x = static_cast<float>(picture.width - 1);
   const float max_y = static_cast<float>(picture.height - 1);
+  std::vector<float> column(width), row(width);
   for (int y = 0; y < height; ++y) {
     float* out = warped->data.data() + static_cast<size_t>(y) * width;
     uint8_t* ok = valid->data() + static_cast<size_t>(y) * width;
     const float py = y + 0.5f;
+    // Where the pixels of a row fall: apart from the sampling, as compilers vectorise it.
     for (int x = 0; x < width; ++x) {
       const float px = x + 0.5f;
       const float w = h(2, 0) * px + h(2, 1) * py + h(2, 2);
       const float inverse = 1.0f / std::max(w, 1e-6f);
       const float sx = (h(0, 0) * px + h(0, 1) * py + h(0, 2)) * inverse - 0.5f;
       const float sy = (h(1, 0) * px + h(1, 1) * py + h(1, 2)) * inverse - 0.5f;
-      const bool inside = w > 1e-6f && sx >= 0.0f && sy >= 0.0f && sx <= max_x && sy <= max_y;
+      const bool inside =
+          (w > 1e-6f) & (sx >= 0.0f) & (sy >= 0.0f) & (sx <= max_x) & (sy <= max_y);
       ok[x] = inside;
-      const float cx = inside ? sx : 0.0f, cy = inside ? sy : 0.0f;
-      const int x0 = std::min(static_cast<int>(cx), picture.width - 2);
-      const int y0 = std::min(static_cast<int>(cy), picture.height - 2);
-      const float tx = cx - x0, ty = cy - y0;
+      column[x] = inside ? sx : 0.0f;
+      row[x] = inside ? sy : 0.0f;
+    }
+    for (int x = 0; x < width; ++x) {
+      const int x0 = std::min(static_cast<int>(column[x]), picture.width - 2);
+      const int y0 = std::min(static_cast<int>(row[x]), picture.height - 2);
+      const float tx = column[x] - x0, ty = row[x] - y0;
       const float* p = picture.data.data() + static_cast<size_t>(y0) * picture.width + x0;
       const float top = p[0] + tx * (p[1] - p[0]);
       const float bottom = p[picture.width] + tx * (p[picture.width + 1] - p[picture.width]);
@@ -156,9 +175,14 @@ CostVolume MatchPlanes(const PosedLuminance& reference,
         costs[s][i] = valid[i] ? bits : kUnknownCost;
       }
     }
-    for (size_t i = 0; i < pixels; ++i) {
-      const int sum = SumOfSmallest(costs, i, kept);
-      volume.cost[i * planes + d] = static_cast<int16_t>(sum * kCostScale / static_cast<int>(kept));
+    for (size_t first = 0; first < pixels; first += kBlock) {
+      const size_t in_block = std::min(kBlock, pixels - first);
+      std::array<uint16_t, kBlock> sums;
+      SumSmallest(costs, first, in_block, kept, &sums);
+      for (size_t i = 0; i < in_block; ++i) {
+        volume.cost[(first + i) * planes + d] =
+            static_cast<int16_t>(sums[i] * kCostScale / static_cast<int>(kept));
+      }
     }
   }
   return volume;

@@ -32,7 +32,7 @@ struct ColorizerOptions {
   };
   Recipe recipe = Recipe::kColor3d;
   Precision precision = Precision::kAuto;
-  int iterations = 150;  // 0..100000
+  int iterations = 100;  // 0..100000
   // > 0: the schedule is shortened to end after so many seconds of computing, at most 86400 (in a
   // batch a scene also waits for its turns, which does not count).
   double time_limit_seconds = 0.0;

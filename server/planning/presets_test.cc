@@ -34,7 +34,7 @@ TEST(Presets, EachIsInItsFileAndPassesTheCheckOfOptions) {
 TEST(Presets, SayWhatThePlansOfEachAre) {
   const v1::ColorizeSceneSpec fast = WithPreset({});
   EXPECT_EQ(fast.max_side_px(), 500);
-  EXPECT_EQ(fast.personalize().iterations(), 150);
+  EXPECT_EQ(fast.personalize().iterations(), 100);
   EXPECT_EQ(fast.reconstruct_geometry().iterations(), 1500);
   EXPECT_EQ(fast.reconstruct_geometry().max_gaussians(), 40'000);
   EXPECT_EQ(fast.reconstruct_geometry().max_side_px(), 500);

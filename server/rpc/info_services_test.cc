@@ -37,7 +37,7 @@ TEST_F(InfoServicesTest, ColorizersAndServerInfo) {
   EXPECT_EQ(info.job_kinds_size(), 14);
   ASSERT_EQ(info.presets_size(), 3);
   EXPECT_EQ(info.presets(0).name(), "fast");
-  EXPECT_EQ(info.presets(0).options().personalize().iterations(), 150);
+  EXPECT_EQ(info.presets(0).options().personalize().iterations(), 100);
 }
 
 }  // namespace
