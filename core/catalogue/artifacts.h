@@ -27,6 +27,9 @@ inline constexpr char kColorizer[] = "colorizer.c3c";
 inline constexpr char kViewsAb[] = "views_ab/";  // view's stem + ".png"
 // view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255)
 inline constexpr char kProvenance[] = "provenance/";
+// The same after corrections, where there are any; they stand for those above then.
+inline constexpr char kCorrectedAb[] = "corrected_ab/";
+inline constexpr char kCorrectedProvenance[] = "corrected_provenance/";
 inline constexpr char kModel[] = "model.c3g";  // Gaussians in colour
 inline constexpr char kPly[] = "scene.ply";
 inline constexpr char kSplat[] = "scene.splat";

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -80,6 +81,19 @@ struct TrainingPicture {
   Image position = Image();  // as PictureFacts'; empty: not known
 };
 
+struct CorrectedColor {
+  Image ab;     // 2 channels, Lab units
+  Image share;  // 1 channel, 0..1: how far that replaces what the place has
+};
+
+// How far colours reach that a user gives on parts of pictures. Immutable, thread-safe.
+class Corrector {
+ public:
+  virtual ~Corrector() = default;
+  // Of a picture's size. `facts`: as the Colorizer's.
+  virtual CorrectedColor Predict(const Image& luminance, const PictureFacts& facts = {}) const = 0;
+};
+
 // Immutable once trained; thread-safe to use.
 class Colorizer {
  public:
@@ -89,6 +103,12 @@ class Colorizer {
   // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
   // than the training size are coloured at that size and upsampled guided by L.
   virtual Image Colorize(const Image& luminance) const = 0;
+  // `corrected`: pictures of the scene; where their weight is above 0 their ab is what the user
+  // wants, and they reach whatever is more like that in looks and space than like all that was
+  // learnt from. Throws Error{kInvalidArgument} when no weight is above 0, kFailedPrecondition for
+  // colorizers without neighbors.
+  virtual std::unique_ptr<const Corrector> Correct(
+      std::span<const TrainingPicture> corrected) const = 0;
   // How the scene's chroma depends on luminance, as the key view shows it.
   virtual RelativeChroma relative_chroma() const = 0;
   // Colorizer file: versioned header, encoder digest, adapters, decoder, training curve.

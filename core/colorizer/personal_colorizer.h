@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +32,8 @@ class PersonalColorizer : public Colorizer {
 
   Image Colorize(const Image& luminance) const override;
   ColorPrediction Predict(const Image& luminance, const PictureFacts& facts = {}) const override;
+  std::unique_ptr<const Corrector> Correct(
+      std::span<const TrainingPicture> corrected) const override;
   RelativeChroma relative_chroma() const override { return parts_.relative_chroma; }
   std::string Serialize() const override;
 

@@ -16,6 +16,8 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   const ViewImages images(scene, context.scene_folder(), ColoredSide(context, scene.views[key]));
   const AbMap key_color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
 
+  const bool corrected =
+      context.HasInput(ViewArtifact(artifact::kCorrectedAb, scene.views[key], ".png"));
   std::map<int, std::shared_ptr<const ChromaTarget>> cache;
   std::mutex mutex;
   const ChromaTargetSource targets = [&](int view) {
@@ -24,8 +26,10 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     if (!target) {
       const Camera camera = images.WorkingCamera(view);
       auto made = std::make_shared<ChromaTarget>();
-      // The key view's colours are the user's own; the others are the colorizer's prediction.
-      made->ab = view == key ? Resize(key_color.ab, camera.width, camera.height)
+      // The key view's colours are the user's own, unless corrected; the others are the colorizer's
+      // prediction.
+      made->ab = view == key && !corrected
+                     ? Resize(key_color.ab, camera.width, camera.height)
                              : ReadViewAb(context, scene.views[view], camera.width, camera.height);
       made->confidence =
           ReadViewConfidence(context, scene.views[view], camera.width, camera.height);

@@ -110,6 +110,19 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
 // automatic one.
 ColorSources SourcesOf(const Colorizer& colorizer, Image position = {});
 
+struct CorrectColorsOptions {
+  // Parts of photos in the colours that they should have, later ones over earlier ones, 1..64:
+  // strokes, points, or a picture (sources/given_colors.h). No held-out views.
+  std::vector<FurtherKeyView> corrections;
+  void Validate() const;
+  bool operator==(const CorrectColorsOptions&) const = default;
+};
+// The colours of every view, corrected: where the user says so, and in whatever is more like that
+// in looks and space than like all that the colorizer learnt from. `encoder`: as RunColorizeViews'.
+void RunCorrectColors(const CorrectColorsOptions& options,
+                      StageContext& context,
+                      const std::string& encoder = "");
+
 // Gaussians of luminance, trained at max_side_px (64..4096). With little memory the size and the
 // number of Gaussians are smaller, and a warning says so.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
