@@ -31,8 +31,8 @@ struct ViewOptions {
 };
 
 constexpr const char* kHowToGetPage =
-    "the worker that made it was built without the viewer; build it again where npm reaches its "
-    "registry, and run `color3d colorize` again";
+    "it is of an older version, or its worker was built without the viewer; build that where npm "
+    "reaches its registry, and run `color3d colorize` again";
 
 fs::path PageIn(const fs::path& target) {
   std::error_code none;
