@@ -39,6 +39,7 @@ inline constexpr char kScores[] = "scores.json";
 inline constexpr char kTruths[] = "truths/";            // view's stem + ".jpg"
 inline constexpr char kColored2d[] = "colored_views/";  // view's stem + ".jpg"
 inline constexpr char kReport[] = "report.html";
+inline constexpr char kViewPage[] = "view.html";  // the scene in a browser, all in one file
 inline constexpr char kMetrics[] = "metrics.json";
 inline constexpr char kAllCurves[] = "curves.csv";
 inline constexpr char kPlan[] = "plan.json";

@@ -68,8 +68,8 @@ const std::vector<Stage>& StageCatalogue() {
        .leaves = {kScores, kTruths, kColored2d}},
       // Its report reads what all the others have left.
       {.kind = kind::kColorizeScene,
-       .leaves = {kReport, kMetrics, kAllCurves, kPlan},
-       .results = {kReport, kMetrics, kAllCurves, kPlan}},
+       .leaves = {kReport, kViewPage, kMetrics, kAllCurves, kPlan},
+       .results = {kReport, kViewPage, kMetrics, kAllCurves, kPlan}},
       {.kind = kind::kPersonalizeScenes},
   };
   return catalogue;
