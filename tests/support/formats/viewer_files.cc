@@ -346,6 +346,26 @@ ViewerGaussians ReadGlb(std::string_view bytes) {
   return g;
 }
 
+std::vector<size_t> PartnersIn(const ViewerGaussians& file, const ViewerGaussians& original) {
+  std::vector<size_t> partners;
+  for (size_t i = 0; i < original.size(); ++i) {
+    size_t best = 0;
+    double least = 1e30;
+    for (size_t j = 0; j < file.size(); ++j) {
+      double squares = 0.0;
+      for (int k = 0; k < 3; ++k) {
+        squares += std::pow(original.position[3 * i + k] - file.position[3 * j + k], 2.0);
+      }
+      if (squares < least) {
+        least = squares;
+        best = j;
+      }
+    }
+    partners.push_back(best);
+  }
+  return partners;
+}
+
 Image RenderForViewers(const ViewerGaussians& g,
                        const Camera& camera,
                        const Pose& cam_from_file,

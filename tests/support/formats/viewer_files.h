@@ -22,6 +22,9 @@ ViewerGaussians ReadGlb(std::string_view bytes);
 // The files of an archive without compression, checked against their checksums.
 std::map<std::string, std::string> ReadStoredZip(std::string_view bytes);
 
+// Which Gaussian of `file` each of `original` became: the nearest by position.
+std::vector<size_t> PartnersIn(const ViewerGaussians& file, const ViewerGaussians& original);
+
 // What the reference 3DGS renderer draws over black: 3 channels, 0..1.
 Image RenderForViewers(const ViewerGaussians& gaussians,
                        const Camera& camera,

@@ -4,17 +4,18 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 namespace color3d {
 namespace {
 
-constexpr int kLevels = 256;
 constexpr int kBins = 512;
 constexpr int kLevelIterations = 200;
 constexpr int kPaletteIterations = 8;
 
 // Levels as dense as the cube root of the values' density, which is best for many levels.
-void SpreadLevels(const std::vector<float>& sorted, std::array<float, kLevels>* levels) {
+void SpreadLevels(const std::vector<float>& sorted, std::span<float> levels) {
+  const size_t count = levels.size();
   const double low = sorted.front(), width = (static_cast<double>(sorted.back()) - low) / kBins;
   std::vector<double> mass(kBins, 0.0);
   for (const float v : sorted) {
@@ -23,15 +24,15 @@ void SpreadLevels(const std::vector<float>& sorted, std::array<float, kLevels>* 
   double total = 0.0;
   for (double& m : mass) total += m = std::cbrt(m);
   double before = 0.0;
-  int next = 0;
+  size_t next = 0;
   for (int b = 0; b < kBins; ++b) {
-    while (next < kLevels && (next + 0.5) / kLevels * total <= before + mass[b]) {
-      const double within = ((next + 0.5) / kLevels * total - before) / mass[b];
-      (*levels)[next++] = static_cast<float>(low + (b + within) * width);
+    while (next < count && (next + 0.5) / count * total <= before + mass[b]) {
+      const double within = ((next + 0.5) / count * total - before) / mass[b];
+      levels[next++] = static_cast<float>(low + (b + within) * width);
     }
     before += mass[b];
   }
-  while (next < kLevels) (*levels)[next++] = sorted.back();
+  while (next < count) levels[next++] = sorted.back();
 }
 
 // k-means of the rows that `members` names.
@@ -132,27 +133,28 @@ std::vector<int> Shares(const Clusters& coarse, int size) {
 
 }  // namespace
 
-Codebook::Codebook(std::vector<float> values) {
+Codebook::Codebook(std::vector<float> values, int count) {
   std::sort(values.begin(), values.end());
   std::vector<float> different;
   std::unique_copy(values.begin(), values.end(), std::back_inserter(different));
-  if (different.size() <= kLevels) {
-    if (!different.empty()) levels_.fill(different.back());
+  if (!different.empty()) levels_.fill(different.back());
+  if (different.size() <= static_cast<size_t>(count)) {
     std::copy(different.begin(), different.end(), levels_.begin());
   } else {
-    SpreadLevels(values, &levels_);
+    const std::span<float> levels(levels_.data(), static_cast<size_t>(count));
+    SpreadLevels(values, levels);
     std::vector<double> sums(values.size() + 1, 0.0);
     for (size_t i = 0; i < values.size(); ++i) sums[i + 1] = sums[i] + values[i];
     for (int iteration = 0; iteration < kLevelIterations; ++iteration) {
       size_t begin = 0;
-      for (int level = 0; level < kLevels; ++level) {
+      for (size_t level = 0; level < levels.size(); ++level) {
         size_t end = values.size();
-        if (level + 1 < kLevels) {
-          const float bound = 0.5f * (levels_[level] + levels_[level + 1]);
+        if (level + 1 < levels.size()) {
+          const float bound = 0.5f * (levels[level] + levels[level + 1]);
           end = std::lower_bound(values.begin() + begin, values.end(), bound) - values.begin();
         }
         if (end > begin) {
-          levels_[level] =
+          levels[level] =
               static_cast<float>((sums[end] - sums[begin]) / static_cast<double>(end - begin));
         }
         begin = end;
@@ -160,7 +162,7 @@ Codebook::Codebook(std::vector<float> values) {
     }
     std::sort(levels_.begin(), levels_.end());
   }
-  for (int level = 0; level + 1 < kLevels; ++level) {
+  for (size_t level = 0; level < bounds_.size(); ++level) {
     bounds_[level] = 0.5f * (levels_[level] + levels_[level + 1]);
   }
 }

@@ -1,5 +1,5 @@
-// Few numbers that stand for many: 256 levels for single values, a palette for rows. Least squared
-// error by Lloyd's iterations, the same for the same input whatever the number of threads.
+// Few numbers that stand for many: up to 256 levels for single values, a palette for rows. Least
+// squared error by Lloyd's iterations, the same for the same input whatever the number of threads.
 #pragma once
 
 #include <array>
@@ -13,8 +13,9 @@ namespace color3d {
 // Immutable after construction, so safe to share between threads.
 class Codebook {
  public:
-  // Finite values; none at all gives zeros. Up to 256 different values are kept as they are.
-  explicit Codebook(std::vector<float> values);
+  // Finite values; none at all gives zeros. 2 <= count <= 256 of the levels are used, the rest
+  // repeat the last. Up to `count` different values are kept as they are.
+  explicit Codebook(std::vector<float> values, int count = 256);
   const std::array<float, 256>& levels() const { return levels_; }  // ascending
   uint8_t Nearest(float value) const;
 

@@ -1,12 +1,14 @@
 #include "core/splat/export/sog/sog.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
+#include "core/splat/export/morton.h"
 #include "core/splat/export/sog/codebook.h"
 #include "core/splat/export/sog/lossless_webp.h"
 #include "core/splat/export/sog/zip.h"
@@ -19,59 +21,22 @@ constexpr int kPaletteColumns = 64;  // of the picture of centroids
 constexpr int kGaussiansPerPaletteRow =
     8;  // what a palette of more rows costs, it hardly wins back
 constexpr int kMaxPalette = 65536;
+// Fewer levels than 256 make smaller pictures, at a cost that is hardly seen; those of scales are.
+constexpr int kColorLevels = 128;
+constexpr int kHarmonicLevels = 64;
 constexpr int kLargestIsW = 252;  // the fourth byte of a rotation: which component is left out
-
-double SignedLog(double x) { return std::copysign(std::log1p(std::abs(x)), x); }
 
 uint8_t Byte(float unit) {
   return static_cast<uint8_t>(std::lround(255.0f * std::clamp(unit, 0.0f, 1.0f)));
 }
 
-// Positions as 16-bit numbers of their logarithms' box.
-struct Grid {
-  std::array<double, 3> low = {};
-  std::array<double, 3> high = {};
-  std::vector<uint16_t> cell;  // 3 a Gaussian
-};
-
-Grid GridOf(const std::vector<float>& position) {
-  Grid grid;
-  if (position.empty()) return grid;
-  for (int k = 0; k < 3; ++k) {
-    grid.low[k] = grid.high[k] = SignedLog(position[k]);
-    for (size_t i = k; i < position.size(); i += 3) {
-      grid.low[k] = std::min(grid.low[k], SignedLog(position[i]));
-      grid.high[k] = std::max(grid.high[k], SignedLog(position[i]));
-    }
+// As JSON: six digits, which are more than a codebook's levels are worth.
+std::vector<double> ShortNumbers(const Codebook& codebook) {
+  std::vector<double> numbers;
+  for (const float level : codebook.levels()) {
+    numbers.push_back(std::stod(fmt::format("{:.6g}", level)));
   }
-  grid.cell.resize(position.size());
-  for (size_t i = 0; i < position.size(); ++i) {
-    const double extent = grid.high[i % 3] - grid.low[i % 3];
-    const double unit = extent > 0.0 ? (SignedLog(position[i]) - grid.low[i % 3]) / extent : 0.0;
-    grid.cell[i] = static_cast<uint16_t>(std::lround(65535.0 * std::clamp(unit, 0.0, 1.0)));
-  }
-  return grid;
-}
-
-// Two zero bits before each bit.
-uint64_t Spread(uint64_t x) {
-  x = (x | x << 16u) & 0x0000ff0000ffULL;
-  x = (x | x << 8u) & 0x00f00f00f00fULL;
-  x = (x | x << 4u) & 0x0c30c30c30c3ULL;
-  return (x | x << 2u) & 0x249249249249ULL;
-}
-
-// Neighbours in space become neighbours in the file; ties by index.
-std::vector<uint32_t> MortonOrder(const Grid& grid) {
-  std::vector<uint64_t> code(grid.cell.size() / 3);
-  for (size_t i = 0; i < code.size(); ++i) {
-    for (unsigned k = 0; k < 3; ++k) code[i] |= Spread(grid.cell[3 * i + k]) << k;
-  }
-  std::vector<uint32_t> order(code.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(
-      order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return code[a] < code[b]; });
-  return order;
+  return numbers;
 }
 
 // The largest component is left out and positive; the others fill -1/sqrt(2)..1/sqrt(2).
@@ -97,7 +62,7 @@ class SogWriter {
         pool_(pool),
         count_(gaussians.size()),
         coefficients_(static_cast<size_t>(ShCoefficients(gaussians.sh_degree))),
-        grid_(GridOf(gaussians.position)),
+        grid_(LogGridOf(gaussians.position)),
         order_(MortonOrder(grid_)) {
     // A multiple of 4 each way; one pixel at least.
     const double side = std::sqrt(static_cast<double>(std::max<size_t>(count_, 1)));
@@ -148,7 +113,7 @@ class SogWriter {
 
   void Scales() {
     const Codebook codebook(g_.log_scale);
-    meta_["scales"] = {{"codebook", codebook.levels()}, {"files", {"scales.webp"}}};
+    meta_["scales"] = {{"codebook", ShortNumbers(codebook)}, {"files", {"scales.webp"}}};
     AddTexture("scales.webp", [&](size_t i, uint8_t* out) {
       for (int k = 0; k < 3; ++k) out[k] = codebook.Nearest(g_.log_scale[3 * i + k]);
       out[3] = 255;
@@ -169,8 +134,8 @@ class SogWriter {
     std::vector<float> values;
     values.reserve(3 * count_);
     for (size_t i = 0; i < count_; ++i) values.insert(values.end(), Sh(i), Sh(i) + 3);
-    const Codebook codebook(std::move(values));
-    meta_["sh0"] = {{"codebook", codebook.levels()}, {"files", {"sh0.webp"}}};
+    const Codebook codebook(std::move(values), kColorLevels);
+    meta_["sh0"] = {{"codebook", ShortNumbers(codebook)}, {"files", {"sh0.webp"}}};
     AddTexture("sh0.webp", [&](size_t i, uint8_t* out) {
       for (int c = 0; c < 3; ++c) out[c] = codebook.Nearest(Sh(i)[c]);
       out[3] = Byte(1.0f / (1.0f + std::exp(-g_.opacity_logit[i])));
@@ -187,7 +152,7 @@ class SogWriter {
     const size_t wanted = std::clamp<size_t>(count_ / kGaussiansPerPaletteRow, 1, kMaxPalette);
     const int size = static_cast<int>(std::bit_floor(wanted));
     const Palette palette = MakePalette(rows, static_cast<int>(3 * rest), size, pool_);
-    const Codebook codebook(palette.rows);
+    const Codebook codebook(palette.rows, kHarmonicLevels);
 
     RgbaTexture centroids;
     centroids.width = kPaletteColumns * static_cast<int>(rest);
@@ -203,7 +168,7 @@ class SogWriter {
     for (size_t at = 0; at < count_; ++at) label[order_[at]] = palette.labels[at];
     meta_["shN"] = {{"count", size},
                     {"bands", g_.sh_degree},
-                    {"codebook", codebook.levels()},
+                    {"codebook", ShortNumbers(codebook)},
                     {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
     textures_.emplace_back("shN_centroids.webp", std::move(centroids));
     AddTexture("shN_labels.webp", [&](size_t i, uint8_t* out) {
@@ -218,7 +183,7 @@ class SogWriter {
   ThreadPool& pool_;
   size_t count_;
   size_t coefficients_;
-  Grid grid_;
+  LogGrid grid_;
   std::vector<uint32_t> order_;
   int width_ = 0;
   int height_ = 0;

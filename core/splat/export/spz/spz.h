@@ -13,12 +13,13 @@ enum class SpzVersion {
   k4 = 4,  // zstd; rotations of 10 bits a component
 };
 
-// SPZ looks along -z with y up; ours, as in 3DGS files, along +z with y down: y and z change their
-// sign here, and readers that ask for the latter (RDF) get the frame of `gaussians` back. Positions
-// have as many of 24 bits behind the point as the scene's size leaves, scales 16 steps a factor e
-// between e^-10 and e^5.9, colours and opacities 8 bits, higher harmonics -1..1 in steps of 1/16
-// and 1/8. Throws Error{kInvalidArgument} without Gaussians (readers refuse such a file), for
-// values that are not finite, and where most scales or any position would not fit.
+// Gaussians come in Morton order. SPZ looks along -z with y up; ours, as in 3DGS files, along +z
+// with y down: y and z change their sign here, and readers that ask for the latter (RDF) get the
+// frame of `gaussians` back. Positions have as many of 24 bits behind the point as the scene's size
+// leaves, scales 16 steps a factor e between e^-10 and e^5.9, colours and opacities 8 bits, higher
+// harmonics -1..1 in steps of 1/16 and 1/8. Throws Error{kInvalidArgument} without Gaussians
+// (readers refuse such a file), for values that are not finite, and where most scales or any
+// position would not fit.
 std::string EncodeSpz(const ViewerGaussians& gaussians, SpzVersion version, ThreadPool& pool);
 
 }  // namespace color3d
