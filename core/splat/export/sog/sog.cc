@@ -194,7 +194,7 @@ class SogWriter {
 }  // namespace
 
 std::vector<uint32_t> SogOrder(const std::vector<float>& position) {
-  return MortonOrder(GridOf(position));
+  return MortonOrder(LogGridOf(position));
 }
 
 std::string EncodeSog(const ViewerGaussians& gaussians, ThreadPool& pool) {
