@@ -9,6 +9,7 @@
 #include "core/base/subprocess.h"
 #include "core/image/codec.h"
 #include "core/splat/export/export.h"
+#include "core/splat/export/sog/sog.h"
 #include "core/view/view_page.h"
 
 namespace color3d {
@@ -34,10 +35,15 @@ std::string FirstOf(const std::vector<std::string>& programs) {
 constexpr int kSide = 48;
 bool OnTheLeft(int i) { return (i * 37) % kSide < kSide / 2; }
 
-std::string WallPly(ThreadPool& pool, std::vector<float>* confidence) {
+struct Wall {
   GaussianModel model;
-  model.channels = 3;
   RgbHarmonics rgb;
+};
+
+Wall MakeWall() {
+  Wall wall;
+  GaussianModel& model = wall.model;
+  model.channels = 3;
   for (int i = 0; i < kSide * kSide; ++i) {
     const float x = static_cast<float>((i * 37) % kSide) / kSide - 0.48f;
     const float y = static_cast<float>(i / kSide) / kSide - 0.48f;
@@ -47,10 +53,29 @@ std::string WallPly(ThreadPool& pool, std::vector<float>* confidence) {
     model.opacity_logit.push_back(4.0f);
     for (std::vector<float>* sh : {&model.sh_l, &model.sh_a, &model.sh_b}) sh->push_back(0.0f);
     const float red = OnTheLeft(i) ? 0.9f : 0.1f, blue = OnTheLeft(i) ? 0.1f : 0.9f;
-    for (const float value : {red, 0.1f, blue}) rgb.sh.push_back((value - 0.5f) / kShDc);
-    confidence->push_back(OnTheLeft(i) ? 1.0f : 0.0f);
+    for (const float value : {red, 0.1f, blue}) wall.rgb.sh.push_back((value - 0.5f) / kShDc);
+    model.confidence.push_back(OnTheLeft(i) ? 1.0f : 0.0f);
   }
-  return EncodeGaussianPly(model, rgb, {}, pool);
+  return wall;
+}
+
+// The wall in the format of this name, its sureness in the order of that.
+void TakeWall(const std::string& file_name, ViewPage* page) {
+  ThreadPool pool(1);
+  const Wall wall = MakeWall();
+  page->file_name = file_name;
+  page->confidence = wall.model.confidence;
+  if (file_name.ends_with(".ply")) {
+    page->file_bytes = EncodeGaussianPly(wall.model, wall.rgb, {}, pool);
+    return;
+  }
+  const ViewerGaussians gaussians = ForViewers(wall.model, wall.rgb, {}, pool);
+  page->file_bytes = EncodeSog(gaussians, pool);
+  page->file_is_compressed = true;
+  const std::vector<uint32_t> order = SogOrder(gaussians.position);
+  for (size_t i = 0; i < order.size(); ++i) {
+    page->confidence[i] = wall.model.confidence[order[i]];
+  }
 }
 
 Scene WallScene() {
@@ -65,11 +90,9 @@ Scene WallScene() {
   return scene;
 }
 
-std::string PageOfWall(const ScratchFolder& folder) {
-  ThreadPool pool(1);
+std::string PageOfWall(const ScratchFolder& folder, const std::string& file_name) {
   ViewPage page;
-  page.file_name = "scene.ply";
-  page.file_bytes = WallPly(pool, &page.confidence);
+  TakeWall(file_name, &page);
   page.focus = {0.0, 0.0, 2.0};
   page.poster = EncodeJpeg(Image(120, 80, 3, 0.5f));
   page.photos = {{0, EncodeJpeg(Image(120, 80, 3, 1.0f))},
@@ -87,10 +110,12 @@ class BrowserTest : public ::testing::Test {
     if (chromium_.empty()) GTEST_SKIP() << "skipped, because there is no Chromium";
     if (FirstOf({"node"}).empty()) GTEST_SKIP() << "skipped, because there is no Node";
   }
-  nlohmann::json Look(const std::vector<std::string>& environment = {}) {
+  nlohmann::json Look(const std::string& file_name,
+                      const std::vector<std::string>& environment = {}) {
+    const std::string page = PageOfWall(scratch_, file_name);
     const std::string log = scratch_.path() / "log";
     const SubprocessResult result =
-        RunSubprocess({.arguments = {"node", COLOR3D_LOOK_AT_PAGE, chromium_, PageOfWall(scratch_)},
+        RunSubprocess({.arguments = {"node", COLOR3D_LOOK_AT_PAGE, chromium_, page},
                        .environment = environment,
                        .log_path = log,
                        .timeout = std::chrono::seconds(150)},
@@ -109,8 +134,14 @@ std::array<int, 3> Seen(const nlohmann::json& looked, const char* step, const ch
   return looked.at("seen").at(step).at(half);
 }
 
-TEST_F(BrowserTest, ShowsTheSceneInColorInGrayAndByWhereItsColorsComeFrom) {
-  const nlohmann::json looked = Look();
+class BrowserFormatTest : public BrowserTest, public ::testing::WithParamInterface<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Formats,
+                         BrowserFormatTest,
+                         ::testing::Values("scene.ply", "scene.sog"),
+                         [](const auto& format) { return std::string(format.param).substr(6); });
+
+TEST_P(BrowserFormatTest, ShowsTheSceneInColorInGrayAndByWhereItsColorsComeFrom) {
+  const nlohmann::json looked = Look(GetParam());
   SCOPED_TRACE(looked.dump(1));
   ASSERT_EQ(looked.at("state"), "ready");
   EXPECT_TRUE(looked.at("errors").empty());
@@ -138,7 +169,7 @@ TEST_F(BrowserTest, ShowsTheSceneInColorInGrayAndByWhereItsColorsComeFrom) {
 }
 
 TEST_F(BrowserTest, SaysSoAndShowsAPictureWhereThereIsNoWebGl) {
-  const nlohmann::json looked = Look({"COLOR3D_BROWSER_FLAGS=--disable-3d-apis"});
+  const nlohmann::json looked = Look("scene.sog", {"COLOR3D_BROWSER_FLAGS=--disable-3d-apis"});
   SCOPED_TRACE(looked.dump(1));
   EXPECT_EQ(looked.at("state"), "failed");
   EXPECT_NE(looked.at("note").get<std::string>().find("WebGL"), std::string::npos);

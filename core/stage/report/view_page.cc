@@ -10,6 +10,7 @@
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/export/export.h"
+#include "core/splat/export/sog/sog.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
@@ -35,12 +36,22 @@ Eigen::Vector3d FocusOf(const View& view, const Camera& camera, const Image& dep
   return view.cam_from_world.WorldFromCamera(away * camera.Ray(camera.cx, camera.cy));
 }
 
-// The file that the page shows, and the sureness of its Gaussians in its order.
-void TakeScene(const GaussianModel& model, const StageContext& context, ViewPage* page) {
-  page->file_name = artifact::kPly;
-  page->file_bytes = context.ReadInput(artifact::kPly);
-  page->file_is_compressed = false;
+// The smaller of the exported files, and the sureness of its Gaussians in its order.
+void TakeScene(const GaussianModel& model,
+               const ExportFrame& frame,
+               StageContext& context,
+               ViewPage* page) {
+  page->file_scale = frame.scale;
+  page->file_offset = frame.offset;
+  page->file_is_compressed = context.HasInput(artifact::kSog);
+  page->file_name = page->file_is_compressed ? artifact::kSog : artifact::kPly;
+  page->file_bytes = context.ReadInput(page->file_name);
   page->confidence = model.confidence;
+  if (!page->file_is_compressed || model.confidence.empty()) return;
+  const RgbHarmonics no_colors{.degree = 0, .sh = std::vector<float>(3 * model.size())};
+  const std::vector<uint32_t> order =
+      SogOrder(ForViewers(model, no_colors, frame, context.pool()).position);
+  for (size_t i = 0; i < order.size(); ++i) page->confidence[i] = model.confidence[order[i]];
 }
 
 std::vector<ViewPagePhoto> PhotosOf(const Scene& scene, int key_view, StageContext& context) {
@@ -65,7 +76,8 @@ std::vector<ViewPagePhoto> PhotosOf(const Scene& scene, int key_view, StageConte
 }  // namespace
 
 bool WriteViewPage(const Scene& scene, int key_view, StageContext& context) {
-  if (!context.HasInput(artifact::kPly) || !context.HasInput(artifact::kModel)) return false;
+  const bool exported = context.HasInput(artifact::kSog) || context.HasInput(artifact::kPly);
+  if (!exported || !context.HasInput(artifact::kModel)) return false;
   if (!HasViewer()) {
     context.progress().OnWarning(fmt::format(
         "this build has no viewer, so there is no {}: build again where npm reaches its registry",
@@ -76,12 +88,9 @@ bool WriteViewPage(const Scene& scene, int key_view, StageContext& context) {
   const View& key = scene.views.at(key_view);
   const Camera camera = key.camera.FitWithin(kPosterPx);
   const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
-  const ExportFrame frame = ExportFrameOf(scene);
 
   ViewPage page;
-  TakeScene(model, context, &page);
-  page.file_scale = frame.scale;
-  page.file_offset = frame.offset;
+  TakeScene(model, ExportFrameOf(scene), context, &page);
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);

@@ -27,6 +27,12 @@ TEST_F(StageTest, ThePageIsMadeFromTheExportedSceneAndTheModel) {
   EXPECT_EQ(context.outputs(), (std::vector<std::string>{"view.html"}));
   const std::string html = ReadFile(scratch_.path() / "out/view.html");
   EXPECT_NE(html.find(Base64(Gzip("the bytes of the exported file"))), std::string::npos);
+  // The smaller file is taken where there is one.
+  AddInput(artifact::kSog, "the bytes of the smaller file");
+  StageContext smaller = MakeContext();
+  ASSERT_TRUE(WriteViewPage(scene, 1, smaller));
+  EXPECT_NE(ReadFile(scratch_.path() / "out/view.html").find(Base64("the bytes of the smaller")),
+            std::string::npos);
   for (const View& view : scene.views) {
     EXPECT_NE(html.find("\"name\":\"" + view.name), std::string::npos) << view.name;
   }

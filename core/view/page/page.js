@@ -295,6 +295,7 @@ const prepare = (entity, confidence) => {
   splats = entity.gsplat;
   const resource = splats.resource;
   resource.format.addExtraStreams([{ name: 'colorSureness', format: 52 /* one byte */ }]);
+  resource.streams.syncWithFormat(resource.format);
   const texture = resource.getTexture('colorSureness');
   const texels = texture.lock();
   texels.fill(255);

@@ -193,6 +193,10 @@ class SogWriter {
 
 }  // namespace
 
+std::vector<uint32_t> SogOrder(const std::vector<float>& position) {
+  return MortonOrder(LogGridOf(position));
+}
+
 std::string EncodeSog(const ViewerGaussians& gaussians, ThreadPool& pool) {
   CheckFinite(gaussians);
   return SogWriter(gaussians, pool).Write();

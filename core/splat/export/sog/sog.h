@@ -2,7 +2,9 @@
 // Gaussian, an order of magnitude smaller than a PLY. A pure function.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "core/base/parallel.h"
 #include "core/splat/export/viewer_gaussians.h"
@@ -16,5 +18,9 @@ namespace color3d {
 // Error{kInvalidArgument} for values that are not finite and for more Gaussians than WebP pictures
 // can hold.
 std::string EncodeSog(const ViewerGaussians& gaussians, ThreadPool& pool);
+
+// For what lies beside the file: entry i is the index, in what EncodeSog is given, of the file's
+// i-th Gaussian. `position`: ViewerGaussians::position.
+std::vector<uint32_t> SogOrder(const std::vector<float>& position);
 
 }  // namespace color3d
