@@ -27,7 +27,7 @@ namespace color3d {
 struct FeatureNeighborsOptions {
   int bank_size = 6000;          // cells of the key view, drawn at random
   int further_bank_size = 3000;  // cells of all other pictures together
-  double min_weight = 0.25;      // only cells that are surer than this
+  double min_weight = 0.25;      // cells of other pictures that are surer than this
   WhiteningOptions whitening;
   VoteOptions vote{.median_steps = 5, .position_weight = 1.5};
   RelativeChroma relative_chroma;  // that the bank's colours are kept relative to

@@ -42,6 +42,12 @@ TrainingPicture KeyPicture(const Image& luminance, StageContext& context) {
   }
   TrainingPicture picture{"the key view", luminance, std::move(color.ab)};
   const auto unpainted = [](float confidence) { return confidence == 0.0f; };
+  if (std::all_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
+    throw InvalidArgument(
+        "what is painted on the key view is too fine to be seen at {} px; paint areas, or give the "
+        "picture as strokes, which spread",
+        SizeText(luminance));
+  }
   if (std::any_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
     for (float& value : color.confidence.data) value = unpainted(value) ? 0.0f : 1.0f;
     picture.weight = std::move(color.confidence);

@@ -74,6 +74,19 @@ TEST_F(PersonalizeStageTest, WhatIsLeftUnpaintedIsNotLearntFrom) {
   EXPECT_GT(right_of(painted), 15.0) << "not painted";
 }
 
+TEST_F(PersonalizeStageTest, APaintedPartThatIsTooFineIsRefused) {
+  Image ab(4 * kWidth, 4 * kHeight, 2, 30.0f), painted(4 * kWidth, 4 * kHeight, 1);
+  for (int x = 0; x < painted.width; ++x) painted.At(0, 10, x) = 1.0f;
+  AddInput(artifact::kKeyColor, EncodeAbPng(ab, painted));
+  try {
+    Personalize();
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("too fine"), HasSubstr("strokes")));
+  }
+}
+
 TEST_F(PersonalizeStageTest, GeneratedPicturesAreLearntFrom) {
   // Not the key view itself, whose own cells would answer.
   const Image luminance = LuminanceOfLab(Painting(kWidth / 2, kHeight));

@@ -91,10 +91,9 @@ CarriedColor ReadKeyColor(const StageContext& context, int width, int height) {
   for (float& value : painted.data) value = unpainted(value) ? 0.0f : 1.0f;
   CarriedColor color{ResizeWeighted(map.ab, painted, width, height),
                      Resize(map.confidence, width, height)};
-  // A pixel that is painted in part is not painted: its edges are somebody's guess.
   painted = Resize(painted, width, height);
   for (size_t i = 0; i < painted.data.size(); ++i) {
-    if (painted.data[i] < 0.999f) color.confidence.data[i] = 0.0f;
+    if (painted.data[i] < 0.5f) color.confidence.data[i] = 0.0f;
   }
   return color;
 }
