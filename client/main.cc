@@ -51,6 +51,7 @@ int Main(int argc, char** argv) {
   AddSceneCommands(app, context);
   AddKeyCommands(app, context);
   AddPreviewCommand(app, context);
+  AddViewCommand(app, context);
   AddColorizerCommands(app, context);
   AddJobCommands(app, context);
   AddArtifactCommands(app, context);

@@ -11,7 +11,7 @@ packages=(
   libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libabsl-dev
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
-  libicu-dev libnanoflann-dev zlib1g-dev
+  libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev libzstd-dev
 )
 case "${1:-}" in
   "") ;;
@@ -25,25 +25,39 @@ if ! command -v apt-get >/dev/null 2>&1; then
   exit 1
 fi
 
+# Wished for only: without npm the build leaves out the page to look at scenes in a browser.
+wished=()
+command -v npm >/dev/null 2>&1 || wished=(npm)
+
 missing=()
 for package in "${packages[@]}"; do
   state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
   [ "$state" = installed ] || missing+=("$package")
 done
-if [ "${#missing[@]}" -eq 0 ]; then
+if [ "${#missing[@]}" -eq 0 ] && [ "${#wished[@]}" -eq 0 ]; then
   exit 0
 fi
 
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
   if ! command -v sudo >/dev/null 2>&1; then
+    [ "${#missing[@]}" -gt 0 ] || exit 0
     echo "install-deps: these packages are missing, and installing them needs root or sudo:" >&2
     echo "  ${missing[*]}" >&2
     exit 1
   fi
   as_root=(sudo)
 fi
-echo "install-deps: installing ${missing[*]}"
-"${as_root[@]}" apt-get update -q
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-  apt-get install -y -q --no-install-recommends "${missing[@]}"
+install() {
+  "${as_root[@]}" apt-get update -q
+  echo "install-deps: installing $*"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get install -y -q --no-install-recommends "$@"
+}
+if [ "${#missing[@]}" -gt 0 ]; then
+  install "${missing[@]}"
+fi
+if [ "${#wished[@]}" -gt 0 ]; then
+  install "${wished[@]}" ||
+    echo "install-deps: without ${wished[*]}, which only the page to look at scenes needs" >&2
+fi

@@ -39,6 +39,7 @@ void AddInspectCommand(CLI::App& app, Context& context);
 void AddSceneCommands(CLI::App& app, Context& context);
 void AddKeyCommands(CLI::App& app, Context& context);
 void AddPreviewCommand(CLI::App& app, Context& context);
+void AddViewCommand(CLI::App& app, Context& context);
 void AddColorizerCommands(CLI::App& app, Context& context);
 void AddJobCommands(CLI::App& app, Context& context);
 void AddArtifactCommands(CLI::App& app, Context& context);

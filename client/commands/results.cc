@@ -148,7 +148,8 @@ std::string Summary(const fs::path& out) {
     text += Line("computing time", HumanSeconds(*seconds));
   }
   const std::pair<const char*, const char*> files[] = {{"coloured scene", artifact::kPly},
-                                                       {"report", artifact::kReport}};
+                                                       {"report", artifact::kReport},
+                                                       {"in the browser", artifact::kViewPage}};
   for (const auto& [label, name] : files) {
     std::error_code none;
     if (fs::exists(out / name, none)) text += Line(label, (out / name).string());

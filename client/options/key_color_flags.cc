@@ -180,7 +180,9 @@ void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
     return app.add_option(name, *value, help)->group(group);
   };
   app.add_flag("--auto", flags->automatic, "Automatic colours: nothing else to do")->group(group);
-  text("--key-color,--image", &flags->image, "The key view, coloured (JPEG, PNG or TIFF)");
+  text("--key-color,--image",
+       &flags->image,
+       "The key view, coloured (JPEG, PNG or TIFF); what is transparent is inferred");
   text("--hints,--strokes,--points",
        &flags->hints,
        "Colour strokes (PNG of the key view's size, transparent elsewhere), or points, lines and "

@@ -126,8 +126,7 @@ void WarpThroughPlane(const PosedLuminance& reference,
       const float inverse = 1.0f / std::max(w, 1e-6f);
       const float sx = (h(0, 0) * px + h(0, 1) * py + h(0, 2)) * inverse - 0.5f;
       const float sy = (h(1, 0) * px + h(1, 1) * py + h(1, 2)) * inverse - 0.5f;
-      const bool inside =
-          (w > 1e-6f) & (sx >= 0.0f) & (sy >= 0.0f) & (sx <= max_x) & (sy <= max_y);
+      const bool inside = (w > 1e-6f) & (sx >= 0.0f) & (sy >= 0.0f) & (sx <= max_x) & (sy <= max_y);
       ok[x] = inside;
       column[x] = inside ? sx : 0.0f;
       row[x] = inside ? sy : 0.0f;

@@ -60,8 +60,8 @@ const std::vector<Stage>& StageCatalogue() {
        .keeps_time_limit = true},
       {.kind = kind::kExport,
        .needs = {kScene, kModel},
-       .leaves = {kPly, kSplat, kExportScores},
-       .results = {kPly, kSplat}},
+       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kExportScores},
+       .results = {kPly, kSog, kSpz, kGlb, kSplat}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
        .leaves = {kRenders},
@@ -72,8 +72,8 @@ const std::vector<Stage>& StageCatalogue() {
        .leaves = {kScores, kTruths, kColored2d}},
       // Its report reads what all the others have left.
       {.kind = kind::kColorizeScene,
-       .leaves = {kReport, kMetrics, kAllCurves, kPlan},
-       .results = {kReport, kMetrics, kAllCurves, kPlan}},
+       .leaves = {kReport, kViewPage, kMetrics, kAllCurves, kPlan},
+       .results = {kReport, kViewPage, kMetrics, kAllCurves, kPlan}},
       {.kind = kind::kPersonalizeScenes},
   };
   return catalogue;

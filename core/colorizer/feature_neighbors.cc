@@ -54,7 +54,11 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
     : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
   torch::NoGradGuard no_grad;
   const KnownCells key = CellsOf(encoder, pictures.front(), options.relative_chroma);
-  const KnownCells of_key = Select(key, SampleRows(key.weights.size(0), options.bank_size, random));
+  // Cells without a colour would answer grey to what looks like them.
+  torch::Tensor colored = (key.weights > 0.0).nonzero().squeeze(1);
+  if (colored.size(0) == 0) colored = torch::arange(key.weights.size(0));
+  const KnownCells of_key =
+      Select(key, colored.index_select(0, SampleRows(colored.size(0), options.bank_size, random)));
   ViewNoise view_noise;
   std::vector<KnownCells> parts =
       FurtherCells(encoder, pictures, key, options, random, cancel, &view_noise);

@@ -6,11 +6,37 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/keycolor/picture_checks.h"
 
 namespace color3d {
+namespace {
 
-Image KeyColorFromImage(const Image& luminance, const Image& colored) {
+constexpr float kPaintedAlpha = 0.5f;
+
+// 1 where the picture is opaque; empty when it is everywhere.
+Image OpaquePart(const Image& colored) {
+  if (colored.channels < 4) return {};
+  Image opaque(colored.width, colored.height, 1);
+  size_t count = 0;
+  for (size_t i = 0; i < opaque.data.size(); ++i) {
+    opaque.data[i] = colored.Plane(3)[i] > kPaintedAlpha ? 1.0f : 0.0f;
+    count += opaque.data[i] > 0.0f ? 1 : 0;
+  }
+  if (count == 0)
+    throw InvalidArgument("the coloured picture is transparent all over; paint on it");
+  return count < opaque.data.size() ? opaque : Image();
+}
+
+Image WithoutAlpha(const Image& colored) {
+  Image srgb(colored.width, colored.height, 3);
+  std::copy_n(colored.data.begin(), srgb.data.size(), srgb.data.begin());
+  return srgb;
+}
+
+}  // namespace
+
+PaintedColor KeyColorFromImage(const Image& luminance, const Image& colored) {
   if (luminance.channels != 1 || luminance.Empty()) {
     throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
                           luminance.channels);
@@ -21,7 +47,7 @@ Image KeyColorFromImage(const Image& luminance, const Image& colored) {
         SizeText(colored),
         SizeText(luminance));
   }
-  if (colored.channels != 3) {
+  if (colored.channels < 3) {
     throw InvalidArgument("the coloured picture has no colour ({} channels, 3 are needed)",
                           colored.channels);
   }
@@ -30,12 +56,20 @@ Image KeyColorFromImage(const Image& luminance, const Image& colored) {
       throw InvalidArgument("the coloured picture holds a value that is not finite");
     }
   }
-  const Image lab = LabFromSrgb(colored);
-  Image ab(lab.width, lab.height, 2);
-  std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
-  ExpectColor(lab, "the coloured picture");
+  PaintedColor color;
+  color.painted = OpaquePart(colored);
+  Image lab = LabFromSrgb(WithoutAlpha(colored));
+  // What was not painted is the photo's, without colour.
+  for (size_t i = 0; i < color.painted.data.size(); ++i) {
+    if (color.painted.data[i] > 0.0f) continue;
+    lab.Plane(0)[i] = luminance.data[i];
+    lab.Plane(1)[i] = lab.Plane(2)[i] = 0.0f;
+  }
+  // A part may well be meant to be grey.
+  if (color.painted.Empty()) ExpectColor(lab, "the coloured picture");
   ExpectSameSubject(luminance, lab, "the coloured picture");
-  return ab;
+  color.ab = ChromaOfLab(lab);
+  return color;
 }
 
 }  // namespace color3d

@@ -39,7 +39,8 @@ std::string MessageOf(const Image& luminance, const Image& colored) {
 
 TEST(KeyColorFromImageTest, ReturnsTheChroma) {
   const Image lab = MakeLab(60, 40);
-  const Image ab = KeyColorFromImage(LuminanceOfLab(lab), SrgbFromLab(lab));
+  const auto [ab, painted] = KeyColorFromImage(LuminanceOfLab(lab), SrgbFromLab(lab));
+  EXPECT_TRUE(painted.Empty());
   ASSERT_EQ(ab.channels, 2);
   for (int y = 0; y < 40; ++y) {
     for (int x = 0; x < 60; ++x) {
@@ -107,6 +108,31 @@ TEST(KeyColorFromImageTest, NonFiniteValuesAreRefused) {
   Image colored = SrgbFromLab(lab);
   colored.data[3] = std::numeric_limits<float>::quiet_NaN();
   EXPECT_NE(MessageOf(LuminanceOfLab(lab), colored), "");
+}
+
+// The picture with an alpha of 1 left of `columns`, else of 0 over a black that is nobody's colour.
+Image PaintedLeftOf(int columns, const Image& srgb) {
+  Image painted(srgb.width, srgb.height, 4);
+  for (int y = 0; y < srgb.height; ++y) {
+    for (int x = 0; x < std::min(columns, srgb.width); ++x) {
+      for (int c = 0; c < 3; ++c) painted.At(c, y, x) = srgb.At(c, y, x);
+      painted.At(3, y, x) = 1.0f;
+    }
+  }
+  return painted;
+}
+
+TEST(KeyColorFromImageTest, OnlyWhatIsPaintedCounts) {
+  const Image lab = MakeLab(60, 40);
+  const Image luminance = LuminanceOfLab(lab), srgb = SrgbFromLab(lab);
+  const auto [ab, painted] = KeyColorFromImage(luminance, PaintedLeftOf(20, srgb));
+  ASSERT_EQ(painted.width, 60);
+  for (int x = 0; x < 60; ++x) {
+    EXPECT_EQ(painted.At(0, 7, x), x < 20 ? 1.0f : 0.0f) << x;
+    EXPECT_NEAR(ab.At(0, 7, x), x < 20 ? lab.At(1, 7, x) : 0.0f, 0.02f) << x;
+  }
+  EXPECT_TRUE(KeyColorFromImage(luminance, PaintedLeftOf(60, srgb)).painted.Empty());
+  EXPECT_NE(MessageOf(luminance, PaintedLeftOf(0, srgb)).find("transparent"), std::string::npos);
 }
 
 }  // namespace

@@ -45,8 +45,7 @@ Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image&
   const Image rendered = FitWithin(lab, kColorSidePx);
   v["delta_e00"] = MeanDeltaE00(rendered, truth);
   v["delta_e00_chroma"] = MeanDeltaE00(UnderTrueL(truth, ChromaOfLab(rendered)), truth);
-  v["delta_e00_chroma_2d"] =
-      MeanDeltaE00(UnderTrueL(truth, AtColorSide(view_ab)), truth);
+  v["delta_e00_chroma_2d"] = MeanDeltaE00(UnderTrueL(truth, AtColorSide(view_ab)), truth);
   v["delta_e00_gray"] = MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
   return v;
 }

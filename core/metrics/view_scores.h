@@ -17,8 +17,9 @@ inline constexpr int kScoreSidePx = 500;
 inline constexpr int kColorSidePx = 400;
 
 // `true_srgb`: 3 channels; `rendered_lab`: of the same size; `view_ab`: any size. Means over the
-// view's pixels. PSNR, SSIM and colourfulness at kScoreSidePx, "delta_e00*" (CIEDE2000) at kColorSidePx: of the
-// render, of its chroma and of the view's own chroma under the true L, and of no chroma at all.
+// view's pixels. PSNR, SSIM and colourfulness at kScoreSidePx, "delta_e00*" (CIEDE2000) at
+// kColorSidePx: of the render, of its chroma and of the view's own chroma under the true L, and of
+// no chroma at all.
 Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image& view_ab);
 
 // CIEDE2000 of the chroma of `rendered_lab` under the true L, at kColorSidePx.

@@ -1,9 +1,8 @@
 #include "core/report/report_page.h"
 
-#include <openssl/evp.h>
-
 #include <cstdio>
 
+#include "core/base/base64.h"
 #include "core/report/plot.h"
 
 namespace color3d {
@@ -23,17 +22,10 @@ td.v{text-align:right;font-variant-numeric:tabular-nums}
 .plots{display:flex;flex-wrap:wrap;gap:8px}.plot{width:360px;max-width:100%}
 .plot .t{font-size:12px;fill:currentColor}.plot .n{font-size:10px;fill:currentColor;opacity:.7}
 .plot .g{stroke:currentColor;opacity:.15}.plot .c{fill:none;stroke:#2b7de9;stroke-width:1.6}
+.go{display:inline-block;padding:.5rem 1rem;border-radius:6px;background:#2b6cb0;color:#fff;
+text-decoration:none}
 .no{opacity:.6}.warn{border-left:4px solid #e0a000;padding:.1rem .8rem}
 )";
-
-std::string Base64(const std::string& bytes) {
-  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');
-  const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
-                                     reinterpret_cast<const unsigned char*>(bytes.data()),
-                                     static_cast<int>(bytes.size()));
-  text.resize(static_cast<size_t>(length));
-  return text;
-}
 
 std::string Number(double value) {
   char buffer[64];
@@ -126,6 +118,10 @@ std::string RenderReport(const ReportData& data) {
       "<meta name=\"viewport\" content=\"width=device-width\"><title>" +
       EscapeHtml(data.title) + "</title><style>" + kStyle + "</style></head><body>";
   html += "<h1>" + EscapeHtml(data.title) + "</h1><p>" + EscapeHtml(data.summary) + "</p>";
+  if (!data.view_page.empty()) {
+    html += "<p><a class=\"go\" href=\"" + EscapeHtml(data.view_page) +
+            "\">Look at the scene in 3D</a></p>";
+  }
   for (const std::string& warning : data.warnings) {
     html += "<p class=\"warn\">" + EscapeHtml(warning) + "</p>";
   }

@@ -47,7 +47,8 @@ struct ReportSection {
 
 struct ReportData {
   std::string title;
-  std::string summary;  // one paragraph of plain text
+  std::string summary;    // one paragraph of plain text
+  std::string view_page;  // file beside the report that shows the scene in 3D; empty: none
   ReportKeyView key_view;
   std::vector<ReportSection> sections;  // between the key view and the views
   std::vector<ReportRow> views;

@@ -47,9 +47,7 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
   keys[0].view = ReadKeyView(context, scene);
   keys[0].surfaces = maker.Make(keys[0].view);
   const Camera& camera = keys[0].surfaces.rendered.camera;
-  const AbMap map = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
-  keys[0].color = {Resize(map.ab, camera.width, camera.height),
-                   Resize(map.confidence, camera.width, camera.height)};
+  keys[0].color = ReadKeyColor(context, camera.width, camera.height);
   for (const FurtherKeyView& further : options.further) {
     context.cancel().ThrowIfCancelled();
     ColoredKeyView key;

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
@@ -6,6 +8,11 @@
 #include "core/stage/stages.h"
 
 namespace color3d {
+namespace {
+
+constexpr float kLeastConfidence = 1.0f / 255.0f;
+
+}  // namespace
 
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
@@ -23,8 +30,11 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   }
   // Everything after this works on undistorted pictures.
   const ViewImages images(scene, context.scene_folder(), 0, 0);
-  const Image confidence =
-      result.confidence.Empty() ? Image() : images.Undistort(key, result.confidence);
+  Image confidence = result.confidence.Empty() ? Image() : images.Undistort(key, result.confidence);
+  if (options.source != ColorizeKeyViewOptions::Source::kImage) {
+    // None at all says that the user left a place unpainted; what a source says is more.
+    for (float& value : confidence.data) value = std::max(value, kLeastConfidence);
+  }
   context.WriteOutput(artifact::kKeyColor,
                       EncodeAbPng(images.Undistort(key, result.ab), confidence));
   context.WriteOutput(artifact::kKeyViewColored,

@@ -36,6 +36,28 @@ TEST_F(StageTest, KeyColourKeepsTheCapturedLuminanceAndTheGivenChroma) {
   EXPECT_NEAR(map.ab.At(1, 16, 24), -6.0f, 0.1f);
 }
 
+TEST_F(StageTest, WhatIsTransparentInThePictureIsNotKnown) {
+  AddInput(artifact::kScene, SceneToJson(RampScene(scratch_.path(), 48, 32)));
+  AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
+  const Image luminance = LuminanceFromSrgb(ReadImage(scratch_.path() / "p1.png"));
+  const Image srgb = SrgbFromLab(JoinLab(luminance, Image(48, 32, 2, 8.0f)));
+  Image painted(48, 32, 4);
+  std::copy(srgb.data.begin(), srgb.data.end(), painted.data.begin());
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 24; ++x) painted.At(3, y, x) = 1.0f;
+  }
+  WriteFileAtomic(scratch_.path() / "part.png", EncodePng8(painted));
+  ColorizeKeyViewOptions options;
+  options.file = scratch_.path() / "part.png";
+  StageContext context = MakeContext();
+  RunColorizeKeyView(options, context);
+  const AbMap map = DecodeAbPng(ReadFile(scratch_.path() / "out/key_color.png"), "key_color.png");
+  EXPECT_EQ(map.confidence.At(0, 16, 12), 1.0f);
+  EXPECT_EQ(map.confidence.At(0, 16, 36), 0.0f);
+  const auto facts = nlohmann::json::parse(ReadFile(scratch_.path() / "out/key_color.json"));
+  EXPECT_NEAR(facts.at("painted").get<double>(), 0.5, 1e-6);
+}
+
 // Sepia, and brighter than what it was sent.
 class SepiaBackend : public RemoteColorizer {
  public:

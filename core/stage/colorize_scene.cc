@@ -13,6 +13,7 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
+#include "core/stage/report/view_page.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -207,6 +208,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
   data.summary = Summary(scene, metrics, keys);
+  if (WriteViewPage(scene, key, context)) data.view_page = artifact::kViewPage;
   data.key_view = ReportOfKeyView(
       {scene.views[key].name,
        {Picture(context, artifact::kKeyViewGray, "as captured"),

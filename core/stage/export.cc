@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/splat/export/glb/glb.h"
 #include "core/splat/export/rgb_refine.h"
+#include "core/splat/export/sog/sog.h"
+#include "core/splat/export/spz/spz.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -36,14 +39,37 @@ nlohmann::ordered_json ScoresOf(const RgbRefinement& refinement,
           {"unrefined_worst_psnr_db_vs_lab", refinement.before.worst_psnr_db}};
 }
 
+void WriteWithHarmonics(const ExportOptions& options,
+                        const GaussianModel& model,
+                        const RgbHarmonics& rgb,
+                        const ExportFrame& frame,
+                        bool with_confidence,
+                        StageContext& context) {
+  if (options.ply) {
+    context.WriteOutput(artifact::kPly,
+                        EncodeGaussianPly(model, rgb, frame, context.pool(), with_confidence));
+  }
+  if (!options.sog && !options.spz && !options.glb) return;
+  const ViewerGaussians gaussians = ForViewers(model, rgb, frame, context.pool());
+  if (options.sog) context.WriteOutput(artifact::kSog, EncodeSog(gaussians, context.pool()));
+  if (options.spz) {
+    const SpzVersion version = options.spz_version == 2 ? SpzVersion::k2 : SpzVersion::k4;
+    context.WriteOutput(artifact::kSpz, EncodeSpz(gaussians, version, context.pool()));
+  }
+  if (options.glb) context.WriteOutput(artifact::kGlb, EncodeGlb(gaussians));
+}
+
 }  // namespace
 
 void ExportOptions::Validate() const {
-  if (!ply && !splat) {
-    throw InvalidArgument("the export has nothing to write; ask for ply or splat");
+  if (!ply && !sog && !spz && !glb && !splat) {
+    throw InvalidArgument("the export has nothing to write; ask for ply, sog, spz, glb or splat");
   }
   if (confidence && !ply) {
     throw InvalidArgument("only a PLY can carry confidence; ask for ply too");
+  }
+  if (spz_version != 2 && spz_version != 4) {
+    throw InvalidArgument("there is no SPZ of version {} here; ask for 4 or 2", spz_version);
   }
 }
 
@@ -73,19 +99,17 @@ void RunExport(const ExportOptions& options, StageContext& context) {
   };
   const RgbHarmonics fitted = FitRgbHarmonics(model, context.pool());
   nlohmann::ordered_json scores;
-  if (options.ply) {
+  if (options.ply || options.sog || options.spz || options.glb) {
     const RgbRefinement rgb = refined(fitted);
     context.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
     context.progress().OnError(refine.epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
     scores["ply"] = ScoresOf(rgb, names);
-    context.WriteOutput(
-        artifact::kPly,
-        EncodeGaussianPly(model, rgb.harmonics, frame, context.pool(), with_confidence));
+    WriteWithHarmonics(options, model, rgb.harmonics, frame, with_confidence, context);
   }
   if (options.splat) {
     const RgbRefinement rgb = refined(DegreeZero(fitted));
     scores["splat"] = ScoresOf(rgb, names);
-    context.WriteOutput(artifact::kSplat, EncodeSplat(model, rgb.harmonics, frame));
+    context.WriteOutput(artifact::kSplat, EncodeSplat(model, rgb.harmonics, frame, context.pool()));
   }
   context.WriteOutput(artifact::kExportScores, scores.dump(1) + "\n");
 }

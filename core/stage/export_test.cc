@@ -4,12 +4,13 @@
 
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
+#include "tests/support/formats/viewer_files.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, ExportWritesBothFormatsInTheWorldsFrameAndSaysWhatTheyLose) {
+TEST_F(StageTest, ExportWritesItsFilesInTheWorldsFrameAndSaysWhatTheyLose) {
   Scene scene = RampScene(scratch_.path(), 48, 32);
   scene.world_from_scene_scale = 0.001;
   scene.world_offset = {1e6, 0.0, 0.0};
@@ -17,12 +18,26 @@ TEST_F(StageTest, ExportWritesBothFormatsInTheWorldsFrameAndSaysWhatTheyLose) {
   AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
   StageContext context = MakeContext();
   RunExport({}, context);
-  EXPECT_EQ(context.outputs(),
-            (std::vector<std::string>{"scene.ply", "scene.splat", "export.json"}));
+  EXPECT_EQ(context.outputs(), (std::vector<std::string>{"scene.ply", "scene.sog", "export.json"}));
   EXPECT_NE(observer_.text.find("relative to the offset"), std::string::npos) << observer_.text;
   const std::string ply = ReadFile(scratch_.path() / "out/scene.ply");
   EXPECT_NE(ply.find("comment offset 1e+06 0 0\n"), std::string::npos);
-  EXPECT_EQ(ReadFile(scratch_.path() / "out/scene.splat").size(), 9u * 32);
+  const ViewerGaussians from_ply = ReadPly(ply);
+  const ViewerGaussians from_sog = ReadSog(ReadFile(scratch_.path() / "out/scene.sog"));
+  ASSERT_EQ(from_ply.size(), 9u);
+  ASSERT_EQ(from_sog.size(), 9u);
+  for (int k = 0; k < 3; ++k) {  // one box, in the file's units
+    const auto extent = [k](const ViewerGaussians& g) {
+      float low = 1e30f, high = -1e30f;
+      for (size_t i = k; i < g.position.size(); i += 3) {
+        low = std::min(low, g.position[i]);
+        high = std::max(high, g.position[i]);
+      }
+      return std::pair(low, high);
+    };
+    EXPECT_NEAR(extent(from_ply).first, extent(from_sog).first, 1e-7);
+    EXPECT_NEAR(extent(from_ply).second, extent(from_sog).second, 1e-7);
+  }
   const auto scores = nlohmann::json::parse(ReadFile(scratch_.path() / "out/export.json"));
   const double before = scores.at("ply").at("unrefined_psnr_db_vs_lab");
   const double after = scores.at("ply").at("psnr_db_vs_lab");
@@ -30,7 +45,16 @@ TEST_F(StageTest, ExportWritesBothFormatsInTheWorldsFrameAndSaysWhatTheyLose) {
   EXPECT_GE(after, before);
   EXPECT_EQ(scores.at("ply").at("worst_view").get<std::string>().substr(0, 1), "p");
   StageContext again = MakeContext();
-  EXPECT_THROW(RunExport({.ply = false, .splat = false}, again), Error);
+  EXPECT_THROW(RunExport({.ply = false, .sog = false}, again), Error);
+  EXPECT_THROW(RunExport({.spz = true, .spz_version = 3}, again), Error);
+  RunExport({.ply = false, .sog = false, .splat = true}, again);
+  EXPECT_EQ(again.outputs(), (std::vector<std::string>{"scene.splat", "export.json"}));
+  EXPECT_EQ(ReadFile(scratch_.path() / "out/scene.splat").size(), 9u * 32);
+  StageContext others = MakeContext();
+  RunExport({.ply = false, .sog = false, .spz = true, .spz_version = 2, .glb = true}, others);
+  EXPECT_EQ(others.outputs(), (std::vector<std::string>{"scene.spz", "scene.glb", "export.json"}));
+  EXPECT_EQ(ReadSpz(ReadFile(scratch_.path() / "out/scene.spz")).size(), 9u);
+  EXPECT_EQ(ReadGlb(ReadFile(scratch_.path() / "out/scene.glb")).position, from_ply.position);
 }
 
 }  // namespace

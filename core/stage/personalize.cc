@@ -16,27 +16,43 @@
 namespace color3d {
 namespace {
 
-// The key view's colour at the size of its luminance.
-Image KeyAb(const Image& luminance, StageContext& context) {
-  const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
-  const double height = static_cast<double>(luminance.width) / color.ab.width * color.ab.height;
-  if (std::abs(height - luminance.height) > 1.0 + 0.01 * luminance.height) {
-    throw InvalidArgument(
-        "{} is {} px, the key view {}: its shape is another; colour the photo that "
-        "is the key view",
-        artifact::kKeyColor,
-        SizeText(color.ab),
-        SizeText(luminance));
-  }
-  Image ab = Resize(color.ab, luminance.width, luminance.height);
-  const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, ab));
+void ExpectShapeOf(const Image& luminance, StageContext& context) {
+  const ImageInfo color = ProbeImage(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+  const double height = static_cast<double>(luminance.width) / color.width * color.height;
+  if (std::abs(height - luminance.height) <= 1.0 + 0.01 * luminance.height) return;
+  throw InvalidArgument(
+      "{} is {}x{} px, the key view {}: its shape is another; colour the photo that is the key "
+      "view",
+      artifact::kKeyColor,
+      color.width,
+      color.height,
+      SizeText(luminance));
+}
+
+// The key view in colour; what the user left unpainted is not learnt from.
+TrainingPicture KeyPicture(const Image& luminance, StageContext& context) {
+  ExpectShapeOf(luminance, context);
+  CarriedColor color = ReadKeyColor(context, luminance.width, luminance.height);
+  const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, color.ab));
   if (chroma.IsGray()) {
     context.progress().OnWarning(fmt::format(
         "the coloured key view has hardly any colour (mean chroma {:.2f} Lab units), so "
         "the scene will stay grey; colour it by another means, e.g. hints or a picture",
         chroma.mean));
   }
-  return ab;
+  TrainingPicture picture{"the key view", luminance, std::move(color.ab)};
+  const auto unpainted = [](float confidence) { return confidence == 0.0f; };
+  if (std::all_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
+    throw InvalidArgument(
+        "what is painted on the key view is too fine to be seen at {} px; paint areas, or give the "
+        "picture as strokes, which spread",
+        SizeText(luminance));
+  }
+  if (std::any_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
+    for (float& value : color.confidence.data) value = unpainted(value) ? 0.0f : 1.0f;
+    picture.weight = std::move(color.confidence);
+  }
+  return picture;
 }
 
 // Views that carried colours are learnt from: the best covered ones that are not the key view.
@@ -88,8 +104,7 @@ void RunPersonalize(const ColorizerOptions& options,
   const int key = ReadKeyView(context, scene);
   const ViewImages images(scene, context.scene_folder(), options.max_side_px, 0);
   const auto luminance = images.Luminance(key);
-  std::vector<TrainingPicture> pictures = {
-      {"the key view", *luminance, KeyAb(*luminance, context)}};
+  std::vector<TrainingPicture> pictures = {KeyPicture(*luminance, context)};
   const ViewPositions positions(scene, context);
   pictures[0].position = positions.Of(key, images.WorkingCamera(key), *luminance);
   if (context.HasInput(artifact::kAugmentationFacts)) {

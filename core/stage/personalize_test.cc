@@ -51,6 +51,42 @@ TEST_F(PersonalizeStageTest, AKeyColourOfAnotherShapeIsRefused) {
   EXPECT_FALSE(Personalize().empty()) << "another size of the same shape will do";
 }
 
+// Its grey would answer for every other view's, too.
+TEST_F(PersonalizeStageTest, WhatIsLeftUnpaintedIsNotLearntFrom) {
+  Image ab(kWidth, kHeight, 2, 30.0f), painted(kWidth, kHeight, 1, 1.0f);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = kWidth / 2; x < kWidth; ++x) {
+      ab.At(0, y, x) = ab.At(1, y, x) = 0.0f;
+      painted.At(0, y, x) = 0.0f;
+    }
+  }
+  const auto right_of = [&](const Image& confidence) {
+    AddInput(artifact::kKeyColor, EncodeAbPng(ab, confidence));
+    const Image colors = LoadColorizer(Personalize(), Encoder::Embedded(), 1)
+                             ->Colorize(LuminanceOfLab(Painting(kWidth, kHeight)));
+    double sum = 0.0;
+    for (int y = 0; y < colors.height; ++y) {
+      for (int x = 3 * colors.width / 4; x < colors.width; ++x) sum += colors.At(0, y, x);
+    }
+    return sum / (colors.height * (colors.width - 3 * colors.width / 4));
+  };
+  EXPECT_LT(right_of(Image()), 5.0) << "painted grey";
+  EXPECT_GT(right_of(painted), 15.0) << "not painted";
+}
+
+TEST_F(PersonalizeStageTest, APaintedPartThatIsTooFineIsRefused) {
+  Image ab(4 * kWidth, 4 * kHeight, 2, 30.0f), painted(4 * kWidth, 4 * kHeight, 1);
+  for (int x = 0; x < painted.width; ++x) painted.At(0, 10, x) = 1.0f;
+  AddInput(artifact::kKeyColor, EncodeAbPng(ab, painted));
+  try {
+    Personalize();
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+    EXPECT_THAT(e.what(), AllOf(HasSubstr("too fine"), HasSubstr("strokes")));
+  }
+}
+
 TEST_F(PersonalizeStageTest, GeneratedPicturesAreLearntFrom) {
   // Not the key view itself, whose own cells would answer.
   const Image luminance = LuminanceOfLab(Painting(kWidth / 2, kHeight));

@@ -25,7 +25,7 @@ class ConfidenceTest : public EvaluatedSceneTest {
   std::string ExportedPly() {
     inputs_[artifact::kModel] = scratch_.path() / "out/model.c3g";
     StageContext context = MakeContext();
-    RunExport({.ply = true, .splat = false, .confidence = true}, context);
+    RunExport({.ply = true, .sog = false, .confidence = true}, context);
     return ReadFile(scratch_.path() / "out/scene.ply");
   }
 };

@@ -131,8 +131,12 @@ void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, Sta
 void RunSolveChroma(const ChromaOptions& options, StageContext& context);
 
 struct ExportOptions {
-  bool ply = true;    // 3DGS with RGB spherical harmonics
-  bool splat = true;  // 32 bytes a Gaussian, no view dependence
+  bool ply = true;      // 3DGS with RGB spherical harmonics
+  bool sog = true;      // the same in a tenth of the bytes, for web viewers
+  bool spz = false;     // a byte or two for each number
+  int spz_version = 4;  // 4, or 2 for older readers
+  bool glb = false;     // glTF with KHR_gaussian_splatting
+  bool splat = false;   // 32 bytes a Gaussian, no view dependence
   // PLY with a property "confidence", which strict viewers may refuse; needs a model that has it.
   bool confidence = false;
   void Validate() const;

@@ -30,12 +30,14 @@ void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
     spec.mutable_generate_augmentations()->set_samples(SamplesOf(spec.generate_augmentations()));
   }
   TakeEncoderOfColorizer(*builder, &spec);
-  const bool nothing_to_do = spec.has_export_() && spec.export_().has_ply() &&
-                             !spec.export_().ply() && !spec.export_().splat();
-  builder->Add(std::move(spec),
-               nothing_to_do
-                   ? "export.ply is false and no splat is asked for: there is nothing to export"
-                   : "");
+  const v1::ExportSpec& files = spec.export_();
+  const bool nothing_to_do = spec.has_export_() && files.has_ply() && !files.ply() &&
+                             !files.sog() && !files.spz() && !files.glb() && !files.splat();
+  builder->Add(
+      std::move(spec),
+      nothing_to_do
+          ? "export.ply is false and no other file is asked for: there is nothing to export"
+          : "");
 }
 
 }  // namespace

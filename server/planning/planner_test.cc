@@ -298,6 +298,9 @@ TEST(Planner, ExportOfNothingIsSkipped) {
               HasSubstr("ply"));
   spec.mutable_export_()->set_splat(true);
   EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
+  spec.mutable_export_()->clear_splat();
+  spec.mutable_export_()->set_sog(true);
+  EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
 }
 
 JobRecord Done(const std::string& kind) {

@@ -140,7 +140,11 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
 ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   ExportOptions options;
   if (spec.has_ply()) options.ply = spec.ply();
-  options.splat = spec.has_splat() ? spec.splat() : options.ply;
+  options.sog = spec.has_sog() ? spec.sog() : options.ply;
+  options.spz = spec.spz();
+  if (spec.has_spz_version()) options.spz_version = spec.spz_version();
+  options.glb = spec.glb();
+  options.splat = spec.splat();
   options.confidence = spec.confidence();
   return options;
 }

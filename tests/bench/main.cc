@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   color3d::AddAutomaticCommand(app);
   color3d::AddChoicesCommand(app);
   color3d::AddFloorCommand(app);
+  color3d::AddFormatsCommand(app);
   color3d::AddGoldenCommand(app);
   color3d::AddMakeWeightsCommand(app);
   color3d::AddNetworksCommand(app);

@@ -7,6 +7,7 @@
 
 #include "core/base/digest.h"
 #include "core/image/codec.h"
+#include "core/view/view_page.h"
 #include "tests/integration/service_fixture.h"
 
 namespace color3d {
@@ -20,6 +21,7 @@ class ColorizeTest : public ServiceTest {
  protected:
   void SetUp() override { StartServer(); }
   void ExpectSameBytesFromArtifactDownload(const std::string& job);
+  void ExpectPageToLookAt(const v1::Job& job);
 };
 
 // What `artifact download` brings is what was uploaded as the job's result.
@@ -36,6 +38,29 @@ void ColorizeTest::ExpectSameBytesFromArtifactDownload(const std::string& job) {
     ++files;
   }
   EXPECT_GE(files, 6);
+}
+
+// `view` brings the page of a job and of its scene, and finds it in a folder of results.
+void ColorizeTest::ExpectPageToLookAt(const v1::Job& job) {
+  const std::string out = Path("page").string();
+  const ProcessResult of_job = Client({"view", job.name(), "-o", out, "--no-open", "--json"});
+  if (!HasViewer()) {
+    ExpectRefusal(of_job, 2, {"view.html", "npm"});
+    return;
+  }
+  ASSERT_EQ(of_job.exit_code, 0) << of_job.err;
+  const std::string page = json::parse(of_job.out).at("page");
+  EXPECT_EQ(fs::path(page), fs::absolute(Path("page") / "view.html"));
+  EXPECT_NE(ReadFile(page).find("\"scene\":\"scene."), std::string::npos);
+  fs::remove_all(out);
+  const ProcessResult of_scene = Client({"view", job.spec().scene(), "-o", out, "--no-open"});
+  ASSERT_EQ(of_scene.exit_code, 0) << of_scene.err;
+  EXPECT_NE(of_scene.out.find(page), std::string::npos) << of_scene.out;
+  EXPECT_EQ(Client({"view", out, "--no-open"}).exit_code, 0);
+  fs::remove_all(out);
+  fs::create_directories(out);
+  ExpectRefusal(Client({"view", out}), 2, {out, "view.html", "artifact download"});
+  ExpectRefusal(Client({"view", Path("nowhere").string()}), 2, {"there is no folder"});
 }
 
 TEST_F(ColorizeTest, ReadOnlyCommandsAnswerInWordsAndInJson) {
@@ -270,6 +295,8 @@ TEST_F(ColorizeTest, DetachReturnsAtOnceAndWatchAttachesAgain) {
                                         QuickOptions());
   ASSERT_EQ(detached.exit_code, 0) << detached.err;
   const std::string job = NewestJob("colorize_scene").name();
+  ExpectRefusal(
+      Client({"view", NewestJob("colorize_scene").spec().scene()}), 2, {"still being", job});
   EXPECT_NE(detached.out.find(job.substr(job.find('/') + 1)), std::string::npos) << detached.out;
   const ProcessResult watched = Client({"job", "watch", job});
   EXPECT_EQ(watched.exit_code, 0) << watched.err;
@@ -278,6 +305,7 @@ TEST_F(ColorizeTest, DetachReturnsAtOnceAndWatchAttachesAgain) {
   EXPECT_NE(shown.out.find("SUCCEEDED"), std::string::npos);
   EXPECT_TRUE(json::accept(shown.out)) << shown.out;
   ExpectSameBytesFromArtifactDownload(job);
+  ExpectPageToLookAt(NewestJob("colorize_scene"));
 }
 
 }  // namespace

@@ -4,22 +4,9 @@
 #include <string>
 
 #include "core/base/parallel.h"
-#include "core/splat/export/rgb_harmonics.h"
-#include "core/splat/model/gaussian_model.h"
+#include "core/splat/export/viewer_gaussians.h"
 
 namespace color3d {
-
-// Where an exported scene stands: file = scale * scene + offset.
-struct ExportFrame {
-  double scale = 1.0;
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
-  // Not in the positions, because float32 cannot carry it: the user has to add it to them.
-  Eigen::Vector3d left_out = Eigen::Vector3d::Zero();
-};
-
-// The world's own units, and its own origin too unless float32 would then round positions by more
-// than 1e-3 of the scene's extent.
-ExportFrame ExportFrameOf(const Scene& scene);
 
 // Binary little-endian PLY bytes with x y z nx ny nz f_dc_* f_rest_* opacity scale_* rot_*. An
 // offset that was left out stands in a header comment "offset x y z". `with_confidence` adds a last
@@ -38,6 +25,7 @@ std::string EncodeGaussianPly(const GaussianModel& model,
 // Throws as EncodeGaussianPly.
 std::string EncodeSplat(const GaussianModel& model,
                         const RgbHarmonics& rgb,
-                        const ExportFrame& frame);
+                        const ExportFrame& frame,
+                        ThreadPool& pool);
 
 }  // namespace color3d

@@ -93,7 +93,7 @@ TEST(ExportTest, SplatReadsBackSortedByImportance) {
   ThreadPool pool(1);
   const GaussianModel m = DullModel(50, 1, 0);
   const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
-  const std::string bytes = EncodeSplat(m, rgb, {3.0, {10.0, 0.0, -5.0}, {0.0, 0.0, 0.0}});
+  const std::string bytes = EncodeSplat(m, rgb, {3.0, {10.0, 0.0, -5.0}, {0.0, 0.0, 0.0}}, pool);
   ASSERT_EQ(bytes.size(), 50u * 32);
   std::vector<SplatRow> rows(50);
   std::memcpy(rows.data(), bytes.data(), bytes.size());

@@ -81,6 +81,23 @@ nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& 
   }
 }
 
+CarriedColor ReadKeyColor(const StageContext& context, int width, int height) {
+  const AbMap map = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+  const auto unpainted = [](float confidence) { return confidence == 0.0f; };
+  if (std::none_of(map.confidence.data.begin(), map.confidence.data.end(), unpainted)) {
+    return {Resize(map.ab, width, height), Resize(map.confidence, width, height)};
+  }
+  Image painted = map.confidence;
+  for (float& value : painted.data) value = unpainted(value) ? 0.0f : 1.0f;
+  CarriedColor color{ResizeWeighted(map.ab, painted, width, height),
+                     Resize(map.confidence, width, height)};
+  painted = Resize(painted, width, height);
+  for (size_t i = 0; i < painted.data.size(); ++i) {
+    if (painted.data[i] < 0.5f) color.confidence.data[i] = 0.0f;
+  }
+  return color;
+}
+
 CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height) {
   const std::string name = ViewArtifact(artifact::kCarried, view, ".png");
   if (!context.HasInput(name)) return {Image(width, height, 2), Image(width, height, 1)};

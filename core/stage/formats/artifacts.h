@@ -41,6 +41,9 @@ int ReadKeyView(const StageContext& context, const Scene& scene);
 // Throws Error{kInvalidArgument} with the artifact's name when it is no JSON.
 nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& name);
 
+// The key view's colour, resized; confidence 0 where the user left it unpainted.
+CarriedColor ReadKeyColor(const StageContext& context, int width, int height);
+
 // What was carried into a view, resized; nothing where there is no such artifact.
 CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height);
 

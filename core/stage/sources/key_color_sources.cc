@@ -1,6 +1,8 @@
 #include "core/stage/sources/key_color_sources.h"
 
 #include <algorithm>
+#include <numeric>
+#include <utility>
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
@@ -31,9 +33,18 @@ Image ReadMask(const std::filesystem::path& file) {
   return mask;
 }
 
+double MeanOf(const Image& plane) {
+  return std::accumulate(plane.data.begin(), plane.data.end(), 0.0) /
+         static_cast<double>(plane.data.size());
+}
+
 KeyColorResult FromImage(const Options& options, const KeyPhoto& photo, StageContext&) {
+  PaintedColor color =
+      KeyColorFromImage(photo.luminance, ReadImage(options.file, /*keep_alpha=*/true));
   KeyColorResult result;
-  result.ab = KeyColorFromImage(photo.luminance, ReadImage(options.file));
+  result.ab = std::move(color.ab);
+  result.confidence = std::move(color.painted);
+  if (!result.confidence.Empty()) result.facts = {{"painted", MeanOf(result.confidence)}};
   return result;
 }
 

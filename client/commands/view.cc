@@ -1,0 +1,198 @@
+// `color3d view`: a coloured scene in the browser.
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/results.h"
+#include "client/lib/job_watch.h"
+#include "client/lib/names.h"
+#include "client/lib/text.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+struct ViewOptions {
+  std::string target;  // folder of results, jobs/ID or scenes/ID
+  std::string out = "view";
+  bool open = true;
+};
+
+constexpr const char* kHowToGetPage =
+    "it is of an older version, or its worker was built without the viewer; build that where npm "
+    "reaches its registry, and run `color3d colorize` again";
+
+fs::path PageIn(const fs::path& target) {
+  std::error_code none;
+  if (fs::is_regular_file(target, none) && target.extension() == ".html") return target;
+  if (!fs::is_directory(target, none)) {
+    throw Error(ErrorCode::kNotFound,
+                "there is no folder {}; name the one that `color3d colorize` wrote to (-o), "
+                "jobs/ID or scenes/ID",
+                target.string());
+  }
+  const fs::path page = target / artifact::kViewPage;
+  if (fs::is_regular_file(page, none)) return page;
+  if (fs::exists(target / artifact::kReport, none)) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} has results, but no {}: {}",
+                target.string(),
+                artifact::kViewPage,
+                kHowToGetPage);
+  }
+  throw Error(ErrorCode::kFailedPrecondition,
+              "{} has no {}: it holds no finished results of `color3d colorize`; when the job is "
+              "done, fetch them with `color3d artifact download jobs/ID -o {}`",
+              target.string(),
+              artifact::kViewPage,
+              target.string());
+}
+
+// The newest colorize_scene job of the scene that has succeeded.
+v1::Job NewestResult(Connection& connection, const std::string& scene) {
+  v1::GetSceneRequest known;
+  known.set_name(scene);
+  connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), known);
+  v1::ListJobsRequest request;
+  request.set_parent(scene);
+  request.set_page_size(200);
+  std::string unfinished;
+  do {
+    const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
+    for (const v1::Job& job : jobs.jobs()) {
+      if (job.kind() != kind::kColorizeScene || !job.parent().empty()) continue;
+      if (job.state() == v1::Job::STATE_SUCCEEDED) return job;
+      if (unfinished.empty() && !IsFinished(job.state())) unfinished = job.name();
+    }
+    request.set_page_token(jobs.next_page_token());
+  } while (!request.page_token().empty());
+  if (!unfinished.empty()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} is still being coloured; follow it with `color3d job watch {}`",
+                scene,
+                unfinished);
+  }
+  throw Error(ErrorCode::kFailedPrecondition,
+              "{} has not been coloured yet; do that with `color3d colorize {}`",
+              scene,
+              scene);
+}
+
+fs::path Download(const Context& context, const ViewOptions& options) {
+  Connection connection(context.server, *context.interrupt);
+  const v1::Job job = options.target.starts_with("scenes/")
+                          ? NewestResult(connection, options.target)
+                          : GetJob(connection, ResourceName(options.target, "jobs"));
+  if (job.kind() != kind::kColorizeScene) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} is a {} job; a page to look at comes with {} jobs only",
+                job.name(),
+                job.kind(),
+                kind::kColorizeScene);
+  }
+  if (job.state() != v1::Job::STATE_SUCCEEDED) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} has no results: it is {}; see `color3d job show {}`",
+                job.name(),
+                StateName(job.state()),
+                job.name());
+  }
+  for (const v1::Artifact& artifact : job.artifacts()) {
+    if (artifact.name() != artifact::kViewPage) continue;
+    PrepareOut(options.out);
+    ProgressDisplay display(context.json);
+    DownloadArtifacts(connection, {artifact}, options.out, display);
+    return fs::path(options.out) / artifact::kViewPage;
+  }
+  throw Error(ErrorCode::kFailedPrecondition,
+              "{} has results, but no {}: {}",
+              job.name(),
+              artifact::kViewPage,
+              kHowToGetPage);
+}
+
+// Starts `program` on a file, apart from us: it may become the browser and must outlive us. False
+// when it is not there or fails within a moment.
+bool StartApart(const char* program, const fs::path& file) {
+  posix_spawnattr_t attributes;
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  for (const int output : {1, 2}) {
+    posix_spawn_file_actions_addopen(&actions, output, "/dev/null", O_WRONLY, 0);
+  }
+  std::string name = program, path = file.string();
+  char* arguments[] = {name.data(), path.data(), nullptr};
+  pid_t child = 0;
+  const int error = posix_spawnp(&child, program, &actions, &attributes, arguments, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  if (error != 0) return false;
+  for (int tenths = 0; tenths < 20; ++tenths) {
+    int status = 0;
+    if (waitpid(child, &status, WNOHANG) == child) {
+      return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  return true;
+}
+
+// In the browser that the desktop names; false where there is no desktop or it fails.
+bool OpenInBrowser(const fs::path& page) {
+#if defined(__APPLE__)
+  return StartApart("open", page);
+#else
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return false;
+  return StartApart("xdg-open", page);
+#endif
+}
+
+ExitCode RunView(const Context& context, const ViewOptions& options) {
+  const bool stored = options.target.starts_with("scenes/") || options.target.starts_with("jobs/");
+  const fs::path page = fs::absolute(
+      stored && !fs::exists(options.target) ? Download(context, options) : PageIn(options.target));
+  const bool opened = options.open && OpenInBrowser(page);
+  if (context.json) {
+    PrintJson({{"page", page.string()}, {"opened", opened}});
+    return ExitCode::kOk;
+  }
+  PrintText(page.string() + "\n");
+  if (options.open && !opened) {
+    PrintNote(context, "there is no browser to open here; open this file in one, or send it");
+  }
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddViewCommand(CLI::App& app, Context& context) {
+  const auto options = std::make_shared<ViewOptions>();
+  CLI::App* view =
+      app.add_subcommand("view", "Turn a coloured scene in the browser")->fallthrough();
+  view->add_option("RESULTS",
+                   options->target,
+                   "Folder of results, or jobs/ID or scenes/ID, which are fetched")
+      ->required();
+  view->add_option("-o,--out", options->out, "Folder for what is fetched")->capture_default_str();
+  view->add_flag("!--no-open", options->open, "Only say where the page is");
+  view->callback([&context, options] {
+    context.action = [&context, options] { return RunView(context, *options); };
+  });
+}
+
+}  // namespace color3d::client

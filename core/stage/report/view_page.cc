@@ -1,0 +1,102 @@
+#include "core/stage/report/view_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/base/median.h"
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/scene/view_images.h"
+#include "core/splat/export/export.h"
+#include "core/splat/export/sog/sog.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/splat/raster/render.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/view/view_page.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kPosterPx = 900;       // longer side of the picture that is there first
+constexpr int kPhotoPx = 480;        // longer side of the photos
+constexpr int kPhotoQuality = 80;    // of their JPEG
+constexpr size_t kMaxPictures = 48;  // with more photos, the others are a name and a camera
+
+// What the middle of the key view shows: the median of the depths there, on the camera's axis.
+Eigen::Vector3d FocusOf(const View& view, const Camera& camera, const Image& depth) {
+  std::vector<double> middle;
+  for (int y = depth.height / 4; y < depth.height - depth.height / 4; ++y) {
+    for (int x = depth.width / 4; x < depth.width - depth.width / 4; ++x) {
+      if (depth.At(0, y, x) > 0.0f) middle.push_back(depth.At(0, y, x));
+    }
+  }
+  const double away = middle.empty() ? 1.0 : Median(std::move(middle));
+  return view.cam_from_world.WorldFromCamera(away * camera.Ray(camera.cx, camera.cy));
+}
+
+// The smaller of the exported files, and the sureness of its Gaussians in its order.
+void TakeScene(const GaussianModel& model,
+               const ExportFrame& frame,
+               StageContext& context,
+               ViewPage* page) {
+  page->file_scale = frame.scale;
+  page->file_offset = frame.offset;
+  page->file_is_compressed = context.HasInput(artifact::kSog);
+  page->file_name = page->file_is_compressed ? artifact::kSog : artifact::kPly;
+  page->file_bytes = context.ReadInput(page->file_name);
+  page->confidence = model.confidence;
+  if (!page->file_is_compressed || model.confidence.empty()) return;
+  const RgbHarmonics no_colors{.degree = 0, .sh = std::vector<float>(3 * model.size())};
+  const std::vector<uint32_t> order =
+      SogOrder(ForViewers(model, no_colors, frame, context.pool()).position);
+  for (size_t i = 0; i < order.size(); ++i) page->confidence[i] = model.confidence[order[i]];
+}
+
+std::vector<ViewPagePhoto> PhotosOf(const Scene& scene, int key_view, StageContext& context) {
+  const size_t count = scene.views.size();
+  std::vector<ViewPagePhoto> photos(count);
+  std::vector<int> pictured = {key_view};
+  for (size_t i = 0; i < count; ++i) {
+    photos[i].view = static_cast<int>(i);
+    const size_t evenly = i * kMaxPictures / count, next = (i + 1) * kMaxPictures / count;
+    if ((count <= kMaxPictures || next > evenly) && photos[i].view != key_view) {
+      pictured.push_back(photos[i].view);
+    }
+  }
+  const ViewImages images(scene, context.scene_folder(), kPhotoPx, 0);
+  context.pool().ForEach(static_cast<int64_t>(pictured.size()), [&](int64_t i, int) {
+    context.cancel().ThrowIfCancelled();
+    photos[pictured[i]].jpeg = EncodeJpeg(images.Srgb(pictured[i]), kPhotoQuality);
+  });
+  return photos;
+}
+
+}  // namespace
+
+bool WriteViewPage(const Scene& scene, int key_view, StageContext& context) {
+  const bool exported = context.HasInput(artifact::kSog) || context.HasInput(artifact::kPly);
+  if (!exported || !context.HasInput(artifact::kModel)) return false;
+  if (!HasViewer()) {
+    context.progress().OnWarning(fmt::format(
+        "this build has no viewer, so there is no {}: build again where npm reaches its registry",
+        artifact::kViewPage));
+    return false;
+  }
+  const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
+  const View& key = scene.views.at(key_view);
+  const Camera camera = key.camera.FitWithin(kPosterPx);
+  const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
+
+  ViewPage page;
+  TakeScene(model, ExportFrameOf(scene), context, &page);
+  page.key_view = key_view;
+  page.focus = FocusOf(key, camera, rendered.median_depth);
+  page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);
+  page.photos = PhotosOf(scene, key_view, context);
+  context.WriteOutput(artifact::kViewPage, RenderViewPage(scene, page));
+  return true;
+}
+
+}  // namespace color3d

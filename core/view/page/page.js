@@ -1,0 +1,352 @@
+// Drives the viewer of the page: colours, photos, comparison. All that it needs is in the page.
+(() => {
+'use strict';
+const $ = (id) => document.getElementById(id);
+const facts = JSON.parse($('facts').textContent);
+const photos = facts.photos;
+const pictureOf = (photo) => photo.jpeg ? 'data:image/jpeg;base64,' + photo.jpeg : '';
+const say = (text) => { $('note').textContent = text; };
+const press = (button, on) => button.setAttribute('aria-pressed', String(on));
+
+// Lightness that people see, as sRGB; shades for where a colour comes from, over the grey picture.
+const glsl = `
+uniform float uShades;
+uniform vec3 uGuessed;
+uniform vec3 uInferred;
+uniform vec3 uSeen;
+void modifySplatCenter(inout vec3 center) {
+}
+void modifySplatRotationScale(vec3 before, vec3 after, inout vec4 rotation, inout vec3 scale) {
+}
+void modifySplatColor(vec3 center, inout vec4 color) {
+  if (uShades < 0.5) return;
+  vec3 linear = pow(clamp(color.rgb, 0.0, 1.0), vec3(2.2));
+  float gray = pow(dot(linear, vec3(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
+  if (uShades < 1.5) {
+    color.rgb = vec3(gray);
+    return;
+  }
+  float sure = loadColorSureness().r;
+  vec3 shade = sure < 0.5 ? mix(uGuessed, uInferred, 2.0 * sure)
+                          : mix(uInferred, uSeen, 2.0 * sure - 1.0);
+  color.rgb = shade * (0.15 + 0.95 * gray);
+}
+`;
+const wgsl = `
+uniform uShades: f32;
+uniform uGuessed: vec3f;
+uniform uInferred: vec3f;
+uniform uSeen: vec3f;
+fn modifySplatCenter(center: ptr<function, vec3f>) {
+}
+fn modifySplatRotationScale(before: vec3f, after: vec3f, rotation: ptr<function, vec4f>, scale: ptr<function, vec3f>) {
+}
+fn modifySplatColor(center: vec3f, color: ptr<function, vec4f>) {
+  if (uniform.uShades < 0.5) { return; }
+  let linear = pow(clamp((*color).rgb, vec3f(0.0), vec3f(1.0)), vec3f(2.2));
+  let gray = pow(dot(linear, vec3f(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
+  if (uniform.uShades < 1.5) {
+    *color = vec4f(vec3f(gray), (*color).a);
+    return;
+  }
+  let sure = f32(loadColorSureness().r);
+  var shade = mix(uniform.uGuessed, uniform.uInferred, 2.0 * sure);
+  if (sure >= 0.5) { shade = mix(uniform.uInferred, uniform.uSeen, 2.0 * sure - 1.0); }
+  *color = vec4f(shade * (0.15 + 0.95 * gray), (*color).a);
+}
+`;
+const shades = {
+  uSeen: ['#6fb7b0', 'seen in a key view'],
+  uInferred: ['#e0b25f', 'inferred from it'],
+  uGuessed: ['#b873a0', 'guessed'],
+};
+const rgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+
+const bytesOf = (base64) => fetch('data:application/octet-stream;base64,' + base64);
+const unpacked = async (base64) =>
+  new Response((await bytesOf(base64)).body.pipeThrough(new DecompressionStream('gzip')));
+
+// The viewer's module, run from its text: pages opened from a disk may not import files.
+const loadProgram = async () => {
+  const code = await (await unpacked($('program').textContent)).text();
+  const script = document.createElement('script');
+  script.type = 'module';
+  const ready = new Promise((resolve) => { window.color3dProgram = resolve; });
+  script.textContent = code + '\nwindow.color3dProgram(createViewer);\n';
+  document.head.appendChild(script);
+  return ready;
+};
+
+// ---- cameras ----------------------------------------------------------------------------------
+const stage = $('stage');
+// Where the whole picture of `photo` fits on the stage, px, with the camera's axis in the middle.
+const frameOf = (photo) => {
+  const w = stage.clientWidth, h = stage.clientHeight;
+  const reachX = Math.max(photo.center[0], 1 - photo.center[0]);
+  const reachY = Math.max(photo.center[1], 1 - photo.center[1]);
+  const height = Math.min(h / (2 * reachY), w / (2 * reachX * photo.aspect));
+  const width = height * photo.aspect;
+  return { width, height, left: w / 2 - photo.center[0] * width, top: h / 2 - photo.center[1] * height };
+};
+// Vertical field of view of the whole stage then, degrees.
+const fovOf = (photo) => {
+  const tan = photo.tan * stage.clientHeight / frameOf(photo).height;
+  return 2 * Math.atan(tan) * 180 / Math.PI;
+};
+// The viewer's fields of view belong to the stage's longer side.
+const longFov = (degrees) => {
+  const w = stage.clientWidth, h = stage.clientHeight;
+  if (w <= h) return degrees;
+  return 2 * Math.atan(Math.tan(degrees * Math.PI / 360) * w / h) * 180 / Math.PI;
+};
+
+// A way around the target for `Turn`: a full circle where photos stand all around, a swing else.
+const turnTrack = () => {
+  const home = photos[facts.key];
+  const radius = Math.hypot(home.position[0], home.position[2]);
+  const start = Math.atan2(home.position[0], home.position[2]);
+  const angles = photos.map((p) => Math.atan2(p.position[0], p.position[2])).sort((a, b) => a - b);
+  const gaps = angles.map((a, i) => (i ? a - angles[i - 1] : a + 2 * Math.PI - angles[angles.length - 1]));
+  const around = Math.max(...gaps) < Math.PI / 2;
+  const reach = Math.min(0.35, Math.max(0.1, (2 * Math.PI - Math.max(...gaps)) / 2));
+  const steps = 24, times = [], position = [], target = [], fov = [];
+  for (let i = 0; i < steps; ++i) {
+    const turn = 2 * Math.PI * i / steps;
+    const angle = start + (around ? turn : reach * Math.sin(turn));
+    times.push(i * 30);
+    position.push(radius * Math.sin(angle), home.position[1], radius * Math.cos(angle));
+    target.push(0, 0, 0);
+    fov.push(longFov(fovOf(home)));
+  }
+  return { name: 'turn', duration: steps, frameRate: 30, loopMode: 'repeat', interpolation: 'spline',
+           smoothness: 1, keyframes: { times, values: { position, target, fov } } };
+};
+
+const off = { enabled: false };
+const settingsOf = () => ({
+  version: 2, tonemapping: 'none', highPrecisionRendering: false,
+  background: { color: [0, 0, 0] },
+  postEffectSettings: {
+    sharpness: { ...off, amount: 0 }, bloom: { ...off, intensity: 0.1, blurLevel: 2 },
+    grading: { ...off, brightness: 1, contrast: 1, saturation: 1, tint: [1, 1, 1] },
+    vignette: { ...off, intensity: 0.5, inner: 0.3, outer: 0.75, curvature: 1 },
+    fringing: { ...off, intensity: 0.5 },
+  },
+  animTracks: [turnTrack()], startMode: 'animTrack',
+  cameras: [{ initial: cameraOf(photos[facts.key]) }],
+  annotations: photos.map((photo) => ({
+    position: photo.target, title: photo.name, text: '', camera: { initial: cameraOf(photo) } })),
+});
+const cameraOf = (photo) =>
+  ({ position: photo.position, target: photo.target, fov: longFov(fovOf(photo)) });
+
+// ---- the page ---------------------------------------------------------------------------------
+let viewer = null, splats = null;
+let held = null;  // {photo, from, since}: the camera stands where this photo was taken
+
+const showShades = (mode) => {
+  for (const button of document.querySelectorAll('[data-shades]')) {
+    press(button, Number(button.dataset.shades) === mode);
+  }
+  $('legend').hidden = mode !== 2;
+  splats.setParameter('uShades', mode);
+  viewer.app.renderNextFrame = true;
+};
+
+const layOut = () => {
+  const comparing = $('compare').getAttribute('aria-pressed') === 'true' && held && held.photo.jpeg;
+  for (const id of ['photo', 'divider', 'slider']) $(id).hidden = !comparing;
+  if (!comparing) return;
+  const frame = frameOf(held.photo);
+  const share = $('share').value / 100;
+  Object.assign($('photo').style, { left: frame.left + 'px', top: frame.top + 'px',
+    width: frame.width + 'px', height: frame.height + 'px',
+    clipPath: `inset(0 ${100 - 100 * share}% 0 0)` });
+  Object.assign($('slider').style, { left: Math.max(8, frame.left - 8) + 'px',
+    width: Math.min(stage.clientWidth - 16, frame.width + 16) + 'px' });
+  Object.assign($('divider').style, { left: frame.left + share * frame.width + 'px',
+    top: frame.top + 'px', height: frame.height + 'px' });
+};
+
+const goTo = (index, glide = true) => {
+  const photo = photos[index];
+  const camera = viewer.app.root.findByName('camera');
+  held = { photo, since: glide ? performance.now() : -Infinity,
+           from: { position: camera.getPosition().clone(), rotation: camera.getRotation().clone(),
+                   fov: camera.camera.fov, long: camera.camera.horizontalFov } };
+  viewer.annotations[index].camera.initial.fov = longFov(fovOf(photo));
+  viewer.selectAnnotation(index);  // where one goes on from when one lets go of the photo
+  press($('turn'), false);
+  viewer.state.animationPaused = true;
+  $('photo').src = pictureOf(photo);
+  for (const button of $('photos').children) press(button, Number(button.dataset.index) === index);
+  say(photo.name + (index === facts.key ? ' (key view)' : photo.held_out ? ' (held out)' : ''));
+  layOut();
+  viewer.app.renderNextFrame = true;
+};
+
+const letGo = () => {
+  if (!held) return;
+  held = null;
+  press($('compare'), false);
+  for (const button of $('photos').children) press(button, false);
+  say('');
+  layOut();
+};
+
+// After the viewer has placed its camera: while a photo is held, the camera is the photo's.
+const placeCamera = () => {
+  if (!held) return;
+  const entity = viewer.app.root.findByName('camera');
+  const { photo, from, since } = held;
+  const t = Math.min(1, (performance.now() - since) / 700);
+  const ease = t * t * (3 - 2 * t);
+  const Vec3 = from.position.constructor, Quat = from.rotation.constructor;
+  entity.setPosition(new Vec3().lerp(from.position, new Vec3(...photo.position), ease));
+  entity.setRotation(new Quat().slerp(from.rotation, new Quat(...photo.rotation), ease));
+  let before = from.fov * Math.PI / 360;
+  if (from.long) {
+    before = Math.atan(Math.tan(before) * stage.clientHeight / stage.clientWidth);
+  }
+  const fov = (1 - ease) * before * 360 / Math.PI + ease * fovOf(photo);
+  entity.camera.horizontalFov = false;
+  entity.camera.fov = fov;
+  if (t < 1) viewer.app.renderNextFrame = true;
+};
+
+const fillPhotos = () => {
+  photos.forEach((photo, index) => {
+    const button = document.createElement('button');
+    button.dataset.index = index;
+    button.title = photo.name;
+    if (photo.jpeg) {
+      const image = document.createElement('img');
+      image.alt = '';
+      image.src = pictureOf(photo);
+      button.appendChild(image);
+    }
+    const name = document.createElement('span');
+    name.textContent = (index === facts.key ? '★ ' : '') + photo.name;
+    button.appendChild(name);
+    button.onclick = () => goTo(index);
+    $('photos').appendChild(button);
+  });
+};
+
+const wirePanels = () => {
+  const toggle = (id, panel) => {
+    $(id).onclick = () => {
+      $(panel).hidden = !$(panel).hidden;
+      press($(id), !$(panel).hidden);
+      if (panel === 'photos' && !$('photos').children.length) fillPhotos();
+    };
+  };
+  toggle('list', 'photos');
+  toggle('info', 'about');
+  $('about').textContent = facts.about;
+};
+
+const wireButtons = () => {
+  for (const button of document.querySelectorAll('[data-shades]')) {
+    button.onclick = () => showShades(Number(button.dataset.shades));
+  }
+  const sureness = document.querySelector('[data-shades="2"]');
+  if (!facts.confidence) {
+    sureness.disabled = true;
+    sureness.title = 'This scene does not know where its colours come from';
+  }
+  for (const [hex, text] of Object.values(shades)) {
+    const item = document.createElement('span');
+    item.innerHTML = `<i style="background:${hex}"></i>`;
+    item.append(text);
+    $('legend').appendChild(item);
+  }
+  $('home').onclick = () => goTo(facts.key);
+  $('compare').onclick = () => {
+    const on = $('compare').getAttribute('aria-pressed') !== 'true';
+    press($('compare'), on);
+    if (on && !(held && held.photo.jpeg)) goTo(facts.key);
+    layOut();
+  };
+  $('share').oninput = layOut;
+  $('turn').onclick = () => {
+    const on = $('turn').getAttribute('aria-pressed') !== 'true';
+    letGo();
+    press($('turn'), on);
+    if (on) viewer.state.cameraMode = 'anim';
+    viewer.state.animationPaused = !on;
+    if (!on) viewer.state.cameraMode = 'orbit';
+  };
+  const canvas = document.querySelector('#viewer canvas');
+  for (const event of ['pointerdown', 'wheel']) canvas.addEventListener(event, () => {
+    letGo();
+    press($('turn'), false);
+  }, { capture: true, passive: true });
+  new ResizeObserver(layOut).observe(stage);
+};
+
+// The scene stands upright here, and each Gaussian gets its sureness, before anything is drawn.
+const prepare = (entity, confidence) => {
+  const { rotation, scale, position } = facts.frame;
+  const Vec3 = entity.getLocalPosition().constructor;
+  entity.setLocalRotation(...rotation);
+  entity.setLocalScale(scale, scale, scale);
+  entity.setLocalPosition(...position);
+  splats = entity.gsplat;
+  const resource = splats.resource;
+  resource.format.addExtraStreams([{ name: 'colorSureness', format: 52 /* one byte */ }]);
+  resource.streams.syncWithFormat(resource.format);
+  const texture = resource.getTexture('colorSureness');
+  const texels = texture.lock();
+  texels.fill(255);
+  if (confidence) texels.set(confidence);
+  texture.unlock();
+  splats.setParameter('uShades', 0);
+  for (const [name, [hex]] of Object.entries(shades)) splats.setParameter(name, rgb(hex));
+  splats.setWorkBufferModifier({ glsl, wgsl });
+};
+
+const start = async () => {
+  wirePanels();
+  $('poster').src = 'data:image/jpeg;base64,' + facts.poster;
+  if (typeof DecompressionStream === 'undefined' ||
+      !document.createElement('canvas').getContext('webgl2')) {
+    throw new Error('This browser has no WebGL 2, which drawing in 3D needs');
+  }
+  const createViewer = await loadProgram();
+  const packed = facts.packed ? unpacked : bytesOf;
+  let hand;
+  const contents = new Promise((resolve) => { hand = resolve; });
+  viewer = await createViewer({
+    container: $('viewer'), settings: settingsOf(), contentUrl: 'scene', contentFilename: facts.scene,
+    contents, ui: false, noanim: true,
+    renderer: new URL(location.href).searchParams.has('webgpu') ? 'webgpu' : 'webgl',
+  });
+  const confidence = facts.confidence &&
+    new Uint8Array(await (await unpacked(facts.confidence)).arrayBuffer());
+  // Sureness comes in the file's order, so the viewer has to keep it.
+  for (const asset of viewer.app.assets.list()) {
+    asset.data.reorder = false;
+    asset.on('error', fail);
+  }
+  viewer.app.root.on('childinsert', (entity) => {
+    if (entity.gsplat) prepare(entity, confidence);
+  });
+  viewer.app.on('update', placeCamera);
+  viewer.events.on('loaded:changed', () => {
+    viewer.state.cameraMode = 'orbit';
+    wireButtons();
+    goTo(facts.key, false);
+    say('Drag to turn, wheel or pinch to come nearer, right drag or two fingers to move');
+    document.body.dataset.state = 'ready';
+  });
+  hand(packed($('scene').textContent));
+};
+
+const fail = (error) => {
+  document.body.dataset.state = 'failed';
+  for (const button of document.querySelectorAll('nav button:not(#info)')) button.disabled = true;
+  say(`${error.message || error}. Here is a picture from the key view instead.`);
+};
+start().catch(fail);
+})();

@@ -1,0 +1,18 @@
+// The texts that a page is put together from, parts of the program.
+#pragma once
+
+#include <string_view>
+
+namespace color3d {
+
+std::string_view PageTemplate();  // page/page.html
+std::string_view PageStyle();     // page/page.css
+std::string_view PageScript();    // page/page.js
+
+// The viewer's module, gzip, and its licence; both empty when it was left out at build time.
+std::string_view ViewerProgram();
+std::string_view ViewerLicense();
+// "SuperSplat Viewer 1.36.2".
+std::string_view ViewerName();
+
+}  // namespace color3d

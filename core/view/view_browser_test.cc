@@ -1,0 +1,182 @@
+// The page in a real browser: headless Chromium without a graphics card, driven by Node.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "core/base/files.h"
+#include "core/base/subprocess.h"
+#include "core/image/codec.h"
+#include "core/splat/export/export.h"
+#include "core/splat/export/sog/sog.h"
+#include "core/view/view_page.h"
+
+namespace color3d {
+namespace {
+
+constexpr float kShDc = 0.28209479f;
+
+std::string FirstOf(const std::vector<std::string>& programs) {
+  for (const std::string& program : programs) {
+    try {
+      if (RunSubprocess({.arguments = {program, "--version"}}, CancellationToken()).exit_code ==
+          0) {
+        return program;
+      }
+    } catch (const Error&) {  // not installed
+    }
+  }
+  return "";
+}
+
+// A wall that the camera sees as two halves: red and seen on its left, blue and guessed on its
+// right. Its Gaussians are not in an order that a viewer would choose.
+constexpr int kSide = 48;
+bool OnTheLeft(int i) { return (i * 37) % kSide < kSide / 2; }
+
+struct Wall {
+  GaussianModel model;
+  RgbHarmonics rgb;
+};
+
+Wall MakeWall() {
+  Wall wall;
+  GaussianModel& model = wall.model;
+  model.channels = 3;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const float x = static_cast<float>((i * 37) % kSide) / kSide - 0.48f;
+    const float y = static_cast<float>(i / kSide) / kSide - 0.48f;
+    model.position.insert(model.position.end(), {4.0f * x, 4.0f * y, 2.0f});
+    model.log_scale.insert(model.log_scale.end(), 3, std::log(0.1f));
+    model.rotation.insert(model.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
+    model.opacity_logit.push_back(4.0f);
+    for (std::vector<float>* sh : {&model.sh_l, &model.sh_a, &model.sh_b}) sh->push_back(0.0f);
+    const float red = OnTheLeft(i) ? 0.9f : 0.1f, blue = OnTheLeft(i) ? 0.1f : 0.9f;
+    for (const float value : {red, 0.1f, blue}) wall.rgb.sh.push_back((value - 0.5f) / kShDc);
+    model.confidence.push_back(OnTheLeft(i) ? 1.0f : 0.0f);
+  }
+  return wall;
+}
+
+// The wall in the format of this name, its sureness in the order of that.
+void TakeWall(const std::string& file_name, ViewPage* page) {
+  ThreadPool pool(1);
+  const Wall wall = MakeWall();
+  page->file_name = file_name;
+  page->confidence = wall.model.confidence;
+  if (file_name.ends_with(".ply")) {
+    page->file_bytes = EncodeGaussianPly(wall.model, wall.rgb, {}, pool);
+    return;
+  }
+  const ViewerGaussians gaussians = ForViewers(wall.model, wall.rgb, {}, pool);
+  page->file_bytes = EncodeSog(gaussians, pool);
+  page->file_is_compressed = true;
+  const std::vector<uint32_t> order = SogOrder(gaussians.position);
+  for (size_t i = 0; i < order.size(); ++i) {
+    page->confidence[i] = wall.model.confidence[order[i]];
+  }
+}
+
+Scene WallScene() {
+  Scene scene;
+  for (int i = 0; i < 2; ++i) {
+    View view;
+    view.name = i == 0 ? "key.jpg" : "side.jpg";
+    view.camera = {120, 80, 100.0, 100.0, 60.0, 40.0};
+    view.cam_from_world.translation = {0.2 * i, 0.0, 0.0};
+    scene.views.push_back(view);
+  }
+  return scene;
+}
+
+std::string PageOfWall(const ScratchFolder& folder, const std::string& file_name) {
+  ViewPage page;
+  TakeWall(file_name, &page);
+  page.focus = {0.0, 0.0, 2.0};
+  page.poster = EncodeJpeg(Image(120, 80, 3, 0.5f));
+  page.photos = {{0, EncodeJpeg(Image(120, 80, 3, 1.0f))},
+                 {1, EncodeJpeg(Image(120, 80, 3, 0.0f))}};
+  const std::string file = folder.path() / "view.html";
+  WriteFileAtomic(file, RenderViewPage(WallScene(), page));
+  return file;
+}
+
+class BrowserTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!HasViewer()) GTEST_SKIP() << "skipped, because the viewer was left out of this build";
+    chromium_ = FirstOf({"chromium", "chromium-browser", "google-chrome"});
+    if (chromium_.empty()) GTEST_SKIP() << "skipped, because there is no Chromium";
+    if (FirstOf({"node"}).empty()) GTEST_SKIP() << "skipped, because there is no Node";
+  }
+  nlohmann::json Look(const std::string& file_name,
+                      const std::vector<std::string>& environment = {}) {
+    const std::string page = PageOfWall(scratch_, file_name);
+    const std::string log = scratch_.path() / "log";
+    const SubprocessResult result =
+        RunSubprocess({.arguments = {"node", COLOR3D_LOOK_AT_PAGE, chromium_, page},
+                       .environment = environment,
+                       .log_path = log,
+                       .timeout = std::chrono::seconds(150)},
+                      CancellationToken());
+    const std::string text = ReadFile(log);
+    EXPECT_EQ(result.exit_code, 0) << text;
+    return nlohmann::json::parse(text);
+  }
+
+  std::string chromium_;
+  ScratchFolder scratch_;
+};
+
+// red, green, blue of a half in a step, 0..255.
+std::array<int, 3> Seen(const nlohmann::json& looked, const char* step, const char* half) {
+  return looked.at("seen").at(step).at(half);
+}
+
+class BrowserFormatTest : public BrowserTest, public ::testing::WithParamInterface<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Formats,
+                         BrowserFormatTest,
+                         ::testing::Values("scene.ply", "scene.sog"),
+                         [](const auto& format) { return std::string(format.param).substr(6); });
+
+TEST_P(BrowserFormatTest, ShowsTheSceneInColorInGrayAndByWhereItsColorsComeFrom) {
+  const nlohmann::json looked = Look(GetParam());
+  SCOPED_TRACE(looked.dump(1));
+  ASSERT_EQ(looked.at("state"), "ready");
+  EXPECT_TRUE(looked.at("errors").empty());
+  EXPECT_TRUE(looked.at("requests").empty());
+  for (const char* step : {"color", "back_in_color"}) {
+    const auto left = Seen(looked, step, "left"), right = Seen(looked, step, "right");
+    EXPECT_NEAR(left[0], 0.9 * 255, 20);
+    EXPECT_NEAR(left[2], 0.1 * 255, 20);
+    EXPECT_NEAR(right[0], 0.1 * 255, 20);
+    EXPECT_NEAR(right[2], 0.9 * 255, 20);
+  }
+  for (const char* half : {"left", "right"}) {
+    const auto gray = Seen(looked, "gray", half);
+    EXPECT_NEAR(gray[0], gray[1], 2);
+    EXPECT_NEAR(gray[1], gray[2], 2);
+    EXPECT_GT(gray[1], 40);
+  }
+  // Greens for what was seen, reds for what was guessed; each Gaussian has kept its own.
+  const auto seen = Seen(looked, "where_from", "left");
+  const auto guessed = Seen(looked, "where_from", "right");
+  EXPECT_GT(seen[1], seen[0] + 15);
+  EXPECT_GT(guessed[0], guessed[1] + 15);
+  // The whole photo over the scene: white.
+  for (const char* half : {"left", "right"}) EXPECT_GT(Seen(looked, "photo", half)[1], 245);
+}
+
+TEST_F(BrowserTest, SaysSoAndShowsAPictureWhereThereIsNoWebGl) {
+  const nlohmann::json looked = Look("scene.sog", {"COLOR3D_BROWSER_FLAGS=--disable-3d-apis"});
+  SCOPED_TRACE(looked.dump(1));
+  EXPECT_EQ(looked.at("state"), "failed");
+  EXPECT_NE(looked.at("note").get<std::string>().find("WebGL"), std::string::npos);
+  EXPECT_NE(looked.at("note").get<std::string>().find("picture"), std::string::npos);
+  const auto poster = Seen(looked, "color", "left");
+  EXPECT_NEAR(poster[0], 128, 6);
+}
+
+}  // namespace
+}  // namespace color3d

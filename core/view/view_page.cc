@@ -1,0 +1,140 @@
+#include "core/view/view_page.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/base/base64.h"
+#include "core/base/error.h"
+#include "core/view/view_assets.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kAbout =
+    "A scene of monochrome photos in colour, made by Color3D. All of it is in this file; nothing "
+    "is fetched.\n\nDrag to turn, wheel or pinch to come nearer, right drag or two fingers to "
+    "move. Photos: stand where one was taken. Compare: the photo over the scene. Where from: "
+    "which colours were seen in a key view, inferred from it, or guessed.\n\nDrawn by {0} with "
+    "the PlayCanvas Engine in it, both Copyright (c) PlayCanvas Ltd. under this licence:\n\n{1}";
+
+ordered_json Numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+ordered_json Numbers(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
+
+ordered_json PhotoJson(const Stand& stand, const View& view, const std::string& jpeg) {
+  const StandingCamera standing = CameraOn(stand, view);
+  const Camera& camera = view.camera;
+  return {{"name", view.name},
+          {"held_out", view.held_out},
+          {"position", Numbers(standing.position)},
+          {"rotation", Numbers(standing.rotation)},
+          {"target", Numbers(standing.target)},
+          {"aspect", static_cast<double>(camera.width) / camera.height},
+          {"tan", 0.5 * camera.height / camera.fy},  // half the vertical field of view
+          {"center", {camera.cx / camera.width, camera.cy / camera.height}},
+          {"jpeg", Base64(jpeg)}};
+}
+
+std::string ConfidenceBytes(const std::vector<float>& confidence) {
+  std::string bytes(confidence.size(), '\0');
+  std::transform(confidence.begin(), confidence.end(), bytes.begin(), [](float value) {
+    return static_cast<char>(std::lround(255.0f * std::clamp(value, 0.0f, 1.0f)));
+  });
+  return bytes;
+}
+
+// JSON that may stand in a script element of HTML.
+std::string InHtml(const ordered_json& json) {
+  std::string text;
+  for (const char c : json.dump(-1, ' ', true)) {
+    if (c == '<') {
+      text += "\\u003c";
+    } else {
+      text += c;
+    }
+  }
+  return text;
+}
+
+std::string Facts(const Scene& scene, const ViewPage& page) {
+  const Stand stand = StandOf(scene, page.key_view, page.focus);
+  ordered_json photos = ordered_json::array();
+  int key = -1;
+  for (const ViewPagePhoto& photo : page.photos) {
+    if (photo.view == page.key_view) key = static_cast<int>(photos.size());
+    photos.push_back(PhotoJson(stand, scene.views.at(photo.view), photo.jpeg));
+  }
+  if (key < 0) throw InvalidArgument("the key view is not among the photos of the page");
+  // page = stand of ((file - offset) / scale).
+  const double scale = stand.scale / page.file_scale;
+  const Eigen::Vector3d center = page.file_scale * stand.center + page.file_offset;
+  return InHtml({{"scene", page.file_name},
+                 {"packed", !page.file_is_compressed},
+                 {"frame",
+                  {{"rotation", Numbers(stand.rotation)},
+                   {"scale", scale},
+                   {"position", Numbers(Eigen::Vector3d(-scale * (stand.rotation * center)))}}},
+                 {"confidence",
+                  page.confidence.empty() ? "" : Base64(Gzip(ConfidenceBytes(page.confidence)))},
+                 {"key", key},
+                 {"poster", Base64(page.poster)},
+                 {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
+                 {"photos", std::move(photos)}});
+}
+
+}  // namespace
+
+bool HasViewer() { return !ViewerProgram().empty(); }
+
+std::string Gzip(std::string_view bytes) {
+  z_stream stream{};
+  constexpr int kGzipWindow = 15 + 16;
+  if (deflateInit2(&stream, 6, Z_DEFLATED, kGzipWindow, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw Error(ErrorCode::kInternal, "zlib does not start");
+  }
+  std::string packed(deflateBound(&stream, bytes.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  const int result = deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (result != Z_STREAM_END) {
+    throw Error(ErrorCode::kInternal, "zlib does not pack {} bytes", bytes.size());
+  }
+  return packed;
+}
+
+std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
+  if (!HasViewer()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "this build has no viewer: build again where npm reaches its registry");
+  }
+  const std::string scene_text =
+      Base64(page.file_is_compressed ? page.file_bytes : Gzip(page.file_bytes));
+  const std::string facts = Facts(scene, page);
+  const std::string program = Base64(ViewerProgram());
+  const std::pair<std::string_view, std::string_view> parts[] = {{"@STYLE@", PageStyle()},
+                                                                 {"@FACTS@", facts},
+                                                                 {"@SCENE@", scene_text},
+                                                                 {"@PROGRAM@", program},
+                                                                 {"@SCRIPT@", PageScript()}};
+  std::string html;
+  std::string_view rest = PageTemplate();
+  for (const auto& [mark, text] : parts) {
+    const size_t at = rest.find(mark);
+    if (at == std::string_view::npos)
+      throw Error(ErrorCode::kInternal, "page.html has no {}", mark);
+    html.append(rest.substr(0, at)).append(text);
+    rest.remove_prefix(at + mark.size());
+  }
+  return html.append(rest);
+}
+
+}  // namespace color3d
