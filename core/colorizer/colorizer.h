@@ -17,7 +17,9 @@
 
 namespace color3d {
 
+class Corrector;
 class SceneBatch;
+struct Correction;
 
 // The defaults are those of the service's preset "fast".
 struct ColorizerOptions {
@@ -81,19 +83,6 @@ struct TrainingPicture {
   Image position = Image();  // as PictureFacts'; empty: not known
 };
 
-struct CorrectedColor {
-  Image ab;     // 2 channels, Lab units
-  Image share;  // 1 channel, 0..1: how far that replaces what the place has
-};
-
-// How far colours reach that a user gives on parts of pictures. Immutable, thread-safe.
-class Corrector {
- public:
-  virtual ~Corrector() = default;
-  // Of a picture's size. `facts`: as the Colorizer's.
-  virtual CorrectedColor Predict(const Image& luminance, const PictureFacts& facts = {}) const = 0;
-};
-
 // Immutable once trained; thread-safe to use.
 class Colorizer {
  public:
@@ -103,12 +92,11 @@ class Colorizer {
   // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
   // than the training size are coloured at that size and upsampled guided by L.
   virtual Image Colorize(const Image& luminance) const = 0;
-  // `corrected`: pictures of the scene; where their weight is above 0 their ab is what the user
-  // wants, and they reach whatever is more like that in looks and space than like all that was
-  // learnt from. Throws Error{kInvalidArgument} when no weight is above 0, kFailedPrecondition for
-  // colorizers without neighbors.
+  // `corrections` may be empty: then nothing changes, and only Corrector::Propose is of use. Where
+  // two of them show one place the later one counts. Throws Error{kInvalidArgument} when one paints
+  // nothing, kFailedPrecondition for colorizers without feature neighbors (the paper's recipe).
   virtual std::unique_ptr<const Corrector> Correct(
-      std::span<const TrainingPicture> corrected) const = 0;
+      std::span<const Correction> corrections) const = 0;
   // How the scene's chroma depends on luminance, as the key view shows it.
   virtual RelativeChroma relative_chroma() const = 0;
   // Colorizer file: versioned header, encoder digest, adapters, decoder, training curve.

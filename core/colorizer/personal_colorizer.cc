@@ -164,21 +164,21 @@ ColorPrediction PersonalColorizer::Predict(const Image& luminance,
 }
 
 std::unique_ptr<const Corrector> PersonalColorizer::Correct(
-    std::span<const TrainingPicture> corrected) const {
+    std::span<const Correction> corrections) const {
   if (!parts_.neighbors) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "this colorizer was trained by the paper's recipe, which cannot be corrected; "
-                "colour the scene with another preset");
+                "a colorizer of the paper's recipe cannot be corrected; colour the scene with another "
+                "preset");
   }
-  for (const TrainingPicture& picture : corrected) Check(picture.luminance);
+  for (const Correction& correction : corrections) Check(correction.picture.luminance);
   return WithTorchErrors("correction", [&]() -> std::unique_ptr<const Corrector> {
     SetThreads();
-    return std::make_unique<PersonalCorrector>(parts_.encoder,
+    return std::make_unique<PersonalCorrector>(*parts_.encoder,
                                                *parts_.neighbors,
                                                parts_.relative_chroma,
                                                parts_.options.max_side_px,
                                                parts_.threads,
-                                               corrected);
+                                               corrections);
   });
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
+#include "core/colorizer/corrector.h"
 #include "core/colorizer/feature_neighbors.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
@@ -32,8 +33,7 @@ class PersonalColorizer : public Colorizer {
 
   Image Colorize(const Image& luminance) const override;
   ColorPrediction Predict(const Image& luminance, const PictureFacts& facts = {}) const override;
-  std::unique_ptr<const Corrector> Correct(
-      std::span<const TrainingPicture> corrected) const override;
+  std::unique_ptr<const Corrector> Correct(std::span<const Correction> corrections) const override;
   RelativeChroma relative_chroma() const override { return parts_.relative_chroma; }
   std::string Serialize() const override;
 

@@ -204,7 +204,6 @@ CellMatches MatchCells(const CellQueries& queries,
   CellMatches matches{torch::empty({count, 2}),
                       torch::empty({count}),
                       torch::empty({count}),
-                      torch::empty({count}),
                       torch::empty({count}, torch::kInt64),
                       {}};
   for (int64_t begin = 0; begin < count; begin += kQueriesAtOnce) {
@@ -231,7 +230,6 @@ CellMatches MatchCells(const CellQueries& queries,
     const float* squares = q_squares.data_ptr<float>();
     float* ab = matches.ab.data_ptr<float>() + 2 * begin;
     float* distance = matches.distance.data_ptr<float>() + begin;
-    float* apartness_of_query = matches.apart.data_ptr<float>() + begin;
     float* variance = matches.variance.data_ptr<float>() + begin;
     int64_t* nearest = matches.nearest.data_ptr<int64_t>() + begin;
     at::parallel_for(0, end - begin, /*grain_size=*/32, [&](int64_t first, int64_t last) {
@@ -242,7 +240,6 @@ CellMatches MatchCells(const CellQueries& queries,
         const float best = best_of_query[i];
         distance[i] = std::max(nearest_of_query[i] + squares[i], 0.0f);
         const float apart = std::max(best + squares[i], 0.0f);
-        apartness_of_query[i] = apart;
         const auto inverse_width =
             static_cast<float>(1.0 / (options.temperature * (apart + options.distance_floor)));
         const float farthest = best + kNegligible / inverse_width;

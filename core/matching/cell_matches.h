@@ -45,7 +45,6 @@ struct VoteOptions {
 struct CellMatches {
   torch::Tensor ab;        // [q,2], Lab units: the vote; grey where no cell has weight
   torch::Tensor distance;  // [q], squared, of the features of the nearest cell of the bank
-  torch::Tensor apart;     // [q], the least squared distance with what space adds to it
   torch::Tensor variance;  // [q], of the voters' ab, Lab units squared: how far they disagree
   torch::Tensor nearest;   // [q], int64: row of the nearest cell in the bank
   // [n]: squared distance from each cell of the bank to the nearest query; undefined unless asked

@@ -131,6 +131,19 @@ Image ReadViewAb(const StageContext& context, const View& view, int width, int h
   return Resize(map.ab, width, height);
 }
 
+Image ReadTargetAb(
+    const StageContext& context, const View& view, bool is_key, int width, int height) {
+  Image ab = ReadViewAb(context, view, width, height);
+  if (!is_key || context.HasInput(ViewArtifact(artifact::kCorrectedAb, view, ".png"))) return ab;
+  const CarriedColor own = ReadKeyColor(context, width, height);
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < own.confidence.data.size(); ++i) {
+      if (own.confidence.data[i] > 0.0f) ab.Plane(c)[i] = own.ab.Plane(c)[i];
+    }
+  }
+  return ab;
+}
+
 Image ReadProvenance(const StageContext& context, const View& view, int width, int height) {
   const std::string name = ProvenanceArtifact(context, view);
   if (!context.HasInput(name)) return {};

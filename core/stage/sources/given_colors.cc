@@ -8,8 +8,11 @@
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
+#include "core/image/weighted_resize.h"
 #include "core/keycolor/automatic/automatic.h"
+#include "core/keycolor/from_image.h"
 #include "core/keycolor/hints/hint_map.h"
+#include "core/keycolor/picture_checks.h"
 
 namespace color3d {
 namespace {
@@ -18,18 +21,42 @@ using Source = ColorizeKeyViewOptions::Source;
 
 constexpr int64_t kMaxHintsBytes = 1 << 26;
 constexpr float kGivenAlpha = 0.5f;
+constexpr double kSameShape = 0.01;     // relative difference of aspect ratios
+constexpr float kPaintedOver = 6.0f;    // Lab units: less may be 8 bits' rounding in the dark
 
-// A picture that was painted on: of the photo's size.
+bool HasTransparentPart(const Image& picture) {
+  if (picture.channels != 4) return false;
+  return std::any_of(picture.Plane(3), picture.Plane(3) + picture.PlaneSize(), [](float alpha) {
+    return alpha <= kGivenAlpha;
+  });
+}
+
+Image Channels(const Image& picture, int first, int count) {
+  Image part(picture.width, picture.height, count);
+  std::copy_n(picture.Plane(first), part.data.size(), part.data.begin());
+  return part;
+}
+
+// A picture that was painted on, at the photo's size.
 Image ReadPainted(const std::filesystem::path& file, const Image& photo) {
   Image painted = ReadImage(file, /*keep_alpha=*/true);
-  if (painted.width != photo.width || painted.height != photo.height) {
-    throw InvalidArgument("the picture has {}x{} px, the photo that it corrects {}x{}",
-                          painted.width,
-                          painted.height,
-                          photo.width,
-                          photo.height);
+  const int width = photo.width, height = photo.height;
+  if (painted.width == width && painted.height == height) return painted;
+  const double shape = static_cast<double>(painted.width) * height / painted.height / width;
+  if (!HasTransparentPart(painted) || std::abs(shape - 1.0) > kSameShape) {
+    throw InvalidArgument(
+        "the picture has {} px, the photo that it corrects {}; paint at the photo's size, or on a "
+        "transparent layer over a picture of its shape",
+        SizeText(painted),
+        SizeText(photo));
   }
-  return painted;
+  const Image alpha = Channels(painted, 3, 1);
+  const Image color = ResizeWeighted(Channels(painted, 0, 3), alpha, width, height);
+  const Image small_alpha = Resize(alpha, width, height);
+  Image fitted(width, height, 4);
+  std::copy(color.data.begin(), color.data.end(), fitted.data.begin());
+  std::copy(small_alpha.data.begin(), small_alpha.data.end(), fitted.Plane(3));
+  return fitted;
 }
 
 GivenColors FromMap(HintMap map, const Image& photo) {
@@ -38,12 +65,16 @@ GivenColors FromMap(HintMap map, const Image& photo) {
   return colors;
 }
 
-GivenColors FromPicture(const Image& painted) {
-  Image srgb(painted.width, painted.height, 3);
-  std::copy_n(painted.data.begin(), srgb.data.size(), srgb.data.begin());
-  GivenColors colors{ChromaOfLab(LabFromSrgb(srgb)), Image(painted.width, painted.height, 1, 1.0f)};
-  for (size_t i = 0; painted.channels == 4 && i < colors.given.data.size(); ++i) {
-    colors.given.data[i] = painted.Plane(3)[i] > kGivenAlpha ? 1.0f : 0.0f;
+GivenColors FromPicture(const Image& painted, const Image& srgb, const Image& current_ab) {
+  PaintedColor color = KeyColorFromImage(LuminanceFromSrgb(srgb), painted);
+  GivenColors colors{std::move(color.ab), std::move(color.painted)};
+  if (!colors.given.Empty()) return colors;
+  const Image before = ChromaOfLab(LabFromSrgb(PaintablePhoto(srgb, current_ab)));
+  colors.given = Image(srgb.width, srgb.height, 1);
+  for (size_t i = 0; i < colors.given.data.size(); ++i) {
+    const float a = colors.ab.Plane(0)[i] - before.Plane(0)[i];
+    const float b = colors.ab.Plane(1)[i] - before.Plane(1)[i];
+    colors.given.data[i] = a * a + b * b > kPaintedOver * kPaintedOver ? 1.0f : 0.0f;
   }
   return colors;
 }
@@ -67,33 +98,38 @@ GivenColors FromHints(const ColorizeKeyViewOptions& options,
       srgb);
 }
 
-GivenColors Read(const ColorizeKeyViewOptions& options, const Image& srgb, StageContext& context) {
+GivenColors Read(const ColorizeKeyViewOptions& options,
+                 const Image& srgb,
+                 const Image& current_ab,
+                 StageContext& context) {
   switch (options.source) {
     case Source::kStrokes:
       return FromMap(HintsOfStrokes(ReadPainted(options.file, srgb)), srgb);
     case Source::kPoints:
       return FromHints(options, srgb, context);
-    case Source::kImage: {
-      const Image painted = ReadPainted(options.file, srgb);
-      if (painted.channels < 3) throw InvalidArgument("the picture is grey; colour it");
-      return FromPicture(painted);
-    }
+    case Source::kImage:
+      return FromPicture(ReadPainted(options.file, srgb), srgb, current_ab);
     default:
       throw InvalidArgument(
-          "a correction takes strokes, hints or a picture, no other source of colour");
+          "a correction takes strokes, points or a picture, no other source of colour");
   }
 }
 
 }  // namespace
 
+Image PaintablePhoto(const Image& srgb, const Image& ab) {
+  const Image luminance = LuminanceFromSrgb(srgb);
+  return SrgbFromLab(JoinLab(luminance, Resize(ab, srgb.width, srgb.height)));
+}
+
 GivenColors ReadGivenColors(const ColorizeKeyViewOptions& options,
                             const Image& srgb,
+                            const Image& current_ab,
                             StageContext& context) {
-  GivenColors colors = Read(options, srgb, context);
-  if (std::none_of(colors.given.data.begin(), colors.given.data.end(), [](float v) {
-        return v > 0.0f;
-      })) {
-    throw InvalidArgument("the correction colours no pixel");
+  GivenColors colors = Read(options, srgb, current_ab, context);
+  const auto given = [](float value) { return value > 0.0f; };
+  if (std::none_of(colors.given.data.begin(), colors.given.data.end(), given)) {
+    throw InvalidArgument("it changes no pixel of the photo");
   }
   return colors;
 }

@@ -11,12 +11,18 @@ struct GivenColors {
   Image given;  // 1 channel: 1 where that is the user's, else 0
 };
 
-// Strokes (Source::kStrokes), points, lines and regions (kPoints), or a coloured picture, which
-// counts where its alpha is above a half (kImage). `srgb`: the photo. Throws
-// Error{kInvalidArgument} for other sources, what lies outside of the photo, and when no pixel is
-// given.
+// A photo in colours that it has on a smaller grid: what a user paints on. `srgb`: the photo as
+// captured; `ab`: 2 channels, Lab units, any size. 3 channels, sRGB, of the photo's size.
+Image PaintablePhoto(const Image& srgb, const Image& ab);
+
+// Strokes (Source::kStrokes), points, lines and regions (kPoints), or a picture in colour (kImage):
+// that counts where its alpha is above a half or, without transparent pixels, where it differs
+// from PaintablePhoto(srgb, current_ab). `srgb`: the photo as captured. Pictures have its size; with
+// transparent pixels also another one of its shape. Throws Error{kInvalidArgument} for other
+// sources, what lies outside of the photo, and when no pixel is given.
 GivenColors ReadGivenColors(const ColorizeKeyViewOptions& options,
                             const Image& srgb,
+                            const Image& current_ab,
                             StageContext& context);
 
 }  // namespace color3d

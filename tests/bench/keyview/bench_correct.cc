@@ -9,7 +9,6 @@
 #include "core/catalogue/stages.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/keyview/uncertain_place.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
 #include "tests/bench/commands.h"
@@ -22,33 +21,46 @@ namespace {
 struct Arguments {
   std::string scene_folder, run_folder, out_folder;
   int strokes = 3;
-  double radius = 0.02;  // of the stroke, of the photo's longer side
+  double radius = 0.03;  // of the stroke, of the photo's longer side
+  bool true_colors = false;
   int threads = 2;
 };
 
-// A disc in the mean of the photo's true colours there, painted on nothing.
+// How far colours of one thing differ from those in its middle, Lab units.
+constexpr float kOneThing = 15.0f;
+
+// A disc, as far as it shows the thing in its middle, in the mean of the photo's true colours there,
+// or in these colours themselves.
 FurtherKeyView Stroke(const Arguments& args,
                       const Scene& scene,
                       int view,
-                      double x,  // 0..1 of the picture
-                      double y,
+                      int middle_x,  // px of the photo
+                      int middle_y,
                       int number) {
   const std::filesystem::path folder = args.scene_folder;
   const Image photo = ReadImage(folder / scene.views[view].image_file);
+  const Image lab = LabFromSrgb(photo);
   const double radius = args.radius * std::max(photo.width, photo.height);
-  const double cx = x * photo.width, cy = y * photo.height;
   Image painted(photo.width, photo.height, 4);
   double sum[3] = {0.0, 0.0, 0.0};
   double count = 0.0;
-  for (int row = 0; row < photo.height; ++row) {
-    for (int column = 0; column < photo.width; ++column) {
-      if (std::hypot(column + 0.5 - cx, row + 0.5 - cy) > radius) continue;
-      for (int c = 0; c < 3; ++c) sum[c] += photo.At(c, row, column);
-      painted.At(3, row, column) = 1.0f;
+  for (int y = 0; y < photo.height; ++y) {
+    for (int x = 0; x < photo.width; ++x) {
+      if (std::hypot(x - middle_x, y - middle_y) > radius) continue;
+      float difference = 0.0f;
+      for (int c = 0; c < 3; ++c) {
+        difference += std::abs(lab.At(c, y, x) - lab.At(c, middle_y, middle_x));
+      }
+      if (difference > kOneThing) continue;
+      for (int c = 0; c < 3; ++c) {
+        painted.At(c, y, x) = photo.At(c, y, x);
+        sum[c] += photo.At(c, y, x);
+      }
+      painted.At(3, y, x) = 1.0f;
       ++count;
     }
   }
-  for (int c = 0; c < 3; ++c) {
+  for (int c = 0; c < 3 && !args.true_colors; ++c) {
     std::fill_n(painted.Plane(c), painted.PlaneSize(), static_cast<float>(sum[c] / count));
   }
   FurtherKeyView correction{scene.views[view].name, {}};
@@ -57,6 +69,14 @@ FurtherKeyView Stroke(const Arguments& args,
       std::filesystem::path(args.out_folder) / ("stroke" + std::to_string(number) + ".png");
   WriteFileAtomic(correction.color.file, EncodePng8(painted));
   return correction;
+}
+
+double SecondsOf(const LocalPipeline& pipeline, std::string_view kind) {
+  double seconds = 0.0;
+  for (const StageSummary& stage : pipeline.summaries()) {
+    if (stage.kind == kind) seconds = stage.seconds;
+  }
+  return seconds;
 }
 
 nlohmann::ordered_json Score(LocalPipeline* pipeline) {
@@ -81,27 +101,25 @@ void Run(const Arguments& args) {
   }
   const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
   CorrectColorsOptions options;
+  options.proposals = 1;
   for (int stroke = 0;; ++stroke) {
+    pipeline.Run(kind::kCorrectColors, [&](StageContext& c) { RunCorrectColors(options, c); });
     nlohmann::ordered_json row = Score(&pipeline);
     row["strokes"] = stroke;
-    UncertainPlace place;
-    pipeline.Run("propose", [&](StageContext& c) {
-      std::vector<Image> confidence(scene.views.size());
-      for (const int view : scene.TrainingViews()) {
-        confidence[view] = ReadViewConfidence(c, scene.views[view], 200, 150);
-      }
-      place = LeastCertainPlace(confidence);
-    });
-    if (stroke < args.strokes && place.view >= 0) {
-      row["next"] = {scene.views[place.view].name, place.x / 200.0, place.y / 150.0};
-      row["uncertainty"] = place.uncertainty;
-    }
+    row["seconds"] = SecondsOf(pipeline, kind::kCorrectColors);
+    const auto facts =
+        nlohmann::ordered_json::parse(ReadFile(pipeline.ArtifactPath(artifact::kCorrections)));
+    const auto& proposals = facts.at("proposals");
+    if (!proposals.empty()) row["next"] = proposals.at(0);
     std::printf("%s\n", row.dump().c_str());
     std::fflush(stdout);
-    if (stroke == args.strokes || place.view < 0) return;
-    options.corrections.push_back(
-        Stroke(args, scene, place.view, place.x / 200.0, place.y / 150.0, stroke));
-    pipeline.Run(kind::kCorrectColors, [&](StageContext& c) { RunCorrectColors(options, c); });
+    if (stroke == args.strokes || proposals.empty()) return;
+    options.corrections.push_back(Stroke(args,
+                                         scene,
+                                         scene.FindView(proposals.at(0).at("view").get<std::string>()),
+                                         proposals.at(0).at("x"),
+                                         proposals.at(0).at("y"),
+                                         stroke));
   }
 }
 
@@ -116,6 +134,7 @@ void AddCorrectCommand(CLI::App& app) {
   command->add_option("--out", args->out_folder, "where artifacts go")->required();
   command->add_option("--strokes", args->strokes);
   command->add_option("--radius", args->radius, "of the strokes, of the photo's longer side");
+  command->add_flag("--true-colors", args->true_colors, "paint them, not their mean");
   command->add_option("--threads", args->threads);
   command->callback([args] { Run(*args); });
 }
