@@ -105,7 +105,7 @@ public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
 public core/scene camera import scene view_images
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
-  geometry/geometry_options geometry/geometry_trainer chroma/chroma_fit chroma/chroma_options \
+  geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz
 public core/stage stages formats/artifacts
 public core/view view_page

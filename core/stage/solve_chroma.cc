@@ -33,8 +33,9 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     }
     return target;
   };
-  const GaussianModel model =
+  GaussianModel model =
       FitChroma(geometry, ChromaProblemOf(scene, images, targets), options, context.control());
+  AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }
 
