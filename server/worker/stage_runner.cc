@@ -99,6 +99,12 @@ CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs
   return options;
 }
 
+RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
+  RenderOptions options = RenderOptionsFrom(spec);
+  options.cameras = FetchIf(spec.has_cameras(), spec.cameras(), blobs);
+  return options;
+}
+
 void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {
   EvaluateOptions options;
   for (const v1::TruthImage& image : spec.truth()) {
@@ -188,7 +194,7 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kExport:
         return RunExport(ExportOptionsFrom(spec.export_()), context);
       case JobSpec::kRender:
-        return RunRender(RenderOptionsFrom(spec.render()), context);
+        return RunRender(MovieOptions(spec.render(), blobs), context);
       case JobSpec::kEvaluate:
         return RunEvaluation(spec.evaluate(), blobs, context);
       case JobSpec::kColorizeScene:
