@@ -108,6 +108,12 @@ CorrectColorsOptions CorrectOptions(const v1::CorrectColorsSpec& spec, BlobSourc
   return options;
 }
 
+RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
+  RenderOptions options = RenderOptionsFrom(spec);
+  options.cameras = FetchIf(spec.has_cameras(), spec.cameras(), blobs);
+  return options;
+}
+
 void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {
   EvaluateOptions options;
   for (const v1::TruthImage& image : spec.truth()) {
@@ -200,7 +206,7 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kExport:
         return RunExport(ExportOptionsFrom(spec.export_()), context);
       case JobSpec::kRender:
-        return RunRender(RenderOptionsFrom(spec.render()), context);
+        return RunRender(MovieOptions(spec.render(), blobs), context);
       case JobSpec::kEvaluate:
         return RunEvaluation(spec.evaluate(), blobs, context);
       case JobSpec::kColorizeScene:
