@@ -15,7 +15,7 @@ namespace {
 constexpr double kUnknownApart = 0.8;  // of places in space from those whose position is not known
 constexpr double kLeastWeight = 0.05;
 constexpr double kSamePlace = 0.75;  // of the most that two places can be alike
-constexpr double kWorthAsking = 1e-3;
+constexpr double kWorthAsking = 1e-5;
 
 // Places that are not known lie together, away from all others.
 torch::Tensor InSpace(const torch::Tensor& positions) {

@@ -25,8 +25,8 @@ constexpr int64_t kMostObserved = 800;  // cells of all corrections together
 constexpr int64_t kFewest = 8;          // of each
 constexpr double kTouched = 0.02;       // share of a cell that was painted, to count
 constexpr double kChanged = 3.0;        // Lab units: less is as it was
-// The expected error of a colour, squared: more where it was not seen and nothing alike was learnt,
-// up to so many times the median.
+// The expected error of a colour, squared, grows with the square of the distance to what was learnt,
+// up to so many times its median.
 constexpr double kLeastVariance = 0.1;
 constexpr double kMostUnlike = 4.0;
 
@@ -73,12 +73,12 @@ std::vector<float> Values(const torch::Tensor& tensor) {
 }
 
 // The expected error of each place's colour.
-torch::Tensor Deviation(std::vector<float> seen, std::vector<float> unlike) {
+torch::Tensor Deviation(const std::vector<float>& unlike) {
   std::vector<float> sorted = unlike;
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
   const double median = std::max(sorted[sorted.size() / 2], 1e-6f);
   const torch::Tensor apart = (torch::tensor(unlike) / median).clamp_max(kMostUnlike);
-  return (kLeastVariance + (1.0 - torch::tensor(seen)) * apart).sqrt();
+  return (kLeastVariance + apart.square()).sqrt();
 }
 
 }  // namespace
@@ -218,7 +218,7 @@ std::vector<ProposedPlace> PersonalCorrector::Propose(std::span<const PlaceSampl
     const FieldPlaces all{Joined(samples, &PlaceSample::features, rows),
                           Joined(samples, &PlaceSample::positions, rows),
                           torch::tensor(seen)};
-    for (const auto& [row, gain] : field_->Propose(all, Deviation(seen, unlike), count)) {
+    for (const auto& [row, gain] : field_->Propose(all, Deviation(unlike), count)) {
       proposed.push_back({places[row].first, places[row].second->x, places[row].second->y, gain});
     }
     return proposed;

@@ -101,6 +101,26 @@ void WarnIfOffTheGeometry(const Painted& painted, const std::string& name, Stage
                                "reaches other views by looks alone");
 }
 
+// What was not given must not leak into the edges of what was.
+Image UndistortGiven(const ViewImages& images,
+                     int view,
+                     const GivenColors& given,
+                     const Image& undistorted) {
+  Image weighted = given.ab;
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < given.given.data.size(); ++i) {
+      weighted.Plane(c)[i] *= given.given.data[i];
+    }
+  }
+  Image ab = images.Undistort(view, weighted);
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < undistorted.data.size(); ++i) {
+      if (undistorted.data[i] > 0.0f) ab.Plane(c)[i] /= undistorted.data[i];
+    }
+  }
+  return ab;
+}
+
 Painted ReadCorrection(const FurtherKeyView& wanted,
                        const ColoredViews& views,
                        StageContext& context) {
@@ -114,8 +134,8 @@ Painted ReadCorrection(const FurtherKeyView& wanted,
   const Image before = views.Ab(index, size);
   const GivenColors given = ReadGivenColors(
       wanted.color, ReadImage(context.scene_folder() / view.image_file), before, context);
-  painted.ab = views.images().Undistort(index, given.ab);
   painted.correction.painted = views.images().Undistort(index, given.given);
+  painted.ab = UndistortGiven(views.images(), index, given, painted.correction.painted);
   painted.correction.change = painted.ab;
   for (size_t i = 0; i < before.data.size(); ++i) {
     painted.correction.change.data[i] -= before.data[i];
