@@ -1,4 +1,5 @@
-// `color3d correct`: a coloured scene, mended by strokes on its photos, saturation and white balance.
+// `color3d correct`: a coloured scene, mended by strokes on its photos, saturation and white
+// balance.
 #include <fmt/core.h>
 
 #include <filesystem>
@@ -154,17 +155,17 @@ std::string ProposalText(const Context& context,
   text += "Paint on such a picture and run\n  " +
           CommandLine(context, {"correct", target, "--view", view, "--image", "PAINTED.png"}) +
           "\nor give one place a colour\n  " +
-          CommandLine(context,
-                      {"correct",
-                       target,
-                       "--view",
-                       view,
-                       "--at",
-                       fmt::format("{},{}",
-                                   proposals.at(0).at("x").get<int>(),
-                                   proposals.at(0).at("y").get<int>()),
-                       "--color",
-                       "#rrggbb"}) +
+          CommandLine(
+              context,
+              {"correct",
+               target,
+               "--view",
+               view,
+               "--at",
+               fmt::format(
+                   "{},{}", proposals.at(0).at("x").get<int>(), proposals.at(0).at("y").get<int>()),
+               "--color",
+               "#rrggbb"}) +
           "\n";
   return text;
 }
@@ -201,8 +202,9 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
                {"out", options.out},
                {"files", files},
                {"corrections", corrections},
-               {"proposals", facts.is_object() ? facts.value("proposals", nlohmann::ordered_json())
-                                               : nlohmann::ordered_json()},
+               {"proposals",
+                facts.is_object() ? facts.value("proposals", nlohmann::ordered_json())
+                                  : nlohmann::ordered_json()},
                {"metrics", ReadResult(options.out, artifact::kMetrics)}});
     return ExitCode::kOk;
   }
@@ -254,7 +256,8 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
       ->capture_default_str()
       ->group(place);
   const char* whole = "The whole scene";
-  command->add_option("--saturation", options->saturation, "Factor on all colours, 0..4; 1: as solved")
+  command
+      ->add_option("--saturation", options->saturation, "Factor on all colours, 0..4; 1: as solved")
       ->group(whole);
   command
       ->add_option("--warmth",

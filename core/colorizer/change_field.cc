@@ -1,7 +1,7 @@
 #include "core/colorizer/change_field.h"
 
-#include <ATen/ops/linalg_cholesky.h>
 #include <ATen/ops/cholesky_inverse.h>
+#include <ATen/ops/linalg_cholesky.h>
 #include <torch/types.h>
 
 #include <algorithm>
@@ -62,9 +62,8 @@ torch::Tensor ChangeField::Alike(const FieldPlaces& a, const FieldPlaces& b) con
   const torch::Tensor seen = (a.seen.unsqueeze(1) - b.seen.unsqueeze(0)).abs_();
   const torch::Tensor wide =
       (looks / -options_.wide_looks).exp_() / (1.0 + space.sqrt() / options_.wide_space);
-  const torch::Tensor near = (looks / -options_.near_looks -
-                              space / (options_.near_space * options_.near_space))
-                                 .exp_();
+  const torch::Tensor near =
+      (looks / -options_.near_looks - space / (options_.near_space * options_.near_space)).exp_();
   return (options_.wide * wide + options_.near * near) * (seen / -options_.seen_reach).exp_();
 }
 

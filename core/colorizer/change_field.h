@@ -21,13 +21,13 @@ struct FieldPlaces {
 // several views.
 struct ChangeFieldOptions {
   double wide = 0.5;
-  double wide_looks = 2.0;   // squared feature distance at which that has fallen to 1/e
-  double wide_space = 0.2;   // distance at which that has halved, in units of the scene's radius
+  double wide_looks = 2.0;  // squared feature distance at which that has fallen to 1/e
+  double wide_space = 0.2;  // distance at which that has halved, in units of the scene's radius
   double near = 0.4;
   double near_looks = 4.0;
-  double near_space = 0.1;   // distance at which that has fallen to 1/e
-  double seen_reach = 0.5;   // what a key view shows is its own: difference of `seen` for 1/e
-  double noise = 0.1;        // variance of what the user paints over that of the errors
+  double near_space = 0.1;  // distance at which that has fallen to 1/e
+  double seen_reach = 0.5;  // what a key view shows is its own: difference of `seen` for 1/e
+  double noise = 0.1;       // variance of what the user paints over that of the errors
 };
 
 class ChangeField {
@@ -62,7 +62,7 @@ class ChangeField {
 
   ChangeFieldOptions options_;
   FieldPlaces places_;
-  torch::Tensor inverse_;  // [n,n], of the covariance of what was painted
+  torch::Tensor inverse_;                // [n,n], of the covariance of what was painted
   torch::Tensor weights_times_changes_;  // [n,2]: inverse x changes
 };
 

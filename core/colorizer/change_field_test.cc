@@ -11,8 +11,8 @@ namespace {
 // Places on a line in space, all of one look but for `look`.
 FieldPlaces Places(const std::vector<double>& x, double look = 0.0, double seen = 0.0) {
   const auto count = static_cast<int64_t>(x.size());
-  FieldPlaces places{torch::full({count, 4}, look), torch::zeros({count, 4}),
-                     torch::full({count}, seen)};
+  FieldPlaces places{
+      torch::full({count, 4}, look), torch::zeros({count, 4}), torch::full({count}, seen)};
   for (int64_t i = 0; i < count; ++i) {
     places.positions[i][0] = x[i];
     places.positions[i][3] = 1.0;
@@ -26,7 +26,9 @@ FieldPlaces Unknown(int64_t count) {
 
 ChangeField OneStroke(const FieldPlaces& place, double a) {
   const int64_t count = place.seen.size(0);
-  return {place, torch::full({count, 2}, a), torch::ones({count}),
+  return {place,
+          torch::full({count, 2}, a),
+          torch::ones({count}),
           torch::zeros({count}, torch::kInt64)};
 }
 
@@ -63,8 +65,8 @@ TEST(ChangeField, WhereTwoStrokesContradictTheLaterOneCounts) {
   torch::Tensor changes = torch::zeros({2, 2});
   changes[0][0] = 30.0;
   changes[1][0] = -10.0;
-  const ChangeField field(Places({0.0, 0.0}), changes, torch::ones({2}),
-                          torch::tensor({int64_t{0}, int64_t{1}}));
+  const ChangeField field(
+      Places({0.0, 0.0}), changes, torch::ones({2}), torch::tensor({int64_t{0}, int64_t{1}}));
   EXPECT_NEAR(ChangeAt(field, Places({0.0})), -9.0, 1e-4);
 }
 

@@ -25,7 +25,7 @@ struct Correction {
 // Places drawn from a picture, for Corrector::Propose. A place is a cell of the encoder's grid.
 struct PlaceSample {
   struct Place {
-    double x, y;   // 0..1 of the picture
+    double x, y;  // 0..1 of the picture
     float seen;
     float unlike;  // squared distance of its features to the nearest that colours were learnt from
   };
@@ -43,7 +43,7 @@ struct CorrectedColor {
 
 // Where one stroke would tell most.
 struct ProposedPlace {
-  int picture = -1;  // index into the samples
+  int picture = -1;         // index into the samples
   double x = 0.0, y = 0.0;  // 0..1 of that picture
   // How much of what is uncertain about all pictures it would tell, 0..1.
   double gain = 0.0;

@@ -166,9 +166,10 @@ ColorPrediction PersonalColorizer::Predict(const Image& luminance,
 std::unique_ptr<const Corrector> PersonalColorizer::Correct(
     std::span<const Correction> corrections) const {
   if (!parts_.neighbors) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "a colorizer of the paper's recipe cannot be corrected; colour the scene with another "
-                "preset");
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "a colorizer of the paper's recipe cannot be corrected; colour the scene with another "
+        "preset");
   }
   for (const Correction& correction : corrections) Check(correction.picture.luminance);
   return WithTorchErrors("correction", [&]() -> std::unique_ptr<const Corrector> {

@@ -25,8 +25,8 @@ constexpr int64_t kMostObserved = 800;  // cells of all corrections together
 constexpr int64_t kFewest = 8;          // of each
 constexpr double kTouched = 0.02;       // share of a cell that was painted, to count
 constexpr double kChanged = 3.0;        // Lab units: less is as it was
-// The expected error of a colour, squared, grows with the square of the distance to what was learnt,
-// up to so many times its median.
+// The expected error of a colour, squared, grows with the square of the distance to what was
+// learnt, up to so many times its median.
 constexpr double kLeastVariance = 0.1;
 constexpr double kMostUnlike = 4.0;
 
@@ -41,7 +41,8 @@ PlacedPicture AtSide(const PlacedPicture& picture, int max_side_px) {
 }
 
 torch::Tensor SeenOf(const Image& seen, int64_t count) {
-  return seen.Empty() ? torch::zeros({count}) : CellMeans(PaddedTensor(seen)).squeeze(1).contiguous();
+  return seen.Empty() ? torch::zeros({count})
+                      : CellMeans(PaddedTensor(seen)).squeeze(1).contiguous();
 }
 
 // Rows to observe: half of them where something changes, so that what the user left as it was
@@ -144,10 +145,9 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
                              PlacesOf(small.position, cells.Count()),
                              SeenOf(small.seen, cells.Count())};
     const ChangeField::Answer answer = field_->At(places);
-    const Image coarse =
-        ImageFromTensor(torch::cat({answer.change, answer.share.unsqueeze(1)}, 1)
-                            .t()
-                            .reshape({3, cells.rows, cells.columns}));
+    const Image coarse = ImageFromTensor(torch::cat({answer.change, answer.share.unsqueeze(1)}, 1)
+                                             .t()
+                                             .reshape({3, cells.rows, cells.columns}));
     const int width = picture.luminance.width, height = picture.luminance.height;
     Image fine = CropTo(UpsampleGuided(coarse, ImageFromTensor(padded)),
                         small.luminance.width,
@@ -157,10 +157,10 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
     }
     CorrectedColor color{Image(width, height, 2), Image(width, height, 1), {}};
     std::copy_n(fine.Plane(0), color.change.data.size(), color.change.Plane(0));
-    std::transform(fine.Plane(2),
-                   fine.Plane(2) + fine.PlaneSize(),
-                   color.share.Plane(0),
-                   [](float value) { return std::clamp(value, 0.0f, 1.0f); });
+    std::transform(
+        fine.Plane(2), fine.Plane(2) + fine.PlaneSize(), color.share.Plane(0), [](float value) {
+          return std::clamp(value, 0.0f, 1.0f);
+        });
     color.change = FromRelative(relative_chroma_, picture.luminance, std::move(color.change));
     color.sample = Sample(places, cells.columns, small.luminance, samples);
     return color;

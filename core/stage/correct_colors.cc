@@ -96,9 +96,10 @@ void WarnIfOffTheGeometry(const Painted& painted, const std::string& name, Stage
     if (!position.Empty()) known += weight * position.Plane(3)[i];
   }
   if (known >= kHardlyKnown * all) return;
-  context.progress().OnWarning("the correction of " + name +
-                               " lies where the 3D scene shows nothing of the photo, e.g. on sky: it "
-                               "reaches other views by looks alone");
+  context.progress().OnWarning(
+      "the correction of " + name +
+      " lies where the 3D scene shows nothing of the photo, e.g. on sky: it "
+      "reaches other views by looks alone");
 }
 
 // What was not given must not leak into the edges of what was.

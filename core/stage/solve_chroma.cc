@@ -22,8 +22,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     if (!target) {
       const Camera camera = images.WorkingCamera(view);
       auto made = std::make_shared<ChromaTarget>();
-      made->ab =
-          ReadTargetAb(context, scene.views[view], view == key, camera.width, camera.height);
+      made->ab = ReadTargetAb(context, scene.views[view], view == key, camera.width, camera.height);
       made->confidence =
           ReadViewConfidence(context, scene.views[view], camera.width, camera.height);
       if (made->confidence.Empty() && view == key) {

@@ -14,7 +14,8 @@
 namespace color3d {
 namespace {
 
-// A colorize_views or correct_colors job that names no encoder works with that of the given personalize job.
+// A colorize_views or correct_colors job that names no encoder works with that of the given
+// personalize job.
 void TakeEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
   std::string* encoder = nullptr;
   if (spec->has_colorize_views()) encoder = spec->mutable_colorize_views()->mutable_encoder();

@@ -1,4 +1,5 @@
 // `color3d correct`: strokes, saturation and undo on a coloured scene, through the whole service.
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,16 +23,16 @@ class CorrectTest : public ServiceTest {
   void SetUp() override {
     StartServer();
     WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
-    const ProcessResult colored = Client(
-        std::vector<std::string>{"colorize",
-                                 Path("room").string(),
-                                 "-o",
-                                 Out(),
-                                 "--key-view",
-                                 "view001.png",
-                                 "--key-color",
-                                 (Path("room") / "truth" / "view001.png").string()} +
-        QuickOptions());
+    const ProcessResult colored =
+        Client(std::vector<std::string>{"colorize",
+                                        Path("room").string(),
+                                        "-o",
+                                        Out(),
+                                        "--key-view",
+                                        "view001.png",
+                                        "--key-color",
+                                        (Path("room") / "truth" / "view001.png").string()} +
+               QuickOptions());
     ASSERT_EQ(colored.exit_code, 0) << colored.out << colored.err;
   }
   std::string Out() const { return Path("out").string(); }
@@ -116,7 +117,8 @@ TEST_F(CorrectTest, BadInputSaysWhatToDo) {
   ExpectRefused({"--undo", "some"}, "give one, or all");
   // A picture that was not painted on.
   ExpectRefused(
-      {"--view", "view001", "--image", (Path("room") / "images" / "view001.png").string()}, "colour");
+      {"--view", "view001", "--image", (Path("room") / "images" / "view001.png").string()},
+      "colour");
   const fs::path small = Path("small.png");
   WriteFileAtomic(small, EncodePng8(Image(20, 10, 3, 0.5f)));
   ExpectRefused({"--view", "view002", "--image", small.string()}, "20x10");

@@ -5,8 +5,8 @@
 
 namespace color3d {
 
-// White balance is a von Kries scaling of X and Z. In Lab that is linear in L, a and b, as rendering
-// is, so it is exact on Gaussians but for harmonics of L above chroma's degree.
+// White balance is a von Kries scaling of X and Z. In Lab that is linear in L, a and b, as
+// rendering is, so it is exact on Gaussians but for harmonics of L above chroma's degree.
 struct ChromaAdjustment {
   double saturation = 1.0;  // factor on a and b before the balance, 0..4
   double tint = 0.0;        // a and b of what was a neutral grey of L = 50, Lab units, -50..50

@@ -63,8 +63,8 @@ Image ReadViewAb(const StageContext& context, const View& view, int width, int h
 Image ReadTargetAb(
     const StageContext& context, const View& view, bool is_key, int width, int height);
 
-// Where that colour comes from: 3 channels, shares of guessed, seen and inferred, resized to width x
-// height px. Empty when the view has no provenance.
+// Where that colour comes from: 3 channels, shares of guessed, seen and inferred, resized to width
+// x height px. Empty when the view has no provenance.
 Image ReadProvenance(const StageContext& context, const View& view, int width, int height);
 
 // How sure that colour is, from its provenance: 1 channel, seen + inferred / 2, 0..1, resized to

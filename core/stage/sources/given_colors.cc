@@ -21,8 +21,8 @@ using Source = ColorizeKeyViewOptions::Source;
 
 constexpr int64_t kMaxHintsBytes = 1 << 26;
 constexpr float kGivenAlpha = 0.5f;
-constexpr double kSameShape = 0.01;     // relative difference of aspect ratios
-constexpr float kPaintedOver = 6.0f;    // Lab units: less may be 8 bits' rounding in the dark
+constexpr double kSameShape = 0.01;   // relative difference of aspect ratios
+constexpr float kPaintedOver = 6.0f;  // Lab units: less may be 8 bits' rounding in the dark
 
 bool HasTransparentPart(const Image& picture) {
   if (picture.channels != 4) return false;
@@ -87,9 +87,9 @@ GivenColors FromHints(const ColorizeKeyViewOptions& options,
   const bool asks_automatic = std::any_of(hints.begin(), hints.end(), [](const ColorHint& hint) {
     return hint.fill == ColorHint::Fill::kAutomatic;
   });
-  const Image automatic =
-      asks_automatic ? AutomaticColorizer::Embedded()->Colorize(LuminanceFromSrgb(srgb)).ab
-                     : Image();
+  const Image automatic = asks_automatic
+                              ? AutomaticColorizer::Embedded()->Colorize(LuminanceFromSrgb(srgb)).ab
+                              : Image();
   HintPictures pictures;
   if (!labels.Empty()) pictures.labels = &labels;
   if (asks_automatic) pictures.automatic_ab = &automatic;

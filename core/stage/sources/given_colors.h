@@ -17,8 +17,8 @@ Image PaintablePhoto(const Image& srgb, const Image& ab);
 
 // Strokes (Source::kStrokes), points, lines and regions (kPoints), or a picture in colour (kImage):
 // that counts where its alpha is above a half or, without transparent pixels, where it differs
-// from PaintablePhoto(srgb, current_ab). `srgb`: the photo as captured. Pictures have its size; with
-// transparent pixels also another one of its shape. Throws Error{kInvalidArgument} for other
+// from PaintablePhoto(srgb, current_ab). `srgb`: the photo as captured. Pictures have its size;
+// with transparent pixels also another one of its shape. Throws Error{kInvalidArgument} for other
 // sources, what lies outside of the photo, and when no pixel is given.
 GivenColors ReadGivenColors(const ColorizeKeyViewOptions& options,
                             const Image& srgb,

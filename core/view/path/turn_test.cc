@@ -19,8 +19,8 @@ const Vector3d kFocus(1.0, 2.0, 3.0);
 // A level camera at this angle around the focus, `above` it, that looks at it.
 View ViewAt(double degrees, double distance = 4.0, double above = 1.0) {
   const Vector3d side = kUp.unitOrthogonal();
-  const Vector3d position = kFocus + above * kUp +
-                            distance * (Eigen::AngleAxisd(degrees * kDegree, kUp) * side);
+  const Vector3d position =
+      kFocus + above * kUp + distance * (Eigen::AngleAxisd(degrees * kDegree, kUp) * side);
   const Vector3d z = (kFocus - position).normalized();
   const Vector3d x = z.cross(kUp).normalized();
   Eigen::Matrix3d axes;
@@ -38,9 +38,7 @@ Scene SceneOf(const std::vector<double>& degrees) {
   return scene;
 }
 
-Turn TurnOf(const Scene& scene, int key) {
-  return TurnOf(scene, key, StandOf(scene, key, kFocus));
-}
+Turn TurnOf(const Scene& scene, int key) { return TurnOf(scene, key, StandOf(scene, key, kFocus)); }
 
 TEST(TurnTest, PhotosAllAroundGiveACircleAndOthersASwayAmongThem) {
   std::vector<double> ring;

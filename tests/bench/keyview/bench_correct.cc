@@ -29,8 +29,8 @@ struct Arguments {
 // How far colours of one thing differ from those in its middle, Lab units.
 constexpr float kOneThing = 15.0f;
 
-// A disc, as far as it shows the thing in its middle, in the mean of the photo's true colours there,
-// or in these colours themselves.
+// A disc, as far as it shows the thing in its middle, in the mean of the photo's true colours
+// there, or in these colours themselves.
 FurtherKeyView Stroke(const Arguments& args,
                       const Scene& scene,
                       int view,
@@ -114,12 +114,13 @@ void Run(const Arguments& args) {
     std::printf("%s\n", row.dump().c_str());
     std::fflush(stdout);
     if (stroke == args.strokes || proposals.empty()) return;
-    options.corrections.push_back(Stroke(args,
-                                         scene,
-                                         scene.FindView(proposals.at(0).at("view").get<std::string>()),
-                                         proposals.at(0).at("x"),
-                                         proposals.at(0).at("y"),
-                                         stroke));
+    options.corrections.push_back(
+        Stroke(args,
+               scene,
+               scene.FindView(proposals.at(0).at("view").get<std::string>()),
+               proposals.at(0).at("x"),
+               proposals.at(0).at("y"),
+               stroke));
   }
 }
 
