@@ -25,19 +25,32 @@ torch::Tensor InSpace(const torch::Tensor& positions) {
 
 FieldPlaces Rows(const FieldPlaces& places, const torch::Tensor& rows) {
   return {places.features.index_select(0, rows),
+          places.colors.index_select(0, rows),
           places.positions.index_select(0, rows),
           places.seen.index_select(0, rows)};
+}
+
+// The mean of the wanted colours, the most alike first.
+torch::Tensor WantedNear(const torch::Tensor& alike, const torch::Tensor& wanted) {
+  const torch::Tensor weights = alike.square();
+  return torch::matmul(weights, wanted) / weights.sum(1, /*keepdim=*/true).clamp_min(1e-12);
+}
+
+// `change` as far as it leads towards `limit`, and not beyond; rows are pairs.
+torch::Tensor UpTo(const torch::Tensor& limit, const torch::Tensor& change) {
+  const torch::Tensor length = change.square().sum(1, /*keepdim=*/true).clamp_min(1e-9);
+  return change * ((limit * change).sum(1, /*keepdim=*/true) / length).clamp(0.0, 1.0);
 }
 
 }  // namespace
 
 ChangeField::ChangeField(FieldPlaces places,
-                         torch::Tensor changes,
+                         torch::Tensor wanted,
                          const torch::Tensor& weights,
                          const torch::Tensor& correction_of_row,
                          const ChangeFieldOptions& options)
-    : options_(options), places_(std::move(places)) {
-  if (changes.size(0) == 0) return;
+    : options_(options), places_(std::move(places)), wanted_(std::move(wanted)) {
+  if (wanted_.size(0) == 0) return;
   torch::Tensor covariance = Alike(places_, places_);
   const double most = options_.wide + options_.near;
   const torch::Tensor later = correction_of_row.unsqueeze(0) > correction_of_row.unsqueeze(1);
@@ -45,13 +58,13 @@ ChangeField::ChangeField(FieldPlaces places,
       torch::logical_and(covariance > kSamePlace * most, later).any(/*dim=*/1);
   const torch::Tensor rows = repeated.logical_not().nonzero().squeeze(1);
   places_ = Rows(places_, rows);
+  wanted_ = wanted_.index_select(0, rows);
   covariance = covariance.index_select(0, rows).index_select(1, rows).to(torch::kFloat64);
   const torch::Tensor noise =
       options_.noise / weights.index_select(0, rows).to(torch::kFloat64).clamp_min(kLeastWeight);
   inverse_ = at::cholesky_inverse(at::linalg_cholesky(covariance + torch::diag(noise)));
-  weights_times_changes_ =
-      torch::matmul(inverse_, changes.index_select(0, rows).to(torch::kFloat64))
-          .to(torch::kFloat32);
+  inverse_x_change_ =
+      torch::matmul(inverse_, (wanted_ - places_.colors).to(torch::kFloat64)).to(torch::kFloat32);
   inverse_ = inverse_.to(torch::kFloat32);
 }
 
@@ -72,7 +85,7 @@ ChangeField::Answer ChangeField::At(const FieldPlaces& places) const {
   if (!inverse_.defined()) return {torch::zeros({count, 2}), torch::zeros({count})};
   const torch::Tensor alike = Alike(places, places_);
   const torch::Tensor told = (torch::matmul(alike, inverse_) * alike).sum(1);
-  return {torch::matmul(alike, weights_times_changes_),
+  return {UpTo(WantedNear(alike, wanted_) - places.colors, torch::matmul(alike, inverse_x_change_)),
           (told / (options_.wide + options_.near)).clamp_(0.0, 1.0)};
 }
 

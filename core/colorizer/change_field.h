@@ -12,6 +12,7 @@ namespace color3d {
 
 struct FieldPlaces {
   torch::Tensor features;   // [n,D] in the bank's space
+  torch::Tensor colors;     // [n,2], Lab units: as they are
   torch::Tensor positions;  // [n,4], as CellBank's
   torch::Tensor seen;       // [n], 0..1: share of the colour that a key view shows
 };
@@ -32,17 +33,20 @@ struct ChangeFieldOptions {
 
 class ChangeField {
  public:
-  // `changes` [n,2], Lab units; `weights` [n], 0..1, how far each place is painted; rows in the
-  // order in which they were given: places that a later row shows as well are left out. n may be 0.
+  // `wanted` [n,2], Lab units: the colours that `places` should have; `weights` [n], 0..1: how far
+  // each is painted; `correction_of_row` [n]: places that a later correction shows as well are left
+  // out. n may be 0.
   ChangeField(FieldPlaces places,
-              torch::Tensor changes,
+              torch::Tensor wanted,
               const torch::Tensor& weights,
               const torch::Tensor& correction_of_row,
               const ChangeFieldOptions& options = {});
 
   struct Answer {
-    torch::Tensor change;  // [q,2], Lab units
-    torch::Tensor share;   // [q], 0..1: the part of the errors' variance that is told
+    // [q,2], Lab units; never beyond the wanted colours of what is most alike: a place that has
+    // them already is not wrong as the painted ones were.
+    torch::Tensor change;
+    torch::Tensor share;  // [q], 0..1: the part of the errors' variance that is told
   };
   Answer At(const FieldPlaces& places) const;
 
@@ -62,8 +66,9 @@ class ChangeField {
 
   ChangeFieldOptions options_;
   FieldPlaces places_;
-  torch::Tensor inverse_;                // [n,n], of the covariance of what was painted
-  torch::Tensor weights_times_changes_;  // [n,2]: inverse x changes
+  torch::Tensor inverse_;           // [n,n], of the covariance of what was painted
+  torch::Tensor wanted_;            // [n,2]
+  torch::Tensor inverse_x_change_;  // [n,2]
 };
 
 }  // namespace color3d

@@ -11,8 +11,10 @@ namespace {
 // Places on a line in space, all of one look but for `look`.
 FieldPlaces Places(const std::vector<double>& x, double look = 0.0, double seen = 0.0) {
   const auto count = static_cast<int64_t>(x.size());
-  FieldPlaces places{
-      torch::full({count, 4}, look), torch::zeros({count, 4}), torch::full({count}, seen)};
+  FieldPlaces places{torch::full({count, 4}, look),
+                     torch::zeros({count, 2}),
+                     torch::zeros({count, 4}),
+                     torch::full({count}, seen)};
   for (int64_t i = 0; i < count; ++i) {
     places.positions[i][0] = x[i];
     places.positions[i][3] = 1.0;
@@ -21,7 +23,10 @@ FieldPlaces Places(const std::vector<double>& x, double look = 0.0, double seen 
 }
 
 FieldPlaces Unknown(int64_t count) {
-  return {torch::zeros({count, 4}), torch::zeros({count, 4}), torch::zeros({count})};
+  return {torch::zeros({count, 4}),
+          torch::zeros({count, 2}),
+          torch::zeros({count, 4}),
+          torch::zeros({count})};
 }
 
 ChangeField OneStroke(const FieldPlaces& place, double a) {
@@ -52,6 +57,17 @@ TEST(ChangeField, ReachesWhatIsAlikeAndNearAndNotWhatIsSeenInTheKeyView) {
   EXPECT_LT(ChangeAt(field, Places({0.01}, /*look=*/3.0)), 0.1);
   EXPECT_LT(ChangeAt(field, Places({0.01}, 0.0, /*seen=*/1.0)), 3.0);
   EXPECT_LT(ChangeAt(field, Places({3.0})), 2.0);
+}
+
+TEST(ChangeField, LeavesWhatHasTheWantedColorAlready) {
+  const ChangeField field = OneStroke(Places({0.0}), 20.0);
+  FieldPlaces right = Places({0.01, 0.01, 0.01});
+  right.colors[0].fill_(20.0);  // as wanted
+  right.colors[1].fill_(15.0);  // nearly
+  right.colors[2].fill_(30.0);  // beyond
+  EXPECT_NEAR(ChangeAt(field, right, 0), 0.0, 1e-4);
+  EXPECT_NEAR(ChangeAt(field, right, 1), 5.0, 1e-4);
+  EXPECT_NEAR(ChangeAt(field, right, 2), 0.0, 1e-4);
 }
 
 TEST(ChangeField, WithoutCorrectionsNothingChanges) {

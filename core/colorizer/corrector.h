@@ -12,14 +12,15 @@ namespace color3d {
 // A picture of the scene; maps of its size, or empty.
 struct PlacedPicture {
   Image luminance;  // 1 channel, L 0..100
+  Image ab;         // 2 channels, Lab units: its colours as they are
   Image position;   // PictureFacts::position; empty: not known
   Image seen;       // 1 channel, 0..1: share of its colours that a key view shows; empty: none
 };
 
 struct Correction {
   PlacedPicture picture;
-  Image change;   // 2 channels, Lab units: the ab that is wanted less the ab that is there
-  Image painted;  // 1 channel, 0..1: where that is given
+  Image ab;       // 2 channels, Lab units: the colours that are wanted
+  Image painted;  // 1 channel, 0..1: where they are given
 };
 
 // Places drawn from a picture, for Corrector::Propose. A place is a cell of the encoder's grid.

@@ -31,10 +31,11 @@ constexpr double kLeastVariance = 0.1;
 constexpr double kMostUnlike = 4.0;
 
 PlacedPicture AtSide(const PlacedPicture& picture, int max_side_px) {
-  PlacedPicture small{FitWithin(picture.luminance, max_side_px), {}, {}};
+  PlacedPicture small{FitWithin(picture.luminance, max_side_px), {}, {}, {}};
   const auto fit = [&](const Image& map) {
     return map.Empty() ? Image() : Resize(map, small.luminance.width, small.luminance.height);
   };
+  small.ab = fit(picture.ab);
   small.position = fit(picture.position);
   small.seen = fit(picture.seen);
   return small;
@@ -47,9 +48,12 @@ torch::Tensor SeenOf(const Image& seen, int64_t count) {
 
 // Rows to observe: half of them where something changes, so that what the user left as it was
 // counts as well but never outweighs it.
-torch::Tensor RowsToObserve(const KnownCells& cells, int64_t most, Random& random) {
-  const torch::Tensor touched = cells.weights > kTouched;
-  const torch::Tensor changed = cells.colors.square().sum(1) > kChanged * kChanged;
+torch::Tensor RowsToObserve(const torch::Tensor& change,
+                            const torch::Tensor& weights,
+                            int64_t most,
+                            Random& random) {
+  const torch::Tensor touched = weights > kTouched;
+  const torch::Tensor changed = change.square().sum(1) > kChanged * kChanged;
   const auto draw = [&](const torch::Tensor& wanted) {
     const torch::Tensor rows = wanted.nonzero().squeeze(1);
     return rows.index_select(0, SampleRows(rows.size(0), most / 2, random));
@@ -96,30 +100,35 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
       max_side_px_(max_side_px),
       threads_(threads) {
   torch::NoGradGuard no_grad;
-  FieldPlaces places;
-  std::vector<torch::Tensor> features, positions, seen, changes, weights, numbers;
+  std::vector<torch::Tensor> features, colors, positions, seen, wanted, weights, numbers;
   Random random(kSeed);
   const auto count = static_cast<int64_t>(corrections.size());
   for (int64_t number = 0; number < count; ++number) {
     const Correction& correction = corrections[number];
     const PlacedPicture small = AtSide(correction.picture, max_side_px_);
     const int width = small.luminance.width, height = small.luminance.height;
-    TrainingPicture picture{"",
-                            small.luminance,
-                            ResizeWeighted(correction.change, correction.painted, width, height),
-                            Resize(correction.painted, width, height)};
-    picture.position = small.position;
-    const KnownCells cells = CellsOf(encoder_, picture, relative_chroma_);
-    const torch::Tensor rows =
-        RowsToObserve(cells, std::max(2 * kFewest, kMostObserved / count), random);
+    // What is there and what is wanted, where it was painted.
+    const auto cells_of = [&](const Image& ab) {
+      TrainingPicture picture{"",
+                              small.luminance,
+                              ResizeWeighted(ab, correction.painted, width, height),
+                              Resize(correction.painted, width, height)};
+      picture.position = small.position;
+      return CellsOf(encoder_, picture, relative_chroma_);
+    };
+    const KnownCells cells = cells_of(correction.ab);
+    const torch::Tensor before = cells_of(correction.picture.ab).colors;
+    const torch::Tensor rows = RowsToObserve(
+        cells.colors - before, cells.weights, std::max(2 * kFewest, kMostObserved / count), random);
     if (rows.size(0) == 0) {
       throw InvalidArgument("correction {} of {} paints too little to be seen", number + 1, count);
     }
     const KnownCells observed = Select(cells, rows);
     features.push_back(learnt_.whitening().Apply(observed.blocks));
+    colors.push_back(before.index_select(0, rows));
     positions.push_back(observed.positions);
     seen.push_back(SeenOf(small.seen, cells.weights.size(0)).index_select(0, rows));
-    changes.push_back(observed.colors);
+    wanted.push_back(observed.colors);
     weights.push_back(observed.weights);
     numbers.push_back(torch::full({rows.size(0)}, number, torch::kInt64));
   }
@@ -127,10 +136,12 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
     field_.emplace(FieldPlaces{}, torch::zeros({0, 2}), torch::Tensor(), torch::Tensor());
     return;
   }
-  field_.emplace(FieldPlaces{torch::cat(features), torch::cat(positions), torch::cat(seen)},
-                 torch::cat(changes),
-                 torch::cat(weights),
-                 torch::cat(numbers));
+  field_.emplace(
+      FieldPlaces{
+          torch::cat(features), torch::cat(colors), torch::cat(positions), torch::cat(seen)},
+      torch::cat(wanted),
+      torch::cat(weights),
+      torch::cat(numbers));
 }
 
 CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samples) const {
@@ -141,9 +152,11 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
     const torch::Tensor padded = PaddedTensor(small.luminance);
     const CellFeatures cells =
         DescribeCells(encoder_.config(), encoder_.Taps(encoder_.Input(padded)), padded);
-    const FieldPlaces places{learnt_.whitening().Apply(cells.blocks),
-                             PlacesOf(small.position, cells.Count()),
-                             SeenOf(small.seen, cells.Count())};
+    const FieldPlaces places{
+        learnt_.whitening().Apply(cells.blocks),
+        CellMeans(PaddedTensor(ToRelative(relative_chroma_, small.luminance, small.ab))),
+        PlacesOf(small.position, cells.Count()),
+        SeenOf(small.seen, cells.Count())};
     const ChangeField::Answer answer = field_->At(places);
     const Image coarse = ImageFromTensor(torch::cat({answer.change, answer.share.unsqueeze(1)}, 1)
                                              .t()
@@ -181,6 +194,7 @@ PlaceSample PersonalCorrector::Sample(const FieldPlaces& places,
   const torch::Tensor rows = torch::tensor(inside).index_select(
       0, SampleRows(static_cast<int64_t>(inside.size()), wanted, random));
   const FieldPlaces drawn{places.features.index_select(0, rows),
+                          places.colors.index_select(0, rows),
                           places.positions.index_select(0, rows),
                           places.seen.index_select(0, rows)};
   VoteOptions nearest;
@@ -216,6 +230,7 @@ std::vector<ProposedPlace> PersonalCorrector::Propose(std::span<const PlaceSampl
     if (places.empty()) return proposed;
     const auto rows = static_cast<int64_t>(places.size());
     const FieldPlaces all{Joined(samples, &PlaceSample::features, rows),
+                          torch::zeros({rows, 2}),
                           Joined(samples, &PlaceSample::positions, rows),
                           torch::tensor(seen)};
     for (const auto& [row, gain] : field_->Propose(all, Deviation(unlike), count)) {

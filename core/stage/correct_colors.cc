@@ -42,16 +42,18 @@ class ColoredViews {
   const ViewImages& images() const { return images_; }
 
   PlacedPicture Picture(int view) const {
-    PlacedPicture picture{*images_.Luminance(view), {}, {}};
+    PlacedPicture picture{*images_.Luminance(view), {}, {}, {}};
+    picture.ab = ReadTargetAb(context_,
+                              scene_.views[view],
+                              view == key_,
+                              picture.luminance.width,
+                              picture.luminance.height);
     picture.position = positions_.Of(view, images_.WorkingCamera(view), picture.luminance);
     const Image provenance = Provenance(view, picture.luminance);
     if (provenance.Empty()) return picture;
     picture.seen = Image(provenance.width, provenance.height, 1);
     std::copy_n(provenance.Plane(1), picture.seen.data.size(), picture.seen.data.begin());
     return picture;
-  }
-  Image Ab(int view, const Image& size) const {
-    return ReadTargetAb(context_, scene_.views[view], view == key_, size.width, size.height);
   }
   Image Provenance(int view, const Image& size) const {
     return ReadProvenance(context_, scene_.views[view], size.width, size.height);
@@ -68,7 +70,6 @@ class ColoredViews {
 // A correction on the grid of the working pictures.
 struct Painted {
   int view;
-  Image ab;
   Correction correction;
 };
 
@@ -130,17 +131,14 @@ Painted ReadCorrection(const FurtherKeyView& wanted,
   if (view.held_out) {
     throw InvalidArgument("it is held out for evaluation; correct another view");
   }
-  Painted painted{index, {}, {views.Picture(index), {}, {}}};
-  const Image& size = painted.correction.picture.luminance;
-  const Image before = views.Ab(index, size);
-  const GivenColors given = ReadGivenColors(
-      wanted.color, ReadImage(context.scene_folder() / view.image_file), before, context);
-  painted.correction.painted = views.images().Undistort(index, given.given);
-  painted.ab = UndistortGiven(views.images(), index, given, painted.correction.painted);
-  painted.correction.change = painted.ab;
-  for (size_t i = 0; i < before.data.size(); ++i) {
-    painted.correction.change.data[i] -= before.data[i];
-  }
+  Painted painted{index, {views.Picture(index), {}, {}}};
+  Correction& correction = painted.correction;
+  const GivenColors given = ReadGivenColors(wanted.color,
+                                            ReadImage(context.scene_folder() / view.image_file),
+                                            correction.picture.ab,
+                                            context);
+  correction.painted = views.images().Undistort(index, given.given);
+  correction.ab = UndistortGiven(views.images(), index, given, correction.painted);
   WarnIfOffTheGeometry(painted, view.name, context);
   return painted;
 }
@@ -234,11 +232,11 @@ void RunCorrectColors(const CorrectColorsOptions& options,
     const PlacedPicture picture = views.Picture(number);
     CorrectedColor& answer = answers[index];
     answer = corrector->Predict(picture, view.held_out ? 0 : samples);
-    Image ab = views.Ab(number, picture.luminance);
+    Image ab = picture.ab;
     for (size_t i = 0; i < ab.data.size(); ++i) ab.data[i] += answer.change.data[i];
     for (const Painted& one : painted) {
       if (one.view != number) continue;
-      MixIn(one.ab, one.correction.painted, &ab);
+      MixIn(one.correction.ab, one.correction.painted, &ab);
       for (size_t i = 0; i < answer.share.data.size(); ++i) {
         float& share = answer.share.data[i];
         share = std::max(share, one.correction.painted.data[i]);
