@@ -131,9 +131,9 @@ TEST(ViewsInOrderTest, NumbersCountAsNumbers) {
   }
   std::vector<std::string> names;
   for (const int view : ViewsInOrder(scene)) names.push_back(scene.views[view].name);
-  EXPECT_EQ(names,
-            (std::vector<std::string>{
-                "a.png", "a9.png", "p1.png", "p02.png", "p2.png", "p10.png"}));
+  EXPECT_EQ(
+      names,
+      (std::vector<std::string>{"a.png", "a9.png", "p1.png", "p02.png", "p2.png", "p10.png"}));
 }
 
 }  // namespace
