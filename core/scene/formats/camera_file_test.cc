@@ -13,8 +13,7 @@ using ::testing::HasSubstr;
 const Camera kAbsent{600, 400, 500.0, 520.0, 310.0, 190.0};
 
 std::string Frame(const std::string& first_row = "[1,0,0,5]", const std::string& extra = "") {
-  return "{" + extra + "\"transform_matrix\":[" + first_row +
-         ",[0,1,0,0],[0,0,1,4],[0,0,0,1]]}";
+  return "{" + extra + "\"transform_matrix\":[" + first_row + ",[0,1,0,0],[0,0,1,4],[0,0,0,1]]}";
 }
 
 std::vector<FileCamera> Read(const std::string& text, const Scene& scene = {}) {
@@ -40,8 +39,9 @@ TEST(CameraFileTest, PosesAreInTheUnitsOfTheUploadedModel) {
   // world (5, 0, 4), looking along -z with y up.
   const Pose& pose = cameras[0].cam_from_world;
   EXPECT_LT((pose.Center() - Eigen::Vector3d(0.4, -0.2, 0.1)).norm(), 1e-12);
-  EXPECT_LT((pose.rotation.conjugate() * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(),
-            1e-12);
+  EXPECT_LT(
+      (pose.rotation.conjugate() * Eigen::Vector3d::UnitZ() + Eigen::Vector3d::UnitZ()).norm(),
+      1e-12);
   EXPECT_EQ(cameras[0].camera.width, 600);
   EXPECT_EQ(cameras[0].camera.fy, 520.0);
 }
@@ -72,17 +72,16 @@ TEST(CameraFileTest, WhatIsWrongIsNamed) {
   EXPECT_THAT(Complaint("{\"frames\":[" + Frame() + "," + Frame("[null,0,0,5]") + "]}"),
               HasSubstr("frame 1: transform_matrix"));
   EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1e999,0,0,5]") + "]}"), HasSubstr("path.json"));
-  EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[2,0,0,5]") + "]}"),
-              HasSubstr("not a rotation"));
+  EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[2,0,0,5]") + "]}"), HasSubstr("not a rotation"));
   EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1,0,0,1e300]") + "]}"),
               HasSubstr("from the scene"));
   EXPECT_THAT(Complaint("{\"h\":0,\"frames\":[" + Frame() + "]}"), HasSubstr("600 x 0 px"));
   EXPECT_THAT(Complaint("{\"w\":\"wide\",\"frames\":[" + Frame() + "]}"),
               HasSubstr("w must be a finite number"));
   EXPECT_THAT(Complaint("{\"fl_x\":-5,\"frames\":[" + Frame() + "]}"), HasSubstr("positive"));
-  EXPECT_THAT(Complaint("{\"frames\":[" + Frame() + "," + Frame() + "," + Frame() + "," + Frame() +
-                        "]}"),
-              HasSubstr("4 frames; at most 3"));
+  EXPECT_THAT(
+      Complaint("{\"frames\":[" + Frame() + "," + Frame() + "," + Frame() + "," + Frame() + "]}"),
+      HasSubstr("4 frames; at most 3"));
 }
 
 }  // namespace

@@ -118,8 +118,7 @@ TEST_F(MovieTest, CamerasOfAFileAreTakenOneByOneOrSmoothly) {
 TEST_F(MovieTest, OddSizesBecomeEvenAndTinyOnesAreRefused) {
   for (View& view : scene_.views) view.camera = {101, 77, 100.0, 100.0, 50.5, 38.5};
   AddInput(artifact::kScene, SceneToJson(scene_));
-  const ReadMovie movie =
-      DecodeMovie(Render({.path = Path::kOrbit, .frames = 2}) / "scene.mp4");
+  const ReadMovie movie = DecodeMovie(Render({.path = Path::kOrbit, .frames = 2}) / "scene.mp4");
   EXPECT_EQ(movie.width, 100);
   EXPECT_EQ(movie.height, 76);
   const auto tiny = CameraFile("");
