@@ -52,6 +52,7 @@ int Main(int argc, char** argv) {
   AddKeyCommands(app, context);
   AddPreviewCommand(app, context);
   AddViewCommand(app, context);
+  AddCorrectCommand(app, context);
   AddMovieCommands(app, context);
   AddColorizerCommands(app, context);
   AddJobCommands(app, context);

@@ -94,7 +94,7 @@ public() {
 
 public core/augment augment outpaint surrogates
 public core/carry carry carry_views dense_points plane_sweep view_color
-public core/colorizer colorizer scene_batch scene_colorizers
+public core/colorizer colorizer corrector scene_batch scene_colorizers
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights
@@ -102,13 +102,13 @@ public core/grid edge_weights grid_solver
 public core/image codec draw fill_holes guided_upsample local_features optical_flow plane_sampling reduced weighted_resize \
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
-  external/script hints/hints references/reference words/prompt
+  external/script hints/hint_map hints/hints references/reference words/prompt
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
 public core/scene camera import scene view_images formats/camera_file
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
-  geometry/geometry_options geometry/geometry_trainer chroma/chroma_fit chroma/chroma_options \
+  geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz
 public core/stage stages formats/artifacts
 public core/video mp4_writer

@@ -111,6 +111,20 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
 // automatic one.
 ColorSources SourcesOf(const Colorizer& colorizer, Image position = {});
 
+struct CorrectColorsOptions {
+  // Parts of photos in the colours that they should have, later ones over earlier ones, at most 64:
+  // strokes, points or a picture (sources/given_colors.h). No held-out views.
+  std::vector<FurtherKeyView> corrections;
+  int proposals = 3;  // how many further places are named, 0..16
+  void Validate() const;
+  bool operator==(const CorrectColorsOptions&) const = default;
+};
+// The colours of every view, corrected: where the user says so, and in whatever is like that and
+// near it (METHOD.md "Corrections"). `encoder`: as RunColorizeViews'.
+void RunCorrectColors(const CorrectColorsOptions& options,
+                      StageContext& context,
+                      const std::string& encoder = "");
+
 // Gaussians of luminance, trained at max_side_px (64..4096). With little memory the size and the
 // number of Gaussians are smaller, and a warning says so.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);

@@ -222,6 +222,23 @@ void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
   }
 }
 
+void CheckCorrections(const v1::CorrectColorsSpec& spec, const std::string& path) {
+  for (int i = 0; i < spec.corrections_size(); ++i) {
+    const std::string entry = fmt::format("{}.corrections[{}]", path, i);
+    const v1::FurtherKeyView& correction = spec.corrections(i);
+    if (correction.view().empty()) Reject(entry + ".view", " is empty; name a view");
+    CheckKeyColorExtras(correction.color(), entry + ".color");
+    switch (correction.color().source_case()) {
+      case v1::KeyColorSource::kImage:
+      case v1::KeyColorSource::kStrokes:
+      case v1::KeyColorSource::kPoints:
+        continue;
+      default:
+        Reject(entry + ".color", " must be strokes, points or image: what was painted on the view");
+    }
+  }
+}
+
 void CheckRender(const v1::RenderSpec& spec, bool of_whole_scene, const std::string& path) {
   const bool moves =
       spec.path() != v1::RenderSpec::PATH_UNSPECIFIED && spec.path() != v1::RenderSpec::PATH_VIEWS;
@@ -264,6 +281,7 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
   CheckCarryColor(spec.carry_color(), kind::kCarryColor);
+  CheckCorrections(spec.correct_colors(), kind::kCorrectColors);
   CheckRender(spec.render(), /*of_whole_scene=*/true, kind::kRender);
   CheckTruth(spec.truth(), "truth");
   CheckTraining(spec.training_truth(), !spec.truth().empty(), "training_truth");
@@ -294,6 +312,7 @@ void CheckSpec(const v1::JobSpec& spec) {
     CheckKeyColor(spec.colorize_key_view().source(), kind + ".source");
   }
   if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), kind);
+  if (spec.has_correct_colors()) CheckCorrections(spec.correct_colors(), kind);
   if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), kind);
   if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
   if (spec.has_render()) CheckRender(spec.render(), /*of_whole_scene=*/false, kind);

@@ -108,6 +108,12 @@ CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
   return options;
 }
 
+CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec) {
+  CorrectColorsOptions options;
+  if (spec.has_proposals()) options.proposals = spec.proposals();
+  return options;
+}
+
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed) {
   GeometryOptions options;
   options.seed = seed;
@@ -134,6 +140,9 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
   if (spec.solver() == v1::SolveChromaSpec::SOLVER_ADAM) {
     options.solver = ChromaOptions::Solver::kAdam;
   }
+  if (spec.has_saturation()) options.adjustment.saturation = spec.saturation();
+  if (spec.has_tint()) options.adjustment.tint = spec.tint();
+  if (spec.has_warmth()) options.adjustment.warmth = spec.warmth();
   return options;
 }
 

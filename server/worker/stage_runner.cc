@@ -99,6 +99,15 @@ CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs
   return options;
 }
 
+CorrectColorsOptions CorrectOptions(const v1::CorrectColorsSpec& spec, BlobSource& blobs) {
+  CorrectColorsOptions options = CorrectOptionsFrom(spec);
+  for (const v1::FurtherKeyView& correction : spec.corrections()) {
+    options.corrections.push_back(
+        {correction.view(), SourceOptionsFrom(correction.color(), blobs)});
+  }
+  return options;
+}
+
 RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
   RenderOptions options = RenderOptionsFrom(spec);
   options.cameras = FetchIf(spec.has_cameras(), spec.cameras(), blobs);
@@ -176,6 +185,9 @@ class CoreStageRunner : public StageRunner {
                               spec.personalize().encoder());
       case JobSpec::kCarryColor:
         return RunCarryColor(CarryOptions(spec.carry_color(), blobs), context);
+      case JobSpec::kCorrectColors:
+        return RunCorrectColors(
+            CorrectOptions(spec.correct_colors(), blobs), context, spec.correct_colors().encoder());
       case JobSpec::kColorizeViews:
         return RunColorizeViews(spec.colorize_views().has_max_side_px()
                                     ? spec.colorize_views().max_side_px()
