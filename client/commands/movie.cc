@@ -164,9 +164,9 @@ ExitCode RunMovie(const Context& context, const MovieOptions& options) {
   Check(options);
   const fs::path out = options.out;
   const fs::path folder = IsMovieName(out) ? out.parent_path() : out;
-  PrepareOut(folder.empty() ? fs::path(".") : folder);
   Connection connection(context.server, *context.interrupt);
   const v1::Job of = FindColoredScene(connection, options.target);
+  PrepareOut(folder.empty() ? fs::path(".") : folder);
   const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, of));
   ProgressDisplay display(context.json);
   const v1::Job job = FollowToSuccess(

@@ -86,6 +86,7 @@ TEST_F(MovieTest, TurntableAndPathsOfAFolderOfResultsAJobAndAScene) {
 void MovieTest::ExpectBadInput() {
   const std::string file = Path("bad.mp4").string();
   ExpectRefusal(Client({"turntable", Path("nowhere").string()}), 2, {"there is no folder"});
+  EXPECT_FALSE(fs::exists(Path("nowhere")));
   ExpectRefusal(Client({"turntable", Path("room").string(), "-o", file}), 2, {"model.c3g"});
   ExpectRefusal(Client({"turntable", Out(), "-o", file, "--seconds", "900"}),
                 2,
@@ -105,6 +106,7 @@ void MovieTest::ExpectBadInput() {
                 2,
                 {"select_key_view", "model.c3g"});
   EXPECT_FALSE(fs::exists(file));
+  fs::create_directories(Path("other"));
   WriteFileAtomic(Path("other/model.c3g"), "another");
   ExpectRefusal(Client({"turntable", Path("other").string()}), 2, {"no job that made"});
 }

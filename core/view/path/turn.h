@@ -1,21 +1,29 @@
 // A way around what the key view shows, without a beginning or an end: a full circle where photos
-// stand all around, else a sway that stays among them. The page and movies take the same. Pure
-// functions.
+// stand all around, else a sway that stays among them; as high and as far away as the photos that
+// are near. The page and movies take the same. Pure functions.
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "core/scene/scene.h"
 #include "core/view/stand.h"
 
 namespace color3d {
 
-// Angles of the page's world (stand.h), radians around its y axis; the key view's camera is at 0.
 struct Turn {
+  // A camera as seen from the origin of the page's world (stand.h), radians.
+  struct Place {
+    double angle = 0.0;         // around the y axis
+    double height = 0.0;        // above the level
+    double log_distance = 0.0;  // page's units
+  };
+  Place start;  // the key view's camera
   bool around = false;
-  double middle = 0.0;                              // of the sway
-  double reach = 0.0;                               // of the sway, to either side of its middle
-  Eigen::Vector3d start = Eigen::Vector3d::Zero();  // the key view's camera, page's units
+  // Angles from `start` on.
+  double middle = 0.0;        // of the sway
+  double reach = 0.0;         // of the sway, to either side of its middle
+  std::vector<Place> photos;  // all of them
 };
 
 // `stand`: of the key view (StandOf).

@@ -73,13 +73,30 @@ TEST(TurnTest, TheWayBeginsAtTheKeyViewAndStaysAmongThePhotos) {
       low = std::min(low, at);
       high = std::max(high, at);
     }
-    EXPECT_LT((TurnPosition(turn, 0.0) - turn.start).norm(), 1e-9);
+    const Vector3d home = stand.Apply(scene.views[key].cam_from_world.Center());
+    EXPECT_LT((TurnPosition(turn, 0.0) - home).norm(), 1e-9);
     for (int i = 0; i <= 100; ++i) {
       const double at = angle(TurnPosition(turn, i / 100.0));
       EXPECT_GE(at, low - 1e-9);
       EXPECT_LE(at, high + 1e-9);
     }
   }
+}
+
+TEST(TurnTest, TheWayRisesAndFallsWithThePhotosButNotToThoseOfAnotherHeight) {
+  Scene scene;
+  for (int i = 0; i < 24; ++i) {
+    const double angle = 15.0 * i;
+    scene.views.push_back(ViewAt(angle, 4.0, 1.0 + 0.5 * std::cos(angle * kDegree)));
+    scene.views.push_back(ViewAt(angle, 0.5, 6.0));  // from above
+  }
+  const Stand stand = StandOf(scene, 0, kFocus);
+  const Turn turn = TurnOf(scene, 0, stand);
+  ASSERT_TRUE(turn.around);
+  const auto height = [](const Vector3d& p) { return std::atan2(p.y(), std::hypot(p.x(), p.z())); };
+  EXPECT_NEAR(height(TurnPosition(turn, 0.0)), std::atan2(1.5, 4.0), 0.02);
+  EXPECT_NEAR(height(TurnPosition(turn, 0.25)), std::atan2(1.0, 4.0), 0.04);
+  EXPECT_NEAR(height(TurnPosition(turn, 0.5)), std::atan2(0.5, 4.0), 0.06);
 }
 
 TEST(TurnFramesTest, TheLoopClosesUpStaysUpAndTheFocusStaysInTheMiddle) {
@@ -103,7 +120,7 @@ TEST(TurnFramesTest, TheLoopClosesUpStaysUpAndTheFocusStaysInTheMiddle) {
       EXPECT_GT(up.dot(kUp), 0.9);
       const Vector3d seen = pose.Apply(kFocus);
       EXPECT_LT(seen.head<2>().norm(), 1e-9);
-      EXPECT_NEAR(seen.z(), std::sqrt(17.0), 1e-9);
+      EXPECT_NEAR(seen.z(), std::sqrt(17.0), 1e-9) << "all photos stand as far away";
       EXPECT_EQ(frames[i].camera.cx, 320.0);
       EXPECT_EQ(frames[i].camera.fy, 510.0);
       const double step =
