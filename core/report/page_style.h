@@ -22,7 +22,8 @@ p{margin:.4rem 0;max-width:75ch}a{color:var(--accent)}
 img{display:block;width:100%;height:auto;border-radius:6px;background:var(--line)}
 figure{margin:0;min-width:0}figcaption{font-size:.875rem;color:var(--soft);margin-top:.2rem}
 .row{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,15rem),1fr));gap:.75rem}
-.compare{position:relative;overflow:hidden;border-radius:8px;touch-action:pan-y;max-width:960px}
+.compare{position:relative;overflow:hidden;border-radius:8px;touch-action:pan-y;
+width:min(100%,960px,calc(75vh*var(--shape)))}
 .compare img{border-radius:0}
 .compare .over{position:absolute;inset:0;height:100%;clip-path:inset(0 calc(100% - var(--at)) 0 0)}
 .compare .bar{position:absolute;top:0;bottom:0;left:var(--at);width:2px;margin-left:-1px;background:#fff;
@@ -76,7 +77,7 @@ const show = () => {
     image.alt = picture.alt;
     labels[i].textContent = picture.dataset.short;
   });
-  images[0].style.aspectRatio = result.getAttribute('width') + '/' + result.getAttribute('height');
+  box.style.setProperty('--shape', result.getAttribute('width') + '/' + result.getAttribute('height'));
 };
 const choose = () => {
   const card = by('view-' + view.value), wanted = pair.value;

@@ -72,7 +72,8 @@ std::string SliderHtml(const std::vector<ReportView>& views) {
       });
   std::string html =
       "<section aria-label=\"Before and after\"><div class=\"compare\" id=\"compare\" "
-      "style=\"--at:50%\"><img alt=\"" +
+      "style=\"--at:50%;--shape:" +
+      std::to_string(render.width) + "/" + std::to_string(render.height) + "\"><img alt=\"" +
       EscapeHtml(render.caption) + "\"" + Dimensions(render) + " src=\"" + DataUrl(render.bytes) +
       "\"><img class=\"over\" alt=\"" + EscapeHtml(before.caption) + "\"" + Dimensions(before) +
       " src=\"" + DataUrl(before.bytes) + "\"><div class=\"bar\"></div><span class=\"l\">" +
