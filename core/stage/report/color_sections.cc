@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "core/image/codec.h"
+#include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/report/source_overlay.h"
 
 namespace color3d {
 namespace {
@@ -207,9 +209,11 @@ ReportTable ColorFacts::ErrorTable() const {
 std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
   const std::vector<ViewFacts> views = LeastCertainFirst();
   const size_t wanted = std::min(views.size(), kMaxPictures);
+  const ViewImages photos(scene_, context_.scene_folder(), kPictureSidePx, 0);
   std::vector<ReportRow> rows;
   for (size_t k = 0; k < wanted; ++k) {
-    const View& view = scene_.views[views[k * views.size() / wanted].view];
+    const ViewFacts& facts = views[k * views.size() / wanted];
+    const View& view = scene_.views[facts.view];
     ReportRow row{view.name, {}};
     for (const std::string& name : {ViewArtifact(artifact::kColored2d, view, ".jpg"),
                                     ViewArtifact(artifact::kRenders, view, ".png")}) {
@@ -219,8 +223,12 @@ std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
       break;
     }
     const std::string name = ProvenanceArtifact(context_, view);
-    row.pictures.push_back(SmallPicture(DecodeImage(context_.ReadInput(name), name),
-                                        "green: seen, blue: inferred, red: guessed"));
+    row.pictures.push_back(SmallPicture(
+        ShadeBySource(photos.Srgb(facts.view), DecodeImage(context_.ReadInput(name), name)),
+        fmt::format("where they come from: {} seen, {} inferred, {} guessed",
+                    Percent(facts.shares.seen),
+                    Percent(facts.shares.inferred),
+                    Percent(facts.shares.guessed))));
     rows.push_back(std::move(row));
   }
   return rows;
@@ -246,6 +254,14 @@ ReportSection ColorFacts::SourceSection() const {
   if (!views_.empty()) section.tables.push_back(ShareTable());
   if (!errors_by_source_.empty()) section.tables.push_back(ErrorTable());
   section.rows = ProvenanceRows();
+  if (!section.rows.empty()) {
+    const SourceShares mean = MeanShares(/*scored_only=*/false);
+    section.legend = {
+        {"seen", "seen in a key view: " + Percent(mean.seen) + " (plain photo)"},
+        {"inferred",
+         "inferred, as it resembles something there: " + Percent(mean.inferred) + " (blue tint)"},
+        {"guessed", "guessed: " + Percent(mean.guessed) + " (orange hatching)"}};
+  }
   return section;
 }
 
