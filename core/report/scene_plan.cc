@@ -52,7 +52,11 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
       kSecondsPerFeatureMegapixel * megapixels,
       kind::kSelectKeyView));
   plan.push_back(Step(
-      "luminance_geometry", true, "every scene needs geometry", 0.0, kind::kReconstructGeometry));
+      "luminance_geometry",
+      !f.geometry_given,
+      f.geometry_given ? "the scene's Gaussians were given" : "every scene needs geometry",
+      0.0,
+      kind::kReconstructGeometry));
   plan.push_back(Step("personalization",
                       true,
                       "the key view's colours must reach every view",

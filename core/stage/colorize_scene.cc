@@ -111,6 +111,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   const auto key_view = ReadJson(context, artifact::kKeyView);
   PlanFacts plan_facts;
   plan_facts.has_poses = !facts.ran_structure_from_motion;
+  plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
   plan_facts.has_sparse_points = !facts.random_points;
   plan_facts.has_truth = has_truth;

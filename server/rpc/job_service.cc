@@ -60,12 +60,12 @@ std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec
 
 SceneFacts FactsOf(const SceneRecord& scene) {
   return {.photos = scene.photo_count,
-          .has_poses =
-              scene.layout == StoredLayout::kColmap || scene.layout == StoredLayout::kTransforms,
+          .has_poses = scene.layout != StoredLayout::kPhotos,
           .augment_files = static_cast<int>(
               std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
                 return IsAugmentFile(file.path);
-              }))};
+              })),
+          .is_splat = scene.layout == StoredLayout::kSplat};
 }
 
 // The route's colorize_key_view job, by default the one that its scene's user accepted, and what it

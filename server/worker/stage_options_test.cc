@@ -81,7 +81,9 @@ struct SizedGeometry {
 const std::map<std::string, Method>& Methods() {
   static const std::map<std::string, Method> methods = {
       {"import_scene",
-       MakeMethod<v1::ImportSceneSpec>([](const auto& s) { return ImportOptionsFrom(s); })},
+       MakeMethod<v1::ImportSceneSpec>([](const auto& s) {
+         return std::pair(ImportOptionsFrom(s), SplatViewOptionsFrom(s));
+       })},
       {"select_key_view", MakeMethod<v1::SelectKeyViewSpec>([](const auto& s) {
          return SelectOptionsFrom(s).selection;
        })},
