@@ -32,10 +32,11 @@ std::string ResolveScene(Connection& connection,
   std::error_code none;
   if (!fs::is_directory(text, none) && !fs::is_regular_file(text, none)) {
     if (text.starts_with("scenes/")) return text;
-    throw Error(ErrorCode::kNotFound,
-                "'{}' is neither a folder of photos, nor a splat, nor a scene of the server's (scenes/ID; "
-                "`color3d scene list` shows them)",
-                text);
+    throw Error(
+        ErrorCode::kNotFound,
+        "'{}' is neither a folder of photos, nor a splat, nor a scene of the server's (scenes/ID; "
+        "`color3d scene list` shows them)",
+        text);
   }
   const PhotoFolder folder = CollectPhotos(text);
   for (const std::string& note : folder.notes) PrintNote(context, note);

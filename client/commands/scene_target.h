@@ -16,7 +16,8 @@ std::string UploadFolder(Connection& connection,
                          const PhotoFolder& folder,
                          ProgressDisplay& display);
 
-// `text`: "scenes/...", or a folder or splat, which is uploaded. Throws Error{kNotFound} when it is neither.
+// `text`: "scenes/...", or a folder or splat, which is uploaded. Throws Error{kNotFound} when it is
+// neither.
 std::string ResolveScene(Connection& connection,
                          const Context& context,
                          const std::string& text,

@@ -30,9 +30,9 @@ struct PhotoFolder {
 // Photos (.jpg .jpeg .png .tif .tiff) are taken from images/, at any depth, when there is one with
 // photos; else from `root` itself and from the subfolders that transforms.json names. Also taken: a
 // COLMAP model in sparse/0, sparse or `root`, transforms.json, and everything in augment/ (any
-// depth). Nothing else, but for a splat (.ply .sog .spz): `root` itself, or the only one in a folder
-// without photos. Throws Error: no such folder, another file instead of a folder, no photos, one
-// photo, more than 10,000 files, names that are not safe or not UTF-8.
+// depth). Nothing else, but for a splat (.ply .sog .spz): `root` itself, or the only one in a
+// folder without photos. Throws Error: no such folder, another file instead of a folder, no photos,
+// one photo, more than 10,000 files, names that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root);
 
 // The photo whose file stem is that of `file` ("x/0007_coloured.png" has the stem "0007_coloured"),

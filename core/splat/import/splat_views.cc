@@ -19,7 +19,12 @@ constexpr int kCoarseDirections = 60;
 constexpr int kFineDirections = 600;
 constexpr double kDistances[] = {0.35, 0.6, 1.0, 1.6, 2.5, 4.0};  // radii from the center
 // A direction from which the best distance shows so much of what the best direction shows is good.
-constexpr double kGoodShare = 0.6;
+constexpr double kGoodShare = 0.75;
+// The distance of the best direction is kept where the best one shows little more.
+constexpr double kSameDistanceShare = 0.85;
+// Cameras stand on the ground, hardly ever under it: views from more than 25 degrees below count so
+// much.
+constexpr double kBelow = -0.42, kBelowShare = 0.6;
 constexpr double kFocalShare = 0.9;  // of the picture's width: 58 degrees across
 constexpr double kAspect = 0.75;
 constexpr double kWholeTurn = 6.283185307179586;
@@ -87,16 +92,16 @@ class CameraChooser {
                 const SplatPlace& place,
                 const SplatViewOptions& options,
                 const RunControl& run)
-      : model_(model),
-        place_(place),
+      : place_(place),
         options_(options),
         run_(run),
         picture_(PictureOf(options.side_px)),
-        seen_(model, picture_, run.pool) {}
+        seen_(model, picture_, run.pool),
+        up_(EstimateUp(model)) {}
 
   std::vector<SplatCamera> Choose() {
     LookAround();
-    const Candidate& best = *std::max_element(
+    const Candidate best = *std::max_element(
         coarse_.begin(), coarse_.end(), [](const Candidate& a, const Candidate& b) {
           return a.seen < b.seen;
         });
@@ -105,17 +110,17 @@ class CameraChooser {
           "the splat cannot be seen from anywhere: its Gaussians are fainter or smaller than can "
           "be drawn");
     }
-    up_ = EstimateUp(model_, best.direction);
+    KeepDistance(best.distance);
     return Spread(best);
   }
 
  private:
   double Score(const Candidate& candidate) {
     run_.cancel.ThrowIfCancelled();
-    const Pose pose = LookingAt(
-        place_.center, candidate.direction, candidate.distance, -Eigen::Vector3d::UnitY());
+    const Pose pose = LookingAt(place_.center, candidate.direction, candidate.distance, up_);
     const SeenGaussians::Measure m = seen_.At(pose, candidate.distance);
-    return m.seen * (0.25 + 0.75 * m.covered) * std::max(0.0, 1.0 - 3.0 * m.near);
+    const double below = candidate.direction.dot(up_) < kBelow ? kBelowShare : 1.0;
+    return below * m.seen * (0.25 + 0.75 * m.covered) * std::max(0.0, 1.0 - 3.0 * m.near);
   }
 
   // The best distance of each coarse direction.
@@ -132,6 +137,14 @@ class CameraChooser {
       run_.progress.OnProgress(static_cast<int64_t>(coarse_.size()),
                                kCoarseDirections + options_.views,
                                "looking for views");
+    }
+  }
+
+  void KeepDistance(double distance) {
+    for (Candidate& coarse : coarse_) {
+      const Candidate same{coarse.direction, distance, 0.0};
+      const double seen = coarse.distance == distance ? coarse.seen : Score(same);
+      if (seen >= kSameDistanceShare * coarse.seen) coarse = {coarse.direction, distance, seen};
     }
   }
 
@@ -166,7 +179,7 @@ class CameraChooser {
       Candidate& candidate = fine[static_cast<size_t>(next - far.begin())];
       candidate.seen = Score(candidate);
       *next = 0.0;
-      if (candidate.seen >= 0.8 * kGoodShare * best.seen) take(candidate);
+      if (candidate.seen >= kGoodShare * best.seen) take(candidate);
       run_.progress.OnProgress(kCoarseDirections + static_cast<int64_t>(chosen.size()),
                                kCoarseDirections + options_.views,
                                "looking for views");
@@ -189,14 +202,13 @@ class CameraChooser {
     return cameras;
   }
 
-  const GaussianModel& model_;
   const SplatPlace place_;
   const SplatViewOptions& options_;
   const RunControl& run_;
   const Camera picture_;
   SeenGaussians seen_;
   std::vector<Candidate> coarse_;
-  Eigen::Vector3d up_ = -Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d up_;
 };
 
 }  // namespace
@@ -242,10 +254,10 @@ std::vector<SplatCamera> ChooseSplatCameras(const GaussianModel& model,
   return CameraChooser(model, place, options, run).Choose();
 }
 
-Eigen::Vector3d EstimateUp(const GaussianModel& model, const Eigen::Vector3d& best) {
+Eigen::Vector3d EstimateUp(const GaussianModel& model) {
   // Normals of flat Gaussians vote for the axes near which they lie.
   constexpr size_t kVoters = 20'000;
-  constexpr double kFlat = 0.3, kClearly = 1.5, kMostUpInView = 0.9;
+  constexpr double kFlat = 0.3, kClearly = 1.5;
   const std::vector<Eigen::Vector3d> axes = Directions(kFineDirections);
   const Eigen::Vector3d custom = -Eigen::Vector3d::UnitY();
   std::vector<double> votes(axes.size(), 0.0);
@@ -262,8 +274,7 @@ Eigen::Vector3d EstimateUp(const GaussianModel& model, const Eigen::Vector3d& be
   const double mean = all / 33.0;  // what evenly spread normals would give each axis
   std::optional<size_t> top;
   for (size_t k = 0; k < axes.size(); ++k) {
-    // Half of the sphere; within 60 degrees of the custom, and not what the camera looks at.
-    if (axes[k].dot(custom) < 0.5 || std::abs(axes[k].dot(best)) > kMostUpInView) continue;
+    if (axes[k].dot(custom) < 0.5) continue;
     if (!top || votes[k] > votes[*top]) top = k;
   }
   if (!top || votes[*top] < kClearly * mean) return custom;

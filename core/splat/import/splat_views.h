@@ -39,8 +39,8 @@ std::vector<SplatCamera> ChooseSplatCameras(const GaussianModel& model,
                                             const SplatViewOptions& options,
                                             const RunControl& run);
 
-// A unit vector: what the splat's large flat parts and the custom of 3DGS files (y down) say.
-// `best`: direction from the center to the best camera.
-Eigen::Vector3d EstimateUp(const GaussianModel& model, const Eigen::Vector3d& best);
+// A unit vector: the normal that most flat Gaussians share within 60 degrees of the custom of 3DGS
+// files, which is y down, or else that.
+Eigen::Vector3d EstimateUp(const GaussianModel& model);
 
 }  // namespace color3d

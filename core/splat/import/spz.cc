@@ -93,6 +93,15 @@ class Gunzip {
     }
     return left == 0;
   }
+  // False when the file ends before its checksum, or that is another one. More than was asked for
+  // may follow.
+  bool EndsWell() {
+    Bytef more = 0;
+    stream_.next_out = &more;
+    stream_.avail_out = 1;
+    const int code = inflate(&stream_, Z_NO_FLUSH);
+    return code == Z_STREAM_END || (code == Z_OK && stream_.avail_out == 0);
+  }
 
  private:
   z_stream stream_ = {};
@@ -106,7 +115,7 @@ std::string StreamsOfGzip(std::string_view bytes, const SplatSource& source, Hea
   if (header->bytes() > kMostInflated * bytes.size()) ThrowShort(source);
   CheckCount(header->count, source);
   plain.clear();
-  if (!gunzip.Append(header->bytes(), &plain)) ThrowShort(source);
+  if (!gunzip.Append(header->bytes(), &plain) || !gunzip.EndsWell()) ThrowShort(source);
   return plain;
 }
 

@@ -1,5 +1,6 @@
-// `splat-views`: how a splat becomes a scene. What is lost in grey, and whether the chosen views are
-// like those that it was made from.
+// `splat-views`: how a splat becomes a scene. What is lost in grey, and whether the chosen views
+// are like those that it was made from.
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include "core/base/cancellation.h"
 #include "core/base/files.h"
 #include "core/base/memory.h"
+#include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/splat/import/seen_gaussians.h"
@@ -27,7 +29,7 @@ namespace {
 constexpr int kSheetColumns = 6, kThumbnailPx = 240;
 
 struct SplatViewArguments {
-  std::string splat_file, scene_file, folder, json_file;
+  std::string splat_file, scene_file, colored_file, folder, json_file;
   SplatViewOptions options;
 };
 
@@ -55,13 +57,49 @@ Image Sheet(const std::vector<Image>& pictures) {
   return sheet;
 }
 
+// Of renders with equal luminance, so of chroma alone; the mean over pixels.
+double MeanDifference(const Image& truth, const Image& chroma) {
+  Image lab = LabFromSrgb(truth);
+  const Image other = LabFromSrgb(chroma);
+  double sum = 0.0;
+  for (size_t i = 0; i < lab.PlaneSize(); ++i) {
+    const LabColor a{lab.Plane(0)[i], lab.Plane(1)[i], lab.Plane(2)[i]};
+    const LabColor b{lab.Plane(0)[i], other.Plane(1)[i], other.Plane(2)[i]};
+    sum += DeltaE00(a, b);
+  }
+  return sum / static_cast<double>(lab.PlaneSize());
+}
+
+// The splat's own colours are the truth; `colored`: what came back for its grey twin.
+nlohmann::ordered_json CompareColors(const ViewerGaussians& truth,
+                                     const ViewerGaussians& colored,
+                                     const SplatScene& splat,
+                                     const std::filesystem::path& folder,
+                                     ThreadPool& pool) {
+  double error = 0.0, gray_error = 0.0;
+  for (const View& view : splat.scene.views) {
+    Pose pose = view.cam_from_world;  // in the file's frame
+    pose.translation = -(pose.rotation * splat.scene.WorldFromScene(pose.Center()));
+    const Image wanted = RenderForViewers(truth, view.camera, pose, pool);
+    const Image made = RenderForViewers(colored, view.camera, pose, pool);
+    error += MeanDifference(wanted, made);
+    gray_error += MeanDifference(wanted, Image(wanted.width, wanted.height, 3, 0.5f));
+    if (folder.empty()) continue;
+    WriteFileAtomic(folder / ("truth_" + view.name), EncodePng8(wanted));
+    WriteFileAtomic(folder / ("colored_" + view.name), EncodePng8(made));
+  }
+  const auto count = static_cast<double>(splat.scene.views.size());
+  return {{"delta_e00_chroma", error / count}, {"delta_e00_chroma_gray", gray_error / count}};
+}
+
 // Against the cameras of the photos that the splat was trained on.
 nlohmann::ordered_json CompareWithCapture(const SplatScene& splat,
                                           const Scene& capture,
                                           ThreadPool& pool) {
   const Scene& scene = splat.scene;
   SeenGaussians seen(splat.geometry, scene.views.at(0).camera, pool);
-  Eigen::Vector3d up = Eigen::Vector3d::Zero(), chosen_up = Eigen::Vector3d::Zero();
+  // Upright cameras have level right axes, however they are pitched.
+  Eigen::Matrix3d rights = Eigen::Matrix3d::Zero(), chosen_rights = Eigen::Matrix3d::Zero();
   double captured = 0.0, chosen = 0.0;
   std::vector<Eigen::Vector3d> forward;
   for (const View& view : capture.views) {
@@ -71,14 +109,18 @@ nlohmann::ordered_json CompareWithCapture(const SplatScene& splat,
     pose.translation = -(pose.rotation * center);
     const SeenGaussians::Measure measure = seen.At(pose, 1e-9);
     captured += measure.seen / static_cast<double>(capture.views.size());
-    up += pose.rotation.conjugate() * -Eigen::Vector3d::UnitY();
+    const Eigen::Vector3d right = pose.rotation.conjugate() * Eigen::Vector3d::UnitX();
+    rights += right * right.transpose();
     forward.push_back(pose.rotation.conjugate() * Eigen::Vector3d::UnitZ());
   }
   double farthest = 0.0, mean = 0.0;
   for (const View& view : scene.views) {
     chosen += seen.At(view.cam_from_world, 1e-9).seen / static_cast<double>(scene.views.size());
-    chosen_up += view.cam_from_world.rotation.conjugate() * -Eigen::Vector3d::UnitY();
-    const Eigen::Vector3d mine = view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    const Eigen::Vector3d right =
+        view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitX();
+    chosen_rights += right * right.transpose();
+    const Eigen::Vector3d mine =
+        view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
     double nearest = 4.0;
     for (const Eigen::Vector3d& other : forward) {
       nearest = std::min(nearest, std::acos(std::clamp(mine.dot(other), -1.0, 1.0)));
@@ -87,7 +129,10 @@ nlohmann::ordered_json CompareWithCapture(const SplatScene& splat,
     mean += nearest / static_cast<double>(scene.views.size());
   }
   constexpr double kDegrees = 57.29577951308232;
-  const double tilt = std::acos(std::clamp(up.normalized().dot(chosen_up.normalized()), -1.0, 1.0));
+  const auto level = [](const Eigen::Matrix3d& m) -> Eigen::Vector3d {
+    return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvectors().col(0);
+  };
+  const double tilt = std::acos(std::min(1.0, std::abs(level(rights).dot(level(chosen_rights)))));
   return {{"seen_by_chosen_over_captured", chosen / captured},
           {"up_error_degrees", kDegrees * tilt},
           {"mean_degrees_from_a_captured_direction", kDegrees * mean},
@@ -95,8 +140,8 @@ nlohmann::ordered_json CompareWithCapture(const SplatScene& splat,
 }
 
 void RunSplatViews(const SplatViewArguments& args) {
-  ThreadPool pool;
-  QuietRun run(pool);
+  QuietRun run;
+  ThreadPool& pool = run.pool();
   const std::string bytes = ReadFile(args.splat_file);
   ResetPeakMemory();
   const auto start = std::chrono::steady_clock::now();
@@ -134,6 +179,10 @@ void RunSplatViews(const SplatViewArguments& args) {
     }
     WriteFileAtomic(folder / "sheet.jpg", EncodeJpeg(Sheet(pictures)));
   }
+  if (!args.colored_file.empty()) {
+    report["colors"] =
+        CompareColors(original, ReadSplat(ReadFile(args.colored_file)), splat, args.folder, pool);
+  }
   WriteResult(report, args.json_file);
 }
 
@@ -145,6 +194,8 @@ void AddSplatViewsCommand(CLI::App& app) {
       "splat-views", "a splat as a scene: the views that are chosen, and what is lost in grey");
   command->add_option("--splat", args->splat_file, "PLY, SOG or SPZ")->required();
   command->add_option("--scene", args->scene_file, "scene.json of the photos it was made from");
+  command->add_option(
+      "--colored", args->colored_file, "what `color3d colorize` made of the splat's grey twin");
   command->add_option("--views", args->options.views)->capture_default_str();
   command->add_option("--side", args->options.side_px)->capture_default_str();
   command->add_option("--out", args->folder, "where the views go; default: nowhere");

@@ -1,5 +1,6 @@
 // Readers of the files that the export writes for viewers, for tests: what a viewer would see. PLY,
-// SOG and SPZ are the product's own (splat_file.h), the rest is here: each takes whole files and throws std::runtime_error where one is not as its format says.
+// SOG and SPZ are the product's own (splat_file.h), the rest is here: each takes whole files and
+// throws std::runtime_error where one is not as its format says.
 #pragma once
 
 #include <map>
