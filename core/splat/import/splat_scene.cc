@@ -86,7 +86,7 @@ void RequireMemory(const ViewerGaussians& splat, const std::string& name, int64_
 
 }  // namespace
 
-int64_t WorkBytesPerGaussian(int sh_degree) { return 900 + 100 * ShCoefficients(sh_degree); }
+int64_t WorkBytesPerGaussian(int sh_degree) { return 1000 + 150 * ShCoefficients(sh_degree); }
 
 SplatScene ImportSplat(std::string_view bytes,
                        const std::string& name,

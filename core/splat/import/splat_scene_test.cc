@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/splat/import/seen_gaussians.h"
@@ -55,6 +57,25 @@ TEST(SplatSceneTest, ViewsStandAboveTheGroundAndLookAtTheBall) {
   }
   EXPECT_GT(scene.points.size(), 500u);
   for (const SparsePoint& point : scene.points) EXPECT_GE(point.views.size(), 2u);
+}
+
+TEST(SplatSceneTest, UpIsWhatTheUserSaysOfTheFrame) {
+  ViewerGaussians g = BallOnGround(3000);  // turned: z is up
+  for (size_t i = 0; i < g.size(); ++i) {
+    float* p = g.position.data() + 3 * i;
+    float* q = g.rotation.data() + 4 * i;
+    std::swap(p[1], p[2]);
+    p[2] = -p[2];
+    // The quarter turn about x that does so: (s, -s, 0, 0) * q without the factor.
+    const float turned[4] = {q[0] + q[1], q[1] - q[0], q[2] + q[3], q[3] - q[2]};
+    std::copy_n(turned, 4, q);
+  }
+  SplatViewOptions options = Few();
+  options.up = SplatUp::kZ;
+  for (const View& view : Import(SplatPly(g), options).scene.views) {
+    EXPECT_GT(view.cam_from_world.Center().z(), -1.0);
+    EXPECT_LT((view.cam_from_world.rotation * Eigen::Vector3d::UnitZ()).y(), 0.1) << view.name;
+  }
 }
 
 TEST(SplatSceneTest, TheSameAgain) {

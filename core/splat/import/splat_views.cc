@@ -97,7 +97,7 @@ class CameraChooser {
         run_(run),
         picture_(PictureOf(options.side_px)),
         seen_(model, picture_, run.pool),
-        up_(EstimateUp(model)) {}
+        up_(EstimateUp(model, options.up)) {}
 
   std::vector<SplatCamera> Choose() {
     LookAround();
@@ -254,12 +254,14 @@ std::vector<SplatCamera> ChooseSplatCameras(const GaussianModel& model,
   return CameraChooser(model, place, options, run).Choose();
 }
 
-Eigen::Vector3d EstimateUp(const GaussianModel& model) {
+Eigen::Vector3d EstimateUp(const GaussianModel& model, SplatUp about) {
   // Normals of flat Gaussians vote for the axes near which they lie.
   constexpr size_t kVoters = 20'000;
   constexpr double kFlat = 0.3, kClearly = 1.5;
   const std::vector<Eigen::Vector3d> axes = Directions(kFineDirections);
-  const Eigen::Vector3d custom = -Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d custom = about == SplatUp::kMinusY ? Eigen::Vector3d(0.0, -1.0, 0.0)
+                                 : about == SplatUp::kY    ? Eigen::Vector3d(0.0, 1.0, 0.0)
+                                                           : Eigen::Vector3d(0.0, 0.0, 1.0);
   std::vector<double> votes(axes.size(), 0.0);
   double all = 0.0;
   for (const size_t i : SpreadSample(model, kVoters)) {

@@ -12,8 +12,12 @@
 
 namespace color3d {
 
+// To within 60 degrees; -y is the custom of 3DGS files.
+enum class SplatUp { kMinusY, kY, kZ };
+
 struct SplatViewOptions {
-  int views = 24;         // 2..200; fewer where fewer are any good
+  int views = 24;  // 2..200; fewer where fewer are any good
+  SplatUp up = SplatUp::kMinusY;
   int side_px = 800;      // 64..4096, longer side of the pictures
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const SplatViewOptions&) const = default;
@@ -39,8 +43,8 @@ std::vector<SplatCamera> ChooseSplatCameras(const GaussianModel& model,
                                             const SplatViewOptions& options,
                                             const RunControl& run);
 
-// A unit vector: the normal that most flat Gaussians share within 60 degrees of the custom of 3DGS
-// files, which is y down, or else that.
-Eigen::Vector3d EstimateUp(const GaussianModel& model);
+// A unit vector: the normal that most flat Gaussians share within 60 degrees of `about`, or else
+// that axis itself.
+Eigen::Vector3d EstimateUp(const GaussianModel& model, SplatUp about);
 
 }  // namespace color3d
