@@ -31,6 +31,13 @@ inline constexpr char kColorizer[] = "colorizer.c3c";
 inline constexpr char kViewsAb[] = "views_ab/";  // view's stem + ".png"
 // view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255)
 inline constexpr char kProvenance[] = "provenance/";
+// The same after corrections, where there are any; they stand for those above then.
+inline constexpr char kCorrectedAb[] = "corrected_ab/";
+inline constexpr char kCorrectedProvenance[] = "corrected_provenance/";
+// How far corrections reached, and where the next ones would tell most.
+inline constexpr char kCorrections[] = "corrections.json";
+// view's stem + ".png": photos where a correction is proposed, in their present colours
+inline constexpr char kPaint[] = "paint/";
 inline constexpr char kModel[] = "model.c3g";  // Gaussians in colour
 inline constexpr char kPly[] = "scene.ply";
 inline constexpr char kSog[] = "scene.sog";
@@ -39,6 +46,8 @@ inline constexpr char kGlb[] = "scene.glb";
 inline constexpr char kSplat[] = "scene.splat";
 inline constexpr char kExportScores[] = "export.json";  // what they lose against our renders
 inline constexpr char kRenders[] = "renders/";          // view's stem + ".png"
+inline constexpr char kMovie[] = "scene.mp4";
+inline constexpr char kFrames[] = "frames/";  // "00001.png" and so on, of the movie
 inline constexpr char kScores[] = "scores.json";
 inline constexpr char kTruths[] = "truths/";            // view's stem + ".jpg"
 inline constexpr char kColored2d[] = "colored_views/";  // view's stem + ".jpg"

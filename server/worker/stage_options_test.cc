@@ -108,6 +108,8 @@ const std::map<std::string, Method>& Methods() {
        MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) { return MaxSideFrom(s); })},
       {"carry_color",
        MakeMethod<v1::CarryColorSpec>([](const auto& s) { return CarryOptionsFrom(s); })},
+      {"correct_colors",
+       MakeMethod<v1::CorrectColorsSpec>([](const auto& s) { return CorrectOptionsFrom(s); })},
       {"reconstruct_geometry", MakeMethod<v1::ReconstructGeometrySpec>([](const auto& s) {
          return SizedGeometry{GeometryOptionsFrom(s, 1), MaxSideFrom(s)};
        })},

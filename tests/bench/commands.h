@@ -14,6 +14,7 @@ void AddGoldenCommand(CLI::App& app);
 void AddMakeWeightsCommand(CLI::App& app);
 void AddNetworksCommand(CLI::App& app);
 void AddHintsCommand(CLI::App& app);
+void AddCorrectCommand(CLI::App& app);
 void AddNextKeyCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);

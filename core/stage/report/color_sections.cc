@@ -49,7 +49,7 @@ ColorFacts::ColorFacts(const Scene& scene,
 
 void ColorFacts::ReadProvenance() {
   for (size_t i = 0; i < scene_.views.size(); ++i) {
-    const std::string name = ViewArtifact(artifact::kProvenance, scene_.views[i], ".png");
+    const std::string name = ProvenanceArtifact(context_, scene_.views[i]);
     if (!context_.HasInput(name)) continue;
     const Image image = DecodeImage(context_.ReadInput(name), name);
     if (image.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
@@ -218,7 +218,7 @@ std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
           SmallPicture(DecodeImage(context_.ReadInput(name), name), "its colours"));
       break;
     }
-    const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
+    const std::string name = ProvenanceArtifact(context_, view);
     row.pictures.push_back(SmallPicture(DecodeImage(context_.ReadInput(name), name),
                                         "green: seen, blue: inferred, red: guessed"));
     rows.push_back(std::move(row));

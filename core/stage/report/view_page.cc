@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "core/base/median.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
@@ -14,6 +13,7 @@
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/focus.h"
 #include "core/view/view_page.h"
 
 namespace color3d {
@@ -23,18 +23,6 @@ constexpr int kPosterPx = 900;       // longer side of the picture that is there
 constexpr int kPhotoPx = 480;        // longer side of the photos
 constexpr int kPhotoQuality = 80;    // of their JPEG
 constexpr size_t kMaxPictures = 48;  // with more photos, the others are a name and a camera
-
-// What the middle of the key view shows: the median of the depths there, on the camera's axis.
-Eigen::Vector3d FocusOf(const View& view, const Camera& camera, const Image& depth) {
-  std::vector<double> middle;
-  for (int y = depth.height / 4; y < depth.height - depth.height / 4; ++y) {
-    for (int x = depth.width / 4; x < depth.width - depth.width / 4; ++x) {
-      if (depth.At(0, y, x) > 0.0f) middle.push_back(depth.At(0, y, x));
-    }
-  }
-  const double away = middle.empty() ? 1.0 : Median(std::move(middle));
-  return view.cam_from_world.WorldFromCamera(away * camera.Ray(camera.cx, camera.cy));
-}
 
 // The smaller of the exported files, and the sureness of its Gaussians in its order.
 void TakeScene(const GaussianModel& model,
