@@ -18,6 +18,8 @@ std::string LayoutName(v1::Scene::Layout layout) {
       return "colmap";
     case v1::Scene::LAYOUT_TRANSFORMS:
       return "transforms";
+    case v1::Scene::LAYOUT_SPLAT:
+      return "splat";
     default:
       return "-";
   }
@@ -33,11 +35,10 @@ ExitCode RunCreate(const Context& context, const std::string& photos) {
   Connection connection(context.server, *context.interrupt);
   ProgressDisplay display(context.json);
   const auto entries = BuildManifest(folder, *context.interrupt);
-  const v1::Scene scene = UploadScene(
-      connection,
-      entries,
-      std::filesystem::absolute(folder.root).filename().string(),
-      [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
+  const v1::Scene scene =
+      UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
+        display.OnTransfer("uploading", done, total);
+      });
   display.Clear();
   if (context.json) {
     PrintJson(scene);
@@ -123,8 +124,10 @@ void AddSceneCommands(CLI::App& app, Context& context) {
   const auto text = std::make_shared<std::string>();
   const auto limit = std::make_shared<int>(50);
 
-  CLI::App* create = scene->add_subcommand("create", "Upload a folder of photos");
-  create->fallthrough()->add_option("PHOTOS", *text, "Folder of photos")->required();
+  CLI::App* create = scene->add_subcommand("create", "Upload a folder of photos, or a splat");
+  create->fallthrough()
+      ->add_option("PHOTOS", *text, "Folder of photos, or a splat (.ply, .sog, .spz)")
+      ->required();
   create->callback([&context, text] {
     context.action = [&context, text] { return RunCreate(context, *text); };
   });

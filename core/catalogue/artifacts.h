@@ -8,6 +8,10 @@ namespace color3d::artifact {
 inline constexpr char kScene[] = "scene.json";
 inline constexpr char kImportFacts[] = "import.json";  // what the import found out
 inline constexpr char kSfmLog[] = "sfm.log";
+// Of a scene that is a splat: what stands for photos, drawn from it (view's stem + ".png"; they lie
+// in the scene's folder for all stages that are given them), and its Gaussians in grey.
+inline constexpr char kGivenViews[] = "given_views/";
+inline constexpr char kGivenGeometry[] = "given.c3g";
 inline constexpr char kKeyView[] = "key_view.json";                // which view, and why
 inline constexpr char kKeyViewGray[] = "key_view.png";             // as captured: to be coloured
 inline constexpr char kKeyViewRanking[] = "key_view_ranking.jpg";  // contact sheet of candidates

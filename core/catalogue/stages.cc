@@ -8,7 +8,9 @@ namespace color3d {
 const std::vector<Stage>& StageCatalogue() {
   using namespace artifact;
   static const std::vector<Stage> catalogue = {
-      {.kind = kind::kImportScene, .leaves = {kScene, kImportFacts, kSfmLog}, .results = {kSfmLog}},
+      {.kind = kind::kImportScene,
+       .leaves = {kScene, kImportFacts, kSfmLog, kGivenViews, kGivenGeometry},
+       .results = {kSfmLog}},
       {.kind = kind::kSelectKeyView,
        .needs = {kScene},
        .reads = {kImportFacts, kGeometry},  // geometry of an earlier job, if it is given one
@@ -22,6 +24,7 @@ const std::vector<Stage>& StageCatalogue() {
        .brings_prerequisites = true},
       {.kind = kind::kReconstructGeometry,
        .needs = {kScene},
+       .reads = {kGivenGeometry},  // in place of training
        .leaves = {kGeometry, kMemoryPlan},
        .brings_prerequisites = true,
        .resumes = true,

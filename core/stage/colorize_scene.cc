@@ -114,6 +114,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   PlanFacts plan_facts;
   plan_facts.has_poses = !facts.ran_structure_from_motion;
+  plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
   plan_facts.has_sparse_points = !facts.random_points;
   plan_facts.has_truth = has_truth;

@@ -17,6 +17,7 @@
 #include "core/scene/import.h"
 #include "core/splat/chroma/chroma_options.h"
 #include "core/splat/geometry/geometry_options.h"
+#include "core/splat/import/splat_scene.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -24,8 +25,12 @@ namespace color3d {
 // Throws Error{kInvalidArgument} unless a working size is 64..4096 px.
 void CheckMaxSide(int max_side_px);
 
-// The scene's files as views with poses; structure-from-motion where they have none.
-void RunImportScene(const ImportOptions& options, StageContext& context);
+// The scene's files as views with poses; structure-from-motion where they have none. A scene of one
+// splat (.ply, .sog, .spz) and no photos: views chosen around it and drawn in grey, and its
+// Gaussians, which are the geometry.
+void RunImportScene(const ImportOptions& options,
+                    StageContext& context,
+                    const SplatViewOptions& splat_views = {});
 
 struct SelectKeyViewOptions {
   KeyViewOptions selection;
@@ -126,7 +131,8 @@ void RunCorrectColors(const CorrectColorsOptions& options,
                       const std::string& encoder = "");
 
 // Gaussians of luminance, trained at max_side_px (64..4096). With little memory the size and the
-// number of Gaussians are smaller, and a warning says so.
+// number of Gaussians are smaller, and a warning says so. Gaussians that came with the scene are
+// handed on as they are.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
 
 // The views' chroma on the geometry, with confidence when every training view has its provenance.

@@ -31,6 +31,15 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec) {
   return options;
 }
 
+SplatViewOptions SplatViewOptionsFrom(const v1::ImportSceneSpec& spec) {
+  SplatViewOptions options;
+  if (spec.has_splat_views()) options.views = spec.splat_views();
+  if (spec.has_splat_view_side_px()) options.side_px = spec.splat_view_side_px();
+  if (spec.splat_up() == v1::ImportSceneSpec::SPLAT_UP_Y) options.up = SplatUp::kY;
+  if (spec.splat_up() == v1::ImportSceneSpec::SPLAT_UP_Z) options.up = SplatUp::kZ;
+  return options;
+}
+
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
   SelectKeyViewOptions options;
   options.view = spec.view();

@@ -171,7 +171,9 @@ class CoreStageRunner : public StageRunner {
     const JobSpec& spec = run.spec;
     switch (spec.stage_case()) {
       case JobSpec::kImportScene:
-        return RunImportScene(ImportOptionsFrom(spec.import_scene()), context);
+        return RunImportScene(ImportOptionsFrom(spec.import_scene()),
+                              context,
+                              SplatViewOptionsFrom(spec.import_scene()));
       case JobSpec::kSelectKeyView:
         return RunSelectKeyView(SelectOptionsFrom(spec.select_key_view()), context);
       case JobSpec::kColorizeKeyView:

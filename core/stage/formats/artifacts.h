@@ -24,7 +24,7 @@ void CheckStemsAreUnique(const Scene& scene);
 
 // What the import stage found out, for the plan and the report.
 struct ImportFacts {
-  std::string layout;  // "photos", "colmap", "transforms"
+  std::string layout;  // "photos", "colmap", "transforms", "splat"
   bool ran_structure_from_motion = false;
   std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
   bool undistorted = false;
