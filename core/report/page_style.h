@@ -21,6 +21,8 @@ p{margin:.4rem 0;max-width:75ch}a{color:var(--accent)}
 :focus-visible{outline:3px solid var(--accent);outline-offset:2px}
 img{display:block;width:100%;height:auto;border-radius:6px;background:var(--line)}
 figure{margin:0;min-width:0}figcaption{font-size:.875rem;color:var(--soft);margin-top:.2rem}
+.rows{display:flex;flex-wrap:wrap;gap:0 1.5rem}
+.rows>div{flex:1 1 15rem;max-width:34rem}
 .row{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,15rem),1fr));gap:.75rem}
 .compare{position:relative;overflow:hidden;border-radius:8px;touch-action:pan-y;
 width:min(100%,960px,calc(75vh*var(--shape)))}

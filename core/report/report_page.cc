@@ -156,7 +156,9 @@ std::string SectionHtml(const ReportSection& section) {
     }
     html += "</ul>";
   }
-  for (const ReportRow& row : section.rows) html += RowHtml(row);
+  if (!section.rows.empty()) html += "<div class=\"rows\">";
+  for (const ReportRow& row : section.rows) html += "<div>" + RowHtml(row) + "</div>";
+  if (!section.rows.empty()) html += "</div>";
   for (const ReportTable& table : section.tables) html += TableHtml(table);
   if (!section.curves.empty()) html += CurvesHtml(section.curves);
   if (!section.wide.bytes.empty()) {

@@ -175,7 +175,7 @@ std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& me
     headline.emplace_back(label,
                           fmt::format(fmt::runtime(form), scale * metrics.at(name).get<double>()));
   };
-  add("delta_e00", "colour error, CIEDE2000", "{:.2f}", 1.0);
+  add("delta_e00_chroma", "colour error, CIEDE2000", "{:.2f}", 1.0);
   add("delta_e00_gray", "... if left grey", "{:.2f}", 1.0);
   add("psnr_rgb", "PSNR of held-out views", "{:.1f} dB", 1.0);
   add("share_seen", "seen in a key view", "{:.0f} %", 100.0);
