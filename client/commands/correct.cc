@@ -2,6 +2,7 @@
 // balance.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -16,6 +17,7 @@
 #include "client/commands/results.h"
 #include "client/lib/text.h"
 #include "client/options/key_color_flags.h"
+#include "core/base/digest.h"
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
@@ -102,8 +104,7 @@ void Undo(const std::string& how_many, v1::CorrectColorsSpec* correct) {
 // A place is sent as the file of hints that it stands for, which stays among the results.
 v1::KeyColorSource Upload(Connection& connection, const CorrectOptions& options) {
   if (options.at.empty()) return UploadKeyColor(connection, options.paint);
-  const fs::path file = fs::path(options.out) / artifact::kPaint / "point.json";
-  PrepareOut(file.parent_path());
+  const fs::path file = fs::path(options.out) / "point.json";
   WriteFileAtomic(file, PointHints(options));
   KeyColorFlags flags;
   flags.hints = file.string();
@@ -132,6 +133,40 @@ v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const 
   if (options.tint) solve->set_tint(*options.tint);
   if (options.warmth) solve->set_warmth(*options.warmth);
   return spec;
+}
+
+// Pictures to paint on are those of this job: the ones before go, and what the user has painted over
+// is kept under another name.
+void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job& before) {
+  const fs::path folder = out / artifact::kPaint;
+  std::error_code none;
+  if (!fs::is_directory(folder, none)) return;
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file() && entry.path().stem().extension() != ".painted") {
+      files.push_back(entry.path());
+    }
+  }
+  for (const fs::path& file : files) {
+    const std::string name = artifact::kPaint + file.filename().string();
+    const std::string digest = DigestFile(file).sha256;
+    const bool ours = std::any_of(
+        before.artifacts().begin(), before.artifacts().end(), [&](const v1::Artifact& artifact) {
+          return artifact.name() == name && artifact.digest().sha256() == digest;
+        });
+    if (ours) {
+      fs::remove(file);
+      continue;
+    }
+    fs::path kept = file;
+    kept.replace_extension(".painted" + file.extension().string());
+    for (int number = 2; fs::exists(kept); ++number) {
+      kept = file;
+      kept.replace_extension(fmt::format(".{}.painted{}", number, file.extension().string()));
+    }
+    fs::rename(file, kept);
+    PrintNote(context, "what you painted is kept as " + kept.string());
+  }
 }
 
 std::string ProposalText(const Context& context,
@@ -192,6 +227,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   ProgressDisplay display(context.json);
   const v1::Job job =
       FollowToSuccess(connection, context, {submitted.name()}, options.out, display);
+  ClearPaintFolder(context, options.out, before);
   const auto files = DownloadResults(connection, context, job, options.out, display);
   const auto facts = ReadResult(options.out, artifact::kCorrections);
   const int corrections = job.spec().colorize_scene().correct_colors().corrections_size();

@@ -84,6 +84,12 @@ TEST_F(CorrectTest, NamesPlacesThenAStrokeIsSeenInTheSceneAndCanBeTakenBack) {
   EXPECT_EQ(ReadFile(Path("out") / "model.c3g"), before) << "nothing was to be changed";
   EXPECT_EQ(Done(proposed), std::set<std::string>{"correct_colors"});
 
+  // What the user paints is not overwritten.
+  Image painted = to_paint;
+  for (int i = 0; i < 40 * 40; ++i) painted.At(0, 20 + i / 40, 20 + i % 40) = 0.9f;
+  const std::string mine = EncodePng8(painted);
+  WriteFileAtomic(Path("out") / "paint" / proposed_view, mine);
+
   const double x = 0.5, y = 0.6;
   const double was = RednessAt(kView, x, y);
   const auto at = fmt::format("{},{}", x * photo.width, y * photo.height);
@@ -94,6 +100,15 @@ TEST_F(CorrectTest, NamesPlacesThenAStrokeIsSeenInTheSceneAndCanBeTakenBack) {
   EXPECT_EQ(
       Done(corrected),
       (std::set<std::string>{"correct_colors", "solve_chroma", "export", "render", "evaluate"}));
+
+  const std::string stem = fs::path(proposed_view).stem().string();
+  EXPECT_EQ(ReadFile(Path("out") / "paint" / (stem + ".painted.png")), mine);
+  const json repainted = Correct({"--view",
+                                  proposed_view,
+                                  "--image",
+                                  (Path("out") / "paint" / (stem + ".painted.png")).string()});
+  EXPECT_EQ(repainted.at("corrections"), 2);
+  Correct({"--undo", "1"});
 
   const json undone = Correct({"--undo", "1"});
   EXPECT_EQ(undone.at("corrections"), 0);
