@@ -15,7 +15,8 @@ packages=(
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy) ;;
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy
+    python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
   *) echo "install-deps: unknown option $1; there is --tests" >&2; exit 2 ;;
 esac
 
