@@ -10,7 +10,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 other_flags='--build --install --prefix --preset --target --test-dir --output-on-failure --gtest_filter
-  --plugin --python_out --grpc_python_out'
+  --plugin --python_out --grpc_python_out --ignore-scripts'
 other_names='add_secure_port'
 
 lists=$(mktemp -d)
@@ -18,7 +18,7 @@ trap 'rm -rf "$lists"' EXIT
 git ls-files --cached --others --exclude-standard | while read -r file; do
   [ ! -f "$file" ] || echo "$file"
 done >"$lists/files"
-grep -E '\.(h|cc|proto|textproto|txtpb|sh|py|cmake|json|in)$|(^|/)CMakeLists\.txt$|(^|/)\.clang-[a-z]+$' \
+grep -E '\.(h|cc|proto|textproto|txtpb|sh|py|mjs|cmake|json|in)$|(^|/)CMakeLists\.txt$|(^|/)\.clang-[a-z]+$' \
   "$lists/files" | grep -v '^tests/check_docs\.sh$' >"$lists/sources"
 grep '\.md$' "$lists/files" >"$lists/documents"
 {

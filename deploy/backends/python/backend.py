@@ -1,22 +1,21 @@
 #!/usr/bin/env python3
 """A model server for color3d in Python: wrap a colourization model of your own here.
 
-The README beside this file says how to install and run it. Replace colorize() (and outpaint(), if
-you have a generator) by calls of your models; the rest is the protocol (proto/color3d/backend/v1/backend.proto).
+The README in the folder above says how to install and run it. Replace colorize() (and outpaint(), if
+you have a generator) by calls of your models; the rest is the protocol
+(proto/color3d/backend/v1/backend.proto).
 """
 
 import argparse
-import concurrent.futures
 import io
-import sys
 
 import grpc
 import numpy as np
 from PIL import Image
 
-from color3d.backend.v1 import backend_pb2, backend_pb2_grpc
+import serving
+from serving import backend_pb2, backend_pb2_grpc
 
-MAX_MESSAGE_BYTES = 256 << 20
 MAX_PIXELS = 50_000_000
 
 
@@ -120,26 +119,8 @@ class Backend(backend_pb2_grpc.ColorBackendServicer):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--listen", default="127.0.0.1:50662", help="HOST:PORT")
-    arguments = parser.parse_args()
-    server = grpc.server(
-        concurrent.futures.ThreadPoolExecutor(max_workers=4),
-        options=[
-            ("grpc.max_receive_message_length", MAX_MESSAGE_BYTES),
-            ("grpc.max_send_message_length", MAX_MESSAGE_BYTES),
-            ("grpc.so_reuseport", 0),
-        ],
-    )
-    backend_pb2_grpc.add_ColorBackendServicer_to_server(Backend(), server)
-    try:
-        port = server.add_insecure_port(arguments.listen)
-    except RuntimeError:
-        port = 0
-    if port == 0:
-        sys.exit(f"backend.py: cannot listen on {arguments.listen}; choose another with --listen")
-    server.start()
-    print(f"backend.py listens on port {port}", flush=True)
-    server.wait_for_termination()
+    serving.add_flags(parser, "127.0.0.1:50662")
+    serving.serve(Backend(), parser.parse_args())
 
 
 if __name__ == "__main__":
