@@ -135,8 +135,8 @@ v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const 
   return spec;
 }
 
-// Pictures to paint on are those of this job: the ones before go, and what the user has painted over
-// is kept under another name.
+// Pictures to paint on are those of this job: the ones before go, and what the user has painted
+// over is kept under another name.
 void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job& before) {
   const fs::path folder = out / artifact::kPaint;
   std::error_code none;
