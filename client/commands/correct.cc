@@ -15,6 +15,7 @@
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
 #include "client/commands/results.h"
+#include "client/lib/job_watch.h"
 #include "client/lib/text.h"
 #include "client/options/key_color_flags.h"
 #include "core/base/digest.h"
@@ -169,6 +170,22 @@ void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job
   }
 }
 
+void FetchScene(Connection& connection,
+                const v1::Job& exported,
+                const fs::path& out,
+                ProgressDisplay& display) {
+  const auto& results = FindStage(kind::kExport)->results;
+  std::vector<v1::Artifact> files;
+  const v1::Job fresh = GetJob(connection, exported.name());
+  for (const v1::Artifact& artifact : fresh.artifacts()) {
+    const auto same_name = [&](const char* name) { return artifact.name() == name; };
+    if (std::any_of(results.begin(), results.end(), same_name)) files.push_back(artifact);
+  }
+  const auto fetched = DownloadArtifacts(connection, files, out, display);
+  if (std::find(fetched.begin(), fetched.end(), artifact::kViewPage) == fetched.end()) return;
+  display.Say((out / artifact::kViewPage).string() + " shows it already; figures follow");
+}
+
 std::string ProposalText(const Context& context,
                          const std::string& target,
                          const fs::path& out,
@@ -225,8 +242,12 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   PrepareOut(options.out);
   const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, before));
   ProgressDisplay display(context.json);
+  // The scene as it is now is there to be looked at before it is scored and reported.
+  const auto fetch_scene = [&](const v1::Job& stage) {
+    if (stage.kind() == kind::kExport) FetchScene(connection, stage, options.out, display);
+  };
   const v1::Job job =
-      FollowToSuccess(connection, context, {submitted.name()}, options.out, display);
+      FollowToSuccess(connection, context, {submitted.name()}, options.out, display, fetch_scene);
   ClearPaintFolder(context, options.out, before);
   const auto files = DownloadResults(connection, context, job, options.out, display);
   const auto facts = ReadResult(options.out, artifact::kCorrections);

@@ -64,8 +64,9 @@ const std::vector<Stage>& StageCatalogue() {
        .keeps_time_limit = true},
       {.kind = kind::kExport,
        .needs = {kScene, kModel},
-       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kExportScores},
-       .results = {kPly, kSog, kSpz, kGlb, kSplat}},
+       .reads = {kKeyView},
+       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kViewPage, kExportScores},
+       .results = {kPly, kSog, kSpz, kGlb, kSplat, kViewPage}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
        .reads = {kKeyView},
@@ -77,8 +78,8 @@ const std::vector<Stage>& StageCatalogue() {
        .leaves = {kScores, kTruths, kColored2d}},
       // Its report reads what all the others have left.
       {.kind = kind::kColorizeScene,
-       .leaves = {kReport, kViewPage, kMetrics, kAllCurves, kPlan},
-       .results = {kReport, kViewPage, kMetrics, kAllCurves, kPlan}},
+       .leaves = {kReport, kMetrics, kAllCurves, kPlan},
+       .results = {kReport, kMetrics, kAllCurves, kPlan}},
       {.kind = kind::kPersonalizeScenes},
   };
   return catalogue;

@@ -16,7 +16,6 @@
 #include "core/stage/report/key_view_section.h"
 #include "core/stage/report/repeat_section.h"
 #include "core/stage/report/report_views.h"
-#include "core/stage/report/view_page.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -223,7 +222,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
   data.summary = Summary(scene, metrics, keys);
-  if (key && WriteViewPage(scene, *key, context)) data.view_page = artifact::kViewPage;
+  if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
   data.key_view = ReportOfKeyView(KeyPictures(key ? scene.views[*key].name : "", context), context);
   const std::vector<CurvePoint> curves = CollectCurves(context);
   std::vector<CurvePoint> personalization;

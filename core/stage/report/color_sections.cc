@@ -41,7 +41,7 @@ ReportPicture SmallPicture(const Image& image, std::string caption) {
 }  // namespace
 
 ColorFacts::ColorFacts(const Scene& scene,
-                       const StageContext& context,
+                       StageContext& context,
                        std::optional<NextKeyViewFacts> next)
     : scene_(scene), context_(context), carry_(ReadCarryFacts(context)), next_(std::move(next)) {
   ReadProvenance();
@@ -210,11 +210,12 @@ std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
   const std::vector<ViewFacts> views = LeastCertainFirst();
   const size_t wanted = std::min(views.size(), kMaxPictures);
   const ViewImages photos(scene_, context_.scene_folder(), kPictureSidePx, 0);
-  std::vector<ReportRow> rows;
-  for (size_t k = 0; k < wanted; ++k) {
+  std::vector<ReportRow> rows(wanted);
+  context_.pool().ForEach(static_cast<int64_t>(wanted), [&](int64_t k, int) {
     const ViewFacts& facts = views[k * views.size() / wanted];
     const View& view = scene_.views[facts.view];
-    ReportRow row{view.name, {}};
+    ReportRow& row = rows[k];
+    row.title = view.name;
     for (const std::string& name : {ViewArtifact(artifact::kColored2d, view, ".jpg"),
                                     ViewArtifact(artifact::kRenders, view, ".png")}) {
       if (!context_.HasInput(name)) continue;
@@ -229,8 +230,7 @@ std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
                     Percent(facts.shares.seen),
                     Percent(facts.shares.inferred),
                     Percent(facts.shares.guessed))));
-    rows.push_back(std::move(row));
-  }
+  });
   return rows;
 }
 

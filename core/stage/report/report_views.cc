@@ -49,6 +49,10 @@ ReportView::Picture PictureOf(const char* role,
   return {role, short_name, caption, EncodeJpeg(image, kQuality), image.width, image.height};
 }
 
+Image GrayPicture(const Image& luminance) {
+  return SrgbFromLab(JoinLab(luminance, Image(luminance.width, luminance.height, 2, 0.0f)));
+}
+
 }  // namespace
 
 std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
@@ -61,26 +65,30 @@ std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
   const double side = kLargestPx * std::sqrt(kViewsAtLargest / std::max<size_t>(1, chosen.size()));
   const int side_px = std::clamp(static_cast<int>(side), kSmallestPx, kLargestPx);
   const ViewImages photos(scene, context.scene_folder(), side_px, 0);
-  std::vector<ReportView> views;
-  for (const int index : chosen) {
+  // Views are drawn one after the other, each by all threads; the rest is work for one thread each.
+  std::vector<Image> renders(chosen.size());
+  for (size_t i = 0; model && i < chosen.size(); ++i) {
     context.cancel().ThrowIfCancelled();
-    const View& view = scene.views[index];
+    const View& view = scene.views[chosen[i]];
+    renders[i] =
+        RenderView(*model, photos.WorkingCamera(chosen[i]), view.cam_from_world, context.pool())
+            .lab;
+  }
+  std::vector<ReportView> views(chosen.size());
+  context.pool().ForEach(static_cast<int64_t>(chosen.size()), [&](int64_t i, int) {
+    context.cancel().ThrowIfCancelled();
+    const View& view = scene.views[chosen[i]];
     const auto artifact_of = [&](const char* folder, const char* extension) {
       const std::string name = ViewArtifact(folder, view, extension);
       if (!context.HasInput(name)) return Image();
       return FitWithin(DecodeImage(context.ReadInput(name), name), side_px);
     };
-    ReportView shown{view.name + (view.held_out ? " (held out)" : ""), {}};
-    const Image gray = SrgbFromLab(JoinLab(
-        *photos.Luminance(index),
-        Image(photos.WorkingCamera(index).width, photos.WorkingCamera(index).height, 2, 0.0f)));
-    shown.pictures.push_back(PictureOf("gray", "photo", "the monochrome photo", gray));
-    const Image render =
-        model ? SrgbFromLab(
-                    RenderView(
-                        *model, photos.WorkingCamera(index), view.cam_from_world, context.pool())
-                        .lab)
-              : artifact_of(artifact::kRenders, ".png");
+    ReportView& shown = views[i];
+    shown.name = view.name + (view.held_out ? " (held out)" : "");
+    shown.pictures.push_back(PictureOf(
+        "gray", "photo", "the monochrome photo", GrayPicture(*photos.Luminance(chosen[i]))));
+    const Image render = model ? SrgbFromLab(renders[i]) : artifact_of(artifact::kRenders, ".png");
+    renders[i] = {};
     shown.pictures.push_back(
         PictureOf("render", "coloured scene", "rendered from the coloured 3D scene", render));
     if (const Image truth = artifact_of(artifact::kTruths, ".jpg"); !truth.Empty()) {
@@ -90,8 +98,7 @@ std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
       shown.pictures.push_back(
           PictureOf("direct", "colorizer alone", "the colorizer on the monochrome photo", direct));
     }
-    views.push_back(std::move(shown));
-  }
+  });
   return views;
 }
 

@@ -1,4 +1,4 @@
-#include "core/stage/report/view_page.h"
+#include "core/stage/view_page.h"
 
 #include <fmt/format.h>
 
@@ -24,16 +24,17 @@ constexpr int kPhotoPx = 480;        // longer side of the photos
 constexpr int kPhotoQuality = 80;    // of their JPEG
 constexpr size_t kMaxPictures = 48;  // with more photos, the others are a name and a camera
 
-// The smaller of the exported files, and the sureness of its Gaussians in its order.
+// The exported file, and the sureness of its Gaussians in its order.
 void TakeScene(const GaussianModel& model,
                const ExportFrame& frame,
+               const ExportedFile& file,
                StageContext& context,
                ViewPage* page) {
   page->file_scale = frame.scale;
   page->file_offset = frame.offset;
-  page->file_is_compressed = context.HasInput(artifact::kSog);
-  page->file_name = page->file_is_compressed ? artifact::kSog : artifact::kPly;
-  page->file_bytes = context.ReadInput(page->file_name);
+  page->file_is_compressed = file.name == artifact::kSog;
+  page->file_name = file.name;
+  page->file_bytes = file.bytes;
   page->confidence = model.confidence;
   if (!page->file_is_compressed || model.confidence.empty()) return;
   const RgbHarmonics no_colors{.degree = 0, .sh = std::vector<float>(3 * model.size())};
@@ -63,22 +64,24 @@ std::vector<ViewPagePhoto> PhotosOf(const Scene& scene, int key_view, StageConte
 
 }  // namespace
 
-bool WriteViewPage(const Scene& scene, int key_view, StageContext& context) {
-  const bool exported = context.HasInput(artifact::kSog) || context.HasInput(artifact::kPly);
-  if (!exported || !context.HasInput(artifact::kModel)) return false;
+bool WriteViewPage(const Scene& scene,
+                   int key_view,
+                   const GaussianModel& model,
+                   const ExportedFile& file,
+                   StageContext& context) {
+  if (file.name.empty()) return false;
   if (!HasViewer()) {
     context.progress().OnWarning(fmt::format(
         "this build has no viewer, so there is no {}: build again where npm reaches its registry",
         artifact::kViewPage));
     return false;
   }
-  const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   const View& key = scene.views.at(key_view);
   const Camera camera = key.camera.FitWithin(kPosterPx);
   const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
 
   ViewPage page;
-  TakeScene(model, ExportFrameOf(scene), context, &page);
+  TakeScene(model, ExportFrameOf(scene), file, context, &page);
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);
