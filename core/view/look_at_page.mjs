@@ -10,7 +10,7 @@ import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 
 const [chromium, page, screenshots] = process.argv.slice(2);
-mkdirSync(screenshots, { recursive: true });
+if (screenshots) mkdirSync(screenshots, { recursive: true });
 const profile = mkdtempSync(join(tmpdir(), 'color3d-browser-'));
 const browser = spawn(chromium, [
   '--headless', '--no-sandbox', '--no-first-run', '--remote-debugging-pipe', '--use-angle=swiftshader',
