@@ -111,7 +111,7 @@ public core/splat model/gaussian_cap model/gaussian_model model/memory_plan rast
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene
 public core/stage stages formats/artifacts
-public core/video mp4_writer
+public core/video film_reader mp4_writer
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
 public server/backends backend_address backend_prober grpc_colorizer
