@@ -61,6 +61,7 @@ for part in model raster training geometry chroma export import; do
 done
 allow core/report 'core/(base|catalogue|image|report)'
 allow core/video 'core/(base|video)'
+allow core/film 'core/(base|image|film)'
 allow core/view 'core/(base|scene|view(/path)?)'
 allow core/view/path 'core/(base|scene|view(/path)?)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
@@ -103,6 +104,7 @@ public core/image codec draw fill_holes guided_upsample local_features optical_f
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
+public core/film shots
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan

@@ -55,6 +55,7 @@ class Field {
     if (it == value_.end()) throw InvalidArgument("scene: {} is missing", place);
     return Field(*it, place);
   }
+  bool Has(const char* key) const { return value_.is_object() && value_.contains(key); }
   Field operator[](size_t index) const {
     return Field(value_.at(index), fmt::format("{}[{}]", place_, index));
   }
@@ -145,6 +146,12 @@ Pose PoseFromJson(const Field& field) {
   return pose;
 }
 
+Moment MomentFromJson(const Field& field) {
+  const double time_s = field["time_s"].Number();
+  if (time_s < 0.0) throw field["time_s"].Wrong("0 or more");
+  return {time_s, field["shot"].Integer(0, INT32_MAX)};
+}
+
 View ViewFromJson(const Field& field) {
   View view;
   view.name = field["name"].RelativePath();
@@ -154,6 +161,7 @@ View ViewFromJson(const Field& field) {
   view.distortion = DistortionFromJson(field["distortion"]);
   view.cam_from_world = PoseFromJson(field["cam_from_world"]);
   view.held_out = field["held_out"].Boolean();
+  if (field.Has("moment")) view.moment = MomentFromJson(field["moment"]);
   return view;
 }
 
@@ -189,6 +197,9 @@ std::string SceneToJson(const Scene& scene) {
           {{"rotation_wxyz", json::array({q.w(), q.x(), q.y(), q.z()})},
            {"translation", Vector3ToJson(view.cam_from_world.translation)}}},
          {"held_out", view.held_out}});
+    if (view.moment) {
+      views.back()["moment"] = {{"time_s", view.moment->time_s}, {"shot", view.moment->shot}};
+    }
   }
   json points = json::array();
   for (const SparsePoint& point : scene.points) {
