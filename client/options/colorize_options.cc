@@ -178,7 +178,8 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("PHOTOS",
                  o->photos,
                  "Folder of photos, or one with images/ and a COLMAP model (sparse/0), or with "
-                 "transforms.json and its photos; or a splat (.ply, .sog, .spz)");
+                 "transforms.json and its photos; or a splat (.ply, .sog, .spz); or a film (.mp4, "
+                 ".mov, .mkv, ...), whose frames are coloured");
   app.add_option("--scene",
                  o->scene,
                  "In place of PHOTOS: a scene that the server holds, coloured from the key view "
@@ -213,6 +214,8 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
       o->bound,
       "With --benchmark: also score the same geometry under the true colours of all views");
   app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
+  app.add_flag(
+      "--film", o->film, "The photos are frames of a film: coloured one by one, not reconstructed");
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");

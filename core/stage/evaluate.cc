@@ -12,6 +12,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
+#include "core/stage/film/colored_frames.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -107,8 +108,9 @@ SceneConsistency CompareViews(const Scene& scene,
 // Scores of all held-out views that have a truth, as they come.
 class HeldOutScores {
  public:
+  // Without a model what is delivered, and scored as rendered, are the coloured frames.
   HeldOutScores(const Scene& scene,
-                const GaussianModel& model,
+                const std::optional<GaussianModel>& model,
                 const std::optional<GaussianModel>& bound,
                 StageContext& context)
       : scene_(scene), model_(model), bound_(bound), context_(context) {}
@@ -122,8 +124,10 @@ class HeldOutScores {
     if (captured.channels != 3) throw InvalidArgument("the truth of {} is grey", view.name);
     const Image true_srgb = images.Undistort(index, captured);
     const Camera camera = images.WorkingCamera(index);
-    Scores scores = ScoreView(
-        true_srgb, RenderView(model_, camera, view.cam_from_world, context_.pool()).lab, ab);
+    const Image delivered =
+        model_ ? RenderView(*model_, camera, view.cam_from_world, context_.pool()).lab
+               : ColoredFrame(scene_, index, images, context_);
+    Scores scores = ScoreView(true_srgb, delivered, ab);
     if (bound_) {
       const Image lab = RenderView(*bound_, camera, view.cam_from_world, context_.pool()).lab;
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab);
@@ -162,7 +166,7 @@ class HeldOutScores {
 
  private:
   const Scene& scene_;
-  const GaussianModel& model_;
+  const std::optional<GaussianModel>& model_;
   const std::optional<GaussianModel>& bound_;
   StageContext& context_;
   ordered_json views_ = ordered_json::array();
@@ -206,9 +210,12 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   const TruthFiles held_out = FilesByView(options.truth, true, scene);
   const TruthFiles training = FilesByView(options.training_truth, false, scene);
-  const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
+  std::optional<GaussianModel> model;
+  if (!scene.IsFilm()) model = ParseGaussians(context.ReadInput(artifact::kModel));
   std::optional<GaussianModel> bound;
-  if (options.bound) bound = FitTrueChroma(model, scene, training, options.chroma, context);
+  if (options.bound && model) {
+    bound = FitTrueChroma(*model, scene, training, options.chroma, context);
+  }
   HeldOutScores scores(scene, model, bound, context);
   int64_t done = 0;
   for (const auto& [view, file] : held_out) {
@@ -219,7 +226,8 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   }
   TruthFiles all = held_out;
   all.insert(training.begin(), training.end());
-  const SceneConsistency consistency = CompareViews(scene, model, all, context);
+  SceneConsistency consistency;
+  if (model) consistency = CompareViews(scene, *model, all, context);
   const Scores mean = scores.Mean();
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
   ordered_json json{{"mean", mean}, {"views", scores.views()}};
