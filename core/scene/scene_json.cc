@@ -55,6 +55,7 @@ class Field {
     if (it == value_.end()) throw InvalidArgument("scene: {} is missing", place);
     return Field(*it, place);
   }
+  bool Has(const char* key) const { return value_.is_object() && value_.contains(key); }
   Field operator[](size_t index) const {
     return Field(value_.at(index), fmt::format("{}[{}]", place_, index));
   }
@@ -149,6 +150,7 @@ View ViewFromJson(const Field& field) {
   View view;
   view.name = field["name"].RelativePath();
   view.image_file = field["image_file"].RelativePath();
+  if (field.Has("mask_file")) view.mask_file = field["mask_file"].RelativePath();
   view.camera = CameraFromJson(field["camera"]);
   view.captured_camera = CameraFromJson(field["captured_camera"]);
   view.distortion = DistortionFromJson(field["distortion"]);
@@ -189,6 +191,7 @@ std::string SceneToJson(const Scene& scene) {
           {{"rotation_wxyz", json::array({q.w(), q.x(), q.y(), q.z()})},
            {"translation", Vector3ToJson(view.cam_from_world.translation)}}},
          {"held_out", view.held_out}});
+    if (!view.mask_file.empty()) views.back()["mask_file"] = view.mask_file;
   }
   json points = json::array();
   for (const SparsePoint& point : scene.points) {
