@@ -52,6 +52,8 @@ int Main(int argc, char** argv) {
   AddKeyCommands(app, context);
   AddPreviewCommand(app, context);
   AddViewCommand(app, context);
+  AddCorrectCommand(app, context);
+  AddMovieCommands(app, context);
   AddColorizerCommands(app, context);
   AddJobCommands(app, context);
   AddArtifactCommands(app, context);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
-#           <- {keyview, augment, carry, splat, metrics, report, view, matching <- {keycolor, colorizer}} <- stage
+#           <- {keyview, augment, carry, splat, metrics, report, video, view, matching <- {keycolor, colorizer}} <- stage
 #   server: store <- {planning, storage} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers and SQL never below the server. What tests
 # (*_test.cc) set up is not held against their folder; the product never includes tests/.
@@ -55,12 +55,14 @@ done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
 allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
 lower=
-for part in model raster training geometry chroma export; do
+for part in model raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
   allow "core/splat/$part" "core/(base|simd|color|image|scene|splat/($lower))"
 done
 allow core/report 'core/(base|catalogue|image|report)'
-allow core/view 'core/(base|scene|view)'
+allow core/video 'core/(base|video)'
+allow core/view 'core/(base|scene|view(/path)?)'
+allow core/view/path 'core/(base|scene|view(/path)?)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
 allow proto 'proto'
 allow server/store 'core/(base|catalogue)|server/store'
@@ -74,6 +76,7 @@ forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image c
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
   core/keycolor/hints core/keycolor/words
 forbid 'grpc|google/protobuf|color3d/v1|sqlite3|spdlog' core
+forbid 'libav|libsw' $(ls -d core/*/ | grep -v '^core/video/') server client
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base core/simd core/grid
 
@@ -91,7 +94,7 @@ public() {
 
 public core/augment augment outpaint surrogates
 public core/carry carry carry_views dense_points plane_sweep view_color
-public core/colorizer colorizer scene_batch scene_colorizers
+public core/colorizer colorizer corrector scene_batch scene_colorizers
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights
@@ -99,16 +102,17 @@ public core/grid edge_weights grid_solver
 public core/image codec draw fill_holes guided_upsample local_features optical_flow plane_sampling reduced weighted_resize \
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
-  external/script hints/hints references/reference words/prompt
+  external/script hints/hint_map hints/hints references/reference words/prompt
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
-public core/scene camera import scene view_images
+public core/scene camera import scene view_images formats/camera_file
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
-  geometry/geometry_options geometry/geometry_trainer chroma/chroma_fit chroma/chroma_options \
-  export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz
+  geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
+  export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene
 public core/stage stages formats/artifacts
-public core/view view_page
+public core/video mp4_writer
+public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
 public server/backends backend_address backend_prober grpc_colorizer
 public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key

@@ -51,6 +51,10 @@ class Colorize {
       // Colours that nobody asked for have no business in a benchmark.
       if (options_.benchmark) folder_.augment_files.clear();
     }
+    if (options_.benchmark && folder_.splat) {
+      throw InvalidArgument("--benchmark compares with photos in colour; {} is a splat",
+                            folder_.splat->file.string());
+    }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);
     Connect();

@@ -40,6 +40,8 @@ void AddSceneCommands(CLI::App& app, Context& context);
 void AddKeyCommands(CLI::App& app, Context& context);
 void AddPreviewCommand(CLI::App& app, Context& context);
 void AddViewCommand(CLI::App& app, Context& context);
+void AddCorrectCommand(CLI::App& app, Context& context);
+void AddMovieCommands(CLI::App& app, Context& context);
 void AddColorizerCommands(CLI::App& app, Context& context);
 void AddJobCommands(CLI::App& app, Context& context);
 void AddArtifactCommands(CLI::App& app, Context& context);

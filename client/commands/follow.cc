@@ -51,9 +51,10 @@ std::string ReattachHint(const Context& context, const std::string& job, const s
 bool Follow(Connection& connection,
             const std::vector<std::string>& jobs,
             const Context& context,
-            ProgressDisplay& display) {
+            ProgressDisplay& display,
+            const StageDone& on_stage_done) {
   // A job that has failed may have stages that go on: their results are kept, but not waited for.
-  std::set<std::string> unfinished(jobs.begin(), jobs.end());
+  std::set<std::string> unfinished(jobs.begin(), jobs.end()), done;
   const auto keep_going = [&] {
     display.OnTick();
     return !unfinished.empty() && !context.interrupt->IsCancelled();
@@ -61,6 +62,10 @@ bool Follow(Connection& connection,
   const auto on_event = [&](const v1::JobEvent& event) {
     display.OnEvent(event);
     if (IsFinished(event.job().state())) unfinished.erase(event.job().name());
+    if (on_stage_done && event.job().state() == v1::Job::STATE_SUCCEEDED &&
+        done.insert(event.job().name()).second) {
+      on_stage_done(event.job());
+    }
   };
   try {
     const WatchEnd end = WatchJobs(connection, jobs, on_event, keep_going);
@@ -109,8 +114,9 @@ v1::Job FollowToSuccess(Connection& connection,
                         const Context& context,
                         const std::vector<std::string>& jobs,
                         const std::string& out,
-                        ProgressDisplay& display) {
-  if (!Follow(connection, jobs, context, display)) {
+                        ProgressDisplay& display,
+                        const StageDone& on_stage_done) {
+  if (!Follow(connection, jobs, context, display, on_stage_done)) {
     throw CommandFailure(
         ExitCode::kDetached,
         fmt::format(

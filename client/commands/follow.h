@@ -1,6 +1,7 @@
 // Submitting jobs and following them to their end, with what the user is told on the way.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,11 +16,13 @@ v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec);
 
 // True when all of them have ended (stages that go on after a failure are not waited for); false
 // when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable} that says how to attach again
-// when the server stays away.
+// when the server stays away. `on_stage_done` gets every stage that has succeeded, as it happens.
+using StageDone = std::function<void(const v1::Job& stage)>;
 bool Follow(Connection& connection,
             const std::vector<std::string>& jobs,
             const Context& context,
-            ProgressDisplay& display);
+            ProgressDisplay& display,
+            const StageDone& on_stage_done = {});
 
 // "the job goes on; attach again with ..., then fetch ...". `out` may be empty.
 std::string ReattachHint(const Context& context, const std::string& job, const std::string& out);
@@ -34,7 +37,8 @@ v1::Job FollowToSuccess(Connection& connection,
                         const Context& context,
                         const std::vector<std::string>& jobs,
                         const std::string& out,
-                        ProgressDisplay& display);
+                        ProgressDisplay& display,
+                        const StageDone& on_stage_done = {});
 
 // "color3d ARGUMENTS", with --server when it was given.
 std::string CommandLine(const Context& context, std::vector<std::string> arguments);

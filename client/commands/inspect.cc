@@ -5,6 +5,7 @@
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/lib/photos/gray_copies.h"
+#include "core/base/error.h"
 
 namespace color3d::client {
 namespace {
@@ -13,6 +14,9 @@ constexpr int kMaxPhotos = 24;
 
 ExitCode RunInspect(const Context& context, const std::string& photos) {
   const PhotoFolder folder = CollectPhotos(photos);
+  if (folder.splat) {
+    throw InvalidArgument("{} is a splat; inspect looks at photos", folder.splat->file.string());
+  }
   const ColorCount count = CountColorPhotos(folder, kMaxPhotos, *context.interrupt);
   const std::string kind = count.MostlyColor() ? "colour" : "monochrome";
   if (context.json) {

@@ -268,7 +268,10 @@ ExitCode Key::Accept() {
 
 void AddTarget(CLI::App* command, KeyOptions* options) {
   command->fallthrough();
-  command->add_option("SCENE", options->target, "scenes/ID, or a folder of photos")->required();
+  command
+      ->add_option(
+          "SCENE", options->target, "scenes/ID, a folder of photos, or a splat (.ply, .sog, .spz)")
+      ->required();
 }
 
 void AddView(CLI::App* command, KeyOptions* options) {

@@ -19,6 +19,8 @@ std::string LayoutName(v1::Scene::Layout layout) {
       return "colmap";
     case v1::Scene::LAYOUT_TRANSFORMS:
       return "transforms";
+    case v1::Scene::LAYOUT_SPLAT:
+      return "splat";
     default:
       return "-";
   }
@@ -35,11 +37,10 @@ ExitCode RunCreate(const Context& context, const std::string& photos, const std:
   Connection connection(context.server, *context.interrupt);
   ProgressDisplay display(context.json);
   const auto entries = BuildManifest(folder, *context.interrupt);
-  const v1::Scene scene = UploadScene(
-      connection,
-      entries,
-      std::filesystem::absolute(folder.root).filename().string(),
-      [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
+  const v1::Scene scene =
+      UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
+        display.OnTransfer("uploading", done, total);
+      });
   display.Clear();
   if (context.json) {
     PrintJson(scene);
@@ -125,8 +126,10 @@ void AddSceneCommands(CLI::App& app, Context& context) {
   const auto text = std::make_shared<std::string>();
   const auto limit = std::make_shared<int>(50);
 
-  CLI::App* create = scene->add_subcommand("create", "Upload a folder of photos");
-  create->fallthrough()->add_option("PHOTOS", *text, "Folder of photos")->required();
+  CLI::App* create = scene->add_subcommand("create", "Upload a folder of photos, or a splat");
+  create->fallthrough()
+      ->add_option("PHOTOS", *text, "Folder of photos, or a splat (.ply, .sog, .spz)")
+      ->required();
   const auto masks = std::make_shared<std::string>();
   create->add_option("--masks", *masks, "Folder of masks, called like the photos: white counts");
   create->callback([&context, text, masks] {

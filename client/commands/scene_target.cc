@@ -16,11 +16,12 @@ std::string UploadFolder(Connection& connection,
                          const PhotoFolder& folder,
                          ProgressDisplay& display) {
   const auto entries = BuildManifest(folder, *context.interrupt);
-  const std::string name = fs::absolute(folder.root).filename().string();
-  const v1::Scene scene = UploadScene(connection, entries, name, [&](int64_t done, int64_t total) {
-    display.OnTransfer("uploading", done, total);
-  });
-  display.Say(fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
+  const v1::Scene scene =
+      UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
+        display.OnTransfer("uploading", done, total);
+      });
+  display.Say(folder.splat ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
+                           : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }
 
@@ -29,12 +30,13 @@ std::string ResolveScene(Connection& connection,
                          const std::string& text,
                          ProgressDisplay& display) {
   std::error_code none;
-  if (!fs::is_directory(text, none)) {
+  if (!fs::is_directory(text, none) && !fs::is_regular_file(text, none)) {
     if (text.starts_with("scenes/")) return text;
-    throw Error(ErrorCode::kNotFound,
-                "'{}' is neither a folder of photos nor a scene of the server's (scenes/ID; "
-                "`color3d scene list` shows them)",
-                text);
+    throw Error(
+        ErrorCode::kNotFound,
+        "'{}' is neither a folder of photos, nor a splat, nor a scene of the server's (scenes/ID; "
+        "`color3d scene list` shows them)",
+        text);
   }
   const PhotoFolder folder = CollectPhotos(text);
   for (const std::string& note : folder.notes) PrintNote(context, note);

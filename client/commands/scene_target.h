@@ -1,5 +1,5 @@
-// What a user names as a scene: a folder of photos on this machine, or a scene that the server
-// holds.
+// What a user names as a scene: a folder of photos or a splat on this machine, or a scene that the
+// server holds.
 #pragma once
 
 #include <string>
@@ -16,7 +16,8 @@ std::string UploadFolder(Connection& connection,
                          const PhotoFolder& folder,
                          ProgressDisplay& display);
 
-// `text`: "scenes/..." or a folder, which is uploaded. Throws Error{kNotFound} when it is neither.
+// `text`: "scenes/...", or a folder or splat, which is uploaded. Throws Error{kNotFound} when it is
+// neither.
 std::string ResolveScene(Connection& connection,
                          const Context& context,
                          const std::string& text,

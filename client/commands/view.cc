@@ -11,6 +11,7 @@
 #include <memory>
 #include <thread>
 
+#include "client/commands/colored_scene.h"
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/results.h"
@@ -58,36 +59,6 @@ fs::path PageIn(const fs::path& target) {
               target.string(),
               artifact::kViewPage,
               target.string());
-}
-
-// The newest colorize_scene job of the scene that has succeeded.
-v1::Job NewestResult(Connection& connection, const std::string& scene) {
-  v1::GetSceneRequest known;
-  known.set_name(scene);
-  connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), known);
-  v1::ListJobsRequest request;
-  request.set_parent(scene);
-  request.set_page_size(200);
-  std::string unfinished;
-  do {
-    const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
-    for (const v1::Job& job : jobs.jobs()) {
-      if (job.kind() != kind::kColorizeScene || !job.parent().empty()) continue;
-      if (job.state() == v1::Job::STATE_SUCCEEDED) return job;
-      if (unfinished.empty() && !IsFinished(job.state())) unfinished = job.name();
-    }
-    request.set_page_token(jobs.next_page_token());
-  } while (!request.page_token().empty());
-  if (!unfinished.empty()) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "{} is still being coloured; follow it with `color3d job watch {}`",
-                scene,
-                unfinished);
-  }
-  throw Error(ErrorCode::kFailedPrecondition,
-              "{} has not been coloured yet; do that with `color3d colorize {}`",
-              scene,
-              scene);
 }
 
 fs::path Download(const Context& context, const ViewOptions& options) {
@@ -163,9 +134,8 @@ bool OpenInBrowser(const fs::path& page) {
 }
 
 ExitCode RunView(const Context& context, const ViewOptions& options) {
-  const bool stored = options.target.starts_with("scenes/") || options.target.starts_with("jobs/");
-  const fs::path page = fs::absolute(
-      stored && !fs::exists(options.target) ? Download(context, options) : PageIn(options.target));
+  const fs::path page = fs::absolute(IsOnServer(options.target) ? Download(context, options)
+                                                                : PageIn(options.target));
   const bool opened = options.open && OpenInBrowser(page);
   if (context.json) {
     PrintJson({{"page", page.string()}, {"opened", opened}});

@@ -181,7 +181,7 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("PHOTOS",
                  o->photos,
                  "Folder of photos, or one with images/ and a COLMAP model (sparse/0), or with "
-                 "transforms.json and its photos");
+                 "transforms.json and its photos; or a splat (.ply, .sog, .spz)");
   app.add_option("--scene",
                  o->scene,
                  "In place of PHOTOS: a scene that the server holds, coloured from the key view "

@@ -8,6 +8,10 @@ namespace color3d::artifact {
 inline constexpr char kScene[] = "scene.json";
 inline constexpr char kImportFacts[] = "import.json";  // what the import found out
 inline constexpr char kSfmLog[] = "sfm.log";
+// Of a scene that is a splat: what stands for photos, drawn from it (view's stem + ".png"; they lie
+// in the scene's folder for all stages that are given them), and its Gaussians in grey.
+inline constexpr char kGivenViews[] = "given_views/";
+inline constexpr char kGivenGeometry[] = "given.c3g";
 inline constexpr char kKeyView[] = "key_view.json";                // which view, and why
 inline constexpr char kKeyViewGray[] = "key_view.png";             // as captured: to be coloured
 inline constexpr char kKeyViewRanking[] = "key_view_ranking.jpg";  // contact sheet of candidates
@@ -27,6 +31,13 @@ inline constexpr char kColorizer[] = "colorizer.c3c";
 inline constexpr char kViewsAb[] = "views_ab/";  // view's stem + ".png"
 // view's stem + ".png": 8-bit RGB, shares of guessed, seen and inferred colour (sum 255)
 inline constexpr char kProvenance[] = "provenance/";
+// The same after corrections, where there are any; they stand for those above then.
+inline constexpr char kCorrectedAb[] = "corrected_ab/";
+inline constexpr char kCorrectedProvenance[] = "corrected_provenance/";
+// How far corrections reached, and where the next ones would tell most.
+inline constexpr char kCorrections[] = "corrections.json";
+// view's stem + ".png": photos where a correction is proposed, in their present colours
+inline constexpr char kPaint[] = "paint/";
 inline constexpr char kModel[] = "model.c3g";  // Gaussians in colour
 inline constexpr char kPly[] = "scene.ply";
 inline constexpr char kSog[] = "scene.sog";
@@ -35,6 +46,8 @@ inline constexpr char kGlb[] = "scene.glb";
 inline constexpr char kSplat[] = "scene.splat";
 inline constexpr char kExportScores[] = "export.json";  // what they lose against our renders
 inline constexpr char kRenders[] = "renders/";          // view's stem + ".png"
+inline constexpr char kMovie[] = "scene.mp4";
+inline constexpr char kFrames[] = "frames/";  // "00001.png" and so on, of the movie
 inline constexpr char kScores[] = "scores.json";
 inline constexpr char kTruths[] = "truths/";            // view's stem + ".jpg"
 inline constexpr char kColored2d[] = "colored_views/";  // view's stem + ".jpg"

@@ -16,6 +16,7 @@ inline constexpr char kSelectKeyView[] = "select_key_view";
 inline constexpr char kColorizeKeyView[] = "colorize_key_view";
 inline constexpr char kReconstructGeometry[] = "reconstruct_geometry";
 inline constexpr char kCarryColor[] = "carry_color";
+inline constexpr char kCorrectColors[] = "correct_colors";
 inline constexpr char kGenerateAugmentations[] = "generate_augmentations";
 inline constexpr char kPersonalize[] = "personalize";
 inline constexpr char kColorizeViews[] = "colorize_views";

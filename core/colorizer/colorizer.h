@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,7 +17,9 @@
 
 namespace color3d {
 
+class Corrector;
 class SceneBatch;
+struct Correction;
 
 // The defaults are those of the service's preset "fast".
 struct ColorizerOptions {
@@ -89,6 +92,11 @@ class Colorizer {
   // 1-channel L (0..100) of any size -> 2-channel ab (Lab units) of the same size. Pictures larger
   // than the training size are coloured at that size and upsampled guided by L.
   virtual Image Colorize(const Image& luminance) const = 0;
+  // `corrections` may be empty: then nothing changes, and only Corrector::Propose is of use. Where
+  // two of them show one place the later one counts. Throws Error{kInvalidArgument} when one paints
+  // nothing, kFailedPrecondition for colorizers without feature neighbors (the paper's recipe).
+  virtual std::unique_ptr<const Corrector> Correct(
+      std::span<const Correction> corrections) const = 0;
   // How the scene's chroma depends on luminance, as the key view shows it.
   virtual RelativeChroma relative_chroma() const = 0;
   // Colorizer file: versioned header, encoder digest, adapters, decoder, training curve.

@@ -7,87 +7,13 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/colorizer/padding.h"
-#include "core/encoder/image_tensors.h"
+#include "core/colorizer/known_cells.h"
 #include "core/matching/view_noise.h"
 
 namespace color3d {
 namespace {
 
 constexpr char kPrefix[] = "neighbors.";
-constexpr double kLeastWeight = 1e-6;
-constexpr double kMostlyKnown = 0.5;  // share of a cell whose position is known
-
-// Places of a picture before projection.
-struct KnownCells {
-  std::vector<torch::Tensor> blocks;  // as CellFeatures
-  torch::Tensor colors;               // [n,2], Lab units
-  torch::Tensor weights;              // [n], 0..1
-  torch::Tensor positions;            // [n,4], as CellBank's
-};
-
-torch::Tensor Padded(const Image& image) {
-  return PadToMultiple(TensorFromImage(image), kPadMultiple);
-}
-
-// [count,4] of a picture's cells, as CellBank's: means over what is known of each.
-torch::Tensor PlacesOf(const Image& position, int64_t count) {
-  if (position.Empty()) return torch::zeros({count, 4});
-  const torch::Tensor cells = CellMeans(Padded(position));
-  const torch::Tensor share = cells.slice(1, 3, 4);
-  return torch::cat({cells.slice(1, 0, 3) / share.clamp_min(kMostlyKnown),
-                     (share > kMostlyKnown).to(torch::kFloat32)},
-                    1);
-}
-
-KnownCells CellsOf(const TapEncoder& encoder,
-                   const TrainingPicture& picture,
-                   const RelativeChroma& relative) {
-  const torch::Tensor l = Padded(picture.luminance);
-  CellFeatures features = DescribeCells(encoder.config(), encoder.Taps(encoder.Input(l)), l);
-  const int64_t count = features.Count();
-  KnownCells cells;
-  cells.blocks = std::move(features.blocks);
-  cells.positions = PlacesOf(picture.position, count);
-  const Image color = ToRelative(relative, picture.luminance, picture.ab);
-  if (picture.weight.Empty()) {
-    cells.colors = CellMeans(Padded(color));
-    cells.weights = torch::ones({count});
-    return cells;
-  }
-  // Each pixel counts by its weight.
-  const torch::Tensor weight = Padded(picture.weight);
-  const torch::Tensor mean_weight = CellMeans(weight);
-  cells.colors = CellMeans(Padded(color) * weight) / mean_weight.clamp_min(kLeastWeight);
-  cells.weights = mean_weight.squeeze(1).contiguous();
-  return cells;
-}
-
-KnownCells Join(const std::vector<KnownCells>& parts) {
-  KnownCells all;
-  for (size_t i = 0; i < parts.front().blocks.size(); ++i) {
-    std::vector<torch::Tensor> blocks;
-    for (const KnownCells& part : parts) blocks.push_back(part.blocks[i]);
-    all.blocks.push_back(torch::cat(blocks));
-  }
-  std::vector<torch::Tensor> colors, weights, positions;
-  for (const KnownCells& part : parts) {
-    colors.push_back(part.colors);
-    weights.push_back(part.weights);
-    positions.push_back(part.positions);
-  }
-  all.colors = torch::cat(colors);
-  all.weights = torch::cat(weights);
-  all.positions = torch::cat(positions);
-  return all;
-}
-
-KnownCells Select(const KnownCells& cells, const torch::Tensor& rows) {
-  return {SelectRows(cells.blocks, rows),
-          cells.colors.index_select(0, rows),
-          cells.weights.index_select(0, rows),
-          cells.positions.index_select(0, rows)};
-}
 
 // Of each picture but the first, the key view with the cells `key`, those whose colours are sure.
 // What the features of one place differ by from picture to picture goes to `view_noise`.

@@ -59,6 +59,7 @@ class FeatureNeighbors {
                         const Image& position = {}) const;
 
   const CellBank& bank() const { return bank_; }
+  const Whitening& whitening() const { return whitening_; }
 
   // Adds the arrays "neighbors.*"; the bank is rounded to half precision already, and stored so.
   void PutInto(TensorFile* file) const;

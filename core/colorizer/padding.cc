@@ -13,4 +13,14 @@ torch::Tensor PadToMultiple(const torch::Tensor& x, int multiple) {
                      : torch::replication_pad2d(x, {0, right, 0, bottom});
 }
 
+Image CropTo(const Image& image, int width, int height) {
+  Image out(width, height, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) out.At(c, y, x) = image.At(c, y, x);
+    }
+  }
+  return out;
+}
+
 }  // namespace color3d

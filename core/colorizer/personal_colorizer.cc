@@ -10,6 +10,7 @@
 #include "core/colorizer/named_tensors.h"
 #include "core/colorizer/options_json.h"
 #include "core/colorizer/padding.h"
+#include "core/colorizer/personal_corrector.h"
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
@@ -26,16 +27,6 @@ constexpr double kMaxAb = 128.0;     // Lab units; sRGB spans about -108..98
 
 Image FitTo(const Image& image, int width, int height) {
   return image.Empty() ? Image() : Resize(image, width, height);
-}
-
-Image CropTo(const Image& image, int width, int height) {
-  Image out(width, height, image.channels);
-  for (int c = 0; c < image.channels; ++c) {
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) out.At(c, y, x) = image.At(c, y, x);
-    }
-  }
-  return out;
 }
 
 }  // namespace
@@ -169,6 +160,26 @@ ColorPrediction PersonalColorizer::Predict(const Image& luminance,
     const Image small = AtTrainingSize(luminance);
     const torch::Tensor padded = Padded(small);
     return PredictFromTaps(parts_.model->Taps(padded), padded, small, luminance, facts);
+  });
+}
+
+std::unique_ptr<const Corrector> PersonalColorizer::Correct(
+    std::span<const Correction> corrections) const {
+  if (!parts_.neighbors) {
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "a colorizer of the paper's recipe cannot be corrected; colour the scene with another "
+        "preset");
+  }
+  for (const Correction& correction : corrections) Check(correction.picture.luminance);
+  return WithTorchErrors("correction", [&]() -> std::unique_ptr<const Corrector> {
+    SetThreads();
+    return std::make_unique<PersonalCorrector>(*parts_.encoder,
+                                               *parts_.neighbors,
+                                               parts_.relative_chroma,
+                                               parts_.options.max_side_px,
+                                               parts_.threads,
+                                               corrections);
   });
 }
 

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
+#include "core/colorizer/corrector.h"
 #include "core/colorizer/feature_neighbors.h"
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
@@ -31,6 +33,7 @@ class PersonalColorizer : public Colorizer {
 
   Image Colorize(const Image& luminance) const override;
   ColorPrediction Predict(const Image& luminance, const PictureFacts& facts = {}) const override;
+  std::unique_ptr<const Corrector> Correct(std::span<const Correction> corrections) const override;
   RelativeChroma relative_chroma() const override { return parts_.relative_chroma; }
   std::string Serialize() const override;
 

@@ -211,7 +211,8 @@ std::string PlotsSvg(const std::vector<CurvePoint>& points) {
   std::string svg;
   for (const std::string& title : order) {
     if (groups[title].size() < 2) continue;
-    svg += "<svg class=\"plot\" " + ViewBox(kWidth, kHeight) + ">" +
+    svg += "<svg class=\"plot\" role=\"img\" aria-label=\"" + EscapeHtml(title) + "\" " +
+           ViewBox(kWidth, kHeight) + ">" +
            PlotElements({title, {{"", groups[title]}}, false, title.ends_with("residual")}) +
            "</svg>";
   }

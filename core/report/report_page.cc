@@ -1,31 +1,14 @@
 #include "core/report/report_page.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "core/base/base64.h"
+#include "core/report/page_style.h"
 #include "core/report/plot.h"
 
 namespace color3d {
 namespace {
-
-constexpr const char* kStyle = R"(
-:root{color-scheme:light dark}
-body{font:15px/1.5 system-ui,sans-serif;max-width:1120px;margin:2rem auto;padding:0 1rem;
-background:Canvas;color:CanvasText}
-h1{font-size:1.5rem;margin-bottom:.2rem}h2{font-size:1.1rem;margin-top:2rem;border-bottom:1px solid #8884}
-.row{display:flex;flex-wrap:wrap;gap:12px;margin:.4rem 0 1rem}
-figure{margin:0;flex:1 1 240px;max-width:540px}img{width:100%;border-radius:4px;display:block}
-.wide figure{max-width:none}
-figcaption{font-size:.85rem;opacity:.75}
-table{border-collapse:collapse}td,th{padding:.2rem .8rem .2rem 0;text-align:left;vertical-align:top}
-td.v{text-align:right;font-variant-numeric:tabular-nums}
-.plots{display:flex;flex-wrap:wrap;gap:8px}.plot{width:360px;max-width:100%}
-.plot .t{font-size:12px;fill:currentColor}.plot .n{font-size:10px;fill:currentColor;opacity:.7}
-.plot .g{stroke:currentColor;opacity:.15}.plot .c{fill:none;stroke:#2b7de9;stroke-width:1.6}
-.go{display:inline-block;padding:.5rem 1rem;border-radius:6px;background:#2b6cb0;color:#fff;
-text-decoration:none}
-.no{opacity:.6}.warn{border-left:4px solid #e0a000;padding:.1rem .8rem}
-)";
 
 std::string Number(double value) {
   char buffer[64];
@@ -33,11 +16,15 @@ std::string Number(double value) {
   return buffer;
 }
 
+std::string DataUrl(const std::string& bytes) {
+  const bool png = bytes.size() > 1 && bytes[1] == 'P';
+  return std::string("data:image/") + (png ? "png" : "jpeg") + ";base64," + Base64(bytes);
+}
+
 std::string PictureHtml(const ReportPicture& picture) {
-  const bool png = picture.bytes.size() > 1 && picture.bytes[1] == 'P';
-  return "<figure><img alt=\"" + EscapeHtml(picture.caption) + "\" src=\"data:image/" +
-         (png ? "png" : "jpeg") + ";base64," + Base64(picture.bytes) + "\"><figcaption>" +
-         EscapeHtml(picture.caption) + "</figcaption></figure>";
+  return "<figure><img loading=\"lazy\" decoding=\"async\" alt=\"" + EscapeHtml(picture.caption) +
+         "\" src=\"" + DataUrl(picture.bytes) + "\"><figcaption>" + EscapeHtml(picture.caption) +
+         "</figcaption></figure>";
 }
 
 std::string RowHtml(const ReportRow& row) {
@@ -48,26 +35,102 @@ std::string RowHtml(const ReportRow& row) {
   return html + "</div>";
 }
 
+std::string ChapterStart(const std::string& title) {
+  return "<section><h2>" + EscapeHtml(title) + "</h2>";
+}
+
+std::string Paragraphs(const std::vector<std::string>& texts) {
+  std::string html;
+  for (const std::string& text : texts) html += "<p>" + EscapeHtml(text) + "</p>";
+  return html;
+}
+
+const ReportView::Picture* FindPicture(const ReportView& view, const std::string& role) {
+  for (const ReportView::Picture& picture : view.pictures) {
+    if (picture.role == role) return &picture;
+  }
+  return nullptr;
+}
+
+bool CanBeCompared(const ReportView& view) {
+  return view.pictures.size() > 1 && FindPicture(view, "render") != nullptr;
+}
+
+std::string Dimensions(const ReportView::Picture& picture) {
+  return " width=\"" + std::to_string(picture.width) + "\" height=\"" +
+         std::to_string(picture.height) + "\"";
+}
+
+// What the page shows first is inside of the slider; the script takes the others from ViewsHtml.
+std::string SliderHtml(const std::vector<ReportView>& views) {
+  const auto first = std::find_if(views.begin(), views.end(), CanBeCompared);
+  if (first == views.end()) return "";
+  const ReportView::Picture& render = *FindPicture(*first, "render");
+  const ReportView::Picture& before =
+      *std::find_if(first->pictures.begin(), first->pictures.end(), [](const auto& picture) {
+        return picture.role != "render";
+      });
+  std::string html =
+      "<section aria-label=\"Before and after\"><div class=\"compare\" id=\"compare\" "
+      "style=\"--at:50%;--shape:" +
+      std::to_string(render.width) + "/" + std::to_string(render.height) + "\"><img alt=\"" +
+      EscapeHtml(render.caption) + "\"" + Dimensions(render) + " src=\"" + DataUrl(render.bytes) +
+      "\"><img class=\"over\" alt=\"" + EscapeHtml(before.caption) + "\"" + Dimensions(before) +
+      " src=\"" + DataUrl(before.bytes) + "\"><div class=\"bar\"></div><span class=\"l\">" +
+      EscapeHtml(before.short_name) + "</span><span class=\"r\">" + EscapeHtml(render.short_name) +
+      "</span></div><div class=\"controls\" id=\"controls\" hidden><label>Before and after"
+      "<input type=\"range\" id=\"at\" min=\"0\" max=\"100\" value=\"50\"></label>"
+      "<label>View<select id=\"view\">";
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (!CanBeCompared(views[i])) continue;
+    html +=
+        "<option value=\"" + std::to_string(i) + "\">" + EscapeHtml(views[i].name) + "</option>";
+  }
+  return html + "</select></label><label>Compare with<select id=\"pair\"><option value=\"" +
+         before.role + "\"></option></select></label></div></section>";
+}
+
+std::string ViewsHtml(const std::vector<ReportView>& views) {
+  if (views.empty()) return "";
+  std::string html = ChapterStart("Views") + "<details><summary>All " +
+                     std::to_string(views.size()) + " views side by side</summary>";
+  for (size_t i = 0; i < views.size(); ++i) {
+    html += "<article id=\"view-" + std::to_string(i) + "\"><h3>" + EscapeHtml(views[i].name) +
+            "</h3><div class=\"row\">";
+    for (const ReportView::Picture& picture : views[i].pictures) {
+      html += "<figure><img loading=\"lazy\" decoding=\"async\" data-role=\"" + picture.role +
+              "\" data-short=\"" + EscapeHtml(picture.short_name) + "\"" + Dimensions(picture) +
+              " alt=\"" + EscapeHtml(picture.caption + ", " + views[i].name) + "\" src=\"" +
+              DataUrl(picture.bytes) + "\"><figcaption>" + EscapeHtml(picture.caption) +
+              "</figcaption></figure>";
+    }
+    html += "</div></article>";
+  }
+  return html + "</details></section>";
+}
+
 std::string KeyViewHtml(const ReportKeyView& key) {
-  std::string html = "<h2>Key view</h2>";
-  for (const std::string& note : key.notes) html += "<p>" + EscapeHtml(note) + "</p>";
+  std::string html = ChapterStart("Key view") + Paragraphs(key.notes);
   html += RowHtml(key.pictures);
   if (!key.color_facts.empty()) {
-    html += "<h3>Its colour</h3><table>";
+    html += "<h3>Its colour</h3><div class=\"box\"><table>";
     for (const auto& [name, text] : key.color_facts) {
       html += "<tr><td>" + EscapeHtml(name) + "</td><td>" + EscapeHtml(text) + "</td></tr>";
     }
-    html += "</table>";
+    html += "</table></div>";
   }
   if (!key.ranking.bytes.empty()) {
     html += "<div class=\"wide\">" + PictureHtml(key.ranking) + "</div>";
   }
-  return html;
+  return html + "</section>";
 }
 
 std::string TableHtml(const ReportTable& table) {
-  std::string html = "<table><tr>";
-  for (const std::string& column : table.columns) html += "<th>" + EscapeHtml(column) + "</th>";
+  std::string html = "<div class=\"box\"><table><tr>";
+  for (size_t i = 0; i < table.columns.size(); ++i) {
+    html += std::string(i == 0 ? "<th scope=\"col\">" : "<th scope=\"col\" class=\"v\">") +
+            EscapeHtml(table.columns[i]) + "</th>";
+  }
   html += "</tr>";
   for (const std::vector<std::string>& row : table.rows) {
     html += "<tr>";
@@ -76,7 +139,7 @@ std::string TableHtml(const ReportTable& table) {
     }
     html += "</tr>";
   }
-  return html + "</table>";
+  return html + "</table></div>";
 }
 
 std::string CurvesHtml(const std::vector<CurvePoint>& curves) {
@@ -84,30 +147,116 @@ std::string CurvesHtml(const std::vector<CurvePoint>& curves) {
 }
 
 std::string SectionHtml(const ReportSection& section) {
-  std::string html = "<h2>" + EscapeHtml(section.title) + "</h2>";
-  for (const std::string& note : section.notes) html += "<p>" + EscapeHtml(note) + "</p>";
+  std::string html = ChapterStart(section.title) + Paragraphs(section.notes);
+  if (!section.legend.empty()) {
+    html += "<ul class=\"legend\">";
+    for (const ReportShade& shade : section.legend) {
+      html += "<li><i class=\"" + shade.kind + "\"></i><span>" + EscapeHtml(shade.text) +
+              "</span></li>";
+    }
+    html += "</ul>";
+  }
+  if (!section.rows.empty()) html += "<div class=\"rows\">";
+  for (const ReportRow& row : section.rows) html += "<div>" + RowHtml(row) + "</div>";
+  if (!section.rows.empty()) html += "</div>";
   for (const ReportTable& table : section.tables) html += TableHtml(table);
   if (!section.curves.empty()) html += CurvesHtml(section.curves);
   if (!section.wide.bytes.empty()) {
     html += "<div class=\"wide\">" + PictureHtml(section.wide) + "</div>";
   }
-  for (const ReportRow& row : section.rows) html += RowHtml(row);
-  return html;
+  return html + "</section>";
 }
 
+std::string Seconds(double seconds) { return seconds > 0.0 ? Number(seconds) : std::string(); }
+
+// What was left out first: that is what nobody sees elsewhere.
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
-  std::string html =
-      "<h2>Plan</h2><table><tr><th>step</th><th></th><th>why</th><th>estimate, s</th>"
-      "<th>measured, s</th></tr>";
-  for (const PlanStep& s : plan) {
-    html += std::string(s.needed ? "<tr>" : "<tr class=\"no\">") + "<td>" + EscapeHtml(s.step) +
-            "</td><td>" + (s.needed ? "needed" : "left out") + "</td><td>" + EscapeHtml(s.reason) +
-            "</td><td class=\"v\">" +
-            (s.estimated_seconds > 0 ? Number(s.estimated_seconds) : std::string()) +
-            "</td><td class=\"v\">" +
-            (s.measured_seconds >= 0 ? Number(s.measured_seconds) : std::string()) + "</td></tr>";
+  double saved = 0.0;
+  for (const PlanStep& step : plan) saved += step.needed ? 0.0 : step.estimated_seconds;
+  std::string html = ChapterStart("What the plan left out");
+  char text[120];
+  std::snprintf(
+      text, sizeof(text), "That saved about %.1f s, as far as it can be estimated before.", saved);
+  if (saved >= 0.05) html += Paragraphs({text});
+  ReportTable left_out{{"step", "saved, s"}, {}};
+  ReportTable done{{"step", "estimate, s", "measured, s"}, {}};
+  for (const PlanStep& step : plan) {
+    std::string name = step.step + ": " + step.reason;
+    std::replace(name.begin(), name.begin() + static_cast<int>(step.step.size()), '_', ' ');
+    if (step.needed) {
+      done.rows.push_back({name, Seconds(step.estimated_seconds), Seconds(step.measured_seconds)});
+    } else {
+      left_out.rows.push_back({name, Seconds(step.estimated_seconds)});
+    }
   }
-  return html + "</table>";
+  if (!left_out.rows.empty()) html += TableHtml(left_out);
+  if (!done.rows.empty()) {
+    html += "<details><summary>What it did, and why</summary>" + TableHtml(done) + "</details>";
+  }
+  return html + "</section>";
+}
+
+std::string StagesHtml(const std::vector<ReportStage>& stages) {
+  double longest = 0.0, total = 0.0;
+  for (const ReportStage& stage : stages) {
+    longest = std::max(longest, stage.seconds);
+    total += stage.seconds;
+  }
+  if (!(longest > 0.0)) return "";
+  std::string html = ChapterStart("Seconds by stage") +
+                     "<div class=\"box\"><table><tr><th scope=\"col\">stage</th>"
+                     "<th scope=\"col\" class=\"v\">seconds</th><td></td></tr>";
+  char row[96];
+  for (const ReportStage& stage : stages) {
+    std::string name = stage.name;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    html += "<tr><td>" + EscapeHtml(name);
+    std::snprintf(row, sizeof(row), "</td><td class=\"v\">%.1f</td><td>", stage.seconds);
+    html += row;
+    std::snprintf(row,
+                  sizeof(row),
+                  "<meter aria-hidden=\"true\" value=\"%.3f\"></meter></td></tr>",
+                  stage.seconds / longest);
+    html += row;
+  }
+  std::snprintf(row, sizeof(row), "<tr><th scope=\"row\">all</th><td class=\"v\">%.1f</td>", total);
+  return html + row + "<td></td></tr></table></div></section>";
+}
+
+std::string FiguresHtml(const std::vector<std::pair<std::string, double>>& metrics) {
+  if (metrics.empty()) return "";
+  ReportTable table{{"figure", "value"}, {}};
+  for (const auto& [name, value] : metrics) table.rows.push_back({name, Number(value)});
+  return ChapterStart("Figures") + "<details><summary>All figures of metrics.json</summary>" +
+         TableHtml(table) + "</details></section>";
+}
+
+std::string RepeatHtml(const ReportData& data) {
+  if (data.facts.empty() && data.repeat.empty()) return "";
+  std::string html = ChapterStart("To repeat it");
+  html += Paragraphs(data.repeat_notes);
+  if (!data.repeat.empty()) {
+    html += "<pre>";
+    for (const std::string& command : data.repeat) html += EscapeHtml(command) + "\n";
+    html += "</pre>";
+  }
+  if (data.facts.empty()) return html + "</section>";
+  html += "<div class=\"box\"><table>";
+  for (const auto& [name, text] : data.facts) {
+    html += "<tr><th scope=\"row\">" + EscapeHtml(name) +
+            "</th><td style=\"overflow-wrap:anywhere;min-width:9rem\">" + EscapeHtml(text) +
+            "</td></tr>";
+  }
+  return html + "</table></div></section>";
+}
+
+std::string HeadlineHtml(const ReportData& data) {
+  if (data.headline.empty()) return "";
+  std::string html = "<dl class=\"figures\">";
+  for (const auto& [name, text] : data.headline) {
+    html += "<div><dt>" + EscapeHtml(name) + "</dt><dd>" + EscapeHtml(text) + "</dd></div>";
+  }
+  return html + "</dl>";
 }
 
 }  // namespace
@@ -115,32 +264,33 @@ std::string PlanHtml(const std::vector<PlanStep>& plan) {
 std::string RenderReport(const ReportData& data) {
   std::string html =
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
-      "<meta name=\"viewport\" content=\"width=device-width\"><title>" +
-      EscapeHtml(data.title) + "</title><style>" + kStyle + "</style></head><body>";
-  html += "<h1>" + EscapeHtml(data.title) + "</h1><p>" + EscapeHtml(data.summary) + "</p>";
+      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+      "<link rel=\"icon\" href=\"data:,\"><title>" +
+      EscapeHtml(data.title) + "</title><style>" + kReportStyle + "</style></head><body><header>";
+  html += "<h1>" + EscapeHtml(data.title) + "</h1><p>" + EscapeHtml(data.summary) +
+          "</p></header><main>" + SliderHtml(data.views);
   if (!data.view_page.empty()) {
     html += "<p><a class=\"go\" href=\"" + EscapeHtml(data.view_page) +
             "\">Look at the scene in 3D</a></p>";
   }
+  html += HeadlineHtml(data);
   for (const std::string& warning : data.warnings) {
     html += "<p class=\"warn\">" + EscapeHtml(warning) + "</p>";
   }
-  if (!data.key_view.pictures.pictures.empty()) html += KeyViewHtml(data.key_view);
-  for (const ReportSection& section : data.sections) html += SectionHtml(section);
-  if (!data.views.empty()) html += "<h2>Views</h2>";
-  for (const ReportRow& row : data.views) html += RowHtml(row);
-  if (!data.metrics.empty()) {
-    html += "<h2>Figures</h2><table>";
-    for (const auto& [name, value] : data.metrics) {
-      html +=
-          "<tr><td>" + EscapeHtml(name) + "</td><td class=\"v\">" + Number(value) + "</td></tr>";
-    }
-    html += "</table>";
+  if (!data.key_view.pictures.pictures.empty() || !data.key_view.ranking.bytes.empty()) {
+    html += KeyViewHtml(data.key_view);
   }
+  for (const ReportSection& section : data.sections) html += SectionHtml(section);
+  html += ViewsHtml(data.views);
   if (!data.curves.empty()) {
-    html += "<h2>Error against time</h2>" + CurvesHtml(data.curves);
+    html += ChapterStart("Error against time") + CurvesHtml(data.curves) + "</section>";
   }
   if (!data.plan.empty()) html += PlanHtml(data.plan);
+  html += StagesHtml(data.stages) + FiguresHtml(data.metrics) + RepeatHtml(data);
+  html += "</main>";
+  if (std::any_of(data.views.begin(), data.views.end(), CanBeCompared)) {
+    html += std::string("<script>") + kReportScript + "</script>";
+  }
   return html + "</body></html>\n";
 }
 

@@ -1,4 +1,6 @@
-// The report: one self-contained HTML file (pictures inside, no scripts, nothing fetched).
+// The report: one self-contained HTML file, at home on a phone and a desktop, light and dark.
+// Pictures and a small script are inside, nothing is fetched; without scripts only the slider does
+// not move.
 #pragma once
 
 #include <string>
@@ -14,6 +16,31 @@ namespace color3d {
 struct ReportPicture {
   std::string caption;
   std::string bytes;
+};
+
+// One view as it can be compared: its render, and what to hold beside it.
+struct ReportView {
+  // `role`: "render", "gray", "truth" or "direct"; one of each at most.
+  struct Picture {
+    std::string role;
+    std::string short_name;  // a word or two, on the picture
+    std::string caption;
+    std::string bytes;
+    int width = 0, height = 0;  // px
+  };
+  std::string name;  // for people, e.g. "a.jpg (held out)"
+  std::vector<Picture> pictures;
+};
+
+// A shade of an overlay: "seen", "inferred" or "guessed".
+struct ReportShade {
+  std::string kind;
+  std::string text;
+};
+
+struct ReportStage {
+  std::string name;
+  double seconds = 0.0;
 };
 
 // Pictures of one view side by side.
@@ -43,6 +70,7 @@ struct ReportSection {
   ReportPicture wide;  // over the whole width
   std::vector<ReportRow> rows;
   std::vector<CurvePoint> curves;
+  std::vector<ReportShade> legend = {};  // of the rows
 };
 
 struct ReportData {
@@ -51,11 +79,17 @@ struct ReportData {
   std::string view_page;  // file beside the report that shows the scene in 3D; empty: none
   ReportKeyView key_view;
   std::vector<ReportSection> sections;  // between the key view and the views
-  std::vector<ReportRow> views;
+  // Those with a render and something beside it can be chosen in the slider, the first one first.
+  std::vector<ReportView> views;
+  std::vector<std::pair<std::string, std::string>> headline;  // a few figures, for people
   std::vector<std::pair<std::string, double>> metrics;
   std::vector<CurvePoint> curves;
   std::vector<PlanStep> plan;
+  std::vector<ReportStage> stages;  // that have computed something
   std::vector<std::string> warnings;
+  std::vector<std::pair<std::string, std::string>> facts;  // versions, seeds, digests, licences
+  std::vector<std::string> repeat_notes;
+  std::vector<std::string> repeat;  // commands for a shell
 };
 
 std::string RenderReport(const ReportData& data);

@@ -10,10 +10,11 @@ namespace {
 TEST(Report, EscapesTextAndPlotsConstantCurves) {
   ReportData data;
   data.title = "<script>";
-  data.views = {{"view & more", {{"a \"caption\"", std::string("\xff\xd8jpeg")}}}};
+  data.views = {
+      {"view & more", {{"gray", "photo", "a \"caption\"", std::string("\xff\xd8jpeg"), 4, 3}}}};
   data.curves = {{"s", 1.0, 1, "e", 2.0}, {"s", 1.0, 2, "e", 2.0}};
   const std::string html = RenderReport(data);
-  EXPECT_EQ(html.find("<script>"), std::string::npos);
+  EXPECT_EQ(html.find("<script>"), std::string::npos) << "a single picture needs no slider";
   EXPECT_NE(html.find("&lt;script&gt;"), std::string::npos);
   EXPECT_NE(html.find("data:image/jpeg;base64,/9hqcGVn"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
@@ -37,7 +38,37 @@ TEST(Report, SectionsShowWhatTheyHave) {
   EXPECT_NE(html.find("personalize: heldout_l1"), std::string::npos);
   EXPECT_EQ(PlotsSvg({{"evaluate", 1.0, 0, "delta_e00", 2.0}}), "") << "one point is no curve";
   EXPECT_NE(html.find("data:image/png"), std::string::npos);
-  EXPECT_TRUE(html.find("<h2>Empty one</h2></body>") != std::string::npos) << html;
+  EXPECT_TRUE(html.find("<h2>Empty one</h2></section></main></body>") != std::string::npos) << html;
+}
+
+TEST(Report, SliderStartsAtTheFirstViewThatCanBeCompared) {
+  ReportData data;
+  data.views = {{"alone.jpg", {{"render", "ours", "rendered", "\xff\xd8r", 4, 3}}},
+                {"both.jpg",
+                 {{"gray", "photo", "the photo", "\xff\xd8g", 4, 3},
+                  {"render", "ours", "rendered", "\xff\xd8r", 4, 3}}}};
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("<option value=\"1\">both.jpg</option>"), std::string::npos);
+  EXPECT_EQ(html.find("<option value=\"0\">"), std::string::npos);
+  EXPECT_NE(html.find("id=\"view-1\""), std::string::npos) << "where its script looks";
+  EXPECT_LT(html.find("id=\"compare\""), html.find("<h2>")) << "the result comes first";
+  EXPECT_NE(html.find("<script>"), std::string::npos);
+}
+
+TEST(Report, TellsWhatWasLeftOutHowLongItTookAndHowToRepeatIt) {
+  ReportData data;
+  data.plan = {{"key_view_selection", false, "the key view was given", 1.25, -1.0, ""},
+               {"luminance_geometry", true, "every scene needs it", 0.0, 14.0, ""}};
+  data.stages = {{"solve_chroma", 1.5}, {"export", 0.5}};
+  data.facts = {{"seed", "7"}};
+  data.repeat = {"color3d colorize PHOTOS -o OUT --key-view 'a<b.jpg'"};
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("saved about 1.2 s"), std::string::npos);
+  EXPECT_NE(html.find("key view selection: the key view was given"), std::string::npos);
+  EXPECT_NE(html.find("<td>solve chroma</td><td class=\"v\">1.5</td>"), std::string::npos);
+  EXPECT_NE(html.find("<td class=\"v\">2.0</td>"), std::string::npos) << "the sum";
+  EXPECT_NE(html.find("--key-view &#39;a&lt;b.jpg&#39;"), std::string::npos);
+  EXPECT_EQ(RenderReport({}).find("To repeat it"), std::string::npos);
 }
 
 TEST(Report, KeyViewSectionTellsChoiceAndColour) {

@@ -51,8 +51,12 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
       f.key_view_given ? "the key view was given" : "the key view is chosen by feature coverage",
       kSecondsPerFeatureMegapixel * megapixels,
       kind::kSelectKeyView));
-  plan.push_back(Step(
-      "luminance_geometry", true, "every scene needs geometry", 0.0, kind::kReconstructGeometry));
+  plan.push_back(
+      Step("luminance_geometry",
+           !f.geometry_given,
+           f.geometry_given ? "the scene's Gaussians were given" : "every scene needs geometry",
+           0.0,
+           kind::kReconstructGeometry));
   plan.push_back(Step("personalization",
                       true,
                       "the key view's colours must reach every view",

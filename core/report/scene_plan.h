@@ -24,7 +24,8 @@ struct PlanFacts {
   bool has_poses = false;
   bool has_distortion = false;
   bool has_sparse_points = true;
-  bool time_varying = false;  // film or several moments
+  bool geometry_given = false;  // the scene is a splat
+  bool time_varying = false;    // film or several moments
   bool has_truth = false;
   bool key_view_given = false;
   int views = 0;

@@ -76,17 +76,6 @@ void Normalise(ImportResult* result) {
   }
 }
 
-void HoldOut(ImportResult* result) {
-  std::vector<View>& views = result->scene.views;
-  const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
-  if (views.size() < held_out + kMinTrainingViews) {
-    result->warnings.push_back(
-        fmt::format("no view is held out for evaluation: the scene has only {}", views.size()));
-    return;
-  }
-  for (size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].held_out = true;
-}
-
 // Finds the photos' masks, for structure-from-motion already, and refuses bad ones.
 void FindPhotoMasks(const fs::path& scene_folder,
                     const CancellationToken& cancel,
@@ -177,6 +166,17 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
 
 }  // namespace
 
+void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings) {
+  std::vector<View>& views = scene->views;
+  const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
+  if (views.size() < held_out + kMinTrainingViews) {
+    warnings->push_back(
+        fmt::format("no view is held out for evaluation: the scene has only {}", views.size()));
+    return;
+  }
+  for (size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].held_out = true;
+}
+
 void ImportOptions::Validate() const {
   const RangeCheck check("import option");
   check("sfm_max_image_side_px", sfm_max_image_side_px, 256, 4096);
@@ -225,7 +225,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   DropWeakPoints(&scene);
   Normalise(&result);
   AddRandomPointsWhenEmpty(&result);
-  if (options.hold_out_every_eighth) HoldOut(&result);
+  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result.warnings);
   return result;
 }
 

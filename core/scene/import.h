@@ -12,7 +12,7 @@
 
 namespace color3d {
 
-enum class SceneLayout { kPhotos, kColmap, kTransforms };
+enum class SceneLayout { kPhotos, kColmap, kTransforms, kSplat };
 
 // Which pairs of photos structure-from-motion matches: a planned few, with all as the way out when
 // those do not hang together, or all from the start.
@@ -70,5 +70,8 @@ ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const std::filesystem::path& scratch_folder,
                          const ImportOptions& options,
                          const RunControl& run);
+
+// Marks every eighth view as held out, beginning with the first; warns where the scene has too few.
+void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings);
 
 }  // namespace color3d

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/catalogue/stages.h"
 #include "core/image/codec.h"
@@ -13,7 +14,8 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
-#include "core/stage/report/view_page.h"
+#include "core/stage/report/repeat_section.h"
+#include "core/stage/report/report_views.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -107,14 +109,16 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
                                   const std::vector<StageSummary>& stages,
                                   bool has_truth,
                                   const StageContext& context) {
+  if (!context.HasInput(artifact::kImportFacts)) return {};  // nobody knows what was planned
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
-  const auto key_view = ReadJson(context, artifact::kKeyView);
   PlanFacts plan_facts;
   plan_facts.has_poses = !facts.ran_structure_from_motion;
+  plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
   plan_facts.has_sparse_points = !facts.random_points;
   plan_facts.has_truth = has_truth;
-  plan_facts.key_view_given = key_view.at("strategy") == "manual";
+  plan_facts.key_view_given = context.HasInput(artifact::kKeyView) &&
+                              ReadJson(context, artifact::kKeyView).at("strategy") == "manual";
   plan_facts.views = static_cast<int>(scene.views.size());
   const Camera camera = scene.views.at(0).camera.FitWithin(kReportSidePx);
   plan_facts.megapixels_per_view = 1e-6 * camera.width * camera.height;
@@ -151,37 +155,46 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
 std::string Summary(const Scene& scene,
                     const ordered_json& metrics,
                     const std::vector<std::string>& keys) {
-  return fmt::format(
-      "{} views ({} held out), all colours from the key {} {}. {} Gaussians in {} s of "
-      "computing.",
-      scene.views.size(),
-      scene.HeldOutViews().size(),
-      keys.size() == 1 ? "view" : "views",
-      fmt::join(keys, ", "),
-      metrics.value("gaussians", 0),
-      static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
+  return fmt::format("{} views ({} held out){}. {} Gaussians in {} s of computing.",
+                     scene.views.size(),
+                     scene.HeldOutViews().size(),
+                     keys.empty() ? std::string()
+                                  : fmt::format(", all colours from the key {} {}",
+                                                keys.size() == 1 ? "view" : "views",
+                                                fmt::join(keys, ", ")),
+                     metrics.value("gaussians", 0),
+                     static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
 }
 
-std::vector<ReportRow> ViewRows(const Scene& scene, const StageContext& context) {
-  std::vector<ReportRow> rows;
-  for (const View& view : scene.views) {
-    const std::string render = ViewArtifact(artifact::kRenders, view, ".png");
-    if (!context.HasInput(render)) continue;
-    ReportRow row{view.name + (view.held_out ? " (held out)" : ""), {}};
-    const std::string truth = ViewArtifact(artifact::kTruths, view, ".jpg");
-    const std::string direct = ViewArtifact(artifact::kColored2d, view, ".jpg");
-    if (context.HasInput(truth)) row.pictures.push_back(Picture(context, truth, "truth"));
-    row.pictures.push_back(Picture(context, render, "rendered from the coloured 3D scene"));
-    if (context.HasInput(direct)) {
-      row.pictures.push_back(Picture(context, direct, "the colorizer on the monochrome photo"));
-    }
-    rows.push_back(std::move(row));
+// The few figures that people ask for first.
+std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& metrics) {
+  std::vector<std::pair<std::string, std::string>> headline;
+  const auto add = [&](const char* name, const char* label, const char* form, double scale) {
+    if (!metrics.contains(name) || !metrics.at(name).is_number()) return;
+    headline.emplace_back(label,
+                          fmt::format(fmt::runtime(form), scale * metrics.at(name).get<double>()));
+  };
+  add("delta_e00_chroma", "colour error, CIEDE2000", "{:.2f}", 1.0);
+  add("delta_e00_gray", "... if left grey", "{:.2f}", 1.0);
+  add("psnr_rgb", "PSNR of held-out views", "{:.1f} dB", 1.0);
+  add("share_seen", "seen in a key view", "{:.0f} %", 100.0);
+  add("share_guessed", "guessed", "{:.0f} %", 100.0);
+  add("gaussians", "Gaussians", "{:.0f}", 1.0);
+  add("seconds_total", "computing", "{:.0f} s", 1.0);
+  return headline;
+}
+
+// What there is of the key view's pictures.
+ReportRow KeyPictures(const std::string& name, const StageContext& context) {
+  ReportRow row{name, {}};
+  if (context.HasInput(artifact::kKeyViewGray)) {
+    row.pictures.push_back(Picture(context, artifact::kKeyViewGray, "as captured"));
   }
-  if (context.HasInput(artifact::kAugmentationSheet)) {
-    rows.push_back({"Training pictures beside the key view",
-                    {Picture(context, artifact::kAugmentationSheet, "given, or made from it")}});
+  if (context.HasInput(artifact::kKeyViewColored)) {
+    row.pictures.push_back(
+        Picture(context, artifact::kKeyViewColored, "coloured: all colours come from here"));
   }
-  return rows;
+  return row;
 }
 
 void PassOnResults(StageContext& context) {
@@ -198,22 +211,19 @@ void PassOnResults(StageContext& context) {
 
 void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   const Scene scene = ReadScene(context);
-  const int key = ReadKeyView(context, scene);
+  std::optional<int> key;
+  if (context.HasInput(artifact::kKeyView)) key = ReadKeyView(context, scene);
   std::vector<std::string> keys = ReadCarryFacts(context).key_views;
-  if (keys.empty()) keys = {scene.views[key].name};
-  const auto next = AdviseNextKeyView(scene, keys, context);
+  if (keys.empty() && key) keys = {scene.views[*key].name};
+  const auto next = keys.empty() ? std::nullopt : AdviseNextKeyView(scene, keys, context);
   const ColorFacts colors(scene, context, next);
   const ordered_json metrics = CollectMetrics(stages, keys, next, colors, context);
 
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
   data.summary = Summary(scene, metrics, keys);
-  if (WriteViewPage(scene, key, context)) data.view_page = artifact::kViewPage;
-  data.key_view = ReportOfKeyView(
-      {scene.views[key].name,
-       {Picture(context, artifact::kKeyViewGray, "as captured"),
-        Picture(context, artifact::kKeyViewColored, "coloured: all colours come from here")}},
-      context);
+  if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
+  data.key_view = ReportOfKeyView(KeyPictures(key ? scene.views[*key].name : "", context), context);
   const std::vector<CurvePoint> curves = CollectCurves(context);
   std::vector<CurvePoint> personalization;
   std::partition_copy(curves.begin(),
@@ -222,14 +232,17 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
                       std::back_inserter(data.curves),
                       [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
   data.sections = colors.Sections(std::move(personalization));
-  data.views = ViewRows(scene, context);
+  data.views = ReportViews(scene, context);
+  data.headline = Headline(metrics);
   for (const auto& [name, value] : metrics.items()) {
     if (value.is_number()) data.metrics.emplace_back(name, value.get<double>());
   }
   data.plan = CollectPlan(scene, stages, metrics.contains("delta_e00"), context);
   for (const StageSummary& s : stages) {
+    if (s.state == "SUCCEEDED") data.stages.push_back({s.kind, s.seconds});
     for (const std::string& w : s.warnings) data.warnings.push_back(s.kind + ": " + w);
   }
+  AddHowToRepeat(keys, metrics.contains("delta_e00"), context, &data);
   context.WriteOutput(artifact::kMetrics, metrics.dump(1) + "\n");
   context.WriteOutput(artifact::kAllCurves, CurvesToCsv(curves));
   context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));

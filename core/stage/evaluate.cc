@@ -118,7 +118,7 @@ class HeldOutScores {
 
   void Add(int index, const std::filesystem::path& truth) {
     const View& view = scene_.views[index];
-    const std::string ab_name = ViewArtifact(artifact::kViewsAb, view, ".png");
+    const std::string ab_name = ViewAbArtifact(context_, view);
     const Image ab = DecodeAbPng(context_.ReadInput(ab_name), ab_name).ab;
     const ViewImages images(scene_, context_.scene_folder(), std::max(ab.width, ab.height), 0);
     const Image captured = ReadImage(truth);
@@ -135,7 +135,7 @@ class HeldOutScores {
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab, mask.get());
       scores["colorfulness_bound"] = Colorfulness(SrgbFromLab(lab));
     }
-    const std::string provenance = ViewArtifact(artifact::kProvenance, view, ".png");
+    const std::string provenance = ProvenanceArtifact(context_, view);
     if (context_.HasInput(provenance)) {
       sources_.Add(
           true_srgb, ab, DecodeImage(context_.ReadInput(provenance), provenance), mask.get());

@@ -11,6 +11,7 @@
 #include "core/splat/export/spz/spz.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
+#include "core/stage/view_page.h"
 
 namespace color3d {
 namespace {
@@ -39,24 +40,31 @@ nlohmann::ordered_json ScoresOf(const RgbRefinement& refinement,
           {"unrefined_worst_psnr_db_vs_lab", refinement.before.worst_psnr_db}};
 }
 
-void WriteWithHarmonics(const ExportOptions& options,
-                        const GaussianModel& model,
-                        const RgbHarmonics& rgb,
-                        const ExportFrame& frame,
-                        bool with_confidence,
-                        StageContext& context) {
+// Returns the smaller of the files that browsers show.
+ExportedFile WriteWithHarmonics(const ExportOptions& options,
+                                const GaussianModel& model,
+                                const RgbHarmonics& rgb,
+                                const ExportFrame& frame,
+                                bool with_confidence,
+                                StageContext& context) {
+  ExportedFile smaller;
   if (options.ply) {
-    context.WriteOutput(artifact::kPly,
-                        EncodeGaussianPly(model, rgb, frame, context.pool(), with_confidence));
+    smaller = {artifact::kPly,
+               EncodeGaussianPly(model, rgb, frame, context.pool(), with_confidence)};
+    context.WriteOutput(smaller.name, smaller.bytes);
   }
-  if (!options.sog && !options.spz && !options.glb) return;
+  if (!options.sog && !options.spz && !options.glb) return smaller;
   const ViewerGaussians gaussians = ForViewers(model, rgb, frame, context.pool());
-  if (options.sog) context.WriteOutput(artifact::kSog, EncodeSog(gaussians, context.pool()));
+  if (options.sog) {
+    smaller = {artifact::kSog, EncodeSog(gaussians, context.pool())};
+    context.WriteOutput(smaller.name, smaller.bytes);
+  }
   if (options.spz) {
     const SpzVersion version = options.spz_version == 2 ? SpzVersion::k2 : SpzVersion::k4;
     context.WriteOutput(artifact::kSpz, EncodeSpz(gaussians, version, context.pool()));
   }
   if (options.glb) context.WriteOutput(artifact::kGlb, EncodeGlb(gaussians));
+  return smaller;
 }
 
 }  // namespace
@@ -104,7 +112,11 @@ void RunExport(const ExportOptions& options, StageContext& context) {
     context.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
     context.progress().OnError(refine.epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
     scores["ply"] = ScoresOf(rgb, names);
-    WriteWithHarmonics(options, model, rgb.harmonics, frame, with_confidence, context);
+    const ExportedFile file =
+        WriteWithHarmonics(options, model, rgb.harmonics, frame, with_confidence, context);
+    if (context.HasInput(artifact::kKeyView)) {
+      WriteViewPage(scene, ReadKeyView(context, scene), model, file, context);
+    }
   }
   if (options.splat) {
     const RgbRefinement rgb = refined(DegreeZero(fitted));

@@ -1,8 +1,18 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
 #include "core/base/files.h"
+#include "core/catalogue/scene_files.h"
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/splat/import/splat_scene.h"
+#include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
+namespace fs = std::filesystem;
 namespace {
 
 const char* LayoutName(SceneLayout layout) {
@@ -13,14 +23,69 @@ const char* LayoutName(SceneLayout layout) {
       return "colmap";
     case SceneLayout::kTransforms:
       return "transforms";
+    case SceneLayout::kSplat:
+      return "splat";
   }
   return "photos";
 }
 
+// The splat that a scene without photos consists of; empty where it is none.
+std::string FindSplat(const fs::path& scene_folder) {
+  std::string splat;
+  std::error_code none;
+  if (!fs::is_directory(scene_folder, none)) return splat;
+  for (const std::string& file : ListFiles(scene_folder)) {
+    if (file.starts_with("augment/")) continue;
+    if (HasImageExtension(file)) return "";
+    if (HasSplatExtension(file) && splat.empty()) splat = file;
+  }
+  return splat;
+}
+
+// As a photo of the Gaussians would be, in grey.
+std::string PhotoOf(const GaussianModel& model, const View& view, ThreadPool& pool) {
+  Image gray = RenderView(model, view.camera, view.cam_from_world, pool).lab;
+  for (float& v : gray.data) v = static_cast<float>(GrayFromLuminance(v));
+  return EncodePng16(gray);
+}
+
+void ImportSplatScene(const std::string& file,
+                      const ImportOptions& options,
+                      const SplatViewOptions& views,
+                      StageContext& context) {
+  SplatScene splat = ImportSplat(ReadFile(context.scene_folder() / file),
+                                 file,
+                                 views,
+                                 context.MemoryBytes(),
+                                 context.control());
+  Scene& scene = splat.scene;
+  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &splat.warnings);
+  for (const std::string& warning : splat.warnings) context.progress().OnWarning(warning);
+  const auto count = static_cast<int64_t>(scene.views.size());
+  for (int64_t i = 0; i < count; ++i) {
+    context.cancel().ThrowIfCancelled();
+    context.progress().OnProgress(i, count, "drawing views");
+    View& view = scene.views[static_cast<size_t>(i)];
+    view.image_file = artifact::kGivenViews + view.name;
+    context.WriteOutput(view.image_file, PhotoOf(splat.geometry, view, context.pool()));
+  }
+  ImportFacts facts;
+  facts.layout = LayoutName(SceneLayout::kSplat);
+  facts.photos_found = facts.photos_registered = static_cast<int>(count);
+  context.WriteOutput(artifact::kGivenGeometry, SerializeGaussians(splat.geometry));
+  context.WriteOutput(artifact::kScene, SceneToJson(scene));
+  context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
+}
+
 }  // namespace
 
-void RunImportScene(const ImportOptions& options, StageContext& context) {
+void RunImportScene(const ImportOptions& options,
+                    StageContext& context,
+                    const SplatViewOptions& splat_views) {
   options.Validate();
+  splat_views.Validate();
+  const std::string splat = FindSplat(context.scene_folder());
+  if (!splat.empty()) return ImportSplatScene(splat, options, splat_views, context);
   const ImportResult result =
       ImportScene(context.scene_folder(), context.scratch_folder(), options, context.control());
   CheckStemsAreUnique(result.scene);

@@ -69,6 +69,10 @@ void RunReconstructGeometry(const GeometryOptions& options,
                             StageContext& context) {
   options.Validate();
   CheckMaxSide(max_side_px);
+  if (context.HasInput(artifact::kGivenGeometry)) {
+    context.WriteOutput(artifact::kGeometry, context.ReadInput(artifact::kGivenGeometry));
+    return;
+  }
   const Scene scene = ReadScene(context);
   GeometryOptions planned = options;
   planned.max_gaussians = GaussianCap(options.max_gaussians, TrainingCameras(scene), max_side_px);

@@ -6,6 +6,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/movie/movie.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -29,14 +30,28 @@ std::vector<int> ViewsToRender(const RenderOptions& options, const Scene& scene)
 }  // namespace
 
 void RenderOptions::Validate() const {
-  RangeCheck("render option")("max_views", max_views, 1, 1000);
+  const RangeCheck check("render option");
+  check("max_views", max_views, 1, 1000);
   CheckMaxSide(max_side_px);
+  if (frames) check("frames", *frames, 1, kMaxMovieFrames);
+  check("frames_per_second", frames_per_second, 1, 120);
+  if (path != Path::kViews && !video && !pictures) {
+    throw InvalidArgument("a path without video and without pictures leaves nothing");
+  }
+  if ((path == Path::kCameras) != !cameras.empty()) {
+    throw InvalidArgument(cameras.empty() ? "a path by cameras needs a file of them"
+                                          : "a file of cameras is of use for no other path");
+  }
 }
 
 void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
+  if (model.size() == 0) throw InvalidArgument("the model has no Gaussians: nothing is to be seen");
+  if (options.path != RenderOptions::Path::kViews) {
+    return RenderMovie(options, scene, model, context);
+  }
   const std::vector<int> views = ViewsToRender(options, scene);
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();

@@ -8,20 +8,6 @@
 #include "core/stage/stages.h"
 
 namespace color3d {
-namespace {
-
-// The key view's colours are the user's own, as far as there are any; all else is the colorizer's
-// prediction.
-void TakePainted(const CarriedColor& key_color, Image* ab) {
-  for (int c = 0; c < 2; ++c) {
-    for (size_t i = 0; i < key_color.confidence.data.size(); ++i) {
-      if (key_color.confidence.data[i] > 0.0f) ab->Plane(c)[i] = key_color.ab.Plane(c)[i];
-    }
-  }
-}
-
-}  // namespace
-
 void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
@@ -36,8 +22,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     if (!target) {
       const Camera camera = images.WorkingCamera(view);
       auto made = std::make_shared<ChromaTarget>();
-      made->ab = ReadViewAb(context, scene.views[view], camera.width, camera.height);
-      if (view == key) TakePainted(ReadKeyColor(context, camera.width, camera.height), &made->ab);
+      made->ab = ReadTargetAb(context, scene.views[view], view == key, camera.width, camera.height);
       made->confidence =
           ReadViewConfidence(context, scene.views[view], camera.width, camera.height);
       if (made->confidence.Empty() && view == key) {
@@ -48,8 +33,9 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     }
     return target;
   };
-  const GaussianModel model =
+  GaussianModel model =
       FitChroma(geometry, ChromaProblemOf(scene, images, targets), options, context.control());
+  AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }
 

@@ -82,14 +82,23 @@ std::vector<std::string> StageContext::InputsBelow(std::string_view prefix) cons
 
 std::string StageContext::ReadInput(const std::string& name) const { return ReadFile(Input(name)); }
 
-void StageContext::WriteOutput(const std::string& name, std::string_view bytes) {
+std::filesystem::path StageContext::PlaceFor(const std::string& name) const {
   if (!IsSafeRelativePath(name)) {
     throw InvalidArgument("\"{}\" cannot name an artifact; rename the photo", name);
   }
   const std::filesystem::path path = setup_.output_folder / name;
   std::error_code error;
   std::filesystem::create_directories(path.parent_path(), error);
-  WriteFileAtomic(path, bytes);
+  return path;
+}
+
+void StageContext::WriteOutput(const std::string& name, std::string_view bytes) {
+  WriteFileAtomic(PlaceFor(name), bytes);
+  outputs_.push_back(name);
+}
+
+void StageContext::TakeOutput(const std::string& name, const std::filesystem::path& file) {
+  PublishFile(file, PlaceFor(name));
   outputs_.push_back(name);
 }
 

@@ -77,6 +77,8 @@ class StageContext {
 
   // Writes an artifact, atomically.
   void WriteOutput(const std::string& name, std::string_view bytes);
+  // The same for a finished file in the scratch folder, which is moved.
+  void TakeOutput(const std::string& name, const std::filesystem::path& file);
   // An input that this stage publishes again under its name.
   void PassOn(const std::string& name);
 
@@ -84,6 +86,9 @@ class StageContext {
   const std::vector<std::string>& passed_on() const { return passed_on_; }
 
  private:
+  // Where an artifact of this name goes; its folder is there.
+  std::filesystem::path PlaceFor(const std::string& name) const;
+
   Setup setup_;
   CheckpointStore& checkpoints_;
   ProgressObserver& progress_;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "core/scene/import.h"
 #include "core/splat/chroma/chroma_options.h"
 #include "core/splat/geometry/geometry_options.h"
+#include "core/splat/import/splat_scene.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -23,8 +25,12 @@ namespace color3d {
 // Throws Error{kInvalidArgument} unless a working size is 64..4096 px.
 void CheckMaxSide(int max_side_px);
 
-// The scene's files as views with poses; structure-from-motion where they have none.
-void RunImportScene(const ImportOptions& options, StageContext& context);
+// The scene's files as views with poses; structure-from-motion where they have none. A scene of one
+// splat (.ply, .sog, .spz) and no photos: views chosen around it and drawn in grey, and its
+// Gaussians, which are the geometry.
+void RunImportScene(const ImportOptions& options,
+                    StageContext& context,
+                    const SplatViewOptions& splat_views = {});
 
 struct SelectKeyViewOptions {
   KeyViewOptions selection;
@@ -110,8 +116,23 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
 // automatic one.
 ColorSources SourcesOf(const Colorizer& colorizer, Image position = {});
 
+struct CorrectColorsOptions {
+  // Parts of photos in the colours that they should have, later ones over earlier ones, at most 64:
+  // strokes, points or a picture (sources/given_colors.h). No held-out views.
+  std::vector<FurtherKeyView> corrections;
+  int proposals = 3;  // how many further places are named, 0..16
+  void Validate() const;
+  bool operator==(const CorrectColorsOptions&) const = default;
+};
+// The colours of every view, corrected: where the user says so, and in whatever is like that and
+// near it (METHOD.md "Corrections"). `encoder`: as RunColorizeViews'.
+void RunCorrectColors(const CorrectColorsOptions& options,
+                      StageContext& context,
+                      const std::string& encoder = "");
+
 // Gaussians of luminance, trained at max_side_px (64..4096). With little memory the size and the
-// number of Gaussians are smaller, and a warning says so.
+// number of Gaussians are smaller, and a warning says so. Gaussians that came with the scene are
+// handed on as they are.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
 
 // The views' chroma on the geometry, with confidence when every training view has its provenance.
@@ -132,14 +153,32 @@ struct ExportOptions {
 // The model for viewers in RGB, and what that loses against our renders.
 void RunExport(const ExportOptions& options, StageContext& context);
 
+inline constexpr int kMaxMovieFrames = 18'000;   // ten minutes at 30 frames a second
+inline constexpr int kMaxMoviePictures = 1'000;  // of them, where each is kept as a picture
+inline constexpr int kDefaultMovieFrames = 240;
+
 struct RenderOptions {
-  std::vector<std::string> views;  // by name; empty: held-out views, or evenly spread ones
-  int max_views = 12;              // 1..1000, for the empty list
-  int max_side_px = 500;           // 64..4096
+  // Pictures of views; or a movie: on the turn around the key view, through the photos' cameras in
+  // the order of their names, by the cameras of a file.
+  enum class Path { kViews, kOrbit, kPhotos, kCameras };
+  // By name. For kViews; empty: held-out views, or evenly spread ones. For kPhotos, in this order;
+  // empty: all.
+  std::vector<std::string> views;
+  int max_views = 12;     // 1..1000, for the empty list
+  int max_side_px = 500;  // 64..4096
+  Path path = Path::kViews;
+  // The rest is of movies. 1..kMaxMovieFrames; nothing: kDefaultMovieFrames, of a file of cameras
+  // one for each.
+  std::optional<int> frames;
+  double frames_per_second = 30.0;  // 1..120
+  bool video = true;                // kMovie is made
+  bool pictures = false;            // kFrames are kept, at most kMaxMoviePictures
+  bool bounce = false;              // there and back again
+  std::filesystem::path cameras;    // for kCameras: scene/formats/camera_file.h
   void Validate() const;
   bool operator==(const RenderOptions&) const = default;
 };
-// Pictures of the model.
+// Pictures of the model, or a movie.
 void RunRender(const RenderOptions& options, StageContext& context);
 
 struct TruthFile {

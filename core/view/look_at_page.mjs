@@ -5,11 +5,12 @@
 // right part. With a third argument every step leaves a PNG there. Needs no npm package: it talks to
 // the browser over a pipe.
 import { spawn } from 'node:child_process';
-import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join, resolve } from 'node:path';
 
 const [chromium, page, screenshots] = process.argv.slice(2);
+if (screenshots) mkdirSync(screenshots, { recursive: true });
 const profile = mkdtempSync(join(tmpdir(), 'color3d-browser-'));
 const browser = spawn(chromium, [
   '--headless', '--no-sandbox', '--no-first-run', '--remote-debugging-pipe', '--use-angle=swiftshader',

@@ -9,12 +9,15 @@
 
 #include "core/base/base64.h"
 #include "core/base/error.h"
+#include "core/view/path/turn.h"
 #include "core/view/view_assets.h"
 
 namespace color3d {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr int kTurnSeconds = 24;  // a place of the camera for each
 
 constexpr const char* kAbout =
     "A scene of monochrome photos in colour, made by Color3D. All of it is in this file; nothing "
@@ -38,6 +41,14 @@ ordered_json PhotoJson(const Stand& stand, const View& view, const std::string& 
           {"tan", 0.5 * camera.height / camera.fy},  // half the vertical field of view
           {"center", {camera.cx / camera.width, camera.cy / camera.height}},
           {"jpeg", Base64(jpeg)}};
+}
+
+ordered_json TurnJson(const Turn& turn) {
+  ordered_json positions = ordered_json::array();
+  for (int i = 0; i < kTurnSeconds; ++i) {
+    positions.push_back(Numbers(TurnPosition(turn, static_cast<double>(i) / kTurnSeconds)));
+  }
+  return positions;
 }
 
 std::string ConfidenceBytes(const std::vector<float>& confidence) {
@@ -82,6 +93,7 @@ std::string Facts(const Scene& scene, const ViewPage& page) {
                  {"confidence",
                   page.confidence.empty() ? "" : Base64(Gzip(ConfidenceBytes(page.confidence)))},
                  {"key", key},
+                 {"turn", TurnJson(TurnOf(scene, page.key_view, stand))},
                  {"poster", Base64(page.poster)},
                  {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
                  {"photos", std::move(photos)}});

@@ -103,6 +103,9 @@ void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
       // The colorizer runs on the encoder that it was trained with.
       spec->mutable_colorize_views()->set_encoder(options.personalize().encoder());
       return;
+    case JobSpec::kCorrectColors:
+      spec->mutable_correct_colors()->set_encoder(options.personalize().encoder());
+      return;
     case JobSpec::kExport:
       spec->mutable_export_()->set_ply(true);
       return;
@@ -164,6 +167,9 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     TakeSceneOptions(scene, &spec);
     std::string skip_reason;
     if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);
+    if (kind == kind::kCorrectColors && !given.has_correct_colors()) {
+      skip_reason = "nothing is to be corrected";
+    }
     if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
     builder->Add(std::move(spec), skip_reason);
   }

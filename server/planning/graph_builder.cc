@@ -22,6 +22,12 @@ uint64_t SeedOf(const v1::JobSpec& submitted) {
   return submitted.seed() != 0 ? submitted.seed() : 1;
 }
 
+// Nothing follows from it, so that what comes after is found done already.
+bool OnlyProposes(const NewJob& job) {
+  return job.kind == kind::kCorrectColors &&
+         ParseSpec(job.spec, job.kind).correct_colors().corrections().empty();
+}
+
 }  // namespace
 
 GraphBuilder::GraphBuilder(const v1::JobSpec& submitted,
@@ -96,7 +102,8 @@ void GraphBuilder::LinkIfThere(const std::string& provider, NewJob* job) const {
   const auto given = given_.find(provider);
   if (planned != planned_.end()) {
     const int index = planned->second;
-    if (graph_.jobs[static_cast<size_t>(index)].skip_reason.empty()) job->inputs.push_back(index);
+    const NewJob& other = graph_.jobs[static_cast<size_t>(index)];
+    if (other.skip_reason.empty() && !OnlyProposes(other)) job->inputs.push_back(index);
   } else if (given != given_.end() &&
              (!IsFinished(given->second.state) || given->second.state == JobState::kSucceeded)) {
     job->input_jobs.push_back(given->second.name);

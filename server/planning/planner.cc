@@ -14,13 +14,17 @@
 namespace color3d {
 namespace {
 
-// A colorize_views job that names no encoder works with that of the given personalize job.
+// A colorize_views or correct_colors job that names no encoder works with that of the given
+// personalize job.
 void TakeEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
-  if (!spec->has_colorize_views() || !spec->colorize_views().encoder().empty()) return;
+  std::string* encoder = nullptr;
+  if (spec->has_colorize_views()) encoder = spec->mutable_colorize_views()->mutable_encoder();
+  if (spec->has_correct_colors()) encoder = spec->mutable_correct_colors()->mutable_encoder();
+  if (encoder == nullptr || !encoder->empty()) return;
   const auto given = builder.given().find(kind::kPersonalize);
   if (given == builder.given().end()) return;
   const v1::JobSpec personalize = ParseSpec(given->second.spec, given->second.name);
-  spec->mutable_colorize_views()->set_encoder(personalize.personalize().encoder());
+  *encoder = personalize.personalize().encoder();
 }
 
 void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {

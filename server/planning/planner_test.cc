@@ -20,9 +20,9 @@ using ::testing::Not;
 
 TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
   const NewGraph graph = PlanJob(SceneSpec(), {}, kTwentyPhotos);
-  ASSERT_EQ(graph.jobs.size(), 13u);
+  ASSERT_EQ(graph.jobs.size(), 14u);
   EXPECT_EQ(graph.jobs.back().kind, "colorize_scene");
-  EXPECT_EQ(graph.jobs.back().inputs.size(), 12u);
+  EXPECT_EQ(graph.jobs.back().inputs.size(), 13u);
   EXPECT_THAT(InputKinds(graph, "select_key_view"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "reconstruct_geometry"), ElementsAre("import_scene"));
   EXPECT_THAT(InputKinds(graph, "personalize"),
@@ -52,6 +52,27 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
   EXPECT_THAT(graph.jobs.back().blobs, ElementsAre(Sha256Hex("key")));
   EXPECT_EQ(SpecOf(graph, "colorize_key_view").colorize_key_view().source().image().sha256(),
             Sha256Hex("key"));
+}
+
+TEST(Planner, CorrectionsAreLeftOutProposedOrMadeBeforeTheChroma) {
+  const NewGraph without = PlanJob(SceneSpec(), {}, kTwentyPhotos);
+  EXPECT_THAT(without.jobs[IndexOf(without, "correct_colors")].skip_reason, HasSubstr("nothing"));
+
+  v1::JobSpec spec = SceneSpec();
+  v1::CorrectColorsSpec* correct = spec.mutable_colorize_scene()->mutable_correct_colors();
+  const NewGraph proposes = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(proposes.jobs[IndexOf(proposes, "correct_colors")].skip_reason, "");
+  EXPECT_THAT(InputKinds(proposes, "solve_chroma"), Not(Contains("correct_colors")));
+
+  v1::FurtherKeyView* stroke = correct->add_corrections();
+  stroke->set_view("a");
+  *stroke->mutable_color() = spec.colorize_scene().key_color();
+  const NewGraph corrects = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_THAT(InputKinds(corrects, "correct_colors"), Contains("colorize_views"));
+  EXPECT_THAT(InputKinds(corrects, "solve_chroma"), Contains("correct_colors"));
+  EXPECT_THAT(InputKinds(corrects, "evaluate"), Contains("correct_colors"));
+  stroke->mutable_color()->set_automatic(true);
+  EXPECT_THROW(PlanJob(spec, {}, kTwentyPhotos), Error);
 }
 
 TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {

@@ -222,6 +222,43 @@ void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
   }
 }
 
+void CheckCorrections(const v1::CorrectColorsSpec& spec, const std::string& path) {
+  for (int i = 0; i < spec.corrections_size(); ++i) {
+    const std::string entry = fmt::format("{}.corrections[{}]", path, i);
+    const v1::FurtherKeyView& correction = spec.corrections(i);
+    if (correction.view().empty()) Reject(entry + ".view", " is empty; name a view");
+    CheckKeyColorExtras(correction.color(), entry + ".color");
+    switch (correction.color().source_case()) {
+      case v1::KeyColorSource::kImage:
+      case v1::KeyColorSource::kStrokes:
+      case v1::KeyColorSource::kPoints:
+        continue;
+      default:
+        Reject(entry + ".color", " must be strokes, points or image: what was painted on the view");
+    }
+  }
+}
+
+void CheckRender(const v1::RenderSpec& spec, bool of_whole_scene, const std::string& path) {
+  const bool moves =
+      spec.path() != v1::RenderSpec::PATH_UNSPECIFIED && spec.path() != v1::RenderSpec::PATH_VIEWS;
+  if (moves && of_whole_scene) {
+    Reject(path + ".path",
+           " is set, but the report shows pictures of views; make a movie with a job of its own "
+           "when the scene is done (`color3d turntable`, `color3d render`)");
+  }
+  if (moves && spec.has_video() && !spec.video() && !spec.pictures()) {
+    Reject(path + ".video", " is false, and so is pictures: nothing would be left");
+  }
+  const bool by_cameras = spec.path() == v1::RenderSpec::PATH_CAMERAS;
+  if (by_cameras && !spec.has_cameras()) {
+    Reject(path + ".cameras", " is required with PATH_CAMERAS: a transforms.json");
+  }
+  if (!by_cameras && spec.has_cameras()) {
+    Reject(path + ".cameras", " is set, but only PATH_CAMERAS reads it; leave it out");
+  }
+}
+
 void CheckRoutes(const v1::PersonalizeScenesSpec& spec) {
   const std::string routes = fmt::format("{}.routes", kind::kPersonalizeScenes);
   if (spec.routes().empty()) Reject(routes, " is empty; name a scene");
@@ -244,6 +281,8 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
   CheckCarryColor(spec.carry_color(), kind::kCarryColor);
+  CheckCorrections(spec.correct_colors(), kind::kCorrectColors);
+  CheckRender(spec.render(), /*of_whole_scene=*/true, kind::kRender);
   CheckTruth(spec.truth(), "truth");
   CheckTraining(spec.training_truth(), !spec.truth().empty(), "training_truth");
 }
@@ -273,8 +312,10 @@ void CheckSpec(const v1::JobSpec& spec) {
     CheckKeyColor(spec.colorize_key_view().source(), kind + ".source");
   }
   if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), kind);
+  if (spec.has_correct_colors()) CheckCorrections(spec.correct_colors(), kind);
   if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), kind);
   if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
+  if (spec.has_render()) CheckRender(spec.render(), /*of_whole_scene=*/false, kind);
   if (spec.has_evaluate()) {
     CheckTruth(spec.evaluate().truth(), kind + ".truth");
     CheckTraining(spec.evaluate().training_truth(),

@@ -175,5 +175,43 @@ TEST(SpecNames, AColorizerIsAppliedWithTheEncoderThatItWasTrainedWith) {
   EXPECT_EQ(planned.colorize_views().encoder(), "tiny");
 }
 
+template <typename Change>
+std::string CheckRender(Change change, bool of_whole_scene = false) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  if (of_whole_scene) spec.mutable_colorize_scene()->mutable_key_color()->set_automatic(true);
+  change(of_whole_scene ? spec.mutable_colorize_scene()->mutable_render() : spec.mutable_render());
+  try {
+    CheckSpec(spec);
+  } catch (const ServiceError& e) {
+    EXPECT_EQ(e.reason(), "BAD_OPTION");
+    return e.what();
+  }
+  return "accepted";
+}
+
+TEST(RenderSpecTest, WhatAPathNeedsAndWhatHasNoUseIsNamed) {
+  using Spec = v1::RenderSpec;
+  EXPECT_EQ(CheckRender([](Spec* s) { s->set_path(Spec::PATH_ORBIT); }), "accepted");
+  EXPECT_EQ(CheckRender([](Spec* s) {
+              s->set_path(Spec::PATH_CAMERAS);
+              *s->mutable_cameras() = SomeDigest("cameras");
+            }),
+            "accepted");
+  EXPECT_THAT(CheckRender([](Spec* s) { s->set_path(Spec::PATH_CAMERAS); }),
+              HasSubstr("render.cameras is required"));
+  EXPECT_THAT(CheckRender([](Spec* s) { *s->mutable_cameras() = SomeDigest("cameras"); }),
+              HasSubstr("only PATH_CAMERAS"));
+  EXPECT_THAT(CheckRender([](Spec* s) {
+                s->set_path(Spec::PATH_PHOTOS);
+                s->set_video(false);
+              }),
+              HasSubstr("nothing would be left"));
+  EXPECT_THAT(CheckRender([](Spec* s) { s->set_frames(18'001); }), HasSubstr("1 to 18000"));
+  EXPECT_THAT(CheckRender([](Spec* s) { s->set_frames(0); }), HasSubstr("1 to 18000"));
+  EXPECT_THAT(CheckRender([](Spec* s) { s->set_path(Spec::PATH_ORBIT); }, true),
+              HasSubstr("color3d turntable"));
+}
+
 }  // namespace
 }  // namespace color3d

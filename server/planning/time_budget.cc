@@ -48,6 +48,9 @@ TimeBudget DivideTimeBudget(double seconds, const SceneFacts& facts) {
         {{fmt::format("spec.{}.time_budget_seconds", kind::kColorizeScene),
           "too short for this scene"}});
   }
+  if (facts.is_splat) {  // its geometry is there
+    return {0.0, (kGeometryShare + kPersonalizeShare) * rest, kChromaShare * rest};
+  }
   return {kGeometryShare * rest, kPersonalizeShare * rest, kChromaShare * rest};
 }
 

@@ -26,6 +26,16 @@ TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
   EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
 }
 
+TEST(Planner, ASplatsGeometryTakesNoTime) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  const SceneFacts splat = {.photos = kSplatViews, .has_poses = true, .is_splat = true};
+  const NewGraph graph = PlanJob(spec, {}, splat);
+  const double personalize = SpecOf(graph, "personalize").personalize().time_limit_seconds();
+  const double chroma = SpecOf(graph, "solve_chroma").solve_chroma().time_limit_seconds();
+  EXPECT_NEAR(personalize + chroma + FixedSeconds(splat), 90.0, 1e-6);
+}
+
 TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(604'800);

@@ -34,7 +34,7 @@ TEST_F(InfoServicesTest, ColorizersAndServerInfo) {
   ASSERT_TRUE(client_->server->GetServerInfo(&context4, {}, &info).ok());
   EXPECT_GT(info.memory_bytes(), 0);
   EXPECT_EQ(info.limits().max_unfinished_jobs(), 40);
-  EXPECT_EQ(info.job_kinds_size(), 14);
+  EXPECT_EQ(info.job_kinds_size(), 15);
   ASSERT_EQ(info.presets_size(), 3);
   EXPECT_EQ(info.presets(0).name(), "fast");
   EXPECT_EQ(info.presets(0).options().personalize().iterations(), 100);

@@ -59,13 +59,14 @@ std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec
 }
 
 SceneFacts FactsOf(const SceneRecord& scene) {
-  return {.photos = scene.photo_count,
-          .has_poses =
-              scene.layout == StoredLayout::kColmap || scene.layout == StoredLayout::kTransforms,
+  const bool is_splat = scene.layout == StoredLayout::kSplat;
+  return {.photos = is_splat ? kSplatViews : scene.photo_count,
+          .has_poses = scene.layout != StoredLayout::kPhotos,
           .augment_files = static_cast<int>(
-              std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
-                return IsAugmentFile(file.path);
-              }))};
+              std::count_if(scene.files.begin(),
+                            scene.files.end(),
+                            [](const auto& file) { return IsAugmentFile(file.path); })),
+          .is_splat = is_splat};
 }
 
 // The route's colorize_key_view job, by default the one that its scene's user accepted, and what it

@@ -11,6 +11,7 @@
 #include <set>
 
 #include "core/base/files.h"
+#include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 #include "server/planning/scene_facts.h"
 #include "server/service_error.h"
@@ -83,6 +84,13 @@ void CheckTransforms(const std::string& path,
   }
 }
 
+// Of a scene without photographs.
+int CountSplats(const std::vector<SceneFileRecord>& files) {
+  return static_cast<int>(std::count_if(files.begin(), files.end(), [](const auto& file) {
+    return HasSplatExtension(file.path) && !IsAugmentFile(file.path);
+  }));
+}
+
 // One file's violations; counts it when it is a good photograph.
 void CheckFile(const SceneFileRecord& file,
                const BlobStore& blobs,
@@ -96,7 +104,11 @@ void CheckFile(const SceneFileRecord& file,
   }
   const bool is_photo = HasImageExtension(file.path);
   const bool is_transforms = BaseName(file.path) == "transforms.json";
-  const bool is_augmentation = IsAugmentFile(file.path);
+  const bool is_augmentation = IsAugmentFile(file.path), is_mask = IsMaskFile(file.path);
+  if (is_mask && !is_photo) {
+    violations->push_back({file.path, "is no picture (PNG); remove it from masks/"});
+    return;
+  }
   if (is_augmentation && !is_photo) {
     violations->push_back(
         {file.path, "is no picture (JPEG, PNG or TIFF); remove it from augment/"});
@@ -110,7 +122,7 @@ void CheckFile(const SceneFileRecord& file,
     image_limits.max_pixels = limits.max_pixels_per_image;
     image_limits.max_side_px = limits.max_image_side_px;
     ProbeImage(mapped.bytes(), file.path, image_limits);
-    if (!is_augmentation) ++check->photo_count;
+    if (!is_augmentation && !is_mask) ++check->photo_count;
   } catch (const Error& e) {
     violations->push_back({file.path, e.what()});
   }
@@ -136,6 +148,10 @@ void CheckFile(const SceneFileRecord& file,
 }  // namespace
 
 StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
+  const bool has_photos = std::any_of(files.begin(), files.end(), [](const auto& file) {
+    return HasImageExtension(file.path) && !IsAugmentFile(file.path) && !IsMaskFile(file.path);
+  });
+  if (!has_photos && CountSplats(files) > 0) return StoredLayout::kSplat;
   if (!ModelFolders(files).empty()) return StoredLayout::kColmap;
   for (const SceneFileRecord& file : files) {
     if (BaseName(file.path) == "transforms.json") return StoredLayout::kTransforms;
@@ -165,8 +181,17 @@ SceneCheck CheckScene(const SceneRecord& scene,
     CheckFile(file, blobs, limits, &check, &violations);
     missing += violations.size() - before;
   }
-  if (missing == 0 && check.photo_count == 0) {
-    violations.push_back({"", "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff)"});
+  if (check.layout == StoredLayout::kSplat) {
+    if (const int splats = CountSplats(scene.files); splats > 1) {
+      violations.push_back({"",
+                            fmt::format("the scene holds {} splats and no photographs; give one "
+                                        "splat a scene",
+                                        splats)});
+    }
+  } else if (missing == 0 && check.photo_count == 0) {
+    violations.push_back({"",
+                          "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff) and no "
+                          "splat (.ply, .sog, .spz)"});
   } else if (missing == 0 && check.photo_count == 1) {
     violations.push_back(
         {"", "the scene holds one photograph; at least 3 that overlap are needed"});

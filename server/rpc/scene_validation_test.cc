@@ -83,5 +83,18 @@ TEST_F(SceneValidationTest, LayoutsAreRecognised) {
               HasSubstr("transforms.json"));
 }
 
+TEST_F(SceneValidationTest, OneSplatIsASceneWithoutPhotos) {
+  v1::Scene scene;
+  ASSERT_TRUE(Commit({{"bust.PLY", "ply"}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_SPLAT);
+  EXPECT_EQ(scene.photo_count(), 0);
+  EXPECT_THAT(Commit({{"a.ply", "ply"}, {"b.sog", "PK"}}, &scene).error_message(),
+              HasSubstr("2 splats"));
+  // Beside photos it says nothing.
+  ASSERT_TRUE(
+      Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"points.ply", "ply"}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);
+}
+
 }  // namespace
 }  // namespace color3d::testing

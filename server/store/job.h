@@ -92,7 +92,7 @@ struct Lease {
 };
 
 enum class SceneState { kUploading, kActive };
-enum class StoredLayout { kUnknown, kPhotos, kColmap, kTransforms };
+enum class StoredLayout { kUnknown, kPhotos, kColmap, kTransforms, kSplat };
 
 struct SceneFileRecord {
   std::string path;

@@ -12,6 +12,7 @@
 
 #include "core/base/files.h"
 #include "core/base/memory.h"
+#include "core/catalogue/artifacts.h"
 #include "server/ops/process.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/stage_key.h"
@@ -170,6 +171,10 @@ void Attempt::Prepare() {
       if (!input_artifacts_.emplace(artifact.name, artifact).second) continue;
       const fs::path path = scratch_ / "inputs" / artifact.name;
       LinkOrCopy(context_.blobs.Fetch(artifact.digest.sha256), path);
+      // What was drawn in place of photos lies where photos do.
+      if (artifact.name.starts_with(artifact::kGivenViews)) {
+        LinkOrCopy(path, run_.scene_folder / artifact.name);
+      }
       run_.inputs[artifact.name] = path;
     }
   }

@@ -31,6 +31,15 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec) {
   return options;
 }
 
+SplatViewOptions SplatViewOptionsFrom(const v1::ImportSceneSpec& spec) {
+  SplatViewOptions options;
+  if (spec.has_splat_views()) options.views = spec.splat_views();
+  if (spec.has_splat_view_side_px()) options.side_px = spec.splat_view_side_px();
+  if (spec.splat_up() == v1::ImportSceneSpec::SPLAT_UP_Y) options.up = SplatUp::kY;
+  if (spec.splat_up() == v1::ImportSceneSpec::SPLAT_UP_Z) options.up = SplatUp::kZ;
+  return options;
+}
+
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
   SelectKeyViewOptions options;
   options.view = spec.view();
@@ -108,6 +117,12 @@ CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
   return options;
 }
 
+CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec) {
+  CorrectColorsOptions options;
+  if (spec.has_proposals()) options.proposals = spec.proposals();
+  return options;
+}
+
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed) {
   GeometryOptions options;
   options.seed = seed;
@@ -134,6 +149,9 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
   if (spec.solver() == v1::SolveChromaSpec::SOLVER_ADAM) {
     options.solver = ChromaOptions::Solver::kAdam;
   }
+  if (spec.has_saturation()) options.adjustment.saturation = spec.saturation();
+  if (spec.has_tint()) options.adjustment.tint = spec.tint();
+  if (spec.has_warmth()) options.adjustment.warmth = spec.warmth();
   return options;
 }
 
@@ -154,6 +172,24 @@ RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec) {
   options.views.assign(spec.views().begin(), spec.views().end());
   if (spec.has_max_views()) options.max_views = spec.max_views();
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  switch (spec.path()) {
+    case v1::RenderSpec::PATH_ORBIT:
+      options.path = RenderOptions::Path::kOrbit;
+      break;
+    case v1::RenderSpec::PATH_PHOTOS:
+      options.path = RenderOptions::Path::kPhotos;
+      break;
+    case v1::RenderSpec::PATH_CAMERAS:
+      options.path = RenderOptions::Path::kCameras;
+      break;
+    default:
+      options.path = RenderOptions::Path::kViews;
+  }
+  if (spec.has_frames()) options.frames = spec.frames();
+  if (spec.has_frames_per_second()) options.frames_per_second = spec.frames_per_second();
+  if (spec.has_video()) options.video = spec.video();
+  options.pictures = spec.pictures();
+  options.bounce = spec.bounce();
   return options;
 }
 

@@ -8,6 +8,7 @@
 namespace color3d {
 
 ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec);
+SplatViewOptions SplatViewOptionsFrom(const v1::ImportSceneSpec& spec);
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
 // Source and file are set by the caller, which holds the blobs.
 HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
@@ -15,6 +16,8 @@ AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec&
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed);
 // Further key views are set by the caller, which holds the blobs.
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec);
+// Corrections are set by the caller, which holds the blobs.
+CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec);
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed);
 ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed);
 ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec);

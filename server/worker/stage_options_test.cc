@@ -77,11 +77,23 @@ struct SizedGeometry {
   bool operator==(const SizedGeometry&) const = default;
 };
 
+// Photos and splats have options of their own.
+struct ImportMethod {
+  ImportOptions photos;
+  SplatViewOptions splat;
+  void Validate() const {
+    photos.Validate();
+    splat.Validate();
+  }
+  bool operator==(const ImportMethod&) const = default;
+};
+
 // By the stage's name in JobSpec. A stage that is missing here has no options of its own.
 const std::map<std::string, Method>& Methods() {
   static const std::map<std::string, Method> methods = {
-      {"import_scene",
-       MakeMethod<v1::ImportSceneSpec>([](const auto& s) { return ImportOptionsFrom(s); })},
+      {"import_scene", MakeMethod<v1::ImportSceneSpec>([](const auto& s) {
+         return ImportMethod{ImportOptionsFrom(s), SplatViewOptionsFrom(s)};
+       })},
       {"select_key_view", MakeMethod<v1::SelectKeyViewSpec>([](const auto& s) {
          return SelectOptionsFrom(s).selection;
        })},
@@ -96,6 +108,8 @@ const std::map<std::string, Method>& Methods() {
        MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) { return MaxSideFrom(s); })},
       {"carry_color",
        MakeMethod<v1::CarryColorSpec>([](const auto& s) { return CarryOptionsFrom(s); })},
+      {"correct_colors",
+       MakeMethod<v1::CorrectColorsSpec>([](const auto& s) { return CorrectOptionsFrom(s); })},
       {"reconstruct_geometry", MakeMethod<v1::ReconstructGeometrySpec>([](const auto& s) {
          return SizedGeometry{GeometryOptionsFrom(s, 1), MaxSideFrom(s)};
        })},

@@ -99,6 +99,21 @@ CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs
   return options;
 }
 
+CorrectColorsOptions CorrectOptions(const v1::CorrectColorsSpec& spec, BlobSource& blobs) {
+  CorrectColorsOptions options = CorrectOptionsFrom(spec);
+  for (const v1::FurtherKeyView& correction : spec.corrections()) {
+    options.corrections.push_back(
+        {correction.view(), SourceOptionsFrom(correction.color(), blobs)});
+  }
+  return options;
+}
+
+RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
+  RenderOptions options = RenderOptionsFrom(spec);
+  options.cameras = FetchIf(spec.has_cameras(), spec.cameras(), blobs);
+  return options;
+}
+
 void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {
   EvaluateOptions options;
   for (const v1::TruthImage& image : spec.truth()) {
@@ -156,7 +171,9 @@ class CoreStageRunner : public StageRunner {
     const JobSpec& spec = run.spec;
     switch (spec.stage_case()) {
       case JobSpec::kImportScene:
-        return RunImportScene(ImportOptionsFrom(spec.import_scene()), context);
+        return RunImportScene(ImportOptionsFrom(spec.import_scene()),
+                              context,
+                              SplatViewOptionsFrom(spec.import_scene()));
       case JobSpec::kSelectKeyView:
         return RunSelectKeyView(SelectOptionsFrom(spec.select_key_view()), context);
       case JobSpec::kColorizeKeyView:
@@ -170,6 +187,9 @@ class CoreStageRunner : public StageRunner {
                               spec.personalize().encoder());
       case JobSpec::kCarryColor:
         return RunCarryColor(CarryOptions(spec.carry_color(), blobs), context);
+      case JobSpec::kCorrectColors:
+        return RunCorrectColors(
+            CorrectOptions(spec.correct_colors(), blobs), context, spec.correct_colors().encoder());
       case JobSpec::kColorizeViews:
         return RunColorizeViews(spec.colorize_views().has_max_side_px()
                                     ? spec.colorize_views().max_side_px()
@@ -188,7 +208,7 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kExport:
         return RunExport(ExportOptionsFrom(spec.export_()), context);
       case JobSpec::kRender:
-        return RunRender(RenderOptionsFrom(spec.render()), context);
+        return RunRender(MovieOptions(spec.render(), blobs), context);
       case JobSpec::kEvaluate:
         return RunEvaluation(spec.evaluate(), blobs, context);
       case JobSpec::kColorizeScene:

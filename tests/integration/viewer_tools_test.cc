@@ -83,14 +83,14 @@ TEST_F(ViewerToolsTest, SplatTransformReadsOurFilesAndSeesTheSame) {
     const Image truth = RenderForViewers(g, camera, pose, pool);
     const auto check = [&](const std::string& name,
                            const std::string& bytes,
-                           const std::function<ViewerGaussians(std::string_view)>& ours,
+                           ViewerGaussians (*ours)(std::string_view, const SplatSource&),
                            double least_db) {
       SCOPED_TRACE(fmt::format("{} of degree {}", name, degree));
       const ViewerGaussians file = Converted(name, bytes);
       ASSERT_EQ(file.size(), g.size());
       ASSERT_EQ(file.sh_degree, degree);
       const double theirs_db = PsnrOf(truth, RenderForViewers(file, camera, pose, pool));
-      const double ours_db = PsnrOf(truth, RenderForViewers(ours(bytes), camera, pose, pool));
+      const double ours_db = PsnrOf(truth, RenderForViewers(ours(bytes, {}), camera, pose, pool));
       std::printf("%s of degree %d: %.2f dB by splat-transform, %.2f dB by our reader\n",
                   name.c_str(),
                   degree,

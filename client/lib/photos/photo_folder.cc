@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/utf8.h"
+#include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 
 namespace color3d::client {
@@ -37,7 +38,9 @@ void RequireFolder(const fs::path& root) {
                 "there is no folder {}; give the folder of the photographs",
                 root.string());
   }
-  throw InvalidArgument("{} is not a folder; give the folder of the photographs", root.string());
+  throw InvalidArgument(
+      "{} is not a folder; give the folder of the photographs, or a splat (.ply, .sog or .spz)",
+      root.string());
 }
 
 // Adds `root`/`folder`'s photos, without going into its subfolders.
@@ -154,8 +157,28 @@ std::string SubfolderWithPhotos(const fs::path& root) {
   return found.empty() ? "" : *found.begin();
 }
 
+// The only splat in a folder without photos.
+void CollectSplat(const fs::path& root, PhotoFolder* result) {
+  std::vector<std::string> found;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.') && HasSplatExtension(name) && IsFile(entry.path())) {
+      found.push_back(name);
+    }
+  }
+  if (found.size() > 1) {
+    throw InvalidArgument("{} contains {} splats and no photographs; give one of them (e.g. {})",
+                          root.string(),
+                          found.size(),
+                          (root / *std::min_element(found.begin(), found.end())).string());
+  }
+  if (found.size() == 1) result->splat = {found[0], root / found[0]};
+}
+
 void CheckCounts(const PhotoFolder& folder) {
   const std::string root = folder.root.string();
+  if (folder.splat) return;
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPhotos(folder.root);
     throw InvalidArgument(
@@ -190,22 +213,34 @@ void CheckName(const LocalFile& file) {
 
 std::vector<LocalFile> PhotoFolder::AllFiles() const {
   std::vector<LocalFile> all = photos;
+  if (splat) all.push_back(*splat);
   all.insert(all.end(), model_files.begin(), model_files.end());
   all.insert(all.end(), augment_files.begin(), augment_files.end());
   all.insert(all.end(), mask_files.begin(), mask_files.end());
   return all;
 }
 
+std::string PhotoFolder::Name() const {
+  return fs::absolute(splat ? splat->file : root).filename().string();
+}
+
 PhotoFolder CollectPhotos(const fs::path& root) {
-  RequireFolder(root);
   PhotoFolder result;
+  if (IsFile(root) && HasSplatExtension(root.filename().string())) {
+    result.root = root.parent_path();
+    result.splat = {root.filename().string(), root};
+    CheckName(*result.splat);
+    return result;
+  }
+  RequireFolder(root);
   // "photos/." and "photos/" are "photos".
   result.root = root.lexically_normal();
   if (!result.root.has_filename() && result.root.has_relative_path()) {
     result.root = result.root.parent_path();
   }
   CollectImages(result.root, &result);
-  CollectModel(result.root, &result);
+  if (result.photos.empty()) CollectSplat(result.root, &result);
+  if (!result.splat) CollectModel(result.root, &result);
   CollectAugmentFiles(result.root, &result);
   const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
   std::sort(result.photos.begin(), result.photos.end(), by_path);
@@ -221,8 +256,19 @@ PhotoFolder CollectPhotos(const fs::path& root) {
   return result;
 }
 
+namespace {
+
+bool IsSplatView(const std::string& stem) {
+  constexpr std::string_view kPrefix = "view_";
+  return stem.starts_with(kPrefix) && stem.size() > kPrefix.size() &&
+         stem.find_first_not_of("0123456789", kPrefix.size()) == std::string::npos;
+}
+
+}  // namespace
+
 std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
   const std::string wanted = file.stem().string();
+  if (folder.splat) return IsSplatView(wanted) ? wanted + ".png" : "";
   std::string found;
   for (const LocalFile& photo : folder.photos) {
     if (Stem(photo.path) != wanted) continue;
@@ -233,6 +279,7 @@ std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
 }
 
 void RequirePhoto(const PhotoFolder& folder, const std::string& name) {
+  if (folder.splat) return;
   std::string known;
   for (size_t i = 0; i < folder.photos.size(); ++i) {
     const std::string& path = folder.photos[i].path;

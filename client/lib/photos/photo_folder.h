@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,24 +20,29 @@ struct PhotoFolder {
   std::vector<LocalFile> model_files;    // of a COLMAP model or transforms.json, sorted by path
   std::vector<LocalFile> augment_files;  // pictures in colour for the colorizer, sorted by path
   std::vector<LocalFile> mask_files;     // of photos, see mask_files.h
+  std::optional<LocalFile> splat;        // in place of photos: views are drawn from it
   std::vector<std::string> notes;        // what the user may want to know, one line each
 
   std::vector<LocalFile> AllFiles() const;
+  // For people: the last part of the path that was given.
+  std::string Name() const;
 };
 
 // Photos (.jpg .jpeg .png .tif .tiff) are taken from images/, at any depth, when there is one with
 // photos; else from `root` itself and from the subfolders that transforms.json names. Also taken: a
 // COLMAP model in sparse/0, sparse or `root`, transforms.json, and everything in augment/ (any
-// depth). Nothing else. Throws Error: no such folder, a file instead of a folder, no photos, one
-// photo, more than 10,000 files, names that are not safe or not UTF-8.
+// depth). Nothing else, but for a splat (.ply .sog .spz): `root` itself, or the only one in a
+// folder without photos. Throws Error: no such folder, another file instead of a folder, no photos,
+// one photo, more than 10,000 files, names that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root);
 
 // The photo whose file stem is that of `file` ("x/0007_coloured.png" has the stem "0007_coloured"),
-// as a view's name: relative to images/. Empty when none or several have it.
+// as a view's name: relative to images/. Empty when none or several have it. Views of a splat are
+// called view_01, view_02, ...
 std::string PhotoOfSameStem(const PhotoFolder& folder, const std::filesystem::path& file);
 
 // Throws Error{kNotFound} that names some photos when no photo can be the view `name`: neither path
-// nor stem fits.
+// nor stem fits. A splat's views are not known here: any name will do.
 void RequirePhoto(const PhotoFolder& folder, const std::string& name);
 
 }  // namespace color3d::client

@@ -66,6 +66,25 @@ TEST_F(PhotoFolderTest, PicturesInAugmentGoAlongAndAreNoPhotos) {
   EXPECT_THAT(ErrorOf(root()), HasSubstr("augment/notes.txt is no picture"));
 }
 
+TEST_F(PhotoFolderTest, ASplatStandsForPhotos) {
+  Write("bust.ply");
+  Write("notes.txt");
+  for (const fs::path& path : {root() / "bust.ply", root()}) {
+    const PhotoFolder folder = CollectPhotos(path);
+    ASSERT_TRUE(folder.splat.has_value());
+    EXPECT_EQ(folder.Name(), "bust.ply");
+    EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("bust.ply"));
+    EXPECT_EQ(PhotoOfSameStem(folder, "x/view_07.png"), "view_07.png");
+    EXPECT_EQ(PhotoOfSameStem(folder, "x/coloured.png"), "");
+    RequirePhoto(folder, "view_07");
+  }
+  EXPECT_THAT(ErrorOf(root() / "notes.txt"), HasSubstr("or a splat (.ply, .sog or .spz)"));
+  Write("other.SOG");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("2 splats"));
+  for (const char* name : {"a.jpg", "b.jpg"}) Write(name);
+  EXPECT_FALSE(CollectPhotos(root()).splat.has_value());
+}
+
 TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {
   for (const char* name : {"images/a.jpg", "images/b.jpg"}) Write(name);
   for (const char* stem : {"cameras", "images", "points3D"}) {

@@ -59,7 +59,7 @@ class HintDrawer {
         DrawLabel();
         break;
     }
-    if (drawn_ == 0) throw InvalidArgument("{} holds no pixel of the key view", Name());
+    if (drawn_ == 0) throw InvalidArgument("{} holds no pixel of the photo", Name());
   }
 
   void WarnOfContradictions(ProgressObserver& progress) const {
@@ -91,7 +91,7 @@ class HintDrawer {
                                          : x >= 0.0 && x < width_ && y >= 0.0 && y < height_;
     if (inside) return;
     throw InvalidArgument(
-        "{} at ({}, {}) lies outside of the key view of {}x{} px", Name(), x, y, width_, height_);
+        "{} at ({}, {}) lies outside of the photo of {}x{} px", Name(), x, y, width_, height_);
   }
 
   void CheckRadius() const {

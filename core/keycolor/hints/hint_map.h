@@ -1,4 +1,4 @@
-// Hints drawn onto the key photo's pixels. Internal to core/keycolor.
+// Hints drawn onto a photo's pixels. Pure functions.
 #pragma once
 
 #include <cstdint>

@@ -18,6 +18,7 @@ void ChromaOptions::Validate() const {
   check("tikhonov", tikhonov, 1e-6, 1e6);
   check("tikhonov_rest", tikhonov_rest, 1.0, 1e6);
   check("memory_budget_bytes", static_cast<double>(memory_budget_bytes), 0.0, 1e15);
+  adjustment.Validate();
 }
 
 }  // namespace color3d

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "core/splat/chroma/chroma_adjustment.h"
+
 namespace color3d {
 
 struct ChromaOptions {
@@ -30,6 +32,8 @@ struct ChromaOptions {
   double tikhonov = 0.01;
   double tikhonov_rest = 10.0;
   int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..1e15
+
+  ChromaAdjustment adjustment;  // of what was solved
 
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const ChromaOptions&) const = default;

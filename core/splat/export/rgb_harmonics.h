@@ -29,6 +29,8 @@ class RgbHarmonicsFitter {
   Eigen::MatrixX3d Fit(const Eigen::MatrixX3d& colors) const;
   // Y_k of the directions, for evaluating what Fit returns.
   Eigen::MatrixXd Basis() const { return basis_.leftCols(coefficients_); }
+  // What Fit multiplies with: coefficients x directions.
+  const Eigen::MatrixXd& Solver() const { return solve_; }
 
  private:
   int coefficients_;

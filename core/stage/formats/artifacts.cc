@@ -115,23 +115,53 @@ int ColoredSide(const StageContext& context, const View& view) {
   return std::max(info.width, info.height);
 }
 
+std::string ViewAbArtifact(const StageContext& context, const View& view) {
+  const std::string corrected = ViewArtifact(artifact::kCorrectedAb, view, ".png");
+  return context.HasInput(corrected) ? corrected : ViewArtifact(artifact::kViewsAb, view, ".png");
+}
+
+std::string ProvenanceArtifact(const StageContext& context, const View& view) {
+  const std::string corrected = ViewArtifact(artifact::kCorrectedProvenance, view, ".png");
+  return context.HasInput(corrected) ? corrected
+                                     : ViewArtifact(artifact::kProvenance, view, ".png");
+}
+
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height) {
-  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  const std::string name = ViewAbArtifact(context, view);
   AbMap map = DecodeAbPng(context.ReadInput(name), name);
   if (map.ab.width == width && map.ab.height == height) return std::move(map.ab);
   return Resize(map.ab, width, height);
 }
 
-Image ReadViewConfidence(const StageContext& context, const View& view, int width, int height) {
-  const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
+Image ReadTargetAb(
+    const StageContext& context, const View& view, bool is_key, int width, int height) {
+  Image ab = ReadViewAb(context, view, width, height);
+  if (!is_key || context.HasInput(ViewArtifact(artifact::kCorrectedAb, view, ".png"))) return ab;
+  const CarriedColor own = ReadKeyColor(context, width, height);
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < own.confidence.data.size(); ++i) {
+      if (own.confidence.data[i] > 0.0f) ab.Plane(c)[i] = own.ab.Plane(c)[i];
+    }
+  }
+  return ab;
+}
+
+Image ReadProvenance(const StageContext& context, const View& view, int width, int height) {
+  const std::string name = ProvenanceArtifact(context, view);
   if (!context.HasInput(name)) return {};
   const Image shares = DecodeImage(context.ReadInput(name), name);
   if (shares.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
-  Image confidence(shares.width, shares.height, 1);
+  return Resize(shares, width, height);
+}
+
+Image ReadViewConfidence(const StageContext& context, const View& view, int width, int height) {
+  const Image shares = ReadProvenance(context, view, width, height);
+  if (shares.Empty()) return {};
+  Image confidence(width, height, 1);
   for (size_t i = 0; i < confidence.data.size(); ++i) {
     confidence.data[i] = std::min(1.0f, shares.Plane(1)[i] + 0.5f * shares.Plane(2)[i]);
   }
-  return Resize(confidence, width, height);
+  return confidence;
 }
 
 }  // namespace color3d

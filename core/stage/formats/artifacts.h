@@ -24,7 +24,7 @@ void CheckStemsAreUnique(const Scene& scene);
 
 // What the import stage found out, for the plan and the report.
 struct ImportFacts {
-  std::string layout;  // "photos", "colmap", "transforms"
+  std::string layout;  // "photos", "colmap", "transforms", "splat"
   bool ran_structure_from_motion = false;
   std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
   bool undistorted = false;
@@ -51,8 +51,22 @@ CarriedColor ReadCarried(const StageContext& context, const View& view, int widt
 // Longer side at which a view was coloured, px.
 int ColoredSide(const StageContext& context, const View& view);
 
-// Colour map of one view from its artifact, resized to width x height px.
+// The artifacts of a view that hold its colour and where that comes from: the corrected ones where
+// there are any.
+std::string ViewAbArtifact(const StageContext& context, const View& view);
+std::string ProvenanceArtifact(const StageContext& context, const View& view);
+
+// Colour map of one view, resized to width x height px.
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height);
+
+// What the chroma solve goes by: the same, but the key view has the user's own colours as far as
+// they were painted, unless they were corrected.
+Image ReadTargetAb(
+    const StageContext& context, const View& view, bool is_key, int width, int height);
+
+// Where that colour comes from: 3 channels, shares of guessed, seen and inferred, resized to width
+// x height px. Empty when the view has no provenance.
+Image ReadProvenance(const StageContext& context, const View& view, int width, int height);
 
 // How sure that colour is, from its provenance: 1 channel, seen + inferred / 2, 0..1, resized to
 // width x height px. Empty when the view has no provenance.

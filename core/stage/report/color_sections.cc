@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "core/image/codec.h"
+#include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/report/source_overlay.h"
 
 namespace color3d {
 namespace {
@@ -39,7 +41,7 @@ ReportPicture SmallPicture(const Image& image, std::string caption) {
 }  // namespace
 
 ColorFacts::ColorFacts(const Scene& scene,
-                       const StageContext& context,
+                       StageContext& context,
                        std::optional<NextKeyViewFacts> next)
     : scene_(scene), context_(context), carry_(ReadCarryFacts(context)), next_(std::move(next)) {
   ReadProvenance();
@@ -49,7 +51,7 @@ ColorFacts::ColorFacts(const Scene& scene,
 
 void ColorFacts::ReadProvenance() {
   for (size_t i = 0; i < scene_.views.size(); ++i) {
-    const std::string name = ViewArtifact(artifact::kProvenance, scene_.views[i], ".png");
+    const std::string name = ProvenanceArtifact(context_, scene_.views[i]);
     if (!context_.HasInput(name)) continue;
     const Image image = DecodeImage(context_.ReadInput(name), name);
     if (image.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
@@ -207,10 +209,13 @@ ReportTable ColorFacts::ErrorTable() const {
 std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
   const std::vector<ViewFacts> views = LeastCertainFirst();
   const size_t wanted = std::min(views.size(), kMaxPictures);
-  std::vector<ReportRow> rows;
-  for (size_t k = 0; k < wanted; ++k) {
-    const View& view = scene_.views[views[k * views.size() / wanted].view];
-    ReportRow row{view.name, {}};
+  const ViewImages photos(scene_, context_.scene_folder(), kPictureSidePx, 0);
+  std::vector<ReportRow> rows(wanted);
+  context_.pool().ForEach(static_cast<int64_t>(wanted), [&](int64_t k, int) {
+    const ViewFacts& facts = views[k * views.size() / wanted];
+    const View& view = scene_.views[facts.view];
+    ReportRow& row = rows[k];
+    row.title = view.name;
     for (const std::string& name : {ViewArtifact(artifact::kColored2d, view, ".jpg"),
                                     ViewArtifact(artifact::kRenders, view, ".png")}) {
       if (!context_.HasInput(name)) continue;
@@ -218,11 +223,14 @@ std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
           SmallPicture(DecodeImage(context_.ReadInput(name), name), "its colours"));
       break;
     }
-    const std::string name = ViewArtifact(artifact::kProvenance, view, ".png");
-    row.pictures.push_back(SmallPicture(DecodeImage(context_.ReadInput(name), name),
-                                        "green: seen, blue: inferred, red: guessed"));
-    rows.push_back(std::move(row));
-  }
+    const std::string name = ProvenanceArtifact(context_, view);
+    row.pictures.push_back(SmallPicture(
+        ShadeBySource(photos.Srgb(facts.view), DecodeImage(context_.ReadInput(name), name)),
+        fmt::format("where they come from: {} seen, {} inferred, {} guessed",
+                    Percent(facts.shares.seen),
+                    Percent(facts.shares.inferred),
+                    Percent(facts.shares.guessed))));
+  });
   return rows;
 }
 
@@ -246,6 +254,14 @@ ReportSection ColorFacts::SourceSection() const {
   if (!views_.empty()) section.tables.push_back(ShareTable());
   if (!errors_by_source_.empty()) section.tables.push_back(ErrorTable());
   section.rows = ProvenanceRows();
+  if (!section.rows.empty()) {
+    const SourceShares mean = MeanShares(/*scored_only=*/false);
+    section.legend = {
+        {"seen", "seen in a key view: " + Percent(mean.seen) + " (plain photo)"},
+        {"inferred",
+         "inferred, as it resembles something there: " + Percent(mean.inferred) + " (blue tint)"},
+        {"guessed", "guessed: " + Percent(mean.guessed) + " (orange hatching)"}};
+  }
   return section;
 }
 

@@ -28,7 +28,7 @@ class ColorFacts {
  public:
   // `next`: the view to colour next. Throws Error{kInvalidArgument} when one of them is damaged.
   ColorFacts(const Scene& scene,
-             const StageContext& context,
+             StageContext& context,
              std::optional<NextKeyViewFacts> next = std::nullopt);
 
   // For metrics.json, in the order in which people read them: coverage, share_* over all views and
@@ -66,7 +66,7 @@ class ColorFacts {
   ReportSection PersonalizationSection(std::vector<CurvePoint> curves) const;
 
   const Scene& scene_;
-  const StageContext& context_;
+  StageContext& context_;
   std::vector<ViewFacts> views_;
   CarryFacts carry_;
   std::optional<NextKeyViewFacts> next_;

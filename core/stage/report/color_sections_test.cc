@@ -24,7 +24,7 @@ TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext)
   AddInput(artifact::kAugmentationFacts,
            R"({"samples": [{"name": "file-1", "kind": "file", "source": "augment/a.png"},
                {"name": "animate-1", "kind": "animate", "source": "embedded"}]})");
-  const StageContext context = MakeContext();
+  StageContext context = MakeContext();
   const ColorFacts facts(scene_, context, NextKeyViewFacts{"p0.png", 5.5, 3.25});
   std::map<std::string, double> metrics;
   for (const auto& [name, value] : facts.Metrics()) metrics[name] = value;
@@ -55,13 +55,13 @@ TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext)
 
 TEST_F(ColorSectionsTest, OldJobsHaveNoChaptersAndDamagedFactsAreRefused) {
   {
-    const StageContext context = MakeContext();
+    StageContext context = MakeContext();
     EXPECT_TRUE(ColorFacts(scene_, context).Sections({}).empty());
     EXPECT_TRUE(ColorFacts(scene_, context).Metrics().empty());
     EXPECT_TRUE(ReadViewConfidence(context, scene_.views[0], 48, 32).Empty());
   }
   AddInput(artifact::kCarryFacts, R"({"key_views": [3]})");
-  const StageContext context = MakeContext();
+  StageContext context = MakeContext();
   EXPECT_THROW(ColorFacts(scene_, context), Error);
 }
 

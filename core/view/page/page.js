@@ -100,26 +100,16 @@ const longFov = (degrees) => {
   return 2 * Math.atan(Math.tan(degrees * Math.PI / 360) * w / h) * 180 / Math.PI;
 };
 
-// A way around the target for `Turn`: a full circle where photos stand all around, a swing else.
+// The way around the target for `Turn`, as movies go it.
 const turnTrack = () => {
-  const home = photos[facts.key];
-  const radius = Math.hypot(home.position[0], home.position[2]);
-  const start = Math.atan2(home.position[0], home.position[2]);
-  const angles = photos.map((p) => Math.atan2(p.position[0], p.position[2])).sort((a, b) => a - b);
-  const gaps = angles.map((a, i) => (i ? a - angles[i - 1] : a + 2 * Math.PI - angles[angles.length - 1]));
-  const around = Math.max(...gaps) < Math.PI / 2;
-  const reach = Math.min(0.35, Math.max(0.1, (2 * Math.PI - Math.max(...gaps)) / 2));
-  const steps = 24, times = [], position = [], target = [], fov = [];
-  for (let i = 0; i < steps; ++i) {
-    const turn = 2 * Math.PI * i / steps;
-    const angle = start + (around ? turn : reach * Math.sin(turn));
-    times.push(i * 30);
-    position.push(radius * Math.sin(angle), home.position[1], radius * Math.cos(angle));
-    target.push(0, 0, 0);
-    fov.push(longFov(fovOf(home)));
-  }
-  return { name: 'turn', duration: steps, frameRate: 30, loopMode: 'repeat', interpolation: 'spline',
-           smoothness: 1, keyframes: { times, values: { position, target, fov } } };
+  const fov = longFov(fovOf(photos[facts.key]));
+  const target = [0, 0, 0];
+  return { name: 'turn', duration: facts.turn.length, frameRate: 30, loopMode: 'repeat',
+           interpolation: 'spline', smoothness: 1,
+           keyframes: { times: facts.turn.map((_, i) => i * 30),
+                        values: { position: facts.turn.flat(),
+                                  target: facts.turn.flatMap(() => target),
+                                  fov: facts.turn.map(() => fov) } } };
 };
 
 const off = { enabled: false };

@@ -81,12 +81,12 @@ void RunFormats(const FormatArguments& args) {
     }
   };
   measure(
-      "scene.sog", [&] { return EncodeSog(original, pool); }, ReadSog);
+      "scene.sog", [&] { return EncodeSog(original, pool); }, [](auto b) { return ReadSog(b); });
   const auto spz = [&](SpzVersion version) {
     return [&original, &pool, version] { return EncodeSpz(original, version, pool); };
   };
-  measure("scene.spz", spz(SpzVersion::k4), ReadSpz);
-  measure("version2.spz", spz(SpzVersion::k2), ReadSpz);
+  measure("scene.spz", spz(SpzVersion::k4), [](auto b) { return ReadSpz(b); });
+  measure("version2.spz", spz(SpzVersion::k2), [](auto b) { return ReadSpz(b); });
   measure(
       "scene.glb", [&] { return EncodeGlb(original); }, ReadGlb);
   for (const std::string& file : args.others) {

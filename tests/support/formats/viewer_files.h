@@ -1,5 +1,6 @@
-// Readers of the files that the export writes for viewers, for tests: what a viewer would see.
-// Each takes whole files and throws std::runtime_error where one is not as its format says.
+// Readers of the files that the export writes for viewers, for tests: what a viewer would see. PLY,
+// SOG and SPZ are the product's own (splat_file.h), the rest is here: each takes whole files and
+// throws std::runtime_error where one is not as its format says.
 #pragma once
 
 #include <map>
@@ -10,13 +11,10 @@
 #include "core/base/parallel.h"
 #include "core/scene/camera.h"
 #include "core/splat/export/viewer_gaussians.h"
+#include "core/splat/import/splat_file.h"
 
 namespace color3d {
 
-ViewerGaussians ReadPly(std::string_view bytes);
-ViewerGaussians ReadSog(std::string_view bytes);
-// In the axes of 3DGS files (y down, z forward), as a reader is told that asks for RDF.
-ViewerGaussians ReadSpz(std::string_view bytes);
 // Without its node's turn.
 ViewerGaussians ReadGlb(std::string_view bytes);
 // The files of an archive without compression, checked against their checksums.

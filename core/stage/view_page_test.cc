@@ -1,4 +1,4 @@
-#include "core/stage/report/view_page.h"
+#include "core/stage/view_page.h"
 
 #include <gtest/gtest.h>
 
@@ -12,14 +12,12 @@ namespace {
 
 TEST_F(StageTest, ThePageIsMadeFromTheExportedSceneAndTheModel) {
   const Scene scene = RampScene(scratch_.path(), 48, 32);
-  StageContext nothing = MakeContext();
-  EXPECT_FALSE(WriteViewPage(scene, 1, nothing));
   GaussianModel model = SmallModel();
   model.confidence.assign(model.size(), 0.5f);
-  AddInput(artifact::kModel, SerializeGaussians(model));
-  AddInput(artifact::kPly, "the bytes of the exported file");
   StageContext context = MakeContext();
-  EXPECT_EQ(WriteViewPage(scene, 1, context), HasViewer());
+  EXPECT_FALSE(WriteViewPage(scene, 1, model, {}, context));
+  const ExportedFile ply{artifact::kPly, "the bytes of the exported file"};
+  EXPECT_EQ(WriteViewPage(scene, 1, model, ply, context), HasViewer());
   if (!HasViewer()) {
     EXPECT_NE(observer_.text.find("npm"), std::string::npos) << observer_.text;
     return;
@@ -27,10 +25,9 @@ TEST_F(StageTest, ThePageIsMadeFromTheExportedSceneAndTheModel) {
   EXPECT_EQ(context.outputs(), (std::vector<std::string>{"view.html"}));
   const std::string html = ReadFile(scratch_.path() / "out/view.html");
   EXPECT_NE(html.find(Base64(Gzip("the bytes of the exported file"))), std::string::npos);
-  // The smaller file is taken where there is one.
-  AddInput(artifact::kSog, "the bytes of the smaller file");
-  StageContext smaller = MakeContext();
-  ASSERT_TRUE(WriteViewPage(scene, 1, smaller));
+  StageContext compressed = MakeContext();
+  const ExportedFile sog{artifact::kSog, "the bytes of the smaller file"};
+  ASSERT_TRUE(WriteViewPage(scene, 1, model, sog, compressed));
   EXPECT_NE(ReadFile(scratch_.path() / "out/view.html").find(Base64("the bytes of the smaller")),
             std::string::npos);
   for (const View& view : scene.views) {

@@ -1,11 +1,10 @@
-#include "core/stage/report/view_page.h"
+#include "core/stage/view_page.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <vector>
 
-#include "core/base/median.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
@@ -14,6 +13,7 @@
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/focus.h"
 #include "core/view/view_page.h"
 
 namespace color3d {
@@ -24,28 +24,17 @@ constexpr int kPhotoPx = 480;        // longer side of the photos
 constexpr int kPhotoQuality = 80;    // of their JPEG
 constexpr size_t kMaxPictures = 48;  // with more photos, the others are a name and a camera
 
-// What the middle of the key view shows: the median of the depths there, on the camera's axis.
-Eigen::Vector3d FocusOf(const View& view, const Camera& camera, const Image& depth) {
-  std::vector<double> middle;
-  for (int y = depth.height / 4; y < depth.height - depth.height / 4; ++y) {
-    for (int x = depth.width / 4; x < depth.width - depth.width / 4; ++x) {
-      if (depth.At(0, y, x) > 0.0f) middle.push_back(depth.At(0, y, x));
-    }
-  }
-  const double away = middle.empty() ? 1.0 : Median(std::move(middle));
-  return view.cam_from_world.WorldFromCamera(away * camera.Ray(camera.cx, camera.cy));
-}
-
-// The smaller of the exported files, and the sureness of its Gaussians in its order.
+// The exported file, and the sureness of its Gaussians in its order.
 void TakeScene(const GaussianModel& model,
                const ExportFrame& frame,
+               const ExportedFile& file,
                StageContext& context,
                ViewPage* page) {
   page->file_scale = frame.scale;
   page->file_offset = frame.offset;
-  page->file_is_compressed = context.HasInput(artifact::kSog);
-  page->file_name = page->file_is_compressed ? artifact::kSog : artifact::kPly;
-  page->file_bytes = context.ReadInput(page->file_name);
+  page->file_is_compressed = file.name == artifact::kSog;
+  page->file_name = file.name;
+  page->file_bytes = file.bytes;
   page->confidence = model.confidence;
   if (!page->file_is_compressed || model.confidence.empty()) return;
   const RgbHarmonics no_colors{.degree = 0, .sh = std::vector<float>(3 * model.size())};
@@ -75,22 +64,24 @@ std::vector<ViewPagePhoto> PhotosOf(const Scene& scene, int key_view, StageConte
 
 }  // namespace
 
-bool WriteViewPage(const Scene& scene, int key_view, StageContext& context) {
-  const bool exported = context.HasInput(artifact::kSog) || context.HasInput(artifact::kPly);
-  if (!exported || !context.HasInput(artifact::kModel)) return false;
+bool WriteViewPage(const Scene& scene,
+                   int key_view,
+                   const GaussianModel& model,
+                   const ExportedFile& file,
+                   StageContext& context) {
+  if (file.name.empty()) return false;
   if (!HasViewer()) {
     context.progress().OnWarning(fmt::format(
         "this build has no viewer, so there is no {}: build again where npm reaches its registry",
         artifact::kViewPage));
     return false;
   }
-  const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   const View& key = scene.views.at(key_view);
   const Camera camera = key.camera.FitWithin(kPosterPx);
   const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
 
   ViewPage page;
-  TakeScene(model, ExportFrameOf(scene), context, &page);
+  TakeScene(model, ExportFrameOf(scene), file, context, &page);
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);

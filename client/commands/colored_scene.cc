@@ -1,0 +1,126 @@
+#include "client/commands/colored_scene.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "client/lib/job_watch.h"
+#include "client/lib/names.h"
+#include "client/lib/text.h"
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kPageSize = 200;
+
+const v1::Artifact* ModelOf(const v1::Job& job) {
+  const auto found =
+      std::find_if(job.artifacts().begin(), job.artifacts().end(), [](const v1::Artifact& a) {
+        return a.name() == artifact::kModel;
+      });
+  return found != job.artifacts().end() ? &*found : nullptr;
+}
+
+v1::Job WithModel(v1::Job job) {
+  if (job.state() != v1::Job::STATE_SUCCEEDED) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} has no results: it is {}; see `color3d job show {}`",
+                job.name(),
+                StateName(job.state()),
+                job.name());
+  }
+  if (ModelOf(job) != nullptr) return job;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "{} is a {} job and has no {} to look at; name a {} job",
+              job.name(),
+              job.kind(),
+              artifact::kModel,
+              kind::kColorizeScene);
+}
+
+fs::path ModelFileIn(const fs::path& folder) {
+  std::error_code none;
+  if (!fs::is_directory(folder, none)) {
+    throw Error(ErrorCode::kNotFound,
+                "there is no folder {}; name the one that `color3d colorize` wrote to (-o), "
+                "jobs/ID or scenes/ID",
+                folder.string());
+  }
+  const fs::path model = folder / artifact::kModel;
+  if (fs::is_regular_file(model, none)) return model;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "{} has no {}: it holds no finished results of `color3d colorize`; when the job is "
+              "done, fetch them with `color3d artifact download jobs/ID -o {}`",
+              folder.string(),
+              artifact::kModel,
+              folder.string());
+}
+
+v1::Job JobOfModel(Connection& connection, const fs::path& model) {
+  const FileDigest digest = DigestFile(model);
+  v1::ListJobsRequest request;
+  request.set_page_size(kPageSize);
+  do {
+    const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
+    for (const v1::Job& job : jobs.jobs()) {
+      if (job.state() != v1::Job::STATE_SUCCEEDED || !job.parent().empty()) continue;
+      const v1::Artifact* theirs = ModelOf(job);
+      if (theirs != nullptr && theirs->digest().sha256() == digest.sha256) return job;
+    }
+    request.set_page_token(jobs.next_page_token());
+  } while (!request.page_token().empty());
+  throw Error(ErrorCode::kFailedPrecondition,
+              "the server at {} has no job that made {}; name the server that did with --server, "
+              "or colour the scene again",
+              connection.address(),
+              model.string());
+}
+
+}  // namespace
+
+bool IsOnServer(const std::string& target) {
+  std::error_code none;
+  return (target.starts_with("scenes/") || target.starts_with("jobs/")) &&
+         !fs::exists(target, none);
+}
+
+v1::Job NewestResult(Connection& connection, const std::string& scene) {
+  v1::GetSceneRequest known;
+  known.set_name(scene);
+  connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), known);
+  v1::ListJobsRequest request;
+  request.set_parent(scene);
+  request.set_page_size(kPageSize);
+  std::string unfinished;
+  do {
+    const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
+    for (const v1::Job& job : jobs.jobs()) {
+      if (job.kind() != kind::kColorizeScene || !job.parent().empty()) continue;
+      if (job.state() == v1::Job::STATE_SUCCEEDED) return job;
+      if (unfinished.empty() && !IsFinished(job.state())) unfinished = job.name();
+    }
+    request.set_page_token(jobs.next_page_token());
+  } while (!request.page_token().empty());
+  if (!unfinished.empty()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} is still being coloured; follow it with `color3d job watch {}`",
+                scene,
+                unfinished);
+  }
+  throw Error(ErrorCode::kFailedPrecondition,
+              "{} has not been coloured yet; do that with `color3d colorize {}`",
+              scene,
+              scene);
+}
+
+v1::Job FindColoredScene(Connection& connection, const std::string& target) {
+  if (!IsOnServer(target)) return JobOfModel(connection, ModelFileIn(target));
+  if (target.starts_with("scenes/")) return WithModel(NewestResult(connection, target));
+  return WithModel(GetJob(connection, ResourceName(target, "jobs")));
+}
+
+}  // namespace color3d::client

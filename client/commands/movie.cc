@@ -1,0 +1,248 @@
+// `color3d turntable` and `color3d render`: a coloured scene as a movie or as pictures.
+#include <fmt/core.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/commands/colored_scene.h"
+#include "client/commands/command.h"
+#include "client/commands/console.h"
+#include "client/commands/follow.h"
+#include "client/commands/key_jobs.h"
+#include "client/commands/results.h"
+#include "client/lib/blob_transfer.h"
+#include "client/lib/scene_upload.h"
+#include "client/lib/text.h"
+#include "core/base/digest.h"
+#include "core/catalogue/artifacts.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr char kOrbit[] = "orbit", kOriginal[] = "original";
+constexpr double kSeconds = 8.0;
+
+struct MovieOptions {
+  std::string target;  // folder of results, jobs/ID or scenes/ID
+  std::string out;     // a file that ends in .mp4, or a folder; empty: by the command
+  std::string path;    // kOrbit, kOriginal or a file of cameras; empty: pictures of views
+  std::vector<std::string> views;
+  std::optional<double> seconds;
+  double frames_per_second = 30.0;
+  std::optional<int> max_side_px;
+  bool pictures = false;
+  bool video = true;
+  bool bounce = false;
+  bool skip_cache = false;
+  std::string movie_name = artifact::kMovie;  // in a folder
+};
+
+bool IsMovieName(const fs::path& out) {
+  const std::string extension = out.extension().string();
+  return extension == ".mp4" || extension == ".MP4";
+}
+
+// Before the server is asked for anything.
+void Check(const MovieOptions& options) {
+  if (options.path.empty() && (options.seconds || options.bounce || options.pictures)) {
+    throw InvalidArgument(
+        "--seconds, --bounce and --png belong to a path: say which with --path orbit, --path "
+        "original or --path FILE");
+  }
+  if (options.path.empty() && IsMovieName(options.out)) {
+    throw InvalidArgument(
+        "{} is to be a movie: say which way it goes with --path orbit, --path "
+        "original or --path FILE",
+        options.out);
+  }
+  if (!options.path.empty() && options.path != kOriginal && !options.views.empty()) {
+    throw InvalidArgument("--views are passed by --path original only");
+  }
+  if (!options.video && !options.pictures) {
+    throw InvalidArgument("--no-video leaves nothing without --png");
+  }
+  if (options.pictures && IsMovieName(options.out)) {
+    throw InvalidArgument("--png needs a folder for the pictures; name one with -o in place of {}",
+                          options.out);
+  }
+  if (options.out.empty() || IsMovieName(options.out)) return;
+  std::error_code none;
+  if (fs::exists(options.out, none) && !fs::is_directory(options.out, none)) {
+    throw InvalidArgument("{} is no folder, and a movie's name ends in .mp4", options.out);
+  }
+}
+
+v1::Digest UploadCameras(Connection& connection, const std::string& path) {
+  std::error_code none;
+  if (!fs::is_regular_file(path, none)) {
+    throw Error(ErrorCode::kNotFound,
+                "there is no file {}; --path is {}, {} or a file of cameras (a transforms.json)",
+                path,
+                kOrbit,
+                kOriginal);
+  }
+  const UploadFile upload{path, DigestFile(path)};
+  if (upload.digest.size_bytes == 0) throw InvalidArgument("{} is empty", path);
+  UploadMissing(connection, {upload}, [](int64_t, int64_t) {});
+  return ToProto(upload.digest);
+}
+
+int FramesOf(const MovieOptions& options) {
+  const double frames = options.seconds.value_or(kSeconds) * options.frames_per_second;
+  if (!std::isfinite(frames) || frames > 1e9) {
+    throw InvalidArgument("--seconds {} at --fps {} are more frames than can be counted",
+                          options.seconds.value_or(kSeconds),
+                          options.frames_per_second);
+  }
+  return static_cast<int>(std::lround(frames));
+}
+
+v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1::Job& of) {
+  v1::JobSpec spec;
+  spec.set_scene(of.spec().scene());
+  spec.set_skip_cache(options.skip_cache);
+  for (const std::string& input : WithItsInputs(connection, of)) spec.add_inputs(input);
+  v1::RenderSpec* render = spec.mutable_render();
+  for (const std::string& view : options.views) render->add_views(view);
+  if (options.max_side_px) {
+    render->set_max_side_px(*options.max_side_px);
+  } else if (of.spec().colorize_scene().has_max_side_px()) {
+    render->set_max_side_px(of.spec().colorize_scene().max_side_px());
+  }
+  if (options.path.empty()) return spec;
+  if (options.path == kOrbit) {
+    render->set_path(v1::RenderSpec::PATH_ORBIT);
+  } else if (options.path == kOriginal) {
+    render->set_path(v1::RenderSpec::PATH_PHOTOS);
+  } else {
+    render->set_path(v1::RenderSpec::PATH_CAMERAS);
+    *render->mutable_cameras() = UploadCameras(connection, options.path);
+  }
+  const bool as_in_the_file = render->has_cameras() && !options.seconds;
+  if (!as_in_the_file) render->set_frames(FramesOf(options));
+  render->set_frames_per_second(options.frames_per_second);
+  render->set_video(options.video);
+  render->set_pictures(options.pictures);
+  render->set_bounce(options.bounce);
+  return spec;
+}
+
+// Where results go: the movie under its own name, the rest below a folder.
+std::vector<std::string> Fetch(Connection& connection,
+                               const v1::Job& job,
+                               const fs::path& out,
+                               const std::string& movie_name,
+                               ProgressDisplay& display) {
+  const fs::path folder = IsMovieName(out) ? out.parent_path() : out;
+  std::vector<std::string> files;
+  std::vector<v1::Artifact> rest;
+  for (const v1::Artifact& artifact : job.artifacts()) {
+    if (artifact.name() != artifact::kMovie) {
+      rest.push_back(artifact);
+      continue;
+    }
+    const fs::path file = IsMovieName(out) ? out : folder / movie_name;
+    const FileDigest digest{artifact.digest().sha256(), artifact.digest().size_bytes()};
+    DownloadBlob(connection, digest, file, [&](int64_t received) {
+      display.OnTransfer("downloading", received, digest.size_bytes);
+    });
+    display.Clear();
+    files.push_back(file.string());
+  }
+  for (const std::string& name : DownloadArtifacts(connection, rest, folder, display)) {
+    files.push_back((folder / name).string());
+  }
+  return files;
+}
+
+ExitCode RunMovie(const Context& context, const MovieOptions& options) {
+  Check(options);
+  const fs::path out = options.out;
+  const fs::path folder = IsMovieName(out) ? out.parent_path() : out;
+  Connection connection(context.server, *context.interrupt);
+  const v1::Job of = FindColoredScene(connection, options.target);
+  PrepareOut(folder.empty() ? fs::path(".") : folder);
+  const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, of));
+  ProgressDisplay display(context.json);
+  const v1::Job job = FollowToSuccess(
+      connection, context, {submitted.name()}, folder.empty() ? "." : folder.string(), display);
+  const auto files = Fetch(connection, job, out, options.movie_name, display);
+  if (context.json) {
+    PrintJson({{"job", job.name()},
+               {"scene", job.spec().scene()},
+               {"state", StateName(job.state())},
+               {"out", out.string()},
+               {"files", files}});
+    return ExitCode::kOk;
+  }
+  constexpr size_t kMostLines = 12;
+  std::string text;
+  for (size_t i = 0; i < std::min(files.size(), kMostLines); ++i) {
+    text += fmt::format(
+        "{}  {}\n", files[i], HumanBytes(static_cast<int64_t>(fs::file_size(files[i]))));
+  }
+  if (files.size() > kMostLines) text += fmt::format("and {} more\n", files.size() - kMostLines);
+  PrintText(text);
+  return ExitCode::kOk;
+}
+
+void AddCommonOptions(CLI::App* command, MovieOptions* options) {
+  command->fallthrough();
+  command
+      ->add_option("RESULTS",
+                   options->target,
+                   "Folder of results that `color3d colorize` wrote, or jobs/ID or scenes/ID")
+      ->required();
+  command->add_option("--seconds", options->seconds, "Length of the movie")
+      ->check(CLI::Range(0.01, 86400.0));
+  command->add_option("--fps", options->frames_per_second, "Frames a second")
+      ->check(CLI::Range(1.0, 120.0))
+      ->capture_default_str();
+  command->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px");
+  command->add_flag("--bounce", options->bounce, "There and back again");
+  command->add_flag("--skip-cache", options->skip_cache, "Render again what was rendered before");
+}
+
+}  // namespace
+
+void AddMovieCommands(CLI::App& app, Context& context) {
+  const auto turning = std::make_shared<MovieOptions>();
+  CLI::App* turntable =
+      app.add_subcommand("turntable", "A movie around what the key view shows, without an end");
+  AddCommonOptions(turntable, turning.get());
+  turning->path = kOrbit;
+  turning->movie_name = "turntable.mp4";
+  turntable->add_option(
+      "-o,--out", turning->out, "FILE.mp4 or a folder; else turntable.mp4 among the results");
+  turntable->callback([&context, turning] {
+    context.action = [&context, turning] {
+      if (turning->out.empty()) turning->out = IsOnServer(turning->target) ? "." : turning->target;
+      return RunMovie(context, *turning);
+    };
+  });
+
+  const auto rendering = std::make_shared<MovieOptions>();
+  CLI::App* render = app.add_subcommand("render", "A movie along a path, or pictures of views");
+  AddCommonOptions(render, rendering.get());
+  rendering->out = "render";
+  render->add_option("--path",
+                     rendering->path,
+                     "orbit, original (through the photos' cameras) or a file of cameras "
+                     "(transforms.json); none: pictures of views");
+  render->add_option("--views",
+                     rendering->views,
+                     "Photos: whose views to render, or to pass on the original path");
+  render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();
+  render->add_flag("--png", rendering->pictures, "Every frame as a picture, too");
+  render->add_flag("!--no-video", rendering->video, "With --png: no movie");
+  render->callback([&context, rendering] {
+    context.action = [&context, rendering] { return RunMovie(context, *rendering); };
+  });
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,36 @@
+// Places of pictures whose colours are known, before their features are projected. Torch in the
+// interface; used inside core/colorizer only. Pure functions, thread-safe.
+#pragma once
+
+#include <torch/types.h>
+
+#include <vector>
+
+#include "core/color/relative_chroma.h"
+#include "core/colorizer/colorizer.h"
+#include "core/encoder/tap_encoder.h"
+
+namespace color3d {
+
+struct KnownCells {
+  std::vector<torch::Tensor> blocks;  // as CellFeatures
+  torch::Tensor colors;               // [n,2], Lab units, relative to luminance
+  torch::Tensor weights;              // [n], 0..1
+  torch::Tensor positions;            // [n,4], as CellBank's
+};
+
+// [1,C,H,W], padded to kPadMultiple.
+torch::Tensor PaddedTensor(const Image& image);
+
+// [count,4] of a picture's cells, as CellBank's: means over what is known of each.
+torch::Tensor PlacesOf(const Image& position, int64_t count);
+
+KnownCells CellsOf(const TapEncoder& encoder,
+                   const TrainingPicture& picture,
+                   const RelativeChroma& relative);
+
+// Rows of all `parts`, in their order; at least one part.
+KnownCells Join(const std::vector<KnownCells>& parts);
+KnownCells Select(const KnownCells& cells, const torch::Tensor& rows);
+
+}  // namespace color3d

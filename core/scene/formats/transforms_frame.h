@@ -1,0 +1,44 @@
+// What a transforms.json of NeRF, Nerfstudio or Blender says of one frame's camera. For this folder
+// only.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/scene/camera.h"
+
+namespace color3d {
+
+// Fields of one frame; what a frame does not say, the file says for all. Reading throws
+// Error{kInvalidArgument} that names the place and the field.
+class FrameFields {
+ public:
+  // `place`: "cameras.json: frame 3". The objects must outlive this.
+  FrameFields(const nlohmann::json& root, const nlohmann::json& frame, std::string place);
+
+  const std::string& place() const { return place_; }
+  std::optional<double> Number(const char* key) const;
+  double NumberOr(const char* key, double absent) const { return Number(key).value_or(absent); }
+  std::string TextOr(const char* key, const std::string& absent) const;
+  bool IsTrue(const char* key) const;
+  // Null where there is none.
+  const nlohmann::json* Find(const char* key) const;
+
+ private:
+  const nlohmann::json& root_;
+  const nlohmann::json& frame_;
+  std::string place_;
+};
+
+// The whole file. Throws unless it is an object with a list "frames".
+nlohmann::json ParseFrames(std::string_view text, const std::string& file_name);
+
+// w, h, fl_x, fl_y, cx, cy, camera_angle_x, camera_angle_y. `width`, `height`: where it says none.
+Camera ReadIntrinsics(const FrameFields& fields, int width, int height);
+
+// transform_matrix: OpenGL camera-to-world (x right, y up, z backward), which may be scaled.
+Pose ReadTransform(const FrameFields& fields);
+
+}  // namespace color3d

@@ -1,0 +1,280 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "core/splat/import/read_support.h"
+
+namespace color3d {
+namespace {
+
+constexpr size_t kMaxHeaderBytes = 1 << 16;
+
+struct Property {
+  size_t offset = 0;  // in a row, bytes
+  std::string type;
+};
+
+struct Header {
+  size_t body = 0;  // where the rows begin
+  uint64_t count = 0;
+  size_t stride = 0;
+  std::map<std::string, Property> properties;  // of the vertices
+  bool has_faces = false;
+};
+
+// 0 for a type that PLY does not have.
+size_t SizeOfType(const std::string& type) {
+  static const std::map<std::string, size_t> sizes = {{"char", 1},
+                                                      {"int8", 1},
+                                                      {"uchar", 1},
+                                                      {"uint8", 1},
+                                                      {"short", 2},
+                                                      {"int16", 2},
+                                                      {"ushort", 2},
+                                                      {"uint16", 2},
+                                                      {"int", 4},
+                                                      {"int32", 4},
+                                                      {"uint", 4},
+                                                      {"uint32", 4},
+                                                      {"float", 4},
+                                                      {"float32", 4},
+                                                      {"double", 8},
+                                                      {"float64", 8}};
+  const auto found = sizes.find(type);
+  return found == sizes.end() ? 0 : found->second;
+}
+
+bool IsFloat(const std::string& type) { return type == "float" || type == "float32"; }
+bool IsDouble(const std::string& type) { return type == "double" || type == "float64"; }
+bool IsByte(const std::string& type) { return type == "uchar" || type == "uint8"; }
+
+class HeaderReader {
+ public:
+  HeaderReader(std::string_view bytes, const SplatSource& source) : source_(source) {
+    const std::string_view begin = bytes.substr(0, kMaxHeaderBytes);
+    const size_t end = begin.find("\nend_header");
+    const size_t newline = end == begin.npos ? end : begin.find('\n', end + 1);
+    if (newline == begin.npos) {
+      throw InvalidArgument("{} has no end of a PLY header; it was cut short: copy it again",
+                            source.name);
+    }
+    header_.body = newline + 1;
+    std::istringstream lines{std::string(begin.substr(0, end + 1))};
+    for (std::string line; std::getline(lines, line);) {
+      if (!line.empty() && line.back() == '\r') line.pop_back();
+      ReadLine(line);
+    }
+  }
+
+  Header Take() {
+    if (!saw_vertices_) {
+      throw InvalidArgument("{} is a PLY without vertices, so without Gaussians", source_.name);
+    }
+    return std::move(header_);
+  }
+
+ private:
+  void ReadLine(const std::string& line) {
+    std::istringstream words(line);
+    std::string word, name, number;
+    words >> word;
+    if (word == "format") {
+      words >> name;
+      if (name != "binary_little_endian") {
+        throw InvalidArgument(
+            "{} is a PLY in the format {}; save it as binary_little_endian", source_.name, name);
+      }
+    } else if (word == "element") {
+      words >> name >> number;
+      BeginElement(name, number);
+    } else if (word == "property") {
+      words >> name;
+      std::string type = name;
+      words >> name;
+      AddProperty(type, name);
+    }
+  }
+
+  void BeginElement(const std::string& name, const std::string& number) {
+    uint64_t count = 0;
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), count);
+    if (error != std::errc() || end != number.data() + number.size()) {
+      throw InvalidArgument(
+          "{} says that it has '{}' of {}; its PLY header is damaged", source_.name, number, name);
+    }
+    in_vertices_ = name == "vertex" && !saw_vertices_;
+    header_.has_faces = header_.has_faces || name == "face";
+    if (!in_vertices_) {
+      // Rows in front of the Gaussians: none is known that could be passed over.
+      if (!saw_vertices_ && count > 0) {
+        throw InvalidArgument(
+            "{} begins with {}, as SuperSplat's compressed PLY does; save it uncompressed "
+            "(splat-transform in.ply out.ply), or as .sog or .spz",
+            source_.name,
+            name);
+      }
+      return;
+    }
+    saw_vertices_ = true;
+    header_.count = count;
+  }
+
+  void AddProperty(const std::string& type, const std::string& name) {
+    if (!in_vertices_) return;
+    const size_t size = SizeOfType(type);
+    if (size == 0) {
+      throw InvalidArgument(
+          "{} is no 3DGS PLY: its vertices have the property '{} {}'", source_.name, type, name);
+    }
+    header_.properties[name] = {header_.stride, type};
+    header_.stride += size;
+  }
+
+  const SplatSource& source_;
+  Header header_;
+  bool in_vertices_ = false;
+  bool saw_vertices_ = false;
+};
+
+class PlyReader {
+ public:
+  PlyReader(std::string_view bytes, const SplatSource& source)
+      : source_(source), header_(HeaderReader(bytes, source).Take()), rows_(bytes) {
+    RequireGaussians();
+    rows_.remove_prefix(std::min(header_.body, rows_.size()));
+    const uint64_t whole = rows_.size() / header_.stride;
+    if (whole < header_.count) {
+      throw InvalidArgument("{} ends after {} of its {} Gaussians; it was cut short: copy it again",
+                            source.name,
+                            whole,
+                            header_.count);
+    }
+    CheckCount(header_.count, source);
+  }
+
+  ViewerGaussians Read() const {
+    const int rest = Rest();
+    int degree = 0;
+    while (degree < 3 && ShCoefficients(degree) - 1 < rest) ++degree;
+    ViewerGaussians g = EmptyGaussians(header_.count, degree);
+    const size_t row = 3 * (static_cast<size_t>(rest) + 1);
+    for (int k = 0; k < 3; ++k) {
+      Copy(std::string(1, static_cast<char>('x' + k)), 3, k, &g.position);
+      Copy(fmt::format("scale_{}", k), 3, k, &g.log_scale);
+      if (Has("f_dc_0")) {
+        Copy(fmt::format("f_dc_{}", k), row, k, &g.sh);
+      } else {
+        static constexpr const char* kNames[] = {"red", "green", "blue"};
+        Copy(kNames[k], row, k, &g.sh);
+        for (size_t i = k; i < g.sh.size(); i += row) g.sh[i] = (g.sh[i] / 255.0f - 0.5f) / kShDc;
+      }
+      for (int j = 0; j < rest; ++j) {
+        Copy(fmt::format("f_rest_{}", k * rest + j), row, 3 * (j + 1) + k, &g.sh);
+      }
+    }
+    for (int k = 0; k < 4; ++k) Copy(fmt::format("rot_{}", k), 4, k, &g.rotation);
+    Copy("opacity", 1, 0, &g.opacity_logit);
+    return g;
+  }
+
+ private:
+  bool Has(const std::string& name) const { return header_.properties.contains(name); }
+  bool HasBytesOfColor() const {
+    const auto red = header_.properties.find("red");
+    return red != header_.properties.end() && IsByte(red->second.type) && Has("green") &&
+           Has("blue");
+  }
+
+  // Coefficients above degree 0 of each channel.
+  int Rest() const {
+    int rest = 0;
+    while (Has(fmt::format("f_rest_{}", rest))) ++rest;
+    for (int degree = 0; degree <= 3; ++degree) {
+      if (rest == 3 * (ShCoefficients(degree) - 1)) return rest / 3;
+    }
+    throw InvalidArgument(
+        "{} has {} properties f_rest_*; spherical harmonics of degree 0 to 3 have 0, 9, 24 or 45",
+        source_.name,
+        rest);
+  }
+
+  void RequireGaussians() const {
+    if (Has("packed_position")) {
+      throw InvalidArgument(
+          "{} is SuperSplat's compressed PLY; save it uncompressed (splat-transform in.ply "
+          "out.ply), or as .sog or .spz",
+          source_.name);
+    }
+    std::string missing;
+    for (const char* name : {"x",
+                             "y",
+                             "z",
+                             "scale_0",
+                             "scale_1",
+                             "scale_2",
+                             "rot_0",
+                             "rot_1",
+                             "rot_2",
+                             "rot_3",
+                             "opacity"}) {
+      if (missing.empty() && !Has(name)) missing = name;
+    }
+    if (missing.empty() && !HasBytesOfColor()) {
+      for (const char* name : {"f_dc_0", "f_dc_1", "f_dc_2"}) {
+        if (missing.empty() && !Has(name)) missing = name;
+      }
+    }
+    if (missing.empty()) return;
+    throw InvalidArgument(
+        "{} is {}: its vertices have no {}. Give the PLY that 3D Gaussian splatting has trained",
+        source_.name,
+        header_.has_faces ? "the PLY of a mesh, not of a splat"
+        : Has("scale_0")  ? "no whole 3DGS PLY"
+                          : "the PLY of a point cloud, not of a splat",
+        missing);
+  }
+
+  void Copy(const std::string& name, size_t width, size_t k, std::vector<float>* to) const {
+    const Property& property = header_.properties.at(name);
+    const char* from = rows_.data() + property.offset;
+    for (uint64_t i = 0; i < header_.count; ++i, from += header_.stride) {
+      (*to)[i * width + k] = Value(from, property.type);
+    }
+  }
+
+  static float Value(const char* from, const std::string& type) {
+    if (IsFloat(type)) return As<float>(from);
+    if (IsDouble(type)) return static_cast<float>(As<double>(from));
+    if (IsByte(type)) return As<uint8_t>(from);
+    if (type == "char" || type == "int8") return As<int8_t>(from);
+    if (type == "short" || type == "int16") return As<int16_t>(from);
+    if (type == "ushort" || type == "uint16") return As<uint16_t>(from);
+    if (type == "int" || type == "int32") return static_cast<float>(As<int32_t>(from));
+    return static_cast<float>(As<uint32_t>(from));
+  }
+  template <class Number>
+  static Number As(const char* from) {
+    Number number;
+    std::memcpy(&number, from, sizeof(number));
+    return number;
+  }
+
+  const SplatSource& source_;
+  const Header header_;
+  std::string_view rows_;
+};
+
+}  // namespace
+
+ViewerGaussians ReadPly(std::string_view bytes, const SplatSource& source) {
+  return PlyReader(bytes, source).Read();
+}
+
+}  // namespace color3d

@@ -1,0 +1,218 @@
+#include "core/splat/import/splat_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <functional>
+
+#include "core/base/error.h"
+#include "core/splat/export/sog/sog.h"
+#include "core/splat/export/sog/zip.h"
+#include "core/splat/export/spz/spz.h"
+#include "core/splat/import/unzip.h"
+#include "tests/support/scenes/splat_files.h"
+
+namespace color3d {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string Refusal(const std::string& bytes, SplatSource source = {}) {
+  source.name = "scene.x";
+  try {
+    ReadSplat(bytes, source);
+  } catch (const Error& e) {
+    EXPECT_TRUE(e.code() == ErrorCode::kInvalidArgument ||
+                e.code() == ErrorCode::kResourceExhausted);
+    EXPECT_THAT(e.what(), HasSubstr("scene.x"));
+    return e.what();
+  }
+  return "";
+}
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+std::string Header(const std::string& elements) {
+  return "ply\nformat binary_little_endian 1.0\n" + elements + "end_header\n";
+}
+
+std::string Gzip(const std::string& plain) {
+  z_stream stream = {};
+  deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  std::string packed(plain.size() + 1024, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
+  stream.avail_in = static_cast<uInt>(plain.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+TEST(SplatFileTest, PlyIsReadAsItStandsThere) {
+  for (const int degree : {0, 1, 2, 3}) {
+    const ViewerGaussians g = BallOnGround(7, 0.3f, degree);
+    const ViewerGaussians file = ReadSplat(SplatPly(g));
+    EXPECT_EQ(file.sh_degree, degree);
+    EXPECT_EQ(file.position, g.position);
+    EXPECT_EQ(file.log_scale, g.log_scale);
+    EXPECT_EQ(file.rotation, g.rotation);
+    EXPECT_EQ(file.opacity_logit, g.opacity_logit);
+    EXPECT_EQ(file.sh, g.sh);
+  }
+}
+
+TEST(SplatFileTest, PlyMayHaveOtherTypesOrdersLineEndsAndElements) {
+  std::string text = Header(
+      "comment by another program\nelement vertex 1\nproperty uchar red\nproperty uchar green\n"
+      "property uchar blue\nproperty double x\nproperty float y\nproperty float z\n"
+      "property float opacity\nproperty float scale_0\nproperty float scale_1\n"
+      "property float scale_2\nproperty float rot_0\nproperty float rot_1\nproperty float rot_2\n"
+      "property float rot_3\nelement extra 3\nproperty list uchar int data\n");
+  for (size_t at = 0; (at = text.find('\n', at)) != std::string::npos; at += 2) {
+    text.replace(at, 1, "\r\n");
+  }
+  text += std::string("\xff\x80\x00", 3);
+  const double x = 1.5;
+  text.append(reinterpret_cast<const char*>(&x), 8);
+  for (const float v : {2.0f, 3.0f, 0.5f, -1.0f, -2.0f, -3.0f, 1.0f, 0.0f, 0.0f, 0.0f}) {
+    text.append(reinterpret_cast<const char*>(&v), 4);
+  }
+  const ViewerGaussians g = ReadSplat("ply" + text.substr(3) + "more");
+  ASSERT_EQ(g.size(), 1u);
+  EXPECT_EQ(g.position, (std::vector<float>{1.5f, 2.0f, 3.0f}));
+  EXPECT_EQ(g.log_scale[2], -3.0f);
+  EXPECT_NEAR(0.5f + kShDc * g.sh[0], 1.0f, 1e-6);
+  EXPECT_NEAR(0.5f + kShDc * g.sh[1], 128.0f / 255.0f, 1e-6);
+  EXPECT_NEAR(0.5f + kShDc * g.sh[2], 0.0f, 1e-6);
+}
+
+TEST(SplatFileTest, RefusesOtherPlys) {
+  const std::string ply = SplatPly(BallOnGround(5, 0.0f, 1));
+  EXPECT_THAT(Refusal(Header("element vertex 8\nproperty float x\nproperty float y\n"
+                             "property float z\nelement face 6\n"
+                             "property list uchar int vertex_indices\n") +
+                      std::string(500, '\0')),
+              HasSubstr("mesh"));
+  EXPECT_THAT(Refusal(Header("element vertex 8\nproperty float x\nproperty float y\n"
+                             "property float z\nproperty uchar red\n") +
+                      std::string(500, '\0')),
+              HasSubstr("point cloud"));
+  EXPECT_THAT(Refusal(Replaced(ply, "property float scale_2\n", "property float scale_9\n")),
+              HasSubstr("no scale_2"));
+  EXPECT_THAT(Refusal(Replaced(ply, "binary_little_endian", "ascii")), HasSubstr("ascii"));
+  EXPECT_THAT(Refusal(Replaced(ply, "f_rest_8", "f_rest_x")), HasSubstr("8 properties f_rest"));
+  EXPECT_THAT(Refusal(Replaced(ply,
+                               "element vertex",
+                               "element chunk 1\nproperty float min_x\n"
+                               "element vertex")),
+              HasSubstr("SuperSplat"));
+  EXPECT_THAT(Refusal(Replaced(ply, "vertex 5", "vertex five")), HasSubstr("'five'"));
+  EXPECT_THAT(Refusal(Replaced(ply, "float x", "list uchar int x")), HasSubstr("list"));
+  EXPECT_THAT(Refusal(Header("")), HasSubstr("without vertices"));
+  EXPECT_THAT(Refusal("ply\nformat"), HasSubstr("cut short"));
+  EXPECT_THAT(Refusal(ply.substr(0, ply.size() - 1)), HasSubstr("ends after 4 of its 5"));
+}
+
+TEST(SplatFileTest, SizesAreCheckedBeforeMemoryIsTaken) {
+  const std::string ply = SplatPly(BallOnGround(5));
+  for (const char* count : {"4000000000", "18446744073709551615"}) {
+    EXPECT_THAT(Refusal(Replaced(ply, "vertex 5", std::string("vertex ") + count)),
+                HasSubstr("ends after"));
+  }
+  SplatSource few;
+  few.max_gaussians = 4;
+  few.remedy = "take fewer";
+  EXPECT_THAT(Refusal(ply, few), HasSubstr("holds 5 Gaussians; at most 4"));
+  EXPECT_THAT(Refusal(ply, few), HasSubstr("take fewer"));
+  ThreadPool pool(1);
+  EXPECT_THAT(Refusal(EncodeSog(BallOnGround(5), pool), few), HasSubstr("at most 4"));
+  for (const SpzVersion version : {SpzVersion::k2, SpzVersion::k4}) {
+    EXPECT_THAT(Refusal(EncodeSpz(BallOnGround(5), version, pool), few), HasSubstr("at most 4"));
+  }
+  // A header of SPZ 2 that promises 4 billion Gaussians in a hundred bytes.
+  std::string header("NGSP\x02\0\0\0\xff\xff\xff\xff\0\x0c\0\0", 16);
+  EXPECT_THAT(Refusal(Gzip(header + std::string(1000, '\0'))), HasSubstr("cut short"));
+}
+
+TEST(SplatFileTest, EveryCutOfEveryFormatIsRefused) {
+  ThreadPool pool(1);
+  const ViewerGaussians g = BallOnGround(40, 0.2f, 1);
+  for (const std::string& bytes : {SplatPly(g),
+                                   EncodeSog(g, pool),
+                                   EncodeSpz(g, SpzVersion::k2, pool),
+                                   EncodeSpz(g, SpzVersion::k4, pool)}) {
+    ASSERT_EQ(ReadSplat(bytes).size(), 40u);
+    for (size_t size = 0; size + 1 < bytes.size(); size += 1 + bytes.size() / 97) {
+      EXPECT_NE(Refusal(bytes.substr(0, size)), "") << size << " of " << bytes.size();
+    }
+  }
+}
+
+TEST(SplatFileTest, OtherVersionsAreNamed) {
+  ThreadPool pool(1);
+  const std::string meta = R"({"means":{"shape":[2,3]}})";
+  EXPECT_THAT(Refusal(StoredZip({{"meta.json", meta}})), HasSubstr("SOG of version 1"));
+  EXPECT_THAT(Refusal(StoredZip({{"meta.json", R"({"version":3,"count":1})"}})),
+              HasSubstr("SOG of version 3"));
+  EXPECT_THAT(Refusal(StoredZip({{"meta.json", R"({"version":2})"}})), HasSubstr("count"));
+  EXPECT_THAT(Refusal(StoredZip({{"meta.json", "{"}})), HasSubstr("no JSON"));
+  EXPECT_THAT(Refusal(StoredZip({{"photo.jpg", "x"}})), HasSubstr("without meta.json"));
+  std::string spz = EncodeSpz(BallOnGround(5), SpzVersion::k4, pool);
+  spz[4] = 5;
+  EXPECT_THAT(Refusal(spz), HasSubstr("SPZ of version 5"));
+  EXPECT_THAT(Refusal(Gzip(std::string("NGSP\x01\0\0\0\x01\0\0\0\0\0\0\0", 16))),
+              HasSubstr("SPZ of version 1"));
+  EXPECT_THAT(Refusal(Gzip("a text, packed, of more than 16 bytes")), HasSubstr("no SPZ"));
+}
+
+TEST(SplatFileTest, SpzOfVersion3HasTheRotationsOf4) {
+  ThreadPool pool(1);
+  const ViewerGaussians g = BallOnGround(20);
+  const std::string four = EncodeSpz(g, SpzVersion::k4, pool);
+  const ViewerGaussians expected = ReadSpz(four);
+  // The same streams behind the older header: positions, opacities, colours, scales, rotations.
+  std::string three("NGSP\x03\0\0\0\x14\0\0\0", 12);
+  three += four.substr(12, 2) + std::string(2, '\0');
+  const auto byte = [&](double value) { three += static_cast<char>(std::lround(value)); };
+  for (size_t i = 0; i < 60; ++i) {
+    const double axis = i % 3 == 0 ? 1.0 : -1.0;
+    const auto fixed = static_cast<int32_t>(
+        std::lround(std::ldexp(axis * expected.position[i], static_cast<uint8_t>(four[13]))));
+    for (int k = 0; k < 3; ++k) three += static_cast<char>(fixed >> (8 * k));
+  }
+  for (const float logit : expected.opacity_logit) byte(255.0 / (1.0 + std::exp(-logit)));
+  for (const float sh : expected.sh) byte(255.0 * (0.15 * sh + 0.5));
+  for (const float scale : expected.log_scale) byte(16.0 * (scale + 10.0));
+  for (int i = 0; i < 20; ++i) three += std::string("\0\0\0\xc0", 4);  // w is left out: identity
+  const ViewerGaussians g3 = ReadSpz(Gzip(three));
+  EXPECT_EQ(g3.position, expected.position);
+  EXPECT_EQ(g3.log_scale, expected.log_scale);
+  EXPECT_EQ(g3.sh, expected.sh);
+  EXPECT_NEAR(g3.rotation[0], 1.0f, 1e-6);
+}
+
+TEST(SplatFileTest, WhatIsNoSplatIsNamed) {
+  EXPECT_THAT(Refusal(""), HasSubstr("empty"));
+  EXPECT_THAT(Refusal("\x89PNG...."), HasSubstr("PNG picture"));
+  EXPECT_THAT(Refusal("glTF...."), HasSubstr("glTF"));
+  EXPECT_THAT(Refusal("some text"), HasSubstr("not a splat"));
+}
+
+TEST(SplatFileTest, ZipEntriesAreCheckedAndBounded) {
+  const std::string zip = StoredZip({{"a", "content"}});
+  EXPECT_EQ(ZipReader(zip, "z").Read("a", 7), "content");
+  EXPECT_THROW(ZipReader(zip, "z").Read("a", 6), Error);
+  EXPECT_THROW(ZipReader(zip, "z").Read("b", 7), Error);
+  EXPECT_THROW(ZipReader(Replaced(zip, "content", "contest"), "z").Read("a", 7), Error);
+}
+
+}  // namespace
+}  // namespace color3d

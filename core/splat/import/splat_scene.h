@@ -1,0 +1,42 @@
+// A splat as a scene without photos: views chosen around it, and its Gaussians in grey, which need
+// no training (METHOD.md "A splat without photos").
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/run_control.h"
+#include "core/scene/scene.h"
+#include "core/splat/import/splat_file.h"
+#include "core/splat/import/splat_views.h"
+#include "core/splat/model/gaussian_model.h"
+
+namespace color3d {
+
+struct SplatScene {
+  // Cameras, points on the Gaussians, and how the scene's frame lies in the file's. Views are named
+  // view_01.png, ...; there are no such files yet: `image_file` is the name.
+  Scene scene;
+  GaussianModel geometry;             // luminance only, in the scene's frame
+  int64_t gaussians = 0;              // in the file
+  int64_t dropped = 0;                // left out, because they cannot be drawn
+  bool had_color = false;             // it was removed
+  std::vector<std::string> warnings;  // for the report; not sent to the observer
+};
+
+// Most memory that any stage takes for each Gaussian of a splat of this degree, bytes: of the
+// export, which fits colours to whole pictures.
+int64_t WorkBytesPerGaussian(int sh_degree);
+
+// `bytes`: of a file that ReadSplat reads. Throws Error as ReadSplat, GrayModelOf and
+// ChooseSplatCameras do, and Error{kResourceExhausted} with the numbers when work on so many
+// Gaussians takes more than `memory_bytes`. Keeps no checkpoints.
+SplatScene ImportSplat(std::string_view bytes,
+                       const std::string& name,
+                       const SplatViewOptions& options,
+                       int64_t memory_bytes,
+                       const RunControl& run);
+
+}  // namespace color3d

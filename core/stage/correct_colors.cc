@@ -1,0 +1,273 @@
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/range_check.h"
+#include "core/color/lab.h"
+#include "core/colorizer/corrector.h"
+#include "core/image/codec.h"
+#include "core/scene/view_images.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/given_colors.h"
+#include "core/stage/sources/view_positions.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+namespace {
+
+constexpr size_t kMaxCorrections = 64;
+constexpr int kMaxProposals = 16;
+constexpr size_t kPlacesOfAllViews = 3000;  // that proposals are chosen from
+constexpr double kHardlyKnown = 0.2;        // share of a stroke that lies on the geometry
+
+// The scene's pictures in the colours that they have without corrections.
+class ColoredViews {
+ public:
+  explicit ColoredViews(StageContext& context)
+      : context_(context),
+        scene_(ReadScene(context)),
+        key_(ReadKeyView(context, scene_)),
+        images_(scene_,
+                context.scene_folder(),
+                ColoredSide(context, scene_.views[key_]),
+                /*cache_budget_bytes=*/0),
+        positions_(scene_, context) {}
+
+  const Scene& scene() const { return scene_; }
+  const ViewImages& images() const { return images_; }
+
+  PlacedPicture Picture(int view) const {
+    PlacedPicture picture{*images_.Luminance(view), {}, {}, {}};
+    picture.ab = ReadTargetAb(context_,
+                              scene_.views[view],
+                              view == key_,
+                              picture.luminance.width,
+                              picture.luminance.height);
+    picture.position = positions_.Of(view, images_.WorkingCamera(view), picture.luminance);
+    const Image provenance = Provenance(view, picture.luminance);
+    if (provenance.Empty()) return picture;
+    picture.seen = Image(provenance.width, provenance.height, 1);
+    std::copy_n(provenance.Plane(1), picture.seen.data.size(), picture.seen.data.begin());
+    return picture;
+  }
+  Image Provenance(int view, const Image& size) const {
+    return ReadProvenance(context_, scene_.views[view], size.width, size.height);
+  }
+
+ private:
+  StageContext& context_;
+  const Scene scene_;
+  const int key_;
+  const ViewImages images_;
+  const ViewPositions positions_;
+};
+
+// A correction on the grid of the working pictures.
+struct Painted {
+  int view;
+  Correction correction;
+};
+
+void MixIn(const Image& ab, const Image& share, Image* colors) {
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < share.data.size(); ++i) {
+      float& value = colors->Plane(c)[i];
+      value += share.data[i] * (ab.Plane(c)[i] - value);
+    }
+  }
+}
+
+double Mean(const Image& picture) {
+  double sum = 0.0;
+  for (const float value : picture.data) sum += value;
+  return sum / static_cast<double>(std::max<size_t>(picture.data.size(), 1));
+}
+
+void WarnIfOffTheGeometry(const Painted& painted, const std::string& name, StageContext& context) {
+  const Image& position = painted.correction.picture.position;
+  double known = 0.0, all = 0.0;
+  for (size_t i = 0; i < painted.correction.painted.data.size(); ++i) {
+    const double weight = painted.correction.painted.data[i];
+    all += weight;
+    if (!position.Empty()) known += weight * position.Plane(3)[i];
+  }
+  if (known >= kHardlyKnown * all) return;
+  context.progress().OnWarning(
+      "the correction of " + name +
+      " lies where the 3D scene shows nothing of the photo, e.g. on sky: it "
+      "reaches other views by looks alone");
+}
+
+// What was not given must not leak into the edges of what was.
+Image UndistortGiven(const ViewImages& images,
+                     int view,
+                     const GivenColors& given,
+                     const Image& undistorted) {
+  Image weighted = given.ab;
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < given.given.data.size(); ++i) {
+      weighted.Plane(c)[i] *= given.given.data[i];
+    }
+  }
+  Image ab = images.Undistort(view, weighted);
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < undistorted.data.size(); ++i) {
+      if (undistorted.data[i] > 0.0f) ab.Plane(c)[i] /= undistorted.data[i];
+    }
+  }
+  return ab;
+}
+
+Painted ReadCorrection(const FurtherKeyView& wanted,
+                       const ColoredViews& views,
+                       StageContext& context) {
+  const int index = views.scene().FindView(wanted.view);
+  const View& view = views.scene().views[index];
+  if (view.held_out) {
+    throw InvalidArgument("it is held out for evaluation; correct another view");
+  }
+  Painted painted{index, {views.Picture(index), {}, {}}};
+  Correction& correction = painted.correction;
+  const GivenColors given = ReadGivenColors(wanted.color,
+                                            ReadImage(context.scene_folder() / view.image_file),
+                                            correction.picture.ab,
+                                            context);
+  correction.painted = views.images().Undistort(index, given.given);
+  correction.ab = UndistortGiven(views.images(), index, given, correction.painted);
+  WarnIfOffTheGeometry(painted, view.name, context);
+  return painted;
+}
+
+std::vector<Painted> ReadCorrections(const std::vector<FurtherKeyView>& wanted,
+                                     const ColoredViews& views,
+                                     StageContext& context) {
+  std::vector<Painted> painted;
+  for (size_t i = 0; i < wanted.size(); ++i) {
+    context.cancel().ThrowIfCancelled();
+    try {
+      painted.push_back(ReadCorrection(wanted[i], views, context));
+    } catch (const Error& e) {
+      throw Error(e.code(),
+                  "correction {} of {}, of the view {}: {}",
+                  i + 1,
+                  wanted.size(),
+                  wanted[i].view,
+                  e.what());
+    }
+  }
+  return painted;
+}
+
+// What was corrected is the user's: seen.
+void CountAsSeen(const Image& share, Image* provenance) {
+  for (size_t i = 0; i < share.data.size(); ++i) {
+    for (int c = 0; c < 3; ++c) provenance->Plane(c)[i] *= 1.0f - share.data[i];
+    provenance->Plane(1)[i] += share.data[i];
+  }
+}
+
+// The places worth a stroke as JSON, and their views as pictures to paint on.
+nlohmann::ordered_json WriteProposals(const std::vector<ProposedPlace>& proposed,
+                                      const std::vector<int>& view_of_sample,
+                                      const std::map<int, Image>& colors,
+                                      const ColoredViews& views,
+                                      StageContext& context) {
+  auto places = nlohmann::ordered_json::array();
+  std::set<int> painted;
+  for (const ProposedPlace& place : proposed) {
+    const int index = view_of_sample[place.picture];
+    const View& view = views.scene().views[index];
+    const Image photo = ReadImage(context.scene_folder() / view.image_file);
+    places.push_back({{"view", view.name},
+                      {"x", static_cast<int>(place.x * photo.width)},
+                      {"y", static_cast<int>(place.y * photo.height)},
+                      {"gain", place.gain}});
+    if (!painted.insert(index).second) continue;
+    context.WriteOutput(ViewArtifact(artifact::kPaint, view, ".png"),
+                        EncodePng8(PaintablePhoto(photo, colors.at(index))));
+  }
+  return places;
+}
+
+}  // namespace
+
+void CorrectColorsOptions::Validate() const {
+  if (corrections.size() > kMaxCorrections) {
+    throw InvalidArgument(
+        "{} corrections were given; at most {} are taken", corrections.size(), kMaxCorrections);
+  }
+  RangeCheck("correction option")("proposals", proposals, 0, kMaxProposals);
+}
+
+void RunCorrectColors(const CorrectColorsOptions& options,
+                      StageContext& context,
+                      const std::string& encoder) {
+  options.Validate();
+  const ColoredViews views(context);
+  const Scene& scene = views.scene();
+  const std::vector<Painted> painted = ReadCorrections(options.corrections, views, context);
+  std::vector<Correction> corrections;
+  for (const Painted& one : painted) corrections.push_back(one.correction);
+  // Views are corrected side by side, each on one thread.
+  const auto colorizer = LoadColorizer(context.ReadInput(artifact::kColorizer),
+                                       context.LoadEncoder(encoder),
+                                       /*threads=*/1);
+  const auto corrector = colorizer->Correct(corrections);
+  const auto total = static_cast<int64_t>(scene.views.size());
+  const int samples = static_cast<int>(kPlacesOfAllViews / scene.TrainingViews().size() + 1);
+  std::vector<CorrectedColor> answers(total);
+  std::map<int, Image> colors;  // of views that may be proposed, as they are now
+  std::mutex outputs;
+  int64_t done = 0;
+  double changed = 0.0;
+  context.pool().ForEach(total, [&](int64_t index, int) {
+    context.cancel().ThrowIfCancelled();
+    const auto number = static_cast<int>(index);
+    const View& view = scene.views[index];
+    const PlacedPicture picture = views.Picture(number);
+    CorrectedColor& answer = answers[index];
+    answer = corrector->Predict(picture, view.held_out ? 0 : samples);
+    Image ab = picture.ab;
+    for (size_t i = 0; i < ab.data.size(); ++i) ab.data[i] += answer.change.data[i];
+    for (const Painted& one : painted) {
+      if (one.view != number) continue;
+      MixIn(one.correction.ab, one.correction.painted, &ab);
+      for (size_t i = 0; i < answer.share.data.size(); ++i) {
+        float& share = answer.share.data[i];
+        share = std::max(share, one.correction.painted.data[i]);
+      }
+    }
+    Image provenance = views.Provenance(number, picture.luminance);
+    if (!provenance.Empty()) CountAsSeen(answer.share, &provenance);
+    const std::string ab_png = EncodeAbPng(ab);
+    const std::string provenance_png = provenance.Empty() ? "" : EncodePng8(provenance);
+    const std::lock_guard lock(outputs);
+    changed += Mean(answer.share);
+    if (!painted.empty()) {
+      context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view, ".png"), ab_png);
+      if (!provenance.Empty()) {
+        context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view, ".png"),
+                            provenance_png);
+      }
+    }
+    answer.change = answer.share = Image();
+    if (options.proposals > 0 && !view.held_out) colors[number] = std::move(ab);
+    context.progress().OnProgress(++done, total, "correcting " + view.name);
+  });
+  const std::vector<int> training = scene.TrainingViews();
+  std::vector<PlaceSample> places;
+  for (const int view : training) places.push_back(std::move(answers[view].sample));
+  nlohmann::ordered_json facts;
+  facts["corrections"] = painted.size();
+  facts["share_changed"] = changed / static_cast<double>(total);
+  facts["proposals"] = WriteProposals(
+      corrector->Propose(places, options.proposals), training, colors, views, context);
+  context.WriteOutput(artifact::kCorrections, facts.dump(2));
+}
+
+}  // namespace color3d

@@ -1,0 +1,54 @@
+#include <gtest/gtest.h>
+
+#include "core/splat/export/export.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/stages.h"
+#include "tests/support/formats/viewer_files.h"
+#include "tests/support/scenes/splat_files.h"
+#include "tests/support/stages/stage_fixture.h"
+
+namespace color3d {
+namespace {
+
+TEST_F(StageTest, ASplatBecomesViewsAndGeometryThatNeedsNoTraining) {
+  ViewerGaussians splat = BallOnGround(800, 0.0f, 1);
+  splat.position[4] = std::nanf("");
+  WriteFileAtomic(scratch_.path() / "scene.ply", SplatPly(splat));
+  ImportOptions options;
+  options.hold_out_every_eighth = true;
+  StageContext import = MakeContext();
+  RunImportScene(options, import, {.views = 8, .side_px = 96});
+  EXPECT_NE(observer_.text.find("1 of the 800 Gaussians"), std::string::npos);
+  const auto out = scratch_.path() / "out";
+  const Scene scene = SceneFromJson(ReadFile(out / "scene.json"));
+  ASSERT_EQ(scene.views.size(), 8u);
+  EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{0}));
+  EXPECT_EQ(ImportFactsFromJson(ReadFile(out / "import.json")).layout, "splat");
+  for (const View& view : scene.views) {
+    const Image photo = ReadImage(out / view.image_file);
+    EXPECT_EQ(photo.channels, 1);
+    EXPECT_EQ(photo.width, 96);
+    EXPECT_EQ(photo.height, 72);
+  }
+  inputs_[artifact::kScene] = out / "scene.json";
+  inputs_[artifact::kGivenGeometry] = out / artifact::kGivenGeometry;
+  StageContext reconstruct = MakeContext();
+  RunReconstructGeometry({}, 96, reconstruct);
+  EXPECT_EQ(ReadFile(out / artifact::kGeometry), ReadFile(out / artifact::kGivenGeometry));
+  EXPECT_EQ(ParseGaussians(ReadFile(out / artifact::kGeometry)).size(), 799u);
+}
+
+TEST_F(StageTest, PhotosWinOverASplatBesideThem) {
+  RampScene(scratch_.path(), 32, 32);
+  WriteFileAtomic(scratch_.path() / "points.ply", "ply");
+  StageContext context = MakeContext();
+  try {
+    RunImportScene({}, context);
+    FAIL() << "three ramps cannot be placed";
+  } catch (const Error& e) {
+    EXPECT_EQ(std::string(e.what()).find("points.ply"), std::string::npos) << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace color3d

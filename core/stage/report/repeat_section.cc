@@ -1,0 +1,78 @@
+#include "core/stage/report/repeat_section.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/digest.h"
+#include "core/stage/formats/artifacts.h"
+
+namespace color3d {
+namespace {
+
+// One word for a shell, whatever the name has in it.
+std::string ShellWord(const std::string& text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return word + "'";
+}
+
+void AddDigest(const char* name, const StageContext& context, ReportData* data) {
+  if (!context.HasInput(name)) return;
+  data->facts.emplace_back(fmt::format("SHA-256 of {}", name),
+                           DigestFile(context.Input(name)).sha256);
+}
+
+// The flags that name a source of the key view's colour; empty for one whose text or file is not
+// kept.
+std::string ColorFlags(bool has_truth, const StageContext& context) {
+  if (has_truth) return " --benchmark";
+  if (!context.HasInput(artifact::kKeyColorFacts)) return "";
+  const auto facts = ReadJson(context, artifact::kKeyColorFacts);
+  const std::string source = facts.value("source", "");
+  if (source == "image") return " --key-color COLOURED.png";
+  return source == "automatic" ? " --auto" : "";
+}
+
+}  // namespace
+
+void AddHowToRepeat(const std::vector<std::string>& keys,
+                    bool has_truth,
+                    const StageContext& context,
+                    ReportData* data) {
+  const std::string color = ColorFlags(has_truth, context);
+  if (!keys.empty() && !color.empty() && (keys.size() == 1 || !has_truth)) {
+    std::string command = fmt::format("color3d colorize PHOTOS -o OUT --seed {} --key-view {}{}",
+                                      context.seed(),
+                                      ShellWord(keys.front()),
+                                      color);
+    for (size_t i = 1; i < keys.size(); ++i) {
+      command += " --more-key " + ShellWord(keys[i] + "=COLOURED_" + std::to_string(i) + ".png");
+    }
+    data->repeat.push_back(command);
+  } else if (has_truth && keys.size() > 1) {
+    data->repeat.push_back(
+        fmt::format("color3d colorize PHOTOS -o OUT --seed {} --benchmark --keys {}",
+                    context.seed(),
+                    keys.size()));
+  }
+  if (!data->view_page.empty()) data->repeat.push_back("color3d view OUT");
+  if (!data->repeat.empty()) {
+    data->repeat_notes.push_back(
+        "PHOTOS is the folder of the photos, OUT one for the results, COLOURED.png the key view as "
+        "it was coloured. Add the preset and other options that differed from the defaults. The "
+        "same seed on the same kind of machine gives the same result.");
+  }
+  data->facts.emplace_back("Color3D", COLOR3D_VERSION);
+  data->facts.emplace_back("seed", std::to_string(context.seed()));
+  for (const char* name : {artifact::kKeyColor, artifact::kModel, artifact::kPly, artifact::kSog}) {
+    AddDigest(name, context, data);
+  }
+  data->facts.emplace_back(
+      "licence of the embedded weights",
+      "The project's code is Apache-2.0. The embedded weights were trained on photographs that are "
+      "given for non-commercial research; use them in that spirit. Weights and backends of your "
+      "own have their own licence.");
+}
+
+}  // namespace color3d

@@ -1,0 +1,60 @@
+#include "core/stage/report/report_views.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/image/codec.h"
+#include "core/stage/report/source_overlay.h"
+#include "tests/support/stages/evaluated_scene.h"
+
+namespace color3d {
+namespace {
+
+class ReportViewsTest : public EvaluatedSceneTest {};
+
+TEST_F(ReportViewsTest, EveryViewHasItsPhotoAndARenderOfTheModel) {
+  AddInput(ViewArtifact(artifact::kTruths, scene_.views[1], ".jpg"),
+           EncodeJpeg(Image(48, 32, 3, 0.5f)));
+  StageContext context = MakeContext();
+  const auto views = ReportViews(scene_, context);
+  ASSERT_EQ(views.size(), scene_.views.size());
+  size_t with_truth = 0;
+  for (const ReportView& view : views) {
+    ASSERT_GE(view.pictures.size(), 2u);
+    EXPECT_EQ(view.pictures[0].role, "gray");
+    EXPECT_EQ(view.pictures[1].role, "render");
+    EXPECT_EQ(view.pictures[1].width, 48);
+    if (view.pictures.size() == 3) with_truth += view.pictures[2].role == "truth";
+  }
+  EXPECT_EQ(with_truth, 1u);
+}
+
+TEST_F(ReportViewsTest, AReportOfHalfFinishedWorkShowsWhatThereIs) {
+  StageContext context = MakeContext();  // no key view, no scores, no export, no import facts
+  RunReport({{.kind = "solve_chroma", .state = "SUCCEEDED", .seconds = 2.0}}, context);
+  EXPECT_THAT(context.outputs(), testing::Contains(artifact::kReport));
+  const std::string html = ReadFile(scratch_.path() / "out" / artifact::kReport);
+  EXPECT_THAT(html, testing::HasSubstr("id=\"compare\""));
+  EXPECT_THAT(html, testing::HasSubstr("solve chroma"));
+  EXPECT_THAT(html, testing::Not(testing::HasSubstr("Key view</h2>")));
+  EXPECT_THAT(html, testing::Not(testing::HasSubstr("view.html")));
+}
+
+TEST(SourceOverlay, TellsSourcesApartByLightnessAndPatternNotByHueAlone) {
+  const Image photo(32, 16, 3, 0.6f);
+  const auto shaded = [&](float guessed, float seen, float inferred) {
+    Image shares(32, 16, 3);
+    const float of[] = {guessed, seen, inferred};
+    for (int c = 0; c < 3; ++c) std::fill_n(shares.Plane(c), shares.PlaneSize(), of[c]);
+    return ShadeBySource(photo, shares);
+  };
+  const Image seen = shaded(0.0f, 1.0f, 0.0f), inferred = shaded(0.0f, 0.0f, 1.0f),
+              guessed = shaded(1.0f, 0.0f, 0.0f);
+  EXPECT_NEAR(seen.At(0, 5, 5), seen.At(2, 5, 5), 1e-5) << "plain";
+  EXPECT_GT(inferred.At(2, 5, 5), inferred.At(0, 5, 5) + 0.1f) << "bluish";
+  EXPECT_GT(std::abs(guessed.At(2, 0, 0) - guessed.At(2, 0, 4)), 0.2f) << "stripes";
+  EXPECT_EQ(inferred.At(2, 0, 0), inferred.At(2, 0, 4)) << "no stripes";
+}
+
+}  // namespace
+}  // namespace color3d

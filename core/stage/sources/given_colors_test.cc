@@ -1,0 +1,92 @@
+#include "core/stage/sources/given_colors.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "tests/support/stages/stage_fixture.h"
+
+namespace color3d {
+namespace {
+
+using Source = ColorizeKeyViewOptions::Source;
+using testing::HasSubstr;
+
+class GivenColorsTest : public StageTest {
+ protected:
+  void SetUp() override {
+    StageTest::SetUp();
+    photo_ = Image(48, 32, 3);
+    for (int y = 0; y < 32; ++y) {
+      for (int x = 0; x < 48; ++x) {
+        for (int c = 0; c < 3; ++c) photo_.At(c, y, x) = 0.2f + 0.012f * static_cast<float>(x);
+      }
+    }
+    ab_ = Image(12, 8, 2, 12.0f);
+  }
+  GivenColors Read(Source source, const Image& picture) {
+    ColorizeKeyViewOptions options;
+    options.source = source;
+    options.file = scratch_.path() / "given.png";
+    WriteFileAtomic(options.file, EncodePng8(picture));
+    StageContext context = MakeContext();
+    return ReadGivenColors(options, photo_, ab_, context);
+  }
+  std::string Refusal(Source source, const Image& picture) {
+    try {
+      Read(source, picture);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "nothing was refused";
+  }
+  static double Sum(const Image& picture) {
+    double sum = 0.0;
+    for (const float value : picture.data) sum += value;
+    return sum;
+  }
+
+  Image photo_, ab_;
+};
+
+// A box of a strong green over the picture.
+void PaintBox(int left, int top, int width, int height, Image* picture) {
+  for (int y = top; y < top + height; ++y) {
+    for (int x = left; x < left + width; ++x) {
+      picture->At(0, y, x) = 0.1f;
+      picture->At(1, y, x) = 0.6f;
+      picture->At(2, y, x) = 0.1f;
+      if (picture->channels == 4) picture->At(3, y, x) = 1.0f;
+    }
+  }
+}
+
+TEST_F(GivenColorsTest, APictureThatWasPaintedOnCountsWhereItWasChanged) {
+  Image painted = PaintablePhoto(photo_, ab_);
+  PaintBox(10, 5, 8, 6, &painted);
+  const GivenColors given = Read(Source::kImage, painted);
+  EXPECT_EQ(Sum(given.given), 48.0);
+  EXPECT_EQ(given.given.At(0, 6, 12), 1.0f);
+  EXPECT_LT(given.ab.At(0, 6, 12), -30.0f) << "green";
+}
+
+TEST_F(GivenColorsTest, StrokesOnALayerOfAnotherSizeButTheSameShape) {
+  Image layer(96, 64, 4);
+  PaintBox(20, 10, 16, 12, &layer);
+  const GivenColors given = Read(Source::kStrokes, layer);
+  EXPECT_NEAR(Sum(given.given), 48.0, 4.0);
+  EXPECT_LT(given.ab.At(0, 7, 13), -30.0f);
+}
+
+TEST_F(GivenColorsTest, WhatCannotBeUsedIsRefused) {
+  EXPECT_THAT(Refusal(Source::kImage, PaintablePhoto(photo_, ab_)), HasSubstr("no pixel"));
+  Image other_shape(48, 48, 4);
+  PaintBox(2, 2, 8, 8, &other_shape);
+  EXPECT_THAT(Refusal(Source::kStrokes, other_shape), HasSubstr("48x48"));
+  EXPECT_THAT(Refusal(Source::kImage, Image(96, 64, 3, 0.5f)), HasSubstr("96x64"));
+  EXPECT_THAT(Refusal(Source::kAutomatic, photo_), HasSubstr("strokes, points or a picture"));
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,248 @@
+#include "core/video/mp4_writer.h"
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/error.h>
+#include <libavutil/opt.h>
+}
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/range_check.h"
+#include "core/video/yuv.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+// The best first. Others that FFmpeg may know need a graphics card or are closed.
+constexpr const char* kEncoders[] = {"libx264", "libopenh264", "mpeg4"};
+constexpr int kKeyFrameSeconds = 2;  // a player that is moved has this much to decode at most
+
+struct FreeCodec {
+  void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
+};
+struct FreeFrame {
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+};
+struct FreePacket {
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+};
+struct CloseMovie {
+  void operator()(AVFormatContext* movie) const {
+    if (movie->pb != nullptr) avio_closep(&movie->pb);
+    avformat_free_context(movie);
+  }
+};
+
+// `result`: what FFmpeg returned, < 0.
+[[noreturn]] void Fail(const fs::path& path, const char* what, int result) {
+  char words[AV_ERROR_MAX_STRING_SIZE] = {};
+  av_strerror(result, words, sizeof words);
+  if (result == AVERROR(ENOSPC) || result == AVERROR(EDQUOT) || result == AVERROR(EFBIG)) {
+    throw Error(ErrorCode::kResourceExhausted,
+                "no room for {}: {}; free some disk space",
+                path.filename().string(),
+                words);
+  }
+  throw Error(
+      result == AVERROR(ENOMEM) ? ErrorCode::kResourceExhausted : ErrorCode::kFailedPrecondition,
+      "cannot {} {}: {}",
+      what,
+      path.filename().string(),
+      words);
+}
+
+std::string EncodersText() {
+  std::string text;
+  for (const char* name : kEncoders) text += (text.empty() ? "" : ", ") + std::string(name);
+  return text;
+}
+
+}  // namespace
+
+class Mp4Writer::Impl {
+ public:
+  Impl(fs::path path, const Mp4Options& options)
+      : path_(std::move(path)), part_(path_.string() + ".part"), options_(options) {
+    CheckOptions();
+    av_log_set_level(AV_LOG_ERROR);
+    OpenEncoder();
+    OpenMovie();
+    frame_.reset(av_frame_alloc());
+    packet_.reset(av_packet_alloc());
+    if (!frame_ || !packet_) Fail(path_, "begin", AVERROR(ENOMEM));
+    frame_->format = codec_->pix_fmt;
+    frame_->width = options_.width;
+    frame_->height = options_.height;
+    Require(av_frame_get_buffer(frame_.get(), 0), "begin");
+  }
+
+  ~Impl() {
+    movie_.reset();  // closes the file
+    std::error_code none;
+    fs::remove(part_, none);
+  }
+
+  const std::string& encoder() const { return encoder_; }
+
+  void Add(const Image& srgb, ThreadPool& pool) {
+    if (srgb.width != options_.width || srgb.height != options_.height || srgb.channels != 3) {
+      throw InvalidArgument(
+          "a picture of {} x {} px and {} channels is no part of a movie of {} x "
+          "{} px in colour",
+          srgb.width,
+          srgb.height,
+          srgb.channels,
+          options_.width,
+          options_.height);
+    }
+    // The encoder may still need the last one.
+    Require(av_frame_make_writable(frame_.get()), "go on with");
+    YuvFromSrgb(srgb,
+                {frame_->data[0], frame_->linesize[0]},
+                {frame_->data[1], frame_->linesize[1]},
+                {frame_->data[2], frame_->linesize[2]},
+                pool);
+    frame_->pts = count_++;
+    Encode(frame_.get());
+  }
+
+  void Finish() {
+    if (count_ == 0) throw InvalidArgument("a movie needs a picture");
+    Encode(nullptr);
+    Require(av_write_trailer(movie_.get()), "write the end of");
+    const int closed = avio_closep(&movie_->pb);
+    Require(closed, "write the end of");
+    PublishFile(part_, path_);
+  }
+
+ private:
+  void Require(int result, const char* what) const {
+    if (result < 0) Fail(path_, what, result);
+  }
+
+  void CheckOptions() const {
+    const RangeCheck check("movie option");
+    check("width", options_.width, 16, 8192);
+    check("height", options_.height, 16, 8192);
+    check("frames_per_second", options_.frames_per_second, 1, 120);
+    check("threads", options_.threads, 1, 1024);
+    if (options_.width % 2 != 0 || options_.height % 2 != 0) {
+      throw InvalidArgument(
+          "a movie's sides must be even; these are {} x {} px", options_.width, options_.height);
+    }
+  }
+
+  void OpenEncoder() {
+    int failure = AVERROR_ENCODER_NOT_FOUND;
+    for (const char* name : kEncoders) {
+      const AVCodec* codec = avcodec_find_encoder_by_name(name);
+      if (codec == nullptr) continue;
+      failure = TryEncoder(*codec);
+      if (failure >= 0) return;
+    }
+    char words[AV_ERROR_MAX_STRING_SIZE] = {};
+    av_strerror(failure, words, sizeof words);
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "this machine's libavcodec encodes no movie ({}): it has none of {}, or none works; "
+        "install one with libx264 (Debian's libavcodec), or ask for pictures instead",
+        words,
+        EncodersText());
+  }
+
+  int TryEncoder(const AVCodec& codec) {
+    codec_.reset(avcodec_alloc_context3(&codec));
+    if (!codec_) return AVERROR(ENOMEM);
+    const AVRational rate = av_d2q(options_.frames_per_second, 1001 * 1000);
+    codec_->width = options_.width;
+    codec_->height = options_.height;
+    codec_->pix_fmt = AV_PIX_FMT_YUV420P;
+    codec_->time_base = av_inv_q(rate);
+    codec_->framerate = rate;
+    codec_->sample_aspect_ratio = {1, 1};
+    codec_->gop_size =
+        std::max(1, static_cast<int>(std::lround(kKeyFrameSeconds * options_.frames_per_second)));
+    codec_->thread_count = options_.threads;
+    codec_->color_range = AVCOL_RANGE_MPEG;
+    codec_->color_primaries = AVCOL_PRI_BT709;
+    codec_->color_trc = AVCOL_TRC_BT709;
+    codec_->colorspace = AVCOL_SPC_BT709;
+    codec_->chroma_sample_location = AVCHROMA_LOC_LEFT;
+    codec_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;  // MP4 has the headers apart
+    const std::string name = codec.name;
+    if (name == "libx264") {
+      av_opt_set(codec_->priv_data, "preset", "medium", 0);
+      av_opt_set(codec_->priv_data, "crf", "17", 0);
+    } else if (name == "mpeg4") {
+      codec_->flags |= AV_CODEC_FLAG_QSCALE;
+      codec_->global_quality = 2 * FF_QP2LAMBDA;
+    } else {
+      // About as good for pictures of our size.
+      codec_->bit_rate = static_cast<int64_t>(0.25 * options_.width * options_.height *
+                                              options_.frames_per_second);
+    }
+    const int result = avcodec_open2(codec_.get(), &codec, nullptr);
+    if (result >= 0) encoder_ = name;
+    return result;
+  }
+
+  void OpenMovie() {
+    AVFormatContext* movie = nullptr;
+    Require(avformat_alloc_output_context2(&movie, nullptr, "mp4", part_.c_str()), "begin");
+    movie_.reset(movie);
+    stream_ = avformat_new_stream(movie, nullptr);
+    if (stream_ == nullptr) Fail(path_, "begin", AVERROR(ENOMEM));
+    Require(avcodec_parameters_from_context(stream_->codecpar, codec_.get()), "begin");
+    stream_->time_base = codec_->time_base;
+    stream_->avg_frame_rate = codec_->framerate;
+    movie->flags |= AVFMT_FLAG_BITEXACT;  // equal pictures, equal bytes
+    Require(avio_open(&movie->pb, part_.c_str(), AVIO_FLAG_WRITE), "write");
+    // The index comes first, so that a browser can begin before it has all.
+    AVDictionary* options = nullptr;
+    av_dict_set(&options, "movflags", "+faststart", 0);
+    const int result = avformat_write_header(movie, &options);
+    av_dict_free(&options);
+    Require(result, "write");
+  }
+
+  void Encode(const AVFrame* frame) {
+    Require(avcodec_send_frame(codec_.get(), frame), "encode");
+    for (;;) {
+      const int result = avcodec_receive_packet(codec_.get(), packet_.get());
+      if (result == AVERROR(EAGAIN) || result == AVERROR_EOF) return;
+      Require(result, "encode");
+      if (packet_->duration == 0) packet_->duration = 1;
+      av_packet_rescale_ts(packet_.get(), codec_->time_base, stream_->time_base);
+      packet_->stream_index = stream_->index;
+      Require(av_interleaved_write_frame(movie_.get(), packet_.get()), "write");
+    }
+  }
+
+  const fs::path path_;
+  const std::string part_;
+  const Mp4Options options_;
+  std::string encoder_;
+  int64_t count_ = 0;
+  std::unique_ptr<AVCodecContext, FreeCodec> codec_;
+  std::unique_ptr<AVFormatContext, CloseMovie> movie_;
+  AVStream* stream_ = nullptr;  // the movie's
+  std::unique_ptr<AVFrame, FreeFrame> frame_;
+  std::unique_ptr<AVPacket, FreePacket> packet_;
+};
+
+Mp4Writer::Mp4Writer(fs::path path, const Mp4Options& options)
+    : impl_(std::make_unique<Impl>(std::move(path), options)) {}
+Mp4Writer::~Mp4Writer() = default;
+const std::string& Mp4Writer::encoder() const { return impl_->encoder(); }
+void Mp4Writer::Add(const Image& srgb, ThreadPool& pool) { impl_->Add(srgb, pool); }
+void Mp4Writer::Finish() { impl_->Finish(); }
+
+}  // namespace color3d
