@@ -87,7 +87,7 @@ Image ReadMask(const fs::path& scene_folder,
   const bool is_alpha = mask_file == photo_file;
   const std::string what =
       is_alpha ? "the alpha of " + photo_file : "the mask " + mask_file + " of " + photo_file;
-  const Image image = ReadImage(scene_folder / mask_file, is_alpha);
+  const Image image = DecodeImage(ReadFile(scene_folder / mask_file), mask_file, is_alpha);
   if (image.width != width || image.height != height) {
     throw InvalidArgument("{} is {}, the photo {}; save it at the photo's size",
                           what,
