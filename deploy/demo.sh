@@ -75,6 +75,7 @@ fi
 if [ -f "$out/report.html" ]; then
   echo "demo: the report is $out/report.html"
   [ ! -f "$out/view.html" ] || echo "demo: turn the scene in a browser: $bin/color3d view $out"
+  echo "demo: mend a colour: $bin/color3d-server serve --data-dir $store & sleep 2; $bin/color3d correct $out"
 else
   echo "demo: colour $out/key_view.png by any means, then:"
   echo "  deploy/demo.sh $photos $out -- --key-color COLOURED.png"

@@ -13,6 +13,7 @@
 #include "client/commands/scene_target.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
+#include "client/lib/photos/mask_files.h"
 #include "client/lib/text.h"
 #include "client/options/colorize_options.h"
 #include "core/catalogue/artifacts.h"
@@ -30,6 +31,7 @@ class Colorize {
     options_.Check();
     if (!options_.scene.empty()) return RunStored();
     folder_ = CollectPhotos(options_.photos);
+    if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
     if (options_.film) TakeAsFrames(&folder_);
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
     for (const std::string& text : options_.more_keys) {

@@ -3,6 +3,7 @@
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/lib/names.h"
+#include "client/lib/photos/mask_files.h"
 #include "client/lib/progress_display.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
@@ -31,8 +32,9 @@ std::string SceneState(const v1::Scene& scene) {
   return scene.state() == v1::Scene::STATE_ACTIVE ? "ACTIVE" : "UPLOADING";
 }
 
-ExitCode RunCreate(const Context& context, const std::string& photos) {
-  const PhotoFolder folder = CollectPhotos(photos);
+ExitCode RunCreate(const Context& context, const std::string& photos, const std::string& masks) {
+  PhotoFolder folder = CollectPhotos(photos);
+  if (!masks.empty()) AddMasks(masks, &folder);
   for (const std::string& note : folder.notes) PrintNote(context, note);
   Connection connection(context.server, *context.interrupt);
   ProgressDisplay display(context.json);
@@ -130,8 +132,10 @@ void AddSceneCommands(CLI::App& app, Context& context) {
   create->fallthrough()
       ->add_option("PHOTOS", *text, "Folder of photos, or a splat (.ply, .sog, .spz)")
       ->required();
-  create->callback([&context, text] {
-    context.action = [&context, text] { return RunCreate(context, *text); };
+  const auto masks = std::make_shared<std::string>();
+  create->add_option("--masks", *masks, "Folder of masks, called like the photos: white counts");
+  create->callback([&context, text, masks] {
+    context.action = [&context, text, masks] { return RunCreate(context, *text, *masks); };
   });
 
   CLI::App* list = scene->add_subcommand("list", "Newest first");

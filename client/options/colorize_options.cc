@@ -90,6 +90,12 @@ bool IsWithin(const fs::path& path, const fs::path& folder) {
 }  // namespace
 
 void ColorizeOptions::Check() const {
+  if (!masks.empty() && film) {
+    throw InvalidArgument("--masks is for photos of a place; --film takes frames as they are");
+  }
+  if (!masks.empty() && photos.empty()) {
+    throw InvalidArgument("--masks belongs to PHOTOS; a stored scene has its masks already");
+  }
   if (photos.empty() == scene.empty()) {
     throw InvalidArgument(photos.empty() ? "give a folder of photos, or --scene scenes/ID"
                                          : "PHOTOS and --scene do not go together: the scene has "
@@ -184,6 +190,10 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
                  o->scene,
                  "In place of PHOTOS: a scene that the server holds, coloured from the key view "
                  "that `color3d key accept` has accepted");
+  app.add_option("--masks",
+                 o->masks,
+                 "Folder of masks, PNG, called like the photos (a.png or a.jpg.png): white counts, "
+                 "black is ignored. PNG photos with alpha need none");
   app.add_option("-o,--out", o->out, "Folder for the results")->required();
   DeclareKeyColorFlags(app, &o->color);
   app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");

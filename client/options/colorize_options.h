@@ -18,6 +18,7 @@ struct ColorizeOptions {
   std::string scene;   // "scenes/ID", whose accepted key view is used
   std::string out;
   KeyColorFlags color;
+  std::string masks;                   // folder; empty: none
   std::vector<std::string> more_keys;  // "VIEW=COLOURED_PICTURE", in order of importance
   std::string key_view;                // view name or stem; empty: selected
   std::string encoder;  // weights by name in the server's configuration; empty: the embedded one

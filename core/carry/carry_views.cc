@@ -4,6 +4,7 @@
 
 #include "core/carry/stereo_views.h"
 #include "core/image/codec.h"
+#include "core/scene/masks/photo_masks.h"
 
 namespace color3d {
 namespace {
@@ -38,6 +39,8 @@ ViewSurfaces SurfaceMaker::Make(int view) const {
   for (size_t i = 0; i < surface.depth.data.size(); ++i) {
     if (surface.opacity.data[i] < kMinOpacity) surface.depth.data[i] = 0.0f;
   }
+  // What is masked out has no surface: nothing is carried there or from there.
+  ClearMasked(images_.Mask(view).get(), &surface.depth);
   ViewSurfaces surfaces;
   surfaces.rendered = {camera, pose, *images_.Luminance(view), std::move(surface.depth)};
   surfaces.swept = Sweep(view, surfaces.rendered);
@@ -48,12 +51,14 @@ std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rend
   const StereoPlan plan =
       PlanStereo(scene_, view, PointsOf(view, rendered), training_, depth_sources_);
   if (plan.sources.empty()) return std::nullopt;
-  std::vector<std::shared_ptr<const Image>> pictures;  // keeps them alive
+  std::vector<std::shared_ptr<const Image>> pictures, masks;  // keeps them alive
   const auto posed = [&](int index) {
     pictures.push_back(sweep_images_.Luminance(index));
+    masks.push_back(sweep_images_.Mask(index));
     return PosedLuminance{sweep_images_.WorkingCamera(index),
                           scene_.views[index].cam_from_world,
-                          pictures.back().get()};
+                          pictures.back().get(),
+                          masks.back().get()};
   };
   std::vector<PosedLuminance> sources;
   for (int index : plan.sources) sources.push_back(posed(index));
@@ -61,6 +66,7 @@ std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rend
       SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, sweep_, cancel_);
   SurfaceView swept = rendered;
   swept.depth = Resize(map.depth, rendered.camera.width, rendered.camera.height);
+  ClearMasked(images_.Mask(view).get(), &swept.depth);
   return swept;
 }
 

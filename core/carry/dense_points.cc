@@ -8,6 +8,7 @@
 
 #include "core/carry/stereo_views.h"
 #include "core/image/codec.h"
+#include "core/scene/masks/photo_masks.h"
 
 namespace color3d {
 namespace {
@@ -16,6 +17,7 @@ struct SweptView {
   Camera camera;
   Pose pose;
   Image luminance;           // of the size of the camera
+  Image mask;                // of the same; empty: all counts
   std::vector<int> sources;  // views
   Image depth;               // empty when no other view shows the same
 };
@@ -35,6 +37,9 @@ SweptView Reduced(const Scene& scene, int view, const ViewImages& images, int si
   swept.camera = images.WorkingCamera(view).FitWithin(side_px);
   swept.pose = scene.views[view].cam_from_world;
   swept.luminance = Resize(*images.Luminance(view), swept.camera.width, swept.camera.height);
+  if (const auto mask = images.Mask(view)) {
+    swept.mask = ResizeMask(*mask, swept.camera.width, swept.camera.height);
+  }
   return swept;
 }
 
@@ -49,12 +54,14 @@ void Sweep(const Scene& scene,
   const StereoPlan plan = PlanStereo(scene, view, tracked, candidates, options.depth_sources);
   if (plan.sources.empty()) return;
   const auto posed = [&](int index) {
-    return PosedLuminance{swept[index].camera, swept[index].pose, &swept[index].luminance};
+    const SweptView& v = swept[index];
+    return PosedLuminance{v.camera, v.pose, &v.luminance, v.mask.Empty() ? nullptr : &v.mask};
   };
   std::vector<PosedLuminance> sources;
   for (const int index : plan.sources) sources.push_back(posed(index));
   swept[view].depth =
       SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, options.sweep, cancel).depth;
+  ClearMasked(swept[view].mask.Empty() ? nullptr : &swept[view].mask, &swept[view].depth);
   swept[view].sources = plan.sources;
 }
 

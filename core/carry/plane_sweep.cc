@@ -91,9 +91,33 @@ void SumSmallest(const std::vector<std::vector<uint8_t>>& costs,
   }
 }
 
-// The source seen through the plane at this depth of the reference camera. `valid` is 0 outside.
+// `mask` without the pixels whose census window reaches over its edge. Empty for null.
+Image WholeWindows(const Image* mask) {
+  if (mask == nullptr) return Image();
+  Image across = *mask;
+  for (int y = 0; y < mask->height; ++y) {
+    for (int x = 0; x < mask->width; ++x) {
+      if (mask->At(0, y, x) != 0.0f) continue;
+      const int last = std::min(mask->width - 1, x + kCensusRadius);
+      for (int xx = std::max(0, x - kCensusRadius); xx <= last; ++xx) across.At(0, y, xx) = 0.0f;
+    }
+  }
+  Image whole = across;
+  for (int y = 0; y < mask->height; ++y) {
+    for (int x = 0; x < mask->width; ++x) {
+      if (across.At(0, y, x) != 0.0f) continue;
+      const int last = std::min(mask->height - 1, y + kCensusRadius);
+      for (int yy = std::max(0, y - kCensusRadius); yy <= last; ++yy) whole.At(0, yy, x) = 0.0f;
+    }
+  }
+  return whole;
+}
+
+// The source seen through the plane at this depth of the reference camera. `valid` is 0 outside and
+// where `source_mask` (may be empty) is.
 void WarpThroughPlane(const PosedLuminance& reference,
                       const PosedLuminance& source,
+                      const Image& source_mask,
                       double depth,
                       Image* warped,
                       std::vector<uint8_t>* valid) {
@@ -131,6 +155,10 @@ void WarpThroughPlane(const PosedLuminance& reference,
       column[x] = inside ? sx : 0.0f;
       row[x] = inside ? sy : 0.0f;
     }
+    for (int x = 0; x < width && !source_mask.Empty(); ++x) {
+      const int sx = static_cast<int>(column[x] + 0.5f), sy = static_cast<int>(row[x] + 0.5f);
+      if (source_mask.At(0, sy, sx) == 0.0f) ok[x] = 0;
+    }
     for (int x = 0; x < width; ++x) {
       const int x0 = std::min(static_cast<int>(column[x]), picture.width - 2);
       const int y0 = std::min(static_cast<int>(row[x]), picture.height - 2);
@@ -161,14 +189,20 @@ CostVolume MatchPlanes(const PosedLuminance& reference,
   ComputeCensus(*reference.luminance, &of_reference);
   Image warped(width, height, 1);
   std::vector<uint8_t> valid(pixels);
+  const Image reference_mask = WholeWindows(reference.mask);
+  std::vector<Image> source_masks;
+  for (const PosedLuminance& source : sources) source_masks.push_back(WholeWindows(source.mask));
   const size_t count = sources.size();
   const size_t kept = (count + 1) / 2;  // the best half: the others may be occluded
   std::vector<std::vector<uint8_t>> costs(count, std::vector<uint8_t>(pixels));
   for (int d = 0; d < planes; ++d) {
     cancel.ThrowIfCancelled();
     for (size_t s = 0; s < count; ++s) {
-      WarpThroughPlane(reference, sources[s], depths[d], &warped, &valid);
+      WarpThroughPlane(reference, sources[s], source_masks[s], depths[d], &warped, &valid);
       ComputeCensus(warped, &of_warped);
+      for (size_t i = 0; i < reference_mask.data.size(); ++i) {
+        if (reference_mask.data[i] == 0.0f) valid[i] = 0;
+      }
       for (size_t i = 0; i < pixels; ++i) {
         const uint8_t bits = CountBits(of_reference[i] ^ of_warped[i]);
         costs[s][i] = valid[i] ? bits : kUnknownCost;

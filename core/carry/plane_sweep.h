@@ -15,6 +15,7 @@ struct PosedLuminance {
   Camera camera;  // of the picture
   Pose cam_from_world;
   const Image* luminance = nullptr;  // 1 channel, L 0..100
+  const Image* mask = nullptr;       // 1 channel of 0 and 1; what is 0 is not matched; null: all is
 };
 
 inline constexpr int kMaxSweepSources = 16;
@@ -31,7 +32,7 @@ struct PlaneSweepOptions {
 };
 
 struct DepthMap {
-  Image depth;       // 1 channel, camera depth in scene units
+  Image depth;       // 1 channel, camera depth in scene units; where masked out, as beside it
   Image confidence;  // 1 channel, 0..1: how clearly the best plane beats all others
 };
 

@@ -1,5 +1,6 @@
 #include "core/metrics/view_scores.h"
 
+#include "core/base/error.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
@@ -25,35 +26,78 @@ LabColor Pixel(const Image& lab, size_t i) {
   return {lab.Plane(0)[i], lab.Plane(1)[i], lab.Plane(2)[i]};
 }
 
+// Which pixels of a picture of this size count: the whole ones of `mask`. All for null.
+std::vector<size_t> Counting(const Image* mask, int width, int height) {
+  std::vector<size_t> pixels;
+  const Image reduced =
+      mask == nullptr ? Image(width, height, 1, 1.0f) : Resize(*mask, width, height);
+  for (size_t i = 0; i < reduced.data.size(); ++i) {
+    if (reduced.data[i] > 0.999f) pixels.push_back(i);
+  }
+  if (pixels.empty()) throw InvalidArgument("the mask leaves nothing of the view to score");
+  return pixels;
+}
+
+// The pixels that count, in one row: what is a mean over pixels is one over these.
+Image Gather(const Image& image, const std::vector<size_t>& pixels) {
+  Image row(static_cast<int>(pixels.size()), 1, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (size_t k = 0; k < pixels.size(); ++k) row.Plane(c)[k] = image.Plane(c)[pixels[k]];
+  }
+  return row;
+}
+
+// Mean over the pixels that count, where the others show what the truth shows.
+double MaskedSsim(const Image& drawn, const Image& truth, const std::vector<size_t>& pixels) {
+  if (pixels.size() == truth.PlaneSize()) return Ssim(drawn, truth, 1.0);
+  Image composed = truth;
+  for (int c = 0; c < truth.channels; ++c) {
+    for (const size_t i : pixels) composed.Plane(c)[i] = drawn.Plane(c)[i];
+  }
+  const double share = static_cast<double>(pixels.size()) / static_cast<double>(truth.PlaneSize());
+  return 1.0 - (1.0 - Ssim(composed, truth, 1.0)) / share;
+}
+
 }  // namespace
 
-Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image& view_ab) {
+Scores ScoreView(const Image& true_srgb,
+                 const Image& rendered_lab,
+                 const Image& view_ab,
+                 const Image* mask) {
   Scores v;
   const Image true_lab = FitWithin(LabFromSrgb(true_srgb), kScoreSidePx);
   const Image lab = FitWithin(rendered_lab, kScoreSidePx);
   const Image truth_srgb = SrgbFromLab(true_lab);
   const Image rendered_srgb = SrgbFromLab(lab);
-  v["psnr_rgb"] = Psnr(rendered_srgb, truth_srgb, 1.0);
-  v["ssim_rgb"] = Ssim(rendered_srgb, truth_srgb, 1.0);
-  v["psnr_l"] = Psnr(LuminanceOfLab(lab), LuminanceOfLab(true_lab), 100.0);
-  v["ab_rmse"] = AbRmse(lab, true_lab);
-  v["colorfulness"] = Colorfulness(rendered_srgb);
-  v["colorfulness_2d"] = Colorfulness(SrgbFromLab(UnderTrueL(true_lab, view_ab)));
-  v["colorfulness_truth"] = Colorfulness(truth_srgb);
+  const std::vector<size_t> pixels = Counting(mask, true_lab.width, true_lab.height);
+  const auto counting = [&](const Image& image) { return Gather(image, pixels); };
+  v["psnr_rgb"] = Psnr(counting(rendered_srgb), counting(truth_srgb), 1.0);
+  v["ssim_rgb"] = MaskedSsim(rendered_srgb, truth_srgb, pixels);
+  v["psnr_l"] = Psnr(counting(LuminanceOfLab(lab)), counting(LuminanceOfLab(true_lab)), 100.0);
+  v["ab_rmse"] = AbRmse(counting(lab), counting(true_lab));
+  v["colorfulness"] = Colorfulness(counting(rendered_srgb));
+  v["colorfulness_2d"] = Colorfulness(counting(SrgbFromLab(UnderTrueL(true_lab, view_ab))));
+  v["colorfulness_truth"] = Colorfulness(counting(truth_srgb));
 
   const Image truth = FitWithin(true_lab, kColorSidePx);
   const Image rendered = FitWithin(lab, kColorSidePx);
-  v["delta_e00"] = MeanDeltaE00(rendered, truth);
-  v["delta_e00_chroma"] = MeanDeltaE00(UnderTrueL(truth, ChromaOfLab(rendered)), truth);
-  v["delta_e00_chroma_2d"] = MeanDeltaE00(UnderTrueL(truth, AtColorSide(view_ab)), truth);
-  v["delta_e00_gray"] = MeanDeltaE00(UnderTrueL(truth, Image(truth.width, truth.height, 2)), truth);
+  const std::vector<size_t> of_color = Counting(mask, truth.width, truth.height);
+  const auto error = [&](const Image& ab) {
+    return MeanDeltaE00(Gather(UnderTrueL(truth, ab), of_color), Gather(truth, of_color));
+  };
+  v["delta_e00"] = MeanDeltaE00(Gather(rendered, of_color), Gather(truth, of_color));
+  v["delta_e00_chroma"] = error(ChromaOfLab(rendered));
+  v["delta_e00_chroma_2d"] = error(AtColorSide(view_ab));
+  v["delta_e00_gray"] = error(Image(truth.width, truth.height, 2));
   return v;
 }
 
-double ChromaError(const Image& true_srgb, const Image& rendered_lab) {
+double ChromaError(const Image& true_srgb, const Image& rendered_lab, const Image* mask) {
   const Image truth = AtColorSide(LabFromSrgb(true_srgb));
   const Image rendered = AtColorSide(rendered_lab);
-  return MeanDeltaE00(UnderTrueL(truth, ChromaOfLab(rendered)), truth);
+  const std::vector<size_t> pixels = Counting(mask, truth.width, truth.height);
+  return MeanDeltaE00(Gather(UnderTrueL(truth, ChromaOfLab(rendered)), pixels),
+                      Gather(truth, pixels));
 }
 
 int SourceOf(float guessed, float seen, float inferred) {
@@ -62,11 +106,14 @@ int SourceOf(float guessed, float seen, float inferred) {
   return inferred >= guessed ? 2 : 0;
 }
 
-void SourceErrors::Add(const Image& true_srgb, const Image& view_ab, const Image& provenance) {
+void SourceErrors::Add(const Image& true_srgb,
+                       const Image& view_ab,
+                       const Image& provenance,
+                       const Image* mask) {
   const Image truth = AtColorSide(LabFromSrgb(true_srgb));
   const Image delivered = UnderTrueL(truth, AtColorSide(view_ab));
   const Image shares = Resize(provenance, truth.width, truth.height);
-  for (size_t i = 0; i < truth.PlaneSize(); ++i) {
+  for (const size_t i : Counting(mask, truth.width, truth.height)) {
     const float guessed = shares.Plane(0)[i], seen = shares.Plane(1)[i],
                 inferred = shares.Plane(2)[i];
     errors_.push_back(static_cast<float>(DeltaE00(Pixel(delivered, i), Pixel(truth, i))));

@@ -19,19 +19,27 @@ inline constexpr int kColorSidePx = 400;
 // `true_srgb`: 3 channels; `rendered_lab`: of the same size; `view_ab`: any size. Means over the
 // view's pixels. PSNR, SSIM and colourfulness at kScoreSidePx, "delta_e00*" (CIEDE2000) at
 // kColorSidePx: of the render, of its chroma and of the view's own chroma under the true L, and of
-// no chroma at all.
-Scores ScoreView(const Image& true_srgb, const Image& rendered_lab, const Image& view_ab);
+// no chroma at all. `mask`: 1 channel of 0 and 1 of the truth's size, and only where it is 1 pixels
+// count, also reduced ones of which a part does not; null: all count. Throws
+// Error{kInvalidArgument} when none is left.
+Scores ScoreView(const Image& true_srgb,
+                 const Image& rendered_lab,
+                 const Image& view_ab,
+                 const Image* mask = nullptr);
 
 // CIEDE2000 of the chroma of `rendered_lab` under the true L, at kColorSidePx.
-double ChromaError(const Image& true_srgb, const Image& rendered_lab);
+double ChromaError(const Image& true_srgb, const Image& rendered_lab, const Image* mask = nullptr);
 
 // Whether confidence means anything: errors of the delivered colour by where it comes from. A plain
 // value.
 class SourceErrors {
  public:
   // `provenance`: the view's 3 channels, shares of guessed, seen and inferred colour that sum to 1,
-  // any size.
-  void Add(const Image& true_srgb, const Image& view_ab, const Image& provenance);
+  // any size. `mask` as above.
+  void Add(const Image& true_srgb,
+           const Image& view_ab,
+           const Image& provenance,
+           const Image* mask = nullptr);
   bool Empty() const { return errors_.empty(); }
   // "share_X" of the pixels and their mean "delta_e00_X" for X = seen (share above half), inferred
   // and guessed (whichever is the larger otherwise; no error for one that has no pixels), and

@@ -10,6 +10,7 @@
 #include "core/scene/formats/colmap_model.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/lens.h"
+#include "core/scene/masks/photo_masks.h"
 #include "core/scene/normalise.h"
 #include "core/scene/photos.h"
 #include "core/scene/sfm/sfm.h"
@@ -75,6 +76,41 @@ void Normalise(ImportResult* result) {
   }
 }
 
+// Finds the photos' masks, for structure-from-motion already, and refuses bad ones.
+void FindPhotoMasks(const fs::path& scene_folder,
+                    const CancellationToken& cancel,
+                    std::vector<Photo>* photos) {
+  std::vector<std::string> files;
+  for (const Photo& photo : *photos) files.push_back(photo.file);
+  const std::vector<std::string> masks = FindMasks(scene_folder, files, {});
+  for (size_t i = 0; i < masks.size(); ++i) {
+    cancel.ThrowIfCancelled();
+    Photo& photo = (*photos)[i];
+    photo.mask_file = masks[i];
+    if (!masks[i].empty()) {
+      ReadMask(scene_folder, masks[i], photo.file, photo.width, photo.height);
+    }
+  }
+}
+
+// The same for a scene with poses.
+void FindViewMasks(const fs::path& scene_folder,
+                   const CancellationToken& cancel,
+                   std::vector<View>* views) {
+  std::vector<std::string> files, others;
+  for (const View& view : *views) files.push_back(view.image_file);
+  for (const Photo& photo : ListPhotos(scene_folder)) others.push_back(photo.file);
+  const std::vector<std::string> masks = FindMasks(scene_folder, files, others);
+  for (size_t i = 0; i < masks.size(); ++i) {
+    cancel.ThrowIfCancelled();
+    View& view = (*views)[i];
+    view.mask_file = masks[i];
+    if (masks[i].empty()) continue;
+    const Camera& camera = view.captured_camera;
+    ReadMask(scene_folder, masks[i], view.image_file, camera.width, camera.height);
+  }
+}
+
 void ImportPhotos(const fs::path& scene_folder,
                   const fs::path& scratch_folder,
                   const ImportOptions& options,
@@ -97,6 +133,7 @@ void ImportPhotos(const fs::path& scene_folder,
         scene_folder.string(),
         photos[0].name);
   }
+  FindPhotoMasks(scene_folder, run.cancel, &photos);
   SfmResult sfm = RunStructureFromMotion(photos, scene_folder, scratch_folder, options, run);
   result->scene = std::move(sfm.scene);
   result->sfm = std::move(sfm.report);
@@ -164,11 +201,13 @@ ImportResult ImportScene(const fs::path& scene_folder,
     result.layout = SceneLayout::kColmap;
     result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings);
     WarnOfUnposedPhotos(scene_folder, &result);
+    FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;
     result.scene =
         ReadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
     WarnOfUnposedPhotos(scene_folder, &result);
+    FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }
@@ -178,6 +217,8 @@ ImportResult ImportScene(const fs::path& scene_folder,
                           scene.views.size());
   }
   result.photos_registered = static_cast<int>(scene.views.size());
+  result.masked_views = static_cast<int>(std::count_if(
+      scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));
   result.undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
     return !IsUndistorted(v.distortion);
   });

@@ -52,6 +52,7 @@ struct ImportResult {
   bool random_points = false;  // the input had none
   int photos_found = 0;
   int photos_registered = 0;
+  int masked_views = 0;               // of which parts are masked out
   std::vector<std::string> warnings;  // for the report; not sent to the observer
 };
 
@@ -59,11 +60,12 @@ struct ImportResult {
 // folder itself; text or binary) with images/, or transforms.json with the photos that it names.
 // With poses of several kinds, COLMAP's wins. `scratch_folder` receives structure-from-motion's
 // files and sfm.log. Throws Error: an empty folder, one photo, unreadable photos, a model whose
-// images are missing, non-finite numbers, photos that do not overlap (how many registered and why
-// it may have failed), points that all lie behind their cameras or absurdly far away. Scenes far
-// from the origin are recentred, very small and very large ones rescaled (normalise.h); points with
-// fewer than 2 observations are dropped; poses without points get 20 000 seeded random ones. Warns
-// of cameras whose intrinsics do not fit their observations. Keeps no checkpoints.
+// images are missing, masks that fit no photo (photo_masks.h), non-finite numbers, photos that do
+// not overlap (how many registered and why it may have failed), points that all lie behind their
+// cameras or absurdly far away. Scenes far from the origin are recentred, very small and very large
+// ones rescaled (normalise.h); points with fewer than 2 observations are dropped; poses without
+// points get 20 000 seeded random ones. Warns of cameras whose intrinsics do not fit their
+// observations. Keeps no checkpoints.
 ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const std::filesystem::path& scratch_folder,
                          const ImportOptions& options,

@@ -21,6 +21,7 @@ struct Photo {
   int width = 0;        // px, as looked at: after orientation
   int height = 0;
   double focal_px = 0.0;  // from EXIF; 0: unknown
+  std::string mask_file;  // as View::mask_file
 };
 
 // Photos in images/ (any depth) when there are some, else those directly in the folder, else those

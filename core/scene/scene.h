@@ -24,6 +24,9 @@ struct Moment {
 struct View {
   std::string name;        // unique in the scene: the photo's path relative to the images folder
   std::string image_file;  // path of the photo relative to the scene's folder
+  // What counts of the photo (masks/photo_masks.h), relative to the scene's folder: the photo
+  // itself when its alpha tells; empty: all of it.
+  std::string mask_file;
   // Camera of the *undistorted* picture at full size, and of the photo as captured.
   Camera camera;
   Camera captured_camera;

@@ -156,6 +156,7 @@ View ViewFromJson(const Field& field) {
   View view;
   view.name = field["name"].RelativePath();
   view.image_file = field["image_file"].RelativePath();
+  if (field.Has("mask_file")) view.mask_file = field["mask_file"].RelativePath();
   view.camera = CameraFromJson(field["camera"]);
   view.captured_camera = CameraFromJson(field["captured_camera"]);
   view.distortion = DistortionFromJson(field["distortion"]);
@@ -200,6 +201,7 @@ std::string SceneToJson(const Scene& scene) {
     if (view.moment) {
       views.back()["moment"] = {{"time_s", view.moment->time_s}, {"shot", view.moment->shot}};
     }
+    if (!view.mask_file.empty()) views.back()["mask_file"] = view.mask_file;
   }
   json points = json::array();
   for (const SparsePoint& point : scene.points) {

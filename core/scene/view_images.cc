@@ -18,6 +18,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/lens.h"
+#include "core/scene/masks/photo_masks.h"
 
 namespace color3d {
 namespace {
@@ -114,8 +115,8 @@ struct ViewImages::Impl {
   std::vector<int> lens_of_view;   // index of the first view with the same lens
   std::deque<std::mutex> loading;  // one per view: a picture is decoded once, not twice
   std::mutex mutex;                // guards all below
-  std::map<int, std::shared_ptr<const Image>> cached;
-  std::list<int> recent;  // most recently used first
+  std::map<int, std::shared_ptr<const Image>> cached;  // by view; masks by MaskKey()
+  std::list<int> recent;                               // most recently used first
   int64_t cached_bytes = 0;
   std::list<std::pair<int, std::shared_ptr<const RemapTable>>> tables;  // most recent first
 
@@ -184,6 +185,8 @@ struct ViewImages::Impl {
     return Undistorted(view, ReadImage(folder / v.image_file));
   }
 
+  int MaskKey(int view) const { return view + static_cast<int>(scene.views.size()); }
+
   std::shared_ptr<const Image> FindCached(int view) {
     const std::lock_guard<std::mutex> lock(mutex);
     const auto it = cached.find(view);
@@ -230,6 +233,20 @@ std::shared_ptr<const Image> ViewImages::Luminance(int view) const {
   auto image = std::make_shared<const Image>(LuminanceFromSrgb(impl_->Load(view)));
   impl_->Keep(view, image);
   return image;
+}
+
+std::shared_ptr<const Image> ViewImages::Mask(int view) const {
+  const View& v = impl_->At(view);
+  if (v.mask_file.empty()) return nullptr;
+  const int key = impl_->MaskKey(view);
+  const std::lock_guard<std::mutex> lock(impl_->loading[view]);
+  if (auto mask = impl_->FindCached(key)) return mask;
+  const Camera& c = v.captured_camera;
+  const Image mask = impl_->Undistorted(
+      view, ReadMask(impl_->folder, v.mask_file, v.image_file, c.width, c.height));
+  auto whole = std::make_shared<const Image>(ResizeMask(mask, mask.width, mask.height));
+  impl_->Keep(key, whole);
+  return whole;
 }
 
 Image ViewImages::Srgb(int view) const {

@@ -27,6 +27,9 @@ class ViewImages {
   Camera WorkingCamera(int view) const;
   // 1 channel, L in 0..100, captured precision.
   std::shared_ptr<const Image> Luminance(int view) const;
+  // 1 channel, 1 where the photo counts and 0 where it is masked out, also in part; null: all
+  // counts.
+  std::shared_ptr<const Image> Mask(int view) const;
   // 3 channels, sRGB 0..1 (grey photos: three equal channels). Not cached.
   Image Srgb(int view) const;
   // Any picture (1..4 channels) that has the size of the view's photo as captured, after EXIF

@@ -7,6 +7,7 @@
 #include "core/color/lab.h"
 #include "core/film/film_carry.h"
 #include "core/image/codec.h"
+#include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
@@ -36,6 +37,7 @@ CarriedColor ColorOfFurther(const FurtherKeyView& further,
   color.ab = images.Undistort(view, result.ab);
   color.confidence = result.confidence.Empty() ? Image(color.ab.width, color.ab.height, 1, 1.0f)
                                                : images.Undistort(view, result.confidence);
+  ClearMasked(images.Mask(view).get(), &color.confidence);
   return color;
 }
 
@@ -58,6 +60,7 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
   keys[0].surfaces = maker.Make(keys[0].view);
   const Camera& camera = keys[0].surfaces.rendered.camera;
   keys[0].color = ReadKeyColor(context, camera.width, camera.height);
+  ClearMasked(images.Mask(keys[0].view).get(), &keys[0].color.confidence);
   for (const FurtherKeyView& further : options.further) {
     context.cancel().ThrowIfCancelled();
     ColoredKeyView key;

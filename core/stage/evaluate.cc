@@ -9,6 +9,7 @@
 #include "core/image/codec.h"
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/view_scores.h"
+#include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
@@ -71,6 +72,7 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   const ChromaTargetSource targets = [&](int view) {
     auto target = std::make_shared<ChromaTarget>();
     target->ab = ChromaOfLab(LabFromSrgb(images.Undistort(view, ReadImage(truth.at(view)))));
+    if (const auto mask = images.Mask(view)) target->weight = *mask;
     return target;
   };
   WithoutCurves progress(context.progress());
@@ -92,6 +94,7 @@ SceneConsistency CompareViews(const Scene& scene,
     const Pose& pose = scene.views[view].cam_from_world;
     const Camera camera = images.WorkingCamera(view);
     RenderedView rendered = RenderView(model, camera, pose, context.pool());
+    ClearMasked(images.Mask(view).get(), &rendered.depth);  // nothing matches there
     return ConsistencySource::Rendered{{camera, pose, std::move(rendered.depth)},
                                        std::move(rendered.lab)};
   };
@@ -127,15 +130,17 @@ class HeldOutScores {
     const Image delivered =
         model_ ? RenderView(*model_, camera, view.cam_from_world, context_.pool()).lab
                : ColoredFrame(scene_, index, images, context_);
-    Scores scores = ScoreView(true_srgb, delivered, ab);
+    const auto mask = images.Mask(index);
+    Scores scores = ScoreView(true_srgb, delivered, ab, mask.get());
     if (bound_) {
       const Image lab = RenderView(*bound_, camera, view.cam_from_world, context_.pool()).lab;
-      scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab);
+      scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab, mask.get());
       scores["colorfulness_bound"] = Colorfulness(SrgbFromLab(lab));
     }
     const std::string provenance = ProvenanceArtifact(context_, view);
     if (context_.HasInput(provenance)) {
-      sources_.Add(true_srgb, ab, DecodeImage(context_.ReadInput(provenance), provenance));
+      sources_.Add(
+          true_srgb, ab, DecodeImage(context_.ReadInput(provenance), provenance), mask.get());
     }
     ordered_json entry{{"view", view.name}};
     for (const auto& [name, value] : scores) {

@@ -173,6 +173,14 @@ void LeaveOutNeedless(const AugmentationOptions& options,
   }
 }
 
+// What is masked out must not be learnt from, and pictures made from it do not tell where it is.
+void LeaveOutMasked(std::map<Kind, int>* counts, Outcome* outcome) {
+  for (const auto& [kind, count] : *counts) {
+    outcome->LeaveOut(AugmentationKindName(kind), "parts of the key view are masked out");
+  }
+  counts->clear();
+}
+
 void WriteSheet(const KeyPicture& key, const Outcome& outcome, StageContext& context) {
   ContactSheet sheet;
   sheet.title = "Training pictures of the colorizer";
@@ -239,6 +247,7 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
   const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);
   std::map<Kind, int> counts = Deal(options);
   LeaveOutNeedless(options, context, &counts, &outcome);
+  if (!scene.views[key_index].mask_file.empty()) LeaveOutMasked(&counts, &outcome);
   if (!options.backend.empty() && !counts.empty()) {
     const int side = std::max(options.max_side_px, kRemoteSidePx);
     const Image key_srgb = SrgbFromLab(KeyLab(scene, key_index, side, context));

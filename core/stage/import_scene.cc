@@ -104,6 +104,7 @@ void RunImportScene(const ImportOptions& options,
   facts.random_points = result.random_points;
   facts.photos_found = result.photos_found;
   facts.photos_registered = result.photos_registered;
+  facts.masked_views = result.masked_views;
   context.progress().OnError(
       result.photos_found, "photos_without_pose", result.photos_found - result.photos_registered);
   context.WriteOutput(artifact::kScene, SceneToJson(result.scene));

@@ -7,6 +7,7 @@
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
+#include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/training_pictures.h"
@@ -29,10 +30,12 @@ void ExpectShapeOf(const Image& luminance, StageContext& context) {
       SizeText(luminance));
 }
 
-// The key view in colour; what the user left unpainted is not learnt from.
-TrainingPicture KeyPicture(const Image& luminance, StageContext& context) {
+// The key view in colour; what the user left unpainted or masked out is not learnt
+// from.
+TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageContext& context) {
   ExpectShapeOf(luminance, context);
   CarriedColor color = ReadKeyColor(context, luminance.width, luminance.height);
+  ClearMasked(mask, &color.confidence);
   const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, color.ab));
   if (chroma.IsGray()) {
     context.progress().OnWarning(fmt::format(
@@ -44,8 +47,9 @@ TrainingPicture KeyPicture(const Image& luminance, StageContext& context) {
   const auto unpainted = [](float confidence) { return confidence == 0.0f; };
   if (std::all_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
     throw InvalidArgument(
-        "what is painted on the key view is too fine to be seen at {} px; paint areas, or give the "
-        "picture as strokes, which spread",
+        "what is painted on the key view (and not masked out) is too fine to be seen at {} px; "
+        "paint "
+        "areas, or give the picture as strokes, which spread",
         SizeText(luminance));
   }
   if (std::any_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
@@ -112,7 +116,7 @@ void RunPersonalize(const ColorizerOptions& options,
   const int key = ReadKeyView(context, scene);
   const ViewImages images(scene, context.scene_folder(), options.max_side_px, 0);
   const auto luminance = images.Luminance(key);
-  std::vector<TrainingPicture> pictures = {KeyPicture(*luminance, context)};
+  std::vector<TrainingPicture> pictures = {KeyPicture(*luminance, images.Mask(key).get(), context)};
   const ViewPositions positions(scene, context);
   pictures[0].position = positions.Of(key, images.WorkingCamera(key), *luminance);
   if (context.HasInput(artifact::kAugmentationFacts)) {

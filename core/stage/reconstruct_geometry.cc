@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/carry/dense_points.h"
+#include "core/scene/masks/masked_points.h"
 #include "core/scene/view_images.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_cap.h"
@@ -32,6 +33,11 @@ MemoryPlan PlanMemory(const GeometryOptions& options,
   demand.max_gaussians = options.max_gaussians;
   demand.sh_degree = options.sh_degree;
   return PlanGeometryMemory(demand, budget_bytes);
+}
+
+Scene WithoutMaskedPoints(Scene scene, const ViewImages& images) {
+  scene.points = UnmaskedPoints(scene, images);
+  return scene;
 }
 
 // `scene` with points of the surfaces that several photos agree on.
@@ -79,10 +85,11 @@ void RunReconstructGeometry(const GeometryOptions& options,
   if (!memory.note.empty()) context.progress().OnWarning(memory.note);
   const ViewImages images(
       scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
+  const Scene unmasked = WithoutMaskedPoints(scene, images);
   const Scene start =
       options.recipe == GeometryOptions::Recipe::kPaper
-          ? scene
-          : WithDensePoints(scene, images, planned.max_gaussians, context.control());
+          ? unmasked
+          : WithDensePoints(unmasked, images, planned.max_gaussians, context.control());
   const GeometryProblem problem = GeometryProblemOf(start, images);
   const GaussianModel model = TrainGeometry(problem, planned, context.control());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));

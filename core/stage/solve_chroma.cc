@@ -28,6 +28,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
       if (made->confidence.Empty() && view == key) {
         made->confidence = Image(camera.width, camera.height, 1, 1.0f);
       }
+      if (const auto mask = images.Mask(view)) made->weight = *mask;
       target = std::move(made);
     }
     return target;

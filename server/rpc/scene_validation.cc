@@ -116,7 +116,11 @@ void CheckFile(const SceneFileRecord& file,
   }
   const bool is_photo = HasImageExtension(file.path);
   const bool is_transforms = BaseName(file.path) == "transforms.json";
-  const bool is_augmentation = IsAugmentFile(file.path);
+  const bool is_augmentation = IsAugmentFile(file.path), is_mask = IsMaskFile(file.path);
+  if (is_mask && !is_photo) {
+    violations->push_back({file.path, "is no picture (PNG); remove it from masks/"});
+    return;
+  }
   if (is_augmentation && !is_photo) {
     violations->push_back(
         {file.path, "is no picture (JPEG, PNG or TIFF); remove it from augment/"});
@@ -130,7 +134,7 @@ void CheckFile(const SceneFileRecord& file,
     image_limits.max_pixels = limits.max_pixels_per_image;
     image_limits.max_side_px = limits.max_image_side_px;
     ProbeImage(mapped.bytes(), file.path, image_limits);
-    if (!is_augmentation) ++check->photo_count;
+    if (!is_augmentation && !is_mask) ++check->photo_count;
   } catch (const Error& e) {
     violations->push_back({file.path, e.what()});
   }
@@ -157,7 +161,7 @@ void CheckFile(const SceneFileRecord& file,
 
 StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
   const bool has_photos = std::any_of(files.begin(), files.end(), [](const auto& file) {
-    return HasImageExtension(file.path) && !IsAugmentFile(file.path);
+    return HasImageExtension(file.path) && !IsAugmentFile(file.path) && !IsMaskFile(file.path);
   });
   if (HasFrames(files)) return StoredLayout::kFilm;
   if (!has_photos && CountFilms(files) > 0) return StoredLayout::kFilm;

@@ -83,6 +83,19 @@ TEST_F(SceneValidationTest, LayoutsAreRecognised) {
               HasSubstr("transforms.json"));
 }
 
+TEST_F(SceneValidationTest, MasksAreNoPhotos) {
+  v1::Scene scene;
+  std::vector<std::pair<std::string, std::string>> files = {
+      {"images/a.png", TinyPng()}, {"images/b.png", TinyPng()}, {"masks/a.png", TinyPng()}};
+  ASSERT_TRUE(Commit(files, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);
+  EXPECT_EQ(scene.photo_count(), 2);
+  files.back() = {"masks/a.png", "no picture"};
+  EXPECT_THAT(Commit(files, &scene).error_message(), HasSubstr("masks/a.png"));
+  files.back() = {"masks/a.txt", "no picture"};
+  EXPECT_THAT(Commit(files, &scene).error_message(), HasSubstr("masks/a.txt"));
+}
+
 TEST_F(SceneValidationTest, OneSplatIsASceneWithoutPhotos) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"bust.PLY", "ply"}}, &scene).ok());

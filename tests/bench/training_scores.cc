@@ -29,14 +29,15 @@ nlohmann::ordered_json ScoreTrainingViews(StageContext& context) {
         images.Undistort(view, ReadImage(context.scene_folder() / scene.views[view].image_file));
     const Camera camera = images.WorkingCamera(view);
     const Image ab = ReadViewAb(context, scene.views[view], camera.width, camera.height);
+    const auto mask = images.Mask(view);
     const Image lab =
         RenderView(model, camera, scene.views[view].cam_from_world, context.pool()).lab;
-    for (const auto& [name, value] : ScoreView(truth, lab, ab)) sum[name] += value;
+    for (const auto& [name, value] : ScoreView(truth, lab, ab, mask.get())) sum[name] += value;
     const std::string name = ViewArtifact(artifact::kProvenance, scene.views[view], ".png");
     if (context.HasInput(name)) {
       const Image shares = DecodeImage(context.ReadInput(name), name);
-      photos.Add(truth, ab, shares);
-      renders.Add(truth, ChromaOfLab(lab), shares);
+      photos.Add(truth, ab, shares, mask.get());
+      renders.Add(truth, ChromaOfLab(lab), shares, mask.get());
     }
     views += 1.0;
   }

@@ -4,6 +4,8 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/base/files.h"
@@ -77,11 +79,37 @@ ColorCount CountColorPhotos(const PhotoFolder& folder,
   return count;
 }
 
+namespace {
+
+// The transparency of a PNG photo as a mask of the scene.
+std::optional<LocalFile> SaveAlpha(const std::string& bytes,
+                                   const LocalFile& photo,
+                                   const fs::path& scratch) {
+  if (ProbeImage(bytes, photo.path).format != ImageFormat::kPng) return std::nullopt;
+  const Image image = DecodeImage(bytes, photo.path, /*keep_alpha=*/true);
+  if (image.channels != 2 && image.channels != 4) return std::nullopt;
+  Image mask(image.width, image.height, 1);
+  std::copy_n(image.Plane(image.channels - 1), mask.data.size(), mask.data.begin());
+  if (std::all_of(mask.data.begin(), mask.data.end(), [](float a) { return a > 0.5f; })) {
+    return std::nullopt;
+  }
+  const std::string name = photo.path.starts_with("images/") ? photo.path.substr(7) : photo.path;
+  const std::string path = "masks/" + name + ".png";
+  std::error_code error;
+  fs::create_directories((scratch / path).parent_path(), error);
+  WriteFileAtomic(scratch / path, EncodePng8(mask));
+  return LocalFile{path, scratch / path};
+}
+
+}  // namespace
+
 GrayCopies MakeGrayCopies(const PhotoFolder& folder,
                           const fs::path& scratch,
                           const CancellationToken& cancel) {
   GrayCopies copies{folder, {}};
   std::vector<char> in_color(folder.photos.size(), 0);
+  // Grey copies have no alpha; where the user gives masks, they win anyway.
+  std::vector<std::optional<LocalFile>> alpha(folder.photos.size());
   ThreadPool pool(2);
   pool.ForEach(static_cast<int64_t>(folder.photos.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
@@ -89,6 +117,7 @@ GrayCopies MakeGrayCopies(const PhotoFolder& folder,
     const std::string bytes = ReadFile(photo.file);
     const std::string name = photo.file.string();
     const Image image = DecodeImage(bytes, name);
+    if (folder.mask_files.empty()) alpha[i] = SaveAlpha(bytes, photo, scratch);
     in_color[i] = HasColor(image) ? 1 : 0;
     const fs::path copy = scratch / photo.path;
     std::error_code error;
@@ -96,6 +125,9 @@ GrayCopies MakeGrayCopies(const PhotoFolder& folder,
     WriteFileAtomic(copy, EncodeGray(image, ProbeImage(bytes, name).format));
     copies.folder.photos[i].file = copy;
   });
+  for (const std::optional<LocalFile>& mask : alpha) {
+    if (mask) copies.folder.mask_files.push_back(*mask);
+  }
   for (size_t i = 0; i < in_color.size(); ++i) {
     if (in_color[i] != 0) copies.in_color.insert(folder.photos[i].path);
   }

@@ -220,6 +220,7 @@ std::vector<LocalFile> PhotoFolder::AllFiles() const {
   if (film) all.push_back(*film);
   all.insert(all.end(), model_files.begin(), model_files.end());
   all.insert(all.end(), augment_files.begin(), augment_files.end());
+  all.insert(all.end(), mask_files.begin(), mask_files.end());
   return all;
 }
 

@@ -19,6 +19,7 @@ struct PhotoFolder {
   std::vector<LocalFile> photos;         // sorted by path
   std::vector<LocalFile> model_files;    // of a COLMAP model or transforms.json, sorted by path
   std::vector<LocalFile> augment_files;  // pictures in colour for the colorizer, sorted by path
+  std::vector<LocalFile> mask_files;     // of photos, see mask_files.h
   std::optional<LocalFile> splat;        // in place of photos: views are drawn from it
   std::optional<LocalFile> film;         // in place of photos: a video file, whose frames are views
   std::vector<std::string> notes;        // what the user may want to know, one line each

@@ -304,6 +304,7 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
     copies = WriteFeatureImages(photos,
                                 scene_folder,
                                 work.images(),
+                                work.masks(),
                                 options.sfm_max_image_side_px,
                                 LocalFeatureCount(photos.size()),
                                 run);

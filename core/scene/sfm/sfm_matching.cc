@@ -85,6 +85,9 @@ bool ExtractFeatures(ColmapProcess& colmap,
                                           std::to_string(options.sfm_max_image_side_px),
                                           "--SiftExtraction.max_num_features",
                                           std::to_string(options.sfm_max_features)};
+    if (photos.masked) {
+      arguments.insert(arguments.end(), {"--ImageReader.mask_path", work.masks().string()});
+    }
     if (group.focal_px > 0.0) {
       arguments.insert(arguments.end(), {"--ImageReader.camera_params", CameraParameters(group)});
     }

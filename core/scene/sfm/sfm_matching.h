@@ -17,6 +17,7 @@ namespace color3d {
 struct SfmWorkspace {
   std::filesystem::path folder;
   std::filesystem::path images() const { return folder / "photos"; }
+  std::filesystem::path masks() const { return folder / "photo_masks"; }
   std::filesystem::path database() const { return folder / "database.db"; }
 };
 

@@ -8,6 +8,7 @@
 
 #include "core/base/files.h"
 #include "core/image/codec.h"
+#include "core/scene/masks/photo_masks.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -65,6 +66,7 @@ Image FeatureImage(const Image& photo, int max_side_px) {
 FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
                                  const fs::path& scene_folder,
                                  const fs::path& folder,
+                                 const fs::path& mask_folder,
                                  int max_side_px,
                                  int local_features,
                                  const RunControl& run) {
@@ -84,6 +86,13 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     written.names[i] = fmt::format("{}/{:06}.png", folders[i], i + 1);
     fs::create_directories(folder / folders[i]);
     WriteFileAtomic(folder / written.names[i], EncodePng8(image));
+    if (!photo.mask_file.empty()) {
+      const Image mask =
+          ReadMask(scene_folder, photo.mask_file, photo.file, photo.width, photo.height);
+      fs::create_directories(mask_folder / folders[i]);
+      WriteFileAtomic(mask_folder / (written.names[i] + ".png"),
+                      EncodePng8(ResizeMask(mask, image.width, image.height)));
+    }
     if (local_features > 0) {
       written.features[i] =
           DetectLocalFeatures(FitWithin(image, kSimilaritySidePx), local_features);
@@ -95,6 +104,8 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     run.progress.OnProgress(begin, count, fmt::format("reading photos {}/{}", begin + 1, count));
     run.pool.ForEach(std::min(batch, count - begin), [&](int64_t i, int) { write(begin + i); });
   }
+  written.masked = std::any_of(
+      photos.begin(), photos.end(), [](const Photo& photo) { return !photo.mask_file.empty(); });
   std::map<std::string, size_t> group_of_folder;
   for (size_t i = 0; i < photos.size(); ++i) {
     const auto [it, is_new] = group_of_folder.emplace(folders[i], written.groups.size());

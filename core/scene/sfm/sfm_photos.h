@@ -28,13 +28,17 @@ struct FeatureImages {
   std::vector<std::string> names;       // of all copies, relative to the folder, in photos' order
   std::vector<Group> groups;            // together all names
   std::vector<LocalFeatures> features;  // per photo, for CompareAll; empty unless asked for
+  bool masked = false;                  // some photo has a mask
 };
 
 // Writes photo i as <width>x<height>[_f<focal>]/<i + 1 as 6 digits>.png below `folder`, EXIF
-// orientation applied. `local_features` > 0: also finds so many features in each photo.
+// orientation applied, and its mask, if it has one, as the same name with .png added below
+// `mask_folder`, as COLMAP wants it. `local_features` > 0: also finds so many features in each
+// photo.
 FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& folder,
+                                 const std::filesystem::path& mask_folder,
                                  int max_side_px,
                                  int local_features,
                                  const RunControl& run);

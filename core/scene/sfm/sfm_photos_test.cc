@@ -47,8 +47,13 @@ TEST(FeatureImages, AreGroupedByCamera) {
   add("e.jpg", 100, 28);
   EXPECT_NEAR(photos[0].focal_px, 28.0 * 100.0 / 43.2666, 0.1);
   QuietRun run(2);
-  const FeatureImages written =
-      WriteFeatureImages(photos, folder.path(), scratch.path() / "copies", 40, 50, run.control());
+  const FeatureImages written = WriteFeatureImages(photos,
+                                                   folder.path(),
+                                                   scratch.path() / "copies",
+                                                   scratch.path() / "masks",
+                                                   40,
+                                                   50,
+                                                   run.control());
   ASSERT_EQ(written.groups.size(), 4u);
   EXPECT_EQ(written.groups[0].names,
             (std::vector<std::string>{written.names[0], written.names[1]}));

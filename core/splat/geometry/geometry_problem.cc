@@ -35,6 +35,7 @@ size_t SampleInitialColors(const Scene& scene, GeometryProblem& problem) {
   std::vector<int> count(scene.points.size(), 0);
   std::vector<char> in_front(scene.points.size(), 0);
   for (const PosedCamera& view : problem.training) {
+    const std::shared_ptr<const Image> mask = problem.mask ? problem.mask(view.view) : nullptr;
     const std::shared_ptr<const Image> picture =
         srgb ? problem.colors(view.view) : problem.luminance(view.view);
     for (size_t i = 0; i < scene.points.size(); ++i) {
@@ -42,6 +43,7 @@ size_t SampleInitialColors(const Scene& scene, GeometryProblem& problem) {
       int x = 0, y = 0;
       if (!PixelOf(view, point.position, &x, &y)) continue;
       in_front[i] = 1;
+      if (mask != nullptr && mask->At(0, y, x) == 0.0f) continue;
       if (count[i] >= kMaxSampledViews ||
           !std::binary_search(point.views.begin(), point.views.end(), view.view)) {
         continue;
@@ -74,6 +76,11 @@ GeometryProblem GeometryProblemOf(const Scene& scene,
   problem.training = PosedCameras(scene, images, scene.TrainingViews());
   problem.held_out = PosedCameras(scene, images, scene.HeldOutViews());
   problem.luminance = [&images](int view) { return images.Luminance(view); };
+  if (std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
+        return !view.mask_file.empty();
+      })) {
+    problem.mask = [&images](int view) { return images.Mask(view); };
+  }
   if (colors == TrainingColors::kSrgb) {
     // Decoded once; every level of the pyramid asks again.
     problem.colors = [&images,

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/scene/masks/photo_masks.h"
 #include "core/splat/geometry/densify.h"
 #include "core/splat/geometry/geometry_state.h"
 #include "core/splat/geometry/held_out.h"
@@ -68,7 +69,8 @@ class GeometryTrainer {
         targets_(problem.colors ? problem.colors : problem.luminance,
                  channels_,
                  problem.colors ? 1.0f : 0.01f,
-                 kTargetBudgetBytes) {
+                 kTargetBudgetBytes),
+        masks_(problem.mask, 1, 1.0f, kTargetBudgetBytes, ResizeMask) {
     state_.parameters =
         AtMost(options.max_gaussians,
                WithColors(problem.initial, channels_, ShCoefficients(options.sh_degree)));
@@ -190,8 +192,8 @@ class GeometryTrainer {
     clock_.Enter(Phase::kLoss);
     const bool exposed = !state_.exposures.empty();
     if (exposed) Expose(state_.exposures[drawn], pipeline_.color(), run_.pool, exposed_);
-    const LossValue loss = loss_.Evaluate(
-        exposed ? exposed_ : pipeline_.color(), *target, nullptr, weights, run_.pool, d_color_);
+    const LossValue loss =
+        Compare(exposed ? exposed_ : pipeline_.color(), target, MaskOf(view, level), weights);
     if (!std::isfinite(loss.total)) return false;
     if (exposed) {
       FitExposure(pipeline_.color(),
@@ -213,6 +215,28 @@ class GeometryTrainer {
     if (!Update()) return false;
     state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
     return true;
+  }
+
+  // Null: all of the view counts.
+  std::shared_ptr<const PlaneBuffer> MaskOf(const PosedCamera& view, int level) {
+    return problem_.mask ? masks_.Get(view, level) : nullptr;
+  }
+
+  // Loss and d_color_. What is masked out is taken to be as drawn, which costs nothing, not even in
+  // windows that reach over the mask's edge, and gets no gradient.
+  LossValue Compare(const PlaneBuffer& drawn,
+                    const std::shared_ptr<const PlaneBuffer>& target,
+                    const std::shared_ptr<const PlaneBuffer>& mask,
+                    const LossWeights& weights) {
+    if (mask == nullptr) {
+      return loss_.Evaluate(drawn, *target, nullptr, weights, run_.pool, d_color_);
+    }
+    masked_target_ = *target;
+    TakeWhereMasked(*mask, drawn, masked_target_);
+    const LossValue loss =
+        loss_.Evaluate(drawn, masked_target_, mask.get(), weights, run_.pool, d_color_);
+    ClearWhereMasked(*mask, d_color_);
+    return loss;
   }
 
   // As this iteration's number says, so that a resumed training drops the same.
@@ -326,7 +350,8 @@ class GeometryTrainer {
       pipeline_.Forward(
           state_.parameters, Colors(), CameraAt(view, 0), kBackground, false, run_.pool);
       PlaneBuffer drawn = pipeline_.color();
-      const PictureQuality quality = CompareClamped(*target, loss_, run_.pool, drawn);
+      const PictureQuality quality =
+          CompareClamped(*target, MaskOf(view, 0).get(), loss_, run_.pool, drawn);
       point.psnr_db += each * quality.psnr_db;
       point.ssim += each * quality.ssim;
       point.l1 += each * quality.l1;
@@ -361,6 +386,7 @@ class GeometryTrainer {
   const TrainingSchedule schedule_;
   const int channels_;
   TrainingTargets targets_;
+  TrainingTargets masks_;
   GeometryState state_;
   int64_t initial_count_ = 0;     // Gaussians
   double fraction_ = 0.0;         // of the schedule that is done
@@ -371,6 +397,7 @@ class GeometryTrainer {
   // Work space.
   SplatPipeline pipeline_;
   ImageLoss loss_;
+  PlaneBuffer masked_target_;
   PlaneBuffer exposed_;
   PlaneBuffer d_color_;
   ParameterBlock gradient_;

@@ -5,10 +5,47 @@
 
 namespace color3d {
 
+namespace {
+
+// Calls change(channel, y, x) for each sample that is masked out.
+template <typename Change>
+void ForMasked(const PlaneBuffer& mask, int channels, Change change) {
+  for (int c = 0; c < channels; ++c) {
+    for (int y = 0; y < mask.height; ++y) {
+      const float* counts = mask.Row(0, y);
+      for (int x = 0; x < mask.width; ++x) {
+        if (counts[x] == 0.0f) change(c, y, x);
+      }
+    }
+  }
+}
+
+double CountingShare(const PlaneBuffer* mask) {
+  if (mask == nullptr) return 1.0;
+  double masked = 0.0;
+  ForMasked(*mask, 1, [&](int, int, int) { masked += 1.0; });
+  const double pixels = static_cast<double>(mask->width) * mask->height;
+  return std::max(pixels - masked, 1.0) / pixels;
+}
+
+}  // namespace
+
+void TakeWhereMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes) {
+  ForMasked(mask, planes.channels, [&](int c, int y, int x) {
+    planes.Row(c, y)[x] = other.Row(c, y)[x];
+  });
+}
+
+void ClearWhereMasked(const PlaneBuffer& mask, PlaneBuffer& planes) {
+  ForMasked(mask, planes.channels, [&](int c, int y, int x) { planes.Row(c, y)[x] = 0.0f; });
+}
+
 PictureQuality CompareClamped(const PlaneBuffer& truth,
+                              const PlaneBuffer* mask,
                               ImageLoss& loss,
                               ThreadPool& pool,
                               PlaneBuffer& drawn) {
+  if (mask != nullptr) TakeWhereMasked(*mask, truth, drawn);
   double squares = 0.0;
   for (int c = 0; c < drawn.channels; ++c) {
     for (int y = 0; y < drawn.height; ++y) {
@@ -20,13 +57,14 @@ PictureQuality CompareClamped(const PlaneBuffer& truth,
       }
     }
   }
-  const double samples = static_cast<double>(drawn.width) * drawn.height * drawn.channels;
+  const double share = CountingShare(mask);
+  const double samples = share * drawn.width * drawn.height * drawn.channels;
   PlaneBuffer unused;
   const LossValue value = loss.Evaluate(drawn, truth, nullptr, {}, pool, unused);
   PictureQuality quality;
   quality.psnr_db = std::min(99.0, -10.0 * std::log10(std::max(squares / samples, 1e-12)));
-  quality.ssim = 1.0 - value.ssim;
-  quality.l1 = value.l1;
+  quality.ssim = 1.0 - value.ssim / share;
+  quality.l1 = value.l1 / share;
   return quality;
 }
 

@@ -19,7 +19,7 @@ TEST(CompareClampedTest, ClampsBeforeItCompares) {
   }
   ImageLoss loss;
   ThreadPool pool(1);
-  const PictureQuality quality = CompareClamped(truth, loss, pool, drawn);
+  const PictureQuality quality = CompareClamped(truth, nullptr, loss, pool, drawn);
   EXPECT_NEAR(quality.psnr_db, -10.0 * std::log10(0.01 / 3.0), 1e-3);
   EXPECT_NEAR(quality.l1, 0.1 / 3.0, 1e-5);
   EXPECT_EQ(drawn.Row(1, 3)[4], 1.0f);

@@ -45,6 +45,7 @@ std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view,
   const auto found = kept_.find({view.view, level});
   if (found != kept_.end()) return found->second;
   const std::shared_ptr<const Image> image = source_(view.view);
+  if (image == nullptr) return nullptr;
   if (image->channels != channels_ || image->width != view.camera.width ||
       image->height != view.camera.height) {
     throw InvalidArgument("view {}: the picture is {}x{}x{}, its camera {}x{} px of {} channels",
@@ -57,12 +58,12 @@ std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view,
                           channels_);
   }
   CheckFinite(*image, view.view);
-  auto planes = std::make_shared<const PlaneBuffer>(PlanesFromImage(
-      level == 0
-          ? *image
-          : Resize(*image, SizeAtLevel(image->width, level), SizeAtLevel(image->height, level)),
-      0.0f,
-      scale_));
+  const int width = SizeAtLevel(image->width, level), height = SizeAtLevel(image->height, level);
+  const auto reduced = [&] {
+    return reduce_ ? reduce_(*image, width, height) : Resize(*image, width, height);
+  };
+  auto planes = std::make_shared<const PlaneBuffer>(
+      PlanesFromImage(level == 0 ? *image : reduced(), 0.0f, scale_));
   const int64_t bytes = static_cast<int64_t>(planes->data.size() * sizeof(float));
   if (used_bytes_ + bytes <= budget_bytes_) {
     used_bytes_ += bytes;

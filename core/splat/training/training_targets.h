@@ -14,7 +14,7 @@
 
 namespace color3d {
 
-// A picture of the size of the view's camera.
+// A picture of the size of the view's camera; null: none.
 using PictureSource = std::function<std::shared_ptr<const Image>(int view)>;
 
 // Planes with value = (sample + offset) * scale.
@@ -25,12 +25,22 @@ int SizeAtLevel(int size_px, int level);
 
 class TrainingTargets {
  public:
+  using Reduce = std::function<Image(const Image& image, int width, int height)>;
   // `source` gives `channels` channels, must outlive this object, and is multiplied by `scale`.
-  TrainingTargets(const PictureSource& source, int channels, float scale, int64_t budget_bytes)
-      : source_(source), channels_(channels), scale_(scale), budget_bytes_(budget_bytes) {}
+  // `reduce` makes a picture smaller; Resize when it is empty.
+  TrainingTargets(const PictureSource& source,
+                  int channels,
+                  float scale,
+                  int64_t budget_bytes,
+                  Reduce reduce = {})
+      : source_(source),
+        channels_(channels),
+        scale_(scale),
+        budget_bytes_(budget_bytes),
+        reduce_(std::move(reduce)) {}
 
-  // Picture of a view at a level. Throws Error{kInvalidArgument} when the picture does not have the
-  // camera's size.
+  // Picture of a view at a level; null when the source has none. Throws Error{kInvalidArgument}
+  // when the picture does not have the camera's size.
   std::shared_ptr<const PlaneBuffer> Get(const PosedCamera& view, int level);
 
  private:
@@ -38,6 +48,7 @@ class TrainingTargets {
   int channels_;
   float scale_;
   int64_t budget_bytes_;
+  Reduce reduce_;
   int64_t used_bytes_ = 0;
   std::map<std::pair<int, int>, std::shared_ptr<const PlaneBuffer>> kept_;
 };

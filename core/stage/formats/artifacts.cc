@@ -38,7 +38,8 @@ std::string ImportFactsToJson(const ImportFacts& f) {
                                 {"undistorted", f.undistorted},
                                 {"random_points", f.random_points},
                                 {"photos_found", f.photos_found},
-                                {"photos_registered", f.photos_registered}}
+                                {"photos_registered", f.photos_registered},
+                                {"masked_views", f.masked_views}}
              .dump(1) +
          "\n";
 }
@@ -54,6 +55,7 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
     f.random_points = value.at("random_points");
     f.photos_found = value.at("photos_found");
     f.photos_registered = value.at("photos_registered");
+    f.masked_views = value.at("masked_views");
     return f;
   } catch (const nlohmann::json::exception& e) {
     throw InvalidArgument("{} is damaged: {}", artifact::kImportFacts, e.what());

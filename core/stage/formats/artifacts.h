@@ -31,6 +31,7 @@ struct ImportFacts {
   bool random_points = false;
   int photos_found = 0;
   int photos_registered = 0;
+  int masked_views = 0;  // of which parts are masked out
 };
 std::string ImportFactsToJson(const ImportFacts& facts);
 ImportFacts ImportFactsFromJson(std::string_view json);

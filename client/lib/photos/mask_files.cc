@@ -1,0 +1,78 @@
+#include "client/lib/photos/mask_files.h"
+
+#include <fmt/core.h>
+
+#include <map>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/image/probe/orientation.h"
+#include "core/image/probe/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+// Names that the mask of a photo may have, relative to the folder of masks.
+std::vector<std::string> MaskNames(std::string photo) {
+  if (photo.starts_with("images/")) photo.erase(0, 7);
+  return {photo + ".png", fs::path(photo).replace_extension(".png").generic_string()};
+}
+
+std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
+
+void RequireSizeOf(const fs::path& mask, const fs::path& photo) {
+  const ImageInfo of_mask = ProbeImage(ReadFile(mask), mask.string());
+  if (of_mask.format != ImageFormat::kPng) {
+    throw InvalidArgument("{} is no PNG, as masks must be; save it as one", mask.string());
+  }
+  const std::string bytes = ReadFile(photo);
+  const PictureSize size = OrientedSize(ProbeImage(bytes, photo.string()), ReadOrientation(bytes));
+  if (of_mask.width == size.width && of_mask.height == size.height) return;
+  throw InvalidArgument("the mask {} is {}, its photo {}; save it at the photo's size",
+                        mask.string(),
+                        Size(of_mask.width, of_mask.height),
+                        Size(size.width, size.height));
+}
+
+}  // namespace
+
+void AddMasks(const fs::path& masks, PhotoFolder* folder) {
+  std::error_code none;
+  if (!fs::is_directory(masks, none)) {
+    throw InvalidArgument("--masks {}: there is no such folder", masks.string());
+  }
+  std::map<std::string, const LocalFile*> photo_of;
+  for (const LocalFile& photo : folder->photos) {
+    for (const std::string& name : MaskNames(photo.path)) photo_of.emplace(name, &photo);
+  }
+  std::map<const LocalFile*, std::string> mask_of;
+  for (const std::string& file : ListFiles(masks)) {
+    const auto photo = photo_of.find(file);
+    if (photo == photo_of.end()) {
+      throw InvalidArgument(
+          "--masks: {} is the mask of no photo; masks are PNG files called like their photos "
+          "(a.png "
+          "or a.jpg.png for a.jpg)",
+          (masks / file).string());
+    }
+    const auto [other, is_first] = mask_of.emplace(photo->second, file);
+    if (!is_first) {
+      throw InvalidArgument(
+          "--masks: {} has two masks, {} and {}", photo->second->path, other->second, file);
+    }
+    RequireSizeOf(masks / file, photo->second->file);
+    folder->mask_files.push_back({"masks/" + file, masks / file});
+  }
+  if (folder->mask_files.empty()) {
+    throw InvalidArgument("--masks {}: there is no mask in it", masks.string());
+  }
+  constexpr size_t kMaxFiles = 10'000;
+  if (folder->AllFiles().size() > kMaxFiles) {
+    throw InvalidArgument("photos and masks are {} files; at most {} make up a scene",
+                          folder->AllFiles().size(),
+                          kMaxFiles);
+  }
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,132 @@
+#include "core/scene/masks/photo_masks.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr char kFolder[] = "masks/";
+constexpr const char* kPhotoFolders[] = {"images/", "input/", ""};
+constexpr float kWhole = 0.999f;  // of what a reduced pixel covers
+
+// Where the mask of a photo may be, best first.
+std::vector<std::string> MaskNames(const std::string& photo_file) {
+  std::vector<std::string> names;
+  for (const std::string folder : kPhotoFolders) {
+    if (!photo_file.starts_with(folder)) continue;
+    const std::string name = photo_file.substr(folder.size());
+    names.push_back(kFolder + name + ".png");
+    names.push_back(kFolder + fs::path(name).replace_extension(".png").generic_string());
+  }
+  return names;
+}
+
+bool HasTransparency(const fs::path& file, const std::string& name) {
+  const std::string bytes = ReadFile(file);
+  const ImageInfo info = ProbeImage(bytes, name);
+  if (info.format != ImageFormat::kPng) return false;
+  // Palettes may be transparent, too: decoding tells.
+  const Image image = DecodeImage(bytes, name, /*keep_alpha=*/true);
+  if (image.channels != 2 && image.channels != 4) return false;
+  const float* alpha = image.Plane(image.channels - 1);
+  return std::any_of(alpha, alpha + image.PlaneSize(), [](float a) { return a <= 0.5f; });
+}
+
+std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
+
+}  // namespace
+
+std::vector<std::string> FindMasks(const fs::path& scene_folder,
+                                   const std::vector<std::string>& photo_files,
+                                   const std::vector<std::string>& other_photo_files) {
+  std::set<std::string> files;
+  std::error_code none;
+  if (fs::is_directory(scene_folder / kFolder, none)) {
+    for (const std::string& file : ListFiles(scene_folder / kFolder)) files.insert(kFolder + file);
+  }
+  std::set<std::string> fitting;
+  std::vector<std::string> masks;
+  for (const std::string& photo : photo_files) {
+    std::string& mask = masks.emplace_back();
+    for (const std::string& name : MaskNames(photo)) {
+      fitting.insert(name);
+      if (mask.empty() && files.contains(name)) mask = name;
+    }
+    if (mask.empty() && HasTransparency(scene_folder / photo, photo)) mask = photo;
+  }
+  for (const std::string& photo : other_photo_files) {
+    for (const std::string& name : MaskNames(photo)) fitting.insert(name);
+  }
+  for (const std::string& file : files) {
+    if (!HasImageExtension(file)) {
+      throw InvalidArgument("{} is no picture; masks are PNG files called like their photos", file);
+    }
+    if (!fitting.contains(file)) {
+      throw InvalidArgument(
+          "{} is the mask of no photo; masks are called like their photos (a.png or a.jpg.png for "
+          "a.jpg)",
+          file);
+    }
+  }
+  return masks;
+}
+
+Image ReadMask(const fs::path& scene_folder,
+               const std::string& mask_file,
+               const std::string& photo_file,
+               int width,
+               int height) {
+  const bool is_alpha = mask_file == photo_file;
+  const std::string what =
+      is_alpha ? "the alpha of " + photo_file : "the mask " + mask_file + " of " + photo_file;
+  const Image image = DecodeImage(ReadFile(scene_folder / mask_file), mask_file, is_alpha);
+  if (image.width != width || image.height != height) {
+    throw InvalidArgument("{} is {}, the photo {}; save it at the photo's size",
+                          what,
+                          Size(image.width, image.height),
+                          Size(width, height));
+  }
+  // Of a mask in colour the mean of red, green and blue.
+  const int first = is_alpha ? image.channels - 1 : 0;
+  const int count = is_alpha ? 1 : image.channels;
+  Image mask(width, height, 1);
+  bool any = false;
+  for (size_t i = 0; i < mask.data.size(); ++i) {
+    float sum = 0.0f;
+    for (int c = first; c < first + count; ++c) sum += image.Plane(c)[i];
+    mask.data[i] = sum > 0.5f * static_cast<float>(count) ? 1.0f : 0.0f;
+    any = any || mask.data[i] > 0.0f;
+  }
+  if (!any) {
+    throw InvalidArgument(
+        "{} leaves nothing of the photo: white is what counts, black what is ignored; leave the "
+        "photo out or mend it",
+        what);
+  }
+  return mask;
+}
+
+void ClearMasked(const Image* mask, Image* image) {
+  if (mask == nullptr) return;
+  for (int c = 0; c < image->channels; ++c) {
+    for (size_t i = 0; i < mask->data.size(); ++i) {
+      if (mask->data[i] == 0.0f) image->Plane(c)[i] = 0.0f;
+    }
+  }
+}
+
+Image ResizeMask(const Image& mask, int width, int height) {
+  Image resized = Resize(mask, width, height);
+  for (float& value : resized.data) value = value >= kWhole ? 1.0f : 0.0f;
+  return resized;
+}
+
+}  // namespace color3d
