@@ -11,7 +11,8 @@
 namespace color3d {
 namespace {
 
-constexpr int kWindowRadius = 2;
+constexpr int kWindowRadius = 3;
+constexpr float kLeastConfidence = 0.02f;
 
 float Bilinear(const float* plane, int width, int height, float x, float y) {
   x = std::clamp(x, 0.0f, static_cast<float>(width - 1));
@@ -26,21 +27,21 @@ float Bilinear(const float* plane, int width, int height, float x, float y) {
          fy * ((1 - fx) * bottom[x0] + fx * bottom[x1]);
 }
 
-// Where each pixel of a frame lies in the key frame (px), and how surely.
+// Both ways between the key frame and a frame, px: 2 channels, x and y.
 struct Track {
-  Image place;       // 2 channels: x, y
-  Image confidence;  // 1 channel
+  Image in_key;    // where each pixel of the frame lies in the key frame
+  Image in_frame;  // where each pixel of the key frame lies in the frame
 };
 
-Track AtHome(int width, int height) {
-  Track track{Image(width, height, 2), Image(width, height, 1, 1.0f)};
+Image Identity(int width, int height) {
+  Image place(width, height, 2);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      track.place.At(0, y, x) = static_cast<float>(x);
-      track.place.At(1, y, x) = static_cast<float>(y);
+      place.At(0, y, x) = static_cast<float>(x);
+      place.At(1, y, x) = static_cast<float>(y);
     }
   }
-  return track;
+  return place;
 }
 
 Image Sampled(const Image& image, const Image& place) {
@@ -54,93 +55,128 @@ Image Sampled(const Image& image, const Image& place) {
   return out;
 }
 
-// One step: pixels of `next` are followed into `now`, whose own are followed already.
-Track Step(const Track& now,
-           const Image& luminance_now,
-           const Image& luminance_next,
-           const FilmCarryOptions& options) {
-  const Image back = DenseFlow(luminance_next, luminance_now);
-  const Image there = DenseFlow(luminance_now, luminance_next);
-  const int width = back.width, height = back.height;
-  Track next{Image(width, height, 2), Image(width, height, 1)};
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const float px = static_cast<float>(x) + back.At(0, y, x);
-      const float py = static_cast<float>(y) + back.At(1, y, x);
-      const float ex = back.At(0, y, x) + Bilinear(there.Plane(0), width, height, px, py);
-      const float ey = back.At(1, y, x) + Bilinear(there.Plane(1), width, height, px, py);
-      for (int c = 0; c < 2; ++c) {
-        next.place.At(c, y, x) = Bilinear(now.place.Plane(c), width, height, px, py);
-      }
-      const bool inside = px > -1.0f && py > -1.0f && px < static_cast<float>(width) &&
-                          py < static_cast<float>(height);
-      const double error = std::hypot(ex, ey) / options.flow_tolerance_px;
-      next.confidence.At(0, y, x) =
-          inside ? static_cast<float>(options.keep * std::exp(-error * error)) *
-                       Bilinear(now.confidence.Plane(0), width, height, px, py)
-                 : 0.0f;
-    }
-  }
-  return next;
+// Pixels of `flow` moved by it.
+Image Moved(const Image& flow) {
+  Image place = Identity(flow.width, flow.height);
+  for (size_t i = 0; i < place.data.size(); ++i) place.data[i] += flow.data[i];
+  return place;
 }
 
-// Steps drift: what is left between the frame and the key frame, warped to it, is taken out.
-void Register(const Image& key_luminance, const Image& luminance, Track* track) {
-  const Image warped = Sampled(key_luminance, track->place);
-  const Image rest = DenseFlow(luminance, warped);
-  const Image place = track->place;
-  for (int y = 0; y < place.height; ++y) {
-    for (int x = 0; x < place.width; ++x) {
-      const float dx = rest.At(0, y, x), dy = rest.At(1, y, x);
-      if (dx * dx + dy * dy > 4.0f) continue;  // no drift but another thing
-      for (int c = 0; c < 2; ++c) {
-        track->place.At(c, y, x) = Bilinear(place.Plane(c),
-                                            place.width,
-                                            place.height,
-                                            static_cast<float>(x) + dx,
-                                            static_cast<float>(y) + dy);
-      }
-    }
-  }
+// One step further, from frame `now` to frame `next`.
+Track Step(const Track& track, const Image& now, const Image& next) {
+  const Image there = DenseFlow(now, next);
+  Track further{Sampled(track.in_key, Moved(DenseFlow(next, now))), track.in_frame};
+  const Image step = Sampled(there, track.in_frame);
+  for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
+  return further;
 }
 
-// Mean of |difference| around each pixel.
-Image LocalDifference(const Image& one, const Image& other) {
-  const int width = one.width, height = one.height;
+// Moving mean over windows of 2 radius + 1.
+Image BoxMean(const Image& image, int radius) {
+  const int width = image.width, height = image.height;
   Image rows(width, height, 1), out(width, height, 1);
   for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const int left = std::max(0, x - kWindowRadius),
-                right = std::min(width - 1, x + kWindowRadius);
-      float sum = 0.0f;
-      for (int k = left; k <= right; ++k) sum += std::abs(one.At(0, y, k) - other.At(0, y, k));
-      rows.At(0, y, x) = sum / static_cast<float>(right - left + 1);
+    double sum = 0.0;
+    int count = 0;
+    for (int x = -radius; x < width; ++x) {
+      if (x + radius < width) sum += image.At(0, y, x + radius), ++count;
+      if (x - radius - 1 >= 0) sum -= image.At(0, y, x - radius - 1), --count;
+      if (x >= 0) rows.At(0, y, x) = static_cast<float>(sum / count);
     }
   }
-  for (int y = 0; y < height; ++y) {
-    const int top = std::max(0, y - kWindowRadius),
-              bottom = std::min(height - 1, y + kWindowRadius);
+  std::vector<double> sums(width, 0.0);
+  int count = 0;
+  for (int y = -radius; y < height; ++y) {
+    const int enters = y + radius, leaves = y - radius - 1;
+    if (enters < height) ++count;
+    if (leaves >= 0) --count;
     for (int x = 0; x < width; ++x) {
-      float sum = 0.0f;
-      for (int k = top; k <= bottom; ++k) sum += rows.At(0, k, x);
-      out.At(0, y, x) = sum / static_cast<float>(bottom - top + 1);
+      if (enters < height) sums[x] += rows.At(0, enters, x);
+      if (leaves >= 0) sums[x] -= rows.At(0, leaves, x);
+      if (y >= 0) out.At(0, y, x) = static_cast<float>(sums[x] / count);
     }
   }
   return out;
 }
 
+// L against what is around it: exposure and contrast of a place do not count.
+Image LocalContrast(const Image& luminance) {
+  constexpr int kRadius = 7;
+  constexpr float kGrain = 4.0f;  // L^2, of plain surfaces
+  const Image mean = BoxMean(luminance, kRadius);
+  Image out(luminance.width, luminance.height, 1), square = out;
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    out.data[i] = luminance.data[i] - mean.data[i];
+    square.data[i] = out.data[i] * out.data[i];
+  }
+  const Image variance = BoxMean(square, kRadius);
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    out.data[i] /= std::sqrt(std::max(0.0f, variance.data[i]) + kGrain);
+  }
+  return out;
+}
+
+// Where two pictures of local contrast differ around a pixel: 0 to 2.
+Image Unlike(const Image& one, const Image& other) {
+  Image difference(one.width, one.height, 1);
+  for (size_t i = 0; i < difference.data.size(); ++i) {
+    difference.data[i] = std::min(2.0f, std::abs(one.data[i] - other.data[i]));
+  }
+  return BoxMean(difference, kWindowRadius);
+}
+
+// Steps drift: what is left between a picture and another, warped to it by `place`, is taken out
+// where that makes them more alike.
+void Register(const Image& picture,
+              const Image& contrast,
+              const Image& other,
+              const Image& other_contrast,
+              Image* place) {
+  constexpr float kMostPx = 6.0f;  // more is no drift but another thing
+  constexpr float kLeastGain = 0.02f;
+  Image rest = DenseFlow(picture, Sampled(other, *place));
+  for (size_t i = 0; i < rest.PlaneSize(); ++i) {
+    float& x = rest.Plane(0)[i];
+    float& y = rest.Plane(1)[i];
+    if (x * x + y * y > kMostPx * kMostPx) x = y = 0.0f;
+  }
+  const Image registered = Sampled(*place, Moved(rest));
+  const Image before = Unlike(contrast, Sampled(other_contrast, *place));
+  const Image after = Unlike(contrast, Sampled(other_contrast, registered));
+  for (size_t i = 0; i < before.data.size(); ++i) {
+    if (after.data[i] >= before.data[i] - kLeastGain) continue;
+    for (int c = 0; c < 2; ++c) place->Plane(c)[i] = registered.Plane(c)[i];
+  }
+}
+
+bool Inside(float x, float y, int width, int height) {
+  return x >= -0.5f && y >= -0.5f && x <= static_cast<float>(width) - 0.5f &&
+         y <= static_cast<float>(height) - 0.5f;
+}
+
 FilmColor ColorOf(const FilmKey& key,
-                  const Image& key_luminance,
-                  const Image& luminance,
+                  const Image& key_contrast,
+                  const Image& contrast,
                   const Track& track,
                   const FilmCarryOptions& options) {
-  FilmColor color{Sampled(key.color.ab, track.place), Sampled(key.color.confidence, track.place)};
-  const Image difference = LocalDifference(luminance, Sampled(key_luminance, track.place));
-  for (size_t i = 0; i < difference.PlaneSize(); ++i) {
-    const double d = difference.data[i] / options.luminance_tolerance;
-    color.confidence.data[i] *= track.confidence.data[i] * static_cast<float>(std::exp(-d * d));
-    if (color.confidence.data[i] > 1e-3f) continue;
-    color.confidence.data[i] = color.ab.Plane(0)[i] = color.ab.Plane(1)[i] = 0.0f;
+  FilmColor color{Sampled(key.color.ab, track.in_key), Sampled(key.color.confidence, track.in_key)};
+  const Image unlike = Unlike(contrast, Sampled(key_contrast, track.in_key));
+  const Image back = Sampled(track.in_frame, track.in_key);
+  const int width = contrast.width, height = contrast.height;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double cycle = std::hypot(back.At(0, y, x) - static_cast<float>(x),
+                                      back.At(1, y, x) - static_cast<float>(y)) /
+                           options.cycle_tolerance_px;
+      const double closed = 1.0 / (1.0 + cycle * cycle);
+      const double like =
+          std::exp(-std::max(0.0, unlike.At(0, y, x) - options.unlikeness) / options.unlikeness);
+      const bool inside = Inside(track.in_key.At(0, y, x), track.in_key.At(1, y, x), width, height);
+      float& confidence = color.confidence.At(0, y, x);
+      confidence *= inside ? static_cast<float>(closed * closed * like) : 0.0f;
+      if (confidence > kLeastConfidence) continue;
+      confidence = color.ab.At(0, y, x) = color.ab.At(1, y, x) = 0.0f;
+    }
   }
   return color;
 }
@@ -184,9 +220,8 @@ std::vector<Walk> WalksOf(const FilmFrames& frames, const std::vector<FilmKey>& 
 
 void FilmCarryOptions::Validate() const {
   const RangeCheck check("film carry option");
-  check("flow_tolerance_px", flow_tolerance_px, 0.1, 10);
-  check("luminance_tolerance", luminance_tolerance, 1, 100);
-  check("keep", keep, 0.5, 1);
+  check("cycle_tolerance_px", cycle_tolerance_px, 0.1, 20);
+  check("unlikeness", unlikeness, 0.05, 2);
 }
 
 void CarryAlongFilm(const FilmFrames& frames,
@@ -215,15 +250,18 @@ void CarryAlongFilm(const FilmFrames& frames,
   const std::vector<Walk> walks = WalksOf(frames, keys);
   pool.ForEach(static_cast<int64_t>(walks.size()), [&](int64_t index, int) {
     const Walk& walk = walks[index];
-    const auto key_luminance = frames.luminance(walk.key->frame);
-    auto now = key_luminance;
-    Track track = AtHome(now->width, now->height);
+    const auto key = frames.luminance(walk.key->frame);
+    const Image key_contrast = LocalContrast(*key);
+    auto now = key;
+    Track track{Identity(key->width, key->height), Identity(key->width, key->height)};
     for (const int frame : walk.frames) {
       cancel.ThrowIfCancelled();
       const auto next = frames.luminance(frame);
-      track = Step(track, *now, *next, options);
-      Register(*key_luminance, *next, &track);
-      hand_over(frame, ColorOf(*walk.key, *key_luminance, *next, track, options));
+      const Image contrast = LocalContrast(*next);
+      track = Step(track, *now, *next);
+      Register(*next, contrast, *key, key_contrast, &track.in_key);
+      Register(*key, key_contrast, *next, contrast, &track.in_frame);
+      hand_over(frame, ColorOf(*walk.key, key_contrast, contrast, track, options));
       now = next;
     }
   });

@@ -24,13 +24,11 @@ struct FilmKey {
 };
 
 struct FilmCarryOptions {
-  // Px at which following a pixel there and back again leaves a confidence of 1/e, 0.1..10.
-  double flow_tolerance_px = 1.5;
-  // Difference of L around a pixel and around where it lies in the key frame: confidence falls to
-  // 1/e, L units, 1..100.
-  double luminance_tolerance = 12.0;
-  // What is left of a pixel's confidence from frame to frame, 0.5..1.
-  double keep = 0.99;
+  // From a pixel to the key frame and back again: distance at which confidence falls to a quarter.
+  double cycle_tolerance_px = 2.0;  // 0.1..20
+  // Mean difference of the local contrast of both places from which confidence falls, 0.05..2; to
+  // 1/e at twice that.
+  double unlikeness = 0.4;
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const FilmCarryOptions&) const = default;
 };

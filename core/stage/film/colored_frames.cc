@@ -51,7 +51,7 @@ void RenderFilm(const RenderOptions& options,
                 const Scene& scene,
                 const std::vector<int>& views,
                 StageContext& context) {
-  const ViewImages images(scene, context.scene_folder(), options.max_side_px, 0);
+  const ViewImages images(scene, context.scene_folder(), /*max_side_px=*/0, 0);
   const Camera camera = images.WorkingCamera(0);
   const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
   Mp4Writer movie(file,
@@ -73,7 +73,7 @@ void RenderFilm(const RenderOptions& options,
       movie.Add(EvenSides(frames[i]), context.pool());
       if (std::find(views.begin(), views.end(), view) == views.end()) continue;
       context.WriteOutput(ViewArtifact(artifact::kRenders, scene.views[view], ".png"),
-                          EncodePng8(frames[i]));
+                          EncodePng8(FitWithin(frames[i], options.max_side_px)));
     }
     context.progress().OnProgress(begin + size, count, "writing frames");
   }

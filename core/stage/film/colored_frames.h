@@ -15,8 +15,9 @@ Image ColoredFrame(const Scene& scene, int view, const ViewImages& images, Stage
 // without times.
 double FilmFramesPerSecond(const Scene& scene);
 
-// Leaves artifact::kMovie, all frames one after the other at the film's own rate, and `views` (for
-// the report) as artifact::kRenders. Throws Error{kCancelled} and what Mp4Writer throws.
+// Leaves artifact::kMovie, all frames one after the other at the film's own rate and size, and
+// `views` (for the report) as artifact::kRenders. Throws Error{kCancelled} and what Mp4Writer
+// throws.
 void RenderFilm(const RenderOptions& options,
                 const Scene& scene,
                 const std::vector<int>& views,
