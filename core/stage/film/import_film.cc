@@ -210,7 +210,7 @@ void FilmOptions::Validate() const {
   const RangeCheck check("film option");
   check("stride", stride, 1, 1000);
   check("begin_s", begin_s, 0, 1e6);
-  if (end_s) check("end_s", *end_s, 0, 1e6);
+  if (end_s) check("end_s", *end_s, 0.01, 1e6);
   if (end_s && *end_s <= begin_s) {
     throw InvalidArgument("the film's part ends ({} s) before it begins ({} s)", *end_s, begin_s);
   }
