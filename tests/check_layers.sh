@@ -106,7 +106,7 @@ public core/keycolor from_image picture_checks recolor automatic/automatic exter
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
-public core/scene camera import scene view_images formats/camera_file
+public core/scene camera import scene view_images formats/camera_file masks/masked_points masks/photo_masks
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene
