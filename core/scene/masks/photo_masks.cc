@@ -33,7 +33,10 @@ bool HasTransparency(const fs::path& file, const std::string& name) {
   const std::string bytes = ReadFile(file);
   const ImageInfo info = ProbeImage(bytes, name);
   if (info.format != ImageFormat::kPng) return false;
-  // Palettes may be transparent, too: decoding tells.
+  // Colours of a palette, and one colour of other pictures, may be transparent by a chunk of its
+  // own; where it is not there, decoding is saved.
+  const bool has_alpha = info.channels == 2 || info.channels == 4;
+  if (!has_alpha && bytes.find("tRNS") == std::string::npos) return false;
   const Image image = DecodeImage(bytes, name, /*keep_alpha=*/true);
   if (image.channels != 2 && image.channels != 4) return false;
   const float* alpha = image.Plane(image.channels - 1);
@@ -87,7 +90,7 @@ Image ReadMask(const fs::path& scene_folder,
   const bool is_alpha = mask_file == photo_file;
   const std::string what =
       is_alpha ? "the alpha of " + photo_file : "the mask " + mask_file + " of " + photo_file;
-  const Image image = ReadImage(scene_folder / mask_file, is_alpha);
+  const Image image = DecodeImage(ReadFile(scene_folder / mask_file), mask_file, is_alpha);
   if (image.width != width || image.height != height) {
     throw InvalidArgument("{} is {}, the photo {}; save it at the photo's size",
                           what,
