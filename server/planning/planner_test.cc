@@ -42,7 +42,8 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
                           "colorize_key_view",
                           "colorize_views",
                           "reconstruct_geometry"));
-  EXPECT_THAT(InputKinds(graph, "export"), ElementsAre("import_scene", "solve_chroma"));
+  EXPECT_THAT(InputKinds(graph, "export"),
+              ElementsAre("import_scene", "solve_chroma", "select_key_view"));
   for (const NewJob& job : graph.jobs) {
     const int index = IndexOf(graph, job.kind);
     for (const int input : job.inputs) EXPECT_LT(input, index);
