@@ -207,6 +207,46 @@ TEST(PlaneSweep, FindsTheDepthOfAWallAndOfWhatStandsBeforeIt) {
   EXPECT_GT(right_square, 0.8 * square);
 }
 
+// In every photo something of its own stands before the same part of the wall.
+TEST(PlaneSweep, WhatIsMaskedOutIsNotMatched) {
+  Seen seen[3] = {Look(0.0, 0.0), Look(-0.3, 0.0), Look(0.3, 0.1)};
+  Image mask(kWidth, kHeight, 1, 1.0f);
+  Random random(4);
+  for (int i = 0; i < 3; ++i) {
+    Image picture(kWidth, kHeight, 1);
+    for (float& value : picture.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
+    for (int y = 45; y < 75; ++y) {
+      for (int x = 60; x < 100; ++x) {
+        seen[i].surface.luminance.At(0, y, x) = picture.At(0, y, x);
+        mask.At(0, y, x) = 0.0f;
+      }
+    }
+  }
+  const auto right = [&](const Image* of_reference, const Image* of_sources) {
+    const auto posed = [&](int i) {
+      const SurfaceView& surface = seen[i].surface;
+      return PosedLuminance{surface.camera,
+                            surface.cam_from_world,
+                            &surface.luminance,
+                            i == 0 ? of_reference : of_sources};
+    };
+    const DepthMap map =
+        SweepPlanes(posed(0), {posed(1), posed(2)}, 1.2, 8.0, PlaneSweepOptions{}, {});
+    int close = 0;
+    for (int y = 45; y < 75; ++y) {
+      for (int x = 60; x < 100; ++x) {
+        close += std::abs(map.depth.At(0, y, x) - kWallDepth) < 0.05 * kWallDepth;
+      }
+    }
+    return close / (30.0 * 40.0);
+  };
+  const double plain = right(nullptr, nullptr), masked = right(&mask, &mask);
+  EXPECT_LT(plain, 0.8);
+  EXPECT_GT(masked, 0.95) << "from beside it";
+  const Image whole(kWidth, kHeight, 1, 1.0f);
+  EXPECT_EQ(right(&whole, &whole), plain) << "a mask that leaves all changes nothing";
+}
+
 TEST(PlaneSweep, BadRangesAndNoSourcesAreRefused) {
   const Seen seen = Look(0.0, 0.0);
   const PosedLuminance view{

@@ -78,6 +78,28 @@ TEST_F(DensePointsTest, LieOnTheWallAndOnlyOnce) {
   EXPECT_LT(std::sqrt(squares / static_cast<double>(points.size())), 0.02 * kDepth);
 }
 
+TEST_F(DensePointsTest, MaskedPartsOfPhotosHaveAndConfirmNone) {
+  Image mask(kWidth, kHeight, 1, 1.0f);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth / 2; ++x) mask.At(0, y, x) = 0.0f;
+  }
+  WriteFileAtomic(scratch_.path() / "m.png", EncodePng8(mask));
+  const DensePointsOptions options{.depth_side_px = kWidth, .max_points = 1'000'000};
+  const size_t all = Points(2, options).size();
+  scene_.views[2].mask_file = scene_.views[3].mask_file = "m.png";
+  const std::vector<SparsePoint> points = Points(2, options);
+  EXPECT_LT(points.size(), all);
+  EXPECT_GT(points.size(), all / 3);
+  for (const SparsePoint& point : points) {
+    for (const int view : point.views) {
+      if (view != 2 && view != 3) continue;
+      const Eigen::Vector2d at = scene_.views[view].camera.Project(
+          scene_.views[view].cam_from_world.Apply(point.position));
+      ASSERT_GT(at.x(), kWidth / 2 - 1.5) << view;
+    }
+  }
+}
+
 TEST_F(DensePointsTest, AreThinnedEvenlyAndTheSameForEveryThreadCount) {
   const std::vector<SparsePoint> one = Points(1, {.depth_side_px = kWidth, .max_points = 500});
   const std::vector<SparsePoint> three = Points(3, {.depth_side_px = kWidth, .max_points = 500});

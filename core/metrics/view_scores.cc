@@ -1,6 +1,5 @@
 #include "core/metrics/view_scores.h"
 
-#include "core/base/error.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
@@ -34,7 +33,6 @@ std::vector<size_t> Counting(const Image* mask, int width, int height) {
   for (size_t i = 0; i < reduced.data.size(); ++i) {
     if (reduced.data[i] > 0.999f) pixels.push_back(i);
   }
-  if (pixels.empty()) throw InvalidArgument("the mask leaves nothing of the view to score");
   return pixels;
 }
 
@@ -69,7 +67,10 @@ Scores ScoreView(const Image& true_srgb,
   const Image lab = FitWithin(rendered_lab, kScoreSidePx);
   const Image truth_srgb = SrgbFromLab(true_lab);
   const Image rendered_srgb = SrgbFromLab(lab);
+  const Image truth = FitWithin(true_lab, kColorSidePx);
   const std::vector<size_t> pixels = Counting(mask, true_lab.width, true_lab.height);
+  const std::vector<size_t> of_color = Counting(mask, truth.width, truth.height);
+  if (pixels.empty() || of_color.empty()) return v;
   const auto counting = [&](const Image& image) { return Gather(image, pixels); };
   v["psnr_rgb"] = Psnr(counting(rendered_srgb), counting(truth_srgb), 1.0);
   v["ssim_rgb"] = MaskedSsim(rendered_srgb, truth_srgb, pixels);
@@ -79,9 +80,7 @@ Scores ScoreView(const Image& true_srgb,
   v["colorfulness_2d"] = Colorfulness(counting(SrgbFromLab(UnderTrueL(true_lab, view_ab))));
   v["colorfulness_truth"] = Colorfulness(counting(truth_srgb));
 
-  const Image truth = FitWithin(true_lab, kColorSidePx);
   const Image rendered = FitWithin(lab, kColorSidePx);
-  const std::vector<size_t> of_color = Counting(mask, truth.width, truth.height);
   const auto error = [&](const Image& ab) {
     return MeanDeltaE00(Gather(UnderTrueL(truth, ab), of_color), Gather(truth, of_color));
   };
@@ -90,6 +89,10 @@ Scores ScoreView(const Image& true_srgb,
   v["delta_e00_chroma_2d"] = error(AtColorSide(view_ab));
   v["delta_e00_gray"] = error(Image(truth.width, truth.height, 2));
   return v;
+}
+
+double ColorfulnessWhere(const Image& srgb, const Image* mask) {
+  return Colorfulness(Gather(srgb, Counting(mask, srgb.width, srgb.height)));
 }
 
 double ChromaError(const Image& true_srgb, const Image& rendered_lab, const Image* mask) {

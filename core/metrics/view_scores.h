@@ -20,12 +20,15 @@ inline constexpr int kColorSidePx = 400;
 // view's pixels. PSNR, SSIM and colourfulness at kScoreSidePx, "delta_e00*" (CIEDE2000) at
 // kColorSidePx: of the render, of its chroma and of the view's own chroma under the true L, and of
 // no chroma at all. `mask`: 1 channel of 0 and 1 of the truth's size, and only where it is 1 pixels
-// count, also reduced ones of which a part does not; null: all count. Throws
-// Error{kInvalidArgument} when none is left.
+// count, also reduced ones of which a part does not; null: all count. Empty when none is left,
+// which the functions below must not be asked for then.
 Scores ScoreView(const Image& true_srgb,
                  const Image& rendered_lab,
                  const Image& view_ab,
                  const Image* mask = nullptr);
+
+// Colourfulness of the pixels that count, at the picture's size.
+double ColorfulnessWhere(const Image& srgb, const Image* mask);
 
 // CIEDE2000 of the chroma of `rendered_lab` under the true L, at kColorSidePx.
 double ChromaError(const Image& true_srgb, const Image& rendered_lab, const Image* mask = nullptr);
@@ -35,7 +38,7 @@ double ChromaError(const Image& true_srgb, const Image& rendered_lab, const Imag
 class SourceErrors {
  public:
   // `provenance`: the view's 3 channels, shares of guessed, seen and inferred colour that sum to 1,
-  // any size. `mask` as above.
+  // any size. `mask` as above; nothing is added when it leaves nothing.
   void Add(const Image& true_srgb,
            const Image& view_ab,
            const Image& provenance,

@@ -51,6 +51,39 @@ TEST(ScoreView, LargerPicturesAreScoredAtTheCommonSize) {
   EXPECT_GT(small.at("delta_e00_chroma"), 1.0);
 }
 
+// The scores of a half are those of the cropped pictures, whatever the other half shows.
+TEST(ScoreView, OnlyWhatTheMaskLeavesCounts) {
+  const Image truth = Stripes(96, 0.0f), drawn = LabFromSrgb(Stripes(96, 0.1f));
+  Image mask(96, 72, 1), spoilt = drawn;
+  const auto left = [](const Image& image) {
+    Image half(48, 72, image.channels);
+    for (int c = 0; c < image.channels; ++c) {
+      for (int y = 0; y < 72; ++y) {
+        for (int x = 0; x < 48; ++x) half.At(c, y, x) = image.At(c, y, x);
+      }
+    }
+    return half;
+  };
+  for (int y = 0; y < 72; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      mask.At(0, y, x) = x < 48 ? 1.0f : 0.0f;
+      if (x >= 48) spoilt.At(0, y, x) = 0.0f;
+    }
+  }
+  const Scores cropped = ScoreView(left(truth), left(drawn), ChromaOfLab(left(drawn)));
+  const Scores masked = ScoreView(truth, spoilt, ChromaOfLab(spoilt), &mask);
+  for (const auto& [name, value] : cropped) {
+    EXPECT_NEAR(masked.at(name), value, name == "ssim_rgb" ? 0.03 : 1e-6) << name;
+  }
+  EXPECT_EQ(masked, ScoreView(truth, drawn, ChromaOfLab(drawn), &mask));
+  EXPECT_LT(ScoreView(truth, spoilt, ChromaOfLab(spoilt)).at("psnr_l"), masked.at("psnr_l") - 3.0);
+  const Image whole(96, 72, 1, 1.0f);
+  EXPECT_EQ(ScoreView(truth, spoilt, ChromaOfLab(spoilt), &whole),
+            ScoreView(truth, spoilt, ChromaOfLab(spoilt)));
+  const Image nothing(96, 72, 1);
+  EXPECT_TRUE(ScoreView(truth, drawn, ChromaOfLab(drawn), &nothing).empty());
+}
+
 TEST(SourceErrors, ConfidenceThatKnowsTheErrorsCorrelatesWithThem) {
   const Image truth(48, 32, 3, 0.5f);
   Image ab(48, 32, 2);

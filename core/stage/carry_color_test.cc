@@ -121,6 +121,34 @@ TEST_F(CarryStageTest, EveryViewGetsWhatTheKeyViewShowsOfIt) {
   EXPECT_EQ(observer_.text, "");
 }
 
+TEST_F(CarryStageTest, NothingIsCarriedFromOrToWhatIsMaskedOut) {
+  Image mask(kWidth, kHeight, 1, 1.0f);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth / 2; ++x) mask.At(0, y, x) = 0.0f;
+  }
+  WriteFileAtomic(scratch_.path() / "m.png", EncodePng8(mask));
+  const auto carried_of_half = [](const AbMap& map, int first) {
+    double sum = 0.0;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = first; x < first + kWidth / 2; ++x) sum += map.confidence.At(0, y, x);
+    }
+    return sum / (kHeight * kWidth / 2);
+  };
+  Run();
+  const double right_of_next = carried_of_half(Carried(2), kWidth / 2);
+  EXPECT_GT(carried_of_half(Carried(2), 0), 0.8);
+  EXPECT_GT(carried_of_half(Carried(0), kWidth / 2), 0.8);
+  scene_.views[1].mask_file = scene_.views[2].mask_file = "m.png";
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  Run();
+  EXPECT_LT(carried_of_half(Carried(1), 0), 1e-6) << "the key view itself";
+  EXPECT_GT(carried_of_half(Carried(1), kWidth / 2), 0.9);
+  EXPECT_LT(carried_of_half(Carried(2), 0), 1e-6) << "to it";
+  EXPECT_NEAR(carried_of_half(Carried(2), kWidth / 2), right_of_next, 0.02);
+  // What the photo before the key view shows of it is mostly the masked half.
+  EXPECT_LT(carried_of_half(Carried(0), kWidth / 2), 0.6) << "from it";
+}
+
 TEST_F(CarryStageTest, AFurtherKeyViewFillsTheRestAndContradictsNothing) {
   // A second key view in another colour: only what the first does not show may be its.
   Image other = truth_[4];
@@ -225,7 +253,8 @@ TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
     const GaussianModel wall = ParseGaussians(context.ReadInput(artifact::kGeometry));
     return RenderView(wall, camera, scene_.views[view].cam_from_world, pool).lab;
   };
-  const Image first = positions.Of(1, camera, shown(1)), second = positions.Of(2, camera, shown(2));
+  const Image first = positions.Of(1, camera, shown(1), nullptr),
+              second = positions.Of(2, camera, shown(2), nullptr);
   ASSERT_EQ(first.channels, 4);
   const int shift = static_cast<int>(std::lround(1.2 * kFocal / kDepth));  // px
   for (int y = 20; y < kHeight - 20; y += 10) {
@@ -244,7 +273,13 @@ TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth / 2; ++x) other.At(0, y, x) += 40.0f;
   }
-  const Image half = positions.Of(1, camera, other);
+  const Image half = positions.Of(1, camera, other, nullptr);
+  Image mask(camera.width, camera.height, 1, 1.0f);
+  mask.At(0, 20, 30) = 0.0f;
+  const Image masked = positions.Of(1, camera, shown(1), &mask);
+  EXPECT_EQ(first.At(3, 20, 30), 1.0f);
+  EXPECT_EQ(masked.At(3, 20, 30), 0.0f);
+  EXPECT_EQ(masked.At(3, 20, 31), first.At(3, 20, 31));
   for (int c = 0; c < 4; ++c) EXPECT_EQ(half.At(c, kHeight / 2, kWidth / 4), 0.0f);
   EXPECT_EQ(half.At(3, kHeight / 2, 3 * kWidth / 4), 1.0f);
 }

@@ -37,8 +37,9 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     const View& view = scene.views[index];
     const auto luminance = images.Luminance(number);
     const CarriedColor carried = ReadCarried(context, view, luminance->width, luminance->height);
-    const ColorSources sources =
-        SourcesOf(*colorizer, positions.Of(number, images.WorkingCamera(number), *luminance));
+    const ColorSources sources = SourcesOf(
+        *colorizer,
+        positions.Of(number, images.WorkingCamera(number), *luminance, images.Mask(number).get()));
     ThreadPool one(1);
     const FusedColor fused = ColorOfView(*luminance, carried, sources, one, context.cancel());
     const std::string ab = EncodeAbPng(fused.ab);

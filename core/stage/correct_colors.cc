@@ -11,6 +11,7 @@
 #include "core/color/lab.h"
 #include "core/colorizer/corrector.h"
 #include "core/image/codec.h"
+#include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/given_colors.h"
@@ -24,6 +25,14 @@ constexpr size_t kMaxCorrections = 64;
 constexpr int kMaxProposals = 16;
 constexpr size_t kPlacesOfAllViews = 3000;  // that proposals are chosen from
 constexpr double kHardlyKnown = 0.2;        // share of a stroke that lies on the geometry
+
+// What is masked out colours nothing, so that no stroke is proposed for its sake.
+void SetSeenWhereMasked(const Image& mask, PlacedPicture* picture) {
+  if (picture->seen.Empty()) picture->seen = Image(mask.width, mask.height, 1);
+  for (size_t i = 0; i < mask.data.size(); ++i) {
+    if (mask.data[i] == 0.0f) picture->seen.data[i] = 1.0f;
+  }
+}
 
 // The scene's pictures in the colours that they have without corrections.
 class ColoredViews {
@@ -48,11 +57,15 @@ class ColoredViews {
                               view == key_,
                               picture.luminance.width,
                               picture.luminance.height);
-    picture.position = positions_.Of(view, images_.WorkingCamera(view), picture.luminance);
+    const auto mask = images_.Mask(view);
+    picture.position =
+        positions_.Of(view, images_.WorkingCamera(view), picture.luminance, mask.get());
     const Image provenance = Provenance(view, picture.luminance);
-    if (provenance.Empty()) return picture;
-    picture.seen = Image(provenance.width, provenance.height, 1);
-    std::copy_n(provenance.Plane(1), picture.seen.data.size(), picture.seen.data.begin());
+    if (!provenance.Empty()) {
+      picture.seen = Image(provenance.width, provenance.height, 1);
+      std::copy_n(provenance.Plane(1), picture.seen.data.size(), picture.seen.data.begin());
+    }
+    if (mask) SetSeenWhereMasked(*mask, &picture);
     return picture;
   }
   Image Provenance(int view, const Image& size) const {
@@ -139,6 +152,12 @@ Painted ReadCorrection(const FurtherKeyView& wanted,
                                             context);
   correction.painted = views.images().Undistort(index, given.given);
   correction.ab = UndistortGiven(views.images(), index, given, correction.painted);
+  if (const auto mask = views.images().Mask(index)) {
+    ClearMasked(mask.get(), &correction.painted);
+    if (Mean(correction.painted) == 0.0) {
+      throw InvalidArgument("all that it paints is masked out; paint what the mask leaves");
+    }
+  }
   WarnIfOffTheGeometry(painted, view.name, context);
   return painted;
 }

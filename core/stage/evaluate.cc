@@ -132,10 +132,14 @@ class HeldOutScores {
                : ColoredFrame(scene_, index, images, context_);
     const auto mask = images.Mask(index);
     Scores scores = ScoreView(true_srgb, delivered, ab, mask.get());
+    if (scores.empty()) {
+      context_.progress().OnWarning(view.name + " is not scored: its mask leaves nothing of it");
+      return;
+    }
     if (bound_) {
       const Image lab = RenderView(*bound_, camera, view.cam_from_world, context_.pool()).lab;
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab, mask.get());
-      scores["colorfulness_bound"] = Colorfulness(SrgbFromLab(lab));
+      scores["colorfulness_bound"] = ColorfulnessWhere(SrgbFromLab(lab), mask.get());
     }
     const std::string provenance = ProvenanceArtifact(context_, view);
     if (context_.HasInput(provenance)) {

@@ -61,6 +61,29 @@ TEST_F(EvaluateTest, ErrorsAreToldBySource) {
   EXPECT_FALSE(sources.contains("delta_e00_inferred"));
 }
 
+TEST_F(EvaluateTest, WhatIsMaskedOutIsNotScored) {
+  EvaluateOptions options;
+  options.truth = {TruthOf("p0.png")};
+  Image truth = ReadImage(options.truth[0].file);
+  Image mask(48, 32, 1, 1.0f);
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 20; x < 48; ++x) {
+      mask.At(0, y, x) = 0.0f;
+      truth.At(0, y, x) = 0.9f;
+      truth.At(2, y, x) = 0.1f;
+    }
+  }
+  WriteFileAtomic(options.truth[0].file, EncodePng16(truth));
+  WriteFileAtomic(scratch_.path() / "m.png", EncodePng8(mask));
+  AddProvenance("p0.png", Halves({0.0f, 1.0f, 0.0f}, {1.0f, 0.0f, 0.0f}));
+  EXPECT_GT(Evaluated(options).at("mean").at("delta_e00_chroma_2d"), 5.0);
+  scene_.views[0].mask_file = "m.png";
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  const json scores = Evaluated(options);
+  EXPECT_LT(scores.at("mean").at("delta_e00_chroma_2d"), 0.05);
+  EXPECT_EQ(scores.at("sources").at("share_seen"), 1.0) << "the guessed half is masked out";
+}
+
 TEST_F(StageTest, EvaluationRefusesTruthOfTrainingViews) {
   const Scene scene = RampScene(scratch_.path(), 48, 32);
   AddInput(artifact::kScene, SceneToJson(scene));

@@ -78,6 +78,15 @@ TEST_F(AugmentationStageTest, NothingIsInventedAroundAKeyViewThatCoversTheScene)
   EXPECT_THAT(facts.at("left_out").dump(), AllOf(HasSubstr("95 %"), HasSubstr("not asked for")));
 }
 
+TEST_F(AugmentationStageTest, NothingIsMadeFromAKeyViewThatIsMaskedInPart) {
+  Write("m.png", EncodePng8(Image(kWidth, kHeight, 1, 1.0f)));
+  scene_.views[1].mask_file = "m.png";
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  const nlohmann::json facts = Run();
+  EXPECT_TRUE(facts.at("samples").empty());
+  EXPECT_THAT(facts.dump(), testing::HasSubstr("masked out"));
+}
+
 TEST_F(AugmentationStageTest, DamagedFactsOfTheCarryAreRefused) {
   AddInput(artifact::kCarryFacts, R"({"coverage": "most"})");
   EXPECT_THAT(Complaint(), HasSubstr("carry.json is damaged"));

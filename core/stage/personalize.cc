@@ -30,8 +30,7 @@ void ExpectShapeOf(const Image& luminance, StageContext& context) {
       SizeText(luminance));
 }
 
-// The key view in colour; what the user left unpainted or masked out is not learnt
-// from.
+// The key view in colour; what the user left unpainted or masked out is not learnt from.
 TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageContext& context) {
   ExpectShapeOf(luminance, context);
   CarriedColor color = ReadKeyColor(context, luminance.width, luminance.height);
@@ -48,8 +47,7 @@ TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageConte
   if (std::all_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
     throw InvalidArgument(
         "what is painted on the key view (and not masked out) is too fine to be seen at {} px; "
-        "paint "
-        "areas, or give the picture as strokes, which spread",
+        "paint areas, or give the picture as strokes, which spread",
         SizeText(luminance));
   }
   if (std::any_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
@@ -118,7 +116,8 @@ void RunPersonalize(const ColorizerOptions& options,
   const auto luminance = images.Luminance(key);
   std::vector<TrainingPicture> pictures = {KeyPicture(*luminance, images.Mask(key).get(), context)};
   const ViewPositions positions(scene, context);
-  pictures[0].position = positions.Of(key, images.WorkingCamera(key), *luminance);
+  pictures[0].position =
+      positions.Of(key, images.WorkingCamera(key), *luminance, images.Mask(key).get());
   if (context.HasInput(artifact::kAugmentationFacts)) {
     for (TrainingPicture& picture : TrainingPicturesFrom(
              context.ReadInput(artifact::kAugmentationFacts),
@@ -129,7 +128,8 @@ void RunPersonalize(const ColorizerOptions& options,
   }
   for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
     const int view = scene.FindView(picture.name);
-    picture.position = positions.Of(view, images.WorkingCamera(view), picture.luminance);
+    picture.position =
+        positions.Of(view, images.WorkingCamera(view), picture.luminance, images.Mask(view).get());
     pictures.push_back(std::move(picture));
   }
   SceneBatch alone(context.pool().thread_count());

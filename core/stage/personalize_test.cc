@@ -74,6 +74,30 @@ TEST_F(PersonalizeStageTest, WhatIsLeftUnpaintedIsNotLearntFrom) {
   EXPECT_GT(right_of(painted), 15.0) << "not painted";
 }
 
+TEST_F(PersonalizeStageTest, WhatIsMaskedOutIsNotLearntFrom) {
+  Image mask(kWidth, kHeight, 1, 1.0f);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = kWidth / 2; x < kWidth; ++x) mask.At(0, y, x) = 0.0f;
+  }
+  Write("m.png", EncodePng8(mask));
+  scene_.views[1].mask_file = "m.png";
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  const auto learnt = [&](float masked_out) {
+    Image ab(kWidth, kHeight, 2, 30.0f);
+    for (size_t i = 0; i < mask.data.size(); ++i) {
+      if (mask.data[i] == 0.0f) ab.data[i] = masked_out;
+    }
+    AddInput(artifact::kKeyColor, EncodeAbPng(ab));
+    const Image colors = LoadColorizer(Personalize(), Encoder::Embedded(), 1)
+                             ->Colorize(LuminanceOfLab(Painting(kWidth, kHeight)));
+    double sum = 0.0;
+    for (int y = 0; y < colors.height; ++y) sum += colors.At(0, y, colors.width - 8);
+    return sum / colors.height;
+  };
+  EXPECT_GT(learnt(-60.0f), 15.0);
+  EXPECT_NEAR(learnt(-60.0f), learnt(30.0f), 3.0);
+}
+
 TEST_F(PersonalizeStageTest, APaintedPartThatIsTooFineIsRefused) {
   Image ab(4 * kWidth, 4 * kHeight, 2, 30.0f), painted(4 * kWidth, 4 * kHeight, 1);
   for (int x = 0; x < painted.width; ++x) painted.At(0, 10, x) = 1.0f;

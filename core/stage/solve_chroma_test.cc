@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/splat/raster/render.h"
 #include "core/stage/stages.h"
 #include "tests/support/stages/evaluated_scene.h"
 
@@ -43,6 +44,23 @@ TEST_F(ConfidenceTest, ReachesTheModelAndThePly) {
   EXPECT_GT(right, 0.3) << "the key view has no provenance of its own: it is seen everywhere";
   EXPECT_THAT(ExportedPly(), testing::HasSubstr("property float confidence\nend_header"));
   EXPECT_EQ(observer_.text, "");
+}
+
+// The two training views disagree: p1 says a = 5, p2 says 25.
+TEST_F(ConfidenceTest, MaskedPartsOfPhotosDoNotColourTheModel) {
+  Image mask(48, 32, 1);
+  for (int y = 0; y < 32; ++y) mask.At(0, y, 0) = 1.0f;
+  WriteFileAtomic(scratch_.path() / "m.png", EncodePng8(mask));
+  const auto redness = [&](int masked) {
+    Scene scene = scene_;
+    scene.views[masked].mask_file = "m.png";
+    AddInput(artifact::kScene, SceneToJson(scene));
+    ThreadPool pool(1);
+    const View& view = scene_.views[1];
+    return RenderView(Solved(), view.camera, view.cam_from_world, pool).lab.At(1, 16, 24);
+  };
+  EXPECT_NEAR(redness(2), 5.0, 2.0);
+  EXPECT_NEAR(redness(1), 25.0, 5.0);
 }
 
 TEST_F(ConfidenceTest, JobsWithoutProvenanceHaveNone) {

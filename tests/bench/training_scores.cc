@@ -32,7 +32,9 @@ nlohmann::ordered_json ScoreTrainingViews(StageContext& context) {
     const auto mask = images.Mask(view);
     const Image lab =
         RenderView(model, camera, scene.views[view].cam_from_world, context.pool()).lab;
-    for (const auto& [name, value] : ScoreView(truth, lab, ab, mask.get())) sum[name] += value;
+    const Scores of_view = ScoreView(truth, lab, ab, mask.get());
+    if (of_view.empty()) continue;
+    for (const auto& [name, value] : of_view) sum[name] += value;
     const std::string name = ViewArtifact(artifact::kProvenance, scene.views[view], ".png");
     if (context.HasInput(name)) {
       const Image shares = DecodeImage(context.ReadInput(name), name);

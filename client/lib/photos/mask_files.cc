@@ -52,8 +52,7 @@ void AddMasks(const fs::path& masks, PhotoFolder* folder) {
     if (photo == photo_of.end()) {
       throw InvalidArgument(
           "--masks: {} is the mask of no photo; masks are PNG files called like their photos "
-          "(a.png "
-          "or a.jpg.png for a.jpg)",
+          "(a.png or a.jpg.png for a.jpg)",
           (masks / file).string());
     }
     const auto [other, is_first] = mask_of.emplace(photo->second, file);
@@ -67,6 +66,8 @@ void AddMasks(const fs::path& masks, PhotoFolder* folder) {
   if (folder->mask_files.empty()) {
     throw InvalidArgument("--masks {}: there is no mask in it", masks.string());
   }
+  folder->notes.push_back(
+      fmt::format("{} of {} photos have masks", mask_of.size(), folder->photos.size()));
   constexpr size_t kMaxFiles = 10'000;
   if (folder->AllFiles().size() > kMaxFiles) {
     throw InvalidArgument("photos and masks are {} files; at most {} make up a scene",

@@ -55,6 +55,7 @@ TEST_F(MaskFilesTest, GoAlongUnderEitherName) {
   EXPECT_EQ(folder.mask_files[1].path, "masks/sub/b.jpg.png");
   EXPECT_EQ(folder.mask_files[1].file, masks() / "sub/b.jpg.png");
   EXPECT_EQ(folder.AllFiles().size(), 5u);
+  EXPECT_THAT(folder.notes, ::testing::Contains("2 of 3 photos have masks"));
 }
 
 TEST_F(MaskFilesTest, WhatIsNoMaskOfAPhotoIsRefusedByName) {

@@ -33,7 +33,10 @@ bool HasTransparency(const fs::path& file, const std::string& name) {
   const std::string bytes = ReadFile(file);
   const ImageInfo info = ProbeImage(bytes, name);
   if (info.format != ImageFormat::kPng) return false;
-  // Palettes may be transparent, too: decoding tells.
+  // Colours of a palette, and one colour of other pictures, may be transparent by a chunk of its
+  // own; where it is not there, decoding is saved.
+  const bool has_alpha = info.channels == 2 || info.channels == 4;
+  if (!has_alpha && bytes.find("tRNS") == std::string::npos) return false;
   const Image image = DecodeImage(bytes, name, /*keep_alpha=*/true);
   if (image.channels != 2 && image.channels != 4) return false;
   const float* alpha = image.Plane(image.channels - 1);

@@ -169,5 +169,29 @@ TEST_F(PhotoMasksTest, GoToStructureFromMotionAtTheCopiesSize) {
   EXPECT_EQ(mask.At(0, 9, 20), 1.0f);
 }
 
+TEST_F(PhotoMasksTest, MaskedPartsTieNoPhotosTogether) {
+  Image photo(320, 240, 1, 0.4f);  // squares of different sizes all over
+  for (int i = 0; i < 40; ++i) {
+    const int size = 5 + i % 7, left = 20 + 36 * (i % 8), top = 20 + 44 * (i / 8);
+    for (int y = top; y < top + size; ++y) {
+      for (int x = left; x < left + size; ++x) photo.At(0, y, x) = 0.9f;
+    }
+  }
+  for (const char* name : {"images/a.png", "images/b.png"}) Write(name, EncodePng8(photo));
+  Write("masks/b.png", EncodePng8(Stripe(320, 240, 0, 159)));
+  std::vector<Photo> photos = ListPhotos(root());
+  for (Photo& p : photos) ProbePhoto(root(), &p);
+  photos[1].mask_file = "masks/b.png";
+  QuietRun run(1);
+  const ScratchFolder out;
+  const FeatureImages written = WriteFeatureImages(
+      photos, root(), out.path() / "copies", out.path() / "masks", 320, 100, run.control());
+  const LocalFeatures &all = written.features[0], &half = written.features[1];
+  ASSERT_GT(all.count(), 20);
+  EXPECT_GT(half.count(), all.count() / 4);
+  EXPECT_LT(half.count(), 3 * all.count() / 4);
+  for (int i = 0; i < half.count(); ++i) EXPECT_GE(half.positions[2 * i], -1.0f);
+}
+
 }  // namespace
 }  // namespace color3d

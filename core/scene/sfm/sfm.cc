@@ -250,6 +250,7 @@ SfmResult SceneOfModel(const ColmapModel& model,
     View view;
     view.name = photos[i].name;
     view.image_file = photos[i].file;
+    view.mask_file = photos[i].mask_file;
     // The copies are turned upright already, so no more turning.
     view.captured_camera = camera.camera.Scaled(photos[i].width, photos[i].height);
     view.distortion = camera.distortion;

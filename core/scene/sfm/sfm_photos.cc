@@ -40,6 +40,26 @@ std::string GroupFolder(const FeatureImages::Group& group) {
   return name;
 }
 
+// The features that do not lie where `mask`, of any size, is 0.
+LocalFeatures Unmasked(const LocalFeatures& features, const Image& mask) {
+  LocalFeatures kept;
+  kept.side_px = features.side_px;
+  const double scale =
+      static_cast<double>(std::max(mask.width, mask.height)) / std::max(1, features.side_px);
+  for (int i = 0; i < features.count(); ++i) {
+    const float* at = &features.positions[2 * i];
+    const int x = static_cast<int>(0.5 * mask.width + scale * at[0]);
+    const int y = static_cast<int>(0.5 * mask.height + scale * at[1]);
+    if (mask.At(0, std::clamp(y, 0, mask.height - 1), std::clamp(x, 0, mask.width - 1)) == 0.0f) {
+      continue;
+    }
+    kept.positions.insert(kept.positions.end(), at, at + 2);
+    const auto from = features.descriptors.begin() + int64_t{i} * LocalFeatures::kDimensions;
+    kept.descriptors.insert(kept.descriptors.end(), from, from + LocalFeatures::kDimensions);
+  }
+  return kept;
+}
+
 }  // namespace
 
 Image FeatureImage(const Image& photo, int max_side_px) {
@@ -86,9 +106,9 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     written.names[i] = fmt::format("{}/{:06}.png", folders[i], i + 1);
     fs::create_directories(folder / folders[i]);
     WriteFileAtomic(folder / written.names[i], EncodePng8(image));
+    Image mask;
     if (!photo.mask_file.empty()) {
-      const Image mask =
-          ReadMask(scene_folder, photo.mask_file, photo.file, photo.width, photo.height);
+      mask = ReadMask(scene_folder, photo.mask_file, photo.file, photo.width, photo.height);
       fs::create_directories(mask_folder / folders[i]);
       WriteFileAtomic(mask_folder / (written.names[i] + ".png"),
                       EncodePng8(ResizeMask(mask, image.width, image.height)));
@@ -96,6 +116,7 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     if (local_features > 0) {
       written.features[i] =
           DetectLocalFeatures(FitWithin(image, kSimilaritySidePx), local_features);
+      if (!mask.Empty()) written.features[i] = Unmasked(written.features[i], mask);
     }
   };
   // Observers are called from one thread; large photos take memory, hence not too many at a time.

@@ -34,7 +34,7 @@ struct FeatureImages {
 // Writes photo i as <width>x<height>[_f<focal>]/<i + 1 as 6 digits>.png below `folder`, EXIF
 // orientation applied, and its mask, if it has one, as the same name with .png added below
 // `mask_folder`, as COLMAP wants it. `local_features` > 0: also finds so many features in each
-// photo.
+// photo, of which those that are masked out are dropped.
 FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& folder,

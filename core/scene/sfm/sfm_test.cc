@@ -158,6 +158,39 @@ TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
   }
 }
 
+// Something that goes along with the camera, as a bonnet does, would tell that it stands still.
+TEST_F(Sfm, WhatIsMaskedOutDoesNotPlaceCameras) {
+  const std::vector<Pose> truth = RoomPoses(7);
+  Random random(5);
+  Image bonnet(400, 150, 1);
+  for (float& v : bonnet.data) v = static_cast<float>(random.NextUniform());
+  bonnet = Resize(Resize(bonnet, 100, 38), 400, 150);
+  Image mask(400, 300, 1, 1.0f);
+  std::fill(mask.data.begin() + 400 * 150, mask.data.end(), 0.0f);
+  fs::create_directories(folder_.path() / "images");
+  fs::create_directories(folder_.path() / "masks");
+  for (int i = 0; i < 7; ++i) {
+    Image photo = RenderRoom(kRoomCamera, truth[i]);
+    std::copy(bonnet.data.begin(), bonnet.data.end(), photo.data.begin() + 400 * 150);
+    WriteFileAtomic(folder_.path() / "images" / PhotoName(i), EncodePng8(photo));
+    WriteFileAtomic(folder_.path() / "masks" / PhotoName(i), EncodePng8(mask));
+  }
+  const ImportResult result = Run();
+  ASSERT_EQ(result.photos_registered, 7);
+  EXPECT_EQ(result.masked_views, 7);
+  Eigen::Matrix<double, 3, 7> found, expected;
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_EQ(result.scene.views[i].mask_file, "masks/" + PhotoName(i));
+    found.col(i) = result.scene.views[i].cam_from_world.Center();
+    expected.col(i) = truth[i].Center();
+  }
+  const Eigen::Matrix4d align = Eigen::umeyama(found, expected);
+  for (int i = 0; i < 7; ++i) {
+    const Eigen::Vector3d aligned = (align * found.col(i).homogeneous()).head<3>();
+    EXPECT_LT((aligned - expected.col(i)).norm(), 0.08) << i;  // the path is 2 long
+  }
+}
+
 // Enough photos that most pairs are left out, from a camera that says its focal length.
 TEST_F(Sfm, PlannedPairsOfPhotosWithAFocalLength) {
   constexpr int kCount = 14;

@@ -23,6 +23,7 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kTargetBudgetBytes = int64_t{512} << 20;
+constexpr int64_t kMaskBudgetBytes = int64_t{128} << 20;
 constexpr double kErrorReports = 100.0;
 constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
@@ -70,7 +71,7 @@ class GeometryTrainer {
                  channels_,
                  problem.colors ? 1.0f : 0.01f,
                  kTargetBudgetBytes),
-        masks_(problem.mask, 1, 1.0f, kTargetBudgetBytes, ResizeMask) {
+        masks_(problem.mask, 1, 1.0f, kMaskBudgetBytes, ResizeMask) {
     state_.parameters =
         AtMost(options.max_gaussians,
                WithColors(problem.initial, channels_, ShCoefficients(options.sh_degree)));

@@ -94,6 +94,39 @@ TEST(TrainGeometryTest, RaisesThePsnrOfAViewItNeverSaw) {
   EXPECT_NEAR(view.depth.At(0, 36, 48), 3.1f, 0.5f);
 }
 
+// Something of its own stands before the room in every photo, which a view without it tells.
+TEST(TrainGeometryTest, LearnsNothingFromWhatIsMaskedOut) {
+  const ProceduralScene s = MakeRoomCorner(7, 96, 72, 800);
+  Image mask(96, 72, 1, 1.0f);
+  for (int y = 20; y < 52; ++y) {
+    for (int x = 30; x < 66; ++x) mask.At(0, y, x) = 0.0f;
+  }
+  const auto counts = std::make_shared<const Image>(mask);
+  const auto psnr = [&](bool spoilt, bool masked) {
+    GeometryProblem problem = ProblemOf(s, 3);
+    if (spoilt) {
+      problem.luminance = [&](int view) {
+        auto picture = std::make_shared<Image>(*s.Luminance(view));
+        for (size_t i = 0; view != 3 && i < mask.data.size(); ++i) {
+          if (mask.data[i] == 0.0f) picture->data[i] = view % 2 == 0 ? 95.0f : 5.0f;
+        }
+        return picture;
+      };
+    }
+    if (masked) problem.mask = [&](int view) { return view == 3 ? nullptr : counts; };
+    ThreadPool pool(2);
+    NoCheckpoints none;
+    Recorder recorder;
+    TrainGeometry(problem, SmallOptions(200), {pool, none, recorder, CancellationToken()});
+    EXPECT_THAT(recorder.warnings, testing::IsEmpty());
+    return recorder.errors["heldout_psnr_l_db"].back();
+  };
+  const double spoilt = psnr(true, false), masked = psnr(true, true), clean = psnr(false, false);
+  EXPECT_GT(masked, spoilt + 3.0);
+  EXPECT_GT(masked, clean - 3.0);
+  EXPECT_NEAR(psnr(false, true), masked, 0.5) << "what is behind the mask does not matter";
+}
+
 TEST(TrainGeometryTest, KeepsTheHardCap) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 64, 500);
   ThreadPool pool(2);

@@ -25,5 +25,25 @@ TEST(CompareClampedTest, ClampsBeforeItCompares) {
   EXPECT_EQ(drawn.Row(1, 3)[4], 1.0f);
 }
 
+TEST(CompareClampedTest, OnlyWhatTheMaskLeavesCounts) {
+  PlaneBuffer drawn(32, 24, 1), truth(32, 24, 1), mask(32, 24, 1);
+  for (int y = 0; y < 24; ++y) {
+    for (int x = 0; x < 32; ++x) {
+      mask.Row(0, y)[x] = x < 16 ? 1.0f : 0.0f;
+      truth.Row(0, y)[x] = 0.5f;
+      drawn.Row(0, y)[x] = x < 16 ? 0.6f : 0.0f;
+    }
+  }
+  ImageLoss loss;
+  ThreadPool pool(1);
+  const PictureQuality quality = CompareClamped(truth, &mask, loss, pool, drawn);
+  EXPECT_NEAR(quality.psnr_db, 20.0, 1e-3);
+  EXPECT_NEAR(quality.l1, 0.1, 1e-5);
+  EXPECT_EQ(drawn.Row(0, 5)[20], 0.5f);
+  ClearWhereMasked(mask, drawn);
+  EXPECT_EQ(drawn.Row(0, 5)[20], 0.0f);
+  EXPECT_EQ(drawn.Row(0, 5)[10], 0.6f);
+}
+
 }  // namespace
 }  // namespace color3d

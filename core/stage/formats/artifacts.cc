@@ -32,16 +32,15 @@ void CheckStemsAreUnique(const Scene& scene) {
 }
 
 std::string ImportFactsToJson(const ImportFacts& f) {
-  return nlohmann::ordered_json{{"layout", f.layout},
-                                {"ran_structure_from_motion", f.ran_structure_from_motion},
-                                {"sfm_plan", f.sfm_plan},
-                                {"undistorted", f.undistorted},
-                                {"random_points", f.random_points},
-                                {"photos_found", f.photos_found},
-                                {"photos_registered", f.photos_registered},
-                                {"masked_views", f.masked_views}}
-             .dump(1) +
-         "\n";
+  nlohmann::ordered_json json{{"layout", f.layout},
+                              {"ran_structure_from_motion", f.ran_structure_from_motion},
+                              {"sfm_plan", f.sfm_plan},
+                              {"undistorted", f.undistorted},
+                              {"random_points", f.random_points},
+                              {"photos_found", f.photos_found},
+                              {"photos_registered", f.photos_registered}};
+  if (f.masked_views > 0) json["masked_views"] = f.masked_views;
+  return json.dump(1) + "\n";
 }
 
 ImportFacts ImportFactsFromJson(std::string_view json) {
@@ -55,7 +54,7 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
     f.random_points = value.at("random_points");
     f.photos_found = value.at("photos_found");
     f.photos_registered = value.at("photos_registered");
-    f.masked_views = value.at("masked_views");
+    f.masked_views = value.value("masked_views", 0);
     return f;
   } catch (const nlohmann::json::exception& e) {
     throw InvalidArgument("{} is damaged: {}", artifact::kImportFacts, e.what());

@@ -17,6 +17,9 @@ TEST_F(StageTest, ImportFactsRoundTrip) {
   EXPECT_EQ(back.layout, "colmap");
   EXPECT_EQ(back.photos_found, 7);
   EXPECT_TRUE(back.undistorted);
+  EXPECT_EQ(back.masked_views, 0);
+  facts.masked_views = 3;
+  EXPECT_EQ(ImportFactsFromJson(ImportFactsToJson(facts)).masked_views, 3);
   EXPECT_THROW(ImportFactsFromJson("{}"), Error);
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/median.h"
+#include "core/scene/masks/photo_masks.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
 
@@ -54,7 +55,10 @@ ViewPositions::ViewPositions(const Scene& scene, const StageContext& context) : 
   radius_ = std::max(Median(values), 1e-9);
 }
 
-Image ViewPositions::Of(int view, const Camera& camera, const Image& luminance) const {
+Image ViewPositions::Of(int view,
+                        const Camera& camera,
+                        const Image& luminance,
+                        const Image* mask) const {
   if (!geometry_) return {};
   const Pose& pose = scene_.views[view].cam_from_world;
   ThreadPool one(1);
@@ -70,6 +74,7 @@ Image ViewPositions::Of(int view, const Camera& camera, const Image& luminance) 
       position.At(3, y, x) = 1.0f;
     }
   }
+  ClearMasked(mask, &position);
   return position;
 }
 

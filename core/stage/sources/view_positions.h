@@ -17,9 +17,9 @@ class ViewPositions {
   ViewPositions(const Scene& scene, const StageContext& context);
 
   // PictureFacts::position, of the size of `luminance`, the view's as `camera` takes it. Known
-  // where the geometry is rendered as the view shows it: elsewhere it stands for something else.
-  // Empty without geometry.
-  Image Of(int view, const Camera& camera, const Image& luminance) const;
+  // where the geometry is rendered as the view shows it: elsewhere, and where `mask` (of that size;
+  // null: nowhere) is 0, the view shows something else. Empty without geometry.
+  Image Of(int view, const Camera& camera, const Image& luminance, const Image* mask) const;
 
  private:
   const Scene& scene_;
