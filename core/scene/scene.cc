@@ -55,8 +55,9 @@ int Scene::FindView(std::string_view name) const {
 }
 
 bool Scene::IsFilm() const {
-  return !views.empty() &&
-         std::all_of(views.begin(), views.end(), [](const View& v) { return v.moment.has_value(); });
+  return !views.empty() && std::all_of(views.begin(), views.end(), [](const View& v) {
+    return v.moment.has_value();
+  });
 }
 
 double Scene::Extent() const {
