@@ -288,7 +288,7 @@ TEST_F(CarryStageTest, WithoutGeometryNoPositionIsKnown) {
   inputs_.erase(artifact::kGeometry);
   const StageContext context = MakeContext();
   EXPECT_TRUE(ViewPositions(scene_, context)
-                  .Of(1, scene_.views[1].camera, Image(kWidth, kHeight, 1))
+                  .Of(1, scene_.views[1].camera, Image(kWidth, kHeight, 1), nullptr)
                   .Empty());
 }
 
