@@ -12,11 +12,11 @@ packages=(
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
   libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev libzstd-dev
-  libavcodec-dev libavformat-dev libavutil-dev # movies
+  libavcodec-dev libavformat-dev libavutil-dev libswscale-dev # film
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy libswscale-dev
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy
     python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
   *) echo "install-deps: unknown option $1; there is --tests" >&2; exit 2 ;;
 esac

@@ -61,6 +61,7 @@ for part in model raster training geometry chroma export import; do
 done
 allow core/report 'core/(base|catalogue|image|report)'
 allow core/video 'core/(base|video)'
+allow core/film 'core/(base|image|film)'
 allow core/view 'core/(base|scene|view(/path)?)'
 allow core/view/path 'core/(base|scene|view(/path)?)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
@@ -103,6 +104,7 @@ public core/image codec draw fill_holes guided_upsample local_features optical_f
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
+public core/film film_carry shots
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
@@ -110,8 +112,8 @@ public core/scene camera import scene view_images formats/camera_file masks/mask
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene
-public core/stage stages formats/artifacts
-public core/video mp4_writer
+public core/stage stages film/import_film formats/artifacts
+public core/video film_reader mp4_writer
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
 public server/backends backend_address backend_prober grpc_colorizer

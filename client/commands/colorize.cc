@@ -32,6 +32,7 @@ class Colorize {
     if (!options_.scene.empty()) return RunStored();
     folder_ = CollectPhotos(options_.photos);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
+    if (options_.film) TakeAsFrames(&folder_);
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
     for (const std::string& text : options_.more_keys) {
       const MoreKey key = ParseMoreKey(text);
@@ -54,6 +55,11 @@ class Colorize {
     if (options_.benchmark && folder_.splat) {
       throw InvalidArgument("--benchmark compares with photos in colour; {} is a splat",
                             folder_.splat->file.string());
+    }
+    if (options_.benchmark && folder_.film) {
+      throw InvalidArgument(
+          "--benchmark needs the frames of {} as pictures in a folder; give that with --film",
+          folder_.film->file.string());
     }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);

@@ -147,7 +147,8 @@ std::string Summary(const fs::path& out) {
   if (const auto seconds = number("seconds_total")) {
     text += Line("computing time", HumanSeconds(*seconds));
   }
-  const std::pair<const char*, const char*> files[] = {{"coloured scene", artifact::kPly},
+  const std::pair<const char*, const char*> files[] = {{"coloured film", artifact::kMovie},
+                                                       {"coloured scene", artifact::kPly},
                                                        {"report", artifact::kReport},
                                                        {"in the browser", artifact::kViewPage}};
   for (const auto& [label, name] : files) {

@@ -21,6 +21,8 @@ std::string LayoutName(v1::Scene::Layout layout) {
       return "transforms";
     case v1::Scene::LAYOUT_SPLAT:
       return "splat";
+    case v1::Scene::LAYOUT_FILM:
+      return "film";
     default:
       return "-";
   }

@@ -20,8 +20,9 @@ std::string UploadFolder(Connection& connection,
       UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
         display.OnTransfer("uploading", done, total);
       });
-  display.Say(folder.splat ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
-                           : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
+  display.Say(folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
+              : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
+                            : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }
 

@@ -90,6 +90,9 @@ bool IsWithin(const fs::path& path, const fs::path& folder) {
 }  // namespace
 
 void ColorizeOptions::Check() const {
+  if (!masks.empty() && film) {
+    throw InvalidArgument("--masks is for photos of a place; --film takes frames as they are");
+  }
   if (!masks.empty() && photos.empty()) {
     throw InvalidArgument("--masks belongs to PHOTOS; a stored scene has its masks already");
   }
@@ -181,7 +184,8 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("PHOTOS",
                  o->photos,
                  "Folder of photos, or one with images/ and a COLMAP model (sparse/0), or with "
-                 "transforms.json and its photos; or a splat (.ply, .sog, .spz)");
+                 "transforms.json and its photos; or a splat (.ply, .sog, .spz); or a film (.mp4, "
+                 ".mov, .mkv, ...), whose frames are coloured");
   app.add_option("--scene",
                  o->scene,
                  "In place of PHOTOS: a scene that the server holds, coloured from the key view "
@@ -220,6 +224,8 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
       o->bound,
       "With --benchmark: also score the same geometry under the true colours of all views");
   app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
+  app.add_flag(
+      "--film", o->film, "The photos are frames of a film: coloured one by one, not reconstructed");
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");

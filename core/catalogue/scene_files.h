@@ -18,4 +18,21 @@ inline bool HasSplatExtension(std::string_view path) {
   return ending == ".ply" || ending == ".sog" || ending == ".spz";
 }
 
+// True for the file name endings of films that we read, any case.
+inline bool HasFilmExtension(std::string_view path) {
+  std::string ending(path.substr(std::min(path.size(), path.find_last_of('.'))));
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  for (const char* known :
+       {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".mts", ".ogv", ".wmv"}) {
+    if (ending == known) return true;
+  }
+  return false;
+}
+
+// Frames of a film lie there as pictures, in the order of their names.
+inline constexpr std::string_view kFramesFolder = "frames/";
+inline bool IsFrameFile(std::string_view path) { return path.starts_with(kFramesFolder); }
+
 }  // namespace color3d

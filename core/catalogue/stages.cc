@@ -69,12 +69,12 @@ const std::vector<Stage>& StageCatalogue() {
        .results = {kPly, kSog, kSpz, kGlb, kSplat, kViewPage}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
-       .reads = {kKeyView},
+       .reads = {kKeyView, kKeyColor, kViewsAb},  // of a film
        .leaves = {kRenders, kMovie, kFrames},
-       .results = {kRenders}},
+       .results = {kRenders, kMovie}},
       {.kind = kind::kEvaluate,
        .needs = {kScene, kViewsAb, kModel},
-       .reads = {kProvenance, kCorrectedAb, kCorrectedProvenance},
+       .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance},
        .leaves = {kScores, kTruths, kColored2d}},
       // Its report reads what all the others have left.
       {.kind = kind::kColorizeScene,

@@ -29,21 +29,23 @@ PlanStep Step(
 std::vector<PlanStep> PlanScene(const PlanFacts& f) {
   const double megapixels = f.views * f.megapixels_per_view;
   std::vector<PlanStep> plan;
-  plan.push_back(Step(
-      "structure_from_motion",
-      !f.has_poses,
-      f.has_poses ? "the scene comes with camera poses" : "the photos come without camera poses",
-      SfmSeconds(f),
-      kind::kImportScene));
+  plan.push_back(Step("structure_from_motion",
+                      !f.has_poses && !f.is_film,
+                      f.is_film     ? "frames of a film are coloured by motion"
+                      : f.has_poses ? "the scene comes with camera poses"
+                                    : "the photos come without camera poses",
+                      SfmSeconds(f),
+                      kind::kImportScene));
   plan.push_back(
       Step("undistortion",
            f.has_distortion,
            f.has_distortion ? "the cameras have lens distortion" : "no camera has lens distortion",
            kSecondsPerRemapMegapixel * megapixels));
   plan.push_back(Step("random_points",
-                      !f.has_sparse_points,
-                      f.has_sparse_points ? "the scene has sparse points to start from"
-                                          : "the scene has no sparse points to start from",
+                      !f.has_sparse_points && !f.is_film,
+                      f.is_film             ? "nothing is reconstructed of a film"
+                      : f.has_sparse_points ? "the scene has sparse points to start from"
+                                            : "the scene has no sparse points to start from",
                       0.1));
   plan.push_back(Step(
       "key_view_selection",
@@ -51,19 +53,24 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
       f.key_view_given ? "the key view was given" : "the key view is chosen by feature coverage",
       kSecondsPerFeatureMegapixel * megapixels,
       kind::kSelectKeyView));
-  plan.push_back(
-      Step("luminance_geometry",
-           !f.geometry_given,
-           f.geometry_given ? "the scene's Gaussians were given" : "every scene needs geometry",
-           0.0,
-           kind::kReconstructGeometry));
+  plan.push_back(Step("luminance_geometry",
+                      !f.geometry_given && !f.is_film,
+                      f.is_film          ? "nothing is reconstructed of a film"
+                      : f.geometry_given ? "the scene's Gaussians were given"
+                                         : "every scene needs geometry",
+                      0.0,
+                      kind::kReconstructGeometry));
   plan.push_back(Step("personalization",
                       true,
                       "the key view's colours must reach every view",
                       0.0,
                       kind::kPersonalize));
-  plan.push_back(
-      Step("chroma", true, "a and b are fitted on the finished geometry", 0.0, kind::kSolveChroma));
+  plan.push_back(Step("chroma",
+                      !f.is_film,
+                      f.is_film ? "nothing is reconstructed of a film"
+                                : "a and b are fitted on the finished geometry",
+                      0.0,
+                      kind::kSolveChroma));
   plan.push_back(Step("warm_up_in_three_channels",
                       false,
                       "three identical luminance channels are one channel: one is rasterised",
@@ -72,10 +79,11 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
                       false,
                       "chroma is low-frequency in angle: degree 0 suffices unless asked for",
                       0.0));
-  plan.push_back(Step("deformation_over_time",
-                      f.time_varying,
-                      f.time_varying ? "the input is film" : "all photos show one moment",
-                      0.0));
+  plan.push_back(
+      Step("deformation_over_time",
+           false,
+           f.is_film ? "nothing is reconstructed of a film" : "all photos show one moment",
+           0.0));
   plan.push_back(
       Step("evaluation",
            true,

@@ -25,7 +25,7 @@ struct PlanFacts {
   bool has_distortion = false;
   bool has_sparse_points = true;
   bool geometry_given = false;  // the scene is a splat
-  bool time_varying = false;    // film or several moments
+  bool is_film = false;         // frames without poses: nothing is reconstructed
   bool has_truth = false;
   bool key_view_given = false;
   int views = 0;

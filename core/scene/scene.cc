@@ -54,6 +54,12 @@ int Scene::FindView(std::string_view name) const {
                                  : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
 }
 
+bool Scene::IsFilm() const {
+  return !views.empty() && std::all_of(views.begin(), views.end(), [](const View& v) {
+    return v.moment.has_value();
+  });
+}
+
 double Scene::Extent() const {
   const std::vector<int> training = TrainingViews();
   if (training.empty()) return 1.0;

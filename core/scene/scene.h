@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,13 @@
 #include "core/scene/camera.h"
 
 namespace color3d {
+
+// When a frame of a film was taken.
+struct Moment {
+  double time_s = 0.0;  // from the film's first frame, >= 0
+  int shot = 0;         // frames of one shot show one place without a cut between them
+  bool operator==(const Moment&) const = default;
+};
 
 struct View {
   std::string name;        // unique in the scene: the photo's path relative to the images folder
@@ -25,6 +33,9 @@ struct View {
   Distortion distortion;  // of captured_camera
   Pose cam_from_world;
   bool held_out = false;  // used for evaluation only, never by any trainer
+  // Of a frame of a film; none: the photo shows a place that stands still. Frames of a film need
+  // not have poses: theirs are then all the same.
+  std::optional<Moment> moment;
 };
 
 struct SparsePoint {
@@ -46,6 +57,8 @@ struct Scene {
   // Index of a view by name (or by file stem when that is unique); throws Error{kNotFound} naming
   // a few that exist.
   int FindView(std::string_view name) const;
+  // Frames of a film: every view has its moment. False without views.
+  bool IsFilm() const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
   double Extent() const;
   // In the world's units and frame.

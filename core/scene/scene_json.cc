@@ -146,6 +146,12 @@ Pose PoseFromJson(const Field& field) {
   return pose;
 }
 
+Moment MomentFromJson(const Field& field) {
+  const double time_s = field["time_s"].Number();
+  if (time_s < 0.0) throw field["time_s"].Wrong("0 or more");
+  return {time_s, field["shot"].Integer(0, INT32_MAX)};
+}
+
 View ViewFromJson(const Field& field) {
   View view;
   view.name = field["name"].RelativePath();
@@ -156,6 +162,7 @@ View ViewFromJson(const Field& field) {
   view.distortion = DistortionFromJson(field["distortion"]);
   view.cam_from_world = PoseFromJson(field["cam_from_world"]);
   view.held_out = field["held_out"].Boolean();
+  if (field.Has("moment")) view.moment = MomentFromJson(field["moment"]);
   return view;
 }
 
@@ -191,6 +198,9 @@ std::string SceneToJson(const Scene& scene) {
           {{"rotation_wxyz", json::array({q.w(), q.x(), q.y(), q.z()})},
            {"translation", Vector3ToJson(view.cam_from_world.translation)}}},
          {"held_out", view.held_out}});
+    if (view.moment) {
+      views.back()["moment"] = {{"time_s", view.moment->time_s}, {"shot", view.moment->shot}};
+    }
     if (!view.mask_file.empty()) views.back()["mask_file"] = view.mask_file;
   }
   json points = json::array();

@@ -5,6 +5,7 @@
 #include "core/base/range_check.h"
 #include "core/carry/carry_views.h"
 #include "core/color/lab.h"
+#include "core/film/film_carry.h"
 #include "core/image/codec.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
@@ -40,6 +41,15 @@ CarriedColor ColorOfFurther(const FurtherKeyView& further,
   return color;
 }
 
+int FurtherView(const FurtherKeyView& further, const Scene& scene) {
+  const int view = scene.FindView(further.view);
+  if (scene.views[view].held_out) {
+    throw InvalidArgument("the view {} is held out for evaluation and cannot be a key view",
+                          scene.views[view].name);
+  }
+  return view;
+}
+
 std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
                                           const Scene& scene,
                                           const ViewImages& images,
@@ -54,11 +64,7 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
   for (const FurtherKeyView& further : options.further) {
     context.cancel().ThrowIfCancelled();
     ColoredKeyView key;
-    key.view = scene.FindView(further.view);
-    if (scene.views[key.view].held_out) {
-      throw InvalidArgument("the view {} is held out for evaluation and cannot be a key view",
-                            scene.views[key.view].name);
-    }
+    key.view = FurtherView(further, scene);
     for (const ColoredKeyView& other : keys) {
       if (other.view == key.view) {
         throw InvalidArgument("the view {} is a key view already; name each once",
@@ -88,15 +94,11 @@ double MeanCoverage(const std::vector<double>& coverage, const std::vector<int>&
 
 // carry.json, and a warning when the key views show next to nothing of the others.
 void Conclude(const Scene& scene,
-              const std::vector<ColoredKeyView>& keys,
+              const std::vector<int>& key_views,
               const std::vector<double>& coverage,
               StageContext& context) {
-  std::vector<int> key_views;
   CarryFacts facts;
-  for (const ColoredKeyView& key : keys) {
-    key_views.push_back(key.view);
-    facts.key_views.push_back(scene.views[key.view].name);
-  }
+  for (const int view : key_views) facts.key_views.push_back(scene.views[view].name);
   const double mean = MeanCoverage(coverage, key_views);
   facts.coverage = mean;
   context.progress().OnError(0, "coverage", mean);
@@ -107,6 +109,43 @@ void Conclude(const Scene& scene,
                     100.0 * mean));
   }
   WriteCarryFacts(facts, scene, coverage, context);
+}
+
+// The key frames' colours along the film, by motion in place of geometry.
+void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageContext& context) {
+  constexpr int64_t kCacheBytes = int64_t{64} << 20;
+  const ViewImages images(scene, context.scene_folder(), options.max_side_px, kCacheBytes);
+  FilmFrames frames;
+  for (const View& view : scene.views) frames.shot.push_back(view.moment->shot);
+  frames.luminance = [&](int frame) { return images.Luminance(frame); };
+  const Camera camera = images.WorkingCamera(0);
+  std::vector<FilmKey> keys(1);
+  keys[0].frame = ReadKeyView(context, scene);
+  CarriedColor first = ReadKeyColor(context, camera.width, camera.height);
+  keys[0].color = {std::move(first.ab), std::move(first.confidence)};
+  for (const FurtherKeyView& further : options.further) {
+    const int view = FurtherView(further, scene);
+    CarriedColor color = ColorOfFurther(further, view, scene, images, context);
+    keys.push_back({view, {std::move(color.ab), std::move(color.confidence)}});
+  }
+  const auto total = static_cast<int64_t>(scene.views.size());
+  std::vector<double> coverage(scene.views.size(), 0.0);
+  int64_t done = 0;
+  CarryAlongFilm(frames,
+                 keys,
+                 options.film,
+                 context.pool(),
+                 context.cancel(),
+                 [&](int frame, const FilmColor& color) {
+                   const View& view = scene.views[frame];
+                   coverage[frame] = Coverage({color.ab, color.confidence}, kCovered);
+                   context.WriteOutput(ViewArtifact(artifact::kCarried, view, ".png"),
+                                       EncodeAbPng(color.ab, color.confidence));
+                   context.progress().OnProgress(++done, total, "carrying colour along the film");
+                 });
+  std::vector<int> views;
+  for (const FilmKey& key : keys) views.push_back(key.frame);
+  Conclude(scene, views, coverage, context);
 }
 
 }  // namespace
@@ -123,11 +162,13 @@ void CarryColorOptions::Validate() const {
   }
   sweep.Validate();
   carry.Validate();
+  film.Validate();
 }
 
 void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
+  if (scene.IsFilm()) return CarryByMotion(options, scene, context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const ViewImages images(scene, context.scene_folder(), options.max_side_px);
   const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);
@@ -153,7 +194,9 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
              key != keys.end() ? 1.0 : Coverage(carried, kCovered),
              EncodeAbPng(carried.ab, carried.confidence));
   });
-  Conclude(scene, keys, done.coverage(), context);
+  std::vector<int> key_views;
+  for (const ColoredKeyView& key : keys) key_views.push_back(key.view);
+  Conclude(scene, key_views, done.coverage(), context);
 }
 
 }  // namespace color3d

@@ -112,6 +112,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   if (!context.HasInput(artifact::kImportFacts)) return {};  // nobody knows what was planned
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   PlanFacts plan_facts;
+  plan_facts.is_film = scene.IsFilm();
   plan_facts.has_poses = !facts.ran_structure_from_motion;
   plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
@@ -155,14 +156,17 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
 std::string Summary(const Scene& scene,
                     const ordered_json& metrics,
                     const std::vector<std::string>& keys) {
-  return fmt::format("{} views ({} held out){}. {} Gaussians in {} s of computing.",
+  const std::string of_model =
+      scene.IsFilm() ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
+  return fmt::format("{} {} ({} held out){}. {} in {} s of computing.",
                      scene.views.size(),
+                     scene.IsFilm() ? "frames" : "views",
                      scene.HeldOutViews().size(),
                      keys.empty() ? std::string()
                                   : fmt::format(", all colours from the key {} {}",
                                                 keys.size() == 1 ? "view" : "views",
                                                 fmt::join(keys, ", ")),
-                     metrics.value("gaussians", 0),
+                     of_model,
                      static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
 }
 

@@ -13,6 +13,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
+#include "core/stage/film/colored_frames.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -110,8 +111,9 @@ SceneConsistency CompareViews(const Scene& scene,
 // Scores of all held-out views that have a truth, as they come.
 class HeldOutScores {
  public:
+  // Without a model what is delivered, and scored as rendered, are the coloured frames.
   HeldOutScores(const Scene& scene,
-                const GaussianModel& model,
+                const std::optional<GaussianModel>& model,
                 const std::optional<GaussianModel>& bound,
                 StageContext& context)
       : scene_(scene), model_(model), bound_(bound), context_(context) {}
@@ -125,11 +127,11 @@ class HeldOutScores {
     if (captured.channels != 3) throw InvalidArgument("the truth of {} is grey", view.name);
     const Image true_srgb = images.Undistort(index, captured);
     const Camera camera = images.WorkingCamera(index);
+    const Image delivered =
+        model_ ? RenderView(*model_, camera, view.cam_from_world, context_.pool()).lab
+               : ColoredFrame(scene_, index, images, context_);
     const auto mask = images.Mask(index);
-    Scores scores = ScoreView(true_srgb,
-                              RenderView(model_, camera, view.cam_from_world, context_.pool()).lab,
-                              ab,
-                              mask.get());
+    Scores scores = ScoreView(true_srgb, delivered, ab, mask.get());
     if (scores.empty()) {
       context_.progress().OnWarning(view.name + " is not scored: its mask leaves nothing of it");
       return;
@@ -173,7 +175,7 @@ class HeldOutScores {
 
  private:
   const Scene& scene_;
-  const GaussianModel& model_;
+  const std::optional<GaussianModel>& model_;
   const std::optional<GaussianModel>& bound_;
   StageContext& context_;
   ordered_json views_ = ordered_json::array();
@@ -217,9 +219,12 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   const TruthFiles held_out = FilesByView(options.truth, true, scene);
   const TruthFiles training = FilesByView(options.training_truth, false, scene);
-  const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
+  std::optional<GaussianModel> model;
+  if (!scene.IsFilm()) model = ParseGaussians(context.ReadInput(artifact::kModel));
   std::optional<GaussianModel> bound;
-  if (options.bound) bound = FitTrueChroma(model, scene, training, options.chroma, context);
+  if (options.bound && model) {
+    bound = FitTrueChroma(*model, scene, training, options.chroma, context);
+  }
   HeldOutScores scores(scene, model, bound, context);
   int64_t done = 0;
   for (const auto& [view, file] : held_out) {
@@ -230,7 +235,8 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   }
   TruthFiles all = held_out;
   all.insert(training.begin(), training.end());
-  const SceneConsistency consistency = CompareViews(scene, model, all, context);
+  SceneConsistency consistency;
+  if (model) consistency = CompareViews(scene, *model, all, context);
   const Scores mean = scores.Mean();
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
   ordered_json json{{"mean", mean}, {"views", scores.views()}};

@@ -81,9 +81,15 @@ void ImportSplatScene(const std::string& file,
 
 void RunImportScene(const ImportOptions& options,
                     StageContext& context,
-                    const SplatViewOptions& splat_views) {
+                    const SplatViewOptions& splat_views,
+                    const FilmOptions& film_options) {
   options.Validate();
   splat_views.Validate();
+  film_options.Validate();
+  const std::string film = FindFilm(context.scene_folder());
+  if (!film.empty()) {
+    return ImportFilm(film, film_options, options.hold_out_every_eighth, context);
+  }
   const std::string splat = FindSplat(context.scene_folder());
   if (!splat.empty()) return ImportSplatScene(splat, options, splat_views, context);
   const ImportResult result =

@@ -59,16 +59,24 @@ TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageConte
 
 // Views that carried colours are learnt from: the best covered ones that are not the key view.
 constexpr int kMaxCarriedViews = 12;
+constexpr size_t kMaxViewsToLookAt = 120;  // of a film; they are all in memory
 constexpr double kMinCoverage = 0.05;
 constexpr float kMinConfidence = 0.3f;
 constexpr double kCarriedShare = 0.5;  // of the samples
+
+std::vector<int> Spread(const std::vector<int>& views, size_t wanted) {
+  if (views.size() <= wanted) return views;
+  std::vector<int> spread;
+  for (size_t i = 0; i < wanted; ++i) spread.push_back(views[i * views.size() / wanted]);
+  return spread;
+}
 
 std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
                                              int key,
                                              const ViewImages& images,
                                              const StageContext& context) {
   std::vector<std::pair<double, TrainingPicture>> found;
-  for (int view : scene.TrainingViews()) {
+  for (int view : Spread(scene.TrainingViews(), kMaxViewsToLookAt)) {
     const std::string name = ViewArtifact(artifact::kCarried, scene.views[view], ".png");
     if (view == key || !context.HasInput(name)) continue;
     const auto luminance = images.Luminance(view);

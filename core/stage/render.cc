@@ -5,6 +5,7 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/stage/film/colored_frames.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/movie/movie.h"
 #include "core/stage/stages.h"
@@ -47,6 +48,7 @@ void RenderOptions::Validate() const {
 void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
+  if (scene.IsFilm()) return RenderFilm(options, scene, ViewsToRender(options, scene), context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   if (model.size() == 0) throw InvalidArgument("the model has no Gaussians: nothing is to be seen");
   if (options.path != RenderOptions::Path::kViews) {

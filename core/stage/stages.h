@@ -12,12 +12,14 @@
 #include "core/carry/view_color.h"
 #include "core/catalogue/stage_summary.h"
 #include "core/colorizer/colorizer.h"
+#include "core/film/film_carry.h"
 #include "core/keycolor/hints/hints.h"
 #include "core/keyview/select.h"
 #include "core/scene/import.h"
 #include "core/splat/chroma/chroma_options.h"
 #include "core/splat/geometry/geometry_options.h"
 #include "core/splat/import/splat_scene.h"
+#include "core/stage/film/import_film.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -27,10 +29,11 @@ void CheckMaxSide(int max_side_px);
 
 // The scene's files as views with poses; structure-from-motion where they have none. A scene of one
 // splat (.ply, .sog, .spz) and no photos: views chosen around it and drawn in grey, and its
-// Gaussians, which are the geometry.
+// Gaussians, which are the geometry. A film: its frames, without poses.
 void RunImportScene(const ImportOptions& options,
                     StageContext& context,
-                    const SplatViewOptions& splat_views = {});
+                    const SplatViewOptions& splat_views = {},
+                    const FilmOptions& film = {});
 
 struct SelectKeyViewOptions {
   KeyViewOptions selection;
@@ -81,6 +84,7 @@ struct CarryColorOptions {
   int depth_sources = 4;    // views that each view is compared with, 1..16
   PlaneSweepOptions sweep;
   CarryOptions carry;
+  FilmCarryOptions film;                // of a film: by motion
   std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
   void Validate() const;
   bool operator==(const CarryColorOptions&) const = default;

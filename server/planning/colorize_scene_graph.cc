@@ -145,6 +145,22 @@ std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts&
   return SamplesOf(spec) == 0 ? "no samples are asked for" + unused : "";
 }
 
+// Why a stage has nothing to do for a film; empty when it has.
+std::string WhyNotForFilm(const std::string& kind) {
+  if (kind == kind::kReconstructGeometry || kind == kind::kSolveChroma || kind == kind::kExport) {
+    return "frames of a film without poses are coloured, not reconstructed";
+  }
+  return "";
+}
+
+void CheckFilm(const ColorizeSceneSpec& given) {
+  if (given.has_correct_colors() && !given.correct_colors().corrections().empty()) {
+    throw InvalidArgument(
+        "corrections are for places that are reconstructed; colour further frames of the film as "
+        "key views instead (carry_color.further_key_views)");
+  }
+}
+
 }  // namespace
 
 void BuildColorizeSceneGraph(const JobSpec& submitted,
@@ -160,6 +176,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
         kind::kSelectKeyView);
   }
   if (submitted.inputs_size() > 0) CheckGiven(builder->given(), given);
+  if (facts.is_film) CheckFilm(given);
   for (const Stage& stage : StageCatalogue()) {
     const std::string kind = stage.kind;
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
@@ -171,6 +188,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       skip_reason = "nothing is to be corrected";
     }
     if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
+    if (skip_reason.empty() && facts.is_film) skip_reason = WhyNotForFilm(kind);
     builder->Add(std::move(spec), skip_reason);
   }
   builder->AddParent();

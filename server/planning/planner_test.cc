@@ -102,6 +102,25 @@ TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
   EXPECT_EQ(SpecOf(graph, "colorize_views").seed(), 1u);
 }
 
+TEST(Planner, AFilmIsColoredNotReconstructed) {
+  v1::JobSpec spec = SceneSpec();
+  const SceneFacts film{.photos = 0, .is_film = true};
+  const NewGraph graph = PlanJob(spec, {}, film);
+  for (const char* kind : {"reconstruct_geometry", "solve_chroma", "export"}) {
+    EXPECT_THAT(graph.jobs[IndexOf(graph, kind)].skip_reason, HasSubstr("film")) << kind;
+  }
+  for (const char* kind : {"carry_color", "personalize", "colorize_views", "render", "evaluate"}) {
+    EXPECT_EQ(graph.jobs[IndexOf(graph, kind)].skip_reason, "") << kind;
+  }
+  EXPECT_THAT(InputKinds(graph, "carry_color"),
+              ElementsAre("import_scene", "select_key_view", "colorize_key_view"));
+  EXPECT_THAT(InputKinds(graph, "render"), Contains("colorize_views"));
+  EXPECT_THAT(InputKinds(graph, "render"), Not(Contains("solve_chroma")));
+  spec.mutable_colorize_scene()->mutable_correct_colors()->add_corrections()->set_view("a");
+  const auto refused = [&] { PlanJob(spec, {}, film); };
+  EXPECT_THROW(refused(), Error);
+}
+
 TEST(Planner, KeyViewMakesTheSelectionManual) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_key_view("a.jpg");

@@ -18,6 +18,7 @@ struct SceneFacts {
   int photos = 0;
   bool has_poses = false;
   int augment_files = 0;
+  bool is_film = false;   // frames without poses: coloured, not reconstructed
   bool is_splat = false;  // its Gaussians are the geometry; `photos` are the views drawn from it
 };
 

@@ -61,11 +61,12 @@ std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec
 SceneFacts FactsOf(const SceneRecord& scene) {
   const bool is_splat = scene.layout == StoredLayout::kSplat;
   return {.photos = is_splat ? kSplatViews : scene.photo_count,
-          .has_poses = scene.layout != StoredLayout::kPhotos,
+          .has_poses = scene.layout != StoredLayout::kPhotos && scene.layout != StoredLayout::kFilm,
           .augment_files = static_cast<int>(
               std::count_if(scene.files.begin(),
                             scene.files.end(),
                             [](const auto& file) { return IsAugmentFile(file.path); })),
+          .is_film = scene.layout == StoredLayout::kFilm,
           .is_splat = is_splat};
 }
 

@@ -91,6 +91,18 @@ int CountSplats(const std::vector<SceneFileRecord>& files) {
   }));
 }
 
+int CountFilms(const std::vector<SceneFileRecord>& files) {
+  return static_cast<int>(std::count_if(files.begin(), files.end(), [](const auto& file) {
+    return HasFilmExtension(file.path) && !IsAugmentFile(file.path);
+  }));
+}
+
+bool HasFrames(const std::vector<SceneFileRecord>& files) {
+  return std::any_of(files.begin(), files.end(), [](const auto& file) {
+    return IsFrameFile(file.path) && HasImageExtension(file.path);
+  });
+}
+
 // One file's violations; counts it when it is a good photograph.
 void CheckFile(const SceneFileRecord& file,
                const BlobStore& blobs,
@@ -151,6 +163,8 @@ StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
   const bool has_photos = std::any_of(files.begin(), files.end(), [](const auto& file) {
     return HasImageExtension(file.path) && !IsAugmentFile(file.path) && !IsMaskFile(file.path);
   });
+  if (HasFrames(files)) return StoredLayout::kFilm;
+  if (!has_photos && CountFilms(files) > 0) return StoredLayout::kFilm;
   if (!has_photos && CountSplats(files) > 0) return StoredLayout::kSplat;
   if (!ModelFolders(files).empty()) return StoredLayout::kColmap;
   for (const SceneFileRecord& file : files) {
@@ -188,10 +202,16 @@ SceneCheck CheckScene(const SceneRecord& scene,
                                         "splat a scene",
                                         splats)});
     }
+  } else if (check.layout == StoredLayout::kFilm) {
+    const int films = CountFilms(scene.files);
+    if (films > 1 || (films == 1 && check.photo_count > 0)) {
+      violations.push_back(
+          {"", "the scene holds a film and more; give one video file, or frames/, a scene"});
+    }
   } else if (missing == 0 && check.photo_count == 0) {
     violations.push_back({"",
-                          "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff) and no "
-                          "splat (.ply, .sog, .spz)"});
+                          "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff), no "
+                          "splat (.ply, .sog, .spz) and no film (.mp4, .mov, .mkv, ...)"});
   } else if (missing == 0 && check.photo_count == 1) {
     violations.push_back(
         {"", "the scene holds one photograph; at least 3 that overlap are needed"});

@@ -96,6 +96,23 @@ TEST_F(SceneValidationTest, MasksAreNoPhotos) {
   EXPECT_THAT(Commit(files, &scene).error_message(), HasSubstr("masks/a.txt"));
 }
 
+TEST_F(SceneValidationTest, AFilmIsOneVideoOrPicturesInFrames) {
+  v1::Scene scene;
+  ASSERT_TRUE(Commit({{"walk.MP4", "any bytes: the import reads them"}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_FILM);
+  EXPECT_EQ(scene.photo_count(), 0);
+  ASSERT_TRUE(Commit({{"frames/a.png", TinyPng()}, {"frames/b.png", TinyPng()}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_FILM);
+  EXPECT_EQ(scene.photo_count(), 2);
+  EXPECT_THAT(Commit({{"a.mp4", "1"}, {"b.mov", "2"}}, &scene).error_message(),
+              HasSubstr("a film and more"));
+  EXPECT_THAT(Commit({{"a.mp4", "1"}, {"frames/b.png", TinyPng()}}, &scene).error_message(),
+              HasSubstr("a film and more"));
+  // Beside photos it says nothing.
+  ASSERT_TRUE(Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"c.mp4", "1"}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);
+}
+
 TEST_F(SceneValidationTest, OneSplatIsASceneWithoutPhotos) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"bust.PLY", "ply"}}, &scene).ok());

@@ -92,7 +92,7 @@ struct Lease {
 };
 
 enum class SceneState { kUploading, kActive };
-enum class StoredLayout { kUnknown, kPhotos, kColmap, kTransforms, kSplat };
+enum class StoredLayout { kUnknown, kPhotos, kColmap, kTransforms, kSplat, kFilm };
 
 struct SceneFileRecord {
   std::string path;

@@ -40,6 +40,14 @@ SplatViewOptions SplatViewOptionsFrom(const v1::ImportSceneSpec& spec) {
   return options;
 }
 
+FilmOptions FilmOptionsFrom(const v1::ImportSceneSpec& spec) {
+  FilmOptions options;
+  if (spec.has_film_stride()) options.stride = spec.film_stride();
+  if (spec.has_film_begin_s()) options.begin_s = spec.film_begin_s();
+  if (spec.has_film_end_s()) options.end_s = spec.film_end_s();
+  return options;
+}
+
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
   SelectKeyViewOptions options;
   options.view = spec.view();

@@ -9,6 +9,7 @@ namespace color3d {
 
 ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec);
 SplatViewOptions SplatViewOptionsFrom(const v1::ImportSceneSpec& spec);
+FilmOptions FilmOptionsFrom(const v1::ImportSceneSpec& spec);
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
 // Source and file are set by the caller, which holds the blobs.
 HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);

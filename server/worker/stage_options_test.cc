@@ -77,13 +77,15 @@ struct SizedGeometry {
   bool operator==(const SizedGeometry&) const = default;
 };
 
-// Photos and splats have options of their own.
+// Photos, splats and films have options of their own.
 struct ImportMethod {
   ImportOptions photos;
   SplatViewOptions splat;
+  FilmOptions film;
   void Validate() const {
     photos.Validate();
     splat.Validate();
+    film.Validate();
   }
   bool operator==(const ImportMethod&) const = default;
 };
@@ -92,7 +94,7 @@ struct ImportMethod {
 const std::map<std::string, Method>& Methods() {
   static const std::map<std::string, Method> methods = {
       {"import_scene", MakeMethod<v1::ImportSceneSpec>([](const auto& s) {
-         return ImportMethod{ImportOptionsFrom(s), SplatViewOptionsFrom(s)};
+         return ImportMethod{ImportOptionsFrom(s), SplatViewOptionsFrom(s), FilmOptionsFrom(s)};
        })},
       {"select_key_view", MakeMethod<v1::SelectKeyViewSpec>([](const auto& s) {
          return SelectOptionsFrom(s).selection;

@@ -173,7 +173,8 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kImportScene:
         return RunImportScene(ImportOptionsFrom(spec.import_scene()),
                               context,
-                              SplatViewOptionsFrom(spec.import_scene()));
+                              SplatViewOptionsFrom(spec.import_scene()),
+                              FilmOptionsFrom(spec.import_scene()));
       case JobSpec::kSelectKeyView:
         return RunSelectKeyView(SelectOptionsFrom(spec.select_key_view()), context);
       case JobSpec::kColorizeKeyView:

@@ -39,7 +39,8 @@ void RequireFolder(const fs::path& root) {
                 root.string());
   }
   throw InvalidArgument(
-      "{} is not a folder; give the folder of the photographs, or a splat (.ply, .sog or .spz)",
+      "{} is not a folder; give the folder of the photographs, a splat (.ply, .sog or .spz) or a "
+      "film (.mp4, .mov, .mkv, ...)",
       root.string());
 }
 
@@ -157,28 +158,30 @@ std::string SubfolderWithPhotos(const fs::path& root) {
   return found.empty() ? "" : *found.begin();
 }
 
-// The only splat in a folder without photos.
-void CollectSplat(const fs::path& root, PhotoFolder* result) {
+// The only splat or film in a folder without photos.
+std::optional<LocalFile> FindOnly(const fs::path& root,
+                                  bool (*is_one)(std::string_view path),
+                                  const char* what) {
   std::vector<std::string> found;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(root, none)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.') && HasSplatExtension(name) && IsFile(entry.path())) {
-      found.push_back(name);
-    }
+    if (!name.starts_with('.') && is_one(name) && IsFile(entry.path())) found.push_back(name);
   }
+  if (found.empty()) return std::nullopt;
   if (found.size() > 1) {
-    throw InvalidArgument("{} contains {} splats and no photographs; give one of them (e.g. {})",
+    throw InvalidArgument("{} contains {} {}s and no photographs; give one of them (e.g. {})",
                           root.string(),
                           found.size(),
+                          what,
                           (root / *std::min_element(found.begin(), found.end())).string());
   }
-  if (found.size() == 1) result->splat = {found[0], root / found[0]};
+  return LocalFile{found[0], root / found[0]};
 }
 
 void CheckCounts(const PhotoFolder& folder) {
   const std::string root = folder.root.string();
-  if (folder.splat) return;
+  if (folder.splat || folder.film) return;
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPhotos(folder.root);
     throw InvalidArgument(
@@ -214,6 +217,7 @@ void CheckName(const LocalFile& file) {
 std::vector<LocalFile> PhotoFolder::AllFiles() const {
   std::vector<LocalFile> all = photos;
   if (splat) all.push_back(*splat);
+  if (film) all.push_back(*film);
   all.insert(all.end(), model_files.begin(), model_files.end());
   all.insert(all.end(), augment_files.begin(), augment_files.end());
   all.insert(all.end(), mask_files.begin(), mask_files.end());
@@ -221,15 +225,16 @@ std::vector<LocalFile> PhotoFolder::AllFiles() const {
 }
 
 std::string PhotoFolder::Name() const {
-  return fs::absolute(splat ? splat->file : root).filename().string();
+  return fs::absolute(splat ? splat->file : film ? film->file : root).filename().string();
 }
 
 PhotoFolder CollectPhotos(const fs::path& root) {
   PhotoFolder result;
-  if (IsFile(root) && HasSplatExtension(root.filename().string())) {
+  const std::string file = root.filename().string();
+  if (IsFile(root) && (HasSplatExtension(file) || HasFilmExtension(file))) {
     result.root = root.parent_path();
-    result.splat = {root.filename().string(), root};
-    CheckName(*result.splat);
+    (HasSplatExtension(file) ? result.splat : result.film) = {file, root};
+    CheckName({file, root});
     return result;
   }
   RequireFolder(root);
@@ -239,8 +244,11 @@ PhotoFolder CollectPhotos(const fs::path& root) {
     result.root = result.root.parent_path();
   }
   CollectImages(result.root, &result);
-  if (result.photos.empty()) CollectSplat(result.root, &result);
-  if (!result.splat) CollectModel(result.root, &result);
+  if (result.photos.empty()) result.splat = FindOnly(result.root, HasSplatExtension, "splat");
+  if (result.photos.empty() && !result.splat) {
+    result.film = FindOnly(result.root, HasFilmExtension, "film");
+  }
+  if (!result.splat && !result.film) CollectModel(result.root, &result);
   CollectAugmentFiles(result.root, &result);
   const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
   std::sort(result.photos.begin(), result.photos.end(), by_path);
@@ -256,30 +264,53 @@ PhotoFolder CollectPhotos(const fs::path& root) {
   return result;
 }
 
+void TakeAsFrames(PhotoFolder* folder) {
+  if (folder->film) return;
+  if (folder->photos.empty()) {
+    throw InvalidArgument("{} has no pictures that could be frames of a film",
+                          folder->root.string());
+  }
+  folder->model_files.clear();
+  std::set<std::string> names;
+  for (LocalFile& photo : folder->photos) {
+    photo.path = std::string(kFramesFolder) + photo.file.filename().string();
+    if (!names.insert(photo.path).second) {
+      throw InvalidArgument("two pictures in {} are called {}; give one camera's frames",
+                            folder->root.string(),
+                            photo.file.filename().string());
+    }
+  }
+  const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
+  std::sort(folder->photos.begin(), folder->photos.end(), by_path);
+}
+
 namespace {
 
-bool IsSplatView(const std::string& stem) {
-  constexpr std::string_view kPrefix = "view_";
-  return stem.starts_with(kPrefix) && stem.size() > kPrefix.size() &&
-         stem.find_first_not_of("0123456789", kPrefix.size()) == std::string::npos;
+bool IsNumbered(const std::string& stem, std::string_view prefix) {
+  return stem.starts_with(prefix) && stem.size() > prefix.size() &&
+         stem.find_first_not_of("0123456789", prefix.size()) == std::string::npos;
 }
 
 }  // namespace
 
 std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
   const std::string wanted = file.stem().string();
-  if (folder.splat) return IsSplatView(wanted) ? wanted + ".png" : "";
+  if (folder.splat) return IsNumbered(wanted, "view_") ? wanted + ".png" : "";
+  if (folder.film) return IsNumbered(wanted, "f") ? wanted + ".png" : "";
   std::string found;
   for (const LocalFile& photo : folder.photos) {
     if (Stem(photo.path) != wanted) continue;
     if (!found.empty()) return "";
-    found = photo.path.starts_with("images/") ? photo.path.substr(7) : photo.path;
+    found = photo.path;
+    for (const std::string_view folder : {std::string_view("images/"), kFramesFolder}) {
+      if (found.starts_with(folder)) found = found.substr(folder.size());
+    }
   }
   return found;
 }
 
 void RequirePhoto(const PhotoFolder& folder, const std::string& name) {
-  if (folder.splat) return;
+  if (folder.splat || folder.film) return;
   std::string known;
   for (size_t i = 0; i < folder.photos.size(); ++i) {
     const std::string& path = folder.photos[i].path;

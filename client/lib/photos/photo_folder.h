@@ -21,6 +21,7 @@ struct PhotoFolder {
   std::vector<LocalFile> augment_files;  // pictures in colour for the colorizer, sorted by path
   std::vector<LocalFile> mask_files;     // of photos, see mask_files.h
   std::optional<LocalFile> splat;        // in place of photos: views are drawn from it
+  std::optional<LocalFile> film;         // in place of photos: a video file, whose frames are views
   std::vector<std::string> notes;        // what the user may want to know, one line each
 
   std::vector<LocalFile> AllFiles() const;
@@ -31,18 +32,22 @@ struct PhotoFolder {
 // Photos (.jpg .jpeg .png .tif .tiff) are taken from images/, at any depth, when there is one with
 // photos; else from `root` itself and from the subfolders that transforms.json names. Also taken: a
 // COLMAP model in sparse/0, sparse or `root`, transforms.json, and everything in augment/ (any
-// depth). Nothing else, but for a splat (.ply .sog .spz): `root` itself, or the only one in a
-// folder without photos. Throws Error: no such folder, another file instead of a folder, no photos,
-// one photo, more than 10,000 files, names that are not safe or not UTF-8.
+// depth). Nothing else, but for a splat (.ply .sog .spz) or a film (.mp4 .mov ...): `root` itself,
+// or the only one in a folder without photos. Throws Error: no such folder, another file instead of
+// a folder, no photos, one photo, more than 10,000 files, names that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root);
+
+// The photos as frames of a film, in the order of their names; poses are of no use then. Throws
+// Error{kInvalidArgument} when there are none, or two of one name.
+void TakeAsFrames(PhotoFolder* folder);
 
 // The photo whose file stem is that of `file` ("x/0007_coloured.png" has the stem "0007_coloured"),
 // as a view's name: relative to images/. Empty when none or several have it. Views of a splat are
-// called view_01, view_02, ...
+// called view_01, view_02, ..., those of a film f000000, f000001, ...
 std::string PhotoOfSameStem(const PhotoFolder& folder, const std::filesystem::path& file);
 
 // Throws Error{kNotFound} that names some photos when no photo can be the view `name`: neither path
-// nor stem fits. A splat's views are not known here: any name will do.
+// nor stem fits. Views of a splat or a video are not known here: any name will do.
 void RequirePhoto(const PhotoFolder& folder, const std::string& name);
 
 }  // namespace color3d::client

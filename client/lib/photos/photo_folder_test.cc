@@ -78,11 +78,38 @@ TEST_F(PhotoFolderTest, ASplatStandsForPhotos) {
     EXPECT_EQ(PhotoOfSameStem(folder, "x/coloured.png"), "");
     RequirePhoto(folder, "view_07");
   }
-  EXPECT_THAT(ErrorOf(root() / "notes.txt"), HasSubstr("or a splat (.ply, .sog or .spz)"));
+  EXPECT_THAT(ErrorOf(root() / "notes.txt"), HasSubstr("a splat (.ply, .sog or .spz) or a film"));
   Write("other.SOG");
   EXPECT_THAT(ErrorOf(root()), HasSubstr("2 splats"));
   for (const char* name : {"a.jpg", "b.jpg"}) Write(name);
   EXPECT_FALSE(CollectPhotos(root()).splat.has_value());
+}
+
+TEST_F(PhotoFolderTest, AFilmStandsForPhotosAndPhotosForAFilm) {
+  Write("walk.MOV");
+  Write("notes.txt");
+  for (const fs::path& path : {root() / "walk.MOV", root()}) {
+    PhotoFolder folder = CollectPhotos(path);
+    ASSERT_TRUE(folder.film.has_value());
+    EXPECT_EQ(folder.Name(), "walk.MOV");
+    EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("walk.MOV"));
+    EXPECT_EQ(PhotoOfSameStem(folder, "x/f000012.png"), "f000012.png");
+    EXPECT_EQ(PhotoOfSameStem(folder, "x/fox.png"), "");
+    RequirePhoto(folder, "f000003");
+    TakeAsFrames(&folder);
+    EXPECT_TRUE(folder.film.has_value());
+  }
+  Write("second.mp4");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("2 films"));
+  for (const char* name : {"images/b.jpg", "images/a.jpg"}) Write(name);
+  PhotoFolder folder = CollectPhotos(root());
+  EXPECT_FALSE(folder.film.has_value());
+  TakeAsFrames(&folder);
+  EXPECT_THAT(Paths(folder.photos), ElementsAre("frames/a.jpg", "frames/b.jpg"));
+  EXPECT_EQ(PhotoOfSameStem(folder, "b.png"), "b.jpg");
+  Write("images/more/a.jpg");
+  PhotoFolder two = CollectPhotos(root());
+  EXPECT_THROW(TakeAsFrames(&two), Error);
 }
 
 TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {

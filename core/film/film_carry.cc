@@ -1,0 +1,270 @@
+#include "core/film/film_carry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "core/base/error.h"
+#include "core/base/range_check.h"
+#include "core/image/optical_flow.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kWindowRadius = 3;
+constexpr float kLeastConfidence = 0.02f;
+
+float Bilinear(const float* plane, int width, int height, float x, float y) {
+  x = std::clamp(x, 0.0f, static_cast<float>(width - 1));
+  y = std::clamp(y, 0.0f, static_cast<float>(height - 1));
+  const int x0 = std::min(static_cast<int>(x), width - 1),
+            y0 = std::min(static_cast<int>(y), height - 1);
+  const int x1 = std::min(x0 + 1, width - 1), y1 = std::min(y0 + 1, height - 1);
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const float* top = plane + static_cast<size_t>(y0) * width;
+  const float* bottom = plane + static_cast<size_t>(y1) * width;
+  return (1 - fy) * ((1 - fx) * top[x0] + fx * top[x1]) +
+         fy * ((1 - fx) * bottom[x0] + fx * bottom[x1]);
+}
+
+// Both ways between the key frame and a frame, px: 2 channels, x and y.
+struct Track {
+  Image in_key;    // where each pixel of the frame lies in the key frame
+  Image in_frame;  // where each pixel of the key frame lies in the frame
+};
+
+Image Identity(int width, int height) {
+  Image place(width, height, 2);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      place.At(0, y, x) = static_cast<float>(x);
+      place.At(1, y, x) = static_cast<float>(y);
+    }
+  }
+  return place;
+}
+
+Image Sampled(const Image& image, const Image& place) {
+  Image out(place.width, place.height, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (size_t i = 0; i < place.PlaneSize(); ++i) {
+      out.Plane(c)[i] =
+          Bilinear(image.Plane(c), image.width, image.height, place.Plane(0)[i], place.Plane(1)[i]);
+    }
+  }
+  return out;
+}
+
+// Pixels of `flow` moved by it.
+Image Moved(const Image& flow) {
+  Image place = Identity(flow.width, flow.height);
+  for (size_t i = 0; i < place.data.size(); ++i) place.data[i] += flow.data[i];
+  return place;
+}
+
+// One step further, from frame `now` to frame `next`.
+Track Step(const Track& track, const Image& now, const Image& next) {
+  const Image there = DenseFlow(now, next);
+  Track further{Sampled(track.in_key, Moved(DenseFlow(next, now))), track.in_frame};
+  const Image step = Sampled(there, track.in_frame);
+  for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
+  return further;
+}
+
+// Moving mean over windows of 2 radius + 1.
+Image BoxMean(const Image& image, int radius) {
+  const int width = image.width, height = image.height;
+  Image rows(width, height, 1), out(width, height, 1);
+  for (int y = 0; y < height; ++y) {
+    double sum = 0.0;
+    int count = 0;
+    for (int x = -radius; x < width; ++x) {
+      if (x + radius < width) sum += image.At(0, y, x + radius), ++count;
+      if (x - radius - 1 >= 0) sum -= image.At(0, y, x - radius - 1), --count;
+      if (x >= 0) rows.At(0, y, x) = static_cast<float>(sum / count);
+    }
+  }
+  std::vector<double> sums(width, 0.0);
+  int count = 0;
+  for (int y = -radius; y < height; ++y) {
+    const int enters = y + radius, leaves = y - radius - 1;
+    if (enters < height) ++count;
+    if (leaves >= 0) --count;
+    for (int x = 0; x < width; ++x) {
+      if (enters < height) sums[x] += rows.At(0, enters, x);
+      if (leaves >= 0) sums[x] -= rows.At(0, leaves, x);
+      if (y >= 0) out.At(0, y, x) = static_cast<float>(sums[x] / count);
+    }
+  }
+  return out;
+}
+
+// L against what is around it: exposure and contrast of a place do not count.
+Image LocalContrast(const Image& luminance) {
+  constexpr int kRadius = 7;
+  constexpr float kGrain = 4.0f;  // L^2, of plain surfaces
+  const Image mean = BoxMean(luminance, kRadius);
+  Image out(luminance.width, luminance.height, 1), square = out;
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    out.data[i] = luminance.data[i] - mean.data[i];
+    square.data[i] = out.data[i] * out.data[i];
+  }
+  const Image variance = BoxMean(square, kRadius);
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    out.data[i] /= std::sqrt(std::max(0.0f, variance.data[i]) + kGrain);
+  }
+  return out;
+}
+
+// Where two pictures of local contrast differ around a pixel: 0 to 2.
+Image Unlike(const Image& one, const Image& other) {
+  Image difference(one.width, one.height, 1);
+  for (size_t i = 0; i < difference.data.size(); ++i) {
+    difference.data[i] = std::min(2.0f, std::abs(one.data[i] - other.data[i]));
+  }
+  return BoxMean(difference, kWindowRadius);
+}
+
+// Steps drift: what is left between a picture and another, warped to it by `place`, is taken out
+// where that makes them more alike.
+void Register(const Image& picture,
+              const Image& contrast,
+              const Image& other,
+              const Image& other_contrast,
+              Image* place) {
+  constexpr float kMostPx = 6.0f;  // more is no drift but another thing
+  constexpr float kLeastGain = 0.02f;
+  Image rest = DenseFlow(picture, Sampled(other, *place));
+  for (size_t i = 0; i < rest.PlaneSize(); ++i) {
+    float& x = rest.Plane(0)[i];
+    float& y = rest.Plane(1)[i];
+    if (x * x + y * y > kMostPx * kMostPx) x = y = 0.0f;
+  }
+  const Image registered = Sampled(*place, Moved(rest));
+  const Image before = Unlike(contrast, Sampled(other_contrast, *place));
+  const Image after = Unlike(contrast, Sampled(other_contrast, registered));
+  for (size_t i = 0; i < before.data.size(); ++i) {
+    if (after.data[i] >= before.data[i] - kLeastGain) continue;
+    for (int c = 0; c < 2; ++c) place->Plane(c)[i] = registered.Plane(c)[i];
+  }
+}
+
+bool Inside(float x, float y, int width, int height) {
+  return x >= -0.5f && y >= -0.5f && x <= static_cast<float>(width) - 0.5f &&
+         y <= static_cast<float>(height) - 0.5f;
+}
+
+FilmColor ColorOf(const FilmKey& key,
+                  const Image& key_contrast,
+                  const Image& contrast,
+                  const Track& track,
+                  const FilmCarryOptions& options) {
+  FilmColor color{Sampled(key.color.ab, track.in_key), Sampled(key.color.confidence, track.in_key)};
+  const Image unlike = Unlike(contrast, Sampled(key_contrast, track.in_key));
+  const Image back = Sampled(track.in_frame, track.in_key);
+  const int width = contrast.width, height = contrast.height;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double cycle = std::hypot(back.At(0, y, x) - static_cast<float>(x),
+                                      back.At(1, y, x) - static_cast<float>(y)) /
+                           options.cycle_tolerance_px;
+      const double closed = 1.0 / (1.0 + cycle * cycle);
+      const double like =
+          std::exp(-std::max(0.0, unlike.At(0, y, x) - options.unlikeness) / options.unlikeness);
+      const bool inside = Inside(track.in_key.At(0, y, x), track.in_key.At(1, y, x), width, height);
+      float& confidence = color.confidence.At(0, y, x);
+      confidence *= inside ? static_cast<float>(closed * closed * like) : 0.0f;
+      if (confidence > kLeastConfidence) continue;
+      confidence = color.ab.At(0, y, x) = color.ab.At(1, y, x) = 0.0f;
+    }
+  }
+  return color;
+}
+
+// A walk away from a key frame, and the frames on it that the key frame colours.
+struct Walk {
+  const FilmKey* key = nullptr;
+  std::vector<int> frames;  // in the order of the walk
+};
+
+std::vector<Walk> WalksOf(const FilmFrames& frames, const std::vector<FilmKey>& keys) {
+  const int count = static_cast<int>(frames.shot.size());
+  std::vector<const FilmKey*> nearest(count, nullptr);
+  for (int i = 0; i < count; ++i) {
+    for (const FilmKey& key : keys) {
+      if (frames.shot[key.frame] != frames.shot[i]) continue;
+      if (nearest[i] == nullptr || std::abs(key.frame - i) < std::abs(nearest[i]->frame - i)) {
+        nearest[i] = &key;
+      }
+    }
+  }
+  std::vector<Walk> walks;
+  for (const FilmKey& key : keys) {
+    for (const int direction : {1, -1}) {
+      Walk walk{&key, {}};
+      for (int i = key.frame + direction; i >= 0 && i < count; i += direction) {
+        // Frames with faults lie between those of a shot.
+        if (nearest[i] == &key) walk.frames.push_back(i);
+      }
+      if (!walk.frames.empty()) walks.push_back(std::move(walk));
+    }
+  }
+  // The longest first, so that threads end together.
+  std::stable_sort(walks.begin(), walks.end(), [](const Walk& x, const Walk& y) {
+    return x.frames.size() > y.frames.size();
+  });
+  return walks;
+}
+
+}  // namespace
+
+void FilmCarryOptions::Validate() const {
+  const RangeCheck check("film carry option");
+  check("cycle_tolerance_px", cycle_tolerance_px, 0.1, 20);
+  check("unlikeness", unlikeness, 0.05, 2);
+}
+
+void CarryAlongFilm(const FilmFrames& frames,
+                    const std::vector<FilmKey>& keys,
+                    const FilmCarryOptions& options,
+                    ThreadPool& pool,
+                    const CancellationToken& cancel,
+                    const std::function<void(int frame, const FilmColor& color)>& on_frame) {
+  options.Validate();
+  for (size_t i = 0; i < keys.size(); ++i) {
+    if (keys[i].frame < 0 || keys[i].frame >= static_cast<int>(frames.shot.size())) {
+      throw InvalidArgument("key frame {} is none of {}", keys[i].frame, frames.shot.size());
+    }
+    for (size_t k = 0; k < i; ++k) {
+      if (keys[k].frame == keys[i].frame) {
+        throw InvalidArgument("the frame {} is a key frame twice", keys[i].frame);
+      }
+    }
+  }
+  std::mutex handing_over;
+  const auto hand_over = [&](int frame, const FilmColor& color) {
+    const std::lock_guard lock(handing_over);
+    on_frame(frame, color);
+  };
+  for (const FilmKey& key : keys) hand_over(key.frame, key.color);
+  const std::vector<Walk> walks = WalksOf(frames, keys);
+  pool.ForEach(static_cast<int64_t>(walks.size()), [&](int64_t index, int) {
+    const Walk& walk = walks[index];
+    const auto key = frames.luminance(walk.key->frame);
+    const Image key_contrast = LocalContrast(*key);
+    auto now = key;
+    Track track{Identity(key->width, key->height), Identity(key->width, key->height)};
+    for (const int frame : walk.frames) {
+      cancel.ThrowIfCancelled();
+      const auto next = frames.luminance(frame);
+      const Image contrast = LocalContrast(*next);
+      track = Step(track, *now, *next);
+      Register(*next, contrast, *key, key_contrast, &track.in_key);
+      Register(*key, key_contrast, *next, contrast, &track.in_frame);
+      hand_over(frame, ColorOf(*walk.key, key_contrast, contrast, track, options));
+      now = next;
+    }
+  });
+}
+
+}  // namespace color3d

@@ -1,0 +1,53 @@
+// Colour of a film's key frames carried along the film by motion (METHOD.md "Film"): every pixel is
+// followed back to where it lies in a key frame, whose own colours are taken there, so that nothing
+// is blurred by being resampled again and again.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/image.h"
+#include "core/base/parallel.h"
+
+namespace color3d {
+
+struct FilmColor {
+  Image ab;          // 2 channels, Lab units
+  Image confidence;  // 1 channel, 0..1
+};
+
+struct FilmKey {
+  int frame = 0;
+  FilmColor color;  // of the working size
+};
+
+struct FilmCarryOptions {
+  // From a pixel to the key frame and back again: distance at which confidence falls to a quarter.
+  double cycle_tolerance_px = 2.0;  // 0.1..20
+  // Mean difference of the local contrast of both places from which confidence falls, 0.05..2; to
+  // 1/e at twice that.
+  double unlikeness = 0.4;
+  void Validate() const;  // throws Error{kInvalidArgument}
+  bool operator==(const FilmCarryOptions&) const = default;
+};
+
+struct FilmFrames {
+  std::vector<int> shot;  // of each frame; colours are carried within a shot only
+  // L in 0..100, 1 channel, all of one size. Called from several threads at once.
+  std::function<std::shared_ptr<const Image>(int frame)> luminance;
+};
+
+// Colours every frame of the shots that have a key frame from the nearest of them, and hands it to
+// `on_frame` in any order, from several threads, one after the other. Frames of other shots are not
+// handed over. Memory does not grow with the number of frames. Throws Error{kInvalidArgument} for
+// keys that are no frames or are given twice.
+void CarryAlongFilm(const FilmFrames& frames,
+                    const std::vector<FilmKey>& keys,
+                    const FilmCarryOptions& options,
+                    ThreadPool& pool,
+                    const CancellationToken& cancel,
+                    const std::function<void(int frame, const FilmColor& color)>& on_frame);
+
+}  // namespace color3d

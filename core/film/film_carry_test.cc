@@ -1,0 +1,158 @@
+#include "core/film/film_carry.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kWidth = 160, kHeight = 112;
+
+// Texture of its own for each place, seen from a camera that pans and zooms.
+struct Scenery {
+  double pan_px = 2.0, zoom = 0.0;
+  int seed = 1;
+
+  float L(double u, double v) const {
+    double l = 50.0;
+    for (int k = 1; k <= 6; ++k) {
+      const double a = 1.3 * seed + 2.1 * k;
+      l += 7.0 * std::sin(0.11 * k * (u * std::cos(a) + v * std::sin(a)) + 2.7 * a);
+    }
+    return static_cast<float>(l);
+  }
+  float A(double u, double v) const {
+    return static_cast<float>(30.0 * std::sin(0.04 * u + 0.02 * v));
+  }
+  float B(double u, double v) const {
+    return static_cast<float>(30.0 * std::cos(0.03 * v - 0.02 * u));
+  }
+
+  Image Luminance(int frame) const { return Picture(frame, 1); }
+  Image Ab(int frame) const { return Picture(frame, 2); }
+
+ private:
+  Image Picture(int frame, int channels) const {
+    Image image(kWidth, kHeight, channels);
+    const double scale = std::exp(zoom * frame);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const double u = scale * (x - kWidth / 2.0) + pan_px * frame,
+                     v = scale * (y - kHeight / 2.0);
+        if (channels == 1) {
+          image.At(0, y, x) = L(u, v);
+        } else {
+          image.At(0, y, x) = A(u, v);
+          image.At(1, y, x) = B(u, v);
+        }
+      }
+    }
+    return image;
+  }
+};
+
+FilmKey KeyOf(const Scenery& scenery, int frame) {
+  return {frame, {scenery.Ab(frame), Image(kWidth, kHeight, 1, 1.0f)}};
+}
+
+std::map<int, FilmColor> Carry(const Scenery& scenery,
+                               std::vector<int> shots,
+                               const std::vector<FilmKey>& keys) {
+  ThreadPool pool(2);
+  CancellationToken cancel;
+  std::map<int, FilmColor> colors;
+  const FilmFrames frames{std::move(shots), [&](int frame) {
+                            return std::make_shared<const Image>(scenery.Luminance(frame));
+                          }};
+  CarryAlongFilm(frames, keys, {}, pool, cancel, [&](int frame, const FilmColor& color) {
+    EXPECT_TRUE(colors.emplace(frame, color).second) << frame;
+  });
+  return colors;
+}
+
+struct Deviation {
+  double weighted = 0.0, coverage = 0.0;
+};
+Deviation ErrorOf(const FilmColor& color, const Image& truth) {
+  double sum = 0.0, weight = 0.0, covered = 0.0;
+  for (size_t i = 0; i < truth.PlaneSize(); ++i) {
+    const double w = color.confidence.data[i];
+    EXPECT_TRUE(std::isfinite(w) && w >= 0.0 && w <= 1.0);
+    sum += w * std::hypot(color.ab.Plane(0)[i] - truth.Plane(0)[i],
+                          color.ab.Plane(1)[i] - truth.Plane(1)[i]);
+    weight += w;
+    covered += w > 0.25 ? 1.0 : 0.0;
+  }
+  return {weight > 0.0 ? sum / weight : 0.0, covered / static_cast<double>(truth.PlaneSize())};
+}
+
+TEST(FilmCarry, ColorsFollowTheCameraWithoutDrift) {
+  const Scenery scenery{.pan_px = 1.5, .zoom = 0.004};
+  const auto colors = Carry(scenery, std::vector<int>(31, 0), {KeyOf(scenery, 15)});
+  ASSERT_EQ(colors.size(), 31u);
+  for (const int frame : {0, 5, 14, 15, 16, 24, 30}) {
+    const Deviation error = ErrorOf(colors.at(frame), scenery.Ab(frame));
+    EXPECT_LT(error.weighted, 1.0) << frame;
+    EXPECT_GT(error.coverage, 0.6) << frame;
+  }
+}
+
+TEST(FilmCarry, TheNearestKeyFrameOfTheShotColors) {
+  const Scenery scenery{.pan_px = 0.0};
+  FilmKey red = KeyOf(scenery, 2), green = KeyOf(scenery, 9);
+  red.color.ab = Image(kWidth, kHeight, 2, 40.0f);
+  green.color.ab = Image(kWidth, kHeight, 2, -40.0f);
+  std::vector<int> shots(14, 0);
+  shots[4] = 2;  // torn
+  for (int i = 12; i < 14; ++i) shots[i] = 1;
+  const auto colors = Carry(scenery, shots, {red, green});
+  EXPECT_EQ(colors.size(), 11u);
+  EXPECT_FALSE(colors.contains(4));
+  EXPECT_FALSE(colors.contains(12));
+  const auto color = [&](int frame) { return colors.at(frame).ab.At(0, kHeight / 2, kWidth / 2); };
+  for (const int frame : {0, 1, 2, 3, 5}) EXPECT_NEAR(color(frame), 40.0f, 1e-3) << frame;
+  for (const int frame : {6, 7, 8, 9, 10, 11}) EXPECT_NEAR(color(frame), -40.0f, 1e-3) << frame;
+}
+
+TEST(FilmCarry, WhatCannotBeFollowedIsNotClaimed) {
+  const Scenery fast{.pan_px = 90.0};
+  const auto colors = Carry(fast, std::vector<int>(6, 0), {KeyOf(fast, 0)});
+  // Waves come again, so some of them are taken for others.
+  EXPECT_LT(ErrorOf(colors.at(5), fast.Ab(5)).coverage, 0.45);
+  Scenery cut{.pan_px = 0.0};
+  const auto elsewhere = [&](int frame) {
+    cut.seed = frame == 0 ? 1 : 5;
+    return std::make_shared<const Image>(cut.Luminance(frame));
+  };
+  ThreadPool pool(1);
+  CancellationToken cancel;
+  CarryAlongFilm({{0, 0}, elsewhere},
+                 {KeyOf({.pan_px = 0.0}, 0)},
+                 {},
+                 pool,
+                 cancel,
+                 [&](int frame, const FilmColor& color) {
+                   if (frame == 0) return;
+                   EXPECT_LT(ErrorOf(color, cut.Ab(1)).coverage, 0.45);
+                 });
+}
+
+TEST(FilmCarry, SmallAndWrong) {
+  const Scenery still{.pan_px = 0.0};
+  EXPECT_EQ(Carry(still, {0}, {KeyOf(still, 0)}).size(), 1u);
+  EXPECT_THROW(Carry(still, {0, 0}, {KeyOf(still, 2)}), Error);
+  EXPECT_THROW(Carry(still, {0, 0}, {KeyOf(still, 1), KeyOf(still, 1)}), Error);
+  EXPECT_TRUE(Carry(still, {0, 0}, {}).empty());
+  ThreadPool pool(1);
+  CancellationToken cancel;
+  EXPECT_THROW(CarryAlongFilm(
+                   {}, {}, {.cycle_tolerance_px = 0.0}, pool, cancel, [](int, const FilmColor&) {}),
+               Error);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,144 @@
+#include "core/film/shots.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+constexpr double kBlankDeviation = 1.5;  // of L; grain of a blank frame stays below
+constexpr int kMaxShiftPx = 5;           // of the thumbnails: a fast pan
+// Unlikeness from which two frames are of two shots, and how much it must stand out of what is
+// usual around there.
+constexpr double kCutUnlikeness = 0.55;
+constexpr double kCutOverUsual = 2.5;
+constexpr int kUsualFrames = 6;  // to either side
+
+struct Moments {
+  double mean = 0.0, deviation = 0.0;
+};
+
+Moments MomentsOf(const Image& image) {
+  double sum = 0.0, squares = 0.0;
+  for (const float v : image.data) {
+    sum += v;
+    squares += static_cast<double>(v) * v;
+  }
+  const double n = static_cast<double>(image.data.size());
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(0.0, squares / n - mean * mean))};
+}
+
+Image Normalised(const Image& image) {
+  const Moments moments = MomentsOf(image);
+  Image out = image;
+  const double scale = 1.0 / std::max(kBlankDeviation, moments.deviation);
+  for (float& v : out.data) v = static_cast<float>((v - moments.mean) * scale);
+  return out;
+}
+
+double Difference(const Image& one, const Image& other, int dx, int dy) {
+  const int x0 = std::max(0, -dx), x1 = std::min(one.width, one.width - dx);
+  const int y0 = std::max(0, -dy), y1 = std::min(one.height, one.height - dy);
+  if (x1 <= x0 || y1 <= y0) return 1e9;
+  double sum = 0.0;
+  for (int y = y0; y < y1; ++y) {
+    const float* a = one.Plane(0) + static_cast<size_t>(y) * one.width;
+    const float* b = other.Plane(0) + static_cast<size_t>(y + dy) * one.width + dx;
+    for (int x = x0; x < x1; ++x) sum += std::abs(a[x] - b[x]);
+  }
+  return sum / (static_cast<double>(x1 - x0) * (y1 - y0));
+}
+
+// Of normalised pictures.
+double UnlikenessOf(const Image& one, const Image& other) {
+  double best = 1e9;
+  const int limit_x = std::min(kMaxShiftPx, one.width / 4),
+            limit_y = std::min(kMaxShiftPx, one.height / 4);
+  for (int dy = -limit_y; dy <= limit_y; ++dy) {
+    for (int dx = -limit_x; dx <= limit_x; ++dx) {
+      best = std::min(best, Difference(one, other, dx, dy));
+    }
+  }
+  return best;
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+  return values[values.size() / 2];
+}
+
+// Of the steps between the frames around the one between frames k and k + 1.
+double Usual(const std::vector<double>& steps, int k) {
+  std::vector<double> around;
+  for (int i = std::max(0, k - kUsualFrames);
+       i <= std::min(static_cast<int>(steps.size()) - 1, k + kUsualFrames);
+       ++i) {
+    if (i != k) around.push_back(steps[i]);
+  }
+  return Median(std::move(around));
+}
+
+}  // namespace
+
+double Unlikeness(const Image& one, const Image& other) {
+  if (one.channels != 1 || other.channels != 1 || one.width != other.width ||
+      one.height != other.height || one.Empty()) {
+    throw InvalidArgument("shots are told from pictures of one channel and one size");
+  }
+  return UnlikenessOf(Normalised(one), Normalised(other));
+}
+
+FilmShots FindShots(const std::vector<Image>& thumbnails) {
+  FilmShots result;
+  const int count = static_cast<int>(thumbnails.size());
+  result.fault.assign(count, FrameFault::kNone);
+  result.shot.assign(count, 0);
+  std::vector<int> kept;  // frames that show something
+  std::vector<Image> normalised;
+  for (int i = 0; i < count; ++i) {
+    const Image& image = thumbnails[i];
+    if (image.channels != 1 || image.width != thumbnails[0].width ||
+        image.height != thumbnails[0].height || image.Empty()) {
+      throw InvalidArgument("shots are told from pictures of one channel and one size");
+    }
+    if (MomentsOf(image).deviation < kBlankDeviation) {
+      result.fault[i] = FrameFault::kBlank;
+    } else {
+      kept.push_back(i);
+      normalised.push_back(Normalised(image));
+    }
+  }
+  std::vector<double> steps;  // between kept frames k and k + 1
+  for (size_t k = 0; k + 1 < kept.size(); ++k) {
+    steps.push_back(UnlikenessOf(normalised[k], normalised[k + 1]));
+  }
+  const auto is_cut = [&](int k) {
+    return steps[k] > kCutUnlikeness && steps[k] > kCutOverUsual * Usual(steps, k);
+  };
+  // Two cuts, one after the other, to and from a frame whose neighbours are alike.
+  std::vector<bool> cut(steps.size(), false);
+  for (int k = 0; k < static_cast<int>(steps.size()); ++k) cut[k] = is_cut(k);
+  for (int k = 0; k + 1 < static_cast<int>(steps.size()); ++k) {
+    if (!cut[k] || !cut[k + 1]) continue;
+    if (UnlikenessOf(normalised[k], normalised[k + 2]) > kCutUnlikeness) continue;
+    result.fault[kept[k + 1]] = FrameFault::kAlien;
+    cut[k] = cut[k + 1] = false;
+  }
+  // Frames with faults get the numbers behind.
+  int shot = 0;
+  for (size_t k = 0; k < kept.size(); ++k) {
+    if (k > 0 && cut[k - 1]) ++shot;
+    result.shot[kept[k]] = shot;
+  }
+  result.count = kept.empty() ? 0 : shot + 1;
+  for (int i = 0; i < count; ++i) {
+    if (result.fault[i] != FrameFault::kNone) result.shot[i] = result.count++;
+  }
+  return result;
+}
+
+}  // namespace color3d

@@ -1,0 +1,26 @@
+// The coloured frames of a film: their own luminance under the colours that their views got. For
+// the stages of this layer only.
+#pragma once
+
+#include "core/scene/view_images.h"
+#include "core/stage/stage.h"
+#include "core/stage/stages.h"
+
+namespace color3d {
+
+// Lab of the view's size in `images`.
+Image ColoredFrame(const Scene& scene, int view, const ViewImages& images, StageContext& context);
+
+// Of the film's frames, from one to the next: the middle one of their distances; 25 for a film
+// without times.
+double FilmFramesPerSecond(const Scene& scene);
+
+// Leaves artifact::kMovie, all frames one after the other at the film's own rate and size, and
+// `views` (for the report) as artifact::kRenders. Throws Error{kCancelled} and what Mp4Writer
+// throws.
+void RenderFilm(const RenderOptions& options,
+                const Scene& scene,
+                const std::vector<int>& views,
+                StageContext& context);
+
+}  // namespace color3d

@@ -1,0 +1,242 @@
+#include "core/stage/film/import_film.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/range_check.h"
+#include "core/catalogue/scene_files.h"
+#include "core/color/lab.h"
+#include "core/film/shots.h"
+#include "core/image/codec.h"
+#include "core/scene/import.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/video/film_reader.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kFramesPerSecond = 25.0;  // of pictures, whose times nobody tells
+constexpr double kFocalOfLongerSide = 1.2;
+constexpr size_t kNamed = 5;  // frames in a warning
+
+// Pictures of all frames that are wanted, one after the other: sRGB or grey.
+struct FrameStream {
+  int count = 0;
+  double frames_per_second = kFramesPerSecond;
+  std::function<double(int)> time_s;
+  std::function<Image(int)> read;  // throws Error{kDataLoss} for a damaged frame
+  std::function<std::string(int)> name;
+  bool is_video = false;
+};
+
+Camera UnknownCamera(int width, int height) {
+  const double focal = kFocalOfLongerSide * std::max(width, height);
+  return {width, height, focal, focal, 0.5 * width, 0.5 * height};
+}
+
+// Indices of the frames that are asked for.
+std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
+  std::vector<int> wanted;
+  for (size_t i = 0; i < times.size(); ++i) {
+    if (times[i] < options.begin_s || (options.end_s && times[i] >= *options.end_s)) continue;
+    wanted.push_back(static_cast<int>(i));
+  }
+  const auto strided = static_cast<int>((wanted.size() + options.stride - 1) / options.stride);
+  if (wanted.empty()) {
+    throw InvalidArgument(
+        "the film has no frame between the times that are asked for; it lasts {:.2f} s",
+        times.back());
+  }
+  if (strided > kMaxFilmFrames) {
+    throw InvalidArgument(
+        "{} frames are more than a job takes ({}); take every {}th (film_stride), or a part "
+        "(film_begin_s, film_end_s)",
+        strided,
+        kMaxFilmFrames,
+        (static_cast<int>(wanted.size()) + kMaxFilmFrames - 1) / kMaxFilmFrames);
+  }
+  for (int i = 0; i < strided; ++i) wanted[i] = wanted[static_cast<size_t>(i) * options.stride];
+  wanted.resize(strided);
+  if (strided == 1) {
+    throw InvalidArgument("one frame is no film; colour it as a photo, by `color3d key color`");
+  }
+  return wanted;
+}
+
+std::string NamesOf(const std::vector<std::string>& names) {
+  std::string text;
+  for (size_t i = 0; i < std::min(kNamed, names.size()); ++i) {
+    text += (i == 0 ? "" : ", ") + names[i];
+  }
+  return names.size() > kNamed ? text + fmt::format(" and {} more", names.size() - kNamed) : text;
+}
+
+void WarnOf(const std::vector<std::string>& names, const char* what, StageContext& context) {
+  if (names.empty()) return;
+  context.progress().OnWarning(fmt::format(
+      "{} {} {}: {}", names.size(), names.size() == 1 ? "frame" : "frames", what, NamesOf(names)));
+}
+
+void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
+  std::vector<std::string> blank, alien, cuts;
+  int last = -1;
+  for (size_t i = 0; i < scene->views.size(); ++i) {
+    View& view = scene->views[i];
+    view.moment->shot = shots.shot[i];
+    if (shots.fault[i] == FrameFault::kBlank) blank.push_back(view.name);
+    if (shots.fault[i] == FrameFault::kAlien) alien.push_back(view.name);
+    if (shots.fault[i] != FrameFault::kNone) continue;
+    if (last >= 0 && shots.shot[i] != last) cuts.push_back(view.name);
+    last = shots.shot[i];
+  }
+  WarnOf(blank, "of one grey all over", context);
+  WarnOf(alien, "unlike those around (torn?), coloured on their own", context);
+  if (cuts.empty()) return;
+  context.progress().OnWarning(fmt::format(
+      "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
+      "by likeness. Colour a frame of each (further key views)",
+      NamesOf(cuts),
+      cuts.size() + 1));
+}
+
+void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& context) {
+  Scene scene;
+  std::vector<Image> thumbnails;
+  std::vector<std::string> damaged, warnings;
+  for (int i = 0; i < stream.count; ++i) {
+    context.cancel().ThrowIfCancelled();
+    context.progress().OnProgress(i, stream.count, "reading frames");
+    Image luminance;
+    try {
+      luminance = LuminanceFromSrgb(stream.read(i));
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::kDataLoss) throw;
+      damaged.push_back(stream.name(i));
+      continue;
+    }
+    View view;
+    view.name = stream.name(i);
+    view.image_file =
+        (stream.is_video ? std::string(artifact::kGivenViews) : std::string(kFramesFolder)) +
+        view.name;
+    view.camera = view.captured_camera = UnknownCamera(luminance.width, luminance.height);
+    view.moment = Moment{stream.time_s(i), 0};
+    if (!scene.views.empty() && (view.camera.width != scene.views[0].camera.width ||
+                                 view.camera.height != scene.views[0].camera.height)) {
+      throw InvalidArgument("{} has {} x {} px, but {} has {} x {} px: frames of a film are alike",
+                            view.name,
+                            view.camera.width,
+                            view.camera.height,
+                            scene.views[0].name,
+                            scene.views[0].camera.width,
+                            scene.views[0].camera.height);
+    }
+    thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
+    if (stream.is_video) {
+      for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
+      context.WriteOutput(view.image_file, EncodePng8(luminance));
+    }
+    scene.views.push_back(std::move(view));
+  }
+  WarnOf(damaged, "cannot be decoded and are left out", context);
+  if (scene.views.size() < 2) {
+    throw InvalidArgument("{} of {} frames can be decoded; a film has two at least",
+                          scene.views.size(),
+                          stream.count);
+  }
+  TellShots(FindShots(thumbnails), &scene, context);
+  if (hold_out) HoldOutEveryEighth(&scene, &warnings);
+  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
+  ImportFacts facts;
+  facts.layout = "film";
+  facts.photos_found = stream.count;
+  facts.photos_registered = static_cast<int>(scene.views.size());
+  context.WriteOutput(artifact::kScene, SceneToJson(scene));
+  context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
+}
+
+void ImportVideo(const std::string& file,
+                 const FilmOptions& options,
+                 bool hold_out,
+                 StageContext& context) {
+  FilmReader film(context.scene_folder() / file);
+  const std::vector<int> wanted = Wanted(film.times(), options);
+  if (!film.facts().constant_rate) {
+    context.progress().OnWarning(
+        "the frames of the film do not follow each other evenly; the coloured film shows each for "
+        "the same time");
+  }
+  if (film.facts().interlaced) {
+    context.progress().OnWarning("the film is interlaced: one field of each frame is taken");
+  }
+  FrameStream stream;
+  stream.count = static_cast<int>(wanted.size());
+  stream.is_video = true;
+  stream.time_s = [&](int i) { return film.times()[wanted[i]]; };
+  stream.read = [&](int i) { return film.Read(wanted[i]); };
+  stream.name = [&](int i) { return fmt::format("f{:06}.png", wanted[i]); };
+  ImportFrames(stream, hold_out, context);
+}
+
+void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& context) {
+  const fs::path folder = context.scene_folder() / kFramesFolder;
+  std::vector<std::string> files;
+  for (const std::string& file : ListFiles(folder)) {
+    if (HasImageExtension(file)) files.push_back(file);
+  }
+  std::sort(files.begin(), files.end());
+  std::vector<double> times;
+  for (size_t i = 0; i < files.size(); ++i)
+    times.push_back(static_cast<double>(i) / kFramesPerSecond);
+  const std::vector<int> wanted = Wanted(times, options);
+  FrameStream stream;
+  stream.count = static_cast<int>(wanted.size());
+  stream.time_s = [&](int i) { return times[wanted[i]]; };
+  stream.read = [&](int i) { return ReadImage(folder / files[wanted[i]]); };
+  stream.name = [&](int i) { return files[wanted[i]]; };
+  ImportFrames(stream, hold_out, context);
+}
+
+}  // namespace
+
+void FilmOptions::Validate() const {
+  const RangeCheck check("film option");
+  check("stride", stride, 1, 1000);
+  check("begin_s", begin_s, 0, 1e6);
+  if (end_s) check("end_s", *end_s, 0.01, 1e6);
+  if (end_s && *end_s <= begin_s) {
+    throw InvalidArgument("the film's part ends ({} s) before it begins ({} s)", *end_s, begin_s);
+  }
+}
+
+std::string FindFilm(const fs::path& scene_folder) {
+  std::string film;
+  std::error_code none;
+  if (!fs::is_directory(scene_folder, none)) return film;
+  bool has_photos = false;
+  for (const std::string& file : ListFiles(scene_folder)) {
+    if (file.starts_with("augment/")) continue;
+    if (IsFrameFile(file) && HasImageExtension(file)) return std::string(kFramesFolder);
+    has_photos |= HasImageExtension(file);
+    if (HasFilmExtension(file) && film.empty()) film = file;
+  }
+  return has_photos ? "" : film;
+}
+
+void ImportFilm(const std::string& film,
+                const FilmOptions& options,
+                bool hold_out_every_eighth,
+                StageContext& context) {
+  options.Validate();
+  if (film == kFramesFolder) return ImportPictures(options, hold_out_every_eighth, context);
+  ImportVideo(film, options, hold_out_every_eighth, context);
+}
+
+}  // namespace color3d

@@ -1,0 +1,35 @@
+// A film as a scene: its frames are the views, all of one camera that is not known. For the import
+// stage only.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+inline constexpr int kMaxFilmFrames = 3000;
+
+struct FilmOptions {
+  int stride = 1;  // every so many frames, 1..1000
+  double begin_s = 0.0;
+  std::optional<double> end_s;  // none: to the end
+  void Validate() const;        // throws Error{kInvalidArgument}
+  bool operator==(const FilmOptions&) const = default;
+};
+
+// The film that the scene consists of: a video file, or "frames/" for pictures in that folder.
+// Empty where it is none.
+std::string FindFilm(const std::filesystem::path& scene_folder);
+
+// Leaves kScene, kImportFacts and, of a video file, its frames in grey as kGivenViews. Frames that
+// cannot be decoded are left out; those, and blank and torn ones, are named in a warning. Throws
+// Error{kInvalidArgument}: no film that can be read, nothing between the times that are asked for,
+// one frame, more than kMaxFilmFrames (with the stride that would do), frames of different sizes.
+void ImportFilm(const std::string& film,
+                const FilmOptions& options,
+                bool hold_out_every_eighth,
+                StageContext& context);
+
+}  // namespace color3d

@@ -1,0 +1,126 @@
+#include "core/stage/film/import_film.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/scene/scene.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/stages.h"
+#include "core/video/mp4_writer.h"
+#include "tests/support/stages/stage_fixture.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr int kWidth = 96, kHeight = 64;
+
+// Waves of their own for each place, that wander.
+Image FrameOf(int place, int frame) {
+  Image image(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      double v = 0.5;
+      for (int k = 1; k <= 4; ++k) {
+        const double a = 1.7 * place + 2.3 * k;
+        v += 0.1 * std::sin(0.09 * k * ((x + frame) * std::cos(a) + y * std::sin(a)) + 3.1 * a);
+      }
+      for (int c = 0; c < 3; ++c) image.At(c, y, x) = static_cast<float>(v);
+    }
+  }
+  return image;
+}
+
+class ImportFilmTest : public StageTest {
+ protected:
+  void WriteVideo(int frames, int frames_of_first_place) {
+    ThreadPool pool(1);
+    Mp4Writer writer(scratch_.path() / "film.mp4",
+                     {.width = kWidth, .height = kHeight, .frames_per_second = 10, .threads = 1});
+    for (int i = 0; i < frames; ++i) {
+      writer.Add(FrameOf(i < frames_of_first_place ? 1 : 2, i), pool);
+    }
+    writer.Finish();
+  }
+  void WriteFrame(const std::string& name, const Image& image) {
+    fs::create_directories(scratch_.path() / "frames");
+    WriteFileAtomic(scratch_.path() / "frames" / name, EncodePng8(image));
+  }
+  Scene Import(const FilmOptions& film = {}, const ImportOptions& options = {}) {
+    fs::remove_all(scratch_.path() / "out");
+    StageContext context = MakeContext();
+    RunImportScene(options, context, {}, film);
+    return SceneFromJson(ReadFile(scratch_.path() / "out/scene.json"));
+  }
+  std::string Complaint(const FilmOptions& film = {}) {
+    try {
+      Import(film);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  }
+};
+
+TEST_F(ImportFilmTest, FramesOfAVideoAreViewsWithTheirMoments) {
+  WriteVideo(24, 24);
+  EXPECT_EQ(FindFilm(scratch_.path()), "film.mp4");
+  ImportOptions options;
+  options.hold_out_every_eighth = true;
+  const Scene scene = Import({}, options);
+  ASSERT_EQ(scene.views.size(), 24u);
+  EXPECT_TRUE(scene.IsFilm());
+  EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{0, 8, 16}));
+  EXPECT_EQ(scene.views[12].name, "f000012.png");
+  EXPECT_NEAR(scene.views[12].moment->time_s, 1.2, 1e-6);
+  EXPECT_EQ(scene.views[12].moment->shot, 0);
+  EXPECT_EQ(ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json")).layout, "film");
+  const Image frame = ReadImage(scratch_.path() / "out" / scene.views[12].image_file);
+  EXPECT_EQ(frame.channels, 1);
+  const Image truth = FrameOf(1, 12);
+  double error = 0.0;
+  for (size_t i = 0; i < frame.PlaneSize(); ++i) error += std::abs(frame.data[i] - truth.data[i]);
+  EXPECT_LT(error / static_cast<double>(frame.PlaneSize()), 0.02);
+  EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(ImportFilmTest, PartsStridesAndCuts) {
+  WriteVideo(40, 20);
+  EXPECT_EQ(Import().views[25].moment->shot, 1);
+  EXPECT_THAT(observer_.text, HasSubstr("cut before f000020.png: 2 shots"));
+  const Scene part = Import({.stride = 3, .begin_s = 0.5, .end_s = 1.55});
+  ASSERT_EQ(part.views.size(), 4u);  // frames 5, 8, 11, 14
+  EXPECT_EQ(part.views[1].name, "f000008.png");
+  EXPECT_THAT(Complaint({.begin_s = 9.0}), HasSubstr("it lasts 3.90 s"));
+  EXPECT_THAT(Complaint({.begin_s = 2.0, .end_s = 1.0}), HasSubstr("ends"));
+  EXPECT_THAT(Complaint({.stride = 0}), HasSubstr("stride"));
+  EXPECT_THAT(Complaint({.stride = 900}), HasSubstr("one frame is no film"));
+}
+
+TEST_F(ImportFilmTest, PicturesInFramesAreAFilm) {
+  for (int i = 0; i < 9; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
+  WriteFrame("n4.png", Image(kWidth, kHeight, 3, 0.01f));
+  EXPECT_EQ(FindFilm(scratch_.path()), "frames/");
+  const Scene scene = Import();
+  ASSERT_EQ(scene.views.size(), 9u);
+  EXPECT_EQ(scene.views[2].image_file, "frames/n2.png");
+  EXPECT_NEAR(scene.views[2].moment->time_s, 0.08, 1e-9);
+  EXPECT_EQ(scene.views[5].moment->shot, 0);
+  EXPECT_EQ(scene.views[4].moment->shot, 1);
+  EXPECT_THAT(observer_.text, HasSubstr("1 frame of one grey all over: n4.png"));
+  WriteFrame("n7.png", Image(kWidth, kHeight + 8, 3, 0.5f));
+  EXPECT_THAT(Complaint(), HasSubstr("n7.png"));
+}
+
+TEST_F(ImportFilmTest, PhotosBesideAVideoAreNoFilm) {
+  WriteVideo(3, 3);
+  WriteFileAtomic(scratch_.path() / "photo.png", EncodePng8(FrameOf(1, 0)));
+  EXPECT_EQ(FindFilm(scratch_.path()), "");
+}
+
+}  // namespace
+}  // namespace color3d

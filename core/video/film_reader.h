@@ -1,0 +1,50 @@
+// Frames of a video file, decoded when they are asked for: memory does not grow with the length of
+// the film (METHOD.md "Film").
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/base/image.h"
+
+namespace color3d {
+
+struct FilmFacts {
+  int width = 0;  // px, as people see it: upright, of square pixels
+  int height = 0;
+  int quarter_turns = 0;  // clockwise, that the file asks for and Read has done; 0..3
+  std::string codec;      // FFmpeg's name, e.g. "h264"
+  double seconds = 0.0;   // from the first frame's beginning to the last one's end
+  bool constant_rate = true;
+  bool interlaced = false;  // its first frame is; of each frame Read then takes one field
+};
+
+// Not thread-safe.
+class FilmReader {
+ public:
+  // Reads the file once through, without decoding it, for its times. Throws Error{kInvalidArgument}
+  // that names the file when it is no film that FFmpeg's libraries can decode, has sound only, or
+  // frames of more than 8192 px; Error{kNotFound} when it is not there.
+  explicit FilmReader(std::filesystem::path file);
+  ~FilmReader();
+  FilmReader(FilmReader&&) noexcept;
+  FilmReader& operator=(FilmReader&&) noexcept;
+
+  const FilmFacts& facts() const;
+  // When each frame is shown: s from the first one, strictly ascending, never empty. Frames that
+  // the file gives one time count once.
+  const std::vector<double>& times() const;
+
+  // sRGB in 0..1, 3 channels, facts().width x facts().height. The frame after the last one read
+  // costs the least; others are decoded from the key frame before them. Throws Error{kDataLoss}
+  // that names the frame and its time when it is damaged (others may still be whole).
+  Image Read(int frame);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace color3d

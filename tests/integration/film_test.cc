@@ -1,0 +1,130 @@
+// Films through the service: frames in, coloured frames and a movie out, or one clear line.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/base/files.h"
+#include "core/image/codec.h"
+#include "core/video/film_reader.h"
+#include "core/video/mp4_writer.h"
+#include "tests/integration/service_fixture.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+constexpr int kWidth = 192, kHeight = 128, kFrames = 17;
+
+// A camera pans over a wall of red and green before which a blue thing walks.
+Image FrameOf(int frame) {
+  Image image(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double u = x + 1.5 * frame, v = y;
+      double l = 0.45;
+      for (int k = 1; k <= 5; ++k) {
+        const double a = 1.9 * k;
+        l += 0.05 * std::sin(0.12 * k * (u * std::cos(a) + v * std::sin(a)) + 2.7 * a);
+      }
+      const double red = 0.5 + 0.4 * std::sin(0.025 * u);
+      double rgb[] = {l * (0.6 + 0.6 * red), l * (1.2 - 0.6 * red), 0.8 * l};
+      if (std::hypot(x - 40.0 - 5.0 * frame, y - 70.0) < 22.0) {
+        const double spots = 0.5 + 0.15 * std::sin(0.5 * (x - 5 * frame)) * std::sin(0.45 * y);
+        rgb[0] = 0.45 * spots, rgb[1] = 0.6 * spots, rgb[2] = 1.4 * spots;
+      }
+      for (int c = 0; c < 3; ++c) image.At(c, y, x) = static_cast<float>(rgb[c]);
+    }
+  }
+  return image;
+}
+
+class FilmTest : public ServiceTest {
+ protected:
+  void SetUp() override { StartServer(); }
+
+  void WriteFrames() {
+    fs::create_directories(Path("frames"));
+    for (int i = 0; i < kFrames; ++i) {
+      const std::string number = std::to_string(100 + i);
+      WriteFileAtomic(Path("frames") / ("n" + number + ".png"), EncodePng8(FrameOf(i)));
+    }
+  }
+  fs::path WriteVideo() {
+    ThreadPool pool(1);
+    Mp4Writer writer(Path("walk.mp4"),
+                     {.width = kWidth, .height = kHeight, .frames_per_second = 12, .threads = 1});
+    for (int i = 0; i < kFrames; ++i) writer.Add(FrameOf(i), pool);
+    writer.Finish();
+    return Path("walk.mp4");
+  }
+  ProcessResult Colorize(const fs::path& film, const std::vector<std::string>& more) {
+    return Client(std::vector<std::string>{"colorize", film.string(), "-o", Path("out").string()} +
+                  QuickOptions() + more);
+  }
+};
+
+TEST_F(FilmTest, FramesComeBackInColor) {
+  WriteFrames();
+  const ProcessResult result =
+      Colorize(Path("frames"), {"--film", "--benchmark", "--key-view", "n109"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.err, HasSubstr("coloured, not reconstructed"));
+  const auto metrics = nlohmann::json::parse(ReadFile(Path("out") / "metrics.json"));
+  const double error = metrics.at("delta_e00_chroma"), gray = metrics.at("delta_e00_gray");
+  std::printf("chroma error %.2f, grey %.2f\n", error, gray);
+  EXPECT_LT(error, 0.35 * gray);
+  EXPECT_GT(metrics.at("psnr_l"), 45.0) << "the luminance is the film's own";
+  FilmReader movie(Path("out") / "scene.mp4");
+  EXPECT_EQ(movie.times().size(), static_cast<size_t>(kFrames));
+  EXPECT_EQ(movie.facts().width, kWidth);
+  EXPECT_TRUE(fs::exists(Path("out") / "report.html"));
+  EXPECT_FALSE(fs::exists(Path("out") / "scene.ply"));
+}
+
+TEST_F(FilmTest, AVideoIsColoredFromOnePaintedFrame) {
+  const fs::path film = WriteVideo();
+  const ProcessResult select = Colorize(film, {});
+  ASSERT_EQ(select.exit_code, 0) << select.err;
+  EXPECT_THAT(select.err, HasSubstr("the film walk.mp4"));
+  const auto selected = nlohmann::json::parse(ReadFile(Path("out") / "key_view.json"));
+  EXPECT_EQ(selected.at("view").get<std::string>().substr(0, 3), "f00");
+  WriteFileAtomic(Path("painted.png"), EncodePng8(FrameOf(6)));
+  const ProcessResult result = Colorize(film,
+                                        {"--key-view",
+                                         "f000006",
+                                         "--key-color",
+                                         Path("painted.png").string(),
+                                         "--set",
+                                         "import_scene.film_end_s=1.05"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  FilmReader movie(Path("out") / "scene.mp4");
+  ASSERT_EQ(movie.times().size(), 13u);
+  EXPECT_NEAR(movie.times()[1], 1.0 / 12.0, 0.01);
+  // The thing that walks is blue at the end as at the beginning.
+  for (const int frame : {0, 12}) {
+    const Image image = movie.Read(frame);
+    const int x = 40 + 5 * frame;
+    EXPECT_GT(image.At(2, 70, x), image.At(0, 70, x) + 0.15f) << frame;
+  }
+}
+
+TEST_F(FilmTest, WhatIsNoFilmIsRefused) {
+  WriteFileAtomic(Path("text.mp4"), "this is no film");
+  const ProcessResult text = Colorize(Path("text.mp4"), {"--auto"});
+  EXPECT_NE(text.exit_code, 0);
+  EXPECT_THAT(text.err, HasSubstr("text.mp4 is no film that can be read"));
+  const fs::path film = WriteVideo();
+  const ProcessResult benchmark = Colorize(film, {"--benchmark"});
+  EXPECT_EQ(benchmark.exit_code, 2);
+  EXPECT_THAT(benchmark.err, HasSubstr("--film"));
+  const ProcessResult late = Colorize(film, {"--auto", "--set", "import_scene.film_begin_s=60"});
+  EXPECT_NE(late.exit_code, 0);
+  EXPECT_THAT(late.err, HasSubstr("it lasts"));
+}
+
+}  // namespace
+}  // namespace color3d
