@@ -104,6 +104,11 @@ TEST_F(ColorizeOptionsTest, AWrongValueIsToldWithTheRange) {
   EXPECT_THAT(Complaint({"--set=personalize.iterations"}), HasSubstr("has no value"));
 }
 
+TEST_F(ColorizeOptionsTest, MasksComeWithPhotosOfAPlace) {
+  EXPECT_THAT(Complaint({"--masks=m"}), HasSubstr("has its masks already"));
+  EXPECT_THAT(Complaint({"--masks=m", "--film"}), HasSubstr("--film takes frames as they are"));
+}
+
 TEST_F(ColorizeOptionsTest, AnUnknownOptionIsToldWithTheNearest) {
   EXPECT_THAT(Complaint({"--set=personalise.iterations=3"}),
               HasSubstr("did you mean personalize.iterations?"));

@@ -64,6 +64,20 @@ TEST_F(MasksTest, WhatStandsBeforeTheSceneIsLeftOut) {
   std::printf("PSNR of L: %.2f dB, with masks %.2f dB\n", plain_db, masked_db);
   EXPECT_GT(masked_db, plain_db + 3.0);
   EXPECT_LT(Metrics("masked").at("delta_e00_chroma"), Metrics("plain").at("delta_e00_gray"));
+  EXPECT_THAT(masked.out + masked.err, HasSubstr("photos have masks"));
+  // A stroke there would say nothing of the scene.
+  const ProcessResult stroke = Client({"correct",
+                                       Path("masked").string(),
+                                       "--view",
+                                       "view002",
+                                       "--at",
+                                       "120,95",
+                                       "--color",
+                                       "#ff2020",
+                                       "--radius",
+                                       "8"});
+  EXPECT_NE(stroke.exit_code, 0);
+  EXPECT_THAT(stroke.err, HasSubstr("masked out"));
 }
 
 TEST_F(MasksTest, BadMasksAreRefusedByName) {
@@ -81,6 +95,13 @@ TEST_F(MasksTest, BadMasksAreRefusedByName) {
   EXPECT_NE(black.exit_code, 0);
   EXPECT_THAT(black.err, HasSubstr("leaves nothing of the photo"));
   EXPECT_FALSE(fs::exists(Path("out") / "scene.ply"));
+  Image clear(photo.width, photo.height, 4, 0.5f);
+  std::fill_n(clear.Plane(3), clear.PlaneSize(), 0.0f);
+  WriteFileAtomic(Path("room") / "images" / first, EncodePng8(clear));
+  const ProcessResult transparent = Colorize("out");
+  EXPECT_NE(transparent.exit_code, 0);
+  EXPECT_THAT(transparent.err, HasSubstr(first));
+  EXPECT_THAT(transparent.err, HasSubstr("leaves nothing of the photo"));
 }
 
 }  // namespace
