@@ -112,7 +112,7 @@ GraySplat GrayModelOf(const ViewerGaussians& splat, const std::string& name, Thr
   model.sh_l.resize(count * coefficients);
   const RgbHarmonicsFitter fitter(splat.sh_degree);
   const Eigen::MatrixXd basis = fitter.Basis();
-  const Eigen::MatrixXd solve = fitter.Solver();
+  const Eigen::MatrixXd& solve = fitter.Solver();
   std::vector<ChromaSums> sums(pool.thread_count());
   const LinearLight linear;
   pool.ForRanges(static_cast<int64_t>(count), [&](int64_t begin, int64_t end, int thread) {
