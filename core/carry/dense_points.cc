@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "core/base/evenly.h"
 #include "core/carry/stereo_views.h"
 #include "core/image/codec.h"
 #include "core/scene/masks/photo_masks.h"
@@ -21,16 +22,6 @@ struct SweptView {
   std::vector<int> sources;  // views
   Image depth;               // empty when no other view shows the same
 };
-
-// At most so many, evenly spaced.
-template <class T>
-std::vector<T> EvenlyOf(std::vector<T> all, int64_t most) {
-  const int64_t found = static_cast<int64_t>(all.size());
-  if (found <= most) return all;
-  std::vector<T> kept;
-  for (int64_t i = 0; i < most; ++i) kept.push_back(std::move(all[i * found / most]));
-  return kept;
-}
 
 SweptView Reduced(const Scene& scene, int view, const ViewImages& images, int side_px) {
   SweptView swept;

@@ -31,6 +31,12 @@ inline bool HasFilmExtension(std::string_view path) {
   return false;
 }
 
+// Pictures in colour that the user gives for the colorizer to learn from: no photos of the scene.
+inline bool IsAugmentFile(std::string_view path) { return path.starts_with("augment/"); }
+
+// Masks of photos: what of them counts.
+inline bool IsMaskFile(std::string_view path) { return path.starts_with("masks/"); }
+
 // Frames of a film lie there as pictures, in the order of their names.
 inline constexpr std::string_view kFramesFolder = "frames/";
 inline bool IsFrameFile(std::string_view path) { return path.starts_with(kFramesFolder); }

@@ -6,26 +6,15 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
+#include "core/image/plane_sampling.h"
 
 namespace color3d {
 namespace {
 
 constexpr int kWindowRadius = 3;
 constexpr float kLeastConfidence = 0.02f;
-
-float Bilinear(const float* plane, int width, int height, float x, float y) {
-  x = std::clamp(x, 0.0f, static_cast<float>(width - 1));
-  y = std::clamp(y, 0.0f, static_cast<float>(height - 1));
-  const int x0 = std::min(static_cast<int>(x), width - 1),
-            y0 = std::min(static_cast<int>(y), height - 1);
-  const int x1 = std::min(x0 + 1, width - 1), y1 = std::min(y0 + 1, height - 1);
-  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
-  const float* top = plane + static_cast<size_t>(y0) * width;
-  const float* bottom = plane + static_cast<size_t>(y1) * width;
-  return (1 - fy) * ((1 - fx) * top[x0] + fx * top[x1]) +
-         fy * ((1 - fx) * bottom[x0] + fx * bottom[x1]);
-}
 
 // Both ways between the key frame and a frame, px: 2 channels, x and y.
 struct Track {
@@ -48,8 +37,7 @@ Image Sampled(const Image& image, const Image& place) {
   Image out(place.width, place.height, image.channels);
   for (int c = 0; c < image.channels; ++c) {
     for (size_t i = 0; i < place.PlaneSize(); ++i) {
-      out.Plane(c)[i] =
-          Bilinear(image.Plane(c), image.width, image.height, place.Plane(0)[i], place.Plane(1)[i]);
+      out.Plane(c)[i] = SampleBilinear(image, c, place.Plane(0)[i], place.Plane(1)[i]);
     }
   }
   return out;
@@ -69,34 +57,6 @@ Track Step(const Track& track, const Image& now, const Image& next) {
   const Image step = Sampled(there, track.in_frame);
   for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
   return further;
-}
-
-// Moving mean over windows of 2 radius + 1.
-Image BoxMean(const Image& image, int radius) {
-  const int width = image.width, height = image.height;
-  Image rows(width, height, 1), out(width, height, 1);
-  for (int y = 0; y < height; ++y) {
-    double sum = 0.0;
-    int count = 0;
-    for (int x = -radius; x < width; ++x) {
-      if (x + radius < width) sum += image.At(0, y, x + radius), ++count;
-      if (x - radius - 1 >= 0) sum -= image.At(0, y, x - radius - 1), --count;
-      if (x >= 0) rows.At(0, y, x) = static_cast<float>(sum / count);
-    }
-  }
-  std::vector<double> sums(width, 0.0);
-  int count = 0;
-  for (int y = -radius; y < height; ++y) {
-    const int enters = y + radius, leaves = y - radius - 1;
-    if (enters < height) ++count;
-    if (leaves >= 0) --count;
-    for (int x = 0; x < width; ++x) {
-      if (enters < height) sums[x] += rows.At(0, enters, x);
-      if (leaves >= 0) sums[x] -= rows.At(0, leaves, x);
-      if (y >= 0) out.At(0, y, x) = static_cast<float>(sums[x] / count);
-    }
-  }
-  return out;
 }
 
 // L against what is around it: exposure and contrast of a place do not count.
@@ -154,12 +114,13 @@ bool Inside(float x, float y, int width, int height) {
          y <= static_cast<float>(height) - 0.5f;
 }
 
-FilmColor ColorOf(const FilmKey& key,
-                  const Image& key_contrast,
-                  const Image& contrast,
-                  const Track& track,
-                  const FilmCarryOptions& options) {
-  FilmColor color{Sampled(key.color.ab, track.in_key), Sampled(key.color.confidence, track.in_key)};
+CarriedColor ColorOf(const FilmKey& key,
+                     const Image& key_contrast,
+                     const Image& contrast,
+                     const Track& track,
+                     const FilmCarryOptions& options) {
+  CarriedColor color{Sampled(key.color.ab, track.in_key),
+                     Sampled(key.color.confidence, track.in_key)};
   const Image unlike = Unlike(contrast, Sampled(key_contrast, track.in_key));
   const Image back = Sampled(track.in_frame, track.in_key);
   const int width = contrast.width, height = contrast.height;
@@ -229,7 +190,7 @@ void CarryAlongFilm(const FilmFrames& frames,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const std::function<void(int frame, const FilmColor& color)>& on_frame) {
+                    const std::function<void(int frame, const CarriedColor& color)>& on_frame) {
   options.Validate();
   for (size_t i = 0; i < keys.size(); ++i) {
     if (keys[i].frame < 0 || keys[i].frame >= static_cast<int>(frames.shot.size())) {
@@ -242,7 +203,7 @@ void CarryAlongFilm(const FilmFrames& frames,
     }
   }
   std::mutex handing_over;
-  const auto hand_over = [&](int frame, const FilmColor& color) {
+  const auto hand_over = [&](int frame, const CarriedColor& color) {
     const std::lock_guard lock(handing_over);
     on_frame(frame, color);
   };

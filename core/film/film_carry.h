@@ -10,17 +10,13 @@
 #include "core/base/cancellation.h"
 #include "core/base/image.h"
 #include "core/base/parallel.h"
+#include "core/carry/carry.h"
 
 namespace color3d {
 
-struct FilmColor {
-  Image ab;          // 2 channels, Lab units
-  Image confidence;  // 1 channel, 0..1
-};
-
 struct FilmKey {
   int frame = 0;
-  FilmColor color;  // of the working size
+  CarriedColor color;  // of the working size
 };
 
 struct FilmCarryOptions {
@@ -48,6 +44,6 @@ void CarryAlongFilm(const FilmFrames& frames,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const std::function<void(int frame, const FilmColor& color)>& on_frame);
+                    const std::function<void(int frame, const CarriedColor& color)>& on_frame);
 
 }  // namespace color3d

@@ -59,16 +59,16 @@ FilmKey KeyOf(const Scenery& scenery, int frame) {
   return {frame, {scenery.Ab(frame), Image(kWidth, kHeight, 1, 1.0f)}};
 }
 
-std::map<int, FilmColor> Carry(const Scenery& scenery,
-                               std::vector<int> shots,
-                               const std::vector<FilmKey>& keys) {
+std::map<int, CarriedColor> Carry(const Scenery& scenery,
+                                  std::vector<int> shots,
+                                  const std::vector<FilmKey>& keys) {
   ThreadPool pool(2);
   CancellationToken cancel;
-  std::map<int, FilmColor> colors;
+  std::map<int, CarriedColor> colors;
   const FilmFrames frames{std::move(shots), [&](int frame) {
                             return std::make_shared<const Image>(scenery.Luminance(frame));
                           }};
-  CarryAlongFilm(frames, keys, {}, pool, cancel, [&](int frame, const FilmColor& color) {
+  CarryAlongFilm(frames, keys, {}, pool, cancel, [&](int frame, const CarriedColor& color) {
     EXPECT_TRUE(colors.emplace(frame, color).second) << frame;
   });
   return colors;
@@ -77,7 +77,7 @@ std::map<int, FilmColor> Carry(const Scenery& scenery,
 struct Deviation {
   double weighted = 0.0, coverage = 0.0;
 };
-Deviation ErrorOf(const FilmColor& color, const Image& truth) {
+Deviation ErrorOf(const CarriedColor& color, const Image& truth) {
   double sum = 0.0, weight = 0.0, covered = 0.0;
   for (size_t i = 0; i < truth.PlaneSize(); ++i) {
     const double w = color.confidence.data[i];
@@ -135,7 +135,7 @@ TEST(FilmCarry, WhatCannotBeFollowedIsNotClaimed) {
                  {},
                  pool,
                  cancel,
-                 [&](int frame, const FilmColor& color) {
+                 [&](int frame, const CarriedColor& color) {
                    if (frame == 0) return;
                    EXPECT_LT(ErrorOf(color, cut.Ab(1)).coverage, 0.45);
                  });
@@ -149,9 +149,10 @@ TEST(FilmCarry, SmallAndWrong) {
   EXPECT_TRUE(Carry(still, {0, 0}, {}).empty());
   ThreadPool pool(1);
   CancellationToken cancel;
-  EXPECT_THROW(CarryAlongFilm(
-                   {}, {}, {.cycle_tolerance_px = 0.0}, pool, cancel, [](int, const FilmColor&) {}),
-               Error);
+  EXPECT_THROW(
+      CarryAlongFilm(
+          {}, {}, {.cycle_tolerance_px = 0.0}, pool, cancel, [](int, const CarriedColor&) {}),
+      Error);
 }
 
 }  // namespace

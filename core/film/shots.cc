@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/base/median.h"
 
 namespace color3d {
 namespace {
@@ -65,12 +66,6 @@ double UnlikenessOf(const Image& one, const Image& other) {
   return best;
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
-
 // Of the steps between the frames around the one between frames k and k + 1.
 double Usual(const std::vector<double>& steps, int k) {
   std::vector<double> around;
@@ -79,7 +74,7 @@ double Usual(const std::vector<double>& steps, int k) {
        ++i) {
     if (i != k) around.push_back(steps[i]);
   }
-  return Median(std::move(around));
+  return around.empty() ? 0.0 : Median(std::move(around));
 }
 
 }  // namespace

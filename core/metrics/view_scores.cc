@@ -6,6 +6,7 @@
 #include "core/image/codec.h"
 #include "core/metrics/quality.h"
 #include "core/metrics/rank_correlation.h"
+#include "core/scene/masks/photo_masks.h"
 
 namespace color3d {
 namespace {
@@ -29,9 +30,9 @@ LabColor Pixel(const Image& lab, size_t i) {
 std::vector<size_t> Counting(const Image* mask, int width, int height) {
   std::vector<size_t> pixels;
   const Image reduced =
-      mask == nullptr ? Image(width, height, 1, 1.0f) : Resize(*mask, width, height);
+      mask == nullptr ? Image(width, height, 1, 1.0f) : ResizeMask(*mask, width, height);
   for (size_t i = 0; i < reduced.data.size(); ++i) {
-    if (reduced.data[i] > 0.999f) pixels.push_back(i);
+    if (reduced.data[i] > 0.0f) pixels.push_back(i);
   }
   return pixels;
 }

@@ -41,13 +41,25 @@ CarriedColor ColorOfFurther(const FurtherKeyView& further,
   return color;
 }
 
-int FurtherView(const FurtherKeyView& further, const Scene& scene) {
+// `taken`: the key views before it.
+int FurtherView(const FurtherKeyView& further, const std::vector<int>& taken, const Scene& scene) {
   const int view = scene.FindView(further.view);
   if (scene.views[view].held_out) {
     throw InvalidArgument("the view {} is held out for evaluation and cannot be a key view",
                           scene.views[view].name);
   }
+  if (std::find(taken.begin(), taken.end(), view) != taken.end()) {
+    throw InvalidArgument("the view {} is a key view already; name each once",
+                          scene.views[view].name);
+  }
   return view;
+}
+
+template <class Key>
+std::vector<int> ViewsOf(const std::vector<Key>& keys, int Key::*view) {
+  std::vector<int> views;
+  for (const Key& key : keys) views.push_back(key.*view);
+  return views;
 }
 
 std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
@@ -64,13 +76,7 @@ std::vector<ColoredKeyView> ColorKeyViews(const CarryColorOptions& options,
   for (const FurtherKeyView& further : options.further) {
     context.cancel().ThrowIfCancelled();
     ColoredKeyView key;
-    key.view = FurtherView(further, scene);
-    for (const ColoredKeyView& other : keys) {
-      if (other.view == key.view) {
-        throw InvalidArgument("the view {} is a key view already; name each once",
-                              scene.views[key.view].name);
-      }
-    }
+    key.view = FurtherView(further, ViewsOf(keys, &ColoredKeyView::view), scene);
     key.surfaces = maker.Make(key.view);
     // What the views before it have given stays; the user's colours fill the rest.
     key.color = CarryFromAll(keys, key.surfaces, options.carry);
@@ -121,12 +127,10 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
   const Camera camera = images.WorkingCamera(0);
   std::vector<FilmKey> keys(1);
   keys[0].frame = ReadKeyView(context, scene);
-  CarriedColor first = ReadKeyColor(context, camera.width, camera.height);
-  keys[0].color = {std::move(first.ab), std::move(first.confidence)};
+  keys[0].color = ReadKeyColor(context, camera.width, camera.height);
   for (const FurtherKeyView& further : options.further) {
-    const int view = FurtherView(further, scene);
-    CarriedColor color = ColorOfFurther(further, view, scene, images, context);
-    keys.push_back({view, {std::move(color.ab), std::move(color.confidence)}});
+    const int view = FurtherView(further, ViewsOf(keys, &FilmKey::frame), scene);
+    keys.push_back({view, ColorOfFurther(further, view, scene, images, context)});
   }
   const auto total = static_cast<int64_t>(scene.views.size());
   std::vector<double> coverage(scene.views.size(), 0.0);
@@ -136,16 +140,14 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
                  options.film,
                  context.pool(),
                  context.cancel(),
-                 [&](int frame, const FilmColor& color) {
+                 [&](int frame, const CarriedColor& color) {
                    const View& view = scene.views[frame];
-                   coverage[frame] = Coverage({color.ab, color.confidence}, kCovered);
+                   coverage[frame] = Coverage(color, kCovered);
                    context.WriteOutput(ViewArtifact(artifact::kCarried, view, ".png"),
                                        EncodeAbPng(color.ab, color.confidence));
                    context.progress().OnProgress(++done, total, "carrying colour along the film");
                  });
-  std::vector<int> views;
-  for (const FilmKey& key : keys) views.push_back(key.frame);
-  Conclude(scene, views, coverage, context);
+  Conclude(scene, ViewsOf(keys, &FilmKey::frame), coverage, context);
 }
 
 }  // namespace
@@ -194,9 +196,7 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
              key != keys.end() ? 1.0 : Coverage(carried, kCovered),
              EncodeAbPng(carried.ab, carried.confidence));
   });
-  std::vector<int> key_views;
-  for (const ColoredKeyView& key : keys) key_views.push_back(key.view);
-  Conclude(scene, key_views, done.coverage(), context);
+  Conclude(scene, ViewsOf(keys, &ColoredKeyView::view), done.coverage(), context);
 }
 
 }  // namespace color3d

@@ -129,7 +129,7 @@ class HeldOutScores {
     const Camera camera = images.WorkingCamera(index);
     const Image delivered =
         model_ ? RenderView(*model_, camera, view.cam_from_world, context_.pool()).lab
-               : ColoredFrame(scene_, index, images, context_);
+               : ColoredFrame(view, index, /*is_key=*/false, images, context_);
     const auto mask = images.Mask(index);
     Scores scores = ScoreView(true_srgb, delivered, ab, mask.get());
     if (scores.empty()) {

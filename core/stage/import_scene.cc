@@ -35,7 +35,7 @@ std::string FindSplat(const fs::path& scene_folder) {
   std::error_code none;
   if (!fs::is_directory(scene_folder, none)) return splat;
   for (const std::string& file : ListFiles(scene_folder)) {
-    if (file.starts_with("augment/")) continue;
+    if (IsAugmentFile(file) || IsMaskFile(file)) continue;
     if (HasImageExtension(file)) return "";
     if (HasSplatExtension(file) && splat.empty()) splat = file;
   }

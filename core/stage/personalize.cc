@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/evenly.h"
 #include "core/color/lab.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
@@ -64,19 +65,12 @@ constexpr double kMinCoverage = 0.05;
 constexpr float kMinConfidence = 0.3f;
 constexpr double kCarriedShare = 0.5;  // of the samples
 
-std::vector<int> Spread(const std::vector<int>& views, size_t wanted) {
-  if (views.size() <= wanted) return views;
-  std::vector<int> spread;
-  for (size_t i = 0; i < wanted; ++i) spread.push_back(views[i * views.size() / wanted]);
-  return spread;
-}
-
 std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
                                              int key,
                                              const ViewImages& images,
                                              const StageContext& context) {
   std::vector<std::pair<double, TrainingPicture>> found;
-  for (int view : Spread(scene.TrainingViews(), kMaxViewsToLookAt)) {
+  for (int view : EvenlyOf(scene.TrainingViews(), kMaxViewsToLookAt)) {
     const std::string name = ViewArtifact(artifact::kCarried, scene.views[view], ".png");
     if (view == key || !context.HasInput(name)) continue;
     const auto luminance = images.Luminance(view);

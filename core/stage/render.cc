@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/evenly.h"
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
@@ -21,11 +22,7 @@ std::vector<int> ViewsToRender(const RenderOptions& options, const Scene& scene)
   if (views.empty()) {
     for (size_t i = 0; i < scene.views.size(); ++i) views.push_back(static_cast<int>(i));
   }
-  const size_t count = views.size();
-  const size_t wanted = std::min(count, static_cast<size_t>(options.max_views));
-  std::vector<int> spread;
-  for (size_t i = 0; i < wanted; ++i) spread.push_back(views[i * count / wanted]);
-  return spread;
+  return EvenlyOf(std::move(views), static_cast<size_t>(options.max_views));
 }
 
 }  // namespace

@@ -1,10 +1,8 @@
 #include "core/video/film_reader.h"
 
 extern "C" {
-#include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/display.h>
-#include <libavutil/error.h>
 #include <libswscale/swscale.h>
 }
 
@@ -15,6 +13,7 @@ extern "C" {
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/video/libav.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -24,27 +23,12 @@ constexpr int kMaxSidePx = 8192;
 // Times of frames that differ by less than this share of their mean distance are one rate.
 constexpr double kRateTolerance = 0.2;
 
-struct FreeCodec {
-  void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
-};
-struct FreeFrame {
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
-};
-struct FreePacket {
-  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
-};
 struct CloseFilm {
   void operator()(AVFormatContext* film) const { avformat_close_input(&film); }
 };
 struct FreeConverter {
   void operator()(SwsContext* converter) const { sws_freeContext(converter); }
 };
-
-std::string Words(int result) {
-  char words[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(result, words, sizeof words);
-  return words;
-}
 
 // A picture in a sound file, its cover, is no film.
 AVStream* FindFilm(AVFormatContext* container) {
@@ -135,11 +119,11 @@ class FilmReader::Impl {
     AVFormatContext* container = nullptr;
     if (const int result = avformat_open_input(&container, file_.c_str(), nullptr, nullptr);
         result < 0) {
-      Refuse(Words(result));
+      Refuse(LibavError(result));
     }
     container_.reset(container);
     if (const int result = avformat_find_stream_info(container, nullptr); result < 0) {
-      Refuse(Words(result));
+      Refuse(LibavError(result));
     }
     stream_ = FindFilm(container);
     if (stream_ == nullptr) Refuse("it has no pictures, perhaps only sound");

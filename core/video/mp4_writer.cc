@@ -1,9 +1,7 @@
 #include "core/video/mp4_writer.h"
 
 extern "C" {
-#include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
-#include <libavutil/error.h>
 #include <libavutil/opt.h>
 }
 
@@ -15,6 +13,7 @@ extern "C" {
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/range_check.h"
+#include "core/video/libav.h"
 #include "core/video/yuv.h"
 
 namespace color3d {
@@ -25,15 +24,6 @@ namespace {
 constexpr const char* kEncoders[] = {"libx264", "libopenh264", "mpeg4"};
 constexpr int kKeyFrameSeconds = 2;  // a player that is moved has this much to decode at most
 
-struct FreeCodec {
-  void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
-};
-struct FreeFrame {
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
-};
-struct FreePacket {
-  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
-};
 struct CloseMovie {
   void operator()(AVFormatContext* movie) const {
     if (movie->pb != nullptr) avio_closep(&movie->pb);
@@ -43,8 +33,7 @@ struct CloseMovie {
 
 // `result`: what FFmpeg returned, < 0.
 [[noreturn]] void Fail(const fs::path& path, const char* what, int result) {
-  char words[AV_ERROR_MAX_STRING_SIZE] = {};
-  av_strerror(result, words, sizeof words);
+  const std::string words = LibavError(result);
   if (result == AVERROR(ENOSPC) || result == AVERROR(EDQUOT) || result == AVERROR(EFBIG)) {
     throw Error(ErrorCode::kResourceExhausted,
                 "no room for {}: {}; free some disk space",

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
 #include "server/planning/plan_scenes.h"
 #include "server/planning/planner.h"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/base/median.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/formats/artifacts.h"
@@ -28,12 +29,14 @@ Image EvenSides(const Image& image) {
 
 }  // namespace
 
-Image ColoredFrame(const Scene& scene, int view, const ViewImages& images, StageContext& context) {
-  const auto luminance = images.Luminance(view);
-  const bool is_key = context.HasInput(artifact::kKeyView) && ReadKeyView(context, scene) == view;
-  return JoinLab(
-      *luminance,
-      ReadTargetAb(context, scene.views[view], is_key, luminance->width, luminance->height));
+Image ColoredFrame(const View& view,
+                   int index,
+                   bool is_key,
+                   const ViewImages& images,
+                   const StageContext& context) {
+  const auto luminance = images.Luminance(index);
+  return JoinLab(*luminance,
+                 ReadTargetAb(context, view, is_key, luminance->width, luminance->height));
 }
 
 double FilmFramesPerSecond(const Scene& scene) {
@@ -42,8 +45,7 @@ double FilmFramesPerSecond(const Scene& scene) {
     steps.push_back(scene.views[i].moment->time_s - scene.views[i - 1].moment->time_s);
   }
   if (steps.empty()) return kUnknownFramesPerSecond;
-  std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
-  const double step = steps[steps.size() / 2];
+  const double step = Median(std::move(steps));
   return step > 0.0 ? std::clamp(1.0 / step, 1.0, 120.0) : kUnknownFramesPerSecond;
 }
 
@@ -53,6 +55,7 @@ void RenderFilm(const RenderOptions& options,
                 StageContext& context) {
   const ViewImages images(scene, context.scene_folder(), /*max_side_px=*/0, 0);
   const Camera camera = images.WorkingCamera(0);
+  const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
   const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
   Mp4Writer movie(file,
                   {.width = camera.width - camera.width % 2,
@@ -66,7 +69,8 @@ void RenderFilm(const RenderOptions& options,
     context.cancel().ThrowIfCancelled();
     const int size = std::min(batch, count - begin);
     context.pool().ForEach(size, [&](int64_t i, int) {
-      frames[i] = SrgbFromLab(ColoredFrame(scene, begin + static_cast<int>(i), images, context));
+      const int view = begin + static_cast<int>(i);
+      frames[i] = SrgbFromLab(ColoredFrame(scene.views[view], view, view == key, images, context));
     });
     for (int i = 0; i < size; ++i) {
       const int view = begin + i;

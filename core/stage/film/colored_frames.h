@@ -8,8 +8,12 @@
 
 namespace color3d {
 
-// Lab of the view's size in `images`.
-Image ColoredFrame(const Scene& scene, int view, const ViewImages& images, StageContext& context);
+// Lab of the size in `images` of the view with that index; the key frame keeps its own colours.
+Image ColoredFrame(const View& view,
+                   int index,
+                   bool is_key,
+                   const ViewImages& images,
+                   const StageContext& context);
 
 // Of the film's frames, from one to the next: the middle one of their distances; 25 for a film
 // without times.

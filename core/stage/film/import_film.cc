@@ -222,7 +222,7 @@ std::string FindFilm(const fs::path& scene_folder) {
   if (!fs::is_directory(scene_folder, none)) return film;
   bool has_photos = false;
   for (const std::string& file : ListFiles(scene_folder)) {
-    if (file.starts_with("augment/")) continue;
+    if (IsAugmentFile(file) || IsMaskFile(file)) continue;
     if (IsFrameFile(file) && HasImageExtension(file)) return std::string(kFramesFolder);
     has_photos |= HasImageExtension(file);
     if (HasFilmExtension(file) && film.empty()) film = file;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/base/evenly.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
@@ -23,21 +24,14 @@ bool HasRender(const View& view, const StageContext& context) {
   return context.HasInput(ViewArtifact(artifact::kRenders, view, ".png"));
 }
 
-std::vector<int> Spread(const std::vector<int>& views, size_t wanted) {
-  if (views.size() <= wanted) return views;
-  std::vector<int> spread;
-  for (size_t i = 0; i < wanted; ++i) spread.push_back(views[i * views.size() / wanted]);
-  return spread;
-}
-
 std::vector<int> ChosenViews(const Scene& scene, bool has_model, const StageContext& context) {
   std::vector<int> held_out, training;
   for (size_t i = 0; i < scene.views.size(); ++i) {
     if (!has_model && !HasRender(scene.views[i], context)) continue;
     (scene.views[i].held_out ? held_out : training).push_back(static_cast<int>(i));
   }
-  std::vector<int> chosen = Spread(held_out, kMaxViews / 2);
-  const std::vector<int> others = Spread(training, kMaxViews - chosen.size());
+  std::vector<int> chosen = EvenlyOf(held_out, kMaxViews / 2);
+  const std::vector<int> others = EvenlyOf(training, kMaxViews - chosen.size());
   chosen.insert(chosen.end(), others.begin(), others.end());
   return chosen;
 }

@@ -1,0 +1,30 @@
+// Owners of what FFmpeg's libraries hand out. For this folder only.
+#pragma once
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavutil/error.h>
+}
+
+#include <string>
+
+namespace color3d {
+
+struct FreeCodec {
+  void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
+};
+struct FreeFrame {
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+};
+struct FreePacket {
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+};
+
+// What FFmpeg means by `result`, < 0.
+inline std::string LibavError(int result) {
+  char words[AV_ERROR_MAX_STRING_SIZE] = {};
+  av_strerror(result, words, sizeof words);
+  return words;
+}
+
+}  // namespace color3d
