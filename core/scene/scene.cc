@@ -15,6 +15,21 @@ std::string_view Stem(std::string_view name) {
   return name.substr(0, dot);
 }
 
+bool HasMoments(const std::vector<View>& views) {
+  return !views.empty() && std::all_of(views.begin(), views.end(), [](const View& view) {
+    return view.moment.has_value();
+  });
+}
+
+// Not all views stand at one place and look one way.
+bool HasPoses(const std::vector<View>& views) {
+  return std::any_of(views.begin(), views.end(), [&](const View& view) {
+    const Pose &one = view.cam_from_world, &first = views.front().cam_from_world;
+    return one.translation != first.translation ||
+           one.rotation.coeffs() != first.rotation.coeffs();
+  });
+}
+
 }  // namespace
 
 std::vector<int> Scene::TrainingViews() const {
@@ -54,11 +69,9 @@ int Scene::FindView(std::string_view name) const {
                                  : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
 }
 
-bool Scene::IsFilm() const {
-  return !views.empty() && std::all_of(views.begin(), views.end(), [](const View& v) {
-    return v.moment.has_value();
-  });
-}
+bool Scene::IsFilm() const { return HasMoments(views) && !HasPoses(views); }
+
+bool Scene::IsDynamic() const { return HasMoments(views) && HasPoses(views); }
 
 double Scene::Extent() const {
   const std::vector<int> training = TrainingViews();

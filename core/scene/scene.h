@@ -14,10 +14,10 @@
 
 namespace color3d {
 
-// When a frame of a film was taken.
+// When a frame of a film was taken, and by which camera.
 struct Moment {
-  double time_s = 0.0;  // from the film's first frame, >= 0
-  int shot = 0;         // frames of one shot show one place without a cut between them
+  double time_s = 0.0;  // from the scene's first frame, >= 0
+  int shot = 0;         // frames of one shot are one camera's, without a cut between them
   bool operator==(const Moment&) const = default;
 };
 
@@ -57,8 +57,11 @@ struct Scene {
   // Index of a view by name (or by file stem when that is unique); throws Error{kNotFound} naming
   // a few that exist.
   int FindView(std::string_view name) const;
-  // Frames of a film: every view has its moment. False without views.
+  // Every view has its moment: frames of a film, whose poses are all the same because nobody knows
+  // them (coloured, not reconstructed) ...
   bool IsFilm() const;
+  // ... or of one or several cameras with poses: a scene that may move. Both false without views.
+  bool IsDynamic() const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
   double Extent() const;
   // In the world's units and frame.
