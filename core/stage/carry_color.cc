@@ -174,10 +174,11 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const ViewImages images(scene, context.scene_folder(), options.max_side_px);
   const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);
-  const SurfaceRenderer render = [&](const Camera& camera, const Pose& pose) {
+  const SurfaceRenderer render = [&](int index, const Camera& camera) {
     ThreadPool one(1);
-    RenderedView view = RenderView(geometry, camera, pose, one);
-    return RenderedSurface{std::move(view.median_depth), std::move(view.opacity)};
+    const View& view = scene.views[index];
+    RenderedView seen = RenderView(geometry, camera, view.cam_from_world, one, 0.0f, view.time_s());
+    return RenderedSurface{std::move(seen.median_depth), std::move(seen.opacity)};
   };
   const SurfaceMaker maker(
       scene, images, sweep_images, render, options.depth_sources, options.sweep, context.cancel());

@@ -55,8 +55,12 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[views[i]];
-    const RenderedView rendered = RenderView(
-        model, view.camera.FitWithin(options.max_side_px), view.cam_from_world, context.pool());
+    const RenderedView rendered = RenderView(model,
+                                             view.camera.FitWithin(options.max_side_px),
+                                             view.cam_from_world,
+                                             context.pool(),
+                                             0.0f,
+                                             view.time_s());
     context.WriteOutput(ViewArtifact(artifact::kRenders, view, ".png"),
                         EncodePng8(SrgbFromLab(rendered.lab)));
     context.progress().OnProgress(
