@@ -33,6 +33,7 @@ void RenderOptions::Validate() const {
   CheckMaxSide(max_side_px);
   if (frames) check("frames", *frames, 1, kMaxMovieFrames);
   check("frames_per_second", frames_per_second, 1, 120);
+  if (time_s) check("time_s", *time_s, 0, 86400);
   if (path != Path::kViews && !video && !pictures) {
     throw InvalidArgument("a path without video and without pictures leaves nothing");
   }

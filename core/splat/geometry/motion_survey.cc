@@ -15,10 +15,10 @@ namespace {
 constexpr int kRadiusPx = 2;
 constexpr double kDeviations = 5.0;
 constexpr double kLeastResidual = 0.03;
-constexpr size_t kMedianFrames = 31;   // at most, evenly over time
-constexpr size_t kFewestFrames = 5;    // that say what stands still
-constexpr int kSpeckPixels = 6;        // of the 3x3 px around one that moves, at least
-constexpr size_t kNoiseStep = 7;       // every so many pixels tell the scene's deviation
+constexpr size_t kMedianFrames = 31;  // at most, evenly over time
+constexpr size_t kFewestFrames = 5;   // that say what stands still
+constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
+constexpr size_t kNoiseStep = 7;      // every so many pixels tell the scene's deviation
 
 using Stand = std::tuple<double, double, double, double, double, double, double, int, int>;
 

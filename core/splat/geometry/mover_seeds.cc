@@ -12,13 +12,13 @@
 namespace color3d {
 namespace {
 
-constexpr int kDepths = 64;          // tried along a ray, evenly in 1 / depth
-constexpr double kNearest = 0.15;    // of the standing surface's depth
-constexpr double kBehind = 1.03;     // of a surface's depth: hidden by it
-constexpr int kPatchRadius = 2;      // of the comparison of luminance, px
+constexpr int kDepths = 64;        // tried along a ray, evenly in 1 / depth
+constexpr double kNearest = 0.15;  // of the standing surface's depth
+constexpr double kBehind = 1.03;   // of a surface's depth: hidden by it
+constexpr int kPatchRadius = 2;    // of the comparison of luminance, px
 constexpr double kSeedOpacity = 0.3;
-constexpr double kSeedWidth = 0.7;   // of the interval between time steps: the window's deviation
-constexpr double kFootprint = 0.6;   // of the distance between seeds: their deviation
+constexpr double kSeedWidth = 0.7;  // of the interval between time steps: the window's deviation
+constexpr double kFootprint = 0.6;  // of the distance between seeds: their deviation
 
 struct Pixel {
   int x = 0;
@@ -33,8 +33,7 @@ struct Seed {
 };
 
 float AtClamped(const Image& image, int x, int y) {
-  return image.At(
-      0, std::clamp(y, 0, image.height - 1), std::clamp(x, 0, image.width - 1));
+  return image.At(0, std::clamp(y, 0, image.height - 1), std::clamp(x, 0, image.width - 1));
 }
 
 // -1..1 for two windows; 0 where one of them is flat.
@@ -209,8 +208,9 @@ ParameterBlock SeedMovers(const std::vector<SurveyedView>& views,
     for (const float m : view.moving.data) moving += m;
   }
   const int step = std::max(
-      1, static_cast<int>(std::ceil(std::sqrt(
-             moving / static_cast<double>(std::max<int64_t>(1, options.most))))));
+      1,
+      static_cast<int>(
+          std::ceil(std::sqrt(moving / static_cast<double>(std::max<int64_t>(1, options.most))))));
   std::vector<std::vector<Seed>> seeds(views.size());
   pool.ForEach(static_cast<int64_t>(views.size()), [&](int64_t i, int) {
     seeds[i] = SeedsOf(views[i], moments.at(views[i].posed.time_s), unit_time[i], step);

@@ -14,9 +14,9 @@ namespace color3d {
 struct MoverSeedOptions {
   int rows = 0;  // of a parameter block, without motion
   int channels = 1;
-  int coefficients = 1;  // of a colour channel
-  int64_t most = 0;      // seeds
-  double interval = 1.0; // from one time step to the next, in units of GaussianMotion's t
+  int coefficients = 1;   // of a colour channel
+  int64_t most = 0;       // seeds
+  double interval = 1.0;  // from one time step to the next, in units of GaussianMotion's t
 };
 
 // One Gaussian per moving pixel (every so many, so that there are at most `most`), there only about

@@ -140,14 +140,8 @@ void DecomposeGradient(const ParameterBlock& still,
                        ThreadPool& pool,
                        ParameterBlock& gradient,
                        ParameterBlock& moving_gradient) {
-  ApplyMotionBackward(moving.parameters,
-                      still.rows(),
-                      t,
-                      still.count(),
-                      at,
-                      gradient,
-                      pool,
-                      moving_gradient);
+  ApplyMotionBackward(
+      moving.parameters, still.rows(), t, still.count(), at, gradient, pool, moving_gradient);
   gradient.Resize(still.count());
 }
 

@@ -127,8 +127,7 @@ void ApplyMotionBackward(const ParameterBlock& moving,
       const float d_logit = d_at.Row(kOpacityRow)[j];
       const float rest = 1.0f - Sigmoid(at.Row(kOpacityRow)[j]);
       const float d_log_opacity = rest > 0.0f ? d_logit / rest : 0.0f;
-      d_moving.Row(kOpacityRow)[i] =
-          d_log_opacity * (1.0f - Sigmoid(moving.Row(kOpacityRow)[i]));
+      d_moving.Row(kOpacityRow)[i] = d_log_opacity * (1.0f - Sigmoid(moving.Row(kOpacityRow)[i]));
       const float inverse_width = std::exp(-moving.Row(row + kLogWidthRow)[i]);
       d_moving.Row(row + kCenterRow)[i] = d_log_opacity * w.scaled * inverse_width - d_tau;
       d_moving.Row(row + kLogWidthRow)[i] = d_log_opacity * w.scaled * w.scaled;
@@ -147,10 +146,8 @@ ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPoo
 
 GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool) {
   if (model.motion.size() == 0) return model;
-  GaussianModel at = ModelFromParameters(ParametersAt(model, time_s, pool),
-                                         model.channels,
-                                         model.sh_degree,
-                                         model.chroma_sh_degree);
+  GaussianModel at = ModelFromParameters(
+      ParametersAt(model, time_s, pool), model.channels, model.sh_degree, model.chroma_sh_degree);
   at.confidence = model.confidence;
   return at;
 }

@@ -27,8 +27,7 @@ std::vector<double> TwinAt(const std::vector<double>& p, double t) {
     at[kPositionRow + k] += m[kVelocityRow + k] * tau + m[kAccelerationRow + k] * tau * tau;
   }
   for (int k = 0; k < 4; ++k) at[kRotationRow + k] += m[kSpinRow + k] * tau;
-  const double opacity =
-      std::exp(-0.5 * scaled * scaled) / (1.0 + std::exp(-p[kOpacityRow]));
+  const double opacity = std::exp(-0.5 * scaled * scaled) / (1.0 + std::exp(-p[kOpacityRow]));
   at[kOpacityRow] = std::log(opacity / (1.0 - opacity));
   return at;
 }
@@ -154,9 +153,8 @@ TEST_F(MotionTest, OnlyTheLastGaussiansOfAModelMove) {
               testing::ElementsAreArray(model.position.begin(), model.position.begin() + 12));
   EXPECT_THAT(std::vector<float>(at.position.begin() + 15, at.position.end()),
               testing::ElementsAre(6.0f, 3.5f, 5.0f));
-  EXPECT_NEAR(at.opacity_logit[5],
-              std::log(1.0 / ((1.0 + std::exp(-1.0)) / std::exp(-0.5) - 1.0)),
-              1e-5);
+  EXPECT_NEAR(
+      at.opacity_logit[5], std::log(1.0 / ((1.0 + std::exp(-1.0)) / std::exp(-0.5) - 1.0)), 1e-5);
   EXPECT_EQ(ModelAt(model, 3.0, pool_).position, model.position);
 }
 
