@@ -38,13 +38,21 @@ Vector3d RayDirection(const View& view, double x_px, double y_px) {
   return view.cam_from_world.rotation.conjugate() * view.camera.Ray(x_px, y_px);
 }
 
-bool Sees(const Room& room, const View& view, const Vector3d& point) {
+std::optional<Eigen::Vector2d> PixelOf(const View& view, const Vector3d& point) {
   const Vector3d p = view.cam_from_world.Apply(point);
-  if (p.z() <= 0.0) return false;
+  if (p.z() <= 0.0) return std::nullopt;
   const Eigen::Vector2d pixel = view.camera.Project(p);
-  if (!view.camera.Contains(pixel)) return false;
-  const Hit hit = room.Trace(view.cam_from_world.Center(), RayDirection(view, pixel.x(), pixel.y()));
-  return hit.object >= 0 && std::abs(hit.distance - p.z()) < 1e-4 * p.z();
+  if (!view.camera.Contains(pixel)) return std::nullopt;
+  return pixel;
+}
+
+bool Sees(const Room& room, const View& view, const Vector3d& point) {
+  const auto pixel = PixelOf(view, point);
+  if (!pixel) return false;
+  const double depth = view.cam_from_world.Apply(point).z();
+  const Vector3d direction = RayDirection(view, pixel->x(), pixel->y());
+  const Hit hit = room.Trace(view.cam_from_world.Center(), direction);
+  return hit.object >= 0 && std::abs(hit.distance - depth) < 1e-4 * depth;
 }
 
 RoomSample SampleRoom(const Room& room, const View& view, int x, int y, const PixelSample& sample) {

@@ -1,6 +1,8 @@
 // Cameras in the made-up room and what they see of it, sample by sample. Pure functions.
 #pragma once
 
+#include <optional>
+
 #include "core/base/image.h"
 #include "core/scene/scene.h"
 #include "tests/support/scenes/room.h"
@@ -15,7 +17,10 @@ View ArcView(double t, int width, int height);
 // distance in its lengths is a depth.
 Eigen::Vector3d RayDirection(const View& view, double x_px, double y_px);
 
-// True when the view's picture contains the point and the room hides it not.
+// Where the picture shows the point, px, if nothing hides it; nothing when it lies outside.
+std::optional<Eigen::Vector2d> PixelOf(const View& view, const Eigen::Vector3d& point);
+
+// True when the view's picture contains the point and the room does not hide it.
 bool Sees(const Room& room, const View& view, const Eigen::Vector3d& point);
 
 // One of the side x side samples of a pixel.

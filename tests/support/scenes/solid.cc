@@ -40,9 +40,7 @@ Vector3d Solid::ToWorld(const Vector3d& v) const {
   return {cos_yaw * v.x() + sin_yaw * v.z(), v.y(), -sin_yaw * v.x() + cos_yaw * v.z()};
 }
 
-double Solid::Height(double x) const {
-  return half.z() * std::sin(2.0 * kPi * x / wave_m - phase);
-}
+double Solid::Height(double x) const { return half.z() * std::sin(2.0 * kPi * x / wave_m - phase); }
 
 Vector3d Solid::OnMaterial(const Vector3d& world) const {
   Vector3d local = ToLocal(world - center);
