@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "core/base/error.h"
@@ -242,7 +243,8 @@ Image DynamicScene::RenderMovers(int view_index) const {
 void WriteDynamicScene(const fs::path& folder, const DynamicScene& made) {
   for (size_t i = 0; i < made.scene().views.size(); ++i) {
     const fs::path file = folder / made.scene().views[i].image_file;
-    fs::create_directories(file.parent_path());
+    std::error_code error;  // writing says it
+    fs::create_directories(file.parent_path(), error);
     WriteFileAtomic(file, EncodePng8(made.RenderSrgb(static_cast<int>(i))));
   }
   WriteTransformsJson(made.scene(), folder / "transforms.json");
