@@ -22,7 +22,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kStepSeconds = 0.125;  // exact in binary and in decimals
-constexpr double kFar = 1e9;             // m; the room is closed: every ray meets it nearer
+constexpr double kFar = 1e9;            // m; the room is closed: every ray meets it nearer
 
 int TimesOf(const DynamicSceneOptions& options) {
   if (options.times > 0) return options.times;
@@ -105,8 +105,7 @@ void DynamicScene::AddSparsePoints() {
   Random random(options_.seed, 6);
   const bool places_differ = options_.moving_cameras;
   const int views = static_cast<int>(scene_.views.size());
-  const size_t needed =
-      static_cast<size_t>(std::min(3, places_differ ? views : options_.cameras));
+  const size_t needed = static_cast<size_t>(std::min(3, places_differ ? views : options_.cameras));
   const int tries = 20 * options_.sparse_points;
   for (int i = 0; i < tries && static_cast<int>(scene_.points.size()) < options_.sparse_points;
        ++i) {

@@ -34,10 +34,10 @@ struct DynamicSceneOptions {
 
 // What a view shows at one position.
 struct SeenPoint {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();     // world, m
-  double depth = 0.0;                                     // along the camera's z axis, m
-  int mover = -1;                                         // -1: it stands still
-  Eigen::Vector3d on_mover = Eigen::Vector3d::Zero();     // its place in the mover's material
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // world, m
+  double depth = 0.0;                                  // along the camera's z axis, m
+  int mover = -1;                                      // -1: it stands still
+  Eigen::Vector3d on_mover = Eigen::Vector3d::Zero();  // its place in the mover's material
 };
 
 // Immutable, thread-safe. Same options, same scene, on any number of threads.

@@ -35,11 +35,11 @@ Solid Ball(const Vector3d& center, double yaw_degrees) {
 }
 
 Solid Crate(const Vector3d& center, double yaw_degrees) {
-  const Material side =
-      Paint(Pattern::kDots, Srgb(0.12, 0.50, 0.55), Srgb(0.95, 0.55, 0.35), 0.26);
+  const Material side = Paint(Pattern::kDots, Srgb(0.12, 0.50, 0.55), Srgb(0.95, 0.55, 0.35), 0.26);
   const Material end =
       Paint(Pattern::kStripes, Srgb(0.85, 0.25, 0.20), Srgb(0.90, 0.85, 0.60), 0.24);
-  const Material lid = Paint(Pattern::kPatches, Srgb(0.25, 0.55, 0.20), Srgb(0.80, 0.85, 0.35), 0.2);
+  const Material lid =
+      Paint(Pattern::kPatches, Srgb(0.25, 0.55, 0.20), Srgb(0.80, 0.85, 0.35), 0.2);
   Solid crate(Shape::kBox, center, {0.34, 0.28, 0.30}, yaw_degrees, side);
   crate.materials = {end, end, lid, lid, side, side};
   return crate;
@@ -56,9 +56,7 @@ Solid Banner(const Vector3d& center, double phase) {
   return banner;
 }
 
-Vector3d OnLine(double progress) {
-  return {-0.65 + 1.3 * progress, 0.45, 0.45 - 0.3 * progress};
-}
+Vector3d OnLine(double progress) { return {-0.65 + 1.3 * progress, 0.45, 0.45 - 0.3 * progress}; }
 
 }  // namespace
 
@@ -84,7 +82,8 @@ DynamicCase DynamicCaseFromName(std::string_view name) {
     if (each == name) return which;
     known.emplace_back(each);
   }
-  throw InvalidArgument("there is no moving scene \"{}\"; there are {}", name, fmt::join(known, ", "));
+  throw InvalidArgument(
+      "there is no moving scene \"{}\"; there are {}", name, fmt::join(known, ", "));
 }
 
 bool IsMoving(DynamicCase which) {

@@ -135,7 +135,7 @@ void WriteTransformsJson(const Scene& scene, const fs::path& json_file) {
     }
     if (view.moment) {
       frame["time"] = view.moment->time_s;
-      frame["camera"] = view.moment->shot;
+      frame["camera"] = fmt::format("cam{:02}", view.moment->shot);
     }
     Eigen::Matrix4d gl = Eigen::Matrix4d::Identity();
     gl.topLeftCorner<3, 3>() = view.cam_from_world.rotation.conjugate().toRotationMatrix() *

@@ -22,7 +22,8 @@ TEST(Solid, RaysMeetASheetOnItsSurfaceFromBothSides) {
   for (const double from : {-3.0, 3.0}) {
     for (int i = 0; i < 400; ++i) {
       const Vector3d origin(0.2, -0.1, 0.4 + from);
-      const Vector3d direction(0.012 * (i % 20 - 10), 0.008 * (i / 20 - 10), from < 0.0 ? 1.0 : -1.0);
+      const Vector3d direction(
+          0.012 * (i % 20 - 10), 0.008 * (i / 20 - 10), from < 0.0 ? 1.0 : -1.0);
       Hit hit;
       if (!sheet.Intersect(origin, direction, &hit)) continue;
       EXPECT_FALSE(sheet.Misses(origin, direction));
