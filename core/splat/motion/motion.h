@@ -48,6 +48,9 @@ void ApplyMotionBackward(const ParameterBlock& moving,
                          ThreadPool& pool,
                          ParameterBlock& d_moving);
 
+// No window in time becomes narrower than exp(least).
+void LimitWindows(float least, int row, ParameterBlock& moving);
+
 // The model's parameters at a time of the scene, seconds; those that stand still are the same at
 // any.
 ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool);
