@@ -44,6 +44,7 @@ inline constexpr char kSog[] = "scene.sog";
 inline constexpr char kSpz[] = "scene.spz";
 inline constexpr char kGlb[] = "scene.glb";
 inline constexpr char kSplat[] = "scene.splat";
+inline constexpr char kMoments[] = "moments/";  // "00001.ply" and so on, of a scene that moves
 inline constexpr char kExportScores[] = "export.json";  // what they lose against our renders
 inline constexpr char kRenders[] = "renders/";          // view's stem + ".png"
 inline constexpr char kMovie[] = "scene.mp4";

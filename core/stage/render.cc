@@ -53,6 +53,12 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     return RenderMovie(options, scene, model, context);
   }
   const std::vector<int> views = ViewsToRender(options, scene);
+  if (model.motion.size() > 0) {  // as the key view's camera saw it
+    RenderOptions movie = options;
+    movie.views.clear();
+    movie.path = RenderOptions::Path::kPhotos;
+    RenderMovie(movie, scene, model, context);
+  }
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[views[i]];

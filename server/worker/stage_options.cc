@@ -173,6 +173,7 @@ ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   options.glb = spec.glb();
   options.splat = spec.splat();
   options.confidence = spec.confidence();
+  options.moments = spec.moments();
   return options;
 }
 

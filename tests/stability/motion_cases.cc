@@ -46,7 +46,7 @@ GeometryProblem ProblemOf(const MadeUp& made) {
       const PosedCamera posed{
           index, view.camera, view.cam_from_world, view.time_s(), view.moment->shot};
       (time % kHoldOutEvery == kHoldOutEvery / 2 && made.scene.times() > 1 ? problem.held_out
-                                                                            : problem.training)
+                                                                           : problem.training)
           .push_back(posed);
     }
   }
@@ -72,8 +72,7 @@ Psnr PsnrOf(const MadeUp& made,
     const auto truth = made.Luminance(posed.view);
     const Image movers = made.scene.RenderMovers(posed.view);
     for (size_t i = 0; i < truth->data.size(); ++i) {
-      const double error =
-          0.01 * (std::clamp(drawn.data[i], 0.0f, 100.0f) - truth->data[i]);
+      const double error = 0.01 * (std::clamp(drawn.data[i], 0.0f, 100.0f) - truth->data[i]);
       const double share[2] = {1.0, movers.data[i]};
       for (int k = 0; k < 2; ++k) {
         sum[k] += share[k] * error * error;

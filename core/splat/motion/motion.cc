@@ -161,9 +161,17 @@ ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPoo
 
 GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool) {
   if (model.motion.size() == 0) return model;
-  GaussianModel at = ModelFromParameters(
-      ParametersAt(model, time_s, pool), model.channels, model.sh_degree, model.chroma_sh_degree);
-  at.confidence = model.confidence;
+  ParameterBlock parameters = ParametersAt(model, time_s, pool);
+  std::vector<uint32_t> seen;
+  for (int64_t i = 0; i < parameters.count(); ++i) {
+    if (parameters.Row(kOpacityRow)[i] > kUnseenLogit) seen.push_back(static_cast<uint32_t>(i));
+  }
+  parameters.Gather(seen);
+  GaussianModel at =
+      ModelFromParameters(parameters, model.channels, model.sh_degree, model.chroma_sh_degree);
+  for (const uint32_t i : seen) {
+    if (!model.confidence.empty()) at.confidence.push_back(model.confidence[i]);
+  }
   return at;
 }
 

@@ -54,7 +54,7 @@ void LimitWindows(float least, int row, ParameterBlock& moving);
 // The model's parameters at a time of the scene, seconds; those that stand still are the same at
 // any.
 ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool);
-// The same as a model without motion.
+// The same as a model without motion: the Gaussians that are seen then.
 GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool);
 
 }  // namespace color3d
