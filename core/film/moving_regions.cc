@@ -64,8 +64,8 @@ Flow SureFlow(const Image& from, const Image& to) {
       if (!(cycle < kSureCyclePx)) continue;
       const int at = y * from.width + x;
       flow.sure[at] = 1;
-      const bool on_grid = x % kSampleStepPx == kSampleStepPx / 2 &&
-                           y % kSampleStepPx == kSampleStepPx / 2;
+      const bool on_grid =
+          x % kSampleStepPx == kSampleStepPx / 2 && y % kSampleStepPx == kSampleStepPx / 2;
       if (on_grid && flow.texture.data[at] > kLeastTexture) flow.sample.push_back(at);
     }
   }
@@ -105,8 +105,8 @@ std::vector<double> ResidualsOf(const Account& account, const Flow& flow) {
   const int width = flow.there.width;
   for (const int at : flow.sample) {
     const double x = at % width, y = at / width;
-    residuals.push_back(account.Residual(
-        x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]));
+    residuals.push_back(
+        account.Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]));
   }
   return residuals;
 }
@@ -240,8 +240,8 @@ PairResidual CompareFrames(const Image& from, const Image& to) {
     for (int x = 0; x < from.width; ++x) {
       const size_t at = static_cast<size_t>(y) * from.width + x;
       if (!flow.sure[at]) continue;
-      const double residual = account->Residual(
-          x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
+      const double residual =
+          account->Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
       // The error of flow goes with the inverse of the gradient.
       const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
       result.excess.data[at] =
@@ -282,7 +282,8 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
     const int frame = static_cast<int>(index);
     const auto picture = frames.luminance(frame);
     const std::vector<int> neighbors = NeighborsOf(frame, frames.count);
-    Votes votes{std::vector<int>(picture->PlaneSize(), 0), std::vector<int>(picture->PlaneSize(), 0)};
+    Votes votes{std::vector<int>(picture->PlaneSize(), 0),
+                std::vector<int>(picture->PlaneSize(), 0)};
     for (const int neighbor : neighbors) {
       cancel.ThrowIfCancelled();
       Add(CompareFrames(*picture, *frames.luminance(neighbor)), &votes);

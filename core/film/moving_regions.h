@@ -12,7 +12,8 @@
 
 namespace color3d {
 
-inline constexpr int kMotionSidePx = 480;  // longer side of the pictures that thresholds are made for
+inline constexpr int kMotionSidePx =
+    480;  // longer side of the pictures that thresholds are made for
 
 // The frames of one shot, in their order.
 struct ShotFrames {
@@ -23,18 +24,18 @@ struct ShotFrames {
 
 // How the camera moved between two frames, by the simplest account that explains the flow.
 enum class CameraMotion {
-  kUnknown,   // too little texture, or nothing in common
-  kStill,     // the flow of most is nearly nothing
-  kTurn,      // a homography: a turn, a zoom, or a plane
-  kMoved,     // a fundamental matrix
+  kUnknown,  // too little texture, or nothing in common
+  kStill,    // the flow of most is nearly nothing
+  kTurn,     // a homography: a turn, a zoom, or a plane
+  kMoved,    // a fundamental matrix
 };
 
 struct PairResidual {
   CameraMotion motion = CameraMotion::kUnknown;
   double background_px = 0.0;  // median length of the flow where it is sure
-  // 1 channel, per pixel of `from`: px by which the flow departs from what the camera explains, as a
-  // multiple of what noise may do there (1 px or more; more where there is little texture). Above 1
-  // it moves; < 0 where the flow is not sure (hidden in the other frame, or beyond its border).
+  // 1 channel, per pixel of `from`: px by which the flow departs from what the camera explains, as
+  // a multiple of what noise may do there (1 px or more; more where there is little texture). Above
+  // 1 it moves; < 0 where the flow is not sure (hidden in the other frame, or beyond its border).
   Image excess;
 };
 

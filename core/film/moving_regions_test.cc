@@ -17,9 +17,9 @@ const Camera kCamera{320, 240, 330.0, 330.0, 160.0, 120.0};
 
 // A camera that walks by, and a board that goes the other way and upwards.
 struct Film {
-  double step = 0.05;        // of the camera, per frame
-  double board_step = 0.025;  // 0: there is no board
-  double noise = 0.0;        // L
+  double step = 0.05;                              // of the camera, per frame
+  double board_step = 0.025;                       // 0: there is no board
+  double noise = 0.0;                              // L
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();  // rad per frame, about the camera's axes
 
   Pose PoseOf(int frame) const {
@@ -125,8 +125,7 @@ TEST(MovingRegions, AccountsOfTwoFrames) {
   EXPECT_EQ(CompareFrames(still.Luminance(3), still.Luminance(5)).motion, CameraMotion::kStill);
   EXPECT_EQ(CompareFrames(turning.Luminance(3), turning.Luminance(5)).motion, CameraMotion::kTurn);
   EXPECT_EQ(CompareFrames(moving.Luminance(3), moving.Luminance(7)).motion, CameraMotion::kMoved);
-  const PairResidual flat =
-      CompareFrames(Image(320, 240, 1, 50.0f), Image(320, 240, 1, 50.0f));
+  const PairResidual flat = CompareFrames(Image(320, 240, 1, 50.0f), Image(320, 240, 1, 50.0f));
   EXPECT_EQ(flat.motion, CameraMotion::kUnknown);
   EXPECT_EQ(*std::max_element(flat.excess.data.begin(), flat.excess.data.end()), -1.0f);
   EXPECT_THROW(CompareFrames(Image(320, 240, 1), Image(300, 240, 1)), Error);
@@ -137,10 +136,10 @@ TEST(MovingRegions, FlatFramesAndSingleFramesTellNothing) {
   for (const int count : {0, 1, 5}) {
     int handed_over = 0;
     const auto flat = std::make_shared<const Image>(64, 48, 1, 30.0f);
-    const ShotMotion motion = FindMovingRegions({count, [&](int) { return flat; }},
-                                                pool,
-                                                CancellationToken(),
-                                                [&](int, const Image&) { ++handed_over; });
+    const ShotMotion motion = FindMovingRegions(
+        {count, [&](int) { return flat; }}, pool, CancellationToken(), [&](int, const Image&) {
+          ++handed_over;
+        });
     EXPECT_EQ(handed_over, count);
     EXPECT_EQ(motion.pairs, 0);
     EXPECT_FALSE(motion.camera_stands_still);
