@@ -55,7 +55,7 @@ done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
 allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
 lower=
-for part in model raster training geometry chroma export import; do
+for part in model motion raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
   allow "core/splat/$part" "core/(base|simd|color|image|scene|splat/($lower))"
 done
@@ -109,7 +109,7 @@ public core/keyview collect_features coverage expected_error select tracks view_
 public core/metrics scene_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
 public core/scene camera import scene view_images formats/camera_file masks/masked_points masks/photo_masks
-public core/splat model/gaussian_cap model/gaussian_model model/memory_plan raster/render \
+public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/motion raster/render \
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene
 public core/stage stages film/import_film formats/artifacts

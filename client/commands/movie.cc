@@ -24,16 +24,17 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr char kOrbit[] = "orbit", kOriginal[] = "original";
-constexpr double kSeconds = 8.0;
+constexpr char kOrbit[] = "orbit", kOriginal[] = "original", kStill[] = "still";
+constexpr double kSeconds = 8.0, kFramesPerSecond = 30.0;  // unless told
 
 struct MovieOptions {
   std::string target;  // folder of results, jobs/ID or scenes/ID
   std::string out;     // a file that ends in .mp4, or a folder; empty: by the command
-  std::string path;    // kOrbit, kOriginal or a file of cameras; empty: pictures of views
+  std::string path;    // kOrbit, kOriginal, kStill or a file of cameras; empty: pictures of views
   std::vector<std::string> views;
   std::optional<double> seconds;
-  double frames_per_second = 30.0;
+  std::optional<double> time_s;  // at which a scene that moves stands still
+  double frames_per_second = kFramesPerSecond;
   std::optional<int> max_side_px;
   bool pictures = false;
   bool video = true;
@@ -49,10 +50,11 @@ bool IsMovieName(const fs::path& out) {
 
 // Before the server is asked for anything.
 void Check(const MovieOptions& options) {
-  if (options.path.empty() && (options.seconds || options.bounce || options.pictures)) {
+  if (options.path.empty() &&
+      (options.seconds || options.time_s || options.bounce || options.pictures)) {
     throw InvalidArgument(
-        "--seconds, --bounce and --png belong to a path: say which with --path orbit, --path "
-        "original or --path FILE");
+        "--seconds, --at, --bounce and --png belong to a path: say which with --path orbit, --path "
+        "original, --path still or --path FILE");
   }
   if (options.path.empty() && IsMovieName(options.out)) {
     throw InvalidArgument(
@@ -80,11 +82,13 @@ void Check(const MovieOptions& options) {
 v1::Digest UploadCameras(Connection& connection, const std::string& path) {
   std::error_code none;
   if (!fs::is_regular_file(path, none)) {
-    throw Error(ErrorCode::kNotFound,
-                "there is no file {}; --path is {}, {} or a file of cameras (a transforms.json)",
-                path,
-                kOrbit,
-                kOriginal);
+    throw Error(
+        ErrorCode::kNotFound,
+        "there is no file {}; --path is {}, {}, {} or a file of cameras (a transforms.json)",
+        path,
+        kOrbit,
+        kOriginal,
+        kStill);
   }
   const UploadFile upload{path, DigestFile(path)};
   if (upload.digest.size_bytes == 0) throw InvalidArgument("{} is empty", path);
@@ -119,16 +123,23 @@ v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1
     render->set_path(v1::RenderSpec::PATH_ORBIT);
   } else if (options.path == kOriginal) {
     render->set_path(v1::RenderSpec::PATH_PHOTOS);
+  } else if (options.path == kStill) {
+    render->set_path(v1::RenderSpec::PATH_STILL);
   } else {
     render->set_path(v1::RenderSpec::PATH_CAMERAS);
     *render->mutable_cameras() = UploadCameras(connection, options.path);
   }
-  const bool as_in_the_file = render->has_cameras() && !options.seconds;
+  // Whoever takes a path of the capture itself gets it at its own pace, if it has one.
+  const bool as_in_the_file =
+      !options.seconds &&
+      (render->has_cameras() || options.path == kStill ||
+       (options.path == kOriginal && options.frames_per_second == kFramesPerSecond));
   if (!as_in_the_file) render->set_frames(FramesOf(options));
   render->set_frames_per_second(options.frames_per_second);
   render->set_video(options.video);
   render->set_pictures(options.pictures);
   render->set_bounce(options.bounce);
+  if (options.time_s) render->set_time_s(*options.time_s);
   return spec;
 }
 
@@ -204,6 +215,8 @@ void AddCommonOptions(CLI::App* command, MovieOptions* options) {
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
   command->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px");
+  command->add_option("--at", options->time_s, "A scene that moves stands still at this second")
+      ->check(CLI::Range(0.0, 86400.0));
   command->add_flag("--bounce", options->bounce, "There and back again");
   command->add_flag("--skip-cache", options->skip_cache, "Render again what was rendered before");
 }
@@ -232,8 +245,9 @@ void AddMovieCommands(CLI::App& app, Context& context) {
   rendering->out = "render";
   render->add_option("--path",
                      rendering->path,
-                     "orbit, original (through the photos' cameras) or a file of cameras "
-                     "(transforms.json); none: pictures of views");
+                     "orbit, original (through the photos' cameras; of a scene that moves, as the "
+                     "key view's camera took it), still (that camera stands still while time runs) "
+                     "or a file of cameras (transforms.json); none: pictures of views");
   render->add_option("--views",
                      rendering->views,
                      "Photos: whose views to render, or to pass on the original path");

@@ -35,7 +35,7 @@ SurfaceMaker::SurfaceMaker(const Scene& scene,
 ViewSurfaces SurfaceMaker::Make(int view) const {
   const Pose& pose = scene_.views[view].cam_from_world;
   const Camera camera = images_.WorkingCamera(view);
-  RenderedSurface surface = render_(camera, pose);
+  RenderedSurface surface = render_(view, camera);
   for (size_t i = 0; i < surface.depth.data.size(); ++i) {
     if (surface.opacity.data[i] < kMinOpacity) surface.depth.data[i] = 0.0f;
   }
@@ -49,7 +49,7 @@ ViewSurfaces SurfaceMaker::Make(int view) const {
 
 std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rendered) const {
   const StereoPlan plan =
-      PlanStereo(scene_, view, PointsOf(view, rendered), training_, depth_sources_);
+      PlanStereo(scene_, view, PointsOf(view, rendered), OfMoment(view), depth_sources_);
   if (plan.sources.empty()) return std::nullopt;
   std::vector<std::shared_ptr<const Image>> pictures, masks;  // keeps them alive
   const auto posed = [&](int index) {
@@ -68,6 +68,15 @@ std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rend
   swept.depth = Resize(map.depth, rendered.camera.width, rendered.camera.height);
   ClearMasked(images_.Mask(view).get(), &swept.depth);
   return swept;
+}
+
+// Training views that show the same: photos of a still place, or frames of one moment.
+std::vector<int> SurfaceMaker::OfMoment(int view) const {
+  std::vector<int> same;
+  for (const int other : training_) {
+    if (scene_.views[other].time_s() == scene_.views[view].time_s()) same.push_back(other);
+  }
+  return same;
 }
 
 // Points that the view sees: tracked ones, or the Gaussians' surface.

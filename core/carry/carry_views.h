@@ -20,18 +20,19 @@ struct ViewSurfaces {
   std::optional<SurfaceView> swept;  // by plane sweep; none when no other view shows the same
 };
 
-// What a camera sees of the geometry: depth and opacity, 1 channel each.
+// What a camera sees of the geometry: depth and opacity, 1 channel each, at the view's moment.
 struct RenderedSurface {
   Image depth;
   Image opacity;
 };
 // Called from several threads at once.
-using SurfaceRenderer = std::function<RenderedSurface(const Camera&, const Pose& cam_from_world)>;
+using SurfaceRenderer = std::function<RenderedSurface(int view, const Camera& camera)>;
 
 class SurfaceMaker {
  public:
   // Surfaces have the size of `images`; planes are swept at the size of `sweep_images` with at most
-  // `depth_sources` training views each. The references must outlive the object.
+  // `depth_sources` training views each, of the same moment where views have one. The references
+  // must outlive the object.
   SurfaceMaker(const Scene& scene,
                const ViewImages& images,
                const ViewImages& sweep_images,
@@ -44,6 +45,7 @@ class SurfaceMaker {
 
  private:
   std::optional<SurfaceView> Sweep(int view, const SurfaceView& rendered) const;
+  std::vector<int> OfMoment(int view) const;
   std::vector<Eigen::Vector3d> PointsOf(int view, const SurfaceView& rendered) const;
 
   const Scene& scene_;

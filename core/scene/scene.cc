@@ -25,8 +25,7 @@ bool HasMoments(const std::vector<View>& views) {
 bool HasPoses(const std::vector<View>& views) {
   return std::any_of(views.begin(), views.end(), [&](const View& view) {
     const Pose &one = view.cam_from_world, &first = views.front().cam_from_world;
-    return one.translation != first.translation ||
-           one.rotation.coeffs() != first.rotation.coeffs();
+    return one.translation != first.translation || one.rotation.coeffs() != first.rotation.coeffs();
   });
 }
 

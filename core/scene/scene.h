@@ -36,6 +36,9 @@ struct View {
   // Of a frame of a film; none: the photo shows a place that stands still. Frames of a film need
   // not have poses: theirs are then all the same.
   std::optional<Moment> moment;
+
+  // 0 for a photo.
+  double time_s() const { return moment ? moment->time_s : 0.0; }
 };
 
 struct SparsePoint {

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "core/base/range_check.h"
 #include "core/carry/carry_views.h"
@@ -10,6 +11,7 @@
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
+#include "core/stage/film/frames_in_color.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/carry_facts.h"
@@ -117,6 +119,29 @@ void Conclude(const Scene& scene,
   WriteCarryFacts(facts, scene, coverage, context);
 }
 
+// Into a view of a scene that moves: by motion within the camera of a key view, from that camera's
+// frame of the same time through the geometry of that time, and where neither knows, from the key
+// views themselves as if nothing had moved (what did is told apart by depth and luminance).
+CarriedColor CarryInTime(const std::vector<ColoredKeyView>& keys,
+                         const FramesInColor& frames,
+                         const SurfaceMaker& maker,
+                         int view,
+                         const CarryOptions& options) {
+  const ViewSurfaces target = maker.Make(view);
+  CarriedColor color;
+  if (frames.Has(view)) {
+    color = frames.Of(view);
+  } else {
+    std::vector<ColoredKeyView> sources;
+    for (const int frame : frames.NearestTo(view)) {
+      sources.push_back({frame, maker.Make(frame), frames.Of(frame)});
+    }
+    color = CarryFromAll(sources, target, options);
+  }
+  FillFrom(CarryFromAll(keys, target, options), &color);
+  return color;
+}
+
 // The key frames' colours along the film, by motion in place of geometry.
 void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageContext& context) {
   constexpr int64_t kCacheBytes = int64_t{64} << 20;
@@ -174,15 +199,18 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const ViewImages images(scene, context.scene_folder(), options.max_side_px);
   const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);
-  const SurfaceRenderer render = [&](const Camera& camera, const Pose& pose) {
+  const SurfaceRenderer render = [&](int index, const Camera& camera) {
     ThreadPool one(1);
-    RenderedView view = RenderView(geometry, camera, pose, one);
-    return RenderedSurface{std::move(view.median_depth), std::move(view.opacity)};
+    const View& view = scene.views[index];
+    RenderedView seen = RenderView(geometry, camera, view.cam_from_world, one, 0.0f, view.time_s());
+    return RenderedSurface{std::move(seen.median_depth), std::move(seen.opacity)};
   };
   const SurfaceMaker maker(
       scene, images, sweep_images, render, options.depth_sources, options.sweep, context.cancel());
   const std::vector<ColoredKeyView> keys = ColorKeyViews(options, scene, images, maker, context);
 
+  std::optional<FramesInColor> frames;
+  if (scene.IsDynamic()) frames.emplace(scene, images, keys, options.film, context);
   CarryCheckpoint done(scene, context);
   context.pool().ForEach(static_cast<int64_t>(scene.views.size()), [&](int64_t index, int) {
     context.cancel().ThrowIfCancelled();
@@ -190,8 +218,9 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
     if (done.WasDone(view)) return;
     const auto key = std::find_if(
         keys.begin(), keys.end(), [&](const ColoredKeyView& k) { return k.view == view; });
-    const CarriedColor carried =
-        key != keys.end() ? key->color : CarryFromAll(keys, maker.Make(view), options.carry);
+    const CarriedColor carried = key != keys.end() ? key->color
+                                 : frames ? CarryInTime(keys, *frames, maker, view, options.carry)
+                                          : CarryFromAll(keys, maker.Make(view), options.carry);
     done.Add(view,
              key != keys.end() ? 1.0 : Coverage(carried, kCovered),
              EncodeAbPng(carried.ab, carried.confidence));

@@ -93,7 +93,8 @@ SceneConsistency CompareViews(const Scene& scene,
   source.render = [&](int view) {
     const Pose& pose = scene.views[view].cam_from_world;
     const Camera camera = images.WorkingCamera(view);
-    RenderedView rendered = RenderView(model, camera, pose, context.pool());
+    RenderedView rendered =
+        RenderView(model, camera, pose, context.pool(), 0.0f, scene.views[view].time_s());
     ClearMasked(images.Mask(view).get(), &rendered.depth);  // nothing matches there
     return ConsistencySource::Rendered{{camera, pose, std::move(rendered.depth)},
                                        std::move(rendered.lab)};
@@ -127,9 +128,8 @@ class HeldOutScores {
     if (captured.channels != 3) throw InvalidArgument("the truth of {} is grey", view.name);
     const Image true_srgb = images.Undistort(index, captured);
     const Camera camera = images.WorkingCamera(index);
-    const Image delivered =
-        model_ ? RenderView(*model_, camera, view.cam_from_world, context_.pool()).lab
-               : ColoredFrame(view, index, /*is_key=*/false, images, context_);
+    const Image delivered = model_ ? Rendered(*model_, camera, view)
+                                   : ColoredFrame(view, index, /*is_key=*/false, images, context_);
     const auto mask = images.Mask(index);
     Scores scores = ScoreView(true_srgb, delivered, ab, mask.get());
     if (scores.empty()) {
@@ -137,7 +137,7 @@ class HeldOutScores {
       return;
     }
     if (bound_) {
-      const Image lab = RenderView(*bound_, camera, view.cam_from_world, context_.pool()).lab;
+      const Image lab = Rendered(*bound_, camera, view);
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab, mask.get());
       scores["colorfulness_bound"] = ColorfulnessWhere(SrgbFromLab(lab), mask.get());
     }
@@ -174,6 +174,10 @@ class HeldOutScores {
   const SourceErrors& sources() const { return sources_; }
 
  private:
+  Image Rendered(const GaussianModel& model, const Camera& camera, const View& view) {
+    return RenderView(model, camera, view.cam_from_world, context_.pool(), 0.0f, view.time_s()).lab;
+  }
+
   const Scene& scene_;
   const std::optional<GaussianModel>& model_;
   const std::optional<GaussianModel>& bound_;

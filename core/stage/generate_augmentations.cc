@@ -112,13 +112,13 @@ void TakeFromBackend(const AugmentationOptions& options,
               options.backend);
 }
 
-// Pictures of the luminance geometry, when it is among the inputs.
-GeometryRenderer RendererFrom(StageContext& context) {
+// Pictures of the luminance geometry at that time, when it is among the inputs.
+GeometryRenderer RendererFrom(double time_s, StageContext& context) {
   if (!context.HasInput(artifact::kGeometry)) return {};
   const auto model =
       std::make_shared<const GaussianModel>(ParseGaussians(context.ReadInput(artifact::kGeometry)));
-  return [model, &context](const Camera& camera, const Pose& cam_from_world) {
-    RenderedView seen = RenderView(*model, camera, cam_from_world, context.pool());
+  return [model, time_s, &context](const Camera& camera, const Pose& cam_from_world) {
+    RenderedView seen = RenderView(*model, camera, cam_from_world, context.pool(), 0.0f, time_s);
     return RenderedGeometry{std::move(seen.lab), std::move(seen.depth), std::move(seen.opacity)};
   };
 }
@@ -254,8 +254,12 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
     TakeFromBackend(options, key_srgb, context, &counts, &outcome);
   }
   if (!counts.empty()) {
-    const Surrogates surrogates(
-        key, scene, key_index, RendererFrom(context), context.seed(), context.cancel());
+    const Surrogates surrogates(key,
+                                scene,
+                                key_index,
+                                RendererFrom(scene.views[key_index].time_s(), context),
+                                context.seed(),
+                                context.cancel());
     MakeSurrogates(counts, surrogates, context, &outcome);
   }
   WriteResults(key, outcome, context);

@@ -33,6 +33,7 @@ void RenderOptions::Validate() const {
   CheckMaxSide(max_side_px);
   if (frames) check("frames", *frames, 1, kMaxMovieFrames);
   check("frames_per_second", frames_per_second, 1, 120);
+  if (time_s) check("time_s", *time_s, 0, 86400);
   if (path != Path::kViews && !video && !pictures) {
     throw InvalidArgument("a path without video and without pictures leaves nothing");
   }
@@ -56,8 +57,12 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[views[i]];
-    const RenderedView rendered = RenderView(
-        model, view.camera.FitWithin(options.max_side_px), view.cam_from_world, context.pool());
+    const RenderedView rendered = RenderView(model,
+                                             view.camera.FitWithin(options.max_side_px),
+                                             view.cam_from_world,
+                                             context.pool(),
+                                             0.0f,
+                                             view.time_s());
     context.WriteOutput(ViewArtifact(artifact::kRenders, view, ".png"),
                         EncodePng8(SrgbFromLab(rendered.lab)));
     context.progress().OnProgress(

@@ -163,8 +163,9 @@ inline constexpr int kDefaultMovieFrames = 240;
 
 struct RenderOptions {
   // Pictures of views; or a movie: on the turn around the key view, through the photos' cameras in
-  // the order of their names, by the cameras of a file.
-  enum class Path { kViews, kOrbit, kPhotos, kCameras };
+  // the order of their names (of a scene that moves: frame by frame with the key view's camera), by
+  // the cameras of a file, or where the key view's camera stood.
+  enum class Path { kViews, kOrbit, kPhotos, kCameras, kStill };
   // By name. For kViews; empty: held-out views, or evenly spread ones. For kPhotos, in this order;
   // empty: all.
   std::vector<std::string> views;
@@ -172,13 +173,15 @@ struct RenderOptions {
   int max_side_px = 500;  // 64..4096
   Path path = Path::kViews;
   // The rest is of movies. 1..kMaxMovieFrames; nothing: kDefaultMovieFrames, of a file of cameras
-  // one for each.
+  // one for each, of a scene that moves with kPhotos and kStill one for each moment.
   std::optional<int> frames;
   double frames_per_second = 30.0;  // 1..120
   bool video = true;                // kMovie is made
   bool pictures = false;            // kFrames are kept, at most kMaxMoviePictures
   bool bounce = false;              // there and back again
-  std::filesystem::path cameras;    // for kCameras: scene/formats/camera_file.h
+  // Of a scene that moves: it stands still at this time, seconds; nothing: time runs.
+  std::optional<double> time_s;
+  std::filesystem::path cameras;  // for kCameras: scene/formats/camera_file.h
   void Validate() const;
   bool operator==(const RenderOptions&) const = default;
 };

@@ -145,6 +145,7 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
   if (spec.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     options.recipe = GeometryOptions::Recipe::kPaper;
   }
+  if (spec.still()) options.motion = GeometryOptions::Motion::kStill;
   return options;
 }
 
@@ -191,6 +192,9 @@ RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec) {
     case v1::RenderSpec::PATH_CAMERAS:
       options.path = RenderOptions::Path::kCameras;
       break;
+    case v1::RenderSpec::PATH_STILL:
+      options.path = RenderOptions::Path::kStill;
+      break;
     default:
       options.path = RenderOptions::Path::kViews;
   }
@@ -199,6 +203,7 @@ RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec) {
   if (spec.has_video()) options.video = spec.video();
   options.pictures = spec.pictures();
   options.bounce = spec.bounce();
+  if (spec.has_time_s()) options.time_s = spec.time_s();
   return options;
 }
 

@@ -30,8 +30,13 @@ nlohmann::ordered_json ScoreTrainingViews(StageContext& context) {
     const Camera camera = images.WorkingCamera(view);
     const Image ab = ReadViewAb(context, scene.views[view], camera.width, camera.height);
     const auto mask = images.Mask(view);
-    const Image lab =
-        RenderView(model, camera, scene.views[view].cam_from_world, context.pool()).lab;
+    const Image lab = RenderView(model,
+                                 camera,
+                                 scene.views[view].cam_from_world,
+                                 context.pool(),
+                                 0.0f,
+                                 scene.views[view].time_s())
+                          .lab;
     const Scores of_view = ScoreView(truth, lab, ab, mask.get());
     if (of_view.empty()) continue;
     for (const auto& [name, value] : of_view) sum[name] += value;

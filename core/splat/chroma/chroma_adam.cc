@@ -7,6 +7,7 @@
 
 #include "core/color/lab.h"
 #include "core/splat/chroma/chroma_targets.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/loss.h"
@@ -30,7 +31,8 @@ class ChromaTrainer {
         options_(fitting.options),
         run_(fitting.run),
         colored_(colored),
-        parameters_(parameters) {
+        parameters_(parameters),
+        in_time_(fitting.geometry, fitting.run.pool) {
     state_.parameters = parameters.block;
     const int rows = state_.parameters.rows();
     const int64_t count = state_.parameters.count();
@@ -120,7 +122,8 @@ class ChromaTrainer {
     const float background[2] = {kNeutralChroma, kNeutralChroma};
     const ColorSpec& color = parameters_.color;
     ThreadPool& pool = run_.pool;
-    pipeline_.Forward(state_.parameters, color, camera, background, false, pool);
+    const ParameterBlock& now = in_time_.At(state_.parameters, view.time_s);
+    pipeline_.Forward(now, color, camera, background, false, pool);
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
@@ -128,8 +131,7 @@ class ChromaTrainer {
     const LossValue loss =
         loss_.Evaluate(pipeline_.color(), target.ab, &target.weight, weights, pool, d_color_);
     if (!std::isfinite(loss.total)) return false;
-    pipeline_.Backward(
-        state_.parameters, color, camera, d_color_, GradientScope::kColorOnly, pool, gradient_);
+    pipeline_.Backward(now, color, camera, d_color_, GradientScope::kColorOnly, pool, gradient_);
     if (!AdamStep(gradient_,
                   LearningRates(),
                   state_.iteration + 1,
@@ -166,6 +168,7 @@ class ChromaTrainer {
   const RunControl& run_;
   const std::vector<int>& colored_;
   ChromaParameters& parameters_;
+  GeometryInTime in_time_;
   TrainingState state_;
   SplatPipeline pipeline_;
   ImageLoss loss_;

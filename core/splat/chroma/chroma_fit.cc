@@ -32,7 +32,9 @@ GaussianModel FitChroma(const GaussianModel& geometry,
   ChromaParameters parameters = ChromaParameters::From(geometry, options.chroma_sh_degree);
   const bool solve =
       options.solver == ChromaOptions::Solver::kConjugateGradients && options.iterations > 0;
-  ChromaSystem system(parameters.block, parameters.color, options.memory_budget_bytes, run.pool);
+  GeometryInTime in_time(geometry, run.pool);
+  ChromaSystem system(
+      parameters.block, parameters.color, in_time, options.memory_budget_bytes, run.pool);
   std::vector<int> colored;  // positions in problem.training
   bool all_confident = true;
   for (size_t k = 0; k < problem.training.size(); ++k) {
@@ -43,6 +45,7 @@ GaussianModel FitChroma(const GaussianModel& geometry,
     colored.push_back(static_cast<int>(k));
     all_confident = all_confident && planes.has_confidence;
     system.AddView(MakeRasterCamera(view.camera, view.cam_from_world),
+                   view.time_s,
                    planes.ab,
                    planes.weight,
                    planes.confidence,

@@ -63,6 +63,7 @@ std::array<float, 2> WeighTile(
 // Targets and D are [tile][block][channel][16], pixel weights [tile][block][16].
 struct ChromaSystem::View {
   RasterCamera camera;
+  double time_s = 0.0;
   int tiles = 0;
   bool kept = false;
   std::vector<TileWeights> weights;  // per tile, when kept
@@ -75,10 +76,13 @@ struct ChromaSystem::View {
 
 ChromaSystem::ChromaSystem(const ParameterBlock& parameters,
                            const ColorSpec& color,
+                           GeometryInTime& in_time,
                            int64_t budget_bytes,
                            ThreadPool& pool)
     : parameters_(parameters),
       color_(color),
+      in_time_(in_time),
+      at_(&parameters),
       coefficients_(color.channel[0].coefficients),
       budget_bytes_(budget_bytes),
       pool_(pool) {
@@ -96,17 +100,20 @@ void ChromaSystem::ResetSums(Sums& sums) const {
 }
 
 void ChromaSystem::BinView(const RasterCamera& camera) {
-  ProjectSplats(parameters_, color_, false, camera, pool_, splats_);
+  ProjectSplats(*at_, color_, false, camera, pool_, splats_);
   binner_.Bin(splats_, camera.width, camera.height, pool_, lists_);
 }
 
 void ChromaSystem::AddView(const RasterCamera& camera,
+                           double time_s,
                            const PlaneBuffer& ab,
                            const PlaneBuffer& weight,
                            const PlaneBuffer& confidence,
                            bool keep) {
   auto view = std::make_unique<View>();
   view->camera = camera;
+  view->time_s = time_s;
+  Enter(time_s);
   BinView(camera);
   view->tiles = lists_.tile_count();
   view->target.resize(static_cast<size_t>(view->tiles) * kTileFloats);
@@ -172,7 +179,7 @@ void ChromaSystem::ForTiles(View& view, const Visitor& visit) {
 void ChromaSystem::Basis(const RasterCamera& camera, int64_t i, float* basis) const {
   float d[3], square = 0.0f;
   for (int k = 0; k < 3; ++k) {
-    d[k] = parameters_.Row(kPositionRow + k)[i] - camera.center[k];
+    d[k] = at_->Row(kPositionRow + k)[i] - camera.center[k];
     square += d[k] * d[k];
   }
   const float inverse = square > 0.0f ? 1.0f / std::sqrt(square) : 0.0f;
@@ -306,6 +313,7 @@ double ChromaSystem::Sweep(const RobustWeights& robust,
   for (size_t k = 0; k < n; ++k) {
     cancel.ThrowIfCancelled();
     View& view = *views_[k * stride % n];
+    Enter(view.time_s);
     SetValues(view.camera, x);
     ForTiles(view, [&](int tile, int thread, const TileWeights& weights) {
       alignas(64) float picture[kTileFloats];
@@ -335,6 +343,7 @@ void ChromaSystem::Reweight(const ChromaVector& x,
   ResetSums(right_);
   for (const auto& view : views_) {
     cancel.ThrowIfCancelled();
+    Enter(view->time_s);
     SetValues(view->camera, x);
     ForTiles(*view, [&](int tile, int thread, const TileWeights& weights) {
       alignas(64) float picture[kTileFloats], right[kTileFloats];
@@ -367,6 +376,7 @@ void ChromaSystem::Multiply(const ChromaVector& x,
   for (size_t k = 0; k < views_.size(); ++k) {
     View& view = *views_[k];
     cancel.ThrowIfCancelled();
+    Enter(view.time_s);
     // Values of degree 0 are the same for all views.
     if (k == 0 || coefficients_ > 1) SetValues(view.camera, x);
     ForTiles(view, [&](int tile, int thread, const TileWeights& weights) {

@@ -15,6 +15,7 @@
 #include "core/base/parallel.h"
 #include "core/splat/chroma/chroma_weights.h"
 #include "core/splat/model/parameter_block.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "core/splat/raster/binning.h"
 #include "core/splat/raster/projection.h"
 
@@ -35,9 +36,10 @@ struct RobustWeights {
 class ChromaSystem {
  public:
   // `parameters` holds the geometry and has the rows of `color` (two channels of 1 or 4
-  // coefficients); both must outlive this object.
+  // coefficients); `in_time` takes them to a view's moment. All must outlive this object.
   ChromaSystem(const ParameterBlock& parameters,
                const ColorSpec& color,
+               GeometryInTime& in_time,
                int64_t budget_bytes,
                ThreadPool& pool);
   ~ChromaSystem();
@@ -45,6 +47,7 @@ class ChromaSystem {
   // `ab`: 2 channels, target chroma from neutral; `weight`, `confidence`: 1 channel, 0..1. With
   // `keep` false only the sums below are taken.
   void AddView(const RasterCamera& camera,
+               double time_s,
                const PlaneBuffer& ab,
                const PlaneBuffer& weight,
                const PlaneBuffer& confidence,
@@ -98,6 +101,7 @@ class ChromaSystem {
   template <class Visitor>
   void ForTiles(View& view, const Visitor& visit);
   void BinView(const RasterCamera& camera);
+  void Enter(double time_s) { at_ = &in_time_.At(parameters_, time_s); }
   void Basis(const RasterCamera& camera, int64_t i, float* basis) const;
   void SetValues(const RasterCamera& camera, const ChromaVector& x);
   PixelSums SumOfThreads();
@@ -112,6 +116,8 @@ class ChromaSystem {
 
   const ParameterBlock& parameters_;
   ColorSpec color_;
+  GeometryInTime& in_time_;
+  const ParameterBlock* at_;  // parameters_ at the moment of the view at hand
   int coefficients_;
   int64_t budget_bytes_;
   int64_t kept_bytes_ = 0;

@@ -74,6 +74,9 @@ struct GeometryOptions {
   // kColor3d: coarse to fine, measured on CPUs. kPaper: the schedule of Kerbl et al. 2023.
   enum class Recipe { kColor3d, kPaper };
   Recipe recipe = Recipe::kColor3d;
+  // kAuto: what moves is found where views have times. kStill: nothing is taken to move.
+  enum class Motion { kAuto, kStill };
+  Motion motion = Motion::kAuto;
   int iterations = 1500;  // 0..100000
   // Of training, 0: none, at most 86400. The whole schedule then fits into this time or the
   // iterations, whichever is used up first; the same input gives similar results, not the same.

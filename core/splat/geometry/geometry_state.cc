@@ -10,6 +10,9 @@ std::string SerializeGeometryState(const GeometryState& state, std::string_view 
   writer.Vector(state.statistics.gradient);
   writer.Vector(state.statistics.count);
   writer.Vector(state.statistics.radius);
+  writer.Block(state.moving.parameters);
+  writer.Block(state.moving.moments.first);
+  writer.Block(state.moving.moments.second);
   writer.Value(state.densified_at);
   writer.Value<uint64_t>(state.exposures.size());
   for (const PhotoExposure& exposure : state.exposures) writer.Value(exposure);
@@ -26,6 +29,9 @@ bool ParseGeometryState(std::string_view bytes,
   read.statistics.gradient = reader.Vector();
   read.statistics.count = reader.Vector();
   read.statistics.radius = reader.Vector();
+  read.moving.parameters = reader.Block();
+  read.moving.moments.first = reader.Block();
+  read.moving.moments.second = reader.Block();
   read.densified_at = reader.Value<int64_t>();
   read.exposures.resize(reader.Count(sizeof(PhotoExposure)));
   for (PhotoExposure& exposure : read.exposures) exposure = reader.Value<PhotoExposure>();

@@ -5,13 +5,15 @@
 #include <string_view>
 
 #include "core/splat/geometry/exposure.h"
+#include "core/splat/geometry/moving_part.h"
 #include "core/splat/raster/projection.h"
 #include "core/splat/training/training_state.h"
 
 namespace color3d {
 
 struct GeometryState : TrainingState {
-  DensifyStatistics statistics;
+  DensifyStatistics statistics;  // of what stands still, then of what moves
+  MovingPart moving;
   int64_t densified_at = 0;  // iteration
   Exposures exposures;       // of the training views, in their order; empty: none are fitted
 };

@@ -6,12 +6,12 @@
 
 #include "core/base/error.h"
 #include "core/scene/masks/photo_masks.h"
-#include "core/splat/geometry/densify.h"
+#include "core/splat/geometry/first_parameters.h"
 #include "core/splat/geometry/geometry_state.h"
 #include "core/splat/geometry/held_out.h"
+#include "core/splat/geometry/moving_part.h"
 #include "core/splat/geometry/regularize.h"
 #include "core/splat/geometry/training_schedule.h"
-#include "core/splat/model/model_parameters.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
@@ -27,33 +27,9 @@ constexpr int64_t kMaskBudgetBytes = int64_t{128} << 20;
 constexpr double kErrorReports = 100.0;
 constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
+constexpr double kSurveyAt = 0.15;  // of the schedule: where motion is looked for
+constexpr double kSeedShare = 0.4;  // of the most Gaussians that there may be
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
-
-// An evenly spaced part when there are more than the cap allows.
-ParameterBlock AtMost(int64_t count, ParameterBlock p) {
-  if (p.count() <= count) return p;
-  std::vector<uint32_t> kept(count);
-  for (int64_t i = 0; i < count; ++i) kept[i] = static_cast<uint32_t>(i * p.count() / count);
-  p.Gather(kept);
-  return p;
-}
-
-// Spherical harmonics of `from`, channel by channel, cut or extended to `coefficients` each. A
-// single channel serves for all.
-ParameterBlock WithColors(const GaussianModel& from, int channels, int coefficients) {
-  const ParameterBlock given = ParametersFromModel(from);
-  const int first = ShCoefficients(from.sh_degree), other = ShCoefficients(from.chroma_sh_degree);
-  ParameterBlock p(kColorRow + channels * coefficients, given.count());
-  for (int r = 0; r < kColorRow; ++r) std::copy_n(given.Row(r), given.count(), p.Row(r));
-  for (int c = 0; c < channels; ++c) {
-    const int source = std::min(c, from.channels - 1);
-    const int row = kColorRow + (source == 0 ? 0 : first + (source - 1) * other);
-    for (int k = 0; k < std::min(coefficients, source == 0 ? first : other); ++k) {
-      std::copy_n(given.Row(row + k), given.count(), p.Row(kColorRow + c * coefficients + k));
-    }
-  }
-  return p;
-}
 
 class GeometryTrainer {
  public:
@@ -66,15 +42,15 @@ class GeometryTrainer {
         run_(run),
         trace_(trace),
         schedule_(options, problem.extent),
+        times_(TimeSpanOf(problem)),
         channels_(problem.colors ? 3 : 1),
         targets_(problem.colors ? problem.colors : problem.luminance,
                  channels_,
                  problem.colors ? 1.0f : 0.01f,
                  kTargetBudgetBytes),
         masks_(problem.mask, 1, 1.0f, kMaskBudgetBytes, ResizeMask) {
-    state_.parameters =
-        AtMost(options.max_gaussians,
-               WithColors(problem.initial, channels_, ShCoefficients(options.sh_degree)));
+    state_.parameters = FirstParameters(
+        problem.initial, channels_, ShCoefficients(options.sh_degree), options.max_gaussians);
     const int rows = state_.parameters.rows();
     initial_count_ = state_.parameters.count();
     state_.moments = {ParameterBlock(rows, initial_count_), ParameterBlock(rows, initial_count_)};
@@ -102,6 +78,7 @@ class GeometryTrainer {
       const double before = fraction_;
       fraction_ = FractionNow();
       clock_.Enter(Phase::kDensify);
+      if (before < kSurveyAt && fraction_ >= kSurveyAt) FindMovers();
       Densify(before);
       clock_.Enter(Phase::kOther);
       if (guard.IsDue(state_.iteration)) guard.Keep(state_);
@@ -112,8 +89,7 @@ class GeometryTrainer {
       }
     }
     FinishTrace();
-    const int chroma_degree = channels_ == 3 ? options_.sh_degree : 0;
-    return ModelFromParameters(state_.parameters, channels_, options_.sh_degree, chroma_degree);
+    return ModelOfParts(state_.parameters, state_.moving, times_, channels_, options_.sh_degree);
   }
 
  private:
@@ -127,8 +103,10 @@ class GeometryTrainer {
     for (const PosedCamera& view : problem_.training) {
       pixels += int64_t{view.camera.width} * view.camera.height;
     }
-    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
                                    channels_,
+                                   static_cast<int>(options_.motion),
+                                   times_.steps,
                                    options_.iterations,
                                    options_.max_gaussians,
                                    options_.sh_degree,
@@ -176,6 +154,34 @@ class GeometryTrainer {
     return spec;
   }
 
+  float UnitTime(const PosedCamera& view) const { return times_.UnitTime(view.time_s); }
+
+  // All Gaussians at the view's moment.
+  const ParameterBlock& At(const PosedCamera& view) {
+    if (state_.moving.parameters.count() == 0) return state_.parameters;
+    ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_);
+    return composed_;
+  }
+
+  int64_t Count() const { return state_.parameters.count() + state_.moving.parameters.count(); }
+
+  void FindMovers() {
+    if (options_.motion == GeometryOptions::Motion::kStill || times_.steps < 2) return;
+    MoverSeedOptions seeds;
+    seeds.rows = state_.parameters.rows();
+    seeds.channels = channels_;
+    seeds.coefficients = ShCoefficients(options_.sh_degree);
+    seeds.most = static_cast<int64_t>(kSeedShare * static_cast<double>(options_.max_gaussians));
+    const auto target = [&](const PosedCamera& view, int level) {
+      return targets_.Get(view, level);
+    };
+    const FoundMovers found =
+        FindMovingPart(problem_, times_, state_.parameters, Colors(), target, seeds, run_.pool);
+    run_.progress.OnError(state_.iteration, "moving_share", found.moving_share);
+    state_.moving = found.moving;
+    state_.statistics.Reset(Count());
+  }
+
   // One iteration. False when something was not finite.
   bool Step() {
     const int drawn = state_.order.Next(static_cast<int>(problem_.training.size()), state_.random);
@@ -184,8 +190,8 @@ class GeometryTrainer {
     const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, level);
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
-    pipeline_.Forward(
-        state_.parameters, color, camera, kBackground, false, run_.pool, DroppingNow());
+    const ParameterBlock& now = At(view);
+    pipeline_.Forward(now, color, camera, kBackground, false, run_.pool, DroppingNow());
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
@@ -205,7 +211,7 @@ class GeometryTrainer {
                   state_.exposures[drawn]);
       Recenter(state_.exposures);
     }
-    pipeline_.Backward(state_.parameters,
+    pipeline_.Backward(now,
                        color,
                        camera,
                        d_color_,
@@ -213,7 +219,7 @@ class GeometryTrainer {
                        run_.pool,
                        gradient_,
                        &state_.statistics);
-    if (!Update()) return false;
+    if (!Update(view)) return false;
     state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
     return true;
   }
@@ -247,27 +253,48 @@ class GeometryTrainer {
   }
 
   // Parameters from the gradient. False when something was not finite.
-  bool Update() {
-    const GeometryTuning& tuning = schedule_.tuning();
+  bool Update(const PosedCamera& view) {
     clock_.Enter(Phase::kAdam);
+    std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
+    MovingPart& moving = state_.moving;
+    bool finite = true;
+    if (moving.parameters.count() > 0) {
+      DecomposeGradient(state_.parameters,
+                        moving,
+                        UnitTime(view),
+                        composed_,
+                        run_.pool,
+                        gradient_,
+                        moving_gradient_);
+      const std::vector<float> motion = schedule_.MotionRates(fraction_, times_.Interval());
+      std::vector<float> all = rates;
+      all.insert(all.end(), motion.begin(), motion.end());
+      finite = UpdatePart(moving_gradient_, std::move(all), moving.parameters, moving.moments);
+    }
+    finite = UpdatePart(gradient_, std::move(rates), state_.parameters, state_.moments) && finite;
+    clock_.Enter(Phase::kOther);
+    return finite;
+  }
+
+  bool UpdatePart(ParameterBlock& gradient,
+                  std::vector<float> rates,
+                  ParameterBlock& parameters,
+                  AdamMoments& moments) {
+    const GeometryTuning& tuning = schedule_.tuning();
     if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
-      AddPenaltyGradients(state_.parameters,
+      AddPenaltyGradients(parameters,
                           static_cast<float>(tuning.opacity_penalty),
                           static_cast<float>(tuning.scale_penalty / problem_.extent),
                           run_.pool,
-                          gradient_);
+                          gradient);
     }
-    std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
-    if (!AdamStep(
-            gradient_, rates, state_.iteration + 1, run_.pool, state_.parameters, state_.moments)) {
+    if (!AdamStep(gradient, rates, state_.iteration + 1, run_.pool, parameters, moments)) {
       return false;
     }
     if (tuning.max_needle_ratio > 0.0) {
-      LimitNeedles(
-          static_cast<float>(std::log(tuning.max_needle_ratio)), run_.pool, state_.parameters);
+      LimitNeedles(static_cast<float>(std::log(tuning.max_needle_ratio)), run_.pool, parameters);
     }
-    clock_.Enter(Phase::kOther);
     return true;
   }
 
@@ -279,8 +306,7 @@ class GeometryTrainer {
         static_cast<double>(std::max<int64_t>(1, now.iteration - last_round_.iteration));
     last_round_ = now;
     const int level = schedule_.Level(fraction_, problem_.training.front().camera);
-    return schedule_.AffordableCount(
-        fraction_, state_.iteration, each, level, state_.parameters.count());
+    return schedule_.AffordableCount(fraction_, state_.iteration, each, level, Count());
   }
 
   void Densify(double before) {
@@ -296,7 +322,7 @@ class GeometryTrainer {
       if (prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
         densify.prune_scale = prune_scale * problem_.extent;
       }
-      DensifyByGradient(densify, target);
+      DensifyParts(densify, target, state_.moving);
     }
     if (schedule_.OpacityResetDue(before, fraction_)) ResetOpacity(0.01, target);
   }
@@ -315,7 +341,7 @@ class GeometryTrainer {
           state_.iteration,
           std::llround(static_cast<double>(state_.iteration) / std::max(fraction_, 1e-9)),
           fmt::format("geometry, {} Gaussians at {}x{} px",
-                      state_.parameters.count(),
+                      Count(),
                       SizeAtLevel(camera.width, level),
                       SizeAtLevel(camera.height, level)));
     }
@@ -342,14 +368,13 @@ class GeometryTrainer {
     HeldOutPoint point;
     point.seconds = earlier_seconds_ + clock_.TrainingSeconds();
     point.iteration = state_.iteration;
-    point.gaussians = state_.parameters.count();
+    point.gaussians = Count();
     pipeline_.set_clock(nullptr);
     clock_.Enter(Phase::kEvaluation);
     const double each = 1.0 / static_cast<double>(views.size());
     for (const PosedCamera& view : views) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
-      pipeline_.Forward(
-          state_.parameters, Colors(), CameraAt(view, 0), kBackground, false, run_.pool);
+      pipeline_.Forward(At(view), Colors(), CameraAt(view, 0), kBackground, false, run_.pool);
       PlaneBuffer drawn = pipeline_.color();
       const PictureQuality quality =
           CompareClamped(*target, MaskOf(view, 0).get(), loss_, run_.pool, drawn);
@@ -371,7 +396,7 @@ class GeometryTrainer {
     trace_->seconds = clock_.TrainingSeconds();
     trace_->phases = clock_.seconds();
     trace_->iterations = state_.iteration;
-    trace_->gaussians = state_.parameters.count();
+    trace_->gaussians = Count();
     if (trace_->score_training) trace_->training = Score(problem_.training);
   }
 
@@ -385,6 +410,7 @@ class GeometryTrainer {
   const RunControl& run_;
   TrainingTrace* const trace_;  // may be null
   const TrainingSchedule schedule_;
+  const TimeSpan times_;
   const int channels_;
   TrainingTargets targets_;
   TrainingTargets masks_;
@@ -401,7 +427,9 @@ class GeometryTrainer {
   PlaneBuffer masked_target_;
   PlaneBuffer exposed_;
   PlaneBuffer d_color_;
+  ParameterBlock composed_;
   ParameterBlock gradient_;
+  ParameterBlock moving_gradient_;
 };
 
 }  // namespace

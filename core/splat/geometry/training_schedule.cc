@@ -6,6 +6,7 @@
 #include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/parameter_block.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/motion/motion.h"
 
 namespace color3d {
 namespace {
@@ -14,6 +15,9 @@ namespace {
 // number of Gaussians.
 constexpr double kCostPerLevel = 2.5;
 constexpr int kMinTrainingSidePx = 64;  // coarser levels are not used below this
+
+constexpr double kAccelerationShare = 0.25;  // of a step of the velocity
+constexpr double kCenterRate = 0.01;         // of the interval between time steps
 
 // How many whole steps of `step`, counted from `from`, lie before `fraction`.
 double StepsDone(double fraction, double from, double step) {
@@ -75,6 +79,23 @@ std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels
     set(row, 1, fade * tuning_.dc_rate);
     set(row + 1, active - 1, fade * tuning_.dc_rate / tuning_.rest_divisor);
   }
+  return rates;
+}
+
+std::vector<float> TrainingSchedule::MotionRates(double fraction, double interval) const {
+  std::vector<float> rates(kMotionRows, 0.0f);
+  const double scale = options_.learning_rate_scale;
+  const auto set = [&](int row, int count, double rate) {
+    std::fill_n(rates.begin() + row, count, static_cast<float>(rate));
+  };
+  // What a step changes one time step away is what a step of the position changes.
+  set(kVelocityRow, 3, scale * PositionRate(fraction) / interval);
+  set(kAccelerationRow,
+      3,
+      scale * kAccelerationShare * PositionRate(fraction) / interval / interval);
+  set(kSpinRow, 4, scale * tuning_.rotation_rate / interval);
+  set(kCenterRow, 1, scale * kCenterRate * interval);
+  set(kLogWidthRow, 1, scale * tuning_.scale_rate);
   return rates;
 }
 

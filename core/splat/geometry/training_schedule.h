@@ -28,6 +28,8 @@ class TrainingSchedule {
   double DropRate(double fraction, int views) const;
   // One per parameter row, for `channels` colour channels of degree options.sh_degree.
   std::vector<float> LearningRates(double fraction, int channels) const;
+  // One per row of motion (motion/motion.h); `interval` between time steps in units of t.
+  std::vector<float> MotionRates(double fraction, double interval) const;
   // True when a round of densification falls into (before, now].
   bool DensifyDue(double before, double now) const;
   bool OpacityResetDue(double before, double now) const;

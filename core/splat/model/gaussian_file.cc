@@ -16,6 +16,7 @@ static_assert(std::endian::native == std::endian::little, "files are little-endi
 constexpr char kMagic[8] = {'C', '3', 'D', 'G', 'A', 'U', 'S', 'S'};
 constexpr uint32_t kPlainVersion = 1;
 constexpr uint32_t kConfidenceVersion = 2;  // confidence is the last buffer
+constexpr uint32_t kMotionVersion = 3;      // a MotionHeader follows the header, motion is the last
 constexpr size_t kDigestBytes = 64;         // hexadecimal SHA-256 of all that stands before it
 
 struct Header {
@@ -28,17 +29,31 @@ struct Header {
 };
 static_assert(sizeof(Header) == 32);
 
+struct MotionHeader {
+  uint64_t moving;  // Gaussians, at most the header's count
+  double begin_s;
+  double end_s;
+  uint64_t with_confidence;  // 0 or 1
+};
+static_assert(sizeof(MotionHeader) == 32);
+
+// visit(name, buffer, width, count) in the order of the file.
 template <class Model, class Visit>
-void ForEachBuffer(Model& m, bool with_confidence, Visit&& visit) {
+void ForEachBuffer(Model& m, size_t count, size_t moving, bool with_confidence, Visit&& visit) {
   const int chroma = m.channels == 3 ? ShCoefficients(m.chroma_sh_degree) : 0;
-  visit("position", m.position, 3);
-  visit("log_scale", m.log_scale, 3);
-  visit("rotation", m.rotation, 4);
-  visit("opacity_logit", m.opacity_logit, 1);
-  visit("sh_l", m.sh_l, ShCoefficients(m.sh_degree));
-  visit("sh_a", m.sh_a, chroma);
-  visit("sh_b", m.sh_b, chroma);
-  if (with_confidence) visit("confidence", m.confidence, 1);
+  visit("position", m.position, 3, count);
+  visit("log_scale", m.log_scale, 3, count);
+  visit("rotation", m.rotation, 4, count);
+  visit("opacity_logit", m.opacity_logit, 1, count);
+  visit("sh_l", m.sh_l, ShCoefficients(m.sh_degree), count);
+  visit("sh_a", m.sh_a, chroma, count);
+  visit("sh_b", m.sh_b, chroma, count);
+  if (with_confidence) visit("confidence", m.confidence, 1, count);
+  visit("velocity", m.motion.velocity, 3, moving);
+  visit("acceleration", m.motion.acceleration, 3, moving);
+  visit("spin", m.motion.spin, 4, moving);
+  visit("center", m.motion.center, 1, moving);
+  visit("log_width", m.motion.log_width, 1, moving);
 }
 
 template <class... Parts>
@@ -66,16 +81,31 @@ Header ReadHeader(std::string_view bytes) {
   if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) {
     throw Refuse("it does not begin with C3DGAUSS");
   }
-  if (h.version != kPlainVersion && h.version != kConfidenceVersion) {
-    throw Refuse("version {}; this program reads versions {} and {}, update it",
+  if (h.version < kPlainVersion || h.version > kMotionVersion) {
+    throw Refuse("version {}; this program reads versions {} to {}, update it",
                  h.version,
                  kPlainVersion,
-                 kConfidenceVersion);
+                 kMotionVersion);
   }
   if ((h.channels != 1 && h.channels != 3) || h.sh_degree > 3 || h.chroma_sh_degree > 3) {
     throw Refuse("channels {} or a degree is out of range", h.channels);
   }
   return h;
+}
+
+MotionHeader ReadMotionHeader(std::string_view bytes, const Header& h) {
+  MotionHeader m{0, 0.0, 0.0, h.version == kConfidenceVersion ? 1u : 0u};
+  if (h.version != kMotionVersion) return m;
+  if (bytes.size() < sizeof(h) + sizeof(m) + kDigestBytes) {
+    throw Refuse("it has only {} bytes", bytes.size());
+  }
+  std::memcpy(&m, bytes.data() + sizeof(h), sizeof(m));
+  if (m.moving == 0 || m.moving > h.count || m.with_confidence > 1 || !std::isfinite(m.begin_s) ||
+      !std::isfinite(m.end_s) || m.begin_s > m.end_s) {
+    throw Refuse(
+        "its motion of {} Gaussians from {} s to {} s cannot be", m.moving, m.begin_s, m.end_s);
+  }
+  return m;
 }
 
 }  // namespace
@@ -85,13 +115,16 @@ std::string SerializeGaussians(const GaussianModel& model) {
   Header h{};
   std::memcpy(h.magic, kMagic, sizeof(kMagic));
   const bool with_confidence = !model.confidence.empty();
-  h.version = with_confidence ? kConfidenceVersion : kPlainVersion;
+  const MotionHeader m{
+      model.motion.size(), model.motion.begin_s, model.motion.end_s, with_confidence ? 1u : 0u};
+  h.version = m.moving > 0 ? kMotionVersion : with_confidence ? kConfidenceVersion : kPlainVersion;
   h.channels = static_cast<uint32_t>(model.channels);
   h.sh_degree = static_cast<uint32_t>(model.sh_degree);
   h.chroma_sh_degree = static_cast<uint32_t>(model.chroma_sh_degree);
   h.count = model.size();
   std::string bytes(reinterpret_cast<const char*>(&h), sizeof(h));
-  const auto append = [&](const char* name, const std::vector<float>& buffer, int width) {
+  if (m.moving > 0) bytes.append(reinterpret_cast<const char*>(&m), sizeof(m));
+  const auto append = [&](const char* name, const std::vector<float>& buffer, int width, size_t) {
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) {
       throw Error(
@@ -99,7 +132,7 @@ std::string SerializeGaussians(const GaussianModel& model) {
     }
     bytes.append(reinterpret_cast<const char*>(buffer.data()), buffer.size() * sizeof(float));
   };
-  ForEachBuffer(model, with_confidence, append);
+  ForEachBuffer(model, model.size(), model.motion.size(), with_confidence, append);
   return bytes + Sha256Hex(bytes);
 }
 
@@ -109,27 +142,34 @@ GaussianModel ParseGaussians(std::string_view bytes) {
   model.channels = static_cast<int>(h.channels);
   model.sh_degree = static_cast<int>(h.sh_degree);
   model.chroma_sh_degree = static_cast<int>(h.chroma_sh_degree);
-  size_t floats_each = 0;
-  const bool with_confidence = h.version == kConfidenceVersion;
-  ForEachBuffer(model, with_confidence, [&](const char*, std::vector<float>&, int width) {
-    floats_each += width;
-  });
-  const size_t body = bytes.size() - sizeof(Header) - kDigestBytes;
-  const size_t bytes_each = floats_each * sizeof(float);
-  if (body % bytes_each != 0 || body / bytes_each != h.count) {
+  const MotionHeader m = ReadMotionHeader(bytes, h);
+  const size_t head = sizeof(Header) + (h.version == kMotionVersion ? sizeof(MotionHeader) : 0);
+  const size_t body = bytes.size() - head - kDigestBytes;
+  // No product of a number from the file may overflow.
+  size_t floats_left = body / sizeof(float);
+  bool fits = body % sizeof(float) == 0;
+  const auto count = [&](const char*, std::vector<float>&, int width, size_t each) {
+    fits = fits && (width == 0 || each <= floats_left / static_cast<size_t>(width));
+    if (fits) floats_left -= each * static_cast<size_t>(width);
+  };
+  ForEachBuffer(model, h.count, m.moving, m.with_confidence == 1, count);
+  if (!fits || floats_left != 0) {
     throw Refuse(
         "it claims {} Gaussians but holds {} bytes of them; it may be truncated", h.count, body);
   }
   const std::string_view content = bytes.substr(0, bytes.size() - kDigestBytes);
   if (Sha256Hex(content) != bytes.substr(content.size())) throw Refuse("the checksum is wrong");
-  const char* next = bytes.data() + sizeof(Header);
-  ForEachBuffer(model, with_confidence, [&](const char* name, auto& buffer, int width) {
-    buffer.resize(static_cast<size_t>(h.count) * width);
+  model.motion.begin_s = m.begin_s;
+  model.motion.end_s = m.end_s;
+  const char* next = bytes.data() + head;
+  const auto read = [&](const char* name, std::vector<float>& buffer, int width, size_t each) {
+    buffer.resize(each * static_cast<size_t>(width));
     std::memcpy(buffer.data(), next, buffer.size() * sizeof(float));
     next += buffer.size() * sizeof(float);
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) throw Refuse("the {} is not finite", place);
-  });
+  };
+  ForEachBuffer(model, h.count, m.moving, m.with_confidence == 1, read);
   CheckModel(model);
   return model;
 }

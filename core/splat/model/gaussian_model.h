@@ -10,6 +10,24 @@
 
 namespace color3d {
 
+// How the last size() Gaussians of a model move and when they are there (METHOD.md "Dynamic
+// scenes"). With t = -1 at begin_s and 1 at end_s, and tau = t - center:
+//   position + velocity tau + acceleration tau^2,  rotation + spin tau,
+//   opacity exp(-(tau / exp(log_width))^2 / 2)
+struct GaussianMotion {
+  double begin_s = 0.0;
+  double end_s = 0.0;               // >= begin_s
+  std::vector<float> velocity;      // 3: world, per unit of t
+  std::vector<float> acceleration;  // 3
+  std::vector<float> spin;          // 4
+  std::vector<float> center;        // 1
+  std::vector<float> log_width;     // 1
+
+  size_t size() const { return center.size(); }
+  // 0 where begin and end are one moment. Moments outside are taken as they are: things move on.
+  float UnitTime(double time_s) const;
+};
+
 // Raw (pre-activation) parameters. Row i of an n-wide buffer is [i*n, (i+1)*n).
 struct GaussianModel {
   int channels = 1;          // 1: luminance only (warm-up); 3: L', a', b'
@@ -28,6 +46,8 @@ struct GaussianModel {
   // 1: how sure the colour is, 0..1 (1: seen in a key view, 0.5: inferred, 0: guessed). Empty when
   // nobody knows; no kernel looks at it.
   std::vector<float> confidence;
+  // Of the last motion.size() Gaussians; those before stand still.
+  GaussianMotion motion;
 
   size_t size() const { return opacity_logit.size(); }
 };
@@ -37,7 +57,7 @@ struct GaussianModel {
 GaussianModel InitialGaussians(const Scene& scene);
 
 // Native file, with a versioned header and a checksum: all of the model, bit for bit. Version 1
-// without confidence, version 2 with it.
+// without confidence, version 2 with it, version 3 (with it or without) where something moves.
 std::string SerializeGaussians(const GaussianModel& model);
 // Throws Error{kInvalidArgument} on anything else (wrong magic, newer version, truncated, NaN).
 GaussianModel ParseGaussians(std::string_view bytes);

@@ -53,6 +53,20 @@ void CheckModel(const GaussianModel& model) {
   CheckSize(model.sh_a, n, chroma, "sh_a");
   CheckSize(model.sh_b, n, chroma, "sh_b");
   if (!model.confidence.empty()) CheckSize(model.confidence, n, 1, "confidence");
+  const GaussianMotion& motion = model.motion;
+  const size_t moving = motion.size();
+  if (moving > n || !(motion.begin_s <= motion.end_s)) {
+    throw InvalidArgument(
+        "Gaussian model: motion of {} Gaussians out of {}, from {} s to {} s, cannot be",
+        moving,
+        n,
+        motion.begin_s,
+        motion.end_s);
+  }
+  CheckSize(motion.velocity, moving, 3, "velocity");
+  CheckSize(motion.acceleration, moving, 3, "acceleration");
+  CheckSize(motion.spin, moving, 4, "spin");
+  CheckSize(motion.log_width, moving, 1, "log_width");
   for (size_t i = 0; i < model.confidence.size(); ++i) {
     if (model.confidence[i] >= 0.0f && model.confidence[i] <= 1.0f) continue;
     throw InvalidArgument("Gaussian model: confidence of Gaussian {} is {}; it must be 0 to 1",

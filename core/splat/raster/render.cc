@@ -2,6 +2,7 @@
 
 #include "core/color/lab.h"
 #include "core/splat/model/model_parameters.h"
+#include "core/splat/motion/motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/raster/raster_constants.h"
@@ -12,8 +13,9 @@ RenderedView RenderView(const GaussianModel& model,
                         const Camera& camera,
                         const Pose& cam_from_world,
                         ThreadPool& pool,
-                        float background_l) {
-  const ParameterBlock parameters = ParametersFromModel(model);
+                        float background_l,
+                        double time_s) {
+  const ParameterBlock parameters = ParametersAt(model, time_s, pool);
   const ColorSpec color = ColorSpecOf(model.channels, model.sh_degree, model.chroma_sh_degree);
   const RasterCamera raster_camera = MakeRasterCamera(camera, cam_from_world);
   const float background[3] = {background_l, kNeutralChroma, kNeutralChroma};

@@ -15,11 +15,13 @@ struct RenderedView {
   Image opacity;       // 1 channel, accumulated alpha 0..1
 };
 
-// Background: L' = background_l, neutral chroma.
+// Background: L' = background_l, neutral chroma. `time_s`: of the scene; tells where something
+// moves.
 RenderedView RenderView(const GaussianModel& model,
                         const Camera& camera,
                         const Pose& cam_from_world,
                         ThreadPool& pool,
-                        float background_l = 0.0f);
+                        float background_l = 0.0f,
+                        double time_s = 0.0);
 
 }  // namespace color3d

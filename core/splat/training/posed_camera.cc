@@ -7,7 +7,8 @@ std::vector<PosedCamera> PosedCameras(const Scene& scene,
                                       const std::vector<int>& views) {
   std::vector<PosedCamera> posed;
   for (const int view : views) {
-    posed.push_back({view, images.WorkingCamera(view), scene.views[view].cam_from_world});
+    const View& of = scene.views[view];
+    posed.push_back({view, images.WorkingCamera(view), of.cam_from_world, of.time_s()});
   }
   return posed;
 }

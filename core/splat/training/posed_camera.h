@@ -12,6 +12,7 @@ struct PosedCamera {
   int view = 0;  // what sources of pictures are asked for
   Camera camera;
   Pose cam_from_world;
+  double time_s = 0.0;  // of the scene
 };
 
 // These views of `scene` at the working size of `images`.

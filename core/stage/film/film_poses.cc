@@ -33,9 +33,10 @@ std::vector<int> LongestShot(const Scene& scene) {
   for (size_t i = 0; i < scene.views.size(); ++i) {
     shots[scene.views[i].moment->shot].push_back(static_cast<int>(i));
   }
-  const auto longest = std::max_element(shots.begin(), shots.end(), [](const auto& a, const auto& b) {
-    return a.second.size() < b.second.size();
-  });
+  const auto longest =
+      std::max_element(shots.begin(), shots.end(), [](const auto& a, const auto& b) {
+        return a.second.size() < b.second.size();
+      });
   return longest->second;
 }
 
@@ -50,11 +51,12 @@ class RegionFiles {
     WriteFileAtomic(MovingFile(view), EncodePng8(moving));
     Image still = moving;
     for (float& v : still.data) v = 1.0f - v;
-    // A mask that leaves nothing is none: such a frame finds its place by what moves, or not at all.
-    if (std::all_of(still.data.begin(), still.data.end(), [](float v) { return v == 0.0f; })) return;
+    // A mask that leaves nothing is none: such a frame finds its place by what moves, or not at
+    // all.
+    if (std::all_of(still.data.begin(), still.data.end(), [](float v) { return v == 0.0f; }))
+      return;
     const Camera& camera = scene_.views[view].captured_camera;
-    WriteFileAtomic(StillFile(view),
-                    EncodePng8(ResizeMask(still, camera.width, camera.height)));
+    WriteFileAtomic(StillFile(view), EncodePng8(ResizeMask(still, camera.width, camera.height)));
   }
   fs::path MovingFile(int view) const { return folder_ / "moving" / Name(view); }
   fs::path StillFile(int view) const { return folder_ / "still" / Name(view); }
@@ -158,7 +160,8 @@ void WarnOfUnevenPath(double unevenness, StageContext& context) {
   constexpr double kUneven = 0.4;
   if (unevenness < kUneven) return;
   context.progress().OnWarning(fmt::format(
-      "the camera's path is uneven (its steps change by {:.0f} % from frame to frame): what was taken "
+      "the camera's path is uneven (its steps change by {:.0f} % from frame to frame): what was "
+      "taken "
       "for the place may move itself; look at the poses, or leave them out (film_poses: off)",
       100.0 * unevenness));
 }
@@ -183,10 +186,10 @@ void FindFilmPoses(const fs::path& frames_root,
   facts->film.emplace();
   const std::vector<int> shot = LongestShot(*scene);
   if (!AreEnough(shot.size(), scene->views.size())) {
-    return stays(
-        fmt::format("its longest shot has {} of {} frames; take one shot (film_begin_s, film_end_s)",
-                    shot.size(),
-                    scene->views.size()));
+    return stays(fmt::format(
+        "its longest shot has {} of {} frames; take one shot (film_begin_s, film_end_s)",
+        shot.size(),
+        scene->views.size()));
   }
   const RegionFiles files(*scene, context.scratch_folder() / "regions");
   const ShotMotion motion = WriteRegions(frames_root, *scene, shot, files, context);

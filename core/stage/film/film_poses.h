@@ -11,11 +11,11 @@
 namespace color3d {
 
 // `scene`: a film without poses, whose pictures lie at their image_file below `frames_root`. When
-// at least 80 % of its frames belong to one shot and find a place, makes it a dynamic scene of those
-// frames, with points, and leaves kMovingRegions. Otherwise the film stays as it is. What is left
-// out, and why there are no poses, is a warning; what was found goes into `facts` either way. The
-// log of structure-from-motion is left as kSfmLog when it ran. Throws Error: cancelled, frames that
-// cannot be read.
+// at least 80 % of its frames belong to one shot and find a place, makes it a dynamic scene of
+// those frames, with points, and leaves kMovingRegions. Otherwise the film stays as it is. What is
+// left out, and why there are no poses, is a warning; what was found goes into `facts` either way.
+// The log of structure-from-motion is left as kSfmLog when it ran. Throws Error: cancelled, frames
+// that cannot be read.
 void FindFilmPoses(const std::filesystem::path& frames_root,
                    const ImportOptions& options,
                    StageContext& context,

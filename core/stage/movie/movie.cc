@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+#include <set>
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
@@ -21,6 +23,13 @@ namespace {
 constexpr int kFocusSidePx = 256;              // of the picture that tells how far the scene is
 constexpr int64_t kMaxFileBytes = 64ll << 20;  // of cameras
 constexpr int kLeastSidePx = 16;
+
+// Different ones, ascending.
+std::vector<double> TimesOf(const Scene& scene) {
+  std::set<double> times;
+  for (const View& view : scene.views) times.insert(view.time_s());
+  return {times.begin(), times.end()};
+}
 
 // The one whose picture says how the movie's looks and how far away things are.
 int HomeView(const Scene& scene, const StageContext& context) {
@@ -41,15 +50,58 @@ std::vector<PathCamera> CamerasOfFile(const RenderOptions& options,
   return cameras;
 }
 
-std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene& scene) {
+// The frames of that view's camera, one after the other.
+std::vector<int> FramesOfCamera(const Scene& scene, int home) {
+  std::vector<int> frames;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (scene.views[i].moment->shot == scene.views[home].moment->shot) {
+      frames.push_back(static_cast<int>(i));
+    }
+  }
+  std::stable_sort(frames.begin(), frames.end(), [&](int a, int b) {
+    return scene.views[a].time_s() < scene.views[b].time_s();
+  });
+  return frames;
+}
+
+std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene& scene, int home) {
   std::vector<int> order;
   for (const std::string& name : options.views) order.push_back(scene.FindView(name));
-  if (order.empty()) order = ViewsInOrder(scene);
+  if (order.empty()) order = scene.IsDynamic() ? FramesOfCamera(scene, home) : ViewsInOrder(scene);
   std::vector<PathCamera> cameras;
-  for (const int view : order) {
-    cameras.push_back({scene.views[view].camera, scene.views[view].cam_from_world});
+  for (const int index : order) {
+    const View& view = scene.views[index];
+    cameras.push_back({view.camera, view.cam_from_world, view.time_s()});
   }
   return cameras;
+}
+
+// Where that view's camera stood, at all moments.
+std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
+  std::vector<PathCamera> cameras;
+  for (const double time_s : TimesOf(scene)) {
+    cameras.push_back({scene.views[home].camera, scene.views[home].cam_from_world, time_s});
+  }
+  return cameras;
+}
+
+// The moment that each frame shows, where the frames are not those of the film: all of the scene's
+// time, and back where the path comes back.
+void SetTimes(const RenderOptions& options, const Scene& scene, std::vector<PathCamera>* frames) {
+  const std::vector<double> times = TimesOf(scene);
+  const double last = std::max<double>(1.0, static_cast<double>(frames->size()) - 1.0);
+  for (size_t i = 0; i < frames->size(); ++i) {
+    double share = static_cast<double>(i) / last;
+    if (options.bounce) share = 1.0 - std::abs(2.0 * share - 1.0);
+    (*frames)[i].time_s = times.front() + share * (times.back() - times.front());
+  }
+}
+
+// Whether a movie without a wanted length shows every camera of its path once.
+bool IsOneByOne(const RenderOptions& options, const Scene& scene) {
+  using Path = RenderOptions::Path;
+  return options.path == Path::kCameras || options.path == Path::kStill ||
+         (options.path == Path::kPhotos && scene.IsDynamic());
 }
 
 // Every camera as it is, and back again where the movie is to end as it begins.
@@ -59,20 +111,24 @@ std::vector<PathCamera> OneByOne(std::vector<PathCamera> cameras, bool bounce) {
   return cameras;
 }
 
-// The frames' cameras, all of one size.
-std::vector<PathCamera> FramesOf(const RenderOptions& options,
-                                 const Scene& scene,
-                                 const GaussianModel& model,
-                                 StageContext& context) {
+// The frames' cameras, all of one size, with their times where they have their own.
+std::vector<PathCamera> CamerasOf(const RenderOptions& options,
+                                  const Scene& scene,
+                                  const GaussianModel& model,
+                                  StageContext& context) {
   using Path = RenderOptions::Path;
   const int home = HomeView(scene, context);
   const View& view = scene.views[home];
   const Camera small = view.camera.FitWithin(kFocusSidePx);
-  const Eigen::Vector3d focus = FocusOf(
-      view, small, RenderView(model, small, view.cam_from_world, context.pool()).median_depth);
+  const Eigen::Vector3d focus =
+      FocusOf(view,
+              small,
+              RenderView(model, small, view.cam_from_world, context.pool(), 0.0f, view.time_s())
+                  .median_depth);
   std::vector<PathCamera> stations;
   if (options.path == Path::kCameras) stations = CamerasOfFile(options, scene, view.camera);
-  if (options.path == Path::kPhotos) stations = CamerasOfViews(options, scene);
+  if (options.path == Path::kPhotos) stations = CamerasOfViews(options, scene, home);
+  if (options.path == Path::kStill) stations = StillCamera(scene, home);
 
   Camera picture = options.path == Path::kCameras ? stations[0].camera : view.camera;
   picture = picture.FitWithin(options.max_side_px);
@@ -89,7 +145,7 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   for (PathCamera& station : stations) {
     station.camera = CoverPicture(station.camera, picture.width, picture.height);
   }
-  if (options.path == Path::kCameras && !options.frames) return OneByOne(stations, options.bounce);
+  if (!options.frames && IsOneByOne(options, scene)) return OneByOne(stations, options.bounce);
 
   const bool turns = options.path == Path::kOrbit;
   const std::vector<double> shares =
@@ -107,12 +163,29 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   return frames;
 }
 
+std::vector<PathCamera> FramesOf(const RenderOptions& options,
+                                 const Scene& scene,
+                                 const GaussianModel& model,
+                                 StageContext& context) {
+  std::vector<PathCamera> frames = CamerasOf(options, scene, model, context);
+  const bool own_times = !options.frames && options.path != RenderOptions::Path::kCameras &&
+                         IsOneByOne(options, scene);
+  if (!own_times && scene.IsDynamic()) SetTimes(options, scene, &frames);
+  for (PathCamera& frame : frames) frame.time_s = options.time_s.value_or(frame.time_s);
+  return frames;
+}
+
 }  // namespace
 
 void RenderMovie(const RenderOptions& options,
                  const Scene& scene,
                  const GaussianModel& model,
                  StageContext& context) {
+  if (!scene.IsDynamic() && (options.path == RenderOptions::Path::kStill || options.time_s)) {
+    throw InvalidArgument(
+        "this scene has no times: a camera that stands still, or a moment, is of use for a scene "
+        "that moves");
+  }
   const std::vector<PathCamera> frames = FramesOf(options, scene, model, context);
   if (options.pictures && frames.size() > kMaxMoviePictures) {
     throw InvalidArgument(
@@ -139,8 +212,9 @@ void RenderMovie(const RenderOptions& options,
   for (int64_t i = 0; i < count; ++i) {
     context.cancel().ThrowIfCancelled();
     const PathCamera& frame = frames[i];
-    const Image srgb =
-        SrgbFromLab(RenderView(model, frame.camera, frame.cam_from_world, context.pool()).lab);
+    const Image srgb = SrgbFromLab(
+        RenderView(model, frame.camera, frame.cam_from_world, context.pool(), 0.0f, frame.time_s)
+            .lab);
     if (movie) movie->Add(srgb, context.pool());
     if (options.pictures) {
       context.WriteOutput(fmt::format("{}{:05}.png", artifact::kFrames, i + 1), EncodePng8(srgb));

@@ -64,9 +64,13 @@ std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
   for (size_t i = 0; model && i < chosen.size(); ++i) {
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[chosen[i]];
-    renders[i] =
-        RenderView(*model, photos.WorkingCamera(chosen[i]), view.cam_from_world, context.pool())
-            .lab;
+    renders[i] = RenderView(*model,
+                            photos.WorkingCamera(chosen[i]),
+                            view.cam_from_world,
+                            context.pool(),
+                            0.0f,
+                            view.time_s())
+                     .lab;
   }
   std::vector<ReportView> views(chosen.size());
   context.pool().ForEach(static_cast<int64_t>(chosen.size()), [&](int64_t i, int) {

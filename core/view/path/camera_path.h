@@ -11,6 +11,7 @@ namespace color3d {
 struct PathCamera {
   Camera camera;
   Pose cam_from_world;
+  double time_s = 0.0;  // of the scene; says nothing where nothing moves
 };
 
 // The camera with another picture: scaled to cover width x height px, with its middle in the

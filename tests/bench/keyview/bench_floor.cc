@@ -126,10 +126,10 @@ void Run(const Arguments& args) {
   const ViewImages images(scene, folder, args.side_px);
   const ViewImages sweep_images(scene, folder, 300);
   const CancellationToken cancel;
-  const SurfaceRenderer render = [&](const Camera& camera, const Pose& pose) {
+  const SurfaceRenderer render = [&](int view, const Camera& camera) {
     ThreadPool one(1);
-    RenderedView view = RenderView(geometry, camera, pose, one);
-    return RenderedSurface{std::move(view.depth), std::move(view.opacity)};
+    RenderedView seen = RenderView(geometry, camera, scene.views[view].cam_from_world, one);
+    return RenderedSurface{std::move(seen.depth), std::move(seen.opacity)};
   };
   const SurfaceMaker maker(scene, images, sweep_images, render, 4, PlaneSweepOptions{}, cancel);
   ThreadPool pool(args.threads);

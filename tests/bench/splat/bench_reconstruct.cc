@@ -240,8 +240,10 @@ void RunReconstruct(ReconstructArguments args) {
     const Image truth = Truth(images, view, args.colors);
     reduced.Add(truth, drawn);
     if (args.pictures_folder.empty()) return;
-    WriteFileAtomic(std::filesystem::path(args.pictures_folder) / (scene.views[view].name + ".png"),
-                    EncodePng8(SideBySide(truth, drawn)));
+    const auto file =
+        std::filesystem::path(args.pictures_folder) / (scene.views[view].name + ".png");
+    std::filesystem::create_directories(file.parent_path());
+    WriteFileAtomic(file, EncodePng8(SideBySide(truth, drawn)));
   };
   const GaussianModel model =
       TrainGeometry(problem, OptionsFrom(args), {pool, recorder, recorder, cancel}, &trace);
@@ -251,6 +253,7 @@ void RunReconstruct(ReconstructArguments args) {
   result["reduced"] = reduced.ToJson();
   for (const CurvePoint& p : recorder.points()) {
     if (p.error_name == "restored_non_finite") result["restored_at"].push_back(p.iteration);
+    if (p.error_name == "moving_share") result["moving_share"] = p.value;
   }
   WriteResult(result, args.json_file);
 }
@@ -287,6 +290,10 @@ void AddReconstructCommand(CLI::App& app) {
   command->add_option("--depth-planes", args->dense_points.sweep.planes);
   command->add_flag(
       "--cap", args->capped, "Gaussians and iterations by the photos, as the service");
+  command->add_flag_callback(
+      "--still",
+      [args] { args->geometry.motion = GeometryOptions::Motion::kStill; },
+      "nothing is taken to move");
   command->add_option("--colours", args->colors, "truth (RGB, the default) or luminance")
       ->transform(CLI::Transformer(std::map<std::string, TrainingColors>{
           {"truth", TrainingColors::kSrgb}, {"luminance", TrainingColors::kLuminance}}));

@@ -1,0 +1,104 @@
+#include "core/splat/geometry/motion_survey.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "core/base/evenly.h"
+#include "core/base/median.h"
+#include "core/image/box_mean.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kRadiusPx = 2;
+constexpr double kDeviations = 5.0;
+constexpr double kLeastResidual = 0.03;
+constexpr size_t kMedianFrames = 31;  // at most, evenly over time
+constexpr size_t kFewestFrames = 5;   // that say what stands still
+constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
+constexpr size_t kNoiseStep = 7;      // every so many pixels tell the scene's deviation
+
+using Stand = std::tuple<double, double, double, double, double, double, double, int, int>;
+
+// Views of one stand are of a camera that does not move.
+Stand StandOf(const PosedCamera& p) {
+  const Eigen::Quaterniond& q = p.cam_from_world.rotation;
+  const Eigen::Vector3d& t = p.cam_from_world.translation;
+  return {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), p.camera.width, p.camera.height};
+}
+
+Image ResidualOf(const SurveyedView& view) {
+  Image residual = view.luminance;
+  for (size_t i = 0; i < residual.data.size(); ++i) residual.data[i] -= view.drawn.data[i];
+  return BoxMean(residual, kRadiusPx);
+}
+
+// Takes the median over time away, pixel by pixel.
+void RemoveStanding(const std::vector<size_t>& frames,
+                    ThreadPool& pool,
+                    std::vector<Image>& residuals) {
+  const std::vector<size_t> some = EvenlyOf(frames, kMedianFrames);
+  const auto pixels = static_cast<int64_t>(residuals[frames.front()].data.size());
+  pool.ForRanges(pixels, [&](int64_t begin, int64_t end, int) {
+    std::vector<double> values(some.size());
+    for (int64_t i = begin; i < end; ++i) {
+      for (size_t k = 0; k < some.size(); ++k) values[k] = residuals[some[k]].data[i];
+      const auto median = static_cast<float>(Median(values));
+      for (const size_t frame : frames) residuals[frame].data[i] -= median;
+    }
+  });
+}
+
+double DeviationOf(const std::vector<Image>& residuals) {
+  std::vector<double> sizes;
+  for (const Image& residual : residuals) {
+    for (size_t i = 0; i < residual.data.size(); i += kNoiseStep) {
+      sizes.push_back(std::abs(residual.data[i]));
+    }
+  }
+  return sizes.empty() ? 0.0 : 1.4826 * Median(std::move(sizes));
+}
+
+Image MaskOf(const Image& residual, double threshold) {
+  Image mask(residual.width, residual.height, 1);
+  for (size_t i = 0; i < residual.data.size(); ++i) {
+    mask.data[i] = std::abs(residual.data[i]) > threshold ? 1.0f : 0.0f;
+  }
+  const Image around = BoxMean(mask, 1);
+  for (size_t i = 0; i < mask.data.size(); ++i) {
+    if (around.data[i] * 9.0f < static_cast<float>(kSpeckPixels) - 0.5f) mask.data[i] = 0.0f;
+  }
+  return mask;
+}
+
+}  // namespace
+
+MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
+  MotionSurvey survey;
+  bool one_time = true;
+  for (const SurveyedView& view : views) {
+    one_time = one_time && view.posed.time_s == views.front().posed.time_s;
+  }
+  std::vector<Image> residuals(views.size());
+  pool.ForEach(static_cast<int64_t>(views.size()),
+               [&](int64_t i, int) { residuals[i] = ResidualOf(views[i]); });
+  std::map<Stand, std::vector<size_t>> stands;
+  for (size_t i = 0; i < views.size(); ++i) stands[StandOf(views[i].posed)].push_back(i);
+  for (const auto& [stand, frames] : stands) {
+    if (frames.size() >= kFewestFrames) RemoveStanding(frames, pool, residuals);
+  }
+  survey.threshold = std::max(kLeastResidual, kDeviations * DeviationOf(residuals));
+  double moving = 0.0, pixels = 0.0;
+  for (size_t i = 0; i < views.size(); ++i) {
+    views[i].moving = one_time ? Image(residuals[i].width, residuals[i].height, 1)
+                               : MaskOf(residuals[i], survey.threshold);
+    for (const float m : views[i].moving.data) moving += m;
+    pixels += static_cast<double>(views[i].moving.data.size());
+  }
+  survey.moving_share = pixels > 0.0 ? moving / pixels : 0.0;
+  return survey;
+}
+
+}  // namespace color3d

@@ -1,0 +1,223 @@
+#include "core/splat/geometry/mover_seeds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/motion/motion.h"
+#include "core/splat/raster/raster_constants.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kDepths = 64;        // tried along a ray, evenly in 1 / depth
+constexpr double kNearest = 0.15;  // of the standing surface's depth
+constexpr double kBehind = 1.03;   // of a surface's depth: hidden by it
+constexpr int kPatchRadius = 2;    // of the comparison of luminance, px
+constexpr double kSeedOpacity = 0.3;
+constexpr double kSeedWidth = 0.7;  // of the interval between time steps: the window's deviation
+constexpr double kFootprint = 0.6;  // of the distance between seeds: their deviation
+
+struct Pixel {
+  int x = 0;
+  int y = 0;
+};
+
+struct Seed {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double scale = 0.0;
+  float luminance = 0.0f;
+  float time = 0.0f;
+};
+
+float AtClamped(const Image& image, int x, int y) {
+  return image.At(0, std::clamp(y, 0, image.height - 1), std::clamp(x, 0, image.width - 1));
+}
+
+// -1..1 for two windows; 0 where one of them is flat.
+double Correlation(const Image& a, Pixel p, const Image& b, Pixel q) {
+  double sa = 0.0, sb = 0.0, saa = 0.0, sbb = 0.0, sab = 0.0;
+  int n = 0;
+  for (int dy = -kPatchRadius; dy <= kPatchRadius; ++dy) {
+    for (int dx = -kPatchRadius; dx <= kPatchRadius; ++dx) {
+      const double u = AtClamped(a, p.x + dx, p.y + dy), v = AtClamped(b, q.x + dx, q.y + dy);
+      sa += u;
+      sb += v;
+      saa += u * u;
+      sbb += v * v;
+      sab += u * v;
+      ++n;
+    }
+  }
+  const double va = saa - sa * sa / n, vb = sbb - sb * sb / n;
+  if (!(va > 1e-5 * n) || !(vb > 1e-5 * n)) return 0.0;
+  return (sab - sa * sb / n) / std::sqrt(va * vb);
+}
+
+bool MovesNear(const Image& moving, Pixel p) {
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      if (AtClamped(moving, p.x + dx, p.y + dy) > 0.0f) return true;
+    }
+  }
+  return false;
+}
+
+// Of pictures of one moment.
+using Views = std::vector<const SurveyedView*>;
+
+// How well the other cameras agree that something moves at this point; none: some camera sees the
+// place and nothing moves there, or no camera sees it.
+std::optional<double> Agreement(const Views& moment,
+                                const SurveyedView& own,
+                                Pixel pixel,
+                                const Eigen::Vector3d& point) {
+  double sum = 0.0;
+  int seen = 0;
+  for (const SurveyedView* other : moment) {
+    if (other == &own) continue;
+    const Eigen::Vector3d p = other->posed.cam_from_world.Apply(point);
+    if (!(p.z() > kNearPlane)) continue;
+    const Eigen::Vector2d at = other->posed.camera.Project(p);
+    if (!other->posed.camera.Contains(at)) continue;
+    const Pixel q{static_cast<int>(at.x()), static_cast<int>(at.y())};
+    if (!MovesNear(other->moving, q)) {
+      const float surface = other->depth.At(0, q.y, q.x);
+      if (surface > 0.0f && p.z() > kBehind * surface) continue;  // hidden
+      return std::nullopt;
+    }
+    sum += 1.0 + Correlation(own.luminance, pixel, other->luminance, q);
+    ++seen;
+  }
+  if (seen == 0) return std::nullopt;
+  return sum / seen;
+}
+
+double MedianDepth(const SurveyedView& view) {
+  std::vector<float> depths;
+  for (const float d : view.depth.data) {
+    if (d > 0.0f) depths.push_back(d);
+  }
+  if (depths.empty()) return 0.0;
+  std::nth_element(depths.begin(), depths.begin() + depths.size() / 2, depths.end());
+  return depths[depths.size() / 2];
+}
+
+// For every pixel, the depth of the standing surface at the lowest pixel of its moving region; 0
+// where nothing moves.
+Image FootDepths(const SurveyedView& view, double usual_depth) {
+  const Image& moving = view.moving;
+  Image depth(moving.width, moving.height, 1);
+  std::vector<char> reached(moving.data.size(), 0);
+  for (int y = 0; y < moving.height; ++y) {
+    for (int x = 0; x < moving.width; ++x) {
+      const size_t start = static_cast<size_t>(y) * moving.width + x;
+      if (moving.data[start] == 0.0f || reached[start] != 0) continue;
+      std::vector<Pixel> region{{x, y}};
+      reached[start] = 1;
+      Pixel foot{x, y};
+      for (size_t k = 0; k < region.size(); ++k) {
+        const Pixel p = region[k];
+        if (p.y > foot.y) foot = p;
+        for (const Pixel q :
+             {Pixel{p.x - 1, p.y}, {p.x + 1, p.y}, {p.x, p.y - 1}, {p.x, p.y + 1}}) {
+          if (q.x < 0 || q.y < 0 || q.x >= moving.width || q.y >= moving.height) continue;
+          const size_t index = static_cast<size_t>(q.y) * moving.width + q.x;
+          if (moving.data[index] == 0.0f || reached[index] != 0) continue;
+          reached[index] = 1;
+          region.push_back(q);
+        }
+      }
+      const float at_foot = view.depth.At(0, foot.y, foot.x);
+      for (const Pixel p : region) {
+        depth.At(0, p.y, p.x) = at_foot > 0.0f ? at_foot : static_cast<float>(usual_depth);
+      }
+    }
+  }
+  return depth;
+}
+
+std::vector<Seed> SeedsOf(const SurveyedView& view, const Views& moment, float time, int step) {
+  std::vector<Seed> seeds;
+  const double usual = MedianDepth(view);
+  if (!(usual > 0.0)) return seeds;
+  const Image foot = FootDepths(view, usual);
+  const Camera& camera = view.posed.camera;
+  for (int y = 0; y < camera.height; ++y) {
+    // Every other row begins half a step later.
+    for (int x = y / step % 2 * (step / 2); x < camera.width; x += step) {
+      if (y % step != 0 || view.moving.At(0, y, x) == 0.0f) continue;
+      const float surface = view.depth.At(0, y, x);
+      const double farthest = surface > 0.0f ? surface : 2.0 * usual;
+      const double nearest = std::max(kNearest * std::min(farthest, usual), 2.0 * kNearPlane);
+      if (!(nearest < farthest)) continue;
+      const Eigen::Vector3d ray = camera.Ray(x + 0.5, y + 0.5);
+      double best = -1.0, depth = std::min<double>(foot.At(0, y, x), farthest);
+      for (int k = 0; k < kDepths; ++k) {
+        const double share = static_cast<double>(k) / (kDepths - 1);
+        const double d = 1.0 / ((1.0 - share) / farthest + share / nearest);
+        const std::optional<double> agreement =
+            Agreement(moment, view, {x, y}, view.posed.cam_from_world.WorldFromCamera(d * ray));
+        if (agreement && *agreement > best) {
+          best = *agreement;
+          depth = d;
+        }
+      }
+      seeds.push_back({view.posed.cam_from_world.WorldFromCamera(depth * ray),
+                       kFootprint * step * depth / camera.fx,
+                       view.luminance.At(0, y, x),
+                       time});
+    }
+  }
+  return seeds;
+}
+
+ParameterBlock BlockOf(const std::vector<Seed>& seeds, const MoverSeedOptions& options) {
+  ParameterBlock block(options.rows + kMotionRows, static_cast<int64_t>(seeds.size()));
+  const auto logit = static_cast<float>(std::log(kSeedOpacity / (1.0 - kSeedOpacity)));
+  const auto width = static_cast<float>(std::log(kSeedWidth * options.interval));
+  for (int64_t i = 0; i < block.count(); ++i) {
+    const Seed& seed = seeds[i];
+    for (int k = 0; k < 3; ++k) {
+      block.Row(kPositionRow + k)[i] = static_cast<float>(seed.position[k]);
+      block.Row(kLogScaleRow + k)[i] = static_cast<float>(std::log(seed.scale));
+    }
+    block.Row(kRotationRow)[i] = 1.0f;
+    block.Row(kOpacityRow)[i] = logit;
+    for (int c = 0; c < options.channels; ++c) {
+      block.Row(kColorRow + c * options.coefficients)[i] = (seed.luminance - 0.5f) / kShDc;
+    }
+    block.Row(options.rows + kCenterRow)[i] = seed.time;
+    block.Row(options.rows + kLogWidthRow)[i] = width;
+  }
+  return block;
+}
+
+}  // namespace
+
+ParameterBlock SeedMovers(const std::vector<SurveyedView>& views,
+                          const std::vector<float>& unit_time,
+                          const MoverSeedOptions& options,
+                          ThreadPool& pool) {
+  std::map<double, Views> moments;
+  double moving = 0.0;
+  for (const SurveyedView& view : views) {
+    moments[view.posed.time_s].push_back(&view);
+    for (const float m : view.moving.data) moving += m;
+  }
+  const int step = std::max(
+      1,
+      static_cast<int>(
+          std::ceil(std::sqrt(moving / static_cast<double>(std::max<int64_t>(1, options.most))))));
+  std::vector<std::vector<Seed>> seeds(views.size());
+  pool.ForEach(static_cast<int64_t>(views.size()), [&](int64_t i, int) {
+    seeds[i] = SeedsOf(views[i], moments.at(views[i].posed.time_s), unit_time[i], step);
+  });
+  std::vector<Seed> all;
+  for (const std::vector<Seed>& some : seeds) all.insert(all.end(), some.begin(), some.end());
+  return BlockOf(all, options);
+}
+
+}  // namespace color3d

@@ -1,0 +1,32 @@
+// The first Gaussians of what moves: structure from motion has no points there. Internal to the
+// splat module. Deterministic whatever the thread count.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/base/parallel.h"
+#include "core/splat/geometry/motion_survey.h"
+#include "core/splat/model/parameter_block.h"
+
+namespace color3d {
+
+struct MoverSeedOptions {
+  int rows = 0;  // of a parameter block, without motion
+  int channels = 1;
+  int coefficients = 1;   // of a colour channel
+  int64_t most = 0;       // seeds
+  double interval = 1.0;  // from one time step to the next, in units of GaussianMotion's t
+};
+
+// One Gaussian per moving pixel (every so many, so that there are at most `most`), there only about
+// its own time. Its depth is the one at which the other cameras of that moment show motion, too,
+// and the same luminance (a visual hull); where no other camera sees it, that of the standing
+// surface at the foot of its region (things stand on the ground), and never behind that surface.
+// Returns options.rows + kMotionRows rows; none when nothing moves. `unit_time` has t of each view.
+ParameterBlock SeedMovers(const std::vector<SurveyedView>& views,
+                          const std::vector<float>& unit_time,
+                          const MoverSeedOptions& options,
+                          ThreadPool& pool);
+
+}  // namespace color3d

@@ -1,0 +1,185 @@
+#include "core/splat/geometry/moving_part.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/splat/geometry/motion_survey.h"
+#include "core/splat/model/model_parameters.h"
+#include "core/splat/motion/motion.h"
+#include "core/splat/raster/pipeline.h"
+#include "core/splat/raster/raster_camera.h"
+
+namespace color3d {
+namespace {
+
+constexpr double kStillShare = 0.002;  // of the pixels: less moves in pictures of a still scene
+constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
+
+// The mean over the channels.
+Image MeanImage(const PlaneBuffer& planes, int channels) {
+  Image image(planes.width, planes.height, 1);
+  for (int y = 0; y < planes.height; ++y) {
+    for (int x = 0; x < planes.width; ++x) {
+      float sum = 0.0f;
+      for (int c = 0; c < channels; ++c) sum += planes.Row(c, y)[x];
+      image.At(0, y, x) = sum / static_cast<float>(channels);
+    }
+  }
+  return image;
+}
+
+// What does not count is drawn as it is: nothing moves there. `mask` may be larger.
+void TakeMasked(const Image& mask, const Image& luminance, Image& drawn) {
+  for (int y = 0; y < drawn.height; ++y) {
+    for (int x = 0; x < drawn.width; ++x) {
+      const int from_y = static_cast<int>(int64_t{y} * mask.height / drawn.height);
+      const int from_x = static_cast<int>(int64_t{x} * mask.width / drawn.width);
+      if (mask.At(0, from_y, from_x) == 0.0f) drawn.At(0, y, x) = luminance.At(0, y, x);
+    }
+  }
+}
+
+// The training views as they are and as `still` draws them.
+std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
+                                        const ParameterBlock& still,
+                                        const ColorSpec& color,
+                                        const LevelTarget& target,
+                                        ThreadPool& pool) {
+  std::vector<SurveyedView> views;
+  SplatPipeline pipeline;
+  for (const PosedCamera& posed : problem.training) {
+    int level = 0;
+    while (std::max(posed.camera.width, posed.camera.height) >> level > kSurveySidePx) ++level;
+    const std::shared_ptr<const PlaneBuffer> picture = target(posed, level);
+    SurveyedView view;
+    view.posed = posed;
+    view.posed.camera = posed.camera.Scaled(picture->width, picture->height);
+    pipeline.Forward(still,
+                     color,
+                     MakeRasterCamera(view.posed.camera, posed.cam_from_world),
+                     kBackground,
+                     true,
+                     pool);
+    view.luminance = MeanImage(*picture, color.channels);
+    view.drawn = MeanImage(pipeline.color(), color.channels);
+    view.depth = MeanImage(pipeline.median_depth(), 1);
+    const std::shared_ptr<const Image> mask = problem.mask ? problem.mask(posed.view) : nullptr;
+    if (mask != nullptr) TakeMasked(*mask, view.luminance, view.drawn);
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+DensifyStatistics Part(const DensifyStatistics& all, int64_t begin, int64_t end) {
+  const auto cut = [&](const AlignedFloats& values) {
+    return AlignedFloats(values.begin() + begin, values.begin() + end);
+  };
+  return {cut(all.gradient), cut(all.count), cut(all.radius)};
+}
+
+}  // namespace
+
+float TimeSpan::UnitTime(double time_s) const {
+  GaussianMotion motion;
+  motion.begin_s = begin_s;
+  motion.end_s = end_s;
+  return motion.UnitTime(time_s);
+}
+
+TimeSpan TimeSpanOf(const GeometryProblem& problem) {
+  std::set<double> times;
+  for (const PosedCamera& view : problem.training) times.insert(view.time_s);
+  for (const PosedCamera& view : problem.held_out) times.insert(view.time_s);
+  if (times.empty()) return {};
+  return {*times.begin(), *times.rbegin(), static_cast<int>(times.size())};
+}
+
+FoundMovers FindMovingPart(const GeometryProblem& problem,
+                           const TimeSpan& times,
+                           const ParameterBlock& still,
+                           const ColorSpec& color,
+                           const LevelTarget& target,
+                           const MoverSeedOptions& seeds,
+                           ThreadPool& pool) {
+  std::vector<SurveyedView> views = SurveyedViews(problem, still, color, target, pool);
+  FoundMovers found;
+  found.moving_share = SurveyMotion(pool, views).moving_share;
+  if (found.moving_share < kStillShare) return found;
+  std::vector<float> unit_time;
+  for (const PosedCamera& view : problem.training) unit_time.push_back(times.UnitTime(view.time_s));
+  MoverSeedOptions options = seeds;
+  options.interval = times.Interval();
+  ParameterBlock& parameters = found.moving.parameters;
+  parameters = SeedMovers(views, unit_time, options, pool);
+  const ParameterBlock zero(parameters.rows(), parameters.count());
+  found.moving.moments = {zero, zero};
+  return found;
+}
+
+void ComposeAt(const ParameterBlock& still,
+               const MovingPart& moving,
+               float t,
+               ThreadPool& pool,
+               ParameterBlock& at) {
+  const int64_t first = still.count(), count = first + moving.parameters.count();
+  if (at.rows() != still.rows()) at = ParameterBlock(still.rows(), count);
+  if (at.count() != count) at.Resize(count);
+  pool.ForRanges(still.rows(), [&](int64_t begin, int64_t end, int) {
+    for (int row = static_cast<int>(begin); row < end; ++row) {
+      std::copy_n(still.Row(row), first, at.Row(row));
+      std::copy_n(moving.parameters.Row(row), moving.parameters.count(), at.Row(row) + first);
+    }
+  });
+  ApplyMotion(moving.parameters, still.rows(), t, first, pool, at);
+}
+
+void DecomposeGradient(const ParameterBlock& still,
+                       const MovingPart& moving,
+                       float t,
+                       const ParameterBlock& at,
+                       ThreadPool& pool,
+                       ParameterBlock& gradient,
+                       ParameterBlock& moving_gradient) {
+  ApplyMotionBackward(
+      moving.parameters, still.rows(), t, still.count(), at, gradient, pool, moving_gradient);
+  gradient.Resize(still.count());
+}
+
+void DensifyParts(const GradientDensifyOptions& options, DensifyTarget& still, MovingPart& moving) {
+  if (moving.parameters.count() == 0) return DensifyByGradient(options, still);
+  const int64_t first = still.parameters.count();
+  const int64_t count = first + moving.parameters.count();
+  const int64_t room = std::max<int64_t>(0, options.max_gaussians - count);
+  const DensifyStatistics all = still.statistics;
+  GradientDensifyOptions part = options;
+  DensifyStatistics of_moving = Part(all, first, count);
+  DensifyTarget target{moving.parameters, moving.moments, of_moving, still.random};
+  part.max_gaussians = moving.parameters.count() + room * moving.parameters.count() / count;
+  DensifyByGradient(part, target);
+  still.statistics = Part(all, 0, first);
+  part.max_gaussians = std::max(first, options.max_gaussians - moving.parameters.count());
+  DensifyByGradient(part, still);
+  still.statistics.Reset(still.parameters.count() + moving.parameters.count());
+}
+
+GaussianModel ModelOfParts(const ParameterBlock& still,
+                           const MovingPart& moving,
+                           const TimeSpan& times,
+                           int channels,
+                           int sh_degree) {
+  const int64_t first = still.count(), count = moving.parameters.count();
+  ParameterBlock all = still;
+  all.Resize(first + count);
+  for (int row = 0; row < still.rows() && count > 0; ++row) {
+    std::copy_n(moving.parameters.Row(row), count, all.Row(row) + first);
+  }
+  GaussianModel model =
+      ModelFromParameters(all, channels, sh_degree, channels == 3 ? sh_degree : 0);
+  if (count == 0) return model;
+  model.motion.begin_s = times.begin_s;
+  model.motion.end_s = times.end_s;
+  SetMotion(moving.parameters, still.rows(), model.motion);
+  return model;
+}
+
+}  // namespace color3d
