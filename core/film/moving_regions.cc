@@ -175,6 +175,19 @@ void Add(const PairResidual& pair, Votes* votes) {
   }
 }
 
+// Plain surfaces of what moves: the flow tells nothing there.
+void FillHoles(cv::Mat* regions) {
+  constexpr double kLargestShare = 0.01;  // of the picture
+  std::vector<std::vector<cv::Point>> outlines;
+  std::vector<cv::Vec4i> hierarchy;
+  cv::findContours(*regions, outlines, hierarchy, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
+  for (size_t i = 0; i < outlines.size(); ++i) {
+    const bool is_hole = hierarchy[i][3] >= 0;
+    if (!is_hole || cv::contourArea(outlines[i]) > kLargestShare * regions->total()) continue;
+    cv::drawContours(*regions, outlines, static_cast<int>(i), cv::Scalar(1), cv::FILLED);
+  }
+}
+
 // Most say so; without specks and holes, grown over the soft edges of the flow.
 Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
   cv::Mat moving(height, width, CV_8U);
@@ -191,6 +204,7 @@ Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
   cv::morphologyEx(moving, moving, cv::MORPH_OPEN, disc(2 * (unit / 2) + 1));
   cv::morphologyEx(moving, moving, cv::MORPH_CLOSE, disc(4 * unit + 1));
   cv::dilate(moving, moving, disc(2 * unit + 1));
+  FillHoles(&moving);
   Image image(width, height, 1);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) image.At(0, y, x) = moving.at<uchar>(y, x) ? 1.0f : 0.0f;

@@ -233,8 +233,16 @@ PairPlan Plan(const std::vector<Photo>& photos,
                    options.sfm_neighbors);
 }
 
-void RequirePlaced(size_t placed, size_t count, const fs::path& log) {
+void RequirePlaced(size_t placed, size_t count, PhotoOrder order, const fs::path& log) {
   if (placed >= kMinPlaced) return;
+  if (order == PhotoOrder::kSequence) {
+    throw InvalidArgument(
+        "{} of {} frames could be placed: they have too little in common that stands still; log: "
+        "{}",
+        placed == 0 ? "none" : fmt::format("only {}", placed),
+        count,
+        log.filename().string());
+  }
   throw InvalidArgument(
       "{} of {} photos could be placed: the others share too few features with them; take at least "
       "3 sharp photos from different places that overlap by 60 %; log: {}",
@@ -329,7 +337,7 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
   colmap.Note("planned " + plan.reason);
   const ColmapModel model =
       Solver(colmap, work, copies, options, order, run.progress, &report).Solve(plan);
-  RequirePlaced(model.images.size(), photos.size(), colmap.log());
+  RequirePlaced(model.images.size(), photos.size(), order, colmap.log());
   SfmResult result = SceneOfModel(model, photos, copies.names);
   result.report = std::move(report);
   return result;

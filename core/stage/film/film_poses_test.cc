@@ -141,7 +141,7 @@ TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
     Write(i, GradientPhoto(400, 300, 1));
   }
   EXPECT_TRUE(Import().IsFilm());
-  EXPECT_THAT(observer_.text, HasSubstr("stays without poses"));
+  EXPECT_THAT(observer_.text, HasSubstr("stays without poses: none of 4 frames could be placed"));
   EXPECT_FALSE(facts_.film->poses_found);
 }
 
