@@ -9,7 +9,7 @@ const std::vector<Stage>& StageCatalogue() {
   using namespace artifact;
   static const std::vector<Stage> catalogue = {
       {.kind = kind::kImportScene,
-       .leaves = {kScene, kImportFacts, kSfmLog, kGivenViews, kGivenGeometry},
+       .leaves = {kScene, kImportFacts, kSfmLog, kGivenViews, kMovingRegions, kGivenGeometry},
        .results = {kSfmLog}},
       {.kind = kind::kSelectKeyView,
        .needs = {kScene},

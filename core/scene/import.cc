@@ -151,6 +151,25 @@ void ImportPhotos(const fs::path& scene_folder,
                   FirstNames(sfm.unplaced, 5)));
 }
 
+// What holds for a posed scene wherever its poses come from.
+void Finish(const ImportOptions& options, ImportResult* result) {
+  Scene& scene = result->scene;
+  if (scene.views.size() < kMinTrainingViews) {
+    throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
+                          scene.views.size());
+  }
+  result->photos_registered = static_cast<int>(scene.views.size());
+  result->masked_views = static_cast<int>(std::count_if(
+      scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));
+  result->undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
+    return !IsUndistorted(v.distortion);
+  });
+  DropWeakPoints(&scene);
+  Normalise(result);
+  AddRandomPointsWhenEmpty(result);
+  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result->warnings);
+}
+
 void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
   const std::vector<Photo> photos = ListPhotos(scene_folder);
   result->photos_found = static_cast<int>(std::max(photos.size(), result->scene.views.size()));
@@ -230,21 +249,33 @@ ImportResult ImportScene(const fs::path& scene_folder,
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }
-  Scene& scene = result.scene;
-  if (scene.views.size() < kMinTrainingViews) {
-    throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
-                          scene.views.size());
+  Finish(options, &result);
+  return result;
+}
+
+ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
+                            const fs::path& scratch_folder,
+                            const ImportOptions& options,
+                            const RunControl& run) {
+  options.Validate();
+  std::vector<Photo> photos;
+  for (const SequenceFrame& frame : frames) {
+    run.cancel.ThrowIfCancelled();
+    Photo photo;
+    photo.name = frame.name;
+    photo.file = frame.file.string();
+    photo.mask_file = frame.mask_file.string();
+    ProbePhoto({}, &photo);
+    photos.push_back(std::move(photo));
   }
-  result.photos_registered = static_cast<int>(scene.views.size());
-  result.masked_views = static_cast<int>(std::count_if(
-      scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));
-  result.undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
-    return !IsUndistorted(v.distortion);
-  });
-  DropWeakPoints(&scene);
-  Normalise(&result);
-  AddRandomPointsWhenEmpty(&result);
-  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result.warnings);
+  ImportResult result;
+  result.photos_found = static_cast<int>(photos.size());
+  SfmResult sfm =
+      RunStructureFromMotion(photos, {}, scratch_folder, options, run, PhotoOrder::kSequence);
+  result.scene = std::move(sfm.scene);
+  result.sfm = std::move(sfm.report);
+  result.ran_structure_from_motion = true;
+  Finish(options, &result);
   return result;
 }
 

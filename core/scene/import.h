@@ -71,6 +71,22 @@ ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const ImportOptions& options,
                          const RunControl& run);
 
+// One of the pictures that a camera took one after the other. Both paths are absolute, or relative
+// to the working directory.
+struct SequenceFrame {
+  std::string name;
+  std::filesystem::path file;
+  std::filesystem::path mask_file;  // what stands still (masks/photo_masks.h); empty: all of it
+};
+
+// Poses by structure-from-motion, as of photos, but each frame is matched with its neighbours only,
+// and all pairs are never tried. The views have the frames' names, in their order; those that found
+// no place are missing. image_file and mask_file are the paths given. Throws Error as ImportScene.
+ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
+                            const std::filesystem::path& scratch_folder,
+                            const ImportOptions& options,
+                            const RunControl& run);
+
 // Marks every eighth view as held out, beginning with the first; of a dynamic scene all views of
 // every eighth moment, beginning with the fifth. Warns where the scene has too few.
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings);

@@ -195,7 +195,7 @@ void CarryColorOptions::Validate() const {
 void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
-  if (scene.IsFilm()) return CarryByMotion(options, scene, context);
+  if (IsColoredAsFilm(context, scene)) return CarryByMotion(options, scene, context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const ViewImages images(scene, context.scene_folder(), options.max_side_px);
   const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);

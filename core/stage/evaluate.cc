@@ -224,7 +224,7 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const TruthFiles held_out = FilesByView(options.truth, true, scene);
   const TruthFiles training = FilesByView(options.training_truth, false, scene);
   std::optional<GaussianModel> model;
-  if (!scene.IsFilm()) model = ParseGaussians(context.ReadInput(artifact::kModel));
+  if (!IsColoredAsFilm(context, scene)) model = ParseGaussians(context.ReadInput(artifact::kModel));
   std::optional<GaussianModel> bound;
   if (options.bound && model) {
     bound = FitTrueChroma(*model, scene, training, options.chroma, context);

@@ -88,7 +88,7 @@ void RunImportScene(const ImportOptions& options,
   film_options.Validate();
   const std::string film = FindFilm(context.scene_folder());
   if (!film.empty()) {
-    return ImportFilm(film, film_options, options.hold_out_every_eighth, context);
+    return ImportFilm(film, film_options, options, context);
   }
   const std::string splat = FindSplat(context.scene_folder());
   if (!splat.empty()) return ImportSplatScene(splat, options, splat_views, context);

@@ -14,7 +14,7 @@
 #include "core/color/lab.h"
 #include "core/film/shots.h"
 #include "core/image/codec.h"
-#include "core/scene/import.h"
+#include "core/stage/film/film_poses.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/video/film_reader.h"
 
@@ -106,7 +106,10 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
       cuts.size() + 1));
 }
 
-void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& context) {
+void ImportFrames(const FrameStream& stream,
+                  const FilmOptions& options,
+                  const ImportOptions& import,
+                  StageContext& context) {
   Scene scene;
   std::vector<Image> thumbnails;
   std::vector<std::string> damaged, warnings;
@@ -141,7 +144,9 @@ void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& contex
     thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
     if (stream.is_video) {
       for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
-      context.WriteOutput(view.image_file, EncodePng8(luminance));
+      const fs::path file = context.scratch_folder() / view.image_file;
+      fs::create_directories(file.parent_path());
+      WriteFileAtomic(file, EncodePng8(luminance));
     }
     scene.views.push_back(std::move(view));
   }
@@ -152,19 +157,31 @@ void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& contex
                           stream.count);
   }
   TellShots(FindShots(thumbnails), &scene, context);
-  if (hold_out) HoldOutEveryEighth(&scene, &warnings);
-  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   ImportFacts facts;
   facts.layout = "film";
   facts.photos_found = stream.count;
   facts.photos_registered = static_cast<int>(scene.views.size());
+  if (options.poses == FilmPoses::kAuto) {
+    FindFilmPoses(stream.is_video ? context.scratch_folder() : context.scene_folder(),
+                  import,
+                  context,
+                  &scene,
+                  &facts);
+  }
+  if (stream.is_video) {
+    for (const View& view : scene.views) {
+      context.TakeOutput(view.image_file, context.scratch_folder() / view.image_file);
+    }
+  }
+  if (import.hold_out_every_eighth) HoldOutEveryEighth(&scene, &warnings);
+  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
   context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
 }
 
 void ImportVideo(const std::string& file,
                  const FilmOptions& options,
-                 bool hold_out,
+                 const ImportOptions& import,
                  StageContext& context) {
   FilmReader film(context.scene_folder() / file);
   const std::vector<int> wanted = Wanted(film.times(), options);
@@ -182,10 +199,12 @@ void ImportVideo(const std::string& file,
   stream.time_s = [&](int i) { return film.times()[wanted[i]]; };
   stream.read = [&](int i) { return film.Read(wanted[i]); };
   stream.name = [&](int i) { return fmt::format("f{:06}.png", wanted[i]); };
-  ImportFrames(stream, hold_out, context);
+  ImportFrames(stream, options, import, context);
 }
 
-void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& context) {
+void ImportPictures(const FilmOptions& options,
+                    const ImportOptions& import,
+                    StageContext& context) {
   const fs::path folder = context.scene_folder() / kFramesFolder;
   std::vector<std::string> files;
   for (const std::string& file : ListFiles(folder)) {
@@ -201,7 +220,7 @@ void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& con
   stream.time_s = [&](int i) { return times[wanted[i]]; };
   stream.read = [&](int i) { return ReadImage(folder / files[wanted[i]]); };
   stream.name = [&](int i) { return files[wanted[i]]; };
-  ImportFrames(stream, hold_out, context);
+  ImportFrames(stream, options, import, context);
 }
 
 }  // namespace
@@ -232,11 +251,11 @@ std::string FindFilm(const fs::path& scene_folder) {
 
 void ImportFilm(const std::string& film,
                 const FilmOptions& options,
-                bool hold_out_every_eighth,
+                const ImportOptions& import,
                 StageContext& context) {
   options.Validate();
-  if (film == kFramesFolder) return ImportPictures(options, hold_out_every_eighth, context);
-  ImportVideo(film, options, hold_out_every_eighth, context);
+  if (film == kFramesFolder) return ImportPictures(options, import, context);
+  ImportVideo(film, options, import, context);
 }
 
 }  // namespace color3d
