@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <set>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
@@ -164,9 +166,26 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
       "{} photos have no pose and were left out: {}", unposed.size(), FirstNames(unposed, 5)));
 }
 
+// Of a scene that may move, what all cameras took at every eighth moment from the fifth on: each
+// has moments before and after it.
+void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
+  std::set<double> times;
+  for (const View& view : scene->views) times.insert(view.time_s());
+  if (times.size() < kHoldOutEvery) {
+    warnings->push_back(fmt::format(
+        "no view is held out for evaluation: the scene has only {} moments", times.size()));
+    return;
+  }
+  for (View& view : scene->views) {
+    const auto step = std::distance(times.begin(), times.find(view.time_s()));
+    view.held_out = step % kHoldOutEvery == kHoldOutEvery / 2;
+  }
+}
+
 }  // namespace
 
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings) {
+  if (scene->IsDynamic()) return HoldOutMoments(scene, warnings);
   std::vector<View>& views = scene->views;
   const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
   if (views.size() < held_out + kMinTrainingViews) {

@@ -19,7 +19,7 @@ enum class SceneLayout { kPhotos, kColmap, kTransforms, kSplat };
 enum class SfmPairs { kPlanned, kExhaustive };
 
 struct ImportOptions {
-  // Hold out every eighth view (sorted by name; the first, ninth, ...) for evaluation.
+  // Hold out every eighth view for evaluation: HoldOutEveryEighth.
   bool hold_out_every_eighth = false;
   // Structure-from-motion (only when the input has no poses).
   int sfm_max_image_side_px = 1600;  // 256..4096
@@ -71,7 +71,8 @@ ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const ImportOptions& options,
                          const RunControl& run);
 
-// Marks every eighth view as held out, beginning with the first; warns where the scene has too few.
+// Marks every eighth view as held out, beginning with the first; of a dynamic scene all views of
+// every eighth moment, beginning with the fifth. Warns where the scene has too few.
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings);
 
 }  // namespace color3d

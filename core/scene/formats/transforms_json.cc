@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/scene/formats/frame_times.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/import.h"
@@ -77,6 +78,11 @@ bool ReadFrame(const FrameFields& fields, const fs::path& scene_folder, View* vi
   return true;
 }
 
+struct Frame {
+  View view;
+  FrameTime time;
+};
+
 }  // namespace
 
 Scene ReadTransformsJson(const fs::path& json_file,
@@ -84,23 +90,30 @@ Scene ReadTransformsJson(const fs::path& json_file,
                          std::vector<std::string>* warnings) {
   const std::string file_name = json_file.filename().string();
   const json root = ParseFrames(ReadFile(json_file), file_name);
-  Scene scene;
+  std::vector<Frame> frames;
   std::vector<std::string> missing;
   for (size_t i = 0; i < root["frames"].size(); ++i) {
     const json& frame = root["frames"][i];
     const std::string place = fmt::format("{}: frame {}", file_name, i);
     if (!frame.is_object()) throw InvalidArgument("{} must be an object", place);
     const FrameFields fields(root, frame, place);
-    View view;
-    if (ReadFrame(fields, scene_folder, &view)) {
-      scene.views.push_back(std::move(view));
+    Frame read;
+    if (ReadFrame(fields, scene_folder, &read.view)) {
+      read.time = {fields.Number("time"), fields.TextOr("camera", "")};
+      frames.push_back(std::move(read));
     } else {
       missing.push_back(fields.TextOr("file_path", ""));
     }
   }
-  std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {
-    return x.name < y.name;
+  std::sort(frames.begin(), frames.end(), [](const Frame& x, const Frame& y) {
+    return x.view.name < y.view.name;
   });
+  Scene scene;
+  std::vector<FrameTime> times;
+  for (Frame& frame : frames) {
+    scene.views.push_back(std::move(frame.view));
+    times.push_back(std::move(frame.time));
+  }
   for (size_t i = 1; i < scene.views.size(); ++i) {
     if (scene.views[i].name == scene.views[i - 1].name) {
       throw InvalidArgument("{} names the photo {} twice", file_name, scene.views[i].name);
@@ -121,6 +134,15 @@ Scene ReadTransformsJson(const fs::path& json_file,
                     root["frames"].size(),
                     file_name,
                     missing[0]));
+  }
+  SetMoments(times, file_name, &scene.views);
+  if (scene.IsFilm()) {
+    throw InvalidArgument(
+        "the {} frames of {} are of one camera that stands still: nothing can be reconstructed of "
+        "them. Colour them as a film: leave {} out and give --film",
+        scene.views.size(),
+        file_name,
+        file_name);
   }
   return scene;
 }
