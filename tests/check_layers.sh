@@ -106,7 +106,7 @@ public core/keycolor from_image picture_checks recolor automatic/automatic exter
   external/script hints/hint_map hints/hints references/reference words/prompt
 public core/film film_carry moving_regions shots
 public core/keyview collect_features coverage expected_error select tracks view_features
-public core/metrics scene_consistency view_scores
+public core/metrics scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
 public core/scene camera import scene view_images formats/camera_file masks/masked_points masks/photo_masks
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/motion raster/render \

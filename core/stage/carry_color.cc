@@ -157,22 +157,19 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
     const int view = FurtherView(further, ViewsOf(keys, &FilmKey::frame), scene);
     keys.push_back({view, ColorOfFurther(further, view, scene, images, context)});
   }
-  const auto total = static_cast<int64_t>(scene.views.size());
-  std::vector<double> coverage(scene.views.size(), 0.0);
-  int64_t done = 0;
+  CarryCheckpoint done(scene, context);
   CarryAlongFilm(frames,
                  keys,
                  options.film,
                  context.pool(),
                  context.cancel(),
                  [&](int frame, const CarriedColor& color) {
-                   const View& view = scene.views[frame];
-                   coverage[frame] = Coverage(color, kCovered);
-                   context.WriteOutput(ViewArtifact(artifact::kCarried, view, ".png"),
-                                       EncodeAbPng(color.ab, color.confidence));
-                   context.progress().OnProgress(++done, total, "carrying colour along the film");
-                 });
-  Conclude(scene, ViewsOf(keys, &FilmKey::frame), coverage, context);
+                   if (done.WasDone(frame)) return;
+                   done.Add(
+                       frame, Coverage(color, kCovered), EncodeAbPng(color.ab, color.confidence));
+                 },
+                 {done.Walks(), [&](const FilmWalk& walk) { done.SetWalk(walk); }});
+  Conclude(scene, ViewsOf(keys, &FilmKey::frame), done.coverage(), context);
 }
 
 }  // namespace
