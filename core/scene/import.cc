@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
@@ -24,6 +25,7 @@ constexpr double kSuspiciousShareBehind = 0.2;
 constexpr int kRandomPoints = 20'000;
 constexpr uint64_t kRandomPointSeed = 1;
 constexpr int kHoldOutEvery = 8;
+constexpr size_t kFirstHeldOutStep = 4;  // of a dynamic scene: nothing is known before the first
 constexpr size_t kMinTrainingViews = 2;
 
 // The folder of the COLMAP model, or an empty path.
@@ -164,9 +166,52 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
       "{} photos have no pose and were left out: {}", unposed.size(), FirstNames(unposed, 5)));
 }
 
+void HoldOutTimeSteps(Scene* scene, std::vector<std::string>* warnings) {
+  std::set<double> times;
+  for (const View& view : scene->views) times.insert(view.time_s());
+  if (times.size() <= kFirstHeldOutStep + 1) {
+    warnings->push_back(fmt::format(
+        "no time is held out for evaluation: the scene has only {} time steps", times.size()));
+    return;
+  }
+  std::set<double> held_out;
+  size_t step = 0;
+  for (const double time : times) {
+    const bool is_last = step + 1 == times.size();
+    if (step++ % kHoldOutEvery == kFirstHeldOutStep && !is_last) held_out.insert(time);
+  }
+  for (View& view : scene->views) view.held_out |= held_out.contains(view.time_s());
+}
+
+void HoldOutCamera(const std::string& camera, ImportResult* result) {
+  const auto found = std::find(result->cameras.begin(), result->cameras.end(), camera);
+  if (result->cameras.size() < 2) {
+    throw InvalidArgument(
+        "hold_out_camera is '{}', but the scene is not one of several cameras with "
+        "times; leave it out",
+        camera);
+  }
+  if (found == result->cameras.end()) {
+    throw InvalidArgument("hold_out_camera: there is no camera '{}'; the scene has {}",
+                          camera,
+                          FirstNames(result->cameras, 8));
+  }
+  const int shot = static_cast<int>(found - result->cameras.begin());
+  for (View& view : result->scene.views) view.held_out |= view.moment && view.moment->shot == shot;
+}
+
+// Throws unless a scene whose frames have times shows what it is from several places.
+void CheckMoves(const Scene& scene) {
+  if (!scene.IsFilm()) return;
+  throw InvalidArgument(
+      "the frames have times but all one pose: a camera that stands still tells no depth. Leave "
+      "the poses out and give its frames as a film (frames/; `color3d colorize --film`)");
+}
+
 }  // namespace
 
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings) {
+  if (scene->IsDynamic()) return HoldOutTimeSteps(scene, warnings);
   std::vector<View>& views = scene->views;
   const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
   if (views.size() < held_out + kMinTrainingViews) {
@@ -204,29 +249,39 @@ ImportResult ImportScene(const fs::path& scene_folder,
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;
-    result.scene =
-        ReadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
+    result.scene = ReadTransformsJson(
+        scene_folder / "transforms.json", scene_folder, &result.warnings, &result.cameras);
     WarnOfUnposedPhotos(scene_folder, &result);
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }
-  Scene& scene = result.scene;
+  FinishPosedScene(options, &result);
+  return result;
+}
+
+void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
+  Scene& scene = result->scene;
   if (scene.views.size() < kMinTrainingViews) {
     throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
                           scene.views.size());
   }
-  result.photos_registered = static_cast<int>(scene.views.size());
-  result.masked_views = static_cast<int>(std::count_if(
+  CheckMoves(scene);
+  result->photos_registered = static_cast<int>(scene.views.size());
+  result->masked_views = static_cast<int>(std::count_if(
       scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));
-  result.undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
+  result->undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
     return !IsUndistorted(v.distortion);
   });
   DropWeakPoints(&scene);
-  Normalise(&result);
-  AddRandomPointsWhenEmpty(&result);
-  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result.warnings);
-  return result;
+  Normalise(result);
+  AddRandomPointsWhenEmpty(result);
+  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result->warnings);
+  if (!options.hold_out_camera.empty()) HoldOutCamera(options.hold_out_camera, result);
+  if (scene.TrainingViews().size() < kMinTrainingViews) {
+    throw InvalidArgument("only {} view is left to learn from when the others are held out",
+                          scene.TrainingViews().size());
+  }
 }
 
 }  // namespace color3d

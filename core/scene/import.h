@@ -12,15 +12,20 @@
 
 namespace color3d {
 
-enum class SceneLayout { kPhotos, kColmap, kTransforms, kSplat };
+enum class SceneLayout { kPhotos, kColmap, kTransforms, kNerfies, kPosedFilms };
 
 // Which pairs of photos structure-from-motion matches: a planned few, with all as the way out when
 // those do not hang together, or all from the start.
 enum class SfmPairs { kPlanned, kExhaustive };
 
 struct ImportOptions {
-  // Hold out every eighth view (sorted by name; the first, ninth, ...) for evaluation.
+  // Hold out for evaluation: every eighth view (sorted by name; the first, ninth, ...), of a
+  // dynamic scene every eighth time step with all its views (the fifth, thirteenth, ...: between
+  // others).
   bool hold_out_every_eighth = false;
+  // Of a dynamic scene of several cameras: all views of this one, by its name or folder. Empty:
+  // none.
+  std::string hold_out_camera;
   // Structure-from-motion (only when the input has no poses).
   int sfm_max_image_side_px = 1600;  // 256..4096
   int sfm_max_features = 4096;       // 512..16384, per photo
@@ -53,6 +58,7 @@ struct ImportResult {
   int photos_found = 0;
   int photos_registered = 0;
   int masked_views = 0;               // of which parts are masked out
+  std::vector<std::string> cameras;   // of a dynamic scene: names by Moment::shot
   std::vector<std::string> warnings;  // for the report; not sent to the observer
 };
 
@@ -71,7 +77,12 @@ ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const ImportOptions& options,
                          const RunControl& run);
 
-// Marks every eighth view as held out, beginning with the first; warns where the scene has too few.
+// What ImportScene does to every scene once its views have poses: the checks, the coordinates, the
+// points where there are none, what is held out.
+void FinishPosedScene(const ImportOptions& options, ImportResult* result);
+
+// Marks every eighth view as held out, beginning with the first, or every eighth time step of a
+// dynamic scene, beginning with the fifth; warns where the scene has too few.
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings);
 
 }  // namespace color3d
