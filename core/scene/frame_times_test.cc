@@ -12,13 +12,15 @@ namespace {
 
 using ::testing::HasSubstr;
 
-FrameTime Frame(const std::string& file, std::optional<double> time, const std::string& camera = "") {
+FrameTime Frame(const std::string& file,
+                std::optional<double> time,
+                const std::string& camera = "") {
   return {"frame " + file.substr(0, 3), file, time, camera};
 }
 
 TEST(FrameTimes, OneMovingCameraInAnyOrder) {
-  const FrameMoments m =
-      MomentsOf({Frame("images/c.png", 0.5), Frame("images/a.png", -0.5), Frame("images/b.png", 0)});
+  const FrameMoments m = MomentsOf(
+      {Frame("images/c.png", 0.5), Frame("images/a.png", -0.5), Frame("images/b.png", 0)});
   EXPECT_EQ(m.moments[0], (Moment{1.0, 0}));
   EXPECT_EQ(m.moments[1], (Moment{0.0, 0}));
   EXPECT_EQ(m.moments[2], (Moment{0.5, 0}));

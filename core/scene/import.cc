@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "core/base/error.h"
@@ -25,7 +26,6 @@ constexpr double kSuspiciousShareBehind = 0.2;
 constexpr int kRandomPoints = 20'000;
 constexpr uint64_t kRandomPointSeed = 1;
 constexpr int kHoldOutEvery = 8;
-constexpr size_t kFirstHeldOutStep = 4;  // of a dynamic scene: nothing is known before the first
 constexpr size_t kMinTrainingViews = 2;
 
 // The folder of the COLMAP model, or an empty path.
@@ -166,21 +166,20 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
       "{} photos have no pose and were left out: {}", unposed.size(), FirstNames(unposed, 5)));
 }
 
-void HoldOutTimeSteps(Scene* scene, std::vector<std::string>* warnings) {
+// Of a scene that may move, what all cameras took at every eighth moment from the fifth on: each
+// has moments before and after it.
+void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
   std::set<double> times;
   for (const View& view : scene->views) times.insert(view.time_s());
-  if (times.size() <= kFirstHeldOutStep + 1) {
+  if (times.size() < kHoldOutEvery) {
     warnings->push_back(fmt::format(
-        "no time is held out for evaluation: the scene has only {} time steps", times.size()));
+        "no view is held out for evaluation: the scene has only {} moments", times.size()));
     return;
   }
-  std::set<double> held_out;
-  size_t step = 0;
-  for (const double time : times) {
-    const bool is_last = step + 1 == times.size();
-    if (step++ % kHoldOutEvery == kFirstHeldOutStep && !is_last) held_out.insert(time);
+  for (View& view : scene->views) {
+    const auto step = std::distance(times.begin(), times.find(view.time_s()));
+    view.held_out = step % kHoldOutEvery == kHoldOutEvery / 2;
   }
-  for (View& view : scene->views) view.held_out |= held_out.contains(view.time_s());
 }
 
 void HoldOutCamera(const std::string& camera, ImportResult* result) {
@@ -204,14 +203,14 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
 void CheckMoves(const Scene& scene) {
   if (!scene.IsFilm()) return;
   throw InvalidArgument(
-      "the frames have times but all one pose: a camera that stands still tells no depth. Leave "
-      "the poses out and give its frames as a film (frames/; `color3d colorize --film`)");
+      "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
+      "Colour them as a film: leave the poses out and give --film");
 }
 
 }  // namespace
 
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings) {
-  if (scene->IsDynamic()) return HoldOutTimeSteps(scene, warnings);
+  if (scene->IsDynamic()) return HoldOutMoments(scene, warnings);
   std::vector<View>& views = scene->views;
   const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
   if (views.size() < held_out + kMinTrainingViews) {

@@ -19,9 +19,7 @@ enum class SceneLayout { kPhotos, kColmap, kTransforms, kNerfies, kPosedFilms };
 enum class SfmPairs { kPlanned, kExhaustive };
 
 struct ImportOptions {
-  // Hold out for evaluation: every eighth view (sorted by name; the first, ninth, ...), of a
-  // dynamic scene every eighth time step with all its views (the fifth, thirteenth, ...: between
-  // others).
+  // Hold out every eighth view for evaluation: HoldOutEveryEighth.
   bool hold_out_every_eighth = false;
   // Of a dynamic scene of several cameras: all views of this one, by its name or folder. Empty:
   // none.
@@ -81,8 +79,8 @@ ImportResult ImportScene(const std::filesystem::path& scene_folder,
 // points where there are none, what is held out.
 void FinishPosedScene(const ImportOptions& options, ImportResult* result);
 
-// Marks every eighth view as held out, beginning with the first, or every eighth time step of a
-// dynamic scene, beginning with the fifth; warns where the scene has too few.
+// Marks every eighth view as held out, beginning with the first; of a dynamic scene all views of
+// every eighth moment, beginning with the fifth. Warns where the scene has too few.
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings);
 
 }  // namespace color3d

@@ -126,7 +126,7 @@ TEST_F(Import, TimeStepsOfARigAreHeldOutWithAllTheirCameras) {
   options_.hold_out_every_eighth = true;
   const ImportResult result = Run();
   EXPECT_TRUE(result.scene.IsDynamic());
-  EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam0", "cam1", "cam2"}));
+  EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam00", "cam01", "cam02"}));
   ASSERT_EQ(result.scene.views.size(), 42u);
   for (const View& view : result.scene.views) {
     // Not the last step: after it nothing is known.
@@ -139,14 +139,14 @@ TEST_F(Import, TimeStepsOfARigAreHeldOutWithAllTheirCameras) {
 TEST_F(Import, AWholeCameraIsHeldOut) {
   RigScene(3, folder_.path());
   options_.hold_out_every_eighth = true;
-  options_.hold_out_camera = "cam1";
+  options_.hold_out_camera = "cam01";
   const ImportResult result = Run();
-  EXPECT_THAT(result.warnings, testing::Contains(HasSubstr("only 3 time steps")));
+  EXPECT_THAT(result.warnings, testing::Contains(HasSubstr("only 3 moments")));
   for (const View& view : result.scene.views) {
     EXPECT_EQ(view.held_out, view.name.starts_with("cam1/")) << view.name;
   }
-  options_.hold_out_camera = "cam9";
-  EXPECT_THAT(Said(), HasSubstr("no camera 'cam9'; the scene has cam0, cam1, cam2"));
+  options_.hold_out_camera = "cam09";
+  EXPECT_THAT(Said(), HasSubstr("no camera 'cam09'; the scene has cam00, cam01, cam02"));
 }
 
 TEST_F(Import, TimesWithoutPosesAreAFilm) {
@@ -157,7 +157,7 @@ TEST_F(Import, TimesWithoutPosesAreAFilm) {
   }
   WritePhotos(scene, folder_.path());
   WriteTransformsJson(scene, folder_.path() / "transforms.json");
-  EXPECT_THAT(Said(), HasSubstr("all one pose"));
+  EXPECT_THAT(Said(), HasSubstr("one camera that stands still"));
 }
 
 TEST_F(Import, GeographicCoordinatesAreRecentred) {

@@ -66,17 +66,19 @@ std::vector<PosedFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fil
       continue;
     }
     if (own.Find("time") != nullptr) {
-      throw InvalidArgument("{}: {} is a film, whose frames have times of their own; leave `time` out",
-                            place,
-                            FileOf(own));
+      throw InvalidArgument(
+          "{}: {} is a film, whose frames have times of their own; leave `time` out",
+          place,
+          FileOf(own));
     }
     films.push_back(ReadFilm(own, FrameFields(root, frame, place), scene_folder, size));
   }
   if (!films.empty() && !photo.empty()) {
-    throw InvalidArgument("{} names the film {}, but {} is no film; give films or pictures, not both",
-                          kTransforms,
-                          films[0].file,
-                          photo);
+    throw InvalidArgument(
+        "{} names the film {}, but {} is no film; give films or pictures, not both",
+        kTransforms,
+        films[0].file,
+        photo);
   }
   return films;
 }
@@ -88,22 +90,23 @@ void CheckFilms(const std::vector<PosedFilm>& films, const std::string& from) {
       throw InvalidArgument("{} names the film {} twice", from, film.file);
     }
     if (!cameras.insert(film.camera).second) {
-      throw InvalidArgument("{}: two films are of the camera {}; give each a `camera` of its own",
-                            from,
-                            film.camera);
+      throw InvalidArgument(
+          "{}: two films are of the camera {}; give each a `camera` of its own", from, film.camera);
     }
     if (film.camera.find('/') != std::string::npos || !IsSafeRelativePath(film.camera)) {
-      throw InvalidArgument("{}: a camera cannot be called '{}'; its frames lie in a folder of that "
-                            "name",
-                            from,
-                            film.camera);
+      throw InvalidArgument(
+          "{}: a camera cannot be called '{}'; its frames lie in a folder of that "
+          "name",
+          from,
+          film.camera);
     }
   }
   if (films.size() < 2) {
-    throw InvalidArgument("{} has the pose of one film; a camera that stands still tells no depth. "
-                          "Colour it as a film, without {}",
-                          from,
-                          from);
+    throw InvalidArgument(
+        "{} has the pose of one film; a camera that stands still tells no depth. "
+        "Colour it as a film, without {}",
+        from,
+        from);
   }
 }
 

@@ -21,8 +21,7 @@ std::vector<double> PosesOfThree() {
   for (int i = 0; i < 3; ++i) {
     const double place = 0.5 * i;
     // Columns: down, right, backwards, place, (height, width, focal length).
-    const double matrix[3][5] = {
-        {0, 1, 0, place, 64}, {-1, 0, 0, 0.25, 96}, {0, 0, 1, 4, 120}};
+    const double matrix[3][5] = {{0, 1, 0, place, 64}, {-1, 0, 0, 0.25, 96}, {0, 0, 1, 4, 120}};
     for (const auto& row : matrix) rows.insert(rows.end(), row, row + 5);
     rows.insert(rows.end(), {1.0, 10.0});
   }
@@ -44,9 +43,8 @@ class PosedFilms : public testing::Test {
     return Read();
   }
   static std::string Frame(const std::string& file, const std::string& more = "", double x = 0.5) {
-    return "{\"file_path\":\"" + file + "\"," + more +
-           "\"transform_matrix\":[[1,0,0," + std::to_string(x) +
-           "],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}";
+    return "{\"file_path\":\"" + file + "\"," + more + "\"transform_matrix\":[[1,0,0," +
+           std::to_string(x) + "],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}";
   }
   std::string Said(const std::string& frames) {
     return Refusal([&] { Read(frames); });
@@ -86,7 +84,8 @@ TEST_F(PosedFilms, WrongTransformsAreRefusedByName) {
               HasSubstr("two films are of the camera x"));
   EXPECT_THAT(Said(Frame("a.mp4", "\"camera\":\"../x\",") + "," + Frame("b.mp4")),
               HasSubstr("cannot be called '../x'"));
-  EXPECT_THAT(Said(Frame("a.mp4") + "," + Frame("b.png")), HasSubstr("films or pictures, not both"));
+  EXPECT_THAT(Said(Frame("a.mp4") + "," + Frame("b.png")),
+              HasSubstr("films or pictures, not both"));
   EXPECT_THAT(Said(Frame("a.mp4") + "," + Frame("b.mp4", "\"time\":1,")),
               HasSubstr("frame 1: b.mp4 is a film, whose frames have times of their own"));
   EXPECT_THAT(Said(Frame("a.mp4")), HasSubstr("the pose of one film"));
@@ -126,7 +125,8 @@ TEST_F(PosedFilms, WrongPosesBoundsAreRefused) {
   EXPECT_THAT(SaidOfPoses(NpyOf({3, 17}, rows)), HasSubstr("not finite"));
   rows = PosesOfThree();
   rows[34 + 14] = -5.0;
-  EXPECT_THAT(SaidOfPoses(NpyOf({3, 17}, rows)), HasSubstr("row 2: 96 x 64 px with a focal length"));
+  EXPECT_THAT(SaidOfPoses(NpyOf({3, 17}, rows)),
+              HasSubstr("row 2: 96 x 64 px with a focal length"));
 }
 
 TEST(Npy, OrdersAndTypes) {

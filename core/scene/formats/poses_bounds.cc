@@ -32,8 +32,11 @@ View ViewOf(const double* row, const std::string& place) {
   const double height = size_and_focal[0], width = size_and_focal[1], focal = size_and_focal[2];
   if (!(width >= 1.0 && height >= 1.0 && width <= kMaxSidePx && height <= kMaxSidePx &&
         focal > 0.0 && focal < 1e9)) {
-    throw InvalidArgument(
-        "{}: {:g} x {:g} px with a focal length of {:g} px is no camera", place, width, height, focal);
+    throw InvalidArgument("{}: {:g} x {:g} px with a focal length of {:g} px is no camera",
+                          place,
+                          width,
+                          height,
+                          focal);
   }
   View view;
   view.captured_camera = {static_cast<int>(std::lround(width)),
@@ -77,9 +80,8 @@ std::vector<PosedFilm> ReadPosesBounds(const fs::path& scene_folder) {
   std::vector<PosedFilm> films;
   for (size_t i = 0; i < files.size(); ++i) {
     const std::string place = fmt::format("{}: row {}", kPosesBounds, i);
-    films.push_back({fs::path(files[i]).stem().string(),
-                     files[i],
-                     ViewOf(&poses.values[i * kColumns], place)});
+    films.push_back(
+        {fs::path(files[i]).stem().string(), files[i], ViewOf(&poses.values[i * kColumns], place)});
   }
   return films;
 }

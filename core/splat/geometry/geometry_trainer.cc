@@ -13,6 +13,7 @@
 #include "core/splat/geometry/regularize.h"
 #include "core/splat/geometry/training_schedule.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/motion/motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/loss.h"
@@ -30,6 +31,11 @@ constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
 constexpr double kSurveyAt = 0.15;  // of the schedule: where motion is looked for
 constexpr double kSeedShare = 0.4;  // of the most Gaussians that there may be
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
+
+void LimitWindows(float least, int row, ParameterBlock& moving) {
+  float* width = moving.Row(row);
+  for (int64_t i = 0; i < moving.count(); ++i) width[i] = std::max(width[i], least);
+}
 
 class GeometryTrainer {
  public:
@@ -157,20 +163,32 @@ class GeometryTrainer {
   float UnitTime(const PosedCamera& view) const { return times_.UnitTime(view.time_s); }
 
   // All Gaussians at the view's moment.
-  const ParameterBlock& At(const PosedCamera& view) {
+  const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
     if (state_.moving.parameters.count() == 0) return state_.parameters;
-    ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_);
+    ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_, hidden);
     return composed_;
+  }
+
+  // ComposeAt's `hidden` in this iteration, as its number says.
+  float HiddenNow() const {
+    Random random(options_.seed, static_cast<uint64_t>(state_.iteration));
+    const bool hides = random.NextUniform() < schedule_.tuning().moment_drop_rate;
+    return hides ? static_cast<float>(0.5 * times_.Interval()) : 0.0f;
   }
 
   int64_t Count() const { return state_.parameters.count() + state_.moving.parameters.count(); }
 
+  bool MayMove() const {
+    return options_.motion == GeometryOptions::Motion::kAuto && times_.steps > 1;
+  }
+
   void FindMovers() {
-    if (options_.motion == GeometryOptions::Motion::kStill || times_.steps < 2) return;
+    if (!MayMove()) return;
     MoverSeedOptions seeds;
     seeds.rows = state_.parameters.rows();
     seeds.channels = channels_;
     seeds.coefficients = ShCoefficients(options_.sh_degree);
+    seeds.width = schedule_.tuning().seed_width;
     seeds.most = static_cast<int64_t>(kSeedShare * static_cast<double>(options_.max_gaussians));
     const auto target = [&](const PosedCamera& view, int level) {
       return targets_.Get(view, level);
@@ -190,7 +208,7 @@ class GeometryTrainer {
     const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, level);
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
-    const ParameterBlock& now = At(view);
+    const ParameterBlock& now = At(view, HiddenNow());
     pipeline_.Forward(now, color, camera, kBackground, false, run_.pool, DroppingNow());
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
@@ -270,6 +288,17 @@ class GeometryTrainer {
       std::vector<float> all = rates;
       all.insert(all.end(), motion.begin(), motion.end());
       finite = UpdatePart(moving_gradient_, std::move(all), moving.parameters, moving.moments);
+      LimitWindows(static_cast<float>(std::log(schedule_.tuning().least_width * times_.Interval())),
+                   state_.parameters.rows() + kLogWidthRow,
+                   moving.parameters);
+    }
+    const GeometryTuning& tuning = schedule_.tuning();
+    if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
+      AddPenaltyGradients(state_.parameters,
+                          static_cast<float>(tuning.opacity_penalty),
+                          static_cast<float>(tuning.scale_penalty / problem_.extent),
+                          run_.pool,
+                          gradient_);
     }
     finite = UpdatePart(gradient_, std::move(rates), state_.parameters, state_.moments) && finite;
     clock_.Enter(Phase::kOther);
@@ -280,20 +309,13 @@ class GeometryTrainer {
                   std::vector<float> rates,
                   ParameterBlock& parameters,
                   AdamMoments& moments) {
-    const GeometryTuning& tuning = schedule_.tuning();
-    if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
-      AddPenaltyGradients(parameters,
-                          static_cast<float>(tuning.opacity_penalty),
-                          static_cast<float>(tuning.scale_penalty / problem_.extent),
-                          run_.pool,
-                          gradient);
-    }
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
     if (!AdamStep(gradient, rates, state_.iteration + 1, run_.pool, parameters, moments)) {
       return false;
     }
-    if (tuning.max_needle_ratio > 0.0) {
-      LimitNeedles(static_cast<float>(std::log(tuning.max_needle_ratio)), run_.pool, parameters);
+    const double ratio = schedule_.tuning().max_needle_ratio;
+    if (ratio > 0.0) {
+      LimitNeedles(static_cast<float>(std::log(ratio)), run_.pool, parameters);
     }
     return true;
   }
@@ -318,6 +340,9 @@ class GeometryTrainer {
       densify.gradient_threshold = options_.densify_gradient;
       densify.clone_below_scale = 0.01 * problem_.extent;
       densify.max_gaussians = CountAllowed();
+      if (MayMove() && fraction_ < kSurveyAt) {  // room for what moves
+        densify.max_gaussians -= static_cast<int64_t>(kSeedShare * densify.max_gaussians);
+      }
       const double prune_scale = schedule_.tuning().prune_scale;
       if (prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
         densify.prune_scale = prune_scale * problem_.extent;

@@ -120,7 +120,8 @@ void ComposeAt(const ParameterBlock& still,
                const MovingPart& moving,
                float t,
                ThreadPool& pool,
-               ParameterBlock& at) {
+               ParameterBlock& at,
+               float hidden) {
   const int64_t first = still.count(), count = first + moving.parameters.count();
   if (at.rows() != still.rows()) at = ParameterBlock(still.rows(), count);
   if (at.count() != count) at.Resize(count);
@@ -130,7 +131,7 @@ void ComposeAt(const ParameterBlock& still,
       std::copy_n(moving.parameters.Row(row), moving.parameters.count(), at.Row(row) + first);
     }
   });
-  ApplyMotion(moving.parameters, still.rows(), t, first, pool, at);
+  ApplyMotion(moving.parameters, still.rows(), t, first, pool, at, hidden);
 }
 
 void DecomposeGradient(const ParameterBlock& still,

@@ -53,12 +53,13 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
                            const MoverSeedOptions& seeds,
                            ThreadPool& pool);
 
-// Both at the moment `t`: those that stand still first.
+// Both at the moment `t`: those that stand still first. `hidden`: ApplyMotion.
 void ComposeAt(const ParameterBlock& still,
                const MovingPart& moving,
                float t,
                ThreadPool& pool,
-               ParameterBlock& at);
+               ParameterBlock& at,
+               float hidden = 0.0f);
 // The adjoint; `gradient` comes as dL/d(at) and leaves as dL/d(still).
 void DecomposeGradient(const ParameterBlock& still,
                        const MovingPart& moving,

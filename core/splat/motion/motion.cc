@@ -73,7 +73,8 @@ void ApplyMotion(const ParameterBlock& moving,
                  float t,
                  int64_t first,
                  ThreadPool& pool,
-                 ParameterBlock& at) {
+                 ParameterBlock& at,
+                 float hidden) {
   pool.ForRanges(moving.count(), [&](int64_t begin, int64_t end, int) {
     for (int64_t i = begin; i < end; ++i) {
       const Window w = WindowAt(moving, row, i, t);
@@ -86,6 +87,10 @@ void ApplyMotion(const ParameterBlock& moving,
         at.Row(kRotationRow + k)[j] += w.tau * moving.Row(row + kSpinRow + k)[i];
       }
       float& logit = at.Row(kOpacityRow)[j];
+      if (std::abs(w.tau) < hidden) {
+        logit = kUnseenLogit;
+        continue;
+      }
       const float opacity = std::min(Sigmoid(logit) * w.value, kMaxOpacity);
       logit = opacity > kUnseenOpacity ? std::log(opacity / (1.0f - opacity)) : kUnseenLogit;
     }

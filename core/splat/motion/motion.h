@@ -26,13 +26,15 @@ ParameterBlock MotionFromModel(const GaussianModel& model);
 void SetMotion(const ParameterBlock& moving, int row, GaussianMotion& motion);
 
 // Takes Gaussians [first, first + moving.count()) of `at` to the moment `t` (GaussianMotion), as
-// rows [row, row + kMotionRows) of `moving` say.
+// rows [row, row + kMotionRows) of `moving` say. Those that belong to a time nearer than `hidden`
+// are not seen.
 void ApplyMotion(const ParameterBlock& moving,
                  int row,
                  float t,
                  int64_t first,
                  ThreadPool& pool,
-                 ParameterBlock& at);
+                 ParameterBlock& at,
+                 float hidden = 0.0f);
 
 // The adjoint. `moving` holds parameters in rows [0, row) and motion from `row` on; `at` holds all
 // Gaussians at `t`, with those of `moving` from `first` on; `d_at` is dL/d(at). Sets `d_moving`,

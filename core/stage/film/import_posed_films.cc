@@ -88,9 +88,8 @@ class PosedFilmImport {
     }
     result.layout = SceneLayout::kPosedFilms;
     result.photos_found = count_;
-    std::sort(views_.begin(), views_.end(), [](const View& x, const View& y) {
-      return x.name < y.name;
-    });
+    std::sort(
+        views_.begin(), views_.end(), [](const View& x, const View& y) { return x.name < y.name; });
     result.scene.views = std::move(views_);
     FinishPosedScene(options, &result);
     return result;
@@ -104,7 +103,8 @@ class PosedFilmImport {
     view.name = fmt::format("{}/f{:06}.png", film.camera, frame);
     view.image_file = artifact::kGivenViews + view.name;
     try {
-      context_.WriteOutput(view.image_file, EncodeGrayFrame(LuminanceFromSrgb(reader->Read(frame))));
+      context_.WriteOutput(view.image_file,
+                           EncodeGrayFrame(LuminanceFromSrgb(reader->Read(frame))));
     } catch (const Error& e) {
       if (e.code() != ErrorCode::kDataLoss) throw;
       damaged_.push_back(view.name);

@@ -23,11 +23,9 @@ class ImportPosedFilmsTest : public StageTest {
   static double Gray(int camera, int frame) { return 0.2 + 0.2 * camera + 0.02 * frame; }
   void WriteFilm(int camera, int frames, double frames_per_second = 10) {
     ThreadPool pool(1);
-    Mp4Writer writer(scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
-                     {.width = kWidth,
-                      .height = kHeight,
-                      .frames_per_second = frames_per_second,
-                      .threads = 1});
+    Mp4Writer writer(
+        scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
+        {.width = kWidth, .height = kHeight, .frames_per_second = frames_per_second, .threads = 1});
     for (int i = 0; i < frames; ++i) {
       writer.Add(Image(kWidth, kHeight, 3, static_cast<float>(Gray(camera, i))), pool);
     }
@@ -36,8 +34,7 @@ class ImportPosedFilmsTest : public StageTest {
   void WritePoses(int cameras) {
     std::vector<double> rows;
     for (int i = 0; i < cameras; ++i) {
-      const double matrix[3][5] = {
-          {0, 1, 0, 0.5 * i, 128}, {-1, 0, 0, 0, 192}, {0, 0, 1, 4, 240}};
+      const double matrix[3][5] = {{0, 1, 0, 0.5 * i, 128}, {-1, 0, 0, 0, 192}, {0, 0, 1, 4, 240}};
       for (const auto& row : matrix) rows.insert(rows.end(), row, row + 5);
       rows.insert(rows.end(), {1.0, 10.0});
     }
