@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/scene/formats/colmap_model.h"
+#include "core/scene/formats/nerfies.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/lens.h"
 #include "core/scene/masks/photo_masks.h"
@@ -245,6 +246,11 @@ ImportResult ImportScene(const fs::path& scene_folder,
     result.layout = SceneLayout::kColmap;
     result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings);
     WarnOfUnposedPhotos(scene_folder, &result);
+    FindViewMasks(scene_folder, run.cancel, &result.scene.views);
+  } else if (IsNerfiesFolder(scene_folder)) {
+    result.layout = SceneLayout::kNerfies;
+    result.scene = ReadNerfies(scene_folder, &result.warnings, &result.cameras);
+    result.photos_found = static_cast<int>(result.scene.views.size());
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;

@@ -61,8 +61,9 @@ struct ImportResult {
 };
 
 // `scene_folder` holds photos (directly or in images/), or a COLMAP model (sparse/0, sparse or the
-// folder itself; text or binary) with images/, or transforms.json with the photos that it names.
-// With poses of several kinds, COLMAP's wins. `scratch_folder` receives structure-from-motion's
+// folder itself; text or binary) with images/, or transforms.json with the photos that it names, or
+// what Nerfies and HyperNeRF have (metadata.json, camera/, rgb/). With poses of several kinds,
+// COLMAP's wins. `scratch_folder` receives structure-from-motion's
 // files and sfm.log. Throws Error: an empty folder, one photo, unreadable photos, a model whose
 // images are missing, masks that fit no photo (photo_masks.h), non-finite numbers, photos that do
 // not overlap (how many registered and why it may have failed), points that all lie behind their

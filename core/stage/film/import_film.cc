@@ -188,13 +188,16 @@ std::string FindFilm(const fs::path& scene_folder) {
   std::error_code none;
   if (!fs::is_directory(scene_folder, none)) return film;
   bool has_photos = false;
+  int films = 0;
   for (const std::string& file : ListFiles(scene_folder)) {
     if (IsAugmentFile(file) || IsMaskFile(file)) continue;
     if (IsFrameFile(file) && HasImageExtension(file)) return std::string(kFramesFolder);
     has_photos |= HasImageExtension(file);
-    if (HasFilmExtension(file) && film.empty()) film = file;
+    if (!HasFilmExtension(file)) continue;
+    film = file;
+    ++films;
   }
-  return has_photos ? "" : film;
+  return has_photos || films != 1 ? "" : film;
 }
 
 void ImportFilm(const std::string& film,
