@@ -185,11 +185,12 @@ Scene ReadNerfies(const fs::path& scene_folder,
     scene.views.push_back(std::move(view));
   }
   if (scene.views.size() < 2) {
-    throw InvalidArgument("{} names {} frames, of which {} have a picture in rgb/; at least 2 are "
-                          "needed",
-                          kMetadata,
-                          frames.size(),
-                          scene.views.size());
+    throw InvalidArgument(
+        "{} names {} frames, of which {} have a picture in rgb/; at least 2 are "
+        "needed",
+        kMetadata,
+        frames.size(),
+        scene.views.size());
   }
   FrameMoments moments = MomentsOf(times);
   for (size_t i = 0; i < times.size(); ++i) scene.views[i].moment = moments.moments[i];

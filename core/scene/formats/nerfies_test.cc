@@ -31,8 +31,19 @@ class Nerfies : public testing::Test {
                       "\"skew\":0.0,\"pixel_aspect_ratio\":1.02,"
                       "\"radial_distortion\":[0.01,0.002,0.003],\"tangential_distortion\":[0,0],"
                       "\"image_size\":[96,64]{}}}",
-                      r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0), r(2, 1),
-                      r(2, 2), c.x(), c.y(), c.z(), more));
+                      r(0, 0),
+                      r(0, 1),
+                      r(0, 2),
+                      r(1, 0),
+                      r(1, 1),
+                      r(1, 2),
+                      r(2, 0),
+                      r(2, 1),
+                      r(2, 2),
+                      c.x(),
+                      c.y(),
+                      c.z(),
+                      more));
   }
   void WriteScene(int count) {
     const Scene scene = ArcScene(2 * count);
@@ -42,9 +53,14 @@ class Nerfies : public testing::Test {
       views_.push_back(scene.views[i]);
       WriteCamera(name, scene.views[i]);
       Write("rgb/2x/" + name + ".png", EncodePng8(GradientPhoto(48, 32, 3)));
-      metadata += fmt::format("{}\"{}\":{{\"warp_id\":{},\"time_id\":{},\"appearance_id\":0,"
-                              "\"camera_id\":{}}}",
-                              i == 0 ? "" : ",", name, 7, 10 + i / 2, i % 2);
+      metadata += fmt::format(
+          "{}\"{}\":{{\"warp_id\":{},\"time_id\":{},\"appearance_id\":0,"
+          "\"camera_id\":{}}}",
+          i == 0 ? "" : ",",
+          name,
+          7,
+          10 + i / 2,
+          i % 2);
     }
     Write("metadata.json", "{" + metadata + "}");
     Write("dataset.json", "{}");
@@ -86,10 +102,10 @@ TEST_F(Nerfies, CamerasTimesAndPoints) {
   ASSERT_EQ(scene.points.size(), 50u);
   for (const SparsePoint& point : scene.points) {
     EXPECT_GE(point.views.size(), 2u);
-    EXPECT_LT((view.cam_from_world.Apply(point.position) -
-               views_[5].cam_from_world.Apply(point.position))
-                  .norm(),
-              1e-5);
+    EXPECT_LT(
+        (view.cam_from_world.Apply(point.position) - views_[5].cam_from_world.Apply(point.position))
+            .norm(),
+        1e-5);
   }
 }
 
@@ -99,8 +115,7 @@ TEST_F(Nerfies, IsImportedAndPointsMayBeMissing) {
   QuietRun run;
   ImportOptions options;
   options.hold_out_every_eighth = true;
-  const ImportResult result =
-      ImportScene(folder_.path(), scratch_.path(), options, run.control());
+  const ImportResult result = ImportScene(folder_.path(), scratch_.path(), options, run.control());
   EXPECT_EQ(result.layout, SceneLayout::kNerfies);
   EXPECT_TRUE(result.undistorted);
   EXPECT_EQ(result.scene.points.size(), 20000u);
