@@ -67,6 +67,12 @@ class Colorize {
           "--benchmark needs the frames of {} as pictures in a folder; give that with --film",
           folder_.film->file.string());
     }
+    if (options_.benchmark && !folder_.posed_films.empty()) {
+      throw InvalidArgument(
+          "--benchmark needs the frames of {} as pictures, named in transforms.json with their "
+          "times",
+          folder_.posed_films[0].file.string());
+    }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);
     Connect();

@@ -102,9 +102,8 @@ TEST(TemporalConsistency, ColorsThatGoWithThingsAreSteadyAndOthersAreNot) {
   // It flickers from frame to frame, not from one to the next but one.
   EXPECT_GT(flickers.cdc_at[0], 2.0 * flickers.cdc_at[1]);
   EXPECT_GT(flickers.cdc_at[0], 2.0 * steady.cdc_at[0]);
-  EXPECT_NEAR(flickers.cdc,
-              (flickers.cdc_at[0] + flickers.cdc_at[1] + flickers.cdc_at[2]) / 3.0,
-              1e-12);
+  EXPECT_NEAR(
+      flickers.cdc, (flickers.cdc_at[0] + flickers.cdc_at[1] + flickers.cdc_at[2]) / 3.0, 1e-12);
 }
 
 TEST(TemporalConsistency, NothingIsComparedAcrossCuts) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "core/catalogue/stages.h"
 #include "core/image/codec.h"
@@ -115,6 +116,19 @@ std::string OfMotion(const FilmFindings& film) {
   return text;
 }
 
+void AddTime(const Scene& scene, PlanFacts* facts) {
+  facts->is_dynamic = scene.IsDynamic();
+  if (!facts->is_dynamic) return;
+  std::set<double> times;
+  std::set<int> cameras;
+  for (const View& view : scene.views) {
+    times.insert(view.moment->time_s);
+    cameras.insert(view.moment->shot);
+  }
+  facts->time_steps = static_cast<int>(times.size());
+  facts->cameras = static_cast<int>(cameras.size());
+}
+
 std::vector<PlanStep> CollectPlan(const Scene& scene,
                                   const std::vector<StageSummary>& stages,
                                   bool has_truth,
@@ -123,6 +137,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   PlanFacts plan_facts;
   plan_facts.is_film = IsColoredAsFilm(context, scene);
+  AddTime(scene, &plan_facts);
   plan_facts.has_poses = !facts.ran_structure_from_motion;
   plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
@@ -170,9 +185,12 @@ std::string Summary(const Scene& scene,
                     const std::vector<std::string>& keys) {
   const std::string of_model =
       is_film ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
-  return fmt::format("{} {} ({} held out){}. {} in {} s of computing.",
+  PlanFacts time;
+  AddTime(scene, &time);
+  return fmt::format("{} {}{} ({} held out){}. {} in {} s of computing.",
                      scene.views.size(),
                      is_film ? "frames" : "views",
+                     time.is_dynamic ? fmt::format(" of {} moments", time.time_steps) : "",
                      scene.HeldOutViews().size(),
                      keys.empty() ? std::string()
                                   : fmt::format(", all colours from the key {} {}",

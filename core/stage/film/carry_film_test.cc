@@ -56,8 +56,8 @@ class CarryFilmTest : public StageTest {
       }
       View view;
       view.name = view.image_file = "f" + std::to_string(100 + i) + ".png";
-      view.camera = view.captured_camera = {
-          kWidth, kHeight, 100.0, 100.0, kWidth / 2.0, kHeight / 2.0};
+      view.camera =
+          view.captured_camera = {kWidth, kHeight, 100.0, 100.0, kWidth / 2.0, kHeight / 2.0};
       view.moment = Moment{0.04 * i, 0};
       WriteFileAtomic(scratch_.path() / view.image_file, EncodePng8(gray));
       scene_.views.push_back(view);

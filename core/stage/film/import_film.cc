@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
@@ -14,6 +15,8 @@
 #include "core/color/lab.h"
 #include "core/film/shots.h"
 #include "core/image/codec.h"
+#include "core/scene/import.h"
+#include "core/stage/film/film_frames.h"
 #include "core/stage/film/film_poses.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/video/film_reader.h"
@@ -24,7 +27,6 @@ namespace {
 
 constexpr double kFramesPerSecond = 25.0;  // of pictures, whose times nobody tells
 constexpr double kFocalOfLongerSide = 1.2;
-constexpr size_t kNamed = 5;  // frames in a warning
 
 // Pictures of all frames that are wanted, one after the other: sRGB or grey.
 struct FrameStream {
@@ -43,45 +45,12 @@ Camera UnknownCamera(int width, int height) {
 
 // Indices of the frames that are asked for.
 std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
-  std::vector<int> wanted;
-  for (size_t i = 0; i < times.size(); ++i) {
-    if (times[i] < options.begin_s || (options.end_s && times[i] >= *options.end_s)) continue;
-    wanted.push_back(static_cast<int>(i));
-  }
-  const auto strided = static_cast<int>((wanted.size() + options.stride - 1) / options.stride);
-  if (wanted.empty()) {
-    throw InvalidArgument(
-        "the film has no frame between the times that are asked for; it lasts {:.2f} s",
-        times.back());
-  }
-  if (strided > kMaxFilmFrames) {
-    throw InvalidArgument(
-        "{} frames are more than a job takes ({}); take every {}th (film_stride), or a part "
-        "(film_begin_s, film_end_s)",
-        strided,
-        kMaxFilmFrames,
-        (static_cast<int>(wanted.size()) + kMaxFilmFrames - 1) / kMaxFilmFrames);
-  }
-  for (int i = 0; i < strided; ++i) wanted[i] = wanted[static_cast<size_t>(i) * options.stride];
-  wanted.resize(strided);
-  if (strided == 1) {
+  std::vector<int> wanted = FramesAskedFor(times, options);
+  CheckFrameCount(wanted.size(), options);
+  if (wanted.size() == 1) {
     throw InvalidArgument("one frame is no film; colour it as a photo, by `color3d key color`");
   }
   return wanted;
-}
-
-std::string NamesOf(const std::vector<std::string>& names) {
-  std::string text;
-  for (size_t i = 0; i < std::min(kNamed, names.size()); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return names.size() > kNamed ? text + fmt::format(" and {} more", names.size() - kNamed) : text;
-}
-
-void WarnOf(const std::vector<std::string>& names, const char* what, StageContext& context) {
-  if (names.empty()) return;
-  context.progress().OnWarning(fmt::format(
-      "{} {} {}: {}", names.size(), names.size() == 1 ? "frame" : "frames", what, NamesOf(names)));
 }
 
 void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
@@ -96,13 +65,13 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
     if (last >= 0 && shots.shot[i] != last) cuts.push_back(view.name);
     last = shots.shot[i];
   }
-  WarnOf(blank, "of one grey all over", context);
-  WarnOf(alien, "unlike those around (torn?), coloured on their own", context);
+  WarnOfFrames(blank, "of one grey all over", context);
+  WarnOfFrames(alien, "unlike those around (torn?), coloured on their own", context);
   if (cuts.empty()) return;
   context.progress().OnWarning(fmt::format(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
       "by likeness. Colour a frame of each (further key views)",
-      NamesOf(cuts),
+      NamesOfFrames(cuts),
       cuts.size() + 1));
 }
 
@@ -143,14 +112,13 @@ void ImportFrames(const FrameStream& stream,
     }
     thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
     if (stream.is_video) {
-      for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
       const fs::path file = context.scratch_folder() / view.image_file;
       fs::create_directories(file.parent_path());
-      WriteFileAtomic(file, EncodePng8(luminance));
+      WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
     }
     scene.views.push_back(std::move(view));
   }
-  WarnOf(damaged, "cannot be decoded and are left out", context);
+  WarnOfFrames(damaged, "cannot be decoded and are left out", context);
   if (scene.views.size() < 2) {
     throw InvalidArgument("{} of {} frames can be decoded; a film has two at least",
                           scene.views.size(),
@@ -240,13 +208,16 @@ std::string FindFilm(const fs::path& scene_folder) {
   std::error_code none;
   if (!fs::is_directory(scene_folder, none)) return film;
   bool has_photos = false;
+  int films = 0;
   for (const std::string& file : ListFiles(scene_folder)) {
     if (IsAugmentFile(file) || IsMaskFile(file)) continue;
     if (IsFrameFile(file) && HasImageExtension(file)) return std::string(kFramesFolder);
     has_photos |= HasImageExtension(file);
-    if (HasFilmExtension(file) && film.empty()) film = file;
+    if (!HasFilmExtension(file)) continue;
+    film = file;
+    ++films;
   }
-  return has_photos ? "" : film;
+  return has_photos || films != 1 ? "" : film;
 }
 
 void ImportFilm(const std::string& film,

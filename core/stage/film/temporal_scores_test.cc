@@ -30,8 +30,8 @@ class TemporalScoresTest : public StageTest {
       }
       View view;
       view.name = view.image_file = "f" + std::to_string(i) + ".png";
-      view.camera = view.captured_camera = {
-          kWidth, kHeight, 100.0, 100.0, kWidth / 2.0, kHeight / 2.0};
+      view.camera =
+          view.captured_camera = {kWidth, kHeight, 100.0, 100.0, kWidth / 2.0, kHeight / 2.0};
       view.held_out = i == 0;
       // Names do not tell the order of time.
       view.moment = Moment{0.1 * (i < 2 ? 1 - i : i), i == kFrames - 1 ? 1 : 0};

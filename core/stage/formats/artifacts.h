@@ -37,7 +37,8 @@ struct FilmFindings {
 
 // What the import stage found out, for the plan and the report.
 struct ImportFacts {
-  std::string layout;  // "photos", "colmap", "transforms", "splat", "film"
+  std::string
+      layout;  // "photos", "colmap", "transforms", "nerfies", "posed_films", "splat", "film"
   bool ran_structure_from_motion = false;
   std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
   bool undistorted = false;
