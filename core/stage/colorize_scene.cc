@@ -74,7 +74,8 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
     }
   }
   if (context.HasInput(artifact::kModel)) {
-    metrics["gaussians"] = ParseGaussians(context.ReadInput(artifact::kModel)).size();
+    const size_t count = ParseGaussians(context.ReadInput(artifact::kModel)).size();
+    if (count > 0) metrics["gaussians"] = count;
   }
   double total = 0.0;
   int64_t peak = 0;

@@ -108,6 +108,10 @@ void ExportOptions::Validate() const {
 void RunExport(const ExportOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
+  if (scene.IsFilm()) {  // nothing was reconstructed
+    context.WriteOutput(artifact::kExportScores, "{}\n");
+    return;
+  }
   const GaussianModel in_time = ParseGaussians(context.ReadInput(artifact::kModel));
   const int shown = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : 0;
   const GaussianModel model = ModelAt(in_time, scene.views.at(shown).time_s(), context.pool());

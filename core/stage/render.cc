@@ -46,8 +46,9 @@ void RenderOptions::Validate() const {
 void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
-  if (IsColoredAsFilm(context, scene))
+  if (IsColoredAsFilm(context, scene)) {
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);
+  }
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   if (model.size() == 0) throw InvalidArgument("the model has no Gaussians: nothing is to be seen");
   if (options.path != RenderOptions::Path::kViews) {
