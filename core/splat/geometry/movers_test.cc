@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "core/splat/geometry/mover_seeds.h"
 #include "core/splat/geometry/motion_survey.h"
+#include "core/splat/geometry/mover_seeds.h"
 #include "core/splat/motion/motion.h"
 
 namespace color3d {
