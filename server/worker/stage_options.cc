@@ -19,6 +19,7 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
 ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec) {
   ImportOptions options;
   options.hold_out_every_eighth = spec.hold_out_every_eighth();
+  options.hold_out_camera = spec.hold_out_camera();
   if (spec.has_sfm_max_image_side_px())
     options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
   if (spec.sfm_pairs() == v1::ImportSceneSpec::SFM_PAIRS_EXHAUSTIVE) {
@@ -45,6 +46,7 @@ FilmOptions FilmOptionsFrom(const v1::ImportSceneSpec& spec) {
   if (spec.has_film_stride()) options.stride = spec.film_stride();
   if (spec.has_film_begin_s()) options.begin_s = spec.film_begin_s();
   if (spec.has_film_end_s()) options.end_s = spec.film_end_s();
+  if (spec.film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO) options.poses = FilmPoses::kAuto;
   return options;
 }
 
@@ -173,6 +175,7 @@ ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   options.glb = spec.glb();
   options.splat = spec.splat();
   options.confidence = spec.confidence();
+  options.moments = spec.moments();
   return options;
 }
 

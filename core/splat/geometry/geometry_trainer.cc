@@ -29,13 +29,7 @@ constexpr double kErrorReports = 100.0;
 constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
 constexpr double kSurveyAt = 0.15;  // of the schedule: where motion is looked for
-constexpr double kSeedShare = 0.4;  // of the most Gaussians that there may be
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
-
-void LimitWindows(float least, int row, ParameterBlock& moving) {
-  float* width = moving.Row(row);
-  for (int64_t i = 0; i < moving.count(); ++i) width[i] = std::max(width[i], least);
-}
 
 class GeometryTrainer {
  public:
@@ -109,10 +103,9 @@ class GeometryTrainer {
     for (const PosedCamera& view : problem_.training) {
       pixels += int64_t{view.camera.width} * view.camera.height;
     }
-    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
                                    channels_,
-                                   static_cast<int>(options_.motion),
-                                   times_.steps,
+                                   MayMove() ? times_.steps : 1,
                                    options_.iterations,
                                    options_.max_gaussians,
                                    options_.sh_degree,
@@ -161,19 +154,11 @@ class GeometryTrainer {
   }
 
   float UnitTime(const PosedCamera& view) const { return times_.UnitTime(view.time_s); }
-
   // All Gaussians at the view's moment.
   const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
     if (state_.moving.parameters.count() == 0) return state_.parameters;
     ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_, hidden);
     return composed_;
-  }
-
-  // ComposeAt's `hidden` in this iteration, as its number says.
-  float HiddenNow() const {
-    Random random(options_.seed, static_cast<uint64_t>(state_.iteration));
-    const bool hides = random.NextUniform() < schedule_.tuning().moment_drop_rate;
-    return hides ? static_cast<float>(0.5 * times_.Interval()) : 0.0f;
   }
 
   int64_t Count() const { return state_.parameters.count() + state_.moving.parameters.count(); }
@@ -184,19 +169,16 @@ class GeometryTrainer {
 
   void FindMovers() {
     if (!MayMove()) return;
-    MoverSeedOptions seeds;
-    seeds.rows = state_.parameters.rows();
-    seeds.channels = channels_;
-    seeds.coefficients = ShCoefficients(options_.sh_degree);
-    seeds.width = schedule_.tuning().seed_width;
-    seeds.most = static_cast<int64_t>(kSeedShare * static_cast<double>(options_.max_gaussians));
     const auto target = [&](const PosedCamera& view, int level) {
       return targets_.Get(view, level);
     };
     const FoundMovers found =
-        FindMovingPart(problem_, times_, state_.parameters, Colors(), target, seeds, run_.pool);
+        FindMovingPart(problem_, times_, state_.parameters, Colors(), target, options_, run_.pool);
     run_.progress.OnError(state_.iteration, "moving_share", found.moving_share);
+    if (found.moving.parameters.count() == 0) return;
     state_.moving = found.moving;
+    DensifyTarget still{state_.parameters, state_.moments, state_.statistics, state_.random};
+    KeepMostOpaque(options_.max_gaussians - state_.moving.parameters.count(), still);
     state_.statistics.Reset(Count());
   }
 
@@ -208,7 +190,7 @@ class GeometryTrainer {
     const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, level);
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
-    const ParameterBlock& now = At(view, HiddenNow());
+    const ParameterBlock& now = At(view, schedule_.HiddenTime(state_.iteration, times_.Interval()));
     pipeline_.Forward(now, color, camera, kBackground, false, run_.pool, DroppingNow());
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
@@ -289,7 +271,7 @@ class GeometryTrainer {
       all.insert(all.end(), motion.begin(), motion.end());
       finite = UpdatePart(moving_gradient_, std::move(all), moving.parameters, moving.moments);
       LimitWindows(static_cast<float>(std::log(schedule_.tuning().least_width * times_.Interval())),
-                   state_.parameters.rows() + kLogWidthRow,
+                   state_.parameters.rows(),
                    moving.parameters);
     }
     const GeometryTuning& tuning = schedule_.tuning();
@@ -340,9 +322,6 @@ class GeometryTrainer {
       densify.gradient_threshold = options_.densify_gradient;
       densify.clone_below_scale = 0.01 * problem_.extent;
       densify.max_gaussians = CountAllowed();
-      if (MayMove() && fraction_ < kSurveyAt) {  // room for what moves
-        densify.max_gaussians -= static_cast<int64_t>(kSeedShare * densify.max_gaussians);
-      }
       const double prune_scale = schedule_.tuning().prune_scale;
       if (prune_scale > 0.0 && schedule_.HasReset(fraction_)) {
         densify.prune_scale = prune_scale * problem_.extent;

@@ -48,10 +48,13 @@ void ApplyMotionBackward(const ParameterBlock& moving,
                          ThreadPool& pool,
                          ParameterBlock& d_moving);
 
+// No window in time becomes narrower than exp(least).
+void LimitWindows(float least, int row, ParameterBlock& moving);
+
 // The model's parameters at a time of the scene, seconds; those that stand still are the same at
 // any.
 ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool);
-// The same as a model without motion.
+// The same as a model without motion: the Gaussians that are seen then.
 GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool);
 
 }  // namespace color3d

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
@@ -15,6 +16,8 @@
 #include "core/film/shots.h"
 #include "core/image/codec.h"
 #include "core/scene/import.h"
+#include "core/stage/film/film_frames.h"
+#include "core/stage/film/film_poses.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/video/film_reader.h"
 
@@ -24,7 +27,6 @@ namespace {
 
 constexpr double kFramesPerSecond = 25.0;  // of pictures, whose times nobody tells
 constexpr double kFocalOfLongerSide = 1.2;
-constexpr size_t kNamed = 5;  // frames in a warning
 
 // Pictures of all frames that are wanted, one after the other: sRGB or grey.
 struct FrameStream {
@@ -43,45 +45,12 @@ Camera UnknownCamera(int width, int height) {
 
 // Indices of the frames that are asked for.
 std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
-  std::vector<int> wanted;
-  for (size_t i = 0; i < times.size(); ++i) {
-    if (times[i] < options.begin_s || (options.end_s && times[i] >= *options.end_s)) continue;
-    wanted.push_back(static_cast<int>(i));
-  }
-  const auto strided = static_cast<int>((wanted.size() + options.stride - 1) / options.stride);
-  if (wanted.empty()) {
-    throw InvalidArgument(
-        "the film has no frame between the times that are asked for; it lasts {:.2f} s",
-        times.back());
-  }
-  if (strided > kMaxFilmFrames) {
-    throw InvalidArgument(
-        "{} frames are more than a job takes ({}); take every {}th (film_stride), or a part "
-        "(film_begin_s, film_end_s)",
-        strided,
-        kMaxFilmFrames,
-        (static_cast<int>(wanted.size()) + kMaxFilmFrames - 1) / kMaxFilmFrames);
-  }
-  for (int i = 0; i < strided; ++i) wanted[i] = wanted[static_cast<size_t>(i) * options.stride];
-  wanted.resize(strided);
-  if (strided == 1) {
+  std::vector<int> wanted = FramesAskedFor(times, options);
+  CheckFrameCount(wanted.size(), options);
+  if (wanted.size() == 1) {
     throw InvalidArgument("one frame is no film; colour it as a photo, by `color3d key color`");
   }
   return wanted;
-}
-
-std::string NamesOf(const std::vector<std::string>& names) {
-  std::string text;
-  for (size_t i = 0; i < std::min(kNamed, names.size()); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return names.size() > kNamed ? text + fmt::format(" and {} more", names.size() - kNamed) : text;
-}
-
-void WarnOf(const std::vector<std::string>& names, const char* what, StageContext& context) {
-  if (names.empty()) return;
-  context.progress().OnWarning(fmt::format(
-      "{} {} {}: {}", names.size(), names.size() == 1 ? "frame" : "frames", what, NamesOf(names)));
 }
 
 void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
@@ -96,17 +65,20 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
     if (last >= 0 && shots.shot[i] != last) cuts.push_back(view.name);
     last = shots.shot[i];
   }
-  WarnOf(blank, "of one grey all over", context);
-  WarnOf(alien, "unlike those around (torn?), coloured on their own", context);
+  WarnOfFrames(blank, "of one grey all over", context);
+  WarnOfFrames(alien, "unlike those around (torn?), coloured on their own", context);
   if (cuts.empty()) return;
   context.progress().OnWarning(fmt::format(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
       "by likeness. Colour a frame of each (further key views)",
-      NamesOf(cuts),
+      NamesOfFrames(cuts),
       cuts.size() + 1));
 }
 
-void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& context) {
+void ImportFrames(const FrameStream& stream,
+                  const FilmOptions& options,
+                  const ImportOptions& import,
+                  StageContext& context) {
   Scene scene;
   std::vector<Image> thumbnails;
   std::vector<std::string> damaged, warnings;
@@ -140,31 +112,44 @@ void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& contex
     }
     thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
     if (stream.is_video) {
-      for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
-      context.WriteOutput(view.image_file, EncodePng8(luminance));
+      const fs::path file = context.scratch_folder() / view.image_file;
+      fs::create_directories(file.parent_path());
+      WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
     }
     scene.views.push_back(std::move(view));
   }
-  WarnOf(damaged, "cannot be decoded and are left out", context);
+  WarnOfFrames(damaged, "cannot be decoded and are left out", context);
   if (scene.views.size() < 2) {
     throw InvalidArgument("{} of {} frames can be decoded; a film has two at least",
                           scene.views.size(),
                           stream.count);
   }
   TellShots(FindShots(thumbnails), &scene, context);
-  if (hold_out) HoldOutEveryEighth(&scene, &warnings);
-  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   ImportFacts facts;
   facts.layout = "film";
   facts.photos_found = stream.count;
   facts.photos_registered = static_cast<int>(scene.views.size());
+  if (options.poses == FilmPoses::kAuto) {
+    FindFilmPoses(stream.is_video ? context.scratch_folder() : context.scene_folder(),
+                  import,
+                  context,
+                  &scene,
+                  &facts);
+  }
+  if (stream.is_video) {
+    for (const View& view : scene.views) {
+      context.TakeOutput(view.image_file, context.scratch_folder() / view.image_file);
+    }
+  }
+  if (import.hold_out_every_eighth) HoldOutEveryEighth(&scene, &warnings);
+  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
   context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
 }
 
 void ImportVideo(const std::string& file,
                  const FilmOptions& options,
-                 bool hold_out,
+                 const ImportOptions& import,
                  StageContext& context) {
   FilmReader film(context.scene_folder() / file);
   const std::vector<int> wanted = Wanted(film.times(), options);
@@ -182,10 +167,12 @@ void ImportVideo(const std::string& file,
   stream.time_s = [&](int i) { return film.times()[wanted[i]]; };
   stream.read = [&](int i) { return film.Read(wanted[i]); };
   stream.name = [&](int i) { return fmt::format("f{:06}.png", wanted[i]); };
-  ImportFrames(stream, hold_out, context);
+  ImportFrames(stream, options, import, context);
 }
 
-void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& context) {
+void ImportPictures(const FilmOptions& options,
+                    const ImportOptions& import,
+                    StageContext& context) {
   const fs::path folder = context.scene_folder() / kFramesFolder;
   std::vector<std::string> files;
   for (const std::string& file : ListFiles(folder)) {
@@ -201,7 +188,7 @@ void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& con
   stream.time_s = [&](int i) { return times[wanted[i]]; };
   stream.read = [&](int i) { return ReadImage(folder / files[wanted[i]]); };
   stream.name = [&](int i) { return files[wanted[i]]; };
-  ImportFrames(stream, hold_out, context);
+  ImportFrames(stream, options, import, context);
 }
 
 }  // namespace
@@ -221,22 +208,25 @@ std::string FindFilm(const fs::path& scene_folder) {
   std::error_code none;
   if (!fs::is_directory(scene_folder, none)) return film;
   bool has_photos = false;
+  int films = 0;
   for (const std::string& file : ListFiles(scene_folder)) {
     if (IsAugmentFile(file) || IsMaskFile(file)) continue;
     if (IsFrameFile(file) && HasImageExtension(file)) return std::string(kFramesFolder);
     has_photos |= HasImageExtension(file);
-    if (HasFilmExtension(file) && film.empty()) film = file;
+    if (!HasFilmExtension(file)) continue;
+    film = file;
+    ++films;
   }
-  return has_photos ? "" : film;
+  return has_photos || films != 1 ? "" : film;
 }
 
 void ImportFilm(const std::string& film,
                 const FilmOptions& options,
-                bool hold_out_every_eighth,
+                const ImportOptions& import,
                 StageContext& context) {
   options.Validate();
-  if (film == kFramesFolder) return ImportPictures(options, hold_out_every_eighth, context);
-  ImportVideo(film, options, hold_out_every_eighth, context);
+  if (film == kFramesFolder) return ImportPictures(options, import, context);
+  ImportVideo(film, options, import, context);
 }
 
 }  // namespace color3d

@@ -1,21 +1,26 @@
-// A film as a scene: its frames are the views, all of one camera that is not known. For the import
-// stage only.
+// A film as a scene: its frames are the views, all of one camera that is not known, unless its
+// poses are asked for and found. For the import stage only.
 #pragma once
 
 #include <optional>
 #include <string>
 
+#include "core/scene/import.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
 
 inline constexpr int kMaxFilmFrames = 3000;
 
+// Whether the frames' poses are looked for (film_poses.h).
+enum class FilmPoses { kOff, kAuto };
+
 struct FilmOptions {
   int stride = 1;  // every so many frames, 1..1000
   double begin_s = 0.0;
   std::optional<double> end_s;  // none: to the end
-  void Validate() const;        // throws Error{kInvalidArgument}
+  FilmPoses poses = FilmPoses::kOff;
+  void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const FilmOptions&) const = default;
 };
 
@@ -23,13 +28,15 @@ struct FilmOptions {
 // Empty where it is none.
 std::string FindFilm(const std::filesystem::path& scene_folder);
 
-// Leaves kScene, kImportFacts and, of a video file, its frames in grey as kGivenViews. Frames that
+// Leaves kScene, kImportFacts and, of a video file, its frames in grey as kGivenViews; with poses
+// kMovingRegions and kSfmLog, too. Of `import`, every eighth frame held out and, for poses, what is
+// said of structure-from-motion count. Frames that
 // cannot be decoded are left out; those, and blank and torn ones, are named in a warning. Throws
 // Error{kInvalidArgument}: no film that can be read, nothing between the times that are asked for,
 // one frame, more than kMaxFilmFrames (with the stride that would do), frames of different sizes.
 void ImportFilm(const std::string& film,
                 const FilmOptions& options,
-                bool hold_out_every_eighth,
+                const ImportOptions& import,
                 StageContext& context);
 
 }  // namespace color3d

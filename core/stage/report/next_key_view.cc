@@ -15,7 +15,9 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
                                                   StageContext& context) {
   constexpr size_t kMaxViews = 500;  // a minute of rendering; who has more knows what to add
   const std::vector<int> training = scene.TrainingViews();
-  if (!context.HasInput(artifact::kModel) || training.size() > kMaxViews) return std::nullopt;
+  if (scene.IsFilm() || !context.HasInput(artifact::kModel) || training.size() > kMaxViews) {
+    return std::nullopt;
+  }
   std::vector<int> keys;
   std::vector<std::filesystem::path> photos;
   for (size_t k = 0; k < training.size(); ++k) {
