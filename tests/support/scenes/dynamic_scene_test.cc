@@ -266,9 +266,7 @@ TEST(DynamicScene, WrittenScenesAreReadBack) {
                expected.cam_from_world.Center())
                   .norm(),
               1e-9);
-    if (read.views[v].moment) {
-      EXPECT_EQ(read.views[v].moment, expected.moment);
-    }
+    EXPECT_EQ(read.views[v].moment, expected.moment);
     EXPECT_NEAR(read.views[v].camera.fx, expected.camera.fx, 1e-9);
     const Image picture = ReadImage(folder.path() / "in" / expected.image_file);
     const Image truth = made.RenderSrgb(v);
