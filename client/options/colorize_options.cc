@@ -200,7 +200,8 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("--more-key",
                  o->more_keys,
                  "VIEW=COLOURED.png: a further key view, for what the first one does not show; its "
-                 "colours never replace those of the key views before it. May be repeated");
+                 "colours never replace those of the key views before it. In a film it colours the "
+                 "frames that are nearer to it. May be repeated");
   app.add_option("--preset",
                  o->preset,
                  fmt::format("How much time quality is worth: {}; or a file of your own (`color3d "
@@ -226,6 +227,9 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
   app.add_flag(
       "--film", o->film, "The photos are frames of a film: coloured one by one, not reconstructed");
+  app.add_flag("--deflicker",
+               o->deflicker,
+               "Take flicker of exposure out of a film; the coloured frames get steady luminance");
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");
@@ -244,6 +248,7 @@ v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene)
   v1::ImportSceneSpec* import_scene = spec.mutable_import_scene();
   *import_scene = Chosen(options).import_scene();
   if (options.hold_out || options.benchmark) import_scene->set_hold_out_every_eighth(true);
+  if (options.deflicker) import_scene->set_film_deflicker(true);
   return spec;
 }
 
@@ -305,6 +310,7 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   if (options.hold_out || options.benchmark) {
     colorize->mutable_import_scene()->set_hold_out_every_eighth(true);
   }
+  if (options.deflicker) colorize->mutable_import_scene()->set_film_deflicker(true);
   return spec;
 }
 

@@ -13,6 +13,7 @@
 #include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/film/shots.h"
+#include "core/film/steady_tones.h"
 #include "core/image/codec.h"
 #include "core/scene/import.h"
 #include "core/stage/formats/artifacts.h"
@@ -29,7 +30,6 @@ constexpr size_t kNamed = 5;  // frames in a warning
 // Pictures of all frames that are wanted, one after the other: sRGB or grey.
 struct FrameStream {
   int count = 0;
-  double frames_per_second = kFramesPerSecond;
   std::function<double(int)> time_s;
   std::function<Image(int)> read;  // throws Error{kDataLoss} for a damaged frame
   std::function<std::string(int)> name;
@@ -55,12 +55,15 @@ std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& opt
         times.back());
   }
   if (strided > kMaxFilmFrames) {
+    const double seconds = times[wanted.back()] - times[wanted.front()];
     throw InvalidArgument(
-        "{} frames are more than a job takes ({}); take every {}th (film_stride), or a part "
-        "(film_begin_s, film_end_s)",
+        "{} frames ({:.0f} s) are more than a job takes ({}); take every {}th (film_stride), or a "
+        "part of {:.0f} s at most (film_begin_s, film_end_s)",
         strided,
+        seconds,
         kMaxFilmFrames,
-        (static_cast<int>(wanted.size()) + kMaxFilmFrames - 1) / kMaxFilmFrames);
+        (static_cast<int>(wanted.size()) + kMaxFilmFrames - 1) / kMaxFilmFrames,
+        std::floor(seconds * kMaxFilmFrames / strided));
   }
   for (int i = 0; i < strided; ++i) wanted[i] = wanted[static_cast<size_t>(i) * options.stride];
   wanted.resize(strided);
@@ -101,15 +104,43 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
   if (cuts.empty()) return;
   context.progress().OnWarning(fmt::format(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
-      "by likeness. Colour a frame of each (further key views)",
+      "by likeness. Colour a frame of each (further key views; the selection of several names one "
+      "a "
+      "shot)",
       NamesOf(cuts),
       cuts.size() + 1));
 }
 
-void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& context) {
+// The frames that can be decoded, and small pictures of them.
+struct ReadFrames {
   Scene scene;
-  std::vector<Image> thumbnails;
-  std::vector<std::string> damaged, warnings;
+  std::vector<int> index;         // of each view, in the stream
+  std::vector<Image> thumbnails;  // for the shots
+  std::vector<Image> tones;       // for exposure; empty where it stays
+};
+
+View ViewOf(const FrameStream& stream, int i, const Image& luminance, bool is_drawn) {
+  View view;
+  view.name = stream.name(i);
+  view.image_file = std::string(kFramesFolder) + view.name;
+  if (is_drawn) {
+    view.image_file =
+        artifact::kGivenViews + fs::path(view.name).replace_extension(".png").string();
+  }
+  view.camera = view.captured_camera = UnknownCamera(luminance.width, luminance.height);
+  view.moment = Moment{stream.time_s(i), 0};
+  return view;
+}
+
+void WriteGray(const View& view, Image luminance, StageContext& context) {
+  for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
+  context.WriteOutput(view.image_file, EncodePng8(luminance));
+}
+
+ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& context) {
+  ReadFrames frames;
+  std::vector<View>& views = frames.scene.views;
+  std::vector<std::string> damaged;
   for (int i = 0; i < stream.count; ++i) {
     context.cancel().ThrowIfCancelled();
     context.progress().OnProgress(i, stream.count, "reading frames");
@@ -121,37 +152,58 @@ void ImportFrames(const FrameStream& stream, bool hold_out, StageContext& contex
       damaged.push_back(stream.name(i));
       continue;
     }
-    View view;
-    view.name = stream.name(i);
-    view.image_file =
-        (stream.is_video ? std::string(artifact::kGivenViews) : std::string(kFramesFolder)) +
-        view.name;
-    view.camera = view.captured_camera = UnknownCamera(luminance.width, luminance.height);
-    view.moment = Moment{stream.time_s(i), 0};
-    if (!scene.views.empty() && (view.camera.width != scene.views[0].camera.width ||
-                                 view.camera.height != scene.views[0].camera.height)) {
+    View view = ViewOf(stream, i, luminance, stream.is_video || deflicker);
+    if (!views.empty() && (view.camera.width != views[0].camera.width ||
+                           view.camera.height != views[0].camera.height)) {
       throw InvalidArgument("{} has {} x {} px, but {} has {} x {} px: frames of a film are alike",
                             view.name,
                             view.camera.width,
                             view.camera.height,
-                            scene.views[0].name,
-                            scene.views[0].camera.width,
-                            scene.views[0].camera.height);
+                            views[0].name,
+                            views[0].camera.width,
+                            views[0].camera.height);
     }
-    thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
-    if (stream.is_video) {
-      for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
-      context.WriteOutput(view.image_file, EncodePng8(luminance));
-    }
-    scene.views.push_back(std::move(view));
+    frames.thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
+    if (deflicker) frames.tones.push_back(FitWithin(luminance, kTonePicturePx));
+    if (stream.is_video && !deflicker) WriteGray(view, std::move(luminance), context);
+    views.push_back(std::move(view));
+    frames.index.push_back(i);
   }
   WarnOf(damaged, "cannot be decoded and are left out", context);
-  if (scene.views.size() < 2) {
-    throw InvalidArgument("{} of {} frames can be decoded; a film has two at least",
-                          scene.views.size(),
-                          stream.count);
+  if (views.size() < 2) {
+    throw InvalidArgument(
+        "{} of {} frames can be decoded; a film has two at least", views.size(), stream.count);
   }
-  TellShots(FindShots(thumbnails), &scene, context);
+  CheckStemsAreUnique(frames.scene);
+  return frames;
+}
+
+// Every frame once more, now that it is known what is steady.
+void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageContext& context) {
+  std::vector<int> shot;
+  for (const View& view : frames.scene.views) shot.push_back(view.moment->shot);
+  const SteadyTones tones = FindSteadyTones(frames.tones, shot, context.pool(), context.cancel());
+  const auto count = static_cast<int>(frames.index.size());
+  for (int i = 0; i < count; ++i) {
+    context.cancel().ThrowIfCancelled();
+    context.progress().OnProgress(i, count, "steadying exposure");
+    WriteGray(frames.scene.views[i],
+              Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
+              context);
+  }
+  context.progress().OnWarning(
+      fmt::format("exposure is steadied: from a frame to the next it changed by {:.2f} L in the "
+                  "mean, now by {:.2f}; the coloured film has the steady luminance",
+                  tones.flicker_before,
+                  tones.flicker_after));
+}
+
+void ImportFrames(const FrameStream& stream, bool deflicker, bool hold_out, StageContext& context) {
+  ReadFrames frames = ReadAll(stream, deflicker, context);
+  Scene& scene = frames.scene;
+  std::vector<std::string> warnings;
+  TellShots(FindShots(frames.thumbnails), &scene, context);
+  if (deflicker) WriteSteady(stream, frames, context);
   if (hold_out) HoldOutEveryEighth(&scene, &warnings);
   for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   ImportFacts facts;
@@ -166,13 +218,13 @@ void ImportVideo(const std::string& file,
                  const FilmOptions& options,
                  bool hold_out,
                  StageContext& context) {
+  if (options.frames_per_second) {
+    throw InvalidArgument(
+        "film_frames_per_second is for frames that come as pictures; {} has times of its own",
+        file);
+  }
   FilmReader film(context.scene_folder() / file);
   const std::vector<int> wanted = Wanted(film.times(), options);
-  if (!film.facts().constant_rate) {
-    context.progress().OnWarning(
-        "the frames of the film do not follow each other evenly; the coloured film shows each for "
-        "the same time");
-  }
   if (film.facts().interlaced) {
     context.progress().OnWarning("the film is interlaced: one field of each frame is taken");
   }
@@ -182,7 +234,7 @@ void ImportVideo(const std::string& file,
   stream.time_s = [&](int i) { return film.times()[wanted[i]]; };
   stream.read = [&](int i) { return film.Read(wanted[i]); };
   stream.name = [&](int i) { return fmt::format("f{:06}.png", wanted[i]); };
-  ImportFrames(stream, hold_out, context);
+  ImportFrames(stream, options.deflicker, hold_out, context);
 }
 
 void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& context) {
@@ -193,15 +245,15 @@ void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& con
   }
   std::sort(files.begin(), files.end());
   std::vector<double> times;
-  for (size_t i = 0; i < files.size(); ++i)
-    times.push_back(static_cast<double>(i) / kFramesPerSecond);
+  const double rate = options.frames_per_second.value_or(kFramesPerSecond);
+  for (size_t i = 0; i < files.size(); ++i) times.push_back(static_cast<double>(i) / rate);
   const std::vector<int> wanted = Wanted(times, options);
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());
   stream.time_s = [&](int i) { return times[wanted[i]]; };
   stream.read = [&](int i) { return ReadImage(folder / files[wanted[i]]); };
   stream.name = [&](int i) { return files[wanted[i]]; };
-  ImportFrames(stream, hold_out, context);
+  ImportFrames(stream, options.deflicker, hold_out, context);
 }
 
 }  // namespace
@@ -211,6 +263,7 @@ void FilmOptions::Validate() const {
   check("stride", stride, 1, 1000);
   check("begin_s", begin_s, 0, 1e6);
   if (end_s) check("end_s", *end_s, 0.01, 1e6);
+  if (frames_per_second) check("frames_per_second", *frames_per_second, 1, 120);
   if (end_s && *end_s <= begin_s) {
     throw InvalidArgument("the film's part ends ({} s) before it begins ({} s)", *end_s, begin_s);
   }
