@@ -39,7 +39,7 @@ allow core/color 'core/(base|color)'
 allow core/image 'core/(base|image(/probe)?)'
 allow core/image/probe 'core/(base|image/probe)'
 allow core/weights 'core/(base|weights)'
-allow core/scene 'core/(base|color|image(/probe)?|scene(/[a-z]+)?)'
+allow core/scene 'core/(base|catalogue|color|image(/probe)?|scene(/[a-z]+)?)'
 allow core/encoder 'core/(base|color|image|weights|encoder(/[a-z]+)?)'
 for folder in keyview augment metrics; do
   allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
@@ -104,11 +104,11 @@ public core/image box_mean codec draw fill_holes guided_upsample local_features 
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
-public core/film film_carry shots steady_tones
+public core/film film_carry moving_regions shots steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features
-public core/metrics scene_consistency view_scores
+public core/metrics scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
-public core/scene camera import scene view_images formats/camera_file masks/masked_points masks/photo_masks
+public core/scene camera frame_times import posed_films scene view_images formats/camera_file masks/masked_points masks/photo_masks
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/motion raster/render \
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene

@@ -33,6 +33,12 @@ class Colorize {
     folder_ = CollectPhotos(options_.photos);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
     if (options_.film) TakeAsFrames(&folder_);
+    if (options_.poses && !options_.film && !folder_.film) {
+      throw InvalidArgument(
+          "--poses is for films, and {} is none; photos get poses anyway (frames as pictures: add "
+          "--film)",
+          options_.photos);
+    }
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
     for (const std::string& text : options_.more_keys) {
       const MoreKey key = ParseMoreKey(text);
@@ -60,6 +66,12 @@ class Colorize {
       throw InvalidArgument(
           "--benchmark needs the frames of {} as pictures in a folder; give that with --film",
           folder_.film->file.string());
+    }
+    if (options_.benchmark && !folder_.posed_films.empty()) {
+      throw InvalidArgument(
+          "--benchmark needs the frames of {} as pictures, named in transforms.json with their "
+          "times",
+          folder_.posed_films[0].file.string());
     }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);

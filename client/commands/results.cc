@@ -30,6 +30,10 @@ constexpr MetricLine kMetricLines[] = {
     {"delta_e00_chroma", "chroma error (CIEDE2000)", 2, ""},
     {"delta_e00_chroma_bound", "  with all true colours", 2, ""},
     {"delta_e00_gray", "  for comparison, grey", 2, ""},
+    {"tc_chroma", "TC of chroma (Lab)", 2, ""},
+    {"tc_chroma_truth", "  of the true colours", 2, ""},
+    {"cdc", "CDC", 5, ""},
+    {"cdc_truth", "  of the true colours", 5, ""},
     {"share_seen", "share seen in a key view", 2, ""},
     {"gaussians", "Gaussians", 0, ""},
 };

@@ -24,6 +24,10 @@ std::string LayoutName(v1::Scene::Layout layout) {
       return "splat";
     case v1::Scene::LAYOUT_FILM:
       return "film";
+    case v1::Scene::LAYOUT_NERFIES:
+      return "nerfies";
+    case v1::Scene::LAYOUT_POSES_BOUNDS:
+      return "poses_bounds";
     default:
       return "-";
   }

@@ -22,7 +22,11 @@ std::string UploadFolder(Connection& connection,
       });
   display.Say(folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
               : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
-                            : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
+              : !folder.posed_films.empty()
+                  ? fmt::format("{}: {} films of cameras with poses",
+                                scene.name(),
+                                folder.posed_films.size())
+                  : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }
 

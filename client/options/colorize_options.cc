@@ -68,10 +68,13 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
 
 constexpr size_t kMaxMoreKeys = 16;
 
-// What preset, file and settings say, before the flags of this command.
+// What preset, file and settings say, and --poses, before the other flags of this command.
 v1::ColorizeSceneSpec Chosen(const ColorizeOptions& options) {
   v1::ColorizeSceneSpec spec = ReadPreset(options.preset);
   for (const std::string& setting : options.settings) SetOption(setting, &spec);
+  if (options.poses) {
+    spec.mutable_import_scene()->set_film_poses(v1::ImportSceneSpec::FILM_POSES_AUTO);
+  }
   return spec;
 }
 
@@ -230,6 +233,9 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_flag("--deflicker",
                o->deflicker,
                "Take flicker of exposure out of a film; the coloured frames get steady luminance");
+  app.add_flag("--poses",
+               o->poses,
+               "Of a film by one moving camera: find the frames' poses by what stands still");
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");

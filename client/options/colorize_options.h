@@ -25,6 +25,7 @@ struct ColorizeOptions {
   std::string preset = "fast";  // of the server's, or a file of the user's own
   bool film = false;            // the photos are frames of a film
   bool deflicker = false;       // its exposure is made steady
+  bool poses = false;           // of a film: its frames' poses are looked for
   bool benchmark = false;
   int keys = 1;        // of the benchmark: key views in their true colours, chosen together
   bool bound = false;  // of the benchmark: upload all true colours, and score what they would give

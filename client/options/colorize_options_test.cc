@@ -109,6 +109,17 @@ TEST_F(ColorizeOptionsTest, MasksComeWithPhotosOfAPlace) {
   EXPECT_THAT(Complaint({"--masks=m", "--film"}), HasSubstr("--film takes frames as they are"));
 }
 
+TEST_F(ColorizeOptionsTest, PosesOfAFilmAreAskedForByFlag) {
+  ColorizeOptions options;
+  EXPECT_FALSE(ImportSpec(options, "scenes/s").import_scene().has_film_poses());
+  options.poses = true;
+  for (const v1::ImportSceneSpec& spec :
+       {ImportSpec(options, "scenes/s").import_scene(),
+        ColorizeSpec(options, "scenes/s").colorize_scene().import_scene()}) {
+    EXPECT_EQ(spec.film_poses(), v1::ImportSceneSpec::FILM_POSES_AUTO);
+  }
+}
+
 TEST_F(ColorizeOptionsTest, AnUnknownOptionIsToldWithTheNearest) {
   EXPECT_THAT(Complaint({"--set=personalise.iterations=3"}),
               HasSubstr("did you mean personalize.iterations?"));

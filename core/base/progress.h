@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -38,6 +39,12 @@ class CheckpointStore {
   virtual bool WantsSave() = 0;
   // Durable when it returns. Throws Error{kAborted} when this worker has lost its lease.
   virtual void Save(const std::string& state) = 0;
+  // The same for states too large to be held in memory. The newest one written to `file`; false
+  // when there is none ...
+  virtual bool LoadTo(const std::filesystem::path& file);
+  // ... and one in a file of the work's scratch folder, which is moved. As they are, both go by
+  // Load and Save; a stage keeps to one pair or the other.
+  virtual void SaveFile(const std::filesystem::path& file);
 };
 
 // Never resumes, never saves.

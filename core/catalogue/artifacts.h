@@ -11,6 +11,8 @@ inline constexpr char kSfmLog[] = "sfm.log";
 // Of a scene that is a splat: what stands for photos, drawn from it (view's stem + ".png"; they lie
 // in the scene's folder for all stages that are given them), and its Gaussians in grey.
 inline constexpr char kGivenViews[] = "given_views/";
+// Of a film with poses, view's stem + ".png", 480 px: white where something moves on its own.
+inline constexpr char kMovingRegions[] = "moving/";
 inline constexpr char kGivenGeometry[] = "given.c3g";
 inline constexpr char kKeyView[] = "key_view.json";                // which view, and why
 inline constexpr char kKeyViewGray[] = "key_view.png";             // as captured: to be coloured
@@ -44,6 +46,7 @@ inline constexpr char kSog[] = "scene.sog";
 inline constexpr char kSpz[] = "scene.spz";
 inline constexpr char kGlb[] = "scene.glb";
 inline constexpr char kSplat[] = "scene.splat";
+inline constexpr char kMoments[] = "moments/";  // "00001.ply" and so on, of a scene that moves
 inline constexpr char kExportScores[] = "export.json";  // what they lose against our renders
 inline constexpr char kRenders[] = "renders/";          // view's stem + ".png"
 inline constexpr char kMovie[] = "scene.mp4";

@@ -9,7 +9,7 @@ const std::vector<Stage>& StageCatalogue() {
   using namespace artifact;
   static const std::vector<Stage> catalogue = {
       {.kind = kind::kImportScene,
-       .leaves = {kScene, kImportFacts, kSfmLog, kGivenViews, kGivenGeometry},
+       .leaves = {kScene, kImportFacts, kSfmLog, kGivenViews, kMovingRegions, kGivenGeometry},
        .results = {kSfmLog}},
       {.kind = kind::kSelectKeyView,
        .needs = {kScene},
@@ -65,8 +65,8 @@ const std::vector<Stage>& StageCatalogue() {
       {.kind = kind::kExport,
        .needs = {kScene, kModel},
        .reads = {kKeyView},
-       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kViewPage, kExportScores},
-       .results = {kPly, kSog, kSpz, kGlb, kSplat, kViewPage}},
+       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kMoments, kViewPage, kExportScores},
+       .results = {kPly, kSog, kSpz, kGlb, kSplat, kMoments, kViewPage}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
        .reads = {kKeyView, kKeyColor, kViewsAb},  // of a film

@@ -16,12 +16,6 @@ namespace {
 constexpr int kWindowRadius = 3;
 constexpr float kLeastConfidence = 0.02f;
 
-// Both ways between the key frame and a frame, px: 2 channels, x and y.
-struct Track {
-  Image in_key;    // where each pixel of the frame lies in the key frame
-  Image in_frame;  // where each pixel of the key frame lies in the frame
-};
-
 Image Identity(int width, int height) {
   Image place(width, height, 2);
   for (int y = 0; y < height; ++y) {
@@ -51,9 +45,13 @@ Image Moved(const Image& flow) {
 }
 
 // One step further, from frame `now` to frame `next`.
-Track Step(const Track& track, const Image& now, const Image& next) {
+FilmTrack Step(const FilmTrack& track,
+               const Image& now,
+               const Image& next,
+               const CancellationToken& cancel) {
   const Image there = DenseFlow(now, next);
-  Track further{Sampled(track.in_key, Moved(DenseFlow(next, now))), track.in_frame};
+  cancel.ThrowIfCancelled();
+  FilmTrack further{Sampled(track.in_key, Moved(DenseFlow(next, now))), track.in_frame};
   const Image step = Sampled(there, track.in_frame);
   for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
   return further;
@@ -117,7 +115,7 @@ bool Inside(float x, float y, int width, int height) {
 CarriedColor ColorOf(const FilmKey& key,
                      const Image& key_contrast,
                      const Image& contrast,
-                     const Track& track,
+                     const FilmTrack& track,
                      const FilmCarryOptions& options) {
   CarriedColor color{Sampled(key.color.ab, track.in_key),
                      Sampled(key.color.confidence, track.in_key)};
@@ -145,10 +143,26 @@ CarriedColor ColorOf(const FilmKey& key,
 // A walk away from a key frame, and the frames on it that the key frame colours.
 struct Walk {
   const FilmKey* key = nullptr;
+  int direction = 1;
   std::vector<int> frames;  // in the order of the walk
+  FilmWalk before;          // track null: it begins at the key frame
 };
 
-std::vector<Walk> WalksOf(const FilmFrames& frames, const std::vector<FilmKey>& keys) {
+// Leaves out what is done.
+void TakeUp(const std::vector<FilmWalk>& walks, Walk* walk) {
+  for (const FilmWalk& done : walks) {
+    if (done.key != walk->key->frame || done.direction != walk->direction) continue;
+    const auto last = std::find(walk->frames.begin(), walk->frames.end(), done.frame);
+    if (last == walk->frames.end()) return;  // of other keys
+    if (!done.track && last + 1 != walk->frames.end()) return;
+    walk->frames.erase(walk->frames.begin(), last + 1);
+    walk->before = done;
+  }
+}
+
+std::vector<Walk> WalksOf(const FilmFrames& frames,
+                          const std::vector<FilmKey>& keys,
+                          const std::vector<FilmWalk>& done) {
   const int count = static_cast<int>(frames.shot.size());
   std::vector<const FilmKey*> nearest(count, nullptr);
   for (int i = 0; i < count; ++i) {
@@ -162,11 +176,12 @@ std::vector<Walk> WalksOf(const FilmFrames& frames, const std::vector<FilmKey>& 
   std::vector<Walk> walks;
   for (const FilmKey& key : keys) {
     for (const int direction : {1, -1}) {
-      Walk walk{&key, {}};
+      Walk walk{&key, direction, {}, {}};
       for (int i = key.frame + direction; i >= 0 && i < count; i += direction) {
         // Frames with faults lie between those of a shot.
         if (nearest[i] == &key) walk.frames.push_back(i);
       }
+      TakeUp(done, &walk);
       if (!walk.frames.empty()) walks.push_back(std::move(walk));
     }
   }
@@ -190,7 +205,8 @@ void CarryAlongFilm(const FilmFrames& frames,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const std::function<void(int frame, const CarriedColor& color)>& on_frame) {
+                    const std::function<void(int frame, const CarriedColor& color)>& on_frame,
+                    const FilmResume& resume) {
   options.Validate();
   for (size_t i = 0; i < keys.size(); ++i) {
     if (keys[i].frame < 0 || keys[i].frame >= static_cast<int>(frames.shot.size())) {
@@ -203,27 +219,38 @@ void CarryAlongFilm(const FilmFrames& frames,
     }
   }
   std::mutex handing_over;
-  const auto hand_over = [&](int frame, const CarriedColor& color) {
-    const std::lock_guard lock(handing_over);
-    on_frame(frame, color);
-  };
-  for (const FilmKey& key : keys) hand_over(key.frame, key.color);
-  const std::vector<Walk> walks = WalksOf(frames, keys);
+  for (const FilmKey& key : keys) on_frame(key.frame, key.color);
+  const std::vector<Walk> walks = WalksOf(frames, keys, resume.walks);
   pool.ForEach(static_cast<int64_t>(walks.size()), [&](int64_t index, int) {
     const Walk& walk = walks[index];
     const auto key = frames.luminance(walk.key->frame);
     const Image key_contrast = LocalContrast(*key);
     auto now = key;
-    Track track{Identity(key->width, key->height), Identity(key->width, key->height)};
+    auto track = walk.before.track;
+    if (track) {
+      now = frames.luminance(walk.before.frame);
+    } else {
+      const Image start = Identity(key->width, key->height);
+      track = std::make_shared<const FilmTrack>(FilmTrack{start, start});
+    }
     for (const int frame : walk.frames) {
       cancel.ThrowIfCancelled();
       const auto next = frames.luminance(frame);
       const Image contrast = LocalContrast(*next);
-      track = Step(track, *now, *next);
-      Register(*next, contrast, *key, key_contrast, &track.in_key);
-      Register(*key, key_contrast, *next, contrast, &track.in_frame);
-      hand_over(frame, ColorOf(*walk.key, key_contrast, contrast, track, options));
+      FilmTrack further = Step(*track, *now, *next, cancel);
+      cancel.ThrowIfCancelled();
+      Register(*next, contrast, *key, key_contrast, &further.in_key);
+      cancel.ThrowIfCancelled();
+      Register(*key, key_contrast, *next, contrast, &further.in_frame);
+      track = std::make_shared<const FilmTrack>(std::move(further));
+      const CarriedColor color = ColorOf(*walk.key, key_contrast, contrast, *track, options);
       now = next;
+      const std::lock_guard lock(handing_over);
+      if (resume.on_walk) {
+        const bool ends = frame == walk.frames.back();
+        resume.on_walk({walk.key->frame, walk.direction, frame, ends ? nullptr : track});
+      }
+      on_frame(frame, color);
     }
   });
 }

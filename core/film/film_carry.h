@@ -35,15 +35,38 @@ struct FilmFrames {
   std::function<std::shared_ptr<const Image>(int frame)> luminance;
 };
 
+// Both ways between a key frame and another: 2 channels, x and y in px.
+struct FilmTrack {
+  Image in_key;    // where each pixel of the frame lies in the key frame
+  Image in_frame;  // where each pixel of the key frame lies in the frame
+};
+
+// How far the walk away from a key frame is.
+struct FilmWalk {
+  int key = 0;                             // frame
+  int direction = 1;                       // 1 or -1
+  int frame = 0;                           // the last one that was handed over
+  std::shared_ptr<const FilmTrack> track;  // to it; null at the walk's end
+};
+
+// For work that may be interrupted.
+struct FilmResume {
+  std::vector<FilmWalk> walks;  // as on_walk told them last: they go on behind their frame
+  // Called before on_frame with the same frame, under the same lock. May be empty.
+  std::function<void(const FilmWalk& walk)> on_walk;
+};
+
 // Colours every frame of the shots that have a key frame from the nearest of them, and hands it to
 // `on_frame` in any order, from several threads, one after the other. Frames of other shots are not
-// handed over. Memory does not grow with the number of frames. Throws Error{kInvalidArgument} for
-// keys that are no frames or are given twice.
+// handed over. Memory does not grow with the number of frames. What comes of resumed walks is the
+// same to the bit; key frames are handed over again. Throws Error{kInvalidArgument} for keys that
+// are no frames or are given twice, kCancelled.
 void CarryAlongFilm(const FilmFrames& frames,
                     const std::vector<FilmKey>& keys,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const std::function<void(int frame, const CarriedColor& color)>& on_frame);
+                    const std::function<void(int frame, const CarriedColor& color)>& on_frame,
+                    const FilmResume& resume = {});
 
 }  // namespace color3d

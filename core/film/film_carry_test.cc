@@ -158,6 +158,59 @@ TEST(FilmCarry, WhatCannotBeFollowedIsNotClaimed) {
                  });
 }
 
+TEST(FilmCarry, InterruptedWalksGoOnToTheSameBits) {
+  const Scenery scenery{.pan_px = 1.5};
+  const std::vector<FilmKey> keys = {KeyOf(scenery, 3), KeyOf(scenery, 9)};
+  const std::vector<int> shots(14, 0);
+  const auto whole = Carry(scenery, shots, keys);
+  CancellationToken cancel;
+  ThreadPool pool(1);
+  std::map<int, CarriedColor> colors;
+  std::map<std::pair<int, int>, FilmWalk> walks;
+  std::vector<int> read;
+  const FilmFrames frames{shots, [&](int frame) {
+                            read.push_back(frame);
+                            return std::make_shared<const Image>(scenery.Luminance(frame));
+                          }};
+  const auto told = [&](const FilmWalk& walk) { walks[{walk.key, walk.direction}] = walk; };
+  int steps = 0, runs = 0;
+  for (bool done = false; !done; ++runs) {
+    ASSERT_LT(runs, 20);
+    FilmResume resume{{}, told};
+    for (const auto& [place, walk] : walks) resume.walks.push_back(walk);
+    try {
+      CarryAlongFilm(
+          frames,
+          keys,
+          {},
+          pool,
+          cancel,
+          [&](int frame, const CarriedColor& color) {
+            const bool is_new = colors.emplace(frame, color).second;
+            EXPECT_TRUE(is_new || frame == 3 || frame == 9) << frame;
+            if (is_new && ++steps % 2 == 0) throw Error(ErrorCode::kAborted, "killed");
+          },
+          resume);
+      done = true;
+    } catch (const Error& e) {
+      ASSERT_EQ(e.code(), ErrorCode::kAborted);
+    }
+  }
+  EXPECT_GT(runs, 6);
+  ASSERT_EQ(colors.size(), whole.size());
+  for (const auto& [frame, color] : whole) {
+    EXPECT_EQ(colors.at(frame).ab.data, color.ab.data) << frame;
+    EXPECT_EQ(colors.at(frame).confidence.data, color.confidence.data) << frame;
+  }
+  // What is at its end reads nothing any more.
+  read.clear();
+  FilmResume resume{{}, {}};
+  for (const auto& [place, walk] : walks) resume.walks.push_back(walk);
+  CarryAlongFilm(
+      frames, keys, {}, pool, cancel, [](int, const CarriedColor&) {}, resume);
+  EXPECT_TRUE(read.empty());
+}
+
 TEST(FilmCarry, SmallAndWrong) {
   const Scenery still{.pan_px = 0.0};
   EXPECT_EQ(Carry(still, {0}, {KeyOf(still, 0)}).size(), 1u);

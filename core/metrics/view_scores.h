@@ -1,6 +1,7 @@
 // Scores of one held-out view against its true colours (METHOD.md "Metrics"). Pure, thread-safe.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -43,16 +44,21 @@ class SourceErrors {
            const Image& view_ab,
            const Image& provenance,
            const Image* mask = nullptr);
-  bool Empty() const { return errors_.empty(); }
+  bool Empty() const { return pixels_ == 0; }
   // "share_X" of the pixels and their mean "delta_e00_X" for X = seen (share above half), inferred
   // and guessed (whichever is the larger otherwise; no error for one that has no pixels), and
   // "confidence_rank_correlation" of confidence = seen + inferred / 2 with the error: -1 is best.
   Scores Result() const;
 
  private:
+  int64_t pixels_ = 0;
+  double sum_[3] = {0.0, 0.0, 0.0};  // of errors, by source
+  double count_[3] = {0.0, 0.0, 0.0};
+  // For the correlation: of very many pixels only every so manieth, so that memory does not grow
+  // with the number of views.
+  int64_t stride_ = 1;
   std::vector<float> errors_;
   std::vector<float> confidence_;
-  std::vector<char> source_;
 };
 
 // Colour of the pixel: index into kSourceNames.

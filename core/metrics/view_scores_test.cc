@@ -99,5 +99,27 @@ TEST(SourceErrors, ConfidenceThatKnowsTheErrorsCorrelatesWithThem) {
   EXPECT_NEAR(wrong.Result().at("confidence_rank_correlation"), 1.0, 1e-6);
 }
 
+TEST(SourceErrors, ManyViewsDoNotChangeWhatIsSaid) {
+  const int side = 400;
+  const Image truth(side, side, 3, 0.5f);
+  Image ab(side, side, 2), shares(side, side, 3);
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const int hash = (x * 7919 + y * 104729) % 97;
+      ab.At(0, y, x) = static_cast<float>(hash % 31);
+      shares.At(hash < 40 ? 1 : 2, y, x) = 1.0f;
+    }
+  }
+  SourceErrors one, many;
+  one.Add(truth, ab, shares);
+  for (int i = 0; i < 30; ++i) many.Add(truth, ab, shares);  // 4.8 million pixels
+  const Scores of_one = one.Result(), of_many = many.Result();
+  for (const char* name : {"share_seen", "delta_e00_seen", "delta_e00_inferred"}) {
+    EXPECT_NEAR(of_many.at(name), of_one.at(name), 1e-6) << name;
+  }
+  EXPECT_NEAR(
+      of_many.at("confidence_rank_correlation"), of_one.at("confidence_rank_correlation"), 0.02);
+}
+
 }  // namespace
 }  // namespace color3d

@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <fstream>
+#include <utility>
 
 #include "core/base/error.h"
 
@@ -25,6 +27,22 @@ double NumberFrom(std::string_view text, int line) {
 }
 
 constexpr std::string_view kHeader = "stage,seconds,iteration,error_name,value";
+
+constexpr size_t kPrefix = sizeof(double) + sizeof(uint64_t);
+
+[[noreturn]] void ThrowDamaged(const std::string& stage) {
+  throw Error(ErrorCode::kDataLoss, "the checkpoint of {} is damaged", stage);
+}
+
+// Seconds and the length of the CSV behind them. `bytes`: at least kPrefix.
+std::pair<double, uint64_t> PrefixOf(std::string_view bytes, const std::string& stage) {
+  double seconds = 0.0;
+  uint64_t length = 0;
+  std::memcpy(&seconds, bytes.data(), sizeof(seconds));
+  std::memcpy(&length, bytes.data() + sizeof(seconds), sizeof(length));
+  if (length > bytes.size() - kPrefix || !std::isfinite(seconds)) ThrowDamaged(stage);
+  return {seconds, length};
+}
 
 }  // namespace
 
@@ -98,35 +116,66 @@ std::vector<CurvePoint> CurveRecorder::points() const {
   return points_;
 }
 
-// Layout of a wrapped checkpoint: seconds (float64), length of the CSV (uint64), CSV, trainer
-// state.
-void CurveRecorder::Save(const std::string& state) {
+// Seconds (float64), length of the CSV (uint64), CSV: before a state in memory, and behind one in a
+// file, there with its own length (uint64) last.
+std::string CurveRecorder::Facts() const {
   const double seconds = Seconds();
   const std::string csv = CurvesToCsv(points());
   const uint64_t length = csv.size();
-  std::string bytes(sizeof(seconds) + sizeof(length), '\0');
+  std::string bytes(kPrefix, '\0');
   std::memcpy(bytes.data(), &seconds, sizeof(seconds));
   std::memcpy(bytes.data() + sizeof(seconds), &length, sizeof(length));
-  bytes += csv;
-  bytes += state;
-  checkpoints_.Save(bytes);
+  return bytes + csv;
 }
+
+void CurveRecorder::TakeFacts(double seconds, std::string_view csv) {
+  std::lock_guard lock(mutex_);
+  points_ = CurvesFromCsv(csv);
+  earlier_seconds_ = seconds;
+}
+
+void CurveRecorder::Save(const std::string& state) { checkpoints_.Save(Facts() + state); }
 
 std::optional<std::string> CurveRecorder::Load() {
   std::optional<std::string> bytes = checkpoints_.Load();
-  constexpr size_t kPrefix = sizeof(double) + sizeof(uint64_t);
   if (!bytes || bytes->size() < kPrefix) return std::nullopt;
-  double seconds = 0.0;
-  uint64_t length = 0;
-  std::memcpy(&seconds, bytes->data(), sizeof(seconds));
-  std::memcpy(&length, bytes->data() + sizeof(seconds), sizeof(length));
-  if (length > bytes->size() - kPrefix || !std::isfinite(seconds)) {
-    throw Error(ErrorCode::kDataLoss, "the checkpoint of {} is damaged", stage_);
-  }
-  std::lock_guard lock(mutex_);
-  points_ = CurvesFromCsv(std::string_view(*bytes).substr(kPrefix, length));
-  earlier_seconds_ = seconds;
+  const auto [seconds, length] = PrefixOf(*bytes, stage_);
+  TakeFacts(seconds, std::string_view(*bytes).substr(kPrefix, length));
   return bytes->substr(kPrefix + length);
+}
+
+void CurveRecorder::SaveFile(const std::filesystem::path& file) {
+  const std::string facts = Facts();
+  const uint64_t length = facts.size();
+  {
+    std::ofstream out(file, std::ios::binary | std::ios::app);
+    out.write(facts.data(), static_cast<std::streamsize>(length));
+    out.write(reinterpret_cast<const char*>(&length), sizeof(length));
+    if (!out.flush()) throw Error(ErrorCode::kResourceExhausted, "cannot write {}", file.string());
+  }
+  checkpoints_.SaveFile(file);
+}
+
+bool CurveRecorder::LoadTo(const std::filesystem::path& file) {
+  if (!checkpoints_.LoadTo(file)) return false;
+  const uint64_t size = std::filesystem::file_size(file);
+  uint64_t length = 0;
+  if (size < sizeof(length) + kPrefix) return false;
+  std::string facts;
+  {
+    std::ifstream in(file, std::ios::binary);
+    in.seekg(static_cast<std::streamoff>(size - sizeof(length)));
+    in.read(reinterpret_cast<char*>(&length), sizeof(length));
+    if (length < kPrefix || length > size - sizeof(length)) ThrowDamaged(stage_);
+    facts.resize(length);
+    in.seekg(static_cast<std::streamoff>(size - sizeof(length) - length));
+    in.read(facts.data(), static_cast<std::streamsize>(length));
+    if (!in) ThrowDamaged(stage_);
+  }
+  const auto [seconds, csv_length] = PrefixOf(facts, stage_);
+  TakeFacts(seconds, std::string_view(facts).substr(kPrefix, csv_length));
+  std::filesystem::resize_file(file, size - sizeof(length) - length);
+  return true;
 }
 
 }  // namespace color3d

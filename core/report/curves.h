@@ -40,11 +40,17 @@ class CurveRecorder : public ProgressObserver, public CheckpointStore {
   std::optional<std::string> Load() override;
   bool WantsSave() override { return checkpoints_.WantsSave(); }
   void Save(const std::string& state) override;
+  bool LoadTo(const std::filesystem::path& file) override;
+  void SaveFile(const std::filesystem::path& file) override;
 
   double Seconds() const;
   std::vector<CurvePoint> points() const;
 
  private:
+  // What a checkpoint holds beside the stage's own state.
+  std::string Facts() const;
+  void TakeFacts(double seconds, std::string_view csv);
+
   std::string stage_;
   ProgressObserver& outer_;
   CheckpointStore& checkpoints_;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/base/files.h"
 
 namespace color3d {
 namespace {
@@ -49,6 +50,33 @@ TEST(CurveRecorder, ResumesPointsAndClock) {
   EXPECT_EQ(points[0].iteration, 1);
   EXPECT_EQ(points[1].iteration, 3);
   EXPECT_GE(points[1].seconds, points[0].seconds);
+}
+
+TEST(CurveRecorder, ResumesStatesInFilesToo) {
+  MemoryCheckpoints checkpoints;
+  NullObserver outer;
+  const ScratchFolder scratch;
+  const auto file = scratch.path() / "state";
+  for (const std::string& state : {std::string("the state of a stage"), std::string()}) {
+    {
+      CurveRecorder first("stage", outer, checkpoints);
+      first.OnError(1, "error", 3.0);
+      WriteFileAtomic(file, state);
+      first.SaveFile(file);
+      EXPECT_FALSE(std::filesystem::exists(file));
+    }
+    CurveRecorder second("stage", outer, checkpoints);
+    ASSERT_TRUE(second.LoadTo(file));
+    EXPECT_EQ(ReadFile(file), state);
+    ASSERT_EQ(second.points().size(), 1u);
+    EXPECT_EQ(second.points()[0].value, 3.0);
+  }
+  checkpoints.Save(std::string(40, '\x7f'));
+  CurveRecorder damaged("stage", outer, checkpoints);
+  EXPECT_THROW(damaged.LoadTo(file), Error);
+  MemoryCheckpoints none;
+  CurveRecorder fresh("stage", outer, none);
+  EXPECT_FALSE(fresh.LoadTo(file));
 }
 
 TEST(CurveRecorder, RefusesADamagedCheckpoint) {

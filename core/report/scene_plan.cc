@@ -1,5 +1,7 @@
 #include "core/report/scene_plan.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -22,6 +24,15 @@ double SfmSeconds(const PlanFacts& f) {
 PlanStep Step(
     std::string name, bool needed, std::string reason, double seconds, std::string stage = "") {
   return {std::move(name), needed, std::move(reason), seconds, -1.0, std::move(stage)};
+}
+
+std::string WhyTime(const PlanFacts& f) {
+  if (f.is_film) return "nothing is reconstructed of a film";
+  if (!f.is_dynamic) return "all photos show one moment";
+  return fmt::format("the views show {} moments, seen by {} camera{}",
+                     f.time_steps,
+                     f.cameras,
+                     f.cameras == 1 ? "" : "s");
 }
 
 }  // namespace
@@ -79,11 +90,7 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
                       false,
                       "chroma is low-frequency in angle: degree 0 suffices unless asked for",
                       0.0));
-  plan.push_back(
-      Step("deformation_over_time",
-           false,
-           f.is_film ? "nothing is reconstructed of a film" : "all photos show one moment",
-           0.0));
+  plan.push_back(Step("deformation_over_time", f.is_dynamic, WhyTime(f), 0.0));
   plan.push_back(
       Step("evaluation",
            true,

@@ -26,6 +26,9 @@ struct PlanFacts {
   bool has_sparse_points = true;
   bool geometry_given = false;  // the scene is a splat
   bool is_film = false;         // frames without poses: nothing is reconstructed
+  bool is_dynamic = false;      // several times with poses
+  int time_steps = 0;           // of a dynamic scene
+  int cameras = 0;              // of a dynamic scene
   bool has_truth = false;
   bool key_view_given = false;
   int views = 0;

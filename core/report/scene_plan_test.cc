@@ -30,5 +30,18 @@ TEST(ScenePlan, LeavesOutWhatTheSceneDoesNotNeed) {
   EXPECT_TRUE(PlanScene(facts)[0].needed);
 }
 
+TEST(ScenePlan, TellsOfTime) {
+  const auto told = [](const PlanFacts& facts) {
+    for (const PlanStep& step : PlanScene(facts)) {
+      if (step.step == "deformation_over_time") return step;
+    }
+    return PlanStep{};
+  };
+  EXPECT_FALSE(told({}).needed);
+  const PlanStep step = told({.is_dynamic = true, .time_steps = 25, .cameras = 4});
+  EXPECT_TRUE(step.needed);
+  EXPECT_EQ(step.reason, "the views show 25 moments, seen by 4 cameras");
+}
+
 }  // namespace
 }  // namespace color3d

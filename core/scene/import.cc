@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <set>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/scene/formats/colmap_model.h"
+#include "core/scene/formats/nerfies.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/lens.h"
 #include "core/scene/masks/photo_masks.h"
@@ -164,9 +167,51 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
       "{} photos have no pose and were left out: {}", unposed.size(), FirstNames(unposed, 5)));
 }
 
+// Of a scene that may move, what all cameras took at every eighth moment from the fifth on: each
+// has moments before and after it.
+void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
+  std::set<double> times;
+  for (const View& view : scene->views) times.insert(view.time_s());
+  if (times.size() < kHoldOutEvery) {
+    warnings->push_back(fmt::format(
+        "no view is held out for evaluation: the scene has only {} moments", times.size()));
+    return;
+  }
+  for (View& view : scene->views) {
+    const auto step = std::distance(times.begin(), times.find(view.time_s()));
+    view.held_out = step % kHoldOutEvery == kHoldOutEvery / 2;
+  }
+}
+
+void HoldOutCamera(const std::string& camera, ImportResult* result) {
+  const auto found = std::find(result->cameras.begin(), result->cameras.end(), camera);
+  if (result->cameras.size() < 2) {
+    throw InvalidArgument(
+        "hold_out_camera is '{}', but the scene is not one of several cameras with "
+        "times; leave it out",
+        camera);
+  }
+  if (found == result->cameras.end()) {
+    throw InvalidArgument("hold_out_camera: there is no camera '{}'; the scene has {}",
+                          camera,
+                          FirstNames(result->cameras, 8));
+  }
+  const int shot = static_cast<int>(found - result->cameras.begin());
+  for (View& view : result->scene.views) view.held_out |= view.moment && view.moment->shot == shot;
+}
+
+// Throws unless a scene whose frames have times shows what it is from several places.
+void CheckMoves(const Scene& scene) {
+  if (!scene.IsFilm()) return;
+  throw InvalidArgument(
+      "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
+      "Colour them as a film: leave the poses out and give --film");
+}
+
 }  // namespace
 
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings) {
+  if (scene->IsDynamic()) return HoldOutMoments(scene, warnings);
   std::vector<View>& views = scene->views;
   const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
   if (views.size() < held_out + kMinTrainingViews) {
@@ -202,31 +247,72 @@ ImportResult ImportScene(const fs::path& scene_folder,
     result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings);
     WarnOfUnposedPhotos(scene_folder, &result);
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
+  } else if (IsNerfiesFolder(scene_folder)) {
+    result.layout = SceneLayout::kNerfies;
+    result.scene = ReadNerfies(scene_folder, &result.warnings, &result.cameras);
+    result.photos_found = static_cast<int>(result.scene.views.size());
+    FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;
-    result.scene =
-        ReadTransformsJson(scene_folder / "transforms.json", scene_folder, &result.warnings);
+    result.scene = ReadTransformsJson(
+        scene_folder / "transforms.json", scene_folder, &result.warnings, &result.cameras);
     WarnOfUnposedPhotos(scene_folder, &result);
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }
-  Scene& scene = result.scene;
+  FinishPosedScene(options, &result);
+  return result;
+}
+
+ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
+                            const fs::path& scratch_folder,
+                            const ImportOptions& options,
+                            const RunControl& run) {
+  options.Validate();
+  std::vector<Photo> photos;
+  for (const SequenceFrame& frame : frames) {
+    run.cancel.ThrowIfCancelled();
+    Photo photo;
+    photo.name = frame.name;
+    photo.file = frame.file.string();
+    photo.mask_file = frame.mask_file.string();
+    ProbePhoto({}, &photo);
+    photos.push_back(std::move(photo));
+  }
+  ImportResult result;
+  result.photos_found = static_cast<int>(photos.size());
+  SfmResult sfm =
+      RunStructureFromMotion(photos, {}, scratch_folder, options, run, PhotoOrder::kSequence);
+  result.scene = std::move(sfm.scene);
+  result.sfm = std::move(sfm.report);
+  result.ran_structure_from_motion = true;
+  FinishPosedScene(options, &result);
+  return result;
+}
+
+void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
+  Scene& scene = result->scene;
   if (scene.views.size() < kMinTrainingViews) {
     throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
                           scene.views.size());
   }
-  result.photos_registered = static_cast<int>(scene.views.size());
-  result.masked_views = static_cast<int>(std::count_if(
+  CheckMoves(scene);
+  result->photos_registered = static_cast<int>(scene.views.size());
+  result->masked_views = static_cast<int>(std::count_if(
       scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));
-  result.undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
+  result->undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
     return !IsUndistorted(v.distortion);
   });
   DropWeakPoints(&scene);
-  Normalise(&result);
-  AddRandomPointsWhenEmpty(&result);
-  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result.warnings);
-  return result;
+  Normalise(result);
+  AddRandomPointsWhenEmpty(result);
+  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result->warnings);
+  if (!options.hold_out_camera.empty()) HoldOutCamera(options.hold_out_camera, result);
+  if (scene.TrainingViews().size() < kMinTrainingViews) {
+    throw InvalidArgument("only {} view is left to learn from when the others are held out",
+                          scene.TrainingViews().size());
+  }
 }
 
 }  // namespace color3d

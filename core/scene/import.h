@@ -12,15 +12,18 @@
 
 namespace color3d {
 
-enum class SceneLayout { kPhotos, kColmap, kTransforms, kSplat };
+enum class SceneLayout { kPhotos, kColmap, kTransforms, kNerfies, kPosedFilms };
 
 // Which pairs of photos structure-from-motion matches: a planned few, with all as the way out when
 // those do not hang together, or all from the start.
 enum class SfmPairs { kPlanned, kExhaustive };
 
 struct ImportOptions {
-  // Hold out every eighth view (sorted by name; the first, ninth, ...) for evaluation.
+  // Hold out every eighth view for evaluation: HoldOutEveryEighth.
   bool hold_out_every_eighth = false;
+  // Of a dynamic scene of several cameras: all views of this one, by its name or folder. Empty:
+  // none.
+  std::string hold_out_camera;
   // Structure-from-motion (only when the input has no poses).
   int sfm_max_image_side_px = 1600;  // 256..4096
   int sfm_max_features = 4096;       // 512..16384, per photo
@@ -53,12 +56,14 @@ struct ImportResult {
   int photos_found = 0;
   int photos_registered = 0;
   int masked_views = 0;               // of which parts are masked out
+  std::vector<std::string> cameras;   // of a dynamic scene: names by Moment::shot
   std::vector<std::string> warnings;  // for the report; not sent to the observer
 };
 
 // `scene_folder` holds photos (directly or in images/), or a COLMAP model (sparse/0, sparse or the
-// folder itself; text or binary) with images/, or transforms.json with the photos that it names.
-// With poses of several kinds, COLMAP's wins. `scratch_folder` receives structure-from-motion's
+// folder itself; text or binary) with images/, or transforms.json with the photos that it names, or
+// what Nerfies and HyperNeRF have (metadata.json, camera/, rgb/). With poses of several kinds,
+// COLMAP's wins. `scratch_folder` receives structure-from-motion's
 // files and sfm.log. Throws Error: an empty folder, one photo, unreadable photos, a model whose
 // images are missing, masks that fit no photo (photo_masks.h), non-finite numbers, photos that do
 // not overlap (how many registered and why it may have failed), points that all lie behind their
@@ -71,7 +76,28 @@ ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const ImportOptions& options,
                          const RunControl& run);
 
-// Marks every eighth view as held out, beginning with the first; warns where the scene has too few.
+// One of the pictures that a camera took one after the other. Both paths are absolute, or relative
+// to the working directory.
+struct SequenceFrame {
+  std::string name;
+  std::filesystem::path file;
+  std::filesystem::path mask_file;  // what stands still (masks/photo_masks.h); empty: all of it
+};
+
+// Poses by structure-from-motion, as of photos, but each frame is matched with its neighbours only,
+// and all pairs are never tried. The views have the frames' names, in their order; those that found
+// no place are missing. image_file and mask_file are the paths given. Throws Error as ImportScene.
+ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
+                            const std::filesystem::path& scratch_folder,
+                            const ImportOptions& options,
+                            const RunControl& run);
+
+// What ImportScene does to every scene once its views have poses: the checks, the coordinates, the
+// points where there are none, what is held out.
+void FinishPosedScene(const ImportOptions& options, ImportResult* result);
+
+// Marks every eighth view as held out, beginning with the first; of a dynamic scene all views of
+// every eighth moment, beginning with the fifth. Warns where the scene has too few.
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings);
 
 }  // namespace color3d

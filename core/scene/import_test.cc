@@ -102,6 +102,64 @@ TEST_F(Import, TwoViewsAreNotHeldOut) {
   EXPECT_THAT(result.warnings[0], HasSubstr("no view is held out"));
 }
 
+// Three cameras on an arc, each a folder, and `steps` times.
+Scene RigScene(int steps, const fs::path& folder) {
+  Scene scene = ArcScene(3);
+  std::vector<View> cameras = std::move(scene.views);
+  scene.views.clear();
+  for (int step = 0; step < steps; ++step) {
+    for (int c = 0; c < 3; ++c) {
+      View view = cameras[c];
+      view.name = "cam" + std::to_string(c) + "/" + std::to_string(step + 10) + ".png";
+      view.image_file = "images/" + view.name;
+      view.moment = Moment{0.1 * step, c};
+      scene.views.push_back(std::move(view));
+    }
+  }
+  WritePhotos(scene, folder);
+  WriteTransformsJson(scene, folder / "transforms.json");
+  return scene;
+}
+
+TEST_F(Import, TimeStepsOfARigAreHeldOutWithAllTheirCameras) {
+  RigScene(14, folder_.path());
+  options_.hold_out_every_eighth = true;
+  const ImportResult result = Run();
+  EXPECT_TRUE(result.scene.IsDynamic());
+  EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam00", "cam01", "cam02"}));
+  ASSERT_EQ(result.scene.views.size(), 42u);
+  for (const View& view : result.scene.views) {
+    // Not the last step: after it nothing is known.
+    EXPECT_EQ(view.held_out, view.name.ends_with("/14.png") || view.name.ends_with("/22.png"))
+        << view.name;
+    EXPECT_EQ(view.moment->shot, view.name[3] - '0');
+  }
+}
+
+TEST_F(Import, AWholeCameraIsHeldOut) {
+  RigScene(3, folder_.path());
+  options_.hold_out_every_eighth = true;
+  options_.hold_out_camera = "cam01";
+  const ImportResult result = Run();
+  EXPECT_THAT(result.warnings, testing::Contains(HasSubstr("only 3 moments")));
+  for (const View& view : result.scene.views) {
+    EXPECT_EQ(view.held_out, view.name.starts_with("cam1/")) << view.name;
+  }
+  options_.hold_out_camera = "cam09";
+  EXPECT_THAT(Said(), HasSubstr("no camera 'cam09'; the scene has cam00, cam01, cam02"));
+}
+
+TEST_F(Import, TimesWithoutPosesAreAFilm) {
+  Scene scene = ArcScene(3);
+  for (View& view : scene.views) {
+    view.cam_from_world = scene.views[0].cam_from_world;
+    view.moment = Moment{0.1 * static_cast<double>(&view - scene.views.data()), 0};
+  }
+  WritePhotos(scene, folder_.path());
+  WriteTransformsJson(scene, folder_.path() / "transforms.json");
+  EXPECT_THAT(Said(), HasSubstr("one camera that stands still"));
+}
+
 TEST_F(Import, GeographicCoordinatesAreRecentred) {
   Scene scene = ArcScene(4);
   WritePhotos(scene, folder_.path());

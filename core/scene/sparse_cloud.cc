@@ -3,11 +3,15 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "core/base/evenly.h"
 #include "core/base/random.h"
 
 namespace color3d {
 namespace {
+
+constexpr size_t kMaxListedViews = 64;
 
 Eigen::Vector3d ViewingDirection(const View& view) {
   return view.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
@@ -30,8 +34,16 @@ double Baseline(const Scene& scene, const Eigen::Vector3d& mean) {
 
 bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(world);
-  if (p.z() < near) return false;
+  if (p.z() <= 0.0 || p.z() < near) return false;
   return view.camera.Contains(view.camera.Project(p));
+}
+
+std::vector<int> AllThatFace(const Scene& scene, const Eigen::Vector3d& world, double near) {
+  std::vector<int> views;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (Sees(scene.views[i], world, near)) views.push_back(static_cast<int>(i));
+  }
+  return views;
 }
 
 bool MostLookAt(const Scene& scene, const Eigen::Vector3d& world) {
@@ -81,6 +93,10 @@ Eigen::Vector3d FocusPoint(const Scene& scene) {
   return MostLookAt(scene, focus) ? focus : fallback;
 }
 
+std::vector<int> ViewsThatFace(const Scene& scene, const Eigen::Vector3d& world, double near) {
+  return EvenlyOf(AllThatFace(scene, world, near), kMaxListedViews);
+}
+
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed) {
   std::vector<SparsePoint> points;
   if (scene.views.empty() || count <= 0) return points;
@@ -107,11 +123,10 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     const double v = random.NextUniform(0.0, view.camera.height);
     SparsePoint point;
     point.position = view.cam_from_world.WorldFromCamera(z * view.camera.Ray(u, v));
-    for (size_t i = 0; i < scene.views.size(); ++i) {
-      if (Sees(scene.views[i], point.position, near)) point.views.push_back(static_cast<int>(i));
-    }
+    point.views = AllThatFace(scene, point.position, near);
     const bool relaxed = attempt >= patience;
     if (point.views.size() < (relaxed ? 1 : std::min(wanted_views, scene.views.size()))) continue;
+    point.views = EvenlyOf(std::move(point.views), kMaxListedViews);
     point.reprojection_error_px = -1.0;
     points.push_back(std::move(point));
   }

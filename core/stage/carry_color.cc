@@ -194,22 +194,19 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
     if (!before.ab.Empty()) FillFrom(before, &key.color);
     keys.push_back(std::move(key));
   }
-  const auto total = static_cast<int64_t>(scene.views.size());
-  std::vector<double> coverage(scene.views.size(), 0.0);
-  int64_t done = 0;
+  CarryCheckpoint done(scene, context);
   CarryAlongFilm(frames,
                  keys,
                  options.film,
                  context.pool(),
                  context.cancel(),
                  [&](int frame, const CarriedColor& color) {
-                   const View& view = scene.views[frame];
-                   coverage[frame] = Coverage(color, kCovered);
-                   context.WriteOutput(ViewArtifact(artifact::kCarried, view, ".png"),
-                                       EncodeAbPng(color.ab, color.confidence));
-                   context.progress().OnProgress(++done, total, "carrying colour along the film");
-                 });
-  Conclude(scene, ViewsOf(keys, &FilmKey::frame), coverage, context);
+                   if (done.WasDone(frame)) return;
+                   done.Add(
+                       frame, Coverage(color, kCovered), EncodeAbPng(color.ab, color.confidence));
+                 },
+                 {done.Walks(), [&](const FilmWalk& walk) { done.SetWalk(walk); }});
+  Conclude(scene, ViewsOf(keys, &FilmKey::frame), done.coverage(), context);
 }
 
 }  // namespace
@@ -232,7 +229,7 @@ void CarryColorOptions::Validate() const {
 void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
-  if (scene.IsFilm()) return CarryByMotion(options, scene, context);
+  if (IsColoredAsFilm(context, scene)) return CarryByMotion(options, scene, context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const ViewImages images(scene, context.scene_folder(), options.max_side_px);
   const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);

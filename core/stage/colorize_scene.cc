@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "core/catalogue/stages.h"
 #include "core/image/codec.h"
@@ -73,7 +74,8 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
     }
   }
   if (context.HasInput(artifact::kModel)) {
-    metrics["gaussians"] = ParseGaussians(context.ReadInput(artifact::kModel)).size();
+    const size_t count = ParseGaussians(context.ReadInput(artifact::kModel)).size();
+    if (count > 0) metrics["gaussians"] = count;
   }
   double total = 0.0;
   int64_t peak = 0;
@@ -105,6 +107,29 @@ double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kin
   return -1.0;
 }
 
+std::string OfMotion(const FilmFindings& film) {
+  std::string text = film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
+                     : film.camera_stands_still ? "the camera stands still"
+                                                : "no poses were found";
+  if (film.motion_energy >= 0.0) {
+    text += fmt::format("; {:.1f} % of the picture moves on its own", 100.0 * film.motion_energy);
+  }
+  return text;
+}
+
+void AddTime(const Scene& scene, PlanFacts* facts) {
+  facts->is_dynamic = scene.IsDynamic();
+  if (!facts->is_dynamic) return;
+  std::set<double> times;
+  std::set<int> cameras;
+  for (const View& view : scene.views) {
+    times.insert(view.moment->time_s);
+    cameras.insert(view.moment->shot);
+  }
+  facts->time_steps = static_cast<int>(times.size());
+  facts->cameras = static_cast<int>(cameras.size());
+}
+
 std::vector<PlanStep> CollectPlan(const Scene& scene,
                                   const std::vector<StageSummary>& stages,
                                   bool has_truth,
@@ -112,7 +137,8 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   if (!context.HasInput(artifact::kImportFacts)) return {};  // nobody knows what was planned
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   PlanFacts plan_facts;
-  plan_facts.is_film = scene.IsFilm();
+  plan_facts.is_film = IsColoredAsFilm(context, scene);
+  AddTime(scene, &plan_facts);
   plan_facts.has_poses = !facts.ran_structure_from_motion;
   plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
@@ -133,6 +159,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     }
   };
   add_reason(kind::kImportScene, facts.sfm_plan);
+  if (facts.film) add_reason(kind::kImportScene, OfMotion(*facts.film));
   if (context.HasInput(artifact::kMemoryPlan)) {
     const auto memory = ReadJson(context, artifact::kMemoryPlan);
     add_reason(kind::kReconstructGeometry, memory.at("note"));
@@ -154,13 +181,17 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
 }
 
 std::string Summary(const Scene& scene,
+                    bool is_film,
                     const ordered_json& metrics,
                     const std::vector<std::string>& keys) {
   const std::string of_model =
-      scene.IsFilm() ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
-  return fmt::format("{} {} ({} held out){}. {} in {} s of computing.",
+      is_film ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
+  PlanFacts time;
+  AddTime(scene, &time);
+  return fmt::format("{} {}{} ({} held out){}. {} in {} s of computing.",
                      scene.views.size(),
-                     scene.IsFilm() ? "frames" : "views",
+                     is_film ? "frames" : "views",
+                     time.is_dynamic ? fmt::format(" of {} moments", time.time_steps) : "",
                      scene.HeldOutViews().size(),
                      keys.empty() ? std::string()
                                   : fmt::format(", all colours from the key {} {}",
@@ -225,7 +256,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
 
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
-  data.summary = Summary(scene, metrics, keys);
+  data.summary = Summary(scene, IsColoredAsFilm(context, scene), metrics, keys);
   if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
   data.key_view = ReportOfKeyView(KeyPictures(key ? scene.views[*key].name : "", context), context);
   const std::vector<CurvePoint> curves = CollectCurves(context);

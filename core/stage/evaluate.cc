@@ -2,6 +2,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "core/color/difference.h"
 #include "core/color/lab.h"
@@ -14,6 +15,7 @@
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/film/colored_frames.h"
+#include "core/stage/film/temporal_scores.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 
@@ -224,7 +226,7 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const TruthFiles held_out = FilesByView(options.truth, true, scene);
   const TruthFiles training = FilesByView(options.training_truth, false, scene);
   std::optional<GaussianModel> model;
-  if (!scene.IsFilm()) model = ParseGaussians(context.ReadInput(artifact::kModel));
+  if (!IsColoredAsFilm(context, scene)) model = ParseGaussians(context.ReadInput(artifact::kModel));
   std::optional<GaussianModel> bound;
   if (options.bound && model) {
     bound = FitTrueChroma(*model, scene, training, options.chroma, context);
@@ -245,6 +247,9 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
   ordered_json json{{"mean", mean}, {"views", scores.views()}};
   json["consistency"] = JsonOf(consistency);
+  if (ordered_json temporal = TemporalScores(scene, model, all, context); !temporal.empty()) {
+    json["temporal"] = std::move(temporal);
+  }
   if (!scores.sources().Empty()) json["sources"] = scores.sources().Result();
   context.WriteOutput(artifact::kScores, json.dump(1) + "\n");
 }

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/base/range_check.h"
 #include "core/splat/export/glb/glb.h"
 #include "core/splat/export/rgb_refine.h"
 #include "core/splat/export/sog/sog.h"
 #include "core/splat/export/spz/spz.h"
+#include "core/splat/motion/motion.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "core/stage/view_page.h"
@@ -67,9 +69,31 @@ ExportedFile WriteWithHarmonics(const ExportOptions& options,
   return smaller;
 }
 
+void WriteMoments(const ExportOptions& options,
+                  const GaussianModel& model,
+                  const ExportFrame& frame,
+                  StageContext& context) {
+  if (options.moments == 0) return;
+  if (model.motion.size() == 0) {
+    context.progress().OnWarning("nothing moves in this scene: there are no moments to export");
+    return;
+  }
+  const double span = model.motion.end_s - model.motion.begin_s;
+  for (int i = 0; i < options.moments; ++i) {
+    context.cancel().ThrowIfCancelled();
+    const double share = options.moments > 1 ? static_cast<double>(i) / (options.moments - 1) : 0.5;
+    const GaussianModel at = ModelAt(model, model.motion.begin_s + share * span, context.pool());
+    context.WriteOutput(
+        fmt::format("{}{:05}.ply", artifact::kMoments, i + 1),
+        EncodeGaussianPly(at, FitRgbHarmonics(at, context.pool()), frame, context.pool()));
+    context.progress().OnProgress(i + 1, options.moments, "writing moments");
+  }
+}
+
 }  // namespace
 
 void ExportOptions::Validate() const {
+  RangeCheck("export option")("moments", moments, 0, 1000);
   if (!ply && !sog && !spz && !glb && !splat) {
     throw InvalidArgument("the export has nothing to write; ask for ply, sog, spz, glb or splat");
   }
@@ -84,7 +108,13 @@ void ExportOptions::Validate() const {
 void RunExport(const ExportOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
-  const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
+  if (scene.IsFilm()) {  // nothing was reconstructed
+    context.WriteOutput(artifact::kExportScores, "{}\n");
+    return;
+  }
+  const GaussianModel in_time = ParseGaussians(context.ReadInput(artifact::kModel));
+  const int shown = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : 0;
+  const GaussianModel model = ModelAt(in_time, scene.views.at(shown).time_s(), context.pool());
   const bool with_confidence = options.confidence && !model.confidence.empty();
   if (options.confidence && !with_confidence) {
     context.progress().OnWarning(
@@ -123,6 +153,7 @@ void RunExport(const ExportOptions& options, StageContext& context) {
     scores["splat"] = ScoresOf(rgb, names);
     context.WriteOutput(artifact::kSplat, EncodeSplat(model, rgb.harmonics, frame, context.pool()));
   }
+  WriteMoments(options, in_time, frame, context);
   context.WriteOutput(artifact::kExportScores, scores.dump(1) + "\n");
 }
 

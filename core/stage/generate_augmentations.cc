@@ -117,6 +117,7 @@ GeometryRenderer RendererFrom(double time_s, StageContext& context) {
   if (!context.HasInput(artifact::kGeometry)) return {};
   const auto model =
       std::make_shared<const GaussianModel>(ParseGaussians(context.ReadInput(artifact::kGeometry)));
+  if (model->size() == 0) return {};
   return [model, time_s, &context](const Camera& camera, const Pose& cam_from_world) {
     RenderedView seen = RenderView(*model, camera, cam_from_world, context.pool(), 0.0f, time_s);
     return RenderedGeometry{std::move(seen.lab), std::move(seen.depth), std::move(seen.opacity)};

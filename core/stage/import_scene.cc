@@ -8,26 +8,14 @@
 #include "core/image/codec.h"
 #include "core/splat/import/splat_scene.h"
 #include "core/splat/raster/render.h"
+#include "core/stage/film/import_posed_films.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/import_output.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
-
-const char* LayoutName(SceneLayout layout) {
-  switch (layout) {
-    case SceneLayout::kPhotos:
-      return "photos";
-    case SceneLayout::kColmap:
-      return "colmap";
-    case SceneLayout::kTransforms:
-      return "transforms";
-    case SceneLayout::kSplat:
-      return "splat";
-  }
-  return "photos";
-}
 
 // The splat that a scene without photos consists of; empty where it is none.
 std::string FindSplat(const fs::path& scene_folder) {
@@ -70,7 +58,7 @@ void ImportSplatScene(const std::string& file,
     context.WriteOutput(view.image_file, PhotoOf(splat.geometry, view, context.pool()));
   }
   ImportFacts facts;
-  facts.layout = LayoutName(SceneLayout::kSplat);
+  facts.layout = "splat";
   facts.photos_found = facts.photos_registered = static_cast<int>(count);
   context.WriteOutput(artifact::kGivenGeometry, SerializeGaussians(splat.geometry));
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
@@ -86,32 +74,16 @@ void RunImportScene(const ImportOptions& options,
   options.Validate();
   splat_views.Validate();
   film_options.Validate();
+  if (ImportPosedFilms(options, film_options, context)) return;
   const std::string film = FindFilm(context.scene_folder());
   if (!film.empty()) {
-    return ImportFilm(film, film_options, options.hold_out_every_eighth, context);
+    return ImportFilm(film, film_options, options, context);
   }
   const std::string splat = FindSplat(context.scene_folder());
   if (!splat.empty()) return ImportSplatScene(splat, options, splat_views, context);
   const ImportResult result =
       ImportScene(context.scene_folder(), context.scratch_folder(), options, context.control());
-  CheckStemsAreUnique(result.scene);
-  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
-  ImportFacts facts;
-  facts.layout = LayoutName(result.layout);
-  facts.ran_structure_from_motion = result.ran_structure_from_motion;
-  facts.sfm_plan = result.sfm.plan;
-  facts.undistorted = result.undistorted;
-  facts.random_points = result.random_points;
-  facts.photos_found = result.photos_found;
-  facts.photos_registered = result.photos_registered;
-  facts.masked_views = result.masked_views;
-  context.progress().OnError(
-      result.photos_found, "photos_without_pose", result.photos_found - result.photos_registered);
-  context.WriteOutput(artifact::kScene, SceneToJson(result.scene));
-  context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
-  if (result.ran_structure_from_motion) {
-    context.WriteOutput(artifact::kSfmLog, ReadFile(result.sfm.log));
-  }
+  WriteImported(result, context);
 }
 
 }  // namespace color3d

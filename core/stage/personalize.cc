@@ -60,7 +60,7 @@ TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageConte
 
 // Views that carried colours are learnt from: the best covered ones that are not the key view.
 constexpr int kMaxCarriedViews = 12;
-constexpr size_t kMaxViewsToLookAt = 120;  // of a film; they are all in memory
+constexpr size_t kMaxViewsToLookAt = 120;  // of a film
 constexpr double kMinCoverage = 0.05;
 constexpr float kMinConfidence = 0.3f;
 constexpr double kCarriedShare = 0.5;  // of the samples
@@ -81,15 +81,19 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
     for (float& value : carried.confidence.data) {
       if (value < kMinConfidence) value = 0.0f;
     }
-    found.push_back({-coverage,
-                     {scene.views[view].name,
-                      *luminance,
-                      std::move(carried.ab),
-                      std::move(carried.confidence)}});
+    // The best so far, best first; those of equal coverage in their order.
+    const auto place =
+        std::upper_bound(found.begin(), found.end(), coverage, [](double value, const auto& other) {
+          return value > other.first;
+        });
+    found.insert(place,
+                 {coverage,
+                  {scene.views[view].name,
+                   *luminance,
+                   std::move(carried.ab),
+                   std::move(carried.confidence)}});
+    if (found.size() > kMaxCarriedViews) found.pop_back();
   }
-  std::stable_sort(
-      found.begin(), found.end(), [](const auto& x, const auto& y) { return x.first < y.first; });
-  if (found.size() > kMaxCarriedViews) found.resize(kMaxCarriedViews);
   std::vector<TrainingPicture> pictures;
   for (auto& [coverage, picture] : found) {
     picture.share = kCarriedShare / (1.0 - kCarriedShare) / static_cast<double>(found.size());

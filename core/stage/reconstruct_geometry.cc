@@ -74,6 +74,10 @@ void RunReconstructGeometry(const GeometryOptions& options,
     return;
   }
   const Scene scene = ReadScene(context);
+  if (scene.IsFilm()) {  // whose poses were looked for in vain
+    context.WriteOutput(artifact::kGeometry, SerializeGaussians({}));
+    return;
+  }
   GeometryOptions planned = options;
   planned.max_gaussians = GaussianCap(options.max_gaussians, TrainingCameras(scene), max_side_px);
   if (options.recipe == GeometryOptions::Recipe::kColor3d) {

@@ -46,13 +46,21 @@ void RenderOptions::Validate() const {
 void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
-  if (scene.IsFilm()) return RenderFilm(options, scene, ViewsToRender(options, scene), context);
+  if (IsColoredAsFilm(context, scene)) {
+    return RenderFilm(options, scene, ViewsToRender(options, scene), context);
+  }
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   if (model.size() == 0) throw InvalidArgument("the model has no Gaussians: nothing is to be seen");
   if (options.path != RenderOptions::Path::kViews) {
     return RenderMovie(options, scene, model, context);
   }
   const std::vector<int> views = ViewsToRender(options, scene);
+  if (model.motion.size() > 0) {  // as the key view's camera saw it
+    RenderOptions movie = options;
+    movie.views.clear();
+    movie.path = RenderOptions::Path::kPhotos;
+    RenderMovie(movie, scene, model, context);
+  }
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();
     const View& view = scene.views[views[i]];

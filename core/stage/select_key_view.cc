@@ -190,7 +190,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   const Scene scene = ReadScene(context);
   // A held-out view must never lend its colour.
   std::vector<int> candidates = scene.TrainingViews();
-  if (scene.IsFilm()) candidates = CandidatesOfFilm(scene, options.view);
+  if (scene.IsFilm() || scene.IsDynamic()) candidates = CandidatesOfFilm(scene, options.view);
   if (options.selection.count > static_cast<int>(candidates.size())) {
     throw InvalidArgument("{} key views are asked for; the scene has {} training views",
                           options.selection.count,

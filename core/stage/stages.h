@@ -152,10 +152,13 @@ struct ExportOptions {
   bool splat = false;   // 32 bytes a Gaussian, no view dependence
   // PLY with a property "confidence", which strict viewers may refuse; needs a model that has it.
   bool confidence = false;
+  // Of a scene that moves: PLYs of so many moments, evenly over its time, 0..1000.
+  int moments = 0;
   void Validate() const;
   bool operator==(const ExportOptions&) const = default;
 };
-// The model for viewers in RGB, and what that loses against our renders.
+// The model for viewers in RGB, and what that loses against our renders. Of a scene that moves it
+// is that of the key view's moment.
 void RunExport(const ExportOptions& options, StageContext& context);
 
 inline constexpr int kMaxMovieFrames = 18'000;   // ten minutes at 30 frames a second

@@ -145,8 +145,10 @@ std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts&
   return SamplesOf(spec) == 0 ? "no samples are asked for" + unused : "";
 }
 
-// Why a stage has nothing to do for a film; empty when it has.
-std::string WhyNotForFilm(const std::string& kind) {
+// Why a stage has nothing to do for a film; empty when it has. Where poses are looked for, the
+// stages of geometry themselves decide, when it is known whether there are any.
+std::string WhyNotForFilm(const std::string& kind, const ColorizeSceneSpec& scene) {
+  if (scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO) return "";
   if (kind == kind::kReconstructGeometry || kind == kind::kSolveChroma || kind == kind::kExport) {
     return "frames of a film without poses are coloured, not reconstructed";
   }
@@ -188,7 +190,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       skip_reason = "nothing is to be corrected";
     }
     if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
-    if (skip_reason.empty() && facts.is_film) skip_reason = WhyNotForFilm(kind);
+    if (skip_reason.empty() && facts.is_film) skip_reason = WhyNotForFilm(kind, scene);
     builder->Add(std::move(spec), skip_reason);
   }
   builder->AddParent();

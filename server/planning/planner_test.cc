@@ -116,6 +116,13 @@ TEST(Planner, AFilmIsColoredNotReconstructed) {
               ElementsAre("import_scene", "select_key_view", "colorize_key_view"));
   EXPECT_THAT(InputKinds(graph, "render"), Contains("colorize_views"));
   EXPECT_THAT(InputKinds(graph, "render"), Not(Contains("solve_chroma")));
+  v1::JobSpec with_poses = spec;
+  with_poses.mutable_colorize_scene()->mutable_import_scene()->set_film_poses(
+      v1::ImportSceneSpec::FILM_POSES_AUTO);
+  const NewGraph decided_later = PlanJob(with_poses, {}, film);
+  for (const char* kind : {"reconstruct_geometry", "solve_chroma", "export"}) {
+    EXPECT_EQ(decided_later.jobs[IndexOf(decided_later, kind)].skip_reason, "") << kind;
+  }
   spec.mutable_colorize_scene()->mutable_correct_colors()->add_corrections()->set_view("a");
   const auto refused = [&] { PlanJob(spec, {}, film); };
   EXPECT_THROW(refused(), Error);

@@ -97,6 +97,18 @@ int CountFilms(const std::vector<SceneFileRecord>& files) {
   }));
 }
 
+bool HasFile(const std::vector<SceneFileRecord>& files, const std::string& path) {
+  return std::any_of(files.begin(), files.end(), [&](const auto& f) { return f.path == path; });
+}
+
+// Of Nerfies and HyperNeRF.
+bool HasNerfiesCameras(const std::vector<SceneFileRecord>& files) {
+  return HasFile(files, "metadata.json") &&
+         std::any_of(files.begin(), files.end(), [](const auto& file) {
+           return file.path.starts_with("camera/") && file.path.ends_with(".json");
+         });
+}
+
 bool HasFrames(const std::vector<SceneFileRecord>& files) {
   return std::any_of(files.begin(), files.end(), [](const auto& file) {
     return IsFrameFile(file.path) && HasImageExtension(file.path);
@@ -164,9 +176,15 @@ StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
     return HasImageExtension(file.path) && !IsAugmentFile(file.path) && !IsMaskFile(file.path);
   });
   if (HasFrames(files)) return StoredLayout::kFilm;
+  // Several films are a rig's, whose poses a file beside them tells.
+  if (!has_photos && CountFilms(files) > 1) {
+    if (HasFile(files, "transforms.json")) return StoredLayout::kTransforms;
+    if (HasFile(files, "poses_bounds.npy")) return StoredLayout::kPosesBounds;
+  }
   if (!has_photos && CountFilms(files) > 0) return StoredLayout::kFilm;
   if (!has_photos && CountSplats(files) > 0) return StoredLayout::kSplat;
   if (!ModelFolders(files).empty()) return StoredLayout::kColmap;
+  if (HasNerfiesCameras(files)) return StoredLayout::kNerfies;
   for (const SceneFileRecord& file : files) {
     if (BaseName(file.path) == "transforms.json") return StoredLayout::kTransforms;
   }
@@ -206,9 +224,11 @@ SceneCheck CheckScene(const SceneRecord& scene,
     const int films = CountFilms(scene.files);
     if (films > 1 || (films == 1 && check.photo_count > 0)) {
       violations.push_back(
-          {"", "the scene holds a film and more; give one video file, or frames/, a scene"});
+          {"",
+           "the scene holds a film and more; give one video file, or frames/, a scene, or the "
+           "cameras' poses with their films (transforms.json, poses_bounds.npy)"});
     }
-  } else if (missing == 0 && check.photo_count == 0) {
+  } else if (missing == 0 && check.photo_count == 0 && CountFilms(scene.files) == 0) {
     violations.push_back({"",
                           "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff), no "
                           "splat (.ply, .sog, .spz) and no film (.mp4, .mov, .mkv, ...)"});

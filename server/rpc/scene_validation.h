@@ -19,7 +19,7 @@ SceneCheck CheckScene(const SceneRecord& scene,
                       const BlobStore& blobs,
                       const ServiceLimits& limits);
 
-// Which kind of input the paths look like; COLMAP wins over transforms.json.
+// Which kind of input the paths look like; COLMAP wins over other poses.
 StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files);
 
 }  // namespace color3d

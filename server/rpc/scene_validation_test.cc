@@ -96,6 +96,27 @@ TEST_F(SceneValidationTest, MasksAreNoPhotos) {
   EXPECT_THAT(Commit(files, &scene).error_message(), HasSubstr("masks/a.txt"));
 }
 
+TEST_F(SceneValidationTest, ScenesThatMoveAreRecognised) {
+  v1::Scene scene;
+  const std::string films = R"({"frames": [{"file_path": "a.mp4"}, {"file_path": "b.mp4"}]})";
+  ASSERT_TRUE(Commit({{"a.mp4", "1"}, {"b.mp4", "2"}, {"transforms.json", films}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_TRANSFORMS);
+  EXPECT_EQ(scene.photo_count(), 0);
+  ASSERT_TRUE(
+      Commit({{"cam00.mp4", "1"}, {"cam01.mp4", "2"}, {"poses_bounds.npy", "3"}}, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_POSES_BOUNDS);
+  EXPECT_THAT(Commit({{"cam00.mp4", "1"}, {"cam01.mp4", "2"}}, &scene).error_message(),
+              HasSubstr("the cameras' poses with their films"));
+  ASSERT_TRUE(Commit({{"metadata.json", "{}"},
+                      {"camera/1.json", "{}"},
+                      {"rgb/2x/1.png", TinyPng()},
+                      {"rgb/2x/2.png", TinyPng()}},
+                     &scene)
+                  .ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_NERFIES);
+  EXPECT_EQ(scene.photo_count(), 2);
+}
+
 TEST_F(SceneValidationTest, AFilmIsOneVideoOrPicturesInFrames) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"walk.MP4", "any bytes: the import reads them"}}, &scene).ok());

@@ -92,7 +92,16 @@ struct Lease {
 };
 
 enum class SceneState { kUploading, kActive };
-enum class StoredLayout { kUnknown, kPhotos, kColmap, kTransforms, kSplat, kFilm };
+enum class StoredLayout {
+  kUnknown,
+  kPhotos,
+  kColmap,
+  kTransforms,
+  kSplat,
+  kFilm,
+  kNerfies,
+  kPosesBounds
+};
 
 struct SceneFileRecord {
   std::string path;

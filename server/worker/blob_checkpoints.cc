@@ -18,22 +18,40 @@ BlobCheckpoints::BlobCheckpoints(JobStore& store,
       interval_(interval),
       newest_(job.checkpoint) {}
 
-std::optional<std::string> BlobCheckpoints::Load() {
+std::optional<std::filesystem::path> BlobCheckpoints::Newest() {
   if (!newest_) return std::nullopt;
   try {
-    return ReadFile(blobs_.Fetch(newest_->sha256));
+    return blobs_.Fetch(newest_->sha256);
   } catch (const Error& e) {
     spdlog::warn("{} the checkpoint is gone, starting afresh: {}", tag_, e.what());
     return std::nullopt;
   }
 }
 
+std::optional<std::string> BlobCheckpoints::Load() {
+  const auto file = Newest();
+  return file ? std::optional(ReadFile(*file)) : std::nullopt;
+}
+
+bool BlobCheckpoints::LoadTo(const std::filesystem::path& file) {
+  const auto newest = Newest();
+  if (newest) {
+    std::filesystem::copy_file(*newest, file, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::permissions(
+        file, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  }
+  return newest.has_value();
+}
+
 bool BlobCheckpoints::WantsSave() {
   return std::chrono::steady_clock::now() - last_save_ >= interval_;
 }
 
-void BlobCheckpoints::Save(const std::string& state) {
-  const FileDigest digest = blobs_.PutBytes(state);
+void BlobCheckpoints::Save(const std::string& state) { Name(blobs_.PutBytes(state)); }
+
+void BlobCheckpoints::SaveFile(const std::filesystem::path& file) { Name(blobs_.PutFile(file)); }
+
+void BlobCheckpoints::Name(const FileDigest& digest) {
   const std::optional<FileDigest> before = store_.SetCheckpoint(lease_, digest);
   newest_ = digest;
   last_save_ = std::chrono::steady_clock::now();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -21,10 +22,16 @@ class BlobCheckpoints : public CheckpointStore {
   std::optional<std::string> Load() override;
   bool WantsSave() override;
   void Save(const std::string& state) override;
+  bool LoadTo(const std::filesystem::path& file) override;
+  void SaveFile(const std::filesystem::path& file) override;
   // After the job was published: its checkpoint is of no more use.
   void RemoveNewest();
 
  private:
+  std::optional<std::filesystem::path> Newest();
+  // A blob that was just put becomes the checkpoint.
+  void Name(const FileDigest& digest);
+
   JobStore& store_;
   BlobStore& blobs_;
   const Lease lease_;

@@ -19,6 +19,7 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
 ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec) {
   ImportOptions options;
   options.hold_out_every_eighth = spec.hold_out_every_eighth();
+  options.hold_out_camera = spec.hold_out_camera();
   if (spec.has_sfm_max_image_side_px())
     options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
   if (spec.sfm_pairs() == v1::ImportSceneSpec::SFM_PAIRS_EXHAUSTIVE) {
@@ -47,6 +48,7 @@ FilmOptions FilmOptionsFrom(const v1::ImportSceneSpec& spec) {
   if (spec.has_film_end_s()) options.end_s = spec.film_end_s();
   if (spec.has_film_frames_per_second()) options.frames_per_second = spec.film_frames_per_second();
   options.deflicker = spec.film_deflicker();
+  if (spec.film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO) options.poses = FilmPoses::kAuto;
   return options;
 }
 
@@ -175,6 +177,7 @@ ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   options.glb = spec.glb();
   options.splat = spec.splat();
   options.confidence = spec.confidence();
+  options.moments = spec.moments();
   return options;
 }
 

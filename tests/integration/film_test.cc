@@ -11,6 +11,8 @@
 #include "core/video/mp4_writer.h"
 #include "tests/integration/service_fixture.h"
 #include "tests/support/formats/sound_film.h"
+#include "tests/support/scenes/test_scenes.h"
+#include "tests/support/scenes/textured_corner.h"
 
 namespace color3d {
 namespace {
@@ -84,6 +86,26 @@ TEST_F(FilmTest, FramesComeBackInColor) {
   EXPECT_EQ(movie.facts().width, kWidth);
   EXPECT_TRUE(fs::exists(Path("out") / "report.html"));
   EXPECT_FALSE(fs::exists(Path("out") / "scene.ply"));
+}
+
+TEST_F(FilmTest, PosesAreLookedForOnRequestOnly) {
+  fs::create_directories(Path("frames"));
+  const Camera camera{320, 240, 330.0, 330.0, 160.0, 120.0};
+  for (int i = 0; i < 6; ++i) {
+    const Image gray = RenderCorner(camera,
+                                    LookAt({0.5, -0.1, -1.3}, {0.1, 0.4, 1.6}),
+                                    MovingBoard{{0.3 - 0.025 * i, 0.3 - 0.02 * i, 0.9}});
+    WriteFileAtomic(Path("frames") / ("n" + std::to_string(i) + ".png"), EncodePng8(gray));
+  }
+  const ProcessResult refused = Colorize(Path("frames"), {"--poses"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--poses is for films"));
+  const ProcessResult still = Colorize(Path("frames"), {"--film", "--poses"});
+  EXPECT_EQ(still.exit_code, 0) << still.err;
+  EXPECT_THAT(still.err, HasSubstr("the film stays without poses: the camera stands still"));
+  const ProcessResult off = Colorize(Path("frames"), {"--film"});
+  EXPECT_EQ(off.exit_code, 0) << off.err;
+  EXPECT_EQ(off.err.find("poses:"), std::string::npos);
 }
 
 TEST_F(FilmTest, AVideoIsColoredFromOnePaintedFrame) {

@@ -23,6 +23,7 @@ std::vector<StabilityCase> StabilityCases() {
   AddLossCases(cases);
   AddAdamCases(cases);
   AddGeometryCases(cases);
+  AddMotionCases(cases);
   AddChromaCases(cases);
   AddMatchingCases(cases);
   AddColorizerCases(cases);

@@ -47,7 +47,7 @@ struct StabilityResult {
 };
 
 struct StabilityCase {
-  std::string group;  // raster, loss, adam, geometry, chroma, matching, colorizer
+  std::string group;  // raster, loss, adam, geometry, motion, chroma, matching, colorizer
   std::string name;   // unique in the group
   bool slow = false;  // for the benchmark only
   std::function<StabilityResult(ThreadPool&)> run;
@@ -66,6 +66,7 @@ void AddRasterCases(std::vector<StabilityCase>& cases);
 void AddLossCases(std::vector<StabilityCase>& cases);
 void AddAdamCases(std::vector<StabilityCase>& cases);
 void AddGeometryCases(std::vector<StabilityCase>& cases);
+void AddMotionCases(std::vector<StabilityCase>& cases);
 void AddChromaCases(std::vector<StabilityCase>& cases);
 void AddMatchingCases(std::vector<StabilityCase>& cases);
 void AddColorizerCases(std::vector<StabilityCase>& cases);

@@ -67,7 +67,12 @@ int64_t CountNonFinite(const GaussianModel& model) {
                                            &model.opacity_logit,
                                            &model.sh_l,
                                            &model.sh_a,
-                                           &model.sh_b}) {
+                                           &model.sh_b,
+                                           &model.motion.velocity,
+                                           &model.motion.acceleration,
+                                           &model.motion.spin,
+                                           &model.motion.center,
+                                           &model.motion.log_width}) {
     bad += CountNonFinite(buffer->data(), buffer->size());
   }
   return bad;

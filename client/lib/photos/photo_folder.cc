@@ -19,6 +19,10 @@ constexpr size_t kMaxFiles = 10'000;
 constexpr size_t kMaxPathBytes = 1024;
 constexpr char kAugment[] = "augment";
 constexpr char kTransforms[] = "transforms.json";
+constexpr char kPosesBounds[] = "poses_bounds.npy";
+constexpr const char* kNerfiesFiles[] = {
+    "metadata.json", "dataset.json", "scene.json", "points.npy"};
+constexpr const char* kNerfiesPictures[] = {"rgb/2x", "rgb/1x", "rgb/4x", "rgb/8x"};
 constexpr const char* kModelFolders[] = {"sparse/0", "sparse", ""};
 constexpr const char* kModelStems[] = {"cameras", "images", "points3D"};
 
@@ -93,7 +97,50 @@ std::set<std::string> NamedFolders(const fs::path& transforms) {
   return folders;
 }
 
+bool IsNerfies(const fs::path& root) {
+  return IsFile(root / kNerfiesFiles[0]) && IsFolder(root / "camera") && IsFolder(root / "rgb");
+}
+
+void CollectNerfies(const fs::path& root, PhotoFolder* result) {
+  for (const char* folder : kNerfiesPictures) {
+    if (result->photos.empty() && IsFolder(root / folder)) AddDirectPhotos(root, folder, result);
+  }
+  for (const char* file : kNerfiesFiles) {
+    if (IsFile(root / file)) result->model_files.push_back({file, root / file});
+  }
+  for (const std::string& file : ListFiles(root / "camera")) {
+    if (file.ends_with(".json")) {
+      result->model_files.push_back({"camera/" + file, root / "camera" / file});
+    }
+  }
+}
+
+// Films directly in `root` and in the folders that transforms.json names, and the file that tells
+// where their cameras stand. Nothing when there is only one film, or no such file.
+void CollectPosedFilms(const fs::path& root, PhotoFolder* result) {
+  const bool has_transforms = IsFile(root / kTransforms);
+  if (!has_transforms && !IsFile(root / kPosesBounds)) return;
+  std::set<std::string> folders = {""};
+  if (has_transforms) folders.merge(NamedFolders(root / kTransforms));
+  std::vector<LocalFile> films;
+  std::error_code none;
+  for (const std::string& folder : folders) {
+    for (const auto& entry : fs::directory_iterator(root / folder, none)) {
+      const std::string name = entry.path().filename().string();
+      if (name.starts_with('.') || !HasFilmExtension(name) || !IsFile(entry.path())) continue;
+      films.push_back({folder.empty() ? name : folder + "/" + name, entry.path()});
+    }
+  }
+  if (films.size() < 2) return;
+  std::sort(films.begin(), films.end(), [](const LocalFile& x, const LocalFile& y) {
+    return x.path < y.path;
+  });
+  result->posed_films = std::move(films);
+  if (!has_transforms) result->model_files.push_back({kPosesBounds, root / kPosesBounds});
+}
+
 void CollectImages(const fs::path& root, PhotoFolder* result) {
+  if (IsNerfies(root)) return CollectNerfies(root, result);
   AddPhotosBelow(root, "images", result);
   if (!result->photos.empty()) return;
   AddDirectPhotos(root, "", result);
@@ -181,7 +228,7 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
 
 void CheckCounts(const PhotoFolder& folder) {
   const std::string root = folder.root.string();
-  if (folder.splat || folder.film) return;
+  if (folder.splat || folder.film || !folder.posed_films.empty()) return;
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPhotos(folder.root);
     throw InvalidArgument(
@@ -212,12 +259,17 @@ void CheckName(const LocalFile& file) {
   }
 }
 
+void CheckNames(const PhotoFolder& folder) {
+  for (const LocalFile& file : folder.AllFiles()) CheckName(file);
+}
+
 }  // namespace
 
 std::vector<LocalFile> PhotoFolder::AllFiles() const {
   std::vector<LocalFile> all = photos;
   if (splat) all.push_back(*splat);
   if (film) all.push_back(*film);
+  all.insert(all.end(), posed_films.begin(), posed_films.end());
   all.insert(all.end(), model_files.begin(), model_files.end());
   all.insert(all.end(), augment_files.begin(), augment_files.end());
   all.insert(all.end(), mask_files.begin(), mask_files.end());
@@ -244,6 +296,12 @@ PhotoFolder CollectPhotos(const fs::path& root) {
     result.root = result.root.parent_path();
   }
   CollectImages(result.root, &result);
+  if (result.photos.empty()) CollectPosedFilms(result.root, &result);
+  if (!result.posed_films.empty()) {
+    CollectModel(result.root, &result);
+    CheckNames(result);
+    return result;
+  }
   if (result.photos.empty()) result.splat = FindOnly(result.root, HasSplatExtension, "splat");
   if (result.photos.empty() && !result.splat) {
     result.film = FindOnly(result.root, HasFilmExtension, "film");
@@ -255,7 +313,7 @@ PhotoFolder CollectPhotos(const fs::path& root) {
   std::sort(result.model_files.begin(), result.model_files.end(), by_path);
   std::sort(result.augment_files.begin(), result.augment_files.end(), by_path);
   CheckCounts(result);
-  for (const LocalFile& file : result.AllFiles()) CheckName(file);
+  CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
   if (result.model_files.empty() && IsFolder(parent / "sparse")) {
     result.notes.push_back("the poses in " + (parent / "sparse").string() +
@@ -266,6 +324,12 @@ PhotoFolder CollectPhotos(const fs::path& root) {
 
 void TakeAsFrames(PhotoFolder* folder) {
   if (folder->film) return;
+  if (!folder->posed_films.empty()) {
+    throw InvalidArgument("{} has {} films; give one of them (e.g. {}), or leave --film out",
+                          folder->root.string(),
+                          folder->posed_films.size(),
+                          folder->posed_films[0].file.string());
+  }
   if (folder->photos.empty()) {
     throw InvalidArgument("{} has no pictures that could be frames of a film",
                           folder->root.string());
@@ -310,7 +374,7 @@ std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
 }
 
 void RequirePhoto(const PhotoFolder& folder, const std::string& name) {
-  if (folder.splat || folder.film) return;
+  if (folder.splat || folder.film || !folder.posed_films.empty()) return;
   std::string known;
   for (size_t i = 0; i < folder.photos.size(); ++i) {
     const std::string& path = folder.photos[i].path;

@@ -22,6 +22,7 @@ struct PhotoFolder {
   std::vector<LocalFile> mask_files;     // of photos, see mask_files.h
   std::optional<LocalFile> splat;        // in place of photos: views are drawn from it
   std::optional<LocalFile> film;         // in place of photos: a video file, whose frames are views
+  std::vector<LocalFile> posed_films;    // in place of photos: of cameras whose poses a file tells
   std::vector<std::string> notes;        // what the user may want to know, one line each
 
   std::vector<LocalFile> AllFiles() const;
@@ -32,9 +33,12 @@ struct PhotoFolder {
 // Photos (.jpg .jpeg .png .tif .tiff) are taken from images/, at any depth, when there is one with
 // photos; else from `root` itself and from the subfolders that transforms.json names. Also taken: a
 // COLMAP model in sparse/0, sparse or `root`, transforms.json, and everything in augment/ (any
-// depth). Nothing else, but for a splat (.ply .sog .spz) or a film (.mp4 .mov ...): `root` itself,
-// or the only one in a folder without photos. Throws Error: no such folder, another file instead of
-// a folder, no photos, one photo, more than 10,000 files, names that are not safe or not UTF-8.
+// depth). Of a folder of Nerfies or HyperNeRF: metadata.json, camera/, points.npy and the pictures
+// of one size, rgb/2x/, else 1x, 4x, 8x. Nothing else, but for a splat (.ply .sog .spz) or a film
+// (.mp4 .mov ...): `root` itself, or the only one in a folder without photos; or several films
+// beside a transforms.json that names them, or beside a poses_bounds.npy. Throws Error: no such
+// folder, another file instead of a folder, no photos, one photo, more than 10,000 files, names
+// that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root);
 
 // The photos as frames of a film, in the order of their names; poses are of no use then. Throws

@@ -138,6 +138,56 @@ TEST_F(PhotoFolderTest, TransformsNamesItsSubfolders) {
   EXPECT_THAT(Paths(folder.model_files), ElementsAre("transforms.json"));
 }
 
+TEST_F(PhotoFolderTest, CamerasOfARigAreSubfolders) {
+  for (const char* name : {"images/cam01/0001.jpg", "images/cam02/0001.jpg"}) Write(name);
+  Write("transforms.json", R"({"frames": []})");
+  EXPECT_THAT(Paths(CollectPhotos(root()).photos),
+              ElementsAre("images/cam01/0001.jpg", "images/cam02/0001.jpg"));
+  fs::remove_all(root() / "images");
+  for (const char* name : {"cam01/0001.jpg", "cam02/0001.jpg", "other/0001.jpg"}) Write(name);
+  Write("transforms.json",
+        R"({"frames": [{"file_path": "./cam01/0001.jpg"}, {"file_path": "cam02/0001.jpg"}]})");
+  EXPECT_THAT(Paths(CollectPhotos(root()).photos), ElementsAre("cam01/0001.jpg", "cam02/0001.jpg"));
+}
+
+TEST_F(PhotoFolderTest, FilmsOfCamerasWithPosesStandForPhotos) {
+  for (const char* name : {"cam01.mp4", "cam00.mp4", "poses_bounds.npy", "notes.txt"}) Write(name);
+  PhotoFolder folder = CollectPhotos(root());
+  EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("cam00.mp4", "cam01.mp4", "poses_bounds.npy"));
+  EXPECT_FALSE(folder.film.has_value());
+  EXPECT_NO_THROW(RequirePhoto(folder, "cam00/f000003.png"));
+  Write("films/cam02.mp4");
+  Write("transforms.json", R"({"frames": [{"file_path": "films/cam02.mp4"}]})");
+  EXPECT_THAT(Paths(CollectPhotos(root()).AllFiles()),
+              ElementsAre("cam00.mp4", "cam01.mp4", "films/cam02.mp4", "transforms.json"));
+  fs::remove(root() / "transforms.json");
+  fs::remove(root() / "cam01.mp4");
+  EXPECT_TRUE(CollectPhotos(root()).film.has_value());  // one film has no use for poses
+}
+
+TEST_F(PhotoFolderTest, FoldersOfNerfiesGoAsTheyAre) {
+  for (const char* name : {"metadata.json",
+                           "dataset.json",
+                           "points.npy",
+                           "camera/1.json",
+                           "camera/2.json",
+                           "camera-paths/orbit/1.json",
+                           "rgb/1x/1.png",
+                           "rgb/1x/2.png",
+                           "rgb/2x/1.png",
+                           "rgb/2x/2.png"}) {
+    Write(name);
+  }
+  EXPECT_THAT(Paths(CollectPhotos(root()).AllFiles()),
+              ElementsAre("rgb/2x/1.png",
+                          "rgb/2x/2.png",
+                          "camera/1.json",
+                          "camera/2.json",
+                          "dataset.json",
+                          "metadata.json",
+                          "points.npy"));
+}
+
 TEST_F(PhotoFolderTest, SaysThatPosesBesideThePhotosAreNotUsed) {
   for (const char* name : {"images/a.jpg", "images/b.jpg", "sparse/0/cameras.bin"}) Write(name);
   const PhotoFolder folder = CollectPhotos(root() / "images/");

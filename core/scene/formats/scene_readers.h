@@ -17,10 +17,13 @@ Scene ReadColmapModel(const std::filesystem::path& model_folder,
                       const std::filesystem::path& scene_folder,
                       std::vector<std::string>* warnings = nullptr);
 
-// The transforms.json of NeRF and Nerfstudio. `warnings` (may be null) receives which frames were
-// left out because their photo does not exist. Throws as ReadColmapModel.
+// The transforms.json of NeRF and Nerfstudio; with a `time` (and perhaps a `camera`) in every
+// frame, as in D-NeRF, the views have moments (frame_times.h). `warnings` (may be null) receives
+// which frames were left out because their photo does not exist, `cameras` (may be null) the names
+// of the cameras by Moment::shot. Throws as ReadColmapModel.
 Scene ReadTransformsJson(const std::filesystem::path& json_file,
                          const std::filesystem::path& scene_folder,
-                         std::vector<std::string>* warnings = nullptr);
+                         std::vector<std::string>* warnings = nullptr,
+                         std::vector<std::string>* cameras = nullptr);
 
 }  // namespace color3d

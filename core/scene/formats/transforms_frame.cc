@@ -1,6 +1,7 @@
 #include "core/scene/formats/transforms_frame.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -17,6 +18,46 @@ int ReadSide(const FrameFields& fields, const char* key, int absent) {
     throw InvalidArgument("{}: {} is {} px", fields.place(), key, side);
   }
   return static_cast<int>(std::lround(side));
+}
+
+Distortion ReadDistortion(const FrameFields& fields) {
+  const std::string model = fields.TextOr("camera_model", "OPENCV");
+  const bool fisheye = model == "OPENCV_FISHEYE" || fields.IsTrue("is_fisheye");
+  const bool pinhole = model == "PINHOLE" || model == "SIMPLE_PINHOLE";
+  const bool brown =
+      model == "OPENCV" || model == "SIMPLE_RADIAL" || model == "RADIAL" || model == "FULL_OPENCV";
+  if (!fisheye && !pinhole && !brown) {
+    throw InvalidArgument(
+        "{}: camera_model {} is not supported; use OPENCV, OPENCV_FISHEYE or PINHOLE",
+        fields.place(),
+        model);
+  }
+  Distortion distortion;
+  if (pinhole && !fisheye) return distortion;
+  if (fisheye) {
+    distortion.model = Distortion::Model::kFisheye;
+    distortion.k = {fields.NumberOr("k1", 0),
+                    fields.NumberOr("k2", 0),
+                    fields.NumberOr("k3", 0),
+                    fields.NumberOr("k4", 0)};
+    return distortion;
+  }
+  if (model != "FULL_OPENCV" && fields.NumberOr("k4", 0.0) != 0.0) {
+    // OpenCV means a denominator by k4, nerfstudio a fourth power: better none than the wrong one.
+    throw InvalidArgument("{}: k4 is not supported for camera_model {}", fields.place(), model);
+  }
+  distortion.k = {fields.NumberOr("k1", 0),
+                  fields.NumberOr("k2", 0),
+                  fields.NumberOr("p1", 0),
+                  fields.NumberOr("p2", 0),
+                  fields.NumberOr("k3", 0),
+                  fields.NumberOr("k4", 0),
+                  fields.NumberOr("k5", 0),
+                  fields.NumberOr("k6", 0)};
+  const bool any =
+      std::any_of(distortion.k.begin(), distortion.k.end(), [](double k) { return k != 0.0; });
+  if (any) distortion.model = Distortion::Model::kBrown;
+  return distortion;
 }
 
 }  // namespace
@@ -132,6 +173,12 @@ Pose ReadTransform(const FrameFields& fields) {
   pose.rotation = Eigen::Quaterniond(Eigen::Matrix3d(world_from_cam.transpose())).normalized();
   pose.translation = -(pose.rotation * m.col(3));
   return pose;
+}
+
+void ReadFrameCamera(const FrameFields& fields, int width, int height, View* view) {
+  view->captured_camera = ReadIntrinsics(fields, width, height);
+  view->distortion = ReadDistortion(fields);
+  view->cam_from_world = ReadTransform(fields);
 }
 
 }  // namespace color3d

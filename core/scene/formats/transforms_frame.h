@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/scene/camera.h"
+#include "core/scene/scene.h"
 
 namespace color3d {
 
@@ -40,5 +40,9 @@ Camera ReadIntrinsics(const FrameFields& fields, int width, int height);
 
 // transform_matrix: OpenGL camera-to-world (x right, y up, z backward), which may be scaled.
 Pose ReadTransform(const FrameFields& fields);
+
+// All of it, lens distortion too (camera_model, k1 to k6, p1, p2): the captured camera of a view,
+// calibrated at any size. `width`, `height`: as above.
+void ReadFrameCamera(const FrameFields& fields, int width, int height, View* view);
 
 }  // namespace color3d

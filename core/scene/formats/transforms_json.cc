@@ -7,6 +7,7 @@
 #include "core/base/files.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/formats/transforms_frame.h"
+#include "core/scene/frame_times.h"
 #include "core/scene/import.h"
 #include "core/scene/photos.h"
 
@@ -15,46 +16,6 @@ namespace fs = std::filesystem;
 namespace {
 
 using nlohmann::json;
-
-Distortion ReadDistortion(const FrameFields& fields) {
-  const std::string model = fields.TextOr("camera_model", "OPENCV");
-  const bool fisheye = model == "OPENCV_FISHEYE" || fields.IsTrue("is_fisheye");
-  const bool pinhole = model == "PINHOLE" || model == "SIMPLE_PINHOLE";
-  const bool brown =
-      model == "OPENCV" || model == "SIMPLE_RADIAL" || model == "RADIAL" || model == "FULL_OPENCV";
-  if (!fisheye && !pinhole && !brown) {
-    throw InvalidArgument(
-        "{}: camera_model {} is not supported; use OPENCV, OPENCV_FISHEYE or PINHOLE",
-        fields.place(),
-        model);
-  }
-  Distortion distortion;
-  if (pinhole && !fisheye) return distortion;
-  if (fisheye) {
-    distortion.model = Distortion::Model::kFisheye;
-    distortion.k = {fields.NumberOr("k1", 0),
-                    fields.NumberOr("k2", 0),
-                    fields.NumberOr("k3", 0),
-                    fields.NumberOr("k4", 0)};
-    return distortion;
-  }
-  if (model != "FULL_OPENCV" && fields.NumberOr("k4", 0.0) != 0.0) {
-    // OpenCV means a denominator by k4, nerfstudio a fourth power: better none than the wrong one.
-    throw InvalidArgument("{}: k4 is not supported for camera_model {}", fields.place(), model);
-  }
-  distortion.k = {fields.NumberOr("k1", 0),
-                  fields.NumberOr("k2", 0),
-                  fields.NumberOr("p1", 0),
-                  fields.NumberOr("p2", 0),
-                  fields.NumberOr("k3", 0),
-                  fields.NumberOr("k4", 0),
-                  fields.NumberOr("k5", 0),
-                  fields.NumberOr("k6", 0)};
-  const bool any =
-      std::any_of(distortion.k.begin(), distortion.k.end(), [](double k) { return k != 0.0; });
-  if (any) distortion.model = Distortion::Model::kBrown;
-  return distortion;
-}
 
 std::string WithoutPrefix(std::string text, const std::string& prefix) {
   while (text.compare(0, prefix.size(), prefix) == 0) text.erase(0, prefix.size());
@@ -70,22 +31,30 @@ bool ReadFrame(const FrameFields& fields, const fs::path& scene_folder, View* vi
   view->name = WithoutPrefix(view->image_file, "images/");
   Photo photo{view->name, view->image_file};
   ProbePhoto(scene_folder, &photo);
-  view->captured_camera = ReadIntrinsics(fields, photo.stored_width, photo.stored_height);
-  view->distortion = ReadDistortion(fields);
-  view->cam_from_world = ReadTransform(fields);
+  ReadFrameCamera(fields, photo.stored_width, photo.stored_height, view);
   FitViewToPhoto(photo, view);
   return true;
+}
+
+// When and by which camera, of the frame itself: no file says that of all its frames.
+FrameTime ReadTime(const json& frame, const std::string& place, const std::string& file) {
+  const FrameFields own(frame, frame, place);
+  FrameTime time{place, file, own.Number("time"), ""};
+  if (time.time) time.camera = own.TextOr("camera", "");
+  return time;
 }
 
 }  // namespace
 
 Scene ReadTransformsJson(const fs::path& json_file,
                          const fs::path& scene_folder,
-                         std::vector<std::string>* warnings) {
+                         std::vector<std::string>* warnings,
+                         std::vector<std::string>* cameras) {
   const std::string file_name = json_file.filename().string();
   const json root = ParseFrames(ReadFile(json_file), file_name);
   Scene scene;
   std::vector<std::string> missing;
+  std::vector<FrameTime> times;
   for (size_t i = 0; i < root["frames"].size(); ++i) {
     const json& frame = root["frames"][i];
     const std::string place = fmt::format("{}: frame {}", file_name, i);
@@ -93,11 +62,16 @@ Scene ReadTransformsJson(const fs::path& json_file,
     const FrameFields fields(root, frame, place);
     View view;
     if (ReadFrame(fields, scene_folder, &view)) {
+      times.push_back(ReadTime(frame, place, view.image_file));
       scene.views.push_back(std::move(view));
     } else {
       missing.push_back(fields.TextOr("file_path", ""));
     }
   }
+  FrameMoments moments = MomentsOf(times);
+  for (size_t i = 0; i < times.size(); ++i) scene.views[i].moment = moments.moments[i];
+  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
+  if (cameras != nullptr) *cameras = std::move(moments.cameras);
   std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {
     return x.name < y.name;
   });

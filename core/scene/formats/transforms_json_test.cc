@@ -129,6 +129,41 @@ TEST_F(TransformsFile, MissingPhotosAreLeftOutWithAWarning) {
   EXPECT_THAT(Said(text), HasSubstr("names 3 photos, of which 1 exist"));
 }
 
+// Json() with the fields that each of the two frames has on its own.
+std::string TimedJson(const std::string& of_a, const std::string& of_b) {
+  std::string text = Json("\"fl_x\":50");
+  for (const auto& [name, fields] : {std::pair("./images/a", of_a), {"images/b.png", of_b}}) {
+    const std::string path = "{\"file_path\":\"" + std::string(name) + "\",";
+    text.insert(text.find(path) + path.size(), fields);
+  }
+  return text;
+}
+
+TEST_F(TransformsFile, FramesHaveTimes) {
+  EXPECT_FALSE(Read(Json("\"fl_x\":50,\"time\":3")).views[0].moment);  // of no frame
+  Scene scene = Read(TimedJson("\"time\":0.75,", "\"time\":0.25,"));
+  EXPECT_EQ(scene.views[0].moment, (Moment{0.5, 0}));
+  EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));
+  scene = Read(TimedJson("\"time\":2,\"camera\":\"r\",", "\"time\":1,\"camera\":\"l\","));
+  EXPECT_EQ(scene.views[0].moment, (Moment{1.0, 1}));
+  EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));
+  std::vector<std::string> warnings;
+  WriteFileAtomic(file(), TimedJson("\"time\":2,", "\"time\":2,"));
+  EXPECT_FALSE(ReadTransformsJson(file(), folder_.path(), &warnings).views[0].moment);
+  EXPECT_THAT(warnings.at(0), HasSubstr("stands still"));
+}
+
+TEST_F(TransformsFile, BadTimesAreRefusedByFrame) {
+  EXPECT_THAT(Said(TimedJson("\"time\":0,", "")),
+              HasSubstr("frame 1 (images/b.png) has no time, but transforms.json: frame 0"));
+  EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":null,")), HasSubstr("has no time"));
+  EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":\"1\",")),
+              HasSubstr("frame 1: time must be a finite number"));
+  EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":NaN,")), HasSubstr("is not JSON"));
+  EXPECT_THAT(Said(TimedJson("\"time\":0,\"camera\":3,", "\"time\":1,")),
+              HasSubstr("frame 0: camera must be a text"));
+}
+
 TEST_F(TransformsFile, BrokenFilesAreRefusedByPlace) {
   EXPECT_THAT(Said("{\"frames\":"), HasSubstr("transforms.json is not JSON"));
   EXPECT_THAT(Said("{}"), HasSubstr("no list of frames"));

@@ -129,6 +129,17 @@ int CountRelated(const SimilarityTable& similarity) {
 
 }  // namespace
 
+PairPlan PairsInSequence(int count) {
+  PairPlan plan;
+  for (int i = 0; i < count; ++i) {
+    for (int step = 1; step <= 16 && i + step < count; step *= 2)
+      plan.pairs.emplace_back(i, i + step);
+  }
+  plan.reason = std::to_string(plan.pairs.size()) + " pairs of frames up to 16 apart";
+  plan.related = count;
+  return plan;
+}
+
 PairPlan PlanPairs(const SimilarityTable& similarity,
                    const std::vector<int>& sequence,
                    int neighbors) {

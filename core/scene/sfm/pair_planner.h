@@ -29,6 +29,10 @@ struct PairPlan {
 // All n (n - 1) / 2 pairs.
 std::vector<PhotoPair> AllPairs(int count);
 
+// Of photos that were taken one after the other, as frames of a film are: each with those 1, 2, 4,
+// 8 and 16 further on.
+PairPlan PairsInSequence(int count);
+
 // Every photo with the `neighbors` most similar ones (twice as many when none of them is clearly
 // similar), with the next two of its sequence, if `sequence` is not empty (a permutation of the
 // photos), and two spanning trees without a common pair, so that the photos hang together even when

@@ -91,6 +91,16 @@ TEST(PairPlanner, GrowsLinearlyAndFewPhotosAreMatchedCompletely) {
   EXPECT_LT(static_cast<double>(PlanPairs(Ring(200), {}, 8).pairs.size()), 4.5 * small);
 }
 
+TEST(PairPlanner, FramesAreMatchedWithNearAndFarNeighbours) {
+  EXPECT_EQ(PairsInSequence(4).pairs,
+            (std::vector<PhotoPair>{{0, 1}, {0, 2}, {1, 2}, {1, 3}, {2, 3}}));
+  const PairPlan plan = PairsInSequence(100);
+  EXPECT_EQ(plan.pairs.size(), 99u + 98u + 96u + 92u + 84u);
+  EXPECT_TRUE(std::is_sorted(plan.pairs.begin(), plan.pairs.end()));
+  EXPECT_EQ(plan.related, 100);
+  EXPECT_TRUE(PairsInSequence(1).pairs.empty());
+}
+
 TEST(PairPlanner, SequenceOrderFromNames) {
   EXPECT_THAT(SequenceOrder({"a/f10.png", "a/f9.png", "a/f8.png"}), Optional(ElementsAre(2, 1, 0)));
   EXPECT_THAT(SequenceOrder({"0001.jpg", "0003.jpg"}), Optional(ElementsAre(0, 1)));

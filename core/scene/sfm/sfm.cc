@@ -56,12 +56,14 @@ class Solver {
          const SfmWorkspace& work,
          const FeatureImages& copies,
          const ImportOptions& options,
+         PhotoOrder order,
          ProgressObserver& progress,
          SfmReport* report)
       : colmap_(colmap),
         work_(work),
         copies_(copies),
         options_(options),
+        order_(order),
         progress_(progress),
         report_(report) {}
 
@@ -71,6 +73,7 @@ class Solver {
     if (planned) {
       SolvePlanned(plan);
       if (PlannedIsEnough()) return std::move(*best_);
+      if (order_ == PhotoOrder::kSequence) return best_ ? std::move(*best_) : ColmapModel{};
       if (IsHopeless(plan)) {
         colmap_.Note(
             fmt::format("{} of {} photos look like another one; comparing all pairs, which "
@@ -151,9 +154,10 @@ class Solver {
     if (!AreNearlyAllPlaced()) Attempt("straight", Strictness::kStraight);
   }
 
-  // Not when finer features of all photos come next anyway.
+  // Not when finer features of all photos come next anyway; and frames far apart share nothing.
   bool AreWorthMatching(const std::vector<PhotoPair>& pairs) const {
-    return !pairs.empty() && (IsHalfPlaced() || !has_coarse_features_);
+    if (pairs.empty() || order_ == PhotoOrder::kSequence) return false;
+    return IsHalfPlaced() || !has_coarse_features_;
   }
 
   void SolveExhaustively(bool has_features) {
@@ -184,6 +188,7 @@ class Solver {
   const SfmWorkspace& work_;
   const FeatureImages& copies_;
   const ImportOptions& options_;
+  PhotoOrder order_;
   ProgressObserver& progress_;
   SfmReport* report_;
   std::optional<ColmapModel> best_;
@@ -194,10 +199,15 @@ class Solver {
 // Before anything that takes minutes.
 void RequireParallax(const std::vector<LocalFeatures>& features,
                      const ColmapProcess& colmap,
+                     PhotoOrder order,
                      const RunControl& run) {
   const ParallaxEvidence evidence = LookForParallax(features, run.pool, run.cancel);
   colmap.Note(Describe(evidence));
   if (!evidence.IsFromOnePlace()) return;
+  if (order == PhotoOrder::kSequence) {
+    throw InvalidArgument("the camera only turns or zooms, so that no depth can follow: {}",
+                          Describe(evidence));
+  }
   throw InvalidArgument(
       "the photos were taken from one place, so that no depth can follow: {}. Take photos from "
       "different places, a step to the side for each (a tenth of the distance to what you "
@@ -209,8 +219,10 @@ void RequireParallax(const std::vector<LocalFeatures>& features,
 PairPlan Plan(const std::vector<Photo>& photos,
               const FeatureImages& copies,
               const ImportOptions& options,
+              PhotoOrder order,
               const RunControl& run) {
   const int count = static_cast<int>(photos.size());
+  if (order == PhotoOrder::kSequence) return PairsInSequence(count);
   if (options.sfm_pairs == SfmPairs::kExhaustive) {
     return {AllPairs(count), "all pairs, as asked for", count};
   }
@@ -221,8 +233,16 @@ PairPlan Plan(const std::vector<Photo>& photos,
                    options.sfm_neighbors);
 }
 
-void RequirePlaced(size_t placed, size_t count, const fs::path& log) {
+void RequirePlaced(size_t placed, size_t count, PhotoOrder order, const fs::path& log) {
   if (placed >= kMinPlaced) return;
+  if (order == PhotoOrder::kSequence) {
+    throw InvalidArgument(
+        "{} of {} frames could be placed: they have too little in common that stands still; log: "
+        "{}",
+        placed == 0 ? "none" : fmt::format("only {}", placed),
+        count,
+        log.filename().string());
+  }
   throw InvalidArgument(
       "{} of {} photos could be placed: the others share too few features with them; take at least "
       "3 sharp photos from different places that overlap by 60 %; log: {}",
@@ -292,7 +312,8 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const fs::path& scene_folder,
                                  const fs::path& scratch_folder,
                                  const ImportOptions& options,
-                                 const RunControl& run) {
+                                 const RunControl& run,
+                                 PhotoOrder order) {
   RemoveEarlierRun(scratch_folder);
   const SfmWorkspace work{scratch_folder};
   SfmReport report;
@@ -309,14 +330,14 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                 options.sfm_max_image_side_px,
                                 LocalFeatureCount(photos.size()),
                                 run);
-    RequireParallax(copies.features, colmap, run);
-    plan = Plan(photos, copies, options, run);
+    RequireParallax(copies.features, colmap, order, run);
+    plan = Plan(photos, copies, options, order, run);
   }
   report.plan = plan.reason;
   colmap.Note("planned " + plan.reason);
   const ColmapModel model =
-      Solver(colmap, work, copies, options, run.progress, &report).Solve(plan);
-  RequirePlaced(model.images.size(), photos.size(), colmap.log());
+      Solver(colmap, work, copies, options, order, run.progress, &report).Solve(plan);
+  RequirePlaced(model.images.size(), photos.size(), order, colmap.log());
   SfmResult result = SceneOfModel(model, photos, copies.names);
   result.report = std::move(report);
   return result;

@@ -18,6 +18,10 @@ struct SfmResult {
   SfmReport report;
 };
 
+// Photos of a place, or frames of a film in their order: those are matched with their neighbours,
+// at distances of 1 to 16, and all pairs of them are never tried.
+enum class PhotoOrder { kAny, kSequence };
+
 // `photos` have been probed and are at least 2. Reduced 8-bit grey copies, COLMAP's database and
 // sfm.log are left in `scratch_folder`. Matches planned pairs, then the photos that found no place
 // with all. While fewer than nine tenths of the photos find a place, tries a straight lens and a
@@ -30,6 +34,7 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& scratch_folder,
                                  const ImportOptions& options,
-                                 const RunControl& run);
+                                 const RunControl& run,
+                                 PhotoOrder order = PhotoOrder::kAny);
 
 }  // namespace color3d

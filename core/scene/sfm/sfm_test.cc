@@ -17,6 +17,7 @@
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/test_exif.h"
 #include "tests/support/scenes/test_scenes.h"
+#include "tests/support/scenes/textured_corner.h"
 
 namespace color3d {
 namespace {
@@ -25,64 +26,6 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
 bool HasColmap() { return fs::exists("/usr/bin/colmap") || fs::exists("/usr/local/bin/colmap"); }
-
-// Noise of many scales on a plane, 0..1: something for SIFT to hold on to.
-float Texture(double u, double v, uint32_t plane) {
-  const auto lattice = [plane](int64_t x, int64_t y, int octave) {
-    uint64_t h = static_cast<uint64_t>(x) * 0x9E3779B97F4A7C15ULL ^
-                 static_cast<uint64_t>(y) * 0xC2B2AE3D27D4EB4FULL ^ (plane * 977u + octave * 131u);
-    h ^= h >> 29;
-    h *= 0xBF58476D1CE4E5B9ULL;
-    h ^= h >> 32;
-    return static_cast<double>(h & 0xFFFFu) / 65535.0;
-  };
-  double sum = 0.0;
-  double weight = 0.3;
-  double scale = 2.0;
-  for (int octave = 0; octave < 5; ++octave, scale *= 2.1, weight *= 0.85) {
-    const double x = u * scale;
-    const double y = v * scale;
-    const int64_t ix = static_cast<int64_t>(std::floor(x));
-    const int64_t iy = static_cast<int64_t>(std::floor(y));
-    const double fx = x - ix;
-    const double fy = y - iy;
-    sum += weight *
-           ((1 - fy) * ((1 - fx) * lattice(ix, iy, octave) + fx * lattice(ix + 1, iy, octave)) +
-            fy * ((1 - fx) * lattice(ix, iy + 1, octave) + fx * lattice(ix + 1, iy + 1, octave)));
-  }
-  return static_cast<float>(std::clamp(1.4 * sum - 0.25, 0.0, 1.0));
-}
-
-// What a ray sees: floor y = 1, wall z = 2, wall x = -1.5.
-float Shade(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
-  double nearest = 1e9;
-  float value = 0.0f;
-  const double walls[3] = {-1.5, 1.0, 2.0};
-  for (int axis = 0; axis < 3; ++axis) {
-    const double t = (walls[axis] - origin[axis]) / direction[axis];
-    if (!(t > 1e-6 && t < nearest)) continue;
-    nearest = t;
-    const Eigen::Vector3d hit = origin + t * direction;
-    value = Texture(hit[(axis + 1) % 3], hit[(axis + 2) % 3], static_cast<uint32_t>(axis));
-  }
-  return value;
-}
-
-Image RenderRoom(const Camera& camera, const Pose& pose) {
-  Image image(camera.width, camera.height, 1);
-  const Eigen::Vector3d origin = pose.Center();
-  for (int y = 0; y < camera.height; ++y) {
-    for (int x = 0; x < camera.width; ++x) {
-      float sum = 0.0f;
-      for (int s = 0; s < 4; ++s) {
-        const Eigen::Vector3d ray = camera.Ray(x + 0.25 + 0.5 * (s % 2), y + 0.25 + 0.5 * (s / 2));
-        sum += 0.25f * Shade(origin, pose.rotation.conjugate() * ray);
-      }
-      image.At(0, y, x) = sum;
-    }
-  }
-  return image;
-}
 
 const Camera kRoomCamera{400, 300, 420.0, 420.0, 200.0, 150.0};
 
@@ -116,7 +59,7 @@ class Sfm : public testing::Test {
 TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
   const std::vector<Pose> truth = RoomPoses(7);
   for (int i = 0; i < 7; ++i) {
-    Image photo = RenderRoom(kRoomCamera, truth[i]);
+    Image photo = RenderCorner(kRoomCamera, truth[i]);
     if (i == 2) {  // a dull 16-bit scan
       for (float& v : photo.data) v = 0.1f + 0.15f * v;
       WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng16(photo));
@@ -170,7 +113,7 @@ TEST_F(Sfm, WhatIsMaskedOutDoesNotPlaceCameras) {
   fs::create_directories(folder_.path() / "images");
   fs::create_directories(folder_.path() / "masks");
   for (int i = 0; i < 7; ++i) {
-    Image photo = RenderRoom(kRoomCamera, truth[i]);
+    Image photo = RenderCorner(kRoomCamera, truth[i]);
     std::copy(bonnet.data.begin(), bonnet.data.end(), photo.data.begin() + 400 * 150);
     WriteFileAtomic(folder_.path() / "images" / PhotoName(i), EncodePng8(photo));
     WriteFileAtomic(folder_.path() / "masks" / PhotoName(i), EncodePng8(mask));
@@ -199,7 +142,7 @@ TEST_F(Sfm, PlannedPairsOfPhotosWithAFocalLength) {
   const auto film_mm =
       static_cast<uint32_t>(std::lround(camera.fx * 43.2666 / std::hypot(320, 240)));
   for (int i = 0; i < kCount; ++i) {
-    const std::string jpeg = EncodeJpeg(RenderRoom(camera, poses[i]));
+    const std::string jpeg = EncodeJpeg(RenderCorner(camera, poses[i]));
     WriteFileAtomic(folder_.path() / ("p" + std::to_string(i) + ".jpg"),
                     WithExif(jpeg, {{41989, 3, film_mm}}));
   }
@@ -244,13 +187,13 @@ TEST_F(Sfm, ManyPhotosThatShareNothingAreNotComparedForLong) {
 
 // A film of a fixed camera: noise, and something that passes by. COLMAP has not even started.
 TEST_F(Sfm, ACameraThatStandsStillIsRefusedAtOnce) {
-  const Image background = RenderRoom(kRoomCamera, RoomPoses(3)[1]);
+  const Image background = RenderCorner(kRoomCamera, RoomPoses(3)[1]);
   Random random(4);
   for (int i = 0; i < 40; ++i) {
     Image photo = background;
     for (int y = 90; y < 210; ++y) {
       for (int x = 8 * i; x < 8 * i + 60; ++x) {
-        photo.At(0, y, x) = Texture(0.02 * (x - 8 * i), 0.02 * y, 7);
+        photo.At(0, y, x) = CornerTexture(0.02 * (x - 8 * i), 0.02 * y, 7);
       }
     }
     for (float& v : photo.data) v += 0.02f * static_cast<float>(random.NextNormal());
@@ -276,7 +219,7 @@ TEST_F(Sfm, FlatPhotosAndTwoPhotosAreRefused) {
 TEST_F(Sfm, CancellationStopsTheChild) {
   const std::vector<Pose> poses = RoomPoses(6);
   for (int i = 0; i < 6; ++i) {
-    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(RenderRoom(kRoomCamera, poses[i])));
+    WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(RenderCorner(kRoomCamera, poses[i])));
   }
   std::thread canceller([this] {
     std::this_thread::sleep_for(std::chrono::milliseconds(400));

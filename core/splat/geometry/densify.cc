@@ -60,6 +60,12 @@ void Jitter(ParameterBlock& p, int64_t i, Random& random) {
   }
 }
 
+void Keep(const std::vector<uint32_t>& kept, DensifyTarget& t) {
+  t.parameters.Gather(kept);
+  t.moments.first.Gather(kept);
+  t.moments.second.Gather(kept);
+}
+
 void Prune(const GradientDensifyOptions& options, DensifyTarget& t) {
   std::vector<uint32_t> kept;
   const ParameterBlock& p = t.parameters;
@@ -68,10 +74,7 @@ void Prune(const GradientDensifyOptions& options, DensifyTarget& t) {
       kept.push_back(static_cast<uint32_t>(i));
     }
   }
-  if (kept.empty() || static_cast<int64_t>(kept.size()) == p.count()) return;
-  t.parameters.Gather(kept);
-  t.moments.first.Gather(kept);
-  t.moments.second.Gather(kept);
+  if (!kept.empty() && static_cast<int64_t>(kept.size()) < p.count()) Keep(kept, t);
 }
 
 }  // namespace
@@ -109,6 +112,18 @@ void DensifyByGradient(const GradientDensifyOptions& options, DensifyTarget& t) 
   }
   Prune(options, t);
   t.statistics.Reset(t.parameters.count());
+}
+
+void KeepMostOpaque(int64_t count, DensifyTarget& t) {
+  if (t.parameters.count() <= count) return;
+  std::vector<uint32_t> kept(t.parameters.count());
+  std::iota(kept.begin(), kept.end(), 0u);
+  const float* logit = t.parameters.Row(kOpacityRow);
+  std::stable_sort(
+      kept.begin(), kept.end(), [&](uint32_t a, uint32_t b) { return logit[a] > logit[b]; });
+  kept.resize(static_cast<size_t>(std::max<int64_t>(1, count)));
+  std::sort(kept.begin(), kept.end());
+  Keep(kept, t);
 }
 
 void ResetOpacity(double max_opacity, DensifyTarget& t) {

@@ -31,6 +31,9 @@ struct GradientDensifyOptions {
 // gradient reaches the threshold, steepest first while `max_gaussians` allows, and prunes.
 void DensifyByGradient(const GradientDensifyOptions& options, DensifyTarget& target);
 
+// Removes the least opaque ones beyond `count`. Statistics are for the caller to reset.
+void KeepMostOpaque(int64_t count, DensifyTarget& target);
+
 // Caps all opacities at `max_opacity` and forgets their moments.
 void ResetOpacity(double max_opacity, DensifyTarget& target);
 

@@ -16,8 +16,8 @@ struct GeometryTuning {
   int densify_rounds = 30;
   double opacity_reset_every = 0.0;  // 0: never; while densifying
   double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
-  double opacity_penalty = 0.005;    // times the mean opacity
-  double scale_penalty = 0.005;      // times the mean scale / extent
+  double opacity_penalty = 0.005;    // times the mean opacity of what stands still
+  double scale_penalty = 0.005;      // times the mean scale / extent of it
   // Of Gaussians left out at random, growing from 0, where there are at most sparse_views views;
   // in inverse proportion to their square where there are more.
   double last_drop_rate = 0.2;
@@ -36,6 +36,11 @@ struct GeometryTuning {
   double rotation_rate = 4e-3;
   // Under a time limit the number of Gaussians grows only while so many can be hoped for.
   double wanted_iterations = 800;
+  // Of pictures for which what belongs to their own moment is left out, so that what belongs to the
+  // moments before and after learns to move there.
+  double moment_drop_rate = 0.5;
+  double least_width = 0.9;  // of a window in time, of the interval between moments
+  double seed_width = 1.0;   // the first
   double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
 
   bool operator==(const GeometryTuning&) const = default;
@@ -67,6 +72,9 @@ void VisitFields(Tuning& tuning, Visit&& visit) {
   visit("scale_rate", tuning.scale_rate);
   visit("rotation_rate", tuning.rotation_rate);
   visit("wanted_iterations", tuning.wanted_iterations);
+  visit("moment_drop_rate", tuning.moment_drop_rate);
+  visit("least_width", tuning.least_width);
+  visit("seed_width", tuning.seed_width);
   visit("last_rate", tuning.last_rate);
 }
 

@@ -13,6 +13,7 @@
 #include "core/splat/geometry/regularize.h"
 #include "core/splat/geometry/training_schedule.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/motion/motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/loss.h"
@@ -28,7 +29,6 @@ constexpr double kErrorReports = 100.0;
 constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
 constexpr double kSurveyAt = 0.15;  // of the schedule: where motion is looked for
-constexpr double kSeedShare = 0.4;  // of the most Gaussians that there may be
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
 class GeometryTrainer {
@@ -103,10 +103,9 @@ class GeometryTrainer {
     for (const PosedCamera& view : problem_.training) {
       pixels += int64_t{view.camera.width} * view.camera.height;
     }
-    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
                                    channels_,
-                                   static_cast<int>(options_.motion),
-                                   times_.steps,
+                                   MayMove() ? times_.steps : 1,
                                    options_.iterations,
                                    options_.max_gaussians,
                                    options_.sh_degree,
@@ -155,30 +154,31 @@ class GeometryTrainer {
   }
 
   float UnitTime(const PosedCamera& view) const { return times_.UnitTime(view.time_s); }
-
   // All Gaussians at the view's moment.
-  const ParameterBlock& At(const PosedCamera& view) {
+  const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
     if (state_.moving.parameters.count() == 0) return state_.parameters;
-    ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_);
+    ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_, hidden);
     return composed_;
   }
 
   int64_t Count() const { return state_.parameters.count() + state_.moving.parameters.count(); }
 
+  bool MayMove() const {
+    return options_.motion == GeometryOptions::Motion::kAuto && times_.steps > 1;
+  }
+
   void FindMovers() {
-    if (options_.motion == GeometryOptions::Motion::kStill || times_.steps < 2) return;
-    MoverSeedOptions seeds;
-    seeds.rows = state_.parameters.rows();
-    seeds.channels = channels_;
-    seeds.coefficients = ShCoefficients(options_.sh_degree);
-    seeds.most = static_cast<int64_t>(kSeedShare * static_cast<double>(options_.max_gaussians));
+    if (!MayMove()) return;
     const auto target = [&](const PosedCamera& view, int level) {
       return targets_.Get(view, level);
     };
     const FoundMovers found =
-        FindMovingPart(problem_, times_, state_.parameters, Colors(), target, seeds, run_.pool);
+        FindMovingPart(problem_, times_, state_.parameters, Colors(), target, options_, run_.pool);
     run_.progress.OnError(state_.iteration, "moving_share", found.moving_share);
+    if (found.moving.parameters.count() == 0) return;
     state_.moving = found.moving;
+    DensifyTarget still{state_.parameters, state_.moments, state_.statistics, state_.random};
+    KeepMostOpaque(options_.max_gaussians - state_.moving.parameters.count(), still);
     state_.statistics.Reset(Count());
   }
 
@@ -190,7 +190,7 @@ class GeometryTrainer {
     const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, level);
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
-    const ParameterBlock& now = At(view);
+    const ParameterBlock& now = At(view, schedule_.HiddenTime(state_.iteration, times_.Interval()));
     pipeline_.Forward(now, color, camera, kBackground, false, run_.pool, DroppingNow());
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
@@ -270,6 +270,17 @@ class GeometryTrainer {
       std::vector<float> all = rates;
       all.insert(all.end(), motion.begin(), motion.end());
       finite = UpdatePart(moving_gradient_, std::move(all), moving.parameters, moving.moments);
+      LimitWindows(static_cast<float>(std::log(schedule_.tuning().least_width * times_.Interval())),
+                   state_.parameters.rows(),
+                   moving.parameters);
+    }
+    const GeometryTuning& tuning = schedule_.tuning();
+    if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
+      AddPenaltyGradients(state_.parameters,
+                          static_cast<float>(tuning.opacity_penalty),
+                          static_cast<float>(tuning.scale_penalty / problem_.extent),
+                          run_.pool,
+                          gradient_);
     }
     finite = UpdatePart(gradient_, std::move(rates), state_.parameters, state_.moments) && finite;
     clock_.Enter(Phase::kOther);
@@ -280,20 +291,13 @@ class GeometryTrainer {
                   std::vector<float> rates,
                   ParameterBlock& parameters,
                   AdamMoments& moments) {
-    const GeometryTuning& tuning = schedule_.tuning();
-    if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
-      AddPenaltyGradients(parameters,
-                          static_cast<float>(tuning.opacity_penalty),
-                          static_cast<float>(tuning.scale_penalty / problem_.extent),
-                          run_.pool,
-                          gradient);
-    }
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
     if (!AdamStep(gradient, rates, state_.iteration + 1, run_.pool, parameters, moments)) {
       return false;
     }
-    if (tuning.max_needle_ratio > 0.0) {
-      LimitNeedles(static_cast<float>(std::log(tuning.max_needle_ratio)), run_.pool, parameters);
+    const double ratio = schedule_.tuning().max_needle_ratio;
+    if (ratio > 0.0) {
+      LimitNeedles(static_cast<float>(std::log(ratio)), run_.pool, parameters);
     }
     return true;
   }

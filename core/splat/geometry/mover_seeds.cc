@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 
+#include "core/splat/geometry/mover_velocity.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/motion/motion.h"
 #include "core/splat/raster/raster_constants.h"
@@ -17,19 +18,11 @@ constexpr double kNearest = 0.15;  // of the standing surface's depth
 constexpr double kBehind = 1.03;   // of a surface's depth: hidden by it
 constexpr int kPatchRadius = 2;    // of the comparison of luminance, px
 constexpr double kSeedOpacity = 0.3;
-constexpr double kSeedWidth = 0.7;  // of the interval between time steps: the window's deviation
 constexpr double kFootprint = 0.6;  // of the distance between seeds: their deviation
 
 struct Pixel {
   int x = 0;
   int y = 0;
-};
-
-struct Seed {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  double scale = 0.0;
-  float luminance = 0.0f;
-  float time = 0.0f;
 };
 
 float AtClamped(const Image& image, int x, int y) {
@@ -139,16 +132,16 @@ Image FootDepths(const SurveyedView& view, double usual_depth) {
   return depth;
 }
 
-std::vector<Seed> SeedsOf(const SurveyedView& view, const Views& moment, float time, int step) {
-  std::vector<Seed> seeds;
+std::vector<MoverSeed> SeedsOf(const SurveyedView& view, const Views& moment, int step) {
+  std::vector<MoverSeed> seeds;
   const double usual = MedianDepth(view);
   if (!(usual > 0.0)) return seeds;
   const Image foot = FootDepths(view, usual);
   const Camera& camera = view.posed.camera;
-  for (int y = 0; y < camera.height; ++y) {
+  for (int y = 0; y < camera.height; y += step) {
     // Every other row begins half a step later.
     for (int x = y / step % 2 * (step / 2); x < camera.width; x += step) {
-      if (y % step != 0 || view.moving.At(0, y, x) == 0.0f) continue;
+      if (view.moving.At(0, y, x) == 0.0f) continue;
       const float surface = view.depth.At(0, y, x);
       const double farthest = surface > 0.0f ? surface : 2.0 * usual;
       const double nearest = std::max(kNearest * std::min(farthest, usual), 2.0 * kNearPlane);
@@ -165,34 +158,42 @@ std::vector<Seed> SeedsOf(const SurveyedView& view, const Views& moment, float t
           depth = d;
         }
       }
-      seeds.push_back({view.posed.cam_from_world.WorldFromCamera(depth * ray),
-                       kFootprint * step * depth / camera.fx,
-                       view.luminance.At(0, y, x),
-                       time});
+      MoverSeed seed{x, y, depth};
+      seed.position = view.posed.cam_from_world.WorldFromCamera(depth * ray);
+      seeds.push_back(seed);
     }
   }
   return seeds;
 }
 
-ParameterBlock BlockOf(const std::vector<Seed>& seeds, const MoverSeedOptions& options) {
-  ParameterBlock block(options.rows + kMotionRows, static_cast<int64_t>(seeds.size()));
+// Appends the seeds of one view.
+void Append(const SurveyedView& view,
+            const std::vector<MoverSeed>& seeds,
+            float time,
+            int step,
+            const MoverSeedOptions& options,
+            ParameterBlock& block) {
   const auto logit = static_cast<float>(std::log(kSeedOpacity / (1.0 - kSeedOpacity)));
-  const auto width = static_cast<float>(std::log(kSeedWidth * options.interval));
-  for (int64_t i = 0; i < block.count(); ++i) {
-    const Seed& seed = seeds[i];
+  const auto width = static_cast<float>(std::log(options.width * options.interval));
+  int64_t i = block.count();
+  block.Resize(i + static_cast<int64_t>(seeds.size()));
+  for (const MoverSeed& seed : seeds) {
+    const double scale = kFootprint * step * seed.depth / view.posed.camera.fx;
     for (int k = 0; k < 3; ++k) {
       block.Row(kPositionRow + k)[i] = static_cast<float>(seed.position[k]);
-      block.Row(kLogScaleRow + k)[i] = static_cast<float>(std::log(seed.scale));
+      block.Row(kLogScaleRow + k)[i] = static_cast<float>(std::log(scale));
+      block.Row(options.rows + kVelocityRow + k)[i] = static_cast<float>(seed.velocity[k]);
     }
     block.Row(kRotationRow)[i] = 1.0f;
     block.Row(kOpacityRow)[i] = logit;
+    const float luminance = view.luminance.At(0, seed.y, seed.x);
     for (int c = 0; c < options.channels; ++c) {
-      block.Row(kColorRow + c * options.coefficients)[i] = (seed.luminance - 0.5f) / kShDc;
+      block.Row(kColorRow + c * options.coefficients)[i] = (luminance - 0.5f) / kShDc;
     }
-    block.Row(options.rows + kCenterRow)[i] = seed.time;
+    block.Row(options.rows + kCenterRow)[i] = time;
     block.Row(options.rows + kLogWidthRow)[i] = width;
+    ++i;
   }
-  return block;
 }
 
 }  // namespace
@@ -211,13 +212,16 @@ ParameterBlock SeedMovers(const std::vector<SurveyedView>& views,
       1,
       static_cast<int>(
           std::ceil(std::sqrt(moving / static_cast<double>(std::max<int64_t>(1, options.most))))));
-  std::vector<std::vector<Seed>> seeds(views.size());
+  std::vector<std::vector<MoverSeed>> seeds(views.size());
   pool.ForEach(static_cast<int64_t>(views.size()), [&](int64_t i, int) {
-    seeds[i] = SeedsOf(views[i], moments.at(views[i].posed.time_s), unit_time[i], step);
+    seeds[i] = SeedsOf(views[i], moments.at(views[i].posed.time_s), step);
   });
-  std::vector<Seed> all;
-  for (const std::vector<Seed>& some : seeds) all.insert(all.end(), some.begin(), some.end());
-  return BlockOf(all, options);
+  FindVelocities(views, unit_time, step, pool, seeds);
+  ParameterBlock block(options.rows + kMotionRows, 0);
+  for (size_t i = 0; i < views.size(); ++i) {
+    Append(views[i], seeds[i], unit_time[i], step, options, block);
+  }
+  return block;
 }
 
 }  // namespace color3d

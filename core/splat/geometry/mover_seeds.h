@@ -16,6 +16,7 @@ struct MoverSeedOptions {
   int channels = 1;
   int coefficients = 1;   // of a colour channel
   int64_t most = 0;       // seeds
+  double width = 0.7;     // deviation of the first window in time, of the interval
   double interval = 1.0;  // from one time step to the next, in units of GaussianMotion's t
 };
 

@@ -5,6 +5,7 @@
 
 #include "core/splat/geometry/motion_survey.h"
 #include "core/splat/model/model_parameters.h"
+#include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/motion/motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
@@ -12,6 +13,7 @@
 namespace color3d {
 namespace {
 
+constexpr double kMoverShare = 0.4;    // of the most Gaussians that there may be
 constexpr double kStillShare = 0.002;  // of the pixels: less moves in pictures of a still scene
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
@@ -99,7 +101,7 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
                            const ParameterBlock& still,
                            const ColorSpec& color,
                            const LevelTarget& target,
-                           const MoverSeedOptions& seeds,
+                           const GeometryOptions& options,
                            ThreadPool& pool) {
   std::vector<SurveyedView> views = SurveyedViews(problem, still, color, target, pool);
   FoundMovers found;
@@ -107,10 +109,15 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
   if (found.moving_share < kStillShare) return found;
   std::vector<float> unit_time;
   for (const PosedCamera& view : problem.training) unit_time.push_back(times.UnitTime(view.time_s));
-  MoverSeedOptions options = seeds;
-  options.interval = times.Interval();
+  MoverSeedOptions seeds;
+  seeds.rows = still.rows();
+  seeds.channels = color.channels;
+  seeds.coefficients = ShCoefficients(options.sh_degree);
+  seeds.most = static_cast<int64_t>(kMoverShare * static_cast<double>(options.max_gaussians));
+  seeds.width = TuningOf(options).seed_width;
+  seeds.interval = times.Interval();
   ParameterBlock& parameters = found.moving.parameters;
-  parameters = SeedMovers(views, unit_time, options, pool);
+  parameters = SeedMovers(views, unit_time, seeds, pool);
   const ParameterBlock zero(parameters.rows(), parameters.count());
   found.moving.moments = {zero, zero};
   return found;
@@ -120,7 +127,8 @@ void ComposeAt(const ParameterBlock& still,
                const MovingPart& moving,
                float t,
                ThreadPool& pool,
-               ParameterBlock& at) {
+               ParameterBlock& at,
+               float hidden) {
   const int64_t first = still.count(), count = first + moving.parameters.count();
   if (at.rows() != still.rows()) at = ParameterBlock(still.rows(), count);
   if (at.count() != count) at.Resize(count);
@@ -130,7 +138,7 @@ void ComposeAt(const ParameterBlock& still,
       std::copy_n(moving.parameters.Row(row), moving.parameters.count(), at.Row(row) + first);
     }
   });
-  ApplyMotion(moving.parameters, still.rows(), t, first, pool, at);
+  ApplyMotion(moving.parameters, still.rows(), t, first, pool, at, hidden);
 }
 
 void DecomposeGradient(const ParameterBlock& still,

@@ -10,6 +10,7 @@
 #include "core/base/parallel.h"
 #include "core/simd/plane_buffer.h"
 #include "core/splat/geometry/densify.h"
+#include "core/splat/geometry/geometry_options.h"
 #include "core/splat/geometry/geometry_problem.h"
 #include "core/splat/geometry/mover_seeds.h"
 #include "core/splat/model/gaussian_model.h"
@@ -50,15 +51,16 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
                            const ParameterBlock& still,
                            const ColorSpec& color,
                            const LevelTarget& target,
-                           const MoverSeedOptions& seeds,
+                           const GeometryOptions& options,
                            ThreadPool& pool);
 
-// Both at the moment `t`: those that stand still first.
+// Both at the moment `t`: those that stand still first. `hidden`: ApplyMotion.
 void ComposeAt(const ParameterBlock& still,
                const MovingPart& moving,
                float t,
                ThreadPool& pool,
-               ParameterBlock& at);
+               ParameterBlock& at,
+               float hidden = 0.0f);
 // The adjoint; `gradient` comes as dL/d(at) and leaves as dL/d(still).
 void DecomposeGradient(const ParameterBlock& still,
                        const MovingPart& moving,

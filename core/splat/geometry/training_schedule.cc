@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/random.h"
 #include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/parameter_block.h"
 #include "core/splat/model/spherical_harmonics.h"
@@ -97,6 +98,12 @@ std::vector<float> TrainingSchedule::MotionRates(double fraction, double interva
   set(kCenterRow, 1, scale * kCenterRate * interval);
   set(kLogWidthRow, 1, scale * tuning_.scale_rate);
   return rates;
+}
+
+float TrainingSchedule::HiddenTime(int64_t iteration, double interval) const {
+  Random random(options_.seed, static_cast<uint64_t>(iteration));
+  return random.NextUniform() < tuning_.moment_drop_rate ? static_cast<float>(0.5 * interval)
+                                                         : 0.0f;
 }
 
 bool TrainingSchedule::DensifyDue(double before, double now) const {

@@ -30,6 +30,9 @@ class TrainingSchedule {
   std::vector<float> LearningRates(double fraction, int channels) const;
   // One per row of motion (motion/motion.h); `interval` between time steps in units of t.
   std::vector<float> MotionRates(double fraction, double interval) const;
+  // What belongs to a nearer moment than this, in units of t, is left out of this iteration's
+  // picture: half of the interval at random, as the iteration's number says, or 0.
+  float HiddenTime(int64_t iteration, double interval) const;
   // True when a round of densification falls into (before, now].
   bool DensifyDue(double before, double now) const;
   bool OpacityResetDue(double before, double now) const;

@@ -16,8 +16,13 @@ constexpr float kMaxOpacity = 1.0f - 1e-6f;
 
 float Sigmoid(float x) { return 1.0f / (1.0f + std::exp(-x)); }
 
+// Of a window; narrower ones are taken to be so wide, so that no product overflows.
+constexpr float kLeastLogWidth = -40.0f;
+constexpr float kFarthest = 1e4f;  // of tau / width: nothing is seen long before
+
 struct Window {
   float tau = 0.0f;
+  float inverse_width = 0.0f;
   float scaled = 0.0f;  // tau / width
   float value = 1.0f;   // 0..1
 };
@@ -25,7 +30,8 @@ struct Window {
 Window WindowAt(const ParameterBlock& moving, int row, int64_t i, float t) {
   Window w;
   w.tau = t - moving.Row(row + kCenterRow)[i];
-  w.scaled = w.tau * std::exp(-moving.Row(row + kLogWidthRow)[i]);
+  w.inverse_width = std::exp(-std::max(moving.Row(row + kLogWidthRow)[i], kLeastLogWidth));
+  w.scaled = std::clamp(w.tau * w.inverse_width, -kFarthest, kFarthest);
   w.value = std::exp(-0.5f * w.scaled * w.scaled);
   return w;
 }
@@ -73,7 +79,8 @@ void ApplyMotion(const ParameterBlock& moving,
                  float t,
                  int64_t first,
                  ThreadPool& pool,
-                 ParameterBlock& at) {
+                 ParameterBlock& at,
+                 float hidden) {
   pool.ForRanges(moving.count(), [&](int64_t begin, int64_t end, int) {
     for (int64_t i = begin; i < end; ++i) {
       const Window w = WindowAt(moving, row, i, t);
@@ -86,6 +93,10 @@ void ApplyMotion(const ParameterBlock& moving,
         at.Row(kRotationRow + k)[j] += w.tau * moving.Row(row + kSpinRow + k)[i];
       }
       float& logit = at.Row(kOpacityRow)[j];
+      if (std::abs(w.tau) < hidden) {
+        logit = kUnseenLogit;
+        continue;
+      }
       const float opacity = std::min(Sigmoid(logit) * w.value, kMaxOpacity);
       logit = opacity > kUnseenOpacity ? std::log(opacity / (1.0f - opacity)) : kUnseenLogit;
     }
@@ -128,11 +139,15 @@ void ApplyMotionBackward(const ParameterBlock& moving,
       const float rest = 1.0f - Sigmoid(at.Row(kOpacityRow)[j]);
       const float d_log_opacity = rest > 0.0f ? d_logit / rest : 0.0f;
       d_moving.Row(kOpacityRow)[i] = d_log_opacity * (1.0f - Sigmoid(moving.Row(kOpacityRow)[i]));
-      const float inverse_width = std::exp(-moving.Row(row + kLogWidthRow)[i]);
-      d_moving.Row(row + kCenterRow)[i] = d_log_opacity * w.scaled * inverse_width - d_tau;
+      d_moving.Row(row + kCenterRow)[i] = d_log_opacity * w.scaled * w.inverse_width - d_tau;
       d_moving.Row(row + kLogWidthRow)[i] = d_log_opacity * w.scaled * w.scaled;
     }
   });
+}
+
+void LimitWindows(float least, int row, ParameterBlock& moving) {
+  float* width = moving.Row(row + kLogWidthRow);
+  for (int64_t i = 0; i < moving.count(); ++i) width[i] = std::max(width[i], least);
 }
 
 ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool) {
@@ -146,9 +161,17 @@ ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPoo
 
 GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool) {
   if (model.motion.size() == 0) return model;
-  GaussianModel at = ModelFromParameters(
-      ParametersAt(model, time_s, pool), model.channels, model.sh_degree, model.chroma_sh_degree);
-  at.confidence = model.confidence;
+  ParameterBlock parameters = ParametersAt(model, time_s, pool);
+  std::vector<uint32_t> seen;
+  for (int64_t i = 0; i < parameters.count(); ++i) {
+    if (parameters.Row(kOpacityRow)[i] > kUnseenLogit) seen.push_back(static_cast<uint32_t>(i));
+  }
+  parameters.Gather(seen);
+  GaussianModel at =
+      ModelFromParameters(parameters, model.channels, model.sh_degree, model.chroma_sh_degree);
+  for (const uint32_t i : seen) {
+    if (!model.confidence.empty()) at.confidence.push_back(model.confidence[i]);
+  }
   return at;
 }
 

@@ -26,13 +26,15 @@ ParameterBlock MotionFromModel(const GaussianModel& model);
 void SetMotion(const ParameterBlock& moving, int row, GaussianMotion& motion);
 
 // Takes Gaussians [first, first + moving.count()) of `at` to the moment `t` (GaussianMotion), as
-// rows [row, row + kMotionRows) of `moving` say.
+// rows [row, row + kMotionRows) of `moving` say. Those that belong to a time nearer than `hidden`
+// are not seen.
 void ApplyMotion(const ParameterBlock& moving,
                  int row,
                  float t,
                  int64_t first,
                  ThreadPool& pool,
-                 ParameterBlock& at);
+                 ParameterBlock& at,
+                 float hidden = 0.0f);
 
 // The adjoint. `moving` holds parameters in rows [0, row) and motion from `row` on; `at` holds all
 // Gaussians at `t`, with those of `moving` from `first` on; `d_at` is dL/d(at). Sets `d_moving`,
@@ -46,10 +48,13 @@ void ApplyMotionBackward(const ParameterBlock& moving,
                          ThreadPool& pool,
                          ParameterBlock& d_moving);
 
+// No window in time becomes narrower than exp(least).
+void LimitWindows(float least, int row, ParameterBlock& moving);
+
 // The model's parameters at a time of the scene, seconds; those that stand still are the same at
 // any.
 ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool);
-// The same as a model without motion.
+// The same as a model without motion: the Gaussians that are seen then.
 GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool);
 
 }  // namespace color3d

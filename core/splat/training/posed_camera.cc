@@ -8,7 +8,11 @@ std::vector<PosedCamera> PosedCameras(const Scene& scene,
   std::vector<PosedCamera> posed;
   for (const int view : views) {
     const View& of = scene.views[view];
-    posed.push_back({view, images.WorkingCamera(view), of.cam_from_world, of.time_s()});
+    posed.push_back({view,
+                     images.WorkingCamera(view),
+                     of.cam_from_world,
+                     of.time_s(),
+                     of.moment ? of.moment->shot : 0});
   }
   return posed;
 }

@@ -13,6 +13,7 @@ struct PosedCamera {
   Camera camera;
   Pose cam_from_world;
   double time_s = 0.0;  // of the scene
+  int shot = 0;         // views of one camera have the same
 };
 
 // These views of `scene` at the working size of `images`.

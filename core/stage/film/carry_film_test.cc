@@ -1,8 +1,8 @@
-// The stage carry_color on a film: key frames that are given later.
-#include <fmt/format.h>
+// The stage carry_color on a film: what it leaves, and that it goes on where it was interrupted.
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "core/color/lab.h"
 #include "core/stage/formats/artifacts.h"
@@ -12,50 +12,83 @@
 namespace color3d {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 72, kFrames = 16;
+constexpr int kWidth = 96, kHeight = 64, kFrames = 12, kKey = 5;
 
-// A camera pans over a wall: red on the left, green on the right of the film's first frame.
-Image LabOf(int frame) {
-  Image lab(kWidth, kHeight, 3);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const double u = x + 1.0 * frame;
-      double l = 50.0;
-      for (int k = 1; k <= 6; ++k) {
-        const double a = 2.1 * k + 1.3;
-        l += 4.0 * std::sin(0.13 * k * (u * std::cos(a) + y * std::sin(a)) + 2.7 * a);
-      }
-      lab.At(0, y, x) = static_cast<float>(l);
-      lab.At(1, y, x) = static_cast<float>(20.0 * std::sin(0.03 * u));
-      lab.At(2, y, x) = static_cast<float>(20.0 * std::cos(0.04 * y));
-    }
+// Told each frame; cancels the work at one of them.
+class FrameCounter : public NullObserver {
+ public:
+  void OnProgress(int64_t step, int64_t total, const std::string&) override {
+    EXPECT_EQ(total, kFrames);
+    steps.push_back(step);
+    if (cancel != nullptr && step == cancel_at) cancel->Cancel();
   }
-  return lab;
-}
+  std::vector<int64_t> steps;
+  CancellationToken* cancel = nullptr;
+  int64_t cancel_at = 0;
+};
+
+// Keeps every state that it is given, and dies at one.
+class Dying : public CheckpointStore {
+ public:
+  std::optional<std::string> Load() override {
+    return states.empty() ? std::nullopt : std::optional(states.back());
+  }
+  bool WantsSave() override { return true; }
+  void Save(const std::string& state) override {
+    states.push_back(state);
+    if (states.size() == dies_at) throw Error(ErrorCode::kAborted, "the lease is lost");
+  }
+  std::vector<std::string> states;
+  size_t dies_at = 4;
+};
 
 class CarryFilmTest : public StageTest {
  protected:
   CarryFilmTest() {
     for (int i = 0; i < kFrames; ++i) {
+      Image gray(kWidth, kHeight, 1);
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          const double u = x + 1.2 * i;
+          gray.At(0, y, x) = static_cast<float>(0.5 + 0.15 * std::sin(0.31 * u + 0.1 * y) +
+                                                0.15 * std::sin(0.23 * y - 0.17 * u));
+        }
+      }
       View view;
-      view.name = view.image_file = fmt::format("f{:02}.png", i);
+      view.name = view.image_file = "f" + std::to_string(100 + i) + ".png";
       view.camera =
           view.captured_camera = {kWidth, kHeight, 100.0, 100.0, kWidth / 2.0, kHeight / 2.0};
       view.moment = Moment{0.04 * i, 0};
-      WriteFileAtomic(scratch_.path() / view.image_file, EncodePng16(SrgbFromLab(LabOf(i))));
+      WriteFileAtomic(scratch_.path() / view.image_file, EncodePng8(gray));
       scene_.views.push_back(view);
     }
     AddInput(artifact::kScene, SceneToJson(scene_));
-    AddInput(artifact::kKeyView, R"({"view": "f02.png"})");
-    const Image truth = LabOf(2);
+    AddInput(artifact::kKeyView, R"({"view": ")" + scene_.views[kKey].name + R"("})");
     Image ab(kWidth, kHeight, 2);
-    std::copy_n(truth.Plane(1), ab.data.size(), ab.data.begin());
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        ab.At(0, y, x) = static_cast<float>(30.0 * std::sin(0.1 * x));
+        ab.At(1, y, x) = static_cast<float>(30.0 * std::cos(0.1 * y));
+      }
+    }
     AddInput(artifact::kKeyColor, EncodeAbPng(ab));
   }
-  // All frames' files.
-  std::vector<std::string> Run(const CarryColorOptions& options) {
-    StageContext context = MakeContext();
-    RunCarryColor(options, context);
+
+  nlohmann::json Run() {
+    std::filesystem::remove_all(scratch_.path() / "out");
+    std::filesystem::create_directories(scratch_.path() / "out");
+    StageContext context({.scene_folder = scratch_.path(),
+                          .inputs = inputs_,
+                          .output_folder = scratch_.path() / "out",
+                          .scratch_folder = scratch_.path(),
+                          .threads = threads_},
+                         *checkpoints_,
+                         frames_,
+                         cancel_);
+    RunCarryColor({}, context);
+    return nlohmann::json::parse(ReadFile(scratch_.path() / "out" / artifact::kCarryFacts));
+  }
+  std::vector<std::string> Carried() {
     std::vector<std::string> files;
     for (const View& view : scene_.views) {
       files.push_back(
@@ -63,51 +96,54 @@ class CarryFilmTest : public StageTest {
     }
     return files;
   }
-  // The frame in one other colour, of which the columns from `begin` to `end` are painted.
-  FurtherKeyView Painted(int view, int begin, int end) {
-    Image lab = LabOf(view);
-    std::fill_n(lab.Plane(1), lab.PlaneSize(), -25.0f);
-    std::fill_n(lab.Plane(2), lab.PlaneSize(), -5.0f);
-    const Image srgb = SrgbFromLab(lab);
-    Image painted(kWidth, kHeight, 4);
-    std::copy(srgb.data.begin(), srgb.data.end(), painted.data.begin());
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = begin; x < end; ++x) painted.At(3, y, x) = 1.0f;
-    }
-    FurtherKeyView further{scene_.views[view].name, {}};
-    further.color.source = ColorizeKeyViewOptions::Source::kImage;
-    further.color.file = scratch_.path() / "painted.png";
-    WriteFileAtomic(further.color.file, EncodePng16(painted));
-    return further;
-  }
+
   Scene scene_;
+  FrameCounter frames_;
+  int threads_ = 1;
 };
 
-TEST_F(CarryFilmTest, ALaterKeyFrameChangesOnlyTheFramesNearerToIt) {
-  CarryColorOptions options;
-  const auto before = Run(options);
-  options.further = {Painted(12, 0, kWidth)};
-  const auto after = Run(options);
-  for (int i = 0; i < kFrames; ++i) EXPECT_EQ(before[i] == after[i], i <= 7) << i;
+TEST_F(CarryFilmTest, AnotherWorkerGoesOnAndGivesTheSame) {
+  const nlohmann::json facts = Run();
+  EXPECT_GT(facts.at("coverage"), 0.5);
+  const std::vector<std::string> files = Carried();
+  EXPECT_EQ(frames_.steps.size(), static_cast<size_t>(kFrames));
+  EXPECT_EQ(frames_.steps.back(), kFrames);
+  for (const int threads : {1, 2}) {
+    threads_ = threads;
+    for (const size_t dies_at : {1u, 4u, 9u}) {
+      Dying store;
+      store.dies_at = dies_at;
+      checkpoints_ = &store;
+      EXPECT_THROW(Run(), Error);
+      ASSERT_EQ(store.states.size(), dies_at);
+      frames_.steps.clear();
+      EXPECT_EQ(Run(), facts);
+      EXPECT_EQ(frames_.steps.size(), kFrames - dies_at) << "no frame is carried into again";
+      EXPECT_EQ(frames_.steps.front(), static_cast<int64_t>(dies_at + 1));
+      EXPECT_EQ(Carried(), files) << threads << " threads, died at " << dies_at;
+    }
+  }
 }
 
-TEST_F(CarryFilmTest, WhatIsNotPaintedOnALaterKeyFrameKeepsItsColor) {
-  CarryColorOptions options;
-  const AbMap before = DecodeAbPng(Run(options)[13], "before");
-  options.further = {Painted(12, 0, kWidth / 2)};
-  const AbMap after = DecodeAbPng(Run(options)[13], "after");
-  const Image truth = LabOf(13);
-  double painted = 0.0, kept = 0.0, sure = 0.0, was_sure = 0.0;
-  int count = 0;
-  for (int y = 12; y < kHeight - 12; ++y, ++count) {
-    painted += std::abs(after.ab.At(0, y, 20) + 25.0f);
-    kept += std::abs(after.ab.At(0, y, 70) - truth.At(1, y, 70));
-    sure += after.confidence.At(0, y, 70);
-    was_sure += before.confidence.At(0, y, 70);
+TEST_F(CarryFilmTest, ACheckpointOfAnotherFilmIsNotTakenUp) {
+  const nlohmann::json facts = Run();
+  Dying store;
+  store.states = {"carry 2\nand then nonsense"};
+  store.dies_at = 0;
+  checkpoints_ = &store;
+  EXPECT_EQ(Run(), facts);
+}
+
+TEST_F(CarryFilmTest, CancelStopsBeforeTheNextFrame) {
+  frames_.cancel = &cancel_;
+  frames_.cancel_at = 3;
+  try {
+    Run();
+    FAIL() << "it went on";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kCancelled);
   }
-  EXPECT_LT(painted / count, 2.0);
-  EXPECT_LT(kept / count, 2.0);
-  EXPECT_GT(sure, 0.7 * was_sure);
+  EXPECT_EQ(frames_.steps.back(), 3);
 }
 
 }  // namespace

@@ -26,38 +26,44 @@ struct FrameTimes {
 
 // Gaps that frames of no use have left stay gaps, so that what is heard fits what is seen.
 FrameTimes TimesOf(const Scene& scene) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < scene.views.size(); ++i) {
+    const double step = scene.views[i].time_s() - scene.views[i - 1].time_s();
+    if (step > 0.0) steps.push_back(step);
+  }
   FrameTimes times;
-  for (const View& view : scene.views) {
-    times.time_s.push_back(view.time_s() - scene.views.front().time_s());
+  const double usual = steps.empty() ? 1.0 / times.frames_per_second : Median(std::move(steps));
+  times.frames_per_second = std::clamp(1.0 / usual, 1.0, 120.0);
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    const double step = i > 0 ? scene.views[i].time_s() - scene.views[i - 1].time_s() : 0.0;
+    // Another camera's film begins again.
+    times.time_s.push_back(i == 0 ? 0.0 : times.time_s.back() + (step > 0.0 ? step : usual));
   }
   times.ticks_per_second = TicksPerSecond(times.time_s);
-  std::vector<double> steps;
   for (size_t i = 1; i < times.time_s.size(); ++i) {
     // Broken films give two frames nearly one time.
     const double least = times.time_s[i - 1] + 1.0 / times.ticks_per_second;
     times.time_s[i] = std::max(times.time_s[i], least);
-    steps.push_back(times.time_s[i] - times.time_s[i - 1]);
+    times.seconds.push_back(times.time_s[i] - times.time_s[i - 1]);
   }
-  times.seconds = steps;
-  const double usual = steps.empty() ? 1.0 / times.frames_per_second : Median(std::move(steps));
   times.seconds.push_back(usual);
-  times.frames_per_second = std::clamp(1.0 / usual, 1.0, 120.0);
   return times;
 }
 
-// None for frames that came as pictures.
+// None for frames that came as pictures, or from several cameras.
 std::optional<SoundPart> SoundOf(const Scene& scene,
                                  const FrameTimes& times,
                                  const StageContext& context) {
+  std::vector<std::string> films;
   for (const std::string& file : ListFiles(context.scene_folder())) {
-    if (!HasFilmExtension(file) || IsAugmentFile(file)) continue;
-    const std::filesystem::path film = context.scene_folder() / file;
-    const FilmFacts facts = FilmReader(film).facts();
-    if (!facts.has_sound) return std::nullopt;
-    const double begin_s = facts.first_s + scene.views.front().time_s();
-    return SoundPart{film, begin_s, begin_s + times.time_s.back() + times.seconds.back()};
+    if (HasFilmExtension(file) && !IsAugmentFile(file)) films.push_back(file);
   }
-  return std::nullopt;
+  if (films.size() != 1) return std::nullopt;
+  const std::filesystem::path film = context.scene_folder() / films[0];
+  const FilmFacts facts = FilmReader(film).facts();
+  if (!facts.has_sound) return std::nullopt;
+  const double begin_s = facts.first_s + scene.views.front().time_s();
+  return SoundPart{film, begin_s, begin_s + times.time_s.back() + times.seconds.back()};
 }
 
 // Movies have even sides.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
@@ -16,6 +17,8 @@
 #include "core/film/steady_tones.h"
 #include "core/image/codec.h"
 #include "core/scene/import.h"
+#include "core/stage/film/film_frames.h"
+#include "core/stage/film/film_poses.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/video/film_reader.h"
 
@@ -25,7 +28,6 @@ namespace {
 
 constexpr double kFramesPerSecond = 25.0;  // of pictures, whose times nobody tells
 constexpr double kFocalOfLongerSide = 1.2;
-constexpr size_t kNamed = 5;  // frames in a warning
 
 // Pictures of all frames that are wanted, one after the other: sRGB or grey.
 struct FrameStream {
@@ -43,48 +45,12 @@ Camera UnknownCamera(int width, int height) {
 
 // Indices of the frames that are asked for.
 std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
-  std::vector<int> wanted;
-  for (size_t i = 0; i < times.size(); ++i) {
-    if (times[i] < options.begin_s || (options.end_s && times[i] >= *options.end_s)) continue;
-    wanted.push_back(static_cast<int>(i));
-  }
-  const auto strided = static_cast<int>((wanted.size() + options.stride - 1) / options.stride);
-  if (wanted.empty()) {
-    throw InvalidArgument(
-        "the film has no frame between the times that are asked for; it lasts {:.2f} s",
-        times.back());
-  }
-  if (strided > kMaxFilmFrames) {
-    const double seconds = times[wanted.back()] - times[wanted.front()];
-    throw InvalidArgument(
-        "{} frames ({:.0f} s) are more than a job takes ({}); take every {}th (film_stride), or a "
-        "part of {:.0f} s at most (film_begin_s, film_end_s)",
-        strided,
-        seconds,
-        kMaxFilmFrames,
-        (static_cast<int>(wanted.size()) + kMaxFilmFrames - 1) / kMaxFilmFrames,
-        std::floor(seconds * kMaxFilmFrames / strided));
-  }
-  for (int i = 0; i < strided; ++i) wanted[i] = wanted[static_cast<size_t>(i) * options.stride];
-  wanted.resize(strided);
-  if (strided == 1) {
+  std::vector<int> wanted = FramesAskedFor(times, options);
+  CheckFrameCount(wanted.size(), times[wanted.back()] - times[wanted.front()], options);
+  if (wanted.size() == 1) {
     throw InvalidArgument("one frame is no film; colour it as a photo, by `color3d key color`");
   }
   return wanted;
-}
-
-std::string NamesOf(const std::vector<std::string>& names) {
-  std::string text;
-  for (size_t i = 0; i < std::min(kNamed, names.size()); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return names.size() > kNamed ? text + fmt::format(" and {} more", names.size() - kNamed) : text;
-}
-
-void WarnOf(const std::vector<std::string>& names, const char* what, StageContext& context) {
-  if (names.empty()) return;
-  context.progress().OnWarning(fmt::format(
-      "{} {} {}: {}", names.size(), names.size() == 1 ? "frame" : "frames", what, NamesOf(names)));
 }
 
 void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
@@ -99,15 +65,15 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
     if (last >= 0 && shots.shot[i] != last) cuts.push_back(view.name);
     last = shots.shot[i];
   }
-  WarnOf(blank, "of one grey all over", context);
-  WarnOf(alien, "unlike those around (torn?), coloured on their own", context);
+  WarnOfFrames(blank, "of one grey all over", context);
+  WarnOfFrames(alien, "unlike those around (torn?), coloured on their own", context);
   if (cuts.empty()) return;
   context.progress().OnWarning(fmt::format(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
       "by likeness. Colour a frame of each (further key views; the selection of several names one "
       "a "
       "shot)",
-      NamesOf(cuts),
+      NamesOfFrames(cuts),
       cuts.size() + 1));
 }
 
@@ -132,9 +98,11 @@ View ViewOf(const FrameStream& stream, int i, const Image& luminance, bool is_dr
   return view;
 }
 
-void WriteGray(const View& view, Image luminance, StageContext& context) {
-  for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
-  context.WriteOutput(view.image_file, EncodePng8(luminance));
+// Kept aside until it is known which frames stay.
+void KeepAside(const View& view, Image luminance, const StageContext& context) {
+  const fs::path file = context.scratch_folder() / view.image_file;
+  fs::create_directories(file.parent_path());
+  WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
 }
 
 ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& context) {
@@ -165,11 +133,11 @@ ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& cont
     }
     frames.thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
     if (deflicker) frames.tones.push_back(FitWithin(luminance, kTonePicturePx));
-    if (stream.is_video && !deflicker) WriteGray(view, std::move(luminance), context);
+    if (stream.is_video && !deflicker) KeepAside(view, std::move(luminance), context);
     views.push_back(std::move(view));
     frames.index.push_back(i);
   }
-  WarnOf(damaged, "cannot be decoded and are left out", context);
+  WarnOfFrames(damaged, "cannot be decoded and are left out", context);
   if (views.size() < 2) {
     throw InvalidArgument(
         "{} of {} frames can be decoded; a film has two at least", views.size(), stream.count);
@@ -187,7 +155,7 @@ void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageConte
   for (int i = 0; i < count; ++i) {
     context.cancel().ThrowIfCancelled();
     context.progress().OnProgress(i, count, "steadying exposure");
-    WriteGray(frames.scene.views[i],
+    KeepAside(frames.scene.views[i],
               Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
               context);
   }
@@ -198,25 +166,41 @@ void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageConte
                   tones.flicker_after));
 }
 
-void ImportFrames(const FrameStream& stream, bool deflicker, bool hold_out, StageContext& context) {
-  ReadFrames frames = ReadAll(stream, deflicker, context);
+void ImportFrames(const FrameStream& stream,
+                  const FilmOptions& options,
+                  const ImportOptions& import,
+                  StageContext& context) {
+  ReadFrames frames = ReadAll(stream, options.deflicker, context);
   Scene& scene = frames.scene;
-  std::vector<std::string> warnings;
   TellShots(FindShots(frames.thumbnails), &scene, context);
-  if (deflicker) WriteSteady(stream, frames, context);
-  if (hold_out) HoldOutEveryEighth(&scene, &warnings);
-  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
+  if (options.deflicker) WriteSteady(stream, frames, context);
+  const bool is_drawn = stream.is_video || options.deflicker;
   ImportFacts facts;
   facts.layout = "film";
   facts.photos_found = stream.count;
   facts.photos_registered = static_cast<int>(scene.views.size());
+  if (options.poses == FilmPoses::kAuto) {
+    FindFilmPoses(is_drawn ? context.scratch_folder() : context.scene_folder(),
+                  import,
+                  context,
+                  &scene,
+                  &facts);
+  }
+  if (is_drawn) {
+    for (const View& view : scene.views) {
+      context.TakeOutput(view.image_file, context.scratch_folder() / view.image_file);
+    }
+  }
+  std::vector<std::string> warnings;
+  if (import.hold_out_every_eighth) HoldOutEveryEighth(&scene, &warnings);
+  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
   context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
 }
 
 void ImportVideo(const std::string& file,
                  const FilmOptions& options,
-                 bool hold_out,
+                 const ImportOptions& import,
                  StageContext& context) {
   if (options.frames_per_second) {
     throw InvalidArgument(
@@ -234,10 +218,12 @@ void ImportVideo(const std::string& file,
   stream.time_s = [&](int i) { return film.times()[wanted[i]]; };
   stream.read = [&](int i) { return film.Read(wanted[i]); };
   stream.name = [&](int i) { return fmt::format("f{:06}.png", wanted[i]); };
-  ImportFrames(stream, options.deflicker, hold_out, context);
+  ImportFrames(stream, options, import, context);
 }
 
-void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& context) {
+void ImportPictures(const FilmOptions& options,
+                    const ImportOptions& import,
+                    StageContext& context) {
   const fs::path folder = context.scene_folder() / kFramesFolder;
   std::vector<std::string> files;
   for (const std::string& file : ListFiles(folder)) {
@@ -253,7 +239,7 @@ void ImportPictures(const FilmOptions& options, bool hold_out, StageContext& con
   stream.time_s = [&](int i) { return times[wanted[i]]; };
   stream.read = [&](int i) { return ReadImage(folder / files[wanted[i]]); };
   stream.name = [&](int i) { return files[wanted[i]]; };
-  ImportFrames(stream, options.deflicker, hold_out, context);
+  ImportFrames(stream, options, import, context);
 }
 
 }  // namespace
@@ -274,22 +260,25 @@ std::string FindFilm(const fs::path& scene_folder) {
   std::error_code none;
   if (!fs::is_directory(scene_folder, none)) return film;
   bool has_photos = false;
+  int films = 0;
   for (const std::string& file : ListFiles(scene_folder)) {
     if (IsAugmentFile(file) || IsMaskFile(file)) continue;
     if (IsFrameFile(file) && HasImageExtension(file)) return std::string(kFramesFolder);
     has_photos |= HasImageExtension(file);
-    if (HasFilmExtension(file) && film.empty()) film = file;
+    if (!HasFilmExtension(file)) continue;
+    film = file;
+    ++films;
   }
-  return has_photos ? "" : film;
+  return has_photos || films != 1 ? "" : film;
 }
 
 void ImportFilm(const std::string& film,
                 const FilmOptions& options,
-                bool hold_out_every_eighth,
+                const ImportOptions& import,
                 StageContext& context) {
   options.Validate();
-  if (film == kFramesFolder) return ImportPictures(options, hold_out_every_eighth, context);
-  ImportVideo(film, options, hold_out_every_eighth, context);
+  if (film == kFramesFolder) return ImportPictures(options, import, context);
+  ImportVideo(film, options, import, context);
 }
 
 }  // namespace color3d

@@ -40,6 +40,14 @@ std::string ImportFactsToJson(const ImportFacts& f) {
                               {"photos_found", f.photos_found},
                               {"photos_registered", f.photos_registered}};
   if (f.masked_views > 0) json["masked_views"] = f.masked_views;
+  if (f.film) {
+    json["film"] = {{"poses_found", f.film->poses_found},
+                    {"frames_placed", f.film->frames_placed},
+                    {"camera_stands_still", f.film->camera_stands_still},
+                    {"background_px", f.film->background_px},
+                    {"path_unevenness", f.film->path_unevenness},
+                    {"motion_energy", f.film->motion_energy}};
+  }
   return json.dump(1) + "\n";
 }
 
@@ -55,6 +63,15 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
     f.photos_found = value.at("photos_found");
     f.photos_registered = value.at("photos_registered");
     f.masked_views = value.value("masked_views", 0);
+    if (value.contains("film")) {
+      const auto& film = value.at("film");
+      f.film = {.poses_found = film.at("poses_found"),
+                .frames_placed = film.at("frames_placed"),
+                .camera_stands_still = film.at("camera_stands_still"),
+                .background_px = film.at("background_px"),
+                .path_unevenness = film.at("path_unevenness"),
+                .motion_energy = film.at("motion_energy")};
+    }
     return f;
   } catch (const nlohmann::json::exception& e) {
     throw InvalidArgument("{} is damaged: {}", artifact::kImportFacts, e.what());
@@ -63,6 +80,12 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
 
 Scene ReadScene(const StageContext& context) {
   return SceneFromJson(context.ReadInput(artifact::kScene));
+}
+
+bool IsColoredAsFilm(const StageContext& context, const Scene& scene) {
+  if (scene.IsFilm()) return true;
+  return scene.IsDynamic() && !context.HasInput(artifact::kGeometry) &&
+         !context.HasInput(artifact::kModel);
 }
 
 int ReadKeyView(const StageContext& context, const Scene& scene) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -22,9 +23,22 @@ std::string ViewArtifact(std::string_view folder, const View& view, std::string_
 // the results of one would overwrite those of the other.
 void CheckStemsAreUnique(const Scene& scene);
 
+// Of a film whose frames' poses were looked for.
+struct FilmFindings {
+  bool poses_found = false;  // the scene is a dynamic one
+  int frames_placed = 0;     // by structure-from-motion, also where they were too few
+  bool camera_stands_still = false;
+  double background_px = 0.0;  // median shift between frames of what the camera alone moves
+  // With poses: median change of the camera's step from frame to frame, in steps; a camera that is
+  // carried has about 0.1. Above 0.4 a warning is given.
+  double path_unevenness = 0.0;
+  double motion_energy = -1.0;  // share of the picture that moves on its own, 0..1; < 0: not known
+};
+
 // What the import stage found out, for the plan and the report.
 struct ImportFacts {
-  std::string layout;  // "photos", "colmap", "transforms", "splat"
+  std::string
+      layout;  // "photos", "colmap", "transforms", "nerfies", "posed_films", "splat", "film"
   bool ran_structure_from_motion = false;
   std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
   bool undistorted = false;
@@ -32,11 +46,15 @@ struct ImportFacts {
   int photos_found = 0;
   int photos_registered = 0;
   int masked_views = 0;  // of which parts are masked out
+  std::optional<FilmFindings> film;
 };
 std::string ImportFactsToJson(const ImportFacts& facts);
 ImportFacts ImportFactsFromJson(std::string_view json);
 
 Scene ReadScene(const StageContext& context);
+// A film, or a dynamic scene of which nothing is reconstructed (neither kGeometry nor kModel is
+// among the inputs): its frames are coloured one by one, by motion.
+bool IsColoredAsFilm(const StageContext& context, const Scene& scene);
 // Index of the chosen key view in the scene.
 int ReadKeyView(const StageContext& context, const Scene& scene);
 // Throws Error{kInvalidArgument} with the artifact's name when it is no JSON.

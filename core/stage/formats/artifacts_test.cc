@@ -23,6 +23,37 @@ TEST_F(StageTest, ImportFactsRoundTrip) {
   EXPECT_THROW(ImportFactsFromJson("{}"), Error);
 }
 
+TEST_F(StageTest, FindingsAboutAFilmRoundTrip) {
+  ImportFacts facts;
+  facts.layout = "film";
+  EXPECT_FALSE(ImportFactsFromJson(ImportFactsToJson(facts)).film.has_value());
+  facts.film = {.poses_found = true,
+                .frames_placed = 61,
+                .background_px = 2.5,
+                .path_unevenness = 0.07,
+                .motion_energy = 0.125};
+  const ImportFacts back = ImportFactsFromJson(ImportFactsToJson(facts));
+  ASSERT_TRUE(back.film.has_value());
+  EXPECT_TRUE(back.film->poses_found);
+  EXPECT_FALSE(back.film->camera_stands_still);
+  EXPECT_EQ(back.film->frames_placed, 61);
+  EXPECT_EQ(back.film->background_px, 2.5);
+  EXPECT_EQ(back.film->path_unevenness, 0.07);
+  EXPECT_EQ(back.film->motion_energy, 0.125);
+}
+
+TEST_F(StageTest, FramesWithPosesAreColoredAsAFilmUnlessTheyAreReconstructed) {
+  Scene scene = RampScene(scratch_.path(), 32, 24);
+  EXPECT_FALSE(IsColoredAsFilm(MakeContext(), scene)) << "photos of a place";
+  for (View& view : scene.views) view.moment = Moment{0.1, 0};
+  ASSERT_TRUE(scene.IsDynamic());
+  EXPECT_TRUE(IsColoredAsFilm(MakeContext(), scene));
+  AddInput(artifact::kGeometry, "");
+  EXPECT_FALSE(IsColoredAsFilm(MakeContext(), scene));
+  for (View& view : scene.views) view.cam_from_world = Pose();
+  EXPECT_TRUE(IsColoredAsFilm(MakeContext(), scene)) << "without poses there is no geometry";
+}
+
 TEST(ViewArtifact, DropsThePhotosExtensionAndNoticesCollisions) {
   Scene scene;
   scene.views.resize(2);

@@ -1,12 +1,18 @@
 // The views that carry_color has finished, kept in checkpoints so that a killed worker's successor
-// does not carry into them again. Thread-safe but for the constructor.
+// does not carry into them again. They wait in a file of the scratch folder: memory does not grow
+// with their number. Thread-safe but for the constructor.
 #pragma once
 
+#include <filesystem>
+#include <fstream>
+#include <map>
 #include <mutex>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "core/film/film_carry.h"
 #include "core/scene/scene.h"
 #include "core/stage/stage.h"
 
@@ -25,15 +31,25 @@ class CarryCheckpoint {
   // By view; once all are there.
   const std::vector<double>& coverage() const { return coverage_; }
 
+  // Of a film: how far its walks were, and how far this one is now; told before the frame is added.
+  std::vector<FilmWalk> Walks() const;
+  void SetWalk(const FilmWalk& walk);
+
  private:
+  void TakeUp(const std::filesystem::path& file);
+  void TakeUp(const nlohmann::json& record);
   void Keep(size_t view, double coverage, const std::string& png);
+  void Save();
+  std::filesystem::path FileOf(const char* name) const;
 
   const Scene& scene_;
   StageContext& context_;
   std::vector<char> was_done_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::vector<double> coverage_;
-  nlohmann::json state_ = nlohmann::json::object();  // by view: {coverage, PNG}
+  int64_t done_ = 0;
+  std::ofstream file_;                             // the views that are done
+  std::map<std::pair<int, int>, FilmWalk> walks_;  // by key frame and direction
 };
 
 }  // namespace color3d

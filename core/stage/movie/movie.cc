@@ -175,6 +175,19 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   return frames;
 }
 
+// Frames of the scene's own moments go at its own rate.
+double RateOf(const RenderOptions& options,
+              const Scene& scene,
+              const std::vector<PathCamera>& frames) {
+  const bool own = !options.frames && !options.time_s && frames.size() > 1 && scene.IsDynamic() &&
+                   options.path != RenderOptions::Path::kCameras && IsOneByOne(options, scene);
+  if (!own) return options.frames_per_second;
+  const double step = std::abs(frames[1].time_s - frames[0].time_s);
+  // Times may also count from 0 to 1 for the whole.
+  const bool seconds = frames.size() > 2 && TimesOf(scene).back() > 1.0;
+  return seconds && step > 0.0 ? std::clamp(1.0 / step, 1.0, 120.0) : options.frames_per_second;
+}
+
 }  // namespace
 
 void RenderMovie(const RenderOptions& options,
@@ -200,7 +213,7 @@ void RenderMovie(const RenderOptions& options,
     movie.emplace(file,
                   Mp4Options{.width = frames[0].camera.width,
                              .height = frames[0].camera.height,
-                             .frames_per_second = options.frames_per_second,
+                             .frames_per_second = RateOf(options, scene, frames),
                              .threads = context.pool().thread_count()});
     if (movie->encoder() == "mpeg4") {
       context.progress().OnWarning(

@@ -90,22 +90,29 @@ void ColorFacts::ReadAugmentations() {
   }
 }
 
+void ColorFacts::AddRows(const ordered_json& found,
+                         const std::vector<const char*>& figures,
+                         std::vector<Agreement>* rows) {
+  const std::pair<const char*, const char*> pictures[] = {
+      {"rendered", "rendered from the 3D scene"},
+      {"colored_views", "the photos in colour"},
+      {"truth", "the true colours"}};
+  for (const auto& [name, what] : pictures) {
+    if (!found.contains(name)) continue;
+    Agreement row{name, what, {}};
+    for (const char* figure : figures) row.figures[figure] = found.at(name).at(figure);
+    rows->push_back(std::move(row));
+  }
+}
+
 void ColorFacts::ReadScores() {
   const ordered_json scores = ReadJson(context_, artifact::kScores);
   try {
     if (const auto found = scores.find("consistency"); found != scores.end()) {
-      const std::pair<const char*, const char*> rows[] = {
-          {"rendered", "rendered from the 3D scene"},
-          {"colored_views", "the photos in colour"},
-          {"truth", "the true colours"}};
-      for (const auto& [name, what] : rows) {
-        if (!found->contains(name)) continue;
-        Agreement row{what, {}};
-        for (const char* figure : {"me", "me_de00", "tc", "tc_short", "tc_long"}) {
-          row.figures[figure] = found->at(name).at(figure);
-        }
-        agreement_.push_back(std::move(row));
-      }
+      AddRows(*found, {"me", "me_de00", "tc", "tc_short", "tc_long"}, &agreement_);
+    }
+    if (const auto found = scores.find("temporal"); found != scores.end()) {
+      AddRows(*found, {"tc_chroma", "chroma", "followed", "cdc"}, &steadiness_);
     }
     if (const auto found = scores.find("sources"); found != scores.end()) {
       errors_by_source_ = found->get<std::map<std::string, double>>();
@@ -133,12 +140,18 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
   for (const auto& [name, value] : errors_by_source_) {
     if (!name.starts_with("share_")) metrics.emplace_back(name, value);
   }
-  const char* suffixes[] = {"", "_2d", "_truth"};
-  for (size_t i = 0; i < agreement_.size(); ++i) {
-    for (const char* name : {"me", "me_de00", "tc"}) {
-      metrics.emplace_back(std::string(name) + suffixes[i], agreement_[i].figures.at(name));
+  // What is delivered first has no suffix: of a film without a model, its frames.
+  const auto add = [&metrics](const std::vector<Agreement>& rows, std::vector<const char*> names) {
+    for (const Agreement& row : rows) {
+      const char* suffix = row.pictures == "truth"                 ? "_truth"
+                           : row.pictures == rows.front().pictures ? ""
+                                                                   : "_2d";
+      for (const char* name : names)
+        metrics.emplace_back(name + std::string(suffix), row.figures.at(name));
     }
-  }
+  };
+  add(agreement_, {"me", "me_de00", "tc"});
+  add(steadiness_, {"tc_chroma", "cdc"});
   return metrics;
 }
 
@@ -288,6 +301,29 @@ ReportSection ColorFacts::AgreementSection() const {
   return section;
 }
 
+ReportSection ColorFacts::SteadinessSection() const {
+  ReportSection section;
+  section.title = "Are the colours steady?";
+  if (steadiness_.empty()) return section;
+  section.notes.push_back(
+      "From frame to frame. TC of chroma: mean change of a, b (Lab) along the motion, of the "
+      "pixels "
+      "that it follows there and back; faint colours change little, so mind the chroma beside it. "
+      "CDC: how unlike the colours of frames 1, 2 and 4 apart are spread, whatever moves. Lower is "
+      "better; true colours change, too.");
+  ReportTable table{{"pictures", "TC of chroma", "their chroma", "followed", "CDC"}, {}};
+  for (const Agreement& row : steadiness_) {
+    const auto& f = row.figures;
+    table.rows.push_back({row.what,
+                          fmt::format("{:.2f}", f.at("tc_chroma")),
+                          fmt::format("{:.1f}", f.at("chroma")),
+                          Percent(f.at("followed")),
+                          fmt::format("{:.5f}", f.at("cdc"))});
+  }
+  section.tables.push_back(std::move(table));
+  return section;
+}
+
 namespace {
 
 // What the curves of personalization say, in words; nothing without two points of held-out error.
@@ -332,6 +368,7 @@ std::vector<ReportSection> ColorFacts::Sections(std::vector<CurvePoint> personal
   for (ReportSection& section :
        std::vector<ReportSection>{SourceSection(),
                                   AgreementSection(),
+                                  SteadinessSection(),
                                   PersonalizationSection(std::move(personalization))}) {
     if (section.notes.empty() && section.tables.empty() && section.curves.empty() &&
         section.wide.bytes.empty()) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -46,9 +47,10 @@ class ColorFacts {
     bool scored = false;
     SourceShares shares;
   };
-  // A row of the table: "me", "me_de00", "tc_short", "tc_long", "tc".
+  // A row of a table, e.g. "me", "me_de00", "tc_short", "tc_long", "tc".
   struct Agreement {
-    std::string what;
+    std::string pictures;  // "rendered", "colored_views" or "truth"
+    std::string what;      // in words
     std::map<std::string, double> figures;
   };
 
@@ -56,6 +58,10 @@ class ColorFacts {
   void ReadScores();
   void ReadAugmentations();
   SourceShares MeanShares(bool scored_only) const;
+  // Adds a row to `rows` for each of the pictures that `found` has figures for.
+  static void AddRows(const nlohmann::ordered_json& found,
+                      const std::vector<const char*>& figures,
+                      std::vector<Agreement>* rows);
   std::string SourceSummary() const;
   std::vector<ViewFacts> LeastCertainFirst() const;
   ReportTable ShareTable() const;
@@ -63,6 +69,7 @@ class ColorFacts {
   std::vector<ReportRow> ProvenanceRows() const;
   ReportSection SourceSection() const;
   ReportSection AgreementSection() const;
+  ReportSection SteadinessSection() const;
   ReportSection PersonalizationSection(std::vector<CurvePoint> curves) const;
 
   const Scene& scene_;
@@ -72,6 +79,7 @@ class ColorFacts {
   std::optional<NextKeyViewFacts> next_;
   std::vector<std::string> augmentations_;
   std::vector<Agreement> agreement_;
+  std::vector<Agreement> steadiness_;  // of a film or of a scene that moves
   std::map<std::string, double> errors_by_source_;
 };
 

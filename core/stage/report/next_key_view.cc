@@ -23,7 +23,9 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
   }
   constexpr size_t kMaxViews = 500;  // a minute of rendering; who has more knows what to add
   const std::vector<int> training = scene.TrainingViews();
-  if (!context.HasInput(artifact::kModel) || training.size() > kMaxViews) return std::nullopt;
+  if (!context.HasInput(artifact::kModel) || training.size() > kMaxViews) {
+    return std::nullopt;
+  }
   std::vector<int> keys;
   std::vector<std::filesystem::path> photos;
   for (size_t k = 0; k < training.size(); ++k) {

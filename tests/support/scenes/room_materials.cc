@@ -97,6 +97,13 @@ double PatternShare(const Material& m,
 
 }  // namespace
 
+Eigen::Vector3d Srgb(double r, double g, double b) {
+  const auto linear = [](double v) {
+    return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+  };
+  return {linear(r), linear(g), linear(b)};
+}
+
 double FractalNoise(
     const Eigen::Vector3d& p, double coarsest_m, double footprint_m, int octaves, uint32_t seed) {
   double sum = 0.0, weight_sum = 0.0, weight = 1.0, wavelength = coarsest_m;

@@ -19,6 +19,9 @@ struct Material {
   double noise_m = 1.0;                                    // its coarsest wavelength
 };
 
+// Linear RGB from the sRGB values, 0..1, that one would pick by eye.
+Eigen::Vector3d Srgb(double r, double g, double b);
+
 // Value noise summed over `octaves` from `coarsest_m` down, 0..1 around one half. Detail finer than
 // `footprint_m`, the size of a sample on the surface, is left out.
 double FractalNoise(

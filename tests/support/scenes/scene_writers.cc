@@ -133,6 +133,10 @@ void WriteTransformsJson(const Scene& scene, const fs::path& json_file) {
     } else {
       frame["camera_model"] = "PINHOLE";
     }
+    if (view.moment) {
+      frame["time"] = view.moment->time_s;
+      frame["camera"] = fmt::format("cam{:02}", view.moment->shot);
+    }
     Eigen::Matrix4d gl = Eigen::Matrix4d::Identity();
     gl.topLeftCorner<3, 3>() = view.cam_from_world.rotation.conjugate().toRotationMatrix() *
                                Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();

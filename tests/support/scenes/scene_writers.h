@@ -10,6 +10,7 @@ namespace color3d {
 
 // cameras.txt, images.txt and points3D.txt.
 void WriteColmapText(const Scene& scene, const std::filesystem::path& model_folder);
+// With "time" (s) and "camera" ("cam00") of views that have their moment.
 void WriteTransformsJson(const Scene& scene, const std::filesystem::path& json_file);
 
 }  // namespace color3d

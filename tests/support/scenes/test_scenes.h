@@ -13,6 +13,7 @@
 #include "core/image/codec.h"
 #include "core/scene/lens.h"
 #include "core/scene/scene.h"
+#include "tests/support/scenes/look_at.h"
 
 namespace color3d {
 
@@ -24,18 +25,6 @@ inline std::string Refusal(const std::function<void()>& work) {
     return e.what();
   }
   return "";
-}
-
-// World-to-camera pose of a camera at `center` that looks at `target`, the world's -y being up.
-inline Pose LookAt(const Eigen::Vector3d& center, const Eigen::Vector3d& target) {
-  const Eigen::Vector3d z = (target - center).normalized();
-  const Eigen::Vector3d x = Eigen::Vector3d::UnitY().cross(z).normalized();
-  Eigen::Matrix3d cam_from_world;
-  cam_from_world << x.transpose(), z.cross(x).transpose(), z.transpose();
-  Pose pose;
-  pose.rotation = Eigen::Quaterniond(cam_from_world).normalized();
-  pose.translation = -(pose.rotation * center);
-  return pose;
 }
 
 inline Image GradientPhoto(int width, int height, int channels) {

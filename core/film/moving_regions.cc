@@ -1,0 +1,319 @@
+#include "core/film/moving_regions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/median.h"
+#include "core/image/box_mean.h"
+#include "core/image/optical_flow.h"
+#include "core/image/plane_sampling.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kDistances[] = {1, 2, 4, 8};
+constexpr float kSureCyclePx = 1.0f;   // there and back again
+constexpr float kLeastTexture = 0.4f;  // mean gradient of what a model is fitted to, L per px
+constexpr int kSampleStepPx = 6;
+constexpr size_t kLeastSamples = 100;
+constexpr double kStillPx = 0.3;
+constexpr double kLeastMotionPx = 1.0;
+constexpr double kNoiseFactor = 4.0 * 1.4826;  // four deviations, from a median
+// A homography that explains nearly as much as a fundamental matrix is the better account: the
+// matrix would be free to explain what moves, too.
+constexpr double kTurnShare = 0.9;
+
+struct Flow {
+  Image there;              // px
+  std::vector<char> sure;   // per pixel
+  std::vector<int> sample;  // indices of sure pixels with texture, on a grid
+  Image texture;            // 1 channel, L per px
+};
+
+// Mean length of the gradient over 7 px.
+Image Texture(const Image& luminance) {
+  const Image smooth = BoxMean(luminance, 1);
+  Image gradient(luminance.width, luminance.height, 1);
+  for (int y = 1; y + 1 < gradient.height; ++y) {
+    for (int x = 1; x + 1 < gradient.width; ++x) {
+      gradient.At(0, y, x) = 0.5f * std::hypot(smooth.At(0, y, x + 1) - smooth.At(0, y, x - 1),
+                                               smooth.At(0, y + 1, x) - smooth.At(0, y - 1, x));
+    }
+  }
+  return BoxMean(gradient, 3);
+}
+
+Flow SureFlow(const Image& from, const Image& to) {
+  Flow flow{DenseFlow(from, to), std::vector<char>(from.PlaneSize(), 0), {}, Texture(from)};
+  const Image back = DenseFlow(to, from);
+  for (int y = 0; y < from.height; ++y) {
+    for (int x = 0; x < from.width; ++x) {
+      const float u = flow.there.At(0, y, x), v = flow.there.At(1, y, x);
+      const float tx = static_cast<float>(x) + u, ty = static_cast<float>(y) + v;
+      if (tx < 0 || ty < 0 || tx > from.width - 1 || ty > from.height - 1) continue;
+      const float cycle =
+          std::hypot(u + SampleBilinear(back, 0, tx, ty), v + SampleBilinear(back, 1, tx, ty));
+      if (!(cycle < kSureCyclePx)) continue;
+      const int at = y * from.width + x;
+      flow.sure[at] = 1;
+      const bool on_grid =
+          x % kSampleStepPx == kSampleStepPx / 2 && y % kSampleStepPx == kSampleStepPx / 2;
+      if (on_grid && flow.texture.data[at] > kLeastTexture) flow.sample.push_back(at);
+    }
+  }
+  return flow;
+}
+
+// What the camera's motion makes of a pixel, as a function of its place in both frames.
+class Account {
+ public:
+  static Account Of(const cv::Matx33d& matrix, CameraMotion motion) { return {matrix, motion}; }
+  static Account Still() { return {cv::Matx33d::eye(), CameraMotion::kStill}; }
+
+  CameraMotion motion() const { return motion_; }
+  // px between where the pixel went and where the camera takes it: the distance from the
+  // homography's place, or Sampson's from the epipolar lines.
+  double Residual(double x, double y, double tx, double ty) const {
+    const cv::Vec3d p(x, y, 1.0), q(tx, ty, 1.0);
+    const cv::Vec3d l = matrix_ * p;
+    if (motion_ != CameraMotion::kMoved) {
+      return std::abs(l[2]) < 1e-9 ? 1e3 : std::hypot(l[0] / l[2] - tx, l[1] / l[2] - ty);
+    }
+    const cv::Vec3d m = matrix_.t() * q;
+    const double slope = l[0] * l[0] + l[1] * l[1] + m[0] * m[0] + m[1] * m[1];
+    return std::abs(q.dot(l)) / std::sqrt(slope + 1e-18);
+  }
+
+ private:
+  Account(const cv::Matx33d& matrix, CameraMotion motion) : matrix_(matrix), motion_(motion) {}
+
+  cv::Matx33d matrix_;
+  CameraMotion motion_;
+};
+
+std::vector<double> ResidualsOf(const Account& account, const Flow& flow) {
+  std::vector<double> residuals;
+  residuals.reserve(flow.sample.size());
+  const int width = flow.there.width;
+  for (const int at : flow.sample) {
+    const double x = at % width, y = at / width;
+    residuals.push_back(
+        account.Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]));
+  }
+  return residuals;
+}
+
+double ShareBelow(const std::vector<double>& values, double limit) {
+  const auto below =
+      std::count_if(values.begin(), values.end(), [&](double v) { return v < limit; });
+  return static_cast<double>(below) / static_cast<double>(values.size());
+}
+
+// Of one motion of the camera; nullopt when none explains the flow.
+std::optional<Account> Explain(const Flow& flow) {
+  std::vector<cv::Point2d> from, to;
+  const int width = flow.there.width;
+  for (const int at : flow.sample) {
+    const double x = at % width, y = at / width;
+    from.emplace_back(x, y);
+    to.emplace_back(x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
+  }
+  std::optional<Account> turn, moved;
+  try {
+    constexpr int kIterations = 2000;
+    constexpr double kConfidence = 0.999;
+    const cv::Mat h = cv::findHomography(
+        from, to, cv::USAC_MAGSAC, kLeastMotionPx, cv::noArray(), kIterations, kConfidence);
+    if (h.rows == 3) turn = Account::Of(cv::Matx33d(h), CameraMotion::kTurn);
+    // Least median of squares: what explains the larger half best wins, however well another matrix
+    // explains what moves, too. It would win by the count of what lies below a threshold.
+    const cv::Mat f = cv::findFundamentalMat(
+        from, to, cv::FM_LMEDS, kLeastMotionPx, kConfidence, kIterations, cv::noArray());
+    if (f.rows == 3) moved = Account::Of(cv::Matx33d(f), CameraMotion::kMoved);
+  } catch (const cv::Exception& e) {
+    throw Error(ErrorCode::kInternal, "the motion of the camera failed: {}", e.err);
+  }
+  if (!turn || !moved) return moved ? moved : turn;
+  const double by_turn = ShareBelow(ResidualsOf(*turn, flow), kLeastMotionPx);
+  const double by_move = ShareBelow(ResidualsOf(*moved, flow), kLeastMotionPx);
+  return by_turn >= kTurnShare * by_move ? turn : moved;
+}
+
+double MedianLength(const Flow& flow) {
+  std::vector<double> lengths;
+  for (const int at : flow.sample) {
+    lengths.push_back(std::hypot(flow.there.Plane(0)[at], flow.there.Plane(1)[at]));
+  }
+  return Median(std::move(lengths));
+}
+
+double MedianTexture(const Flow& flow) {
+  std::vector<double> texture;
+  for (const int at : flow.sample) texture.push_back(flow.texture.data[at]);
+  return Median(std::move(texture));
+}
+
+// Counts over the neighbours of one frame.
+struct Votes {
+  std::vector<int> moving, all;
+};
+
+void Add(const PairResidual& pair, Votes* votes) {
+  for (size_t i = 0; i < votes->all.size(); ++i) {
+    const float excess = pair.excess.data[i];
+    if (excess < 0.0f) continue;
+    ++votes->all[i];
+    if (excess > 1.0f) ++votes->moving[i];
+  }
+}
+
+// Plain surfaces of what moves: the flow tells nothing there.
+void FillHoles(cv::Mat* regions) {
+  constexpr double kLargestShare = 0.01;  // of the picture
+  std::vector<std::vector<cv::Point>> outlines;
+  std::vector<cv::Vec4i> hierarchy;
+  cv::findContours(*regions, outlines, hierarchy, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
+  for (size_t i = 0; i < outlines.size(); ++i) {
+    const bool is_hole = hierarchy[i][3] >= 0;
+    if (!is_hole || cv::contourArea(outlines[i]) > kLargestShare * regions->total()) continue;
+    cv::drawContours(*regions, outlines, static_cast<int>(i), cv::Scalar(1), cv::FILLED);
+  }
+}
+
+// Most say so; without specks and holes, grown over the soft edges of the flow.
+Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
+  cv::Mat moving(height, width, CV_8U);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const size_t i = static_cast<size_t>(y) * width + x;
+      moving.at<uchar>(y, x) = votes.all[i] >= least_votes && 2 * votes.moving[i] > votes.all[i];
+    }
+  }
+  const auto disc = [](int side) {
+    return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(side, side));
+  };
+  const int unit = std::max(1, std::max(width, height) / 160);
+  cv::morphologyEx(moving, moving, cv::MORPH_OPEN, disc(2 * (unit / 2) + 1));
+  cv::morphologyEx(moving, moving, cv::MORPH_CLOSE, disc(4 * unit + 1));
+  cv::dilate(moving, moving, disc(2 * unit + 1));
+  FillHoles(&moving);
+  Image image(width, height, 1);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) image.At(0, y, x) = moving.at<uchar>(y, x) ? 1.0f : 0.0f;
+  }
+  return image;
+}
+
+std::vector<int> NeighborsOf(int frame, int count) {
+  std::vector<int> neighbors;
+  for (const int distance : kDistances) {
+    if (frame >= distance) neighbors.push_back(frame - distance);
+    if (frame + distance < count) neighbors.push_back(frame + distance);
+  }
+  return neighbors;
+}
+
+// Of frames spread over the shot: each with the next one and with all of its like.
+std::vector<std::pair<int, int>> TellingPairs(int count) {
+  constexpr int kPlaces = 6;
+  std::set<int> places;
+  for (int i = 0; i < kPlaces; ++i) places.insert(i * (count - 1) / (kPlaces - 1));
+  std::set<std::pair<int, int>> pairs;
+  for (const int a : places) {
+    if (a + 1 < count) pairs.emplace(a, a + 1);
+    for (const int b : places) {
+      if (a < b) pairs.emplace(a, b);
+    }
+  }
+  return {pairs.begin(), pairs.end()};
+}
+
+}  // namespace
+
+PairResidual CompareFrames(const Image& from, const Image& to) {
+  PairResidual result;
+  result.excess = Image(from.width, from.height, 1, -1.0f);
+  const Flow flow = SureFlow(from, to);
+  if (flow.sample.size() < kLeastSamples) return result;
+  result.background_px = MedianLength(flow);
+  const std::optional<Account> account =
+      result.background_px < kStillPx ? Account::Still() : Explain(flow);
+  if (!account) return result;
+  result.motion = account->motion();
+  const double noise_px = kNoiseFactor * Median(ResidualsOf(*account, flow));
+  const double texture = MedianTexture(flow);
+  for (int y = 0; y < from.height; ++y) {
+    for (int x = 0; x < from.width; ++x) {
+      const size_t at = static_cast<size_t>(y) * from.width + x;
+      if (!flow.sure[at]) continue;
+      const double residual =
+          account->Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
+      // The error of flow goes with the inverse of the gradient.
+      const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
+      result.excess.data[at] =
+          static_cast<float>(residual / std::max(kLeastMotionPx, noise_px * std::max(1.0, plain)));
+    }
+  }
+  return result;
+}
+
+ShotMotion MotionOfCamera(const ShotFrames& frames,
+                          ThreadPool& pool,
+                          const CancellationToken& cancel) {
+  const std::vector<std::pair<int, int>> pairs = TellingPairs(frames.count);
+  std::vector<double> shift(pairs.size(), -1.0);
+  pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
+    cancel.ThrowIfCancelled();
+    const Flow flow =
+        SureFlow(*frames.luminance(pairs[i].first), *frames.luminance(pairs[i].second));
+    if (flow.sample.size() >= kLeastSamples) shift[i] = MedianLength(flow);
+  });
+  std::erase_if(shift, [](double px) { return px < 0.0; });
+  ShotMotion motion;
+  motion.pairs = static_cast<int>(shift.size());
+  if (shift.empty()) return motion;
+  motion.background_px = Median(shift);
+  motion.camera_stands_still = ShareBelow(shift, kStillPx) >= 0.9;
+  return motion;
+}
+
+ShotMotion FindMovingRegions(const ShotFrames& frames,
+                             ThreadPool& pool,
+                             const CancellationToken& cancel,
+                             const std::function<void(int frame, const Image& moving)>& on_frame) {
+  ShotMotion motion = MotionOfCamera(frames, pool, cancel);
+  std::mutex handing_over;
+  std::vector<double> share(frames.count, 0.0);
+  pool.ForEach(frames.count, [&](int64_t index, int) {
+    const int frame = static_cast<int>(index);
+    const auto picture = frames.luminance(frame);
+    const std::vector<int> neighbors = NeighborsOf(frame, frames.count);
+    Votes votes{std::vector<int>(picture->PlaneSize(), 0),
+                std::vector<int>(picture->PlaneSize(), 0)};
+    for (const int neighbor : neighbors) {
+      cancel.ThrowIfCancelled();
+      Add(CompareFrames(*picture, *frames.luminance(neighbor)), &votes);
+    }
+    const int least = std::min<int>(2, static_cast<int>(neighbors.size()));
+    const Image moving = RegionsOf(votes, std::max(1, least), picture->width, picture->height);
+    double sum = 0.0;
+    for (const float v : moving.data) sum += v;
+    share[frame] = sum / static_cast<double>(moving.data.size());
+    const std::lock_guard lock(handing_over);
+    on_frame(frame, moving);
+  });
+  double sum = 0.0;
+  for (const double s : share) sum += s;
+  motion.moving_share = frames.count > 0 ? sum / frames.count : 0.0;
+  return motion;
+}
+
+}  // namespace color3d

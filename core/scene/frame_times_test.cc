@@ -1,0 +1,95 @@
+#include "core/scene/frame_times.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/support/scenes/test_scenes.h"
+
+namespace color3d {
+namespace {
+
+using ::testing::HasSubstr;
+
+FrameTime Frame(const std::string& file,
+                std::optional<double> time,
+                const std::string& camera = "") {
+  return {"frame " + file.substr(0, 3), file, time, camera};
+}
+
+TEST(FrameTimes, OneMovingCameraInAnyOrder) {
+  const FrameMoments m = MomentsOf(
+      {Frame("images/c.png", 0.5), Frame("images/a.png", -0.5), Frame("images/b.png", 0)});
+  EXPECT_EQ(m.moments[0], (Moment{1.0, 0}));
+  EXPECT_EQ(m.moments[1], (Moment{0.0, 0}));
+  EXPECT_EQ(m.moments[2], (Moment{0.5, 0}));
+  EXPECT_EQ(m.cameras.size(), 1u);
+  // Folders mean nothing where no two frames share a time.
+  EXPECT_EQ(MomentsOf({Frame("a/1.png", 0), Frame("b/2.png", 1)}).cameras.size(), 1u);
+}
+
+TEST(FrameTimes, FoldersAreCamerasWhereFramesShareATime) {
+  const FrameMoments m = MomentsOf({Frame("images/cam02/1.png", 3),
+                                    Frame("images/cam01/1.png", 3),
+                                    Frame("images/cam01/2.png", 3.04),
+                                    Frame("images/cam02/2.png", 3.04),
+                                    Frame("images/cam02/3.png", 3.08)});  // films of other lengths
+  EXPECT_EQ(m.cameras, (std::vector<std::string>{"cam01", "cam02"}));
+  EXPECT_EQ(m.moments[0], (Moment{0.0, 1}));
+  EXPECT_EQ(m.moments[1], (Moment{0.0, 0}));
+  EXPECT_EQ(m.moments[2]->time_s, m.moments[3]->time_s);
+  EXPECT_EQ(m.moments[4]->shot, 1);
+}
+
+TEST(FrameTimes, NamedCamerasMayShareAFolder) {
+  const FrameMoments m = MomentsOf({Frame("a.png", 0, "right"),
+                                    Frame("b.png", 0, "left"),
+                                    Frame("c.png", 1, "right"),
+                                    Frame("d.png", 1, "left")});
+  EXPECT_EQ(m.cameras, (std::vector<std::string>{"left", "right"}));
+  EXPECT_EQ(m.moments[2], (Moment{1.0, 1}));
+}
+
+TEST(FrameTimes, WhatRoundingKeepsApartIsOneTime) {
+  const FrameMoments m = MomentsOf({Frame("a/1.png", 0.1 * 3),
+                                    Frame("b/1.png", 0.3),
+                                    Frame("a/0.png", 0),
+                                    Frame("b/0.png", 0),
+                                    Frame("a/2.png", 0.4)});
+  EXPECT_EQ(m.moments[0]->time_s, m.moments[1]->time_s);
+  EXPECT_EQ(m.moments[4]->time_s, 0.4);
+}
+
+TEST(FrameTimes, OneTimeIsAStillScene) {
+  const FrameMoments m = MomentsOf({Frame("a.png", 7), Frame("b.png", 7)});
+  EXPECT_FALSE(m.moments[0] || m.moments[1]);
+  EXPECT_THAT(m.note, HasSubstr("all 2 frames were taken at one time"));
+  EXPECT_TRUE(m.cameras.empty());
+  const FrameMoments none = MomentsOf({Frame("a.png", {}), Frame("b.png", {})});
+  EXPECT_FALSE(none.moments[0]);
+  EXPECT_EQ(none.note, "");
+  EXPECT_TRUE(MomentsOf({}).moments.empty());
+}
+
+std::string Said(const std::vector<FrameTime>& frames) {
+  return Refusal([&] { MomentsOf(frames); });
+}
+
+TEST(FrameTimes, ContradictionsAreRefusedByName) {
+  EXPECT_THAT(Said({Frame("a.png", 0), Frame("b.png", {}), Frame("c.png", 1)}),
+              HasSubstr("frame b.p (b.png) has no time, but frame a.p has one"));
+  EXPECT_THAT(Said({Frame("a.png", {}), Frame("b.png", 0)}), HasSubstr("(a.png) has no time"));
+  EXPECT_THAT(Said({Frame("a.png", 0, "x"), Frame("b.png", 1)}),
+              HasSubstr("(b.png) has no camera"));
+  const std::string flat = Said({Frame("a.png", 0), Frame("b.png", 0), Frame("c.png", 1)});
+  EXPECT_THAT(flat, HasSubstr("(a.png) and frame b.p (b.png) are of one camera and one time (0)"));
+  EXPECT_THAT(flat, HasSubstr("each camera a folder"));
+  EXPECT_THAT(Said({Frame("a.png", 2, "x"), Frame("b.png", 2, "x"), Frame("c.png", 1, "x")}),
+              HasSubstr("of one camera (x) and one time (2)"));
+  const double huge = std::numeric_limits<double>::max();
+  EXPECT_THAT(Said({Frame("a.png", -huge), Frame("b.png", huge)}), HasSubstr("too far apart"));
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,137 @@
+#include "core/scene/posed_films.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/catalogue/scene_files.h"
+#include "core/scene/formats/poses_bounds.h"
+#include "core/scene/formats/transforms_frame.h"
+#include "core/scene/photos.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+using nlohmann::json;
+
+constexpr char kTransforms[] = "transforms.json";
+
+std::string FileOf(const FrameFields& frame) {
+  std::string file = frame.TextOr("file_path", "");
+  while (file.starts_with("./")) file.erase(0, 2);
+  return file;
+}
+
+void FitToFilm(const std::pair<int, int>& size, PosedFilm* film) {
+  const auto [width, height] = size;
+  FitViewToPhoto({film->file, film->file, width, height, 1, width, height}, &film->view);
+}
+
+PosedFilm ReadFilm(const FrameFields& own,
+                   const FrameFields& fields,
+                   const fs::path& scene_folder,
+                   const FilmSize& size) {
+  PosedFilm film;
+  film.file = FileOf(fields);
+  if (!IsSafeRelativePath(film.file)) {
+    throw InvalidArgument("{}: {} is no path below the scene's folder", fields.place(), film.file);
+  }
+  std::error_code error;
+  if (!fs::is_regular_file(scene_folder / film.file, error)) {
+    throw InvalidArgument("{}: there is no film {}", fields.place(), film.file);
+  }
+  film.camera = own.TextOr("camera", fs::path(film.file).stem().string());
+  const auto [width, height] = size(film.file);
+  ReadFrameCamera(fields, width, height, &film.view);
+  FitToFilm({width, height}, &film);
+  return film;
+}
+
+std::vector<PosedFilm> FilmsOfTransforms(const fs::path& scene_folder, const FilmSize& size) {
+  const json root = ParseFrames(ReadFile(scene_folder / kTransforms), kTransforms);
+  std::vector<PosedFilm> films;
+  std::string photo;
+  for (size_t i = 0; i < root["frames"].size(); ++i) {
+    const json& frame = root["frames"][i];
+    const std::string place = fmt::format("{}: frame {}", kTransforms, i);
+    if (!frame.is_object()) throw InvalidArgument("{} must be an object", place);
+    const FrameFields own(frame, frame, place);
+    if (!HasFilmExtension(FileOf(own))) {
+      photo = place;
+      continue;
+    }
+    if (own.Find("time") != nullptr) {
+      throw InvalidArgument(
+          "{}: {} is a film, whose frames have times of their own; leave `time` out",
+          place,
+          FileOf(own));
+    }
+    films.push_back(ReadFilm(own, FrameFields(root, frame, place), scene_folder, size));
+  }
+  if (!films.empty() && !photo.empty()) {
+    throw InvalidArgument(
+        "{} names the film {}, but {} is no film; give films or pictures, not both",
+        kTransforms,
+        films[0].file,
+        photo);
+  }
+  return films;
+}
+
+void CheckFilms(const std::vector<PosedFilm>& films, const std::string& from) {
+  std::set<std::string> cameras, files;
+  for (const PosedFilm& film : films) {
+    if (!files.insert(film.file).second) {
+      throw InvalidArgument("{} names the film {} twice", from, film.file);
+    }
+    if (!cameras.insert(film.camera).second) {
+      throw InvalidArgument(
+          "{}: two films are of the camera {}; give each a `camera` of its own", from, film.camera);
+    }
+    if (film.camera.find('/') != std::string::npos || !IsSafeRelativePath(film.camera)) {
+      throw InvalidArgument(
+          "{}: a camera cannot be called '{}'; its frames lie in a folder of that "
+          "name",
+          from,
+          film.camera);
+    }
+  }
+  if (films.size() < 2) {
+    throw InvalidArgument(
+        "{} has the pose of one film; a camera that stands still tells no depth. "
+        "Colour it as a film, without {}",
+        from,
+        from);
+  }
+}
+
+}  // namespace
+
+std::vector<PosedFilm> ReadPosedFilms(const fs::path& scene_folder, const FilmSize& size_of) {
+  std::vector<PosedFilm> films;
+  std::error_code error;
+  if (!fs::is_directory(scene_folder, error)) return films;
+  const std::vector<std::string> files = ListFiles(scene_folder);
+  if (std::none_of(files.begin(), files.end(), HasFilmExtension)) return films;
+  std::string from = kTransforms;
+  if (fs::is_regular_file(scene_folder / kTransforms, error)) {
+    films = FilmsOfTransforms(scene_folder, size_of);
+  } else if (fs::is_regular_file(scene_folder / kPosesBounds, error)) {
+    from = kPosesBounds;
+    films = ReadPosesBounds(scene_folder);
+    for (PosedFilm& film : films) FitToFilm(size_of(film.file), &film);
+  }
+  if (films.empty()) return films;
+  CheckFilms(films, from);
+  std::sort(films.begin(), films.end(), [](const PosedFilm& x, const PosedFilm& y) {
+    return x.camera < y.camera;
+  });
+  return films;
+}
+
+}  // namespace color3d

@@ -1,0 +1,160 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/splat/geometry/motion_survey.h"
+#include "core/splat/geometry/mover_seeds.h"
+#include "core/splat/motion/motion.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kSide = 96;  // px
+constexpr double kWall = 6.0;
+constexpr double kBallRadius = 0.6;
+
+// Looks along +z from (x, 0, 0), turned so that (0, 0, 4) is in the middle.
+PosedCamera CameraAt(double x, int shot, double time_s) {
+  PosedCamera posed;
+  posed.camera = {kSide, kSide, 90.0, 90.0, 48.0, 48.0};
+  const double angle = std::atan2(-x, 4.0);
+  posed.cam_from_world.rotation =
+      Eigen::Quaterniond(Eigen::AngleAxisd(-angle, Eigen::Vector3d::UnitY()));
+  posed.cam_from_world.translation =
+      -(posed.cam_from_world.rotation * Eigen::Vector3d(x, 0.0, 0.0));
+  posed.time_s = time_s;
+  posed.shot = shot;
+  return posed;
+}
+
+Eigen::Vector3d BallAt(double time_s) { return {0.4 * time_s - 0.8, 0.0, 4.0}; }
+
+// A wall at z = kWall and a ball before it.
+SurveyedView ViewAt(double x, int shot, double time_s, bool with_ball) {
+  SurveyedView view;
+  view.posed = CameraAt(x, shot, time_s);
+  view.luminance = view.drawn = view.depth = Image(kSide, kSide, 1);
+  for (int v = 0; v < kSide; ++v) {
+    for (int u = 0; u < kSide; ++u) {
+      const Pose& pose = view.posed.cam_from_world;
+      const Eigen::Vector3d origin = pose.Center();
+      const Eigen::Vector3d ray =
+          pose.rotation.conjugate() * view.posed.camera.Ray(u + 0.5, v + 0.5);
+      const double to_wall = (kWall - origin.z()) / ray.z();
+      const Eigen::Vector3d at = origin + to_wall * ray;
+      const double wall = 0.5 + 0.1 * std::sin(3.0 * at.x()) * std::cos(2.0 * at.y());
+      view.drawn.At(0, v, u) = view.luminance.At(0, v, u) = static_cast<float>(wall);
+      view.depth.At(0, v, u) = static_cast<float>(to_wall);
+      if (!with_ball) continue;
+      const Eigen::Vector3d to_ball = BallAt(time_s) - origin;
+      const double along = to_ball.dot(ray) / ray.squaredNorm();
+      const double miss = (to_ball - along * ray).squaredNorm();
+      if (miss > kBallRadius * kBallRadius) continue;
+      view.luminance.At(0, v, u) =
+          static_cast<float>(0.9 - 0.3 * std::sin(9.0 * (v / 96.0 + 0.3 * u / 96.0)));
+    }
+  }
+  return view;
+}
+
+std::vector<SurveyedView> Rig(int times, bool with_ball) {
+  std::vector<SurveyedView> views;
+  for (int t = 0; t < times; ++t) {
+    int shot = 0;
+    for (const double x : {-1.5, 0.0, 1.5}) views.push_back(ViewAt(x, shot++, t, with_ball));
+  }
+  return views;
+}
+
+double Share(const Image& mask) {
+  double sum = 0.0;
+  for (const float v : mask.data) sum += v;
+  return sum / static_cast<double>(mask.data.size());
+}
+
+TEST(MotionSurveyTest, FindsWhatIsNotDrawn) {
+  ThreadPool pool(2);
+  std::vector<SurveyedView> views = Rig(4, true);
+  const MotionSurvey survey = SurveyMotion(pool, views);
+  const double disc = M_PI * std::pow(90.0 * kBallRadius / 4.0, 2) / (kSide * kSide);
+  EXPECT_NEAR(survey.moving_share, disc, 0.3 * disc);
+  for (const SurveyedView& view : views) EXPECT_NEAR(Share(view.moving), disc, 0.6 * disc);
+}
+
+TEST(MotionSurveyTest, NothingMovesWhereAllIsDrawnOrThereIsOneMoment) {
+  ThreadPool pool(2);
+  std::vector<SurveyedView> still = Rig(4, false);
+  EXPECT_EQ(SurveyMotion(pool, still).moving_share, 0.0);
+  std::vector<SurveyedView> moment = Rig(1, true);
+  EXPECT_EQ(SurveyMotion(pool, moment).moving_share, 0.0);
+}
+
+// What a camera that stands still always shows stands still, however badly it is drawn.
+TEST(MotionSurveyTest, WhatIsAlwaysDrawnBadlyDoesNotMove) {
+  ThreadPool pool(2);
+  std::vector<SurveyedView> views = Rig(7, false);
+  for (SurveyedView& view : views) {
+    for (int i = 0; i < 20 * kSide; ++i) view.drawn.data[i] += 0.3f;
+  }
+  EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
+}
+
+struct Seeded {
+  ParameterBlock block;
+  int rows = kColorRow + 1;
+};
+
+Seeded SeedsOf(std::vector<SurveyedView>& views, int64_t most) {
+  ThreadPool pool(2);
+  SurveyMotion(pool, views);
+  Seeded seeded;
+  MoverSeedOptions options;
+  options.rows = seeded.rows;
+  options.most = most;
+  options.interval = 0.5;
+  std::vector<float> unit_time;
+  for (const SurveyedView& view : views) {
+    unit_time.push_back(static_cast<float>(0.5 * view.posed.time_s - 1.0));
+  }
+  seeded.block = SeedMovers(views, unit_time, options, pool);
+  return seeded;
+}
+
+TEST(MoverSeedsTest, StandWhereTheBallIsAndMoveAsItDoes) {
+  std::vector<SurveyedView> views = Rig(5, true);
+  const Seeded seeds = SeedsOf(views, 600);
+  const ParameterBlock& b = seeds.block;
+  ASSERT_GT(b.count(), 150);
+  ASSERT_LE(b.count(), 700);
+  int near = 0, along = 0;
+  for (int64_t i = 0; i < b.count(); ++i) {
+    const double time_s = 2.0 * (b.Row(seeds.rows + kCenterRow)[i] + 1.0);
+    const Eigen::Vector3d at(b.Row(0)[i], b.Row(1)[i], b.Row(2)[i]);
+    if ((at - BallAt(time_s)).norm() < 1.6 * kBallRadius) ++near;
+    // 0.4 to the right each second; a unit of t is two seconds.
+    if (std::abs(b.Row(seeds.rows + kVelocityRow)[i] - 0.8f) < 0.6f) ++along;
+  }
+  EXPECT_GT(near, 0.6 * static_cast<double>(b.count()));
+  EXPECT_GT(along, 0.6 * static_cast<double>(b.count()));
+}
+
+TEST(MoverSeedsTest, OneCameraPutsThemBeforeTheWall) {
+  std::vector<SurveyedView> views;
+  for (int t = 0; t < 5; ++t) views.push_back(ViewAt(0.0, 0, t, true));
+  const Seeded seeds = SeedsOf(views, 200);
+  ASSERT_GT(seeds.block.count(), 20);
+  for (int64_t i = 0; i < seeds.block.count(); ++i) {
+    EXPECT_LE(seeds.block.Row(2)[i], kWall + 1e-3);
+    EXPECT_GT(seeds.block.Row(2)[i], 0.5);
+    EXPECT_TRUE(std::isfinite(seeds.block.Row(kLogScaleRow)[i]));
+  }
+}
+
+TEST(MoverSeedsTest, NothingMovesNothingIsSeeded) {
+  std::vector<SurveyedView> views = Rig(4, false);
+  EXPECT_EQ(SeedsOf(views, 100).block.count(), 0);
+}
+
+}  // namespace
+}  // namespace color3d

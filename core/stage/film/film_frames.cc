@@ -1,0 +1,70 @@
+#include "core/stage/film/film_frames.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+
+namespace color3d {
+namespace {
+
+constexpr size_t kNamed = 5;  // frames in a warning
+
+}  // namespace
+
+std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options) {
+  std::vector<int> wanted;
+  int64_t inside = 0;
+  for (size_t i = 0; i < times.size(); ++i) {
+    if (times[i] < options.begin_s || (options.end_s && times[i] >= *options.end_s)) continue;
+    if (inside++ % options.stride == 0) wanted.push_back(static_cast<int>(i));
+  }
+  if (wanted.empty()) {
+    throw InvalidArgument(
+        "the film has no frame between the times that are asked for; it lasts {:.2f} s",
+        times.back());
+  }
+  return wanted;
+}
+
+void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {
+  if (frames <= kMaxFilmFrames) return;
+  throw InvalidArgument(
+      "{} frames ({:.0f} s) are more than a job takes ({}); take every {}th (film_stride), or a "
+      "part "
+      "of {:.0f} s at most (film_begin_s, film_end_s)",
+      frames,
+      seconds,
+      kMaxFilmFrames,
+      (frames * options.stride + kMaxFilmFrames - 1) / kMaxFilmFrames,
+      std::floor(seconds * kMaxFilmFrames / static_cast<double>(frames)));
+}
+
+std::string EncodeGrayFrame(Image luminance) {
+  for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
+  return EncodePng8(luminance);
+}
+
+std::string NamesOfFrames(const std::vector<std::string>& names) {
+  std::string text;
+  for (size_t i = 0; i < std::min(kNamed, names.size()); ++i) {
+    text += (i == 0 ? "" : ", ") + names[i];
+  }
+  return names.size() > kNamed ? text + fmt::format(" and {} more", names.size() - kNamed) : text;
+}
+
+void WarnOfFrames(const std::vector<std::string>& names, const char* what, StageContext& context) {
+  if (names.empty()) return;
+  context.progress().OnWarning(fmt::format("{} {} {}: {}",
+                                           names.size(),
+                                           names.size() == 1 ? "frame" : "frames",
+                                           what,
+                                           NamesOfFrames(names)));
+}
+
+}  // namespace color3d

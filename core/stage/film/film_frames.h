@@ -1,0 +1,28 @@
+// What the ways to import films share: which frames are asked for, how they are kept and named. For
+// this folder only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/base/image.h"
+#include "core/stage/film/import_film.h"
+
+namespace color3d {
+
+// Indices of the frames that are asked for, of a film whose frames are shown at `times`. Throws
+// Error{kInvalidArgument} when there is none.
+std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options);
+
+// Throws Error{kInvalidArgument}, with the stride and the length that would do, for more than
+// kMaxFilmFrames. `seconds`: from the first to the last of them.
+void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options);
+
+// Luminance (Lab L) as an 8-bit grey picture.
+std::string EncodeGrayFrame(Image luminance);
+
+// One warning that names a few of the frames; none without frames.
+void WarnOfFrames(const std::vector<std::string>& names, const char* what, StageContext& context);
+std::string NamesOfFrames(const std::vector<std::string>& names);
+
+}  // namespace color3d

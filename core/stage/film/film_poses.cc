@@ -1,0 +1,245 @@
+#include "core/stage/film/film_poses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/median.h"
+#include "core/film/moving_regions.h"
+#include "core/image/codec.h"
+#include "core/scene/masks/photo_masks.h"
+#include "core/scene/view_images.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kEnough = 0.8;  // of the frames, with poses
+constexpr int64_t kCacheBytes = int64_t{64} << 20;
+
+bool AreEnough(size_t some, size_t all) {
+  return static_cast<double>(some) >= kEnough * static_cast<double>(all);
+}
+
+// The frames of the shot that has most of them.
+std::vector<int> LongestShot(const Scene& scene) {
+  std::map<int, std::vector<int>> shots;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    shots[scene.views[i].moment->shot].push_back(static_cast<int>(i));
+  }
+  const auto longest =
+      std::max_element(shots.begin(), shots.end(), [](const auto& a, const auto& b) {
+        return a.second.size() < b.second.size();
+      });
+  return longest->second;
+}
+
+// What of each frame moves, as a picture, and what stands still, as a mask of the frame's size.
+class RegionFiles {
+ public:
+  RegionFiles(const Scene& scene, fs::path folder) : scene_(scene), folder_(std::move(folder)) {
+    for (const char* kind : {"moving", "still"}) fs::create_directories(folder_ / kind);
+  }
+
+  void Write(int view, const Image& moving) const {
+    WriteFileAtomic(MovingFile(view), EncodePng8(moving));
+    Image still = moving;
+    for (float& v : still.data) v = 1.0f - v;
+    // A mask that leaves nothing is none: such a frame finds its place by what moves, or not at
+    // all.
+    if (std::all_of(still.data.begin(), still.data.end(), [](float v) { return v == 0.0f; }))
+      return;
+    const Camera& camera = scene_.views[view].captured_camera;
+    WriteFileAtomic(StillFile(view), EncodePng8(ResizeMask(still, camera.width, camera.height)));
+  }
+  fs::path MovingFile(int view) const { return folder_ / "moving" / Name(view); }
+  fs::path StillFile(int view) const { return folder_ / "still" / Name(view); }
+
+ private:
+  static std::string Name(int view) { return fmt::format("{:06}.png", view); }
+
+  const Scene& scene_;
+  fs::path folder_;
+};
+
+ShotMotion WriteRegions(const fs::path& frames_root,
+                        const Scene& scene,
+                        const std::vector<int>& shot,
+                        const RegionFiles& files,
+                        StageContext& context) {
+  const ViewImages images(scene, frames_root, kMotionSidePx, kCacheBytes);
+  const auto count = static_cast<int>(shot.size());
+  int done = 0;
+  return FindMovingRegions({count, [&](int frame) { return images.Luminance(shot[frame]); }},
+                           context.pool(),
+                           context.cancel(),
+                           [&](int frame, const Image& moving) {
+                             files.Write(shot[frame], moving);
+                             context.progress().OnProgress(
+                                 ++done, count, "looking for what moves on its own");
+                           });
+}
+
+// Throws what ImportSequence throws.
+ImportResult Place(const fs::path& frames_root,
+                   const Scene& scene,
+                   const std::vector<int>& shot,
+                   const RegionFiles& files,
+                   ImportOptions options,
+                   StageContext& context) {
+  options.hold_out_every_eighth = false;  // whoever imports the film does that
+  std::vector<SequenceFrame> frames;
+  for (const int view : shot) {
+    const fs::path mask = files.StillFile(view);
+    frames.push_back({scene.views[view].name,
+                      frames_root / scene.views[view].image_file,
+                      fs::exists(mask) ? mask : fs::path()});
+  }
+  return ImportSequence(frames, context.scratch_folder() / "poses", options, context.control());
+}
+
+// The placed frames as views of the film: their own files and moments.
+Scene DynamicScene(Scene placed, const Scene& film) {
+  for (View& view : placed.views) {
+    const View& frame = film.views[film.FindView(view.name)];
+    view.image_file = frame.image_file;
+    view.mask_file = frame.mask_file;
+    view.moment = frame.moment;
+  }
+  return placed;
+}
+
+void WarnOfDropped(const Scene& film, const Scene& placed, StageContext& context) {
+  constexpr size_t kNamed = 5;
+  std::vector<std::string> dropped;
+  size_t next = 0;
+  for (const View& view : film.views) {
+    if (next < placed.views.size() && placed.views[next].name == view.name) {
+      ++next;
+    } else {
+      dropped.push_back(view.name);
+    }
+  }
+  if (dropped.empty()) return;
+  std::string names;
+  for (size_t i = 0; i < std::min(kNamed, dropped.size()); ++i) {
+    names += (i == 0 ? "" : ", ") + dropped[i];
+  }
+  context.progress().OnWarning(fmt::format("{} of {} frames found no place and are left out: {}{}",
+                                           dropped.size(),
+                                           film.views.size(),
+                                           names,
+                                           dropped.size() > kNamed ? ", ..." : ""));
+}
+
+// How much the camera's steps differ from one frame to the next, in steps: near 0 for a camera that
+// is carried or driven.
+double Unevenness(const Scene& scene) {
+  std::vector<double> steps, changes;
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  for (size_t i = 1; i < scene.views.size(); ++i) {
+    const Eigen::Vector3d step =
+        scene.views[i].cam_from_world.Center() - scene.views[i - 1].cam_from_world.Center();
+    steps.push_back(step.norm());
+    if (i > 1) changes.push_back((step - last).norm());
+    last = step;
+  }
+  if (changes.empty()) return 0.0;
+  const double step = Median(std::move(steps));
+  return step > 0.0 ? Median(std::move(changes)) / step : 0.0;
+}
+
+// What fills most of the picture counts as the place, even where it is a person.
+void WarnOfUnevenPath(double unevenness, StageContext& context) {
+  constexpr double kUneven = 0.4;
+  if (unevenness < kUneven) return;
+  context.progress().OnWarning(fmt::format(
+      "the camera's path is uneven (its steps change by {:.0f} % from frame to frame): what was "
+      "taken "
+      "for the place may move itself; look at the poses, or leave them out (film_poses: off)",
+      100.0 * unevenness));
+}
+
+// Whether a film may go on without poses after it.
+bool IsAboutPoses(const Error& error) {
+  return error.code() == ErrorCode::kInvalidArgument ||
+         error.code() == ErrorCode::kDeadlineExceeded ||
+         error.code() == ErrorCode::kFailedPrecondition;
+}
+
+}  // namespace
+
+void FindFilmPoses(const fs::path& frames_root,
+                   const ImportOptions& options,
+                   StageContext& context,
+                   Scene* scene,
+                   ImportFacts* facts) {
+  const auto stays = [&](const std::string& why) {
+    context.progress().OnWarning("the film stays without poses: " + why);
+  };
+  facts->film.emplace();
+  const std::vector<int> shot = LongestShot(*scene);
+  if (!AreEnough(shot.size(), scene->views.size())) {
+    return stays(fmt::format(
+        "its longest shot has {} of {} frames; take one shot (film_begin_s, film_end_s)",
+        shot.size(),
+        scene->views.size()));
+  }
+  const RegionFiles files(*scene, context.scratch_folder() / "regions");
+  const ShotMotion motion = WriteRegions(frames_root, *scene, shot, files, context);
+  facts->film->motion_energy = motion.moving_share;
+  facts->film->background_px = motion.background_px;
+  facts->film->camera_stands_still = motion.camera_stands_still;
+  if (motion.camera_stands_still) {
+    return stays(fmt::format(
+        "the camera stands still (what does not move of its own shifts by {:.2f} px at {} px)",
+        motion.background_px,
+        kMotionSidePx));
+  }
+  const fs::path log = context.scratch_folder() / "poses" / "sfm.log";
+  const auto keep_log = [&] {
+    if (fs::exists(log)) context.WriteOutput(artifact::kSfmLog, ReadFile(log));
+  };
+  ImportResult result;
+  try {
+    result = Place(frames_root, *scene, shot, files, options, context);
+  } catch (const Error& e) {
+    if (!IsAboutPoses(e)) throw;
+    keep_log();
+    return stays(e.what());
+  }
+  keep_log();
+  facts->ran_structure_from_motion = true;
+  facts->sfm_plan = result.sfm.plan;
+  facts->film->frames_placed = result.photos_registered;
+  if (!AreEnough(result.scene.views.size(), scene->views.size())) {
+    return stays(
+        fmt::format("only {} of {} frames found a place, {:.0f} % of the picture moves on its own; "
+                    "the others share too little that stands still with them",
+                    result.scene.views.size(),
+                    scene->views.size(),
+                    100.0 * motion.moving_share));
+  }
+  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
+  facts->film->poses_found = true;
+  facts->undistorted = result.undistorted;
+  facts->random_points = result.random_points;
+  facts->photos_registered = result.photos_registered;
+  const Scene placed = DynamicScene(std::move(result.scene), *scene);
+  WarnOfDropped(*scene, placed, context);
+  facts->film->path_unevenness = Unevenness(placed);
+  WarnOfUnevenPath(facts->film->path_unevenness, context);
+  for (const View& view : placed.views) {
+    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
+                       files.MovingFile(scene->FindView(view.name)));
+  }
+  *scene = placed;
+}
+
+}  // namespace color3d

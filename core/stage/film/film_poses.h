@@ -1,0 +1,25 @@
+// Poses of a film's frames where one camera moves through a place, in part of which things move
+// (METHOD.md "Poses of a film"). For the import stage only.
+#pragma once
+
+#include <filesystem>
+
+#include "core/scene/import.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+// `scene`: a film without poses, whose pictures lie at their image_file below `frames_root`. When
+// at least 80 % of its frames belong to one shot and find a place, makes it a dynamic scene of
+// those frames, with points, and leaves kMovingRegions. Otherwise the film stays as it is. What is
+// left out, and why there are no poses, is a warning; what was found goes into `facts` either way.
+// The log of structure-from-motion is left as kSfmLog when it ran. Throws Error: cancelled, frames
+// that cannot be read.
+void FindFilmPoses(const std::filesystem::path& frames_root,
+                   const ImportOptions& options,
+                   StageContext& context,
+                   Scene* scene,
+                   ImportFacts* facts);
+
+}  // namespace color3d

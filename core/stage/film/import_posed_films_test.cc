@@ -1,0 +1,129 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/stages.h"
+#include "core/video/mp4_writer.h"
+#include "tests/support/formats/npy_writer.h"
+#include "tests/support/stages/stage_fixture.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr int kWidth = 96, kHeight = 64;
+
+class ImportPosedFilmsTest : public StageTest {
+ protected:
+  // Of one grey that tells camera and frame.
+  static double Gray(int camera, int frame) { return 0.2 + 0.2 * camera + 0.02 * frame; }
+  void WriteFilm(int camera, int frames, double frames_per_second = 10) {
+    ThreadPool pool(1);
+    Mp4Writer writer(
+        scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
+        {.width = kWidth, .height = kHeight, .frames_per_second = frames_per_second, .threads = 1});
+    for (int i = 0; i < frames; ++i) {
+      writer.Add(Image(kWidth, kHeight, 3, static_cast<float>(Gray(camera, i))), pool);
+    }
+    writer.Finish();
+  }
+  void WritePoses(int cameras) {
+    std::vector<double> rows;
+    for (int i = 0; i < cameras; ++i) {
+      const double matrix[3][5] = {{0, 1, 0, 0.5 * i, 128}, {-1, 0, 0, 0, 192}, {0, 0, 1, 4, 240}};
+      for (const auto& row : matrix) rows.insert(rows.end(), row, row + 5);
+      rows.insert(rows.end(), {1.0, 10.0});
+    }
+    WriteFileAtomic(scratch_.path() / "poses_bounds.npy",
+                    NpyOf({static_cast<size_t>(cameras), 17}, rows));
+  }
+  Scene Import(const FilmOptions& film = {}, const ImportOptions& options = {}) {
+    fs::remove_all(scratch_.path() / "out");
+    observer_.text.clear();
+    StageContext context = MakeContext();
+    RunImportScene(options, context, {}, film);
+    return SceneFromJson(ReadFile(scratch_.path() / "out/scene.json"));
+  }
+  std::string Complaint(const FilmOptions& film = {}, const ImportOptions& options = {}) {
+    try {
+      Import(film, options);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  }
+};
+
+TEST_F(ImportPosedFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
+  WriteFilm(0, 12);
+  WriteFilm(1, 9);  // cameras of different lengths
+  WritePoses(2);
+  ImportOptions options;
+  options.hold_out_every_eighth = true;
+  const Scene scene = Import({}, options);
+  ASSERT_EQ(scene.views.size(), 21u);
+  EXPECT_TRUE(scene.IsDynamic());
+  const View& view = scene.views[12 + 4];
+  EXPECT_EQ(view.name, "cam01/f000004.png");
+  EXPECT_NEAR(view.moment->time_s, 0.4, 1e-6);
+  EXPECT_EQ(view.moment->time_s, scene.views[4].moment->time_s);
+  EXPECT_EQ(view.moment->shot, 1);
+  EXPECT_TRUE(view.held_out);
+  EXPECT_EQ(scene.HeldOutViews().size(), 2u);
+  EXPECT_NEAR(view.camera.fx, 120.0, 1e-9);
+  const Image frame = ReadImage(scratch_.path() / "out" / view.image_file);
+  EXPECT_EQ(frame.channels, 1);
+  EXPECT_NEAR(frame.At(0, 30, 40), Gray(1, 4), 0.02);
+  EXPECT_EQ(scene.points.size(), 20000u);
+  const ImportFacts facts = ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json"));
+  EXPECT_EQ(facts.layout, "posed_films");
+  EXPECT_EQ(facts.photos_found, 21);
+}
+
+TEST_F(ImportPosedFilmsTest, StridesPartsAndHeldOutCameras) {
+  for (int camera = 0; camera < 3; ++camera) WriteFilm(camera, 12);
+  WritePoses(3);
+  ImportOptions options;
+  options.hold_out_camera = "cam02";
+  const Scene scene = Import({.stride = 2, .begin_s = 0.25, .end_s = 0.95}, options);
+  ASSERT_EQ(scene.views.size(), 12u);  // frames 3, 5, 7, 9
+  EXPECT_EQ(scene.views[1].name, "cam00/f000005.png");
+  EXPECT_NEAR(scene.views[1].moment->time_s, 0.2, 1e-6);  // from the first that is taken
+  for (const View& view : scene.views) {
+    EXPECT_EQ(view.held_out, view.name.starts_with("cam02/")) << view.name;
+  }
+  EXPECT_THAT(Complaint({.begin_s = 9.0}), HasSubstr("cam00.mp4: the film has no frame between"));
+  options.hold_out_camera = "cam09";
+  EXPECT_THAT(Complaint({}, options), HasSubstr("the scene has cam00, cam01, cam02"));
+}
+
+TEST_F(ImportPosedFilmsTest, OneTimeIsAStillScene) {
+  for (int camera = 0; camera < 3; ++camera) WriteFilm(camera, 4);
+  WritePoses(3);
+  const Scene scene = Import({.stride = 100});
+  ASSERT_EQ(scene.views.size(), 3u);
+  EXPECT_FALSE(scene.views[0].moment);
+  EXPECT_THAT(observer_.text, HasSubstr("stands still"));
+}
+
+TEST_F(ImportPosedFilmsTest, OddRatesAreTold) {
+  WriteFilm(0, 8, 10);
+  WriteFilm(1, 8, 17);
+  WritePoses(2);
+  Import();
+  EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times"));
+}
+
+TEST_F(ImportPosedFilmsTest, FilmsThatAreNoneAreRefusedByName) {
+  WriteFilm(0, 4);
+  WriteFileAtomic(scratch_.path() / "cam01.mp4", "no film");
+  WritePoses(2);
+  EXPECT_THAT(Complaint(), HasSubstr("cam01.mp4"));
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,90 @@
+#include "core/stage/film/temporal_scores.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/metrics/scene_consistency.h"
+#include "core/metrics/temporal_consistency.h"
+#include "core/splat/raster/render.h"
+#include "core/stage/film/colored_frames.h"
+#include "core/stage/formats/artifacts.h"
+
+namespace color3d {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int64_t kCacheBytes = int64_t{64} << 20;
+
+std::vector<std::vector<int>> ShotsInOrderOfTime(const Scene& scene) {
+  std::map<int, std::vector<int>> shots;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    shots[scene.views[i].moment->shot].push_back(static_cast<int>(i));
+  }
+  std::vector<std::vector<int>> ordered;
+  for (auto& [shot, frames] : shots) {
+    std::stable_sort(frames.begin(), frames.end(), [&](int a, int b) {
+      return scene.views[a].time_s() < scene.views[b].time_s();
+    });
+    ordered.push_back(std::move(frames));
+  }
+  return ordered;
+}
+
+ordered_json JsonOf(const TemporalConsistency& figures) {
+  ordered_json json{{"pairs", figures.pairs},
+                    {"followed", figures.followed},
+                    {"tc_chroma", figures.tc_chroma},
+                    {"chroma", figures.chroma},
+                    {"cdc", figures.cdc}};
+  for (size_t d = 0; d < kCdcDistances.size(); ++d) {
+    json[fmt::format("cdc_{}", kCdcDistances[d])] = figures.cdc_at[d];
+  }
+  return json;
+}
+
+}  // namespace
+
+ordered_json TemporalScores(const Scene& scene,
+                            const std::optional<GaussianModel>& model,
+                            const std::map<int, std::filesystem::path>& truth,
+                            StageContext& context) {
+  ordered_json json = ordered_json::object();
+  if (!scene.IsFilm() && !scene.IsDynamic()) return json;
+  const ViewImages images(scene, context.scene_folder(), kConsistencySidePx, kCacheBytes);
+  const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
+  TemporalSource source;
+  source.shots = ShotsInOrderOfTime(scene);
+  source.luminance = [&](int view) { return *images.Luminance(view); };
+  std::vector<std::string> names = {"colored_views"};
+  source.colorings.emplace_back([&](int view) {
+    return ColoredFrame(scene.views[view], view, view == key, images, context);
+  });
+  if (model) {
+    names.emplace_back("rendered");
+    source.colorings.emplace_back([&](int view) {
+      ThreadPool one(1);
+      const View& seen = scene.views[view];
+      const Camera camera = images.WorkingCamera(view);
+      return RenderView(*model, camera, seen.cam_from_world, one, 0.0f, seen.time_s()).lab;
+    });
+  }
+  if (truth.size() == scene.views.size()) {
+    names.emplace_back("truth");
+    source.colorings.emplace_back(
+        [&](int view) { return LabFromSrgb(images.Undistort(view, ReadImage(truth.at(view)))); });
+  }
+  const std::vector<TemporalConsistency> figures =
+      MeasureTemporalConsistency(source, context.pool(), context.cancel());
+  if (figures.front().pairs == 0) return json;
+  for (size_t i = 0; i < names.size(); ++i) json[names[i]] = JsonOf(figures[i]);
+  return json;
+}
+
+}  // namespace color3d

@@ -1,0 +1,48 @@
+#include "core/stage/formats/import_output.h"
+
+#include "core/base/files.h"
+#include "core/stage/formats/artifacts.h"
+
+namespace color3d {
+namespace {
+
+const char* LayoutName(SceneLayout layout) {
+  switch (layout) {
+    case SceneLayout::kPhotos:
+      return "photos";
+    case SceneLayout::kColmap:
+      return "colmap";
+    case SceneLayout::kTransforms:
+      return "transforms";
+    case SceneLayout::kNerfies:
+      return "nerfies";
+    case SceneLayout::kPosedFilms:
+      return "posed_films";
+  }
+  return "photos";
+}
+
+}  // namespace
+
+void WriteImported(const ImportResult& result, StageContext& context) {
+  CheckStemsAreUnique(result.scene);
+  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
+  ImportFacts facts;
+  facts.layout = LayoutName(result.layout);
+  facts.ran_structure_from_motion = result.ran_structure_from_motion;
+  facts.sfm_plan = result.sfm.plan;
+  facts.undistorted = result.undistorted;
+  facts.random_points = result.random_points;
+  facts.photos_found = result.photos_found;
+  facts.photos_registered = result.photos_registered;
+  facts.masked_views = result.masked_views;
+  context.progress().OnError(
+      result.photos_found, "photos_without_pose", result.photos_found - result.photos_registered);
+  context.WriteOutput(artifact::kScene, SceneToJson(result.scene));
+  context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
+  if (result.ran_structure_from_motion) {
+    context.WriteOutput(artifact::kSfmLog, ReadFile(result.sfm.log));
+  }
+}
+
+}  // namespace color3d

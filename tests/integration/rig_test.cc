@@ -1,0 +1,92 @@
+// Scenes that move through the service: films of cameras with poses, and pictures with times.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/base/files.h"
+#include "core/image/codec.h"
+#include "core/video/mp4_writer.h"
+#include "tests/integration/service_fixture.h"
+#include "tests/support/scenes/dynamic_scene.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+class RigTest : public ServiceTest {
+ protected:
+  void SetUp() override { StartServer(); }
+
+  // Every camera's pictures as one film, and its first pose.
+  void WriteFilms() {
+    fs::create_directories(Path("rig"));
+    WriteDynamicScene(Path("pictures"), made_);
+    const json pictures = json::parse(ReadFile(Path("pictures") / "transforms.json"));
+    json films = json::array();
+    ThreadPool pool(1);
+    for (int camera = 0; camera < made_.cameras(); ++camera) {
+      const std::string name = "cam0" + std::to_string(camera);
+      Mp4Writer writer(Path("rig") / (name + ".mp4"),
+                       {.width = 128, .height = 96, .frames_per_second = 8, .threads = 1});
+      for (int time = 0; time < made_.times(); ++time) {
+        writer.Add(made_.RenderSrgb(made_.ViewOf(camera, time)), pool);
+      }
+      writer.Finish();
+      for (json frame : pictures["frames"]) {
+        if (frame["camera"] != name || frame["time"] != 0.0) continue;
+        frame["file_path"] = name + ".mp4";
+        frame.erase("time");
+        films.push_back(frame);
+      }
+    }
+    WriteFileAtomic(Path("rig") / "transforms.json", json({{"frames", films}}).dump());
+  }
+  ProcessResult Colorize(const std::string& scene, const std::vector<std::string>& more) {
+    return Client(
+        std::vector<std::string>{"colorize", Path(scene).string(), "-o", Path("out").string()} +
+        QuickOptions() + more);
+  }
+
+  const DynamicScene made_{{.which = DynamicCase::kSliding, .cameras = 3, .times = 9}};
+};
+
+TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
+  WriteFilms();
+  WriteFileAtomic(Path("painted.png"), EncodePng8(made_.RenderSrgb(made_.ViewOf(1, 3))));
+  const ProcessResult result = Colorize("rig",
+                                        {"--key-view",
+                                         "cam01/f000003",
+                                         "--key-color",
+                                         Path("painted.png").string(),
+                                         "--hold-out",
+                                         "--set",
+                                         "import_scene.hold_out_camera=cam02"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.err, HasSubstr("3 films of cameras with poses"));
+  bool told = false;
+  for (const json& step : json::parse(ReadFile(Path("out") / "plan.json"))) {
+    if (step["step"] != "deformation_over_time") continue;
+    told = step["reason"] == "the views show 9 moments, seen by 3 cameras" && step["needed"];
+  }
+  EXPECT_TRUE(told) << ReadFile(Path("out") / "plan.json");
+  const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
+  EXPECT_GT(metrics.at("gaussians"), 1000);
+  EXPECT_TRUE(fs::exists(Path("out") / "scene.ply"));
+}
+
+TEST_F(RigTest, WhatDoesNotFitIsOneClearLine) {
+  WriteFilms();
+  fs::remove(Path("rig/cam01.mp4"));
+  ExpectRefusal(Colorize("rig", {"--auto"}), 1, {"there is no film cam01.mp4"});
+  json pictures = json::parse(ReadFile(Path("pictures") / "transforms.json"));
+  pictures["frames"][4].erase("time");
+  WriteFileAtomic(Path("pictures") / "transforms.json", pictures.dump());
+  ExpectRefusal(Colorize("pictures", {"--auto"}), 1, {"transforms.json: frame 4", "has no time"});
+}
+
+}  // namespace
+}  // namespace color3d
