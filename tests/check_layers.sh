@@ -104,7 +104,7 @@ public core/image box_mean codec draw fill_holes guided_upsample local_features 
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
-public core/film film_carry moving_regions shots
+public core/film film_carry moving_regions shots steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
@@ -113,7 +113,7 @@ public core/splat model/gaussian_cap model/gaussian_model model/memory_plan moti
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene
 public core/stage stages film/import_film formats/artifacts
-public core/video film_reader mp4_writer
+public core/video film_reader mp4_writer ticks
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
 public server/backends backend_address backend_prober grpc_colorizer

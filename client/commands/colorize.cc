@@ -97,9 +97,10 @@ class Colorize {
   }
 
   v1::JobSpec AcceptedSpec(const std::string& scene) {
-    if (!options_.key_view.empty() || options_.hold_out) {
+    if (!options_.key_view.empty() || options_.hold_out || options_.deflicker) {
       throw InvalidArgument(
-          "--key-view and --hold-out were settled when the key view was selected (`color3d key "
+          "--key-view, --hold-out and --deflicker were settled when the key view was selected "
+          "(`color3d key "
           "select`); leave them out");
     }
     const KeyState state = ReadKeyState(*connection_, scene);

@@ -32,6 +32,8 @@ struct KeyOptions {
   std::string job;
   int count = 1;  // key views that are chosen together
   bool hold_out = false;
+  bool film = false;       // the target is a folder of a film's frames
+  bool deflicker = false;  // of the film
   KeyColorFlags color;
 };
 
@@ -49,7 +51,9 @@ class Key {
   ExitCode Accept();
 
  private:
-  std::string Scene() { return ResolveScene(connection_, context_, options_.target, display_); }
+  std::string Scene() {
+    return ResolveScene(connection_, context_, options_.target, options_.film, display_);
+  }
   v1::JobSpec Spec(const std::string& scene) const {
     v1::JobSpec spec;
     spec.set_scene(scene);
@@ -102,9 +106,10 @@ v1::Job Key::SubmitSelection(const std::string& scene) {
   if (options_.count > 1) select->set_count(options_.count);
   select->set_encoder(options_.encoder);
   select->set_features(options_.features);
-  if (options_.hold_out) {
+  if (options_.hold_out || options_.deflicker) {
     v1::JobSpec import = Spec(scene);
-    import.mutable_import_scene()->set_hold_out_every_eighth(true);
+    if (options_.hold_out) import.mutable_import_scene()->set_hold_out_every_eighth(true);
+    if (options_.deflicker) import.mutable_import_scene()->set_film_deflicker(true);
     spec.add_inputs(SubmitJob(connection_, import).name());
   }
   return SubmitJob(connection_, spec);
@@ -155,7 +160,7 @@ ExitCode Key::Select() {
 }
 
 std::vector<std::string> Key::SelectionFor(const std::string& scene) {
-  if (!options_.view.empty() || options_.hold_out) {
+  if (!options_.view.empty() || options_.hold_out || options_.deflicker) {
     const v1::Job select = SubmitSelection(scene);
     return WithItsInputs(connection_, select);
   }
@@ -270,13 +275,17 @@ void AddTarget(CLI::App* command, KeyOptions* options) {
   command->fallthrough();
   command
       ->add_option(
-          "SCENE", options->target, "scenes/ID, a folder of photos, or a splat (.ply, .sog, .spz)")
+          "SCENE",
+          options->target,
+          "scenes/ID, a folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
+  command->add_flag("--film", options->film, "The folder's photos are frames of a film");
 }
 
 void AddView(CLI::App* command, KeyOptions* options) {
   command->add_option("--view", options->view, "Take this photo (its name) as the key view");
   command->add_flag("--hold-out", options->hold_out, "Hold out every eighth view");
+  command->add_flag("--deflicker", options->deflicker, "Of a film: take out flicker of exposure");
   command->add_option("-o,--out", options->out, "Folder for the pictures")->capture_default_str();
 }
 
@@ -299,9 +308,11 @@ void AddKeyCommands(CLI::App& app, Context& context) {
   select->add_option("--strategy", options->strategy, "coverage (default), tracks or entropy")
       ->check(CLI::IsMember({"coverage", "tracks", "entropy"}));
   select
-      ->add_option("--count",
-                   options->count,
-                   "So many photos, chosen together for the least error that is expected")
+      ->add_option(
+          "--count",
+          options->count,
+          "So many photos, chosen together for the least error that is expected; of a film "
+          "one a shot, the longest first")
       ->check(CLI::Range(1, 17));
   select->add_option(
       "--encoder", options->encoder, "Weights that this server knows, to compare by");

@@ -7,6 +7,7 @@
 #include "client/lib/progress_display.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
+#include "core/base/error.h"
 
 namespace color3d::client {
 namespace {
@@ -36,8 +37,15 @@ std::string SceneState(const v1::Scene& scene) {
   return scene.state() == v1::Scene::STATE_ACTIVE ? "ACTIVE" : "UPLOADING";
 }
 
-ExitCode RunCreate(const Context& context, const std::string& photos, const std::string& masks) {
+ExitCode RunCreate(const Context& context,
+                   const std::string& photos,
+                   const std::string& masks,
+                   bool film) {
   PhotoFolder folder = CollectPhotos(photos);
+  if (film && !masks.empty()) {
+    throw InvalidArgument("--masks is for photos of a place; --film takes frames as they are");
+  }
+  if (film) TakeAsFrames(&folder);
   if (!masks.empty()) AddMasks(masks, &folder);
   for (const std::string& note : folder.notes) PrintNote(context, note);
   Connection connection(context.server, *context.interrupt);
@@ -132,14 +140,20 @@ void AddSceneCommands(CLI::App& app, Context& context) {
   const auto text = std::make_shared<std::string>();
   const auto limit = std::make_shared<int>(50);
 
-  CLI::App* create = scene->add_subcommand("create", "Upload a folder of photos, or a splat");
+  CLI::App* create =
+      scene->add_subcommand("create", "Upload a folder of photos, a splat or a film");
   create->fallthrough()
-      ->add_option("PHOTOS", *text, "Folder of photos, or a splat (.ply, .sog, .spz)")
+      ->add_option(
+          "PHOTOS", *text, "Folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
   const auto masks = std::make_shared<std::string>();
   create->add_option("--masks", *masks, "Folder of masks, called like the photos: white counts");
-  create->callback([&context, text, masks] {
-    context.action = [&context, text, masks] { return RunCreate(context, *text, *masks); };
+  const auto film = std::make_shared<bool>(false);
+  create->add_flag("--film", *film, "The photos are frames of a film");
+  create->callback([&context, text, masks, film] {
+    context.action = [&context, text, masks, film] {
+      return RunCreate(context, *text, *masks, *film);
+    };
   });
 
   CLI::App* list = scene->add_subcommand("list", "Newest first");

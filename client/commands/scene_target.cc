@@ -33,9 +33,14 @@ std::string UploadFolder(Connection& connection,
 std::string ResolveScene(Connection& connection,
                          const Context& context,
                          const std::string& text,
+                         bool film,
                          ProgressDisplay& display) {
   std::error_code none;
   if (!fs::is_directory(text, none) && !fs::is_regular_file(text, none)) {
+    if (film && text.starts_with("scenes/")) {
+      throw InvalidArgument("--film is for a folder; {} was a film or not when it was uploaded",
+                            text);
+    }
     if (text.starts_with("scenes/")) return text;
     throw Error(
         ErrorCode::kNotFound,
@@ -43,7 +48,8 @@ std::string ResolveScene(Connection& connection,
         "`color3d scene list` shows them)",
         text);
   }
-  const PhotoFolder folder = CollectPhotos(text);
+  PhotoFolder folder = CollectPhotos(text);
+  if (film) TakeAsFrames(&folder);
   for (const std::string& note : folder.notes) PrintNote(context, note);
   return UploadFolder(connection, context, folder, display);
 }

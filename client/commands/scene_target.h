@@ -16,11 +16,13 @@ std::string UploadFolder(Connection& connection,
                          const PhotoFolder& folder,
                          ProgressDisplay& display);
 
-// `text`: "scenes/...", or a folder or splat, which is uploaded. Throws Error{kNotFound} when it is
-// neither.
+// `text`: "scenes/...", or a folder, splat or film, which is uploaded; `film`: the folder's
+// pictures are frames of a film (TakeAsFrames). Throws Error{kNotFound} when it is none of them,
+// Error{kInvalidArgument} for a scene of the server's with `film`.
 std::string ResolveScene(Connection& connection,
                          const Context& context,
                          const std::string& text,
+                         bool film,
                          ProgressDisplay& display);
 
 }  // namespace color3d::client

@@ -203,7 +203,8 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("--more-key",
                  o->more_keys,
                  "VIEW=COLOURED.png: a further key view, for what the first one does not show; its "
-                 "colours never replace those of the key views before it. May be repeated");
+                 "colours never replace those of the key views before it. In a film it colours the "
+                 "frames that are nearer to it. May be repeated");
   app.add_option("--preset",
                  o->preset,
                  fmt::format("How much time quality is worth: {}; or a file of your own (`color3d "
@@ -229,6 +230,9 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
   app.add_flag(
       "--film", o->film, "The photos are frames of a film: coloured one by one, not reconstructed");
+  app.add_flag("--deflicker",
+               o->deflicker,
+               "Take flicker of exposure out of a film; the coloured frames get steady luminance");
   app.add_flag("--poses",
                o->poses,
                "Of a film by one moving camera: find the frames' poses by what stands still");
@@ -250,6 +254,7 @@ v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene)
   v1::ImportSceneSpec* import_scene = spec.mutable_import_scene();
   *import_scene = Chosen(options).import_scene();
   if (options.hold_out || options.benchmark) import_scene->set_hold_out_every_eighth(true);
+  if (options.deflicker) import_scene->set_film_deflicker(true);
   return spec;
 }
 
@@ -311,6 +316,7 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   if (options.hold_out || options.benchmark) {
     colorize->mutable_import_scene()->set_hold_out_every_eighth(true);
   }
+  if (options.deflicker) colorize->mutable_import_scene()->set_film_deflicker(true);
   return spec;
 }
 

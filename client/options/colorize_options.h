@@ -24,6 +24,7 @@ struct ColorizeOptions {
   std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";  // of the server's, or a file of the user's own
   bool film = false;            // the photos are frames of a film
+  bool deflicker = false;       // its exposure is made steady
   bool poses = false;           // of a film: its frames' poses are looked for
   bool benchmark = false;
   int keys = 1;        // of the benchmark: key views in their true colours, chosen together

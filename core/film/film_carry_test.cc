@@ -118,6 +118,23 @@ TEST(FilmCarry, TheNearestKeyFrameOfTheShotColors) {
   for (const int frame : {6, 7, 8, 9, 10, 11}) EXPECT_NEAR(color(frame), -40.0f, 1e-3) << frame;
 }
 
+TEST(FilmCarry, ALaterKeyFrameChangesOnlyTheFramesNearerToIt) {
+  const Scenery scenery{.pan_px = 1.5};
+  FilmKey later = KeyOf(scenery, 16);
+  for (float& v : later.color.ab.data) v = -v;
+  const std::vector<int> shots(21, 0);
+  const auto before = Carry(scenery, shots, {KeyOf(scenery, 4)});
+  const auto after = Carry(scenery, shots, {KeyOf(scenery, 4), later});
+  for (int i = 0; i < 21; ++i) {
+    EXPECT_EQ(before.at(i).ab.data == after.at(i).ab.data, i <= 10) << i;  // 10: as far from both
+    EXPECT_EQ(before.at(i).confidence.data == after.at(i).confidence.data, i <= 10) << i;
+  }
+  // Never a mean of what the two say.
+  Image opposite = scenery.Ab(13);
+  for (float& v : opposite.data) v = -v;
+  EXPECT_LT(ErrorOf(after.at(13), opposite).weighted, 1.5);
+}
+
 TEST(FilmCarry, WhatCannotBeFollowedIsNotClaimed) {
   const Scenery fast{.pan_px = 90.0};
   const auto colors = Carry(fast, std::vector<int>(6, 0), {KeyOf(fast, 0)});

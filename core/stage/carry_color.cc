@@ -142,6 +142,39 @@ CarriedColor CarryInTime(const std::vector<ColoredKeyView>& keys,
   return color;
 }
 
+// What the key frames before it give a frame that is to be one: from the nearest of its shot.
+CarriedColor CarriedToFrame(const FilmFrames& frames,
+                            const std::vector<FilmKey>& keys,
+                            int frame,
+                            const FilmCarryOptions& options,
+                            StageContext& context) {
+  const FilmKey* nearest = nullptr;
+  for (const FilmKey& key : keys) {
+    if (frames.shot[key.frame] != frames.shot[frame]) continue;
+    if (nearest == nullptr || std::abs(key.frame - frame) < std::abs(nearest->frame - frame)) {
+      nearest = &key;
+    }
+  }
+  CarriedColor color;
+  if (nearest == nullptr) return color;
+  // Only the frames between are walked along.
+  FilmFrames between = frames;
+  for (int i = 0; i < static_cast<int>(between.shot.size()); ++i) {
+    if (i < std::min(frame, nearest->frame) || i > std::max(frame, nearest->frame)) {
+      between.shot[i] = -1 - i;
+    }
+  }
+  CarryAlongFilm(between,
+                 {*nearest},
+                 options,
+                 context.pool(),
+                 context.cancel(),
+                 [&](int at, const CarriedColor& carried) {
+                   if (at == frame) color = carried;
+                 });
+  return color;
+}
+
 // The key frames' colours along the film, by motion in place of geometry.
 void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageContext& context) {
   constexpr int64_t kCacheBytes = int64_t{64} << 20;
@@ -155,7 +188,11 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
   keys[0].color = ReadKeyColor(context, camera.width, camera.height);
   for (const FurtherKeyView& further : options.further) {
     const int view = FurtherView(further, ViewsOf(keys, &FilmKey::frame), scene);
-    keys.push_back({view, ColorOfFurther(further, view, scene, images, context)});
+    FilmKey key{view, ColorOfFurther(further, view, scene, images, context)};
+    // What is not painted keeps the colours that it had: a later key frame may mend a part.
+    const CarriedColor before = CarriedToFrame(frames, keys, view, options.film, context);
+    if (!before.ab.Empty()) FillFrom(before, &key.color);
+    keys.push_back(std::move(key));
   }
   CarryCheckpoint done(scene, context);
   CarryAlongFilm(frames,

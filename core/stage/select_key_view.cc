@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
-#include <set>
 
 #include "core/color/lab.h"
 #include "core/encoder/encoder.h"
@@ -11,6 +9,7 @@
 #include "core/keyview/coverage.h"
 #include "core/keyview/expected_error.h"
 #include "core/keyview/tracks.h"
+#include "core/stage/film/film_keys.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/key_view_ranking.h"
 #include "core/stage/sources/seen_samples.h"
@@ -90,6 +89,14 @@ void ChooseTogether(const SelectKeyViewOptions& options,
     ChooseManually(options.view, scene, candidates, ranking);
     first = ranking->selection.index;
   }
+  if (scene.IsFilm()) {
+    ChosenKeyViews chosen = ChooseFilmKeys(
+        scene, candidates, ranking->features, kept, options.selection.count, first, context);
+    ranking->selection.index = chosen.views[0];
+    ranking->together = std::move(chosen.views);
+    ranking->expected_error = std::move(chosen.error);
+    return;
+  }
   const NearestDistances distances =
       FindNearestDistances(ranking->features, kept, context.control());
   const SeenSamples seen =
@@ -157,6 +164,9 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   }
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);
+  if (scene.IsFilm() && TakeFromLongestShot(scene, candidates, &ranking->selection)) {
+    ranking->among = "the film's longest shot";
+  }
   if (options.count > 1) ChooseTogether(stage_options, scene, candidates, kept, context, ranking);
 }
 
@@ -174,39 +184,13 @@ void WarnOfViewsSetAside(const KeyViewRanking& ranking, ProgressObserver& progre
   if (count > 0) progress.OnWarning(fmt::format("key view: set aside:{}", names));
 }
 
-// Neighbours of a film show much the same: some frames, evenly spread over it, stand for all, and
-// none that is a shot of its own (torn, blank) where there are others. One that the user names is
-// among them.
-std::vector<int> CandidatesOfFilm(const Scene& scene,
-                                  const std::vector<int>& training,
-                                  const std::string& named) {
-  constexpr size_t kMaxCandidates = 60;
-  std::map<int, int> frames_of_shot;
-  for (const View& view : scene.views) ++frames_of_shot[view.moment->shot];
-  std::vector<int> of_many;
-  for (const int view : training) {
-    if (frames_of_shot.at(scene.views[view].moment->shot) > 1) of_many.push_back(view);
-  }
-  const std::vector<int>& from = of_many.empty() ? training : of_many;
-  const size_t wanted = std::min(kMaxCandidates, from.size());
-  std::set<int> candidates;
-  for (size_t i = 0; i < wanted; ++i)
-    candidates.insert(from[(2 * i + 1) * from.size() / (2 * wanted)]);
-  if (!named.empty()) {
-    const int view = scene.FindView(named);
-    if (!scene.views[view].held_out) candidates.insert(view);
-  }
-  return {candidates.begin(), candidates.end()};
-}
-
 }  // namespace
 
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   // A held-out view must never lend its colour.
   std::vector<int> candidates = scene.TrainingViews();
-  if (scene.IsFilm() || scene.IsDynamic())
-    candidates = CandidatesOfFilm(scene, candidates, options.view);
+  if (scene.IsFilm() || scene.IsDynamic()) candidates = CandidatesOfFilm(scene, options.view);
   if (options.selection.count > static_cast<int>(candidates.size())) {
     throw InvalidArgument("{} key views are asked for; the scene has {} training views",
                           options.selection.count,

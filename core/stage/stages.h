@@ -71,7 +71,8 @@ struct ColorizeKeyViewOptions {
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
 // A key view beside the first one. Of its colours only those are taken that the key views before it
-// have not given already; so they never contradict.
+// have not given already; so they never contradict. In a film it colours the frames of its shot
+// that are nearer to it, and has what is not painted from the key views before it.
 struct FurtherKeyView {
   std::string view;  // name or unique file stem
   ColorizeKeyViewOptions color;

@@ -1,7 +1,6 @@
 #include "core/video/film_reader.h"
 
 extern "C" {
-#include <libavformat/avformat.h>
 #include <libavutil/display.h>
 #include <libswscale/swscale.h>
 }
@@ -23,9 +22,6 @@ constexpr int kMaxSidePx = 8192;
 // Times of frames that differ by less than this share of their mean distance are one rate.
 constexpr double kRateTolerance = 0.2;
 
-struct CloseFilm {
-  void operator()(AVFormatContext* film) const { avformat_close_input(&film); }
-};
 struct FreeConverter {
   void operator()(SwsContext* converter) const { sws_freeContext(converter); }
 };
@@ -128,7 +124,9 @@ class FilmReader::Impl {
     stream_ = FindFilm(container);
     if (stream_ == nullptr) Refuse("it has no pictures, perhaps only sound");
     for (unsigned i = 0; i < container->nb_streams; ++i) {
-      if (container->streams[i] != stream_) container->streams[i]->discard = AVDISCARD_ALL;
+      const AVStream* other = container->streams[i];
+      facts_.has_sound |= other->codecpar->codec_type == AVMEDIA_TYPE_AUDIO;
+      if (other != stream_) container->streams[i]->discard = AVDISCARD_ALL;
     }
   }
 
@@ -160,6 +158,7 @@ class FilmReader::Impl {
       is_start_.push_back(is_start);
       times_.push_back(static_cast<double>(stamp - stamps_.front()) * tick);
     }
+    facts_.first_s = static_cast<double>(stamps_.front()) * tick;
     facts_.seconds = times_.back() + static_cast<double>(last_duration) * tick;
     const double mean = times_.back() / std::max<size_t>(1, times_.size() - 1);
     for (size_t i = 1; i < times_.size(); ++i) {

@@ -17,7 +17,9 @@ struct FilmFacts {
   int quarter_turns = 0;  // clockwise, that the file asks for and Read has done; 0..3
   std::string codec;      // FFmpeg's name, e.g. "h264"
   double seconds = 0.0;   // from the first frame's beginning to the last one's end
+  double first_s = 0.0;   // the file's own time of the first frame, which times() count from
   bool constant_rate = true;
+  bool has_sound = false;
   bool interlaced = false;  // its first frame is; of each frame Read then takes one field
 };
 

@@ -3,6 +3,7 @@
 
 extern "C" {
 #include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
 #include <libavutil/error.h>
 }
 
@@ -10,6 +11,9 @@ extern "C" {
 
 namespace color3d {
 
+struct CloseFilm {
+  void operator()(AVFormatContext* film) const { avformat_close_input(&film); }
+};
 struct FreeCodec {
   void operator()(AVCodecContext* codec) const { avcodec_free_context(&codec); }
 };

@@ -1,18 +1,20 @@
 #include "core/video/mp4_writer.h"
 
 extern "C" {
-#include <libavformat/avformat.h>
 #include <libavutil/opt.h>
 }
 
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/range_check.h"
+#include "core/video/film_sound.h"
 #include "core/video/libav.h"
 #include "core/video/yuv.h"
 
@@ -63,10 +65,12 @@ class Mp4Writer::Impl {
     CheckOptions();
     av_log_set_level(AV_LOG_ERROR);
     OpenEncoder();
+    if (options_.sound) sound_ = std::make_unique<FilmSound>(*options_.sound);
     OpenMovie();
     frame_.reset(av_frame_alloc());
     packet_.reset(av_packet_alloc());
-    if (!frame_ || !packet_) Fail(path_, "begin", AVERROR(ENOMEM));
+    sound_packet_.reset(av_packet_alloc());
+    if (!frame_ || !packet_ || !sound_packet_) Fail(path_, "begin", AVERROR(ENOMEM));
     frame_->format = codec_->pix_fmt;
     frame_->width = options_.width;
     frame_->height = options_.height;
@@ -80,8 +84,42 @@ class Mp4Writer::Impl {
   }
 
   const std::string& encoder() const { return encoder_; }
+  const std::string& sound_warning() const { return sound_ ? sound_->warning() : nothing_; }
 
   void Add(const Image& srgb, ThreadPool& pool) {
+    if (options_.ticks_per_second > 0) {
+      throw InvalidArgument("pictures of this movie have times of their own (AddAt)");
+    }
+    AddTick(count_, 1, srgb, pool);
+  }
+
+  void AddAt(double time_s, double seconds, const Image& srgb, ThreadPool& pool) {
+    const int64_t tick = std::llround(time_s * options_.ticks_per_second);
+    if (options_.ticks_per_second == 0 || !(seconds > 0.0) || tick < 0 ||
+        (count_ == 0 ? tick != 0 : tick <= last_tick_)) {
+      throw InvalidArgument(
+          "a picture at {} s for {} s cannot follow {} others in a movie of {} ticks a second",
+          time_s,
+          seconds,
+          count_,
+          options_.ticks_per_second);
+    }
+    AddTick(
+        tick, std::max<int64_t>(1, std::llround(seconds * options_.ticks_per_second)), srgb, pool);
+  }
+
+  void Finish() {
+    if (count_ == 0) throw InvalidArgument("a movie needs a picture");
+    Encode(nullptr);
+    WriteSound(std::numeric_limits<double>::infinity());
+    Require(av_write_trailer(movie_.get()), "write the end of");
+    const int closed = avio_closep(&movie_->pb);
+    Require(closed, "write the end of");
+    PublishFile(part_, path_);
+  }
+
+ private:
+  void AddTick(int64_t tick, int64_t ticks, const Image& srgb, ThreadPool& pool) {
     if (srgb.width != options_.width || srgb.height != options_.height || srgb.channels != 3) {
       throw InvalidArgument(
           "a picture of {} x {} px and {} channels is no part of a movie of {} x "
@@ -99,20 +137,13 @@ class Mp4Writer::Impl {
                 {frame_->data[1], frame_->linesize[1]},
                 {frame_->data[2], frame_->linesize[2]},
                 pool);
-    frame_->pts = count_++;
+    frame_->pts = last_tick_ = tick;
+    ticks_of_[tick] = ticks;
+    ++count_;
     Encode(frame_.get());
+    WriteSound(static_cast<double>(tick) * av_q2d(codec_->time_base));
   }
 
-  void Finish() {
-    if (count_ == 0) throw InvalidArgument("a movie needs a picture");
-    Encode(nullptr);
-    Require(av_write_trailer(movie_.get()), "write the end of");
-    const int closed = avio_closep(&movie_->pb);
-    Require(closed, "write the end of");
-    PublishFile(part_, path_);
-  }
-
- private:
   void Require(int result, const char* what) const {
     if (result < 0) Fail(path_, what, result);
   }
@@ -122,6 +153,7 @@ class Mp4Writer::Impl {
     check("width", options_.width, 16, 8192);
     check("height", options_.height, 16, 8192);
     check("frames_per_second", options_.frames_per_second, 1, 120);
+    check("ticks_per_second", options_.ticks_per_second, 0, 65535);
     check("threads", options_.threads, 1, 1024);
     if (options_.width % 2 != 0 || options_.height % 2 != 0) {
       throw InvalidArgument(
@@ -154,7 +186,8 @@ class Mp4Writer::Impl {
     codec_->width = options_.width;
     codec_->height = options_.height;
     codec_->pix_fmt = AV_PIX_FMT_YUV420P;
-    codec_->time_base = av_inv_q(rate);
+    codec_->time_base =
+        options_.ticks_per_second > 0 ? AVRational{1, options_.ticks_per_second} : av_inv_q(rate);
     codec_->framerate = rate;
     codec_->sample_aspect_ratio = {1, 1};
     codec_->gop_size =
@@ -192,6 +225,13 @@ class Mp4Writer::Impl {
     Require(avcodec_parameters_from_context(stream_->codecpar, codec_.get()), "begin");
     stream_->time_base = codec_->time_base;
     stream_->avg_frame_rate = codec_->framerate;
+    if (sound_ && sound_->parameters() != nullptr) {
+      sound_stream_ = avformat_new_stream(movie, nullptr);
+      if (sound_stream_ == nullptr) Fail(path_, "begin", AVERROR(ENOMEM));
+      Require(avcodec_parameters_copy(sound_stream_->codecpar, sound_->parameters()), "begin");
+      sound_stream_->codecpar->codec_tag = 0;  // this container's own
+      sound_stream_->time_base = sound_->time_base();
+    }
     movie->flags |= AVFMT_FLAG_BITEXACT;  // equal pictures, equal bytes
     Require(avio_open(&movie->pb, part_.c_str(), AVIO_FLAG_WRITE), "write");
     // The index comes first, so that a browser can begin before it has all.
@@ -208,10 +248,28 @@ class Mp4Writer::Impl {
       const int result = avcodec_receive_packet(codec_.get(), packet_.get());
       if (result == AVERROR(EAGAIN) || result == AVERROR_EOF) return;
       Require(result, "encode");
-      if (packet_->duration == 0) packet_->duration = 1;
+      const auto ticks = ticks_of_.find(packet_->pts);
+      packet_->duration = ticks != ticks_of_.end() ? ticks->second : 1;
+      if (ticks != ticks_of_.end()) ticks_of_.erase(ticks);
       av_packet_rescale_ts(packet_.get(), codec_->time_base, stream_->time_base);
       packet_->stream_index = stream_->index;
       Require(av_interleaved_write_frame(movie_.get(), packet_.get()), "write");
+    }
+  }
+
+  // All that is heard up to a time.
+  void WriteSound(double until_s) {
+    if (sound_stream_ == nullptr) return;
+    while (heard_s_ <= until_s) {
+      if (!sound_->Next(sound_packet_.get())) {
+        heard_s_ = std::numeric_limits<double>::infinity();
+        return;
+      }
+      const AVRational ticks = sound_->time_base();
+      heard_s_ = static_cast<double>(sound_packet_->pts) * av_q2d(ticks);
+      av_packet_rescale_ts(sound_packet_.get(), ticks, sound_stream_->time_base);
+      sound_packet_->stream_index = sound_stream_->index;
+      Require(av_interleaved_write_frame(movie_.get(), sound_packet_.get()), "write the sound of");
     }
   }
 
@@ -220,18 +278,28 @@ class Mp4Writer::Impl {
   const Mp4Options options_;
   std::string encoder_;
   int64_t count_ = 0;
+  int64_t last_tick_ = 0;
+  std::map<int64_t, int64_t> ticks_of_;  // duration by time, of pictures in the encoder
   std::unique_ptr<AVCodecContext, FreeCodec> codec_;
   std::unique_ptr<AVFormatContext, CloseMovie> movie_;
   AVStream* stream_ = nullptr;  // the movie's
   std::unique_ptr<AVFrame, FreeFrame> frame_;
-  std::unique_ptr<AVPacket, FreePacket> packet_;
+  std::unique_ptr<AVPacket, FreePacket> packet_, sound_packet_;
+  const std::string nothing_;
+  std::unique_ptr<FilmSound> sound_;
+  AVStream* sound_stream_ = nullptr;  // the movie's; none where there is no sound
+  double heard_s_ = -std::numeric_limits<double>::infinity();  // beginning of the last packet
 };
 
 Mp4Writer::Mp4Writer(fs::path path, const Mp4Options& options)
     : impl_(std::make_unique<Impl>(std::move(path), options)) {}
 Mp4Writer::~Mp4Writer() = default;
 const std::string& Mp4Writer::encoder() const { return impl_->encoder(); }
+const std::string& Mp4Writer::sound_warning() const { return impl_->sound_warning(); }
 void Mp4Writer::Add(const Image& srgb, ThreadPool& pool) { impl_->Add(srgb, pool); }
+void Mp4Writer::AddAt(double time_s, double seconds, const Image& srgb, ThreadPool& pool) {
+  impl_->AddAt(time_s, seconds, srgb, pool);
+}
 void Mp4Writer::Finish() { impl_->Finish(); }
 
 }  // namespace color3d

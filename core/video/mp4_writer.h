@@ -1,9 +1,11 @@
-// Movies as people send them: MP4 with H.264, 4:2:0, colours tagged as BT.709. Pictures are coded
-// as they come, so memory does not grow with the length (METHOD.md "Movies").
+// Movies as people send them: MP4 with H.264, 4:2:0, colours tagged as BT.709, and the sound of the
+// film that they come from. Pictures are coded as they come, so memory does not grow with the
+// length (METHOD.md "Movies", "Film").
 #pragma once
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/base/image.h"
@@ -11,11 +13,24 @@
 
 namespace color3d {
 
+// What a film's file sounds like from one time of its own to another: FilmFacts::first_s more than
+// FilmReader::times.
+struct SoundPart {
+  std::filesystem::path film;
+  double begin_s = 0.0;  // with the movie's first picture
+  double end_s = 0.0;
+  bool operator==(const SoundPart&) const = default;
+};
+
 struct Mp4Options {
   int width = 0;  // px, even, 16..8192
   int height = 0;
   double frames_per_second = 30.0;  // 1..120
-  int threads = 1;                  // of the encoder
+  // 1..65535: pictures have times of their own (AddAt), which are rounded to so many ticks a second
+  // (ticks.h); 0: they follow each other evenly.
+  int ticks_per_second = 0;
+  int threads = 1;  // of the encoder
+  std::optional<SoundPart> sound;
   bool operator==(const Mp4Options&) const = default;
 };
 
@@ -33,9 +48,16 @@ class Mp4Writer {
   // Of FFmpeg's; "libx264" where there is that.
   const std::string& encoder() const;
 
+  // What became of the sound that was asked for: a line for people where it is not in the movie;
+  // empty: nothing is missing.
+  const std::string& sound_warning() const;
+
   // The next picture: sRGB in 0..1, 3 channels, of the size of the movie. Throws
   // Error{kResourceExhausted} when the disk is full.
   void Add(const Image& srgb, ThreadPool& pool);
+  // The same for pictures with times, s from the first one's, which must ascend by a tick at least;
+  // shown for `seconds` > 0 if it is the last. Throws Error{kInvalidArgument} for other times.
+  void AddAt(double time_s, double seconds, const Image& srgb, ThreadPool& pool);
 
   // Ends the movie; at least one picture must have been added. Throws as Add.
   void Finish();

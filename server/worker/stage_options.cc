@@ -46,6 +46,8 @@ FilmOptions FilmOptionsFrom(const v1::ImportSceneSpec& spec) {
   if (spec.has_film_stride()) options.stride = spec.film_stride();
   if (spec.has_film_begin_s()) options.begin_s = spec.film_begin_s();
   if (spec.has_film_end_s()) options.end_s = spec.film_end_s();
+  if (spec.has_film_frames_per_second()) options.frames_per_second = spec.film_frames_per_second();
+  options.deflicker = spec.film_deflicker();
   if (spec.film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO) options.poses = FilmPoses::kAuto;
   return options;
 }

@@ -10,6 +10,7 @@
 #include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
 #include "tests/integration/service_fixture.h"
+#include "tests/support/formats/sound_film.h"
 #include "tests/support/scenes/test_scenes.h"
 #include "tests/support/scenes/textured_corner.h"
 
@@ -132,6 +133,60 @@ TEST_F(FilmTest, AVideoIsColoredFromOnePaintedFrame) {
     const int x = 40 + 5 * frame;
     EXPECT_GT(image.At(2, 70, x), image.At(0, 70, x) + 0.15f) << frame;
   }
+}
+
+TEST_F(FilmTest, TheSelectionTakesFramesOfAFilm) {
+  WriteFrames();
+  const ProcessResult select = Client({"key",
+                                       "select",
+                                       Path("frames").string(),
+                                       "--film",
+                                       "--deflicker",
+                                       "--count",
+                                       "2",
+                                       "-o",
+                                       Path("key").string()});
+  ASSERT_EQ(select.exit_code, 0) << select.out << select.err;
+  EXPECT_THAT(select.err, HasSubstr("exposure is steadied"));
+  const auto selected = nlohmann::json::parse(ReadFile(Path("key") / "key_view.json"));
+  EXPECT_EQ(selected.at("key_views").size(), 2u);
+  const ProcessResult create = Client({"scene", "create", Path("frames").string(), "--film"});
+  ASSERT_EQ(create.exit_code, 0) << create.err;
+  const ProcessResult list = Client({"scene", "list"});
+  EXPECT_THAT(list.out, HasSubstr("film"));
+  EXPECT_THAT(list.out, testing::Not(HasSubstr("photos")));
+  const ProcessResult stored =
+      Client({"key", "select", create.out.substr(0, create.out.find('\n')), "--film"});
+  EXPECT_NE(stored.exit_code, 0);
+  EXPECT_THAT(stored.err, HasSubstr("--film is for a folder"));
+}
+
+TEST_F(FilmTest, SoundAndUnevenTimesGoAlong) {
+  ThreadPool pool(1);
+  Mp4Writer writer(Path("silent.mp4"),
+                   {.width = kWidth,
+                    .height = kHeight,
+                    .frames_per_second = 12,
+                    .ticks_per_second = 24000,
+                    .threads = 1});
+  std::vector<double> times;
+  for (int i = 0; i < kFrames; ++i) {
+    times.push_back(i < 8 ? i / 24.0 : i / 8.0 - 2.0 / 3.0);
+    writer.AddAt(times.back(), 0.125, FrameOf(i), pool);
+  }
+  writer.Finish();
+  const auto tone = [](double s) { return s < 0.5 ? 0.0 : 0.5 * std::sin(2500.0 * s); };
+  AddSound(Path("silent.mp4"), {.seconds = times.back() + 0.1, .level = tone}, Path("heard.mp4"));
+  const ProcessResult result = Colorize(Path("heard.mp4"), {"--auto"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  FilmReader movie(Path("out") / "scene.mp4");
+  ASSERT_EQ(movie.times().size(), times.size());
+  for (size_t i = 0; i < times.size(); ++i) EXPECT_NEAR(movie.times()[i], times[i], 1e-6) << i;
+  const HeardSound sound = HearFilm(Path("out") / "scene.mp4");
+  EXPECT_EQ(sound.codec, "aac");
+  size_t onset = 0;
+  while (onset < sound.samples.size() && std::abs(sound.samples[onset]) < 0.15f) ++onset;
+  EXPECT_NEAR(static_cast<double>(onset) / sound.sample_rate, 0.5, 0.01);
 }
 
 TEST_F(FilmTest, WhatIsNoFilmIsRefused) {

@@ -1,4 +1,4 @@
-// Where a scene moves: what Gaussians that stand still cannot explain (METHOD.md "Dynamic scenes").
+// Where a scene moves: what Gaussians that stand still cannot explain (METHOD.md "What moves").
 // Internal to the splat module. Deterministic whatever the thread count.
 #pragma once
 

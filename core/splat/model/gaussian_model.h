@@ -10,8 +10,8 @@
 
 namespace color3d {
 
-// How the last size() Gaussians of a model move and when they are there (METHOD.md "Dynamic
-// scenes"). With t = -1 at begin_s and 1 at end_s, and tau = t - center:
+// How the last size() Gaussians of a model move and when they are there (METHOD.md "What
+// moves"). With t = -1 at begin_s and 1 at end_s, and tau = t - center:
 //   position + velocity tau + acceleration tau^2,  rotation + spin tau,
 //   opacity exp(-(tau / exp(log_width))^2 / 2)
 struct GaussianMotion {

@@ -1,4 +1,4 @@
-// Gaussians in time: where they are at a moment, and the adjoint of that (METHOD.md "Dynamic
+// Gaussians in time: where they are at a moment, and the adjoint of that (METHOD.md "What
 // scenes"). A model at one moment is a model as any other, so no kernel but these knows of time.
 // Internal to the splat module. Deterministic whatever the thread count.
 #pragma once

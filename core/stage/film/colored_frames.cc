@@ -3,16 +3,68 @@
 #include <algorithm>
 #include <optional>
 
+#include "core/base/files.h"
 #include "core/base/median.h"
+#include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
+#include "core/video/ticks.h"
 
 namespace color3d {
 namespace {
 
-constexpr double kUnknownFramesPerSecond = 25.0;
+// When the movie shows each frame, and how long it does.
+struct FrameTimes {
+  int ticks_per_second = 0;
+  std::vector<double> time_s;     // from the first one's
+  std::vector<double> seconds;    // to the next one
+  double frames_per_second = 25;  // as is usual
+};
+
+// Gaps that frames of no use have left stay gaps, so that what is heard fits what is seen.
+FrameTimes TimesOf(const Scene& scene) {
+  std::vector<double> steps;
+  for (size_t i = 1; i < scene.views.size(); ++i) {
+    const double step = scene.views[i].time_s() - scene.views[i - 1].time_s();
+    if (step > 0.0) steps.push_back(step);
+  }
+  FrameTimes times;
+  const double usual = steps.empty() ? 1.0 / times.frames_per_second : Median(std::move(steps));
+  times.frames_per_second = std::clamp(1.0 / usual, 1.0, 120.0);
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    const double step = i > 0 ? scene.views[i].time_s() - scene.views[i - 1].time_s() : 0.0;
+    // Another camera's film begins again.
+    times.time_s.push_back(i == 0 ? 0.0 : times.time_s.back() + (step > 0.0 ? step : usual));
+  }
+  times.ticks_per_second = TicksPerSecond(times.time_s);
+  for (size_t i = 1; i < times.time_s.size(); ++i) {
+    // Broken films give two frames nearly one time.
+    const double least = times.time_s[i - 1] + 1.0 / times.ticks_per_second;
+    times.time_s[i] = std::max(times.time_s[i], least);
+    times.seconds.push_back(times.time_s[i] - times.time_s[i - 1]);
+  }
+  times.seconds.push_back(usual);
+  return times;
+}
+
+// None for frames that came as pictures, or from several cameras.
+std::optional<SoundPart> SoundOf(const Scene& scene,
+                                 const FrameTimes& times,
+                                 const StageContext& context) {
+  std::vector<std::string> films;
+  for (const std::string& file : ListFiles(context.scene_folder())) {
+    if (HasFilmExtension(file) && !IsAugmentFile(file)) films.push_back(file);
+  }
+  if (films.size() != 1) return std::nullopt;
+  const std::filesystem::path film = context.scene_folder() / films[0];
+  const FilmFacts facts = FilmReader(film).facts();
+  if (!facts.has_sound) return std::nullopt;
+  const double begin_s = facts.first_s + scene.views.front().time_s();
+  return SoundPart{film, begin_s, begin_s + times.time_s.back() + times.seconds.back()};
+}
 
 // Movies have even sides.
 Image EvenSides(const Image& image) {
@@ -39,16 +91,6 @@ Image ColoredFrame(const View& view,
                  ReadTargetAb(context, view, is_key, luminance->width, luminance->height));
 }
 
-double FilmFramesPerSecond(const Scene& scene) {
-  std::vector<double> steps;
-  for (size_t i = 1; i < scene.views.size(); ++i) {
-    steps.push_back(scene.views[i].moment->time_s - scene.views[i - 1].moment->time_s);
-  }
-  if (steps.empty()) return kUnknownFramesPerSecond;
-  const double step = Median(std::move(steps));
-  return step > 0.0 ? std::clamp(1.0 / step, 1.0, 120.0) : kUnknownFramesPerSecond;
-}
-
 void RenderFilm(const RenderOptions& options,
                 const Scene& scene,
                 const std::vector<int>& views,
@@ -57,11 +99,15 @@ void RenderFilm(const RenderOptions& options,
   const Camera camera = images.WorkingCamera(0);
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
   const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
+  const FrameTimes times = TimesOf(scene);
   Mp4Writer movie(file,
                   {.width = camera.width - camera.width % 2,
                    .height = camera.height - camera.height % 2,
-                   .frames_per_second = FilmFramesPerSecond(scene),
-                   .threads = context.pool().thread_count()});
+                   .frames_per_second = times.frames_per_second,
+                   .ticks_per_second = times.ticks_per_second,
+                   .threads = context.pool().thread_count(),
+                   .sound = SoundOf(scene, times, context)});
+  if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
   const auto count = static_cast<int>(scene.views.size());
   const int batch = context.pool().thread_count();
   std::vector<Image> frames(batch);
@@ -74,7 +120,7 @@ void RenderFilm(const RenderOptions& options,
     });
     for (int i = 0; i < size; ++i) {
       const int view = begin + i;
-      movie.Add(EvenSides(frames[i]), context.pool());
+      movie.AddAt(times.time_s[view], times.seconds[view], EvenSides(frames[i]), context.pool());
       if (std::find(views.begin(), views.end(), view) == views.end()) continue;
       context.WriteOutput(ViewArtifact(artifact::kRenders, scene.views[view], ".png"),
                           EncodePng8(FitWithin(frames[i], options.max_side_px)));

@@ -15,13 +15,9 @@ Image ColoredFrame(const View& view,
                    const ViewImages& images,
                    const StageContext& context);
 
-// Of the film's frames, from one to the next: the middle one of their distances; 25 for a film
-// without times.
-double FilmFramesPerSecond(const Scene& scene);
-
-// Leaves artifact::kMovie, all frames one after the other at the film's own rate and size, and
-// `views` (for the report) as artifact::kRenders. Throws Error{kCancelled} and what Mp4Writer
-// throws.
+// Leaves artifact::kMovie, all frames at the film's own times and size, with its sound where it
+// came as a video file, and `views` (for the report) as artifact::kRenders. Throws
+// Error{kCancelled} and what Mp4Writer throws.
 void RenderFilm(const RenderOptions& options,
                 const Scene& scene,
                 const std::vector<int>& views,

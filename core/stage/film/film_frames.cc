@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/base/error.h"
@@ -31,14 +32,17 @@ std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOpti
   return wanted;
 }
 
-void CheckFrameCount(size_t frames, const FilmOptions& options) {
+void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {
   if (frames <= kMaxFilmFrames) return;
   throw InvalidArgument(
-      "{} frames are more than a job takes ({}); take every {}th (film_stride), or a part "
-      "(film_begin_s, film_end_s)",
+      "{} frames ({:.0f} s) are more than a job takes ({}); take every {}th (film_stride), or a "
+      "part "
+      "of {:.0f} s at most (film_begin_s, film_end_s)",
       frames,
+      seconds,
       kMaxFilmFrames,
-      (frames * options.stride + kMaxFilmFrames - 1) / kMaxFilmFrames);
+      (frames * options.stride + kMaxFilmFrames - 1) / kMaxFilmFrames,
+      std::floor(seconds * kMaxFilmFrames / static_cast<double>(frames)));
 }
 
 std::string EncodeGrayFrame(Image luminance) {

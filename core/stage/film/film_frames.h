@@ -14,8 +14,9 @@ namespace color3d {
 // Error{kInvalidArgument} when there is none.
 std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options);
 
-// Throws Error{kInvalidArgument}, with the stride that would do, for more than kMaxFilmFrames.
-void CheckFrameCount(size_t frames, const FilmOptions& options);
+// Throws Error{kInvalidArgument}, with the stride and the length that would do, for more than
+// kMaxFilmFrames. `seconds`: from the first to the last of them.
+void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options);
 
 // Luminance (Lab L) as an 8-bit grey picture.
 std::string EncodeGrayFrame(Image luminance);

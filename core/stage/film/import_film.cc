@@ -14,6 +14,7 @@
 #include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/film/shots.h"
+#include "core/film/steady_tones.h"
 #include "core/image/codec.h"
 #include "core/scene/import.h"
 #include "core/stage/film/film_frames.h"
@@ -31,7 +32,6 @@ constexpr double kFocalOfLongerSide = 1.2;
 // Pictures of all frames that are wanted, one after the other: sRGB or grey.
 struct FrameStream {
   int count = 0;
-  double frames_per_second = kFramesPerSecond;
   std::function<double(int)> time_s;
   std::function<Image(int)> read;  // throws Error{kDataLoss} for a damaged frame
   std::function<std::string(int)> name;
@@ -46,7 +46,7 @@ Camera UnknownCamera(int width, int height) {
 // Indices of the frames that are asked for.
 std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
   std::vector<int> wanted = FramesAskedFor(times, options);
-  CheckFrameCount(wanted.size(), options);
+  CheckFrameCount(wanted.size(), times[wanted.back()] - times[wanted.front()], options);
   if (wanted.size() == 1) {
     throw InvalidArgument("one frame is no film; colour it as a photo, by `color3d key color`");
   }
@@ -70,18 +70,45 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
   if (cuts.empty()) return;
   context.progress().OnWarning(fmt::format(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
-      "by likeness. Colour a frame of each (further key views)",
+      "by likeness. Colour a frame of each (further key views; the selection of several names one "
+      "a "
+      "shot)",
       NamesOfFrames(cuts),
       cuts.size() + 1));
 }
 
-void ImportFrames(const FrameStream& stream,
-                  const FilmOptions& options,
-                  const ImportOptions& import,
-                  StageContext& context) {
+// The frames that can be decoded, and small pictures of them.
+struct ReadFrames {
   Scene scene;
-  std::vector<Image> thumbnails;
-  std::vector<std::string> damaged, warnings;
+  std::vector<int> index;         // of each view, in the stream
+  std::vector<Image> thumbnails;  // for the shots
+  std::vector<Image> tones;       // for exposure; empty where it stays
+};
+
+View ViewOf(const FrameStream& stream, int i, const Image& luminance, bool is_drawn) {
+  View view;
+  view.name = stream.name(i);
+  view.image_file = std::string(kFramesFolder) + view.name;
+  if (is_drawn) {
+    view.image_file =
+        artifact::kGivenViews + fs::path(view.name).replace_extension(".png").string();
+  }
+  view.camera = view.captured_camera = UnknownCamera(luminance.width, luminance.height);
+  view.moment = Moment{stream.time_s(i), 0};
+  return view;
+}
+
+// Kept aside until it is known which frames stay.
+void KeepAside(const View& view, Image luminance, const StageContext& context) {
+  const fs::path file = context.scratch_folder() / view.image_file;
+  fs::create_directories(file.parent_path());
+  WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
+}
+
+ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& context) {
+  ReadFrames frames;
+  std::vector<View>& views = frames.scene.views;
+  std::vector<std::string> damaged;
   for (int i = 0; i < stream.count; ++i) {
     context.cancel().ThrowIfCancelled();
     context.progress().OnProgress(i, stream.count, "reading frames");
@@ -93,54 +120,78 @@ void ImportFrames(const FrameStream& stream,
       damaged.push_back(stream.name(i));
       continue;
     }
-    View view;
-    view.name = stream.name(i);
-    view.image_file =
-        (stream.is_video ? std::string(artifact::kGivenViews) : std::string(kFramesFolder)) +
-        view.name;
-    view.camera = view.captured_camera = UnknownCamera(luminance.width, luminance.height);
-    view.moment = Moment{stream.time_s(i), 0};
-    if (!scene.views.empty() && (view.camera.width != scene.views[0].camera.width ||
-                                 view.camera.height != scene.views[0].camera.height)) {
+    View view = ViewOf(stream, i, luminance, stream.is_video || deflicker);
+    if (!views.empty() && (view.camera.width != views[0].camera.width ||
+                           view.camera.height != views[0].camera.height)) {
       throw InvalidArgument("{} has {} x {} px, but {} has {} x {} px: frames of a film are alike",
                             view.name,
                             view.camera.width,
                             view.camera.height,
-                            scene.views[0].name,
-                            scene.views[0].camera.width,
-                            scene.views[0].camera.height);
+                            views[0].name,
+                            views[0].camera.width,
+                            views[0].camera.height);
     }
-    thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
-    if (stream.is_video) {
-      const fs::path file = context.scratch_folder() / view.image_file;
-      fs::create_directories(file.parent_path());
-      WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
-    }
-    scene.views.push_back(std::move(view));
+    frames.thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
+    if (deflicker) frames.tones.push_back(FitWithin(luminance, kTonePicturePx));
+    if (stream.is_video && !deflicker) KeepAside(view, std::move(luminance), context);
+    views.push_back(std::move(view));
+    frames.index.push_back(i);
   }
   WarnOfFrames(damaged, "cannot be decoded and are left out", context);
-  if (scene.views.size() < 2) {
-    throw InvalidArgument("{} of {} frames can be decoded; a film has two at least",
-                          scene.views.size(),
-                          stream.count);
+  if (views.size() < 2) {
+    throw InvalidArgument(
+        "{} of {} frames can be decoded; a film has two at least", views.size(), stream.count);
   }
-  TellShots(FindShots(thumbnails), &scene, context);
+  CheckStemsAreUnique(frames.scene);
+  return frames;
+}
+
+// Every frame once more, now that it is known what is steady.
+void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageContext& context) {
+  std::vector<int> shot;
+  for (const View& view : frames.scene.views) shot.push_back(view.moment->shot);
+  const SteadyTones tones = FindSteadyTones(frames.tones, shot, context.pool(), context.cancel());
+  const auto count = static_cast<int>(frames.index.size());
+  for (int i = 0; i < count; ++i) {
+    context.cancel().ThrowIfCancelled();
+    context.progress().OnProgress(i, count, "steadying exposure");
+    KeepAside(frames.scene.views[i],
+              Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
+              context);
+  }
+  context.progress().OnWarning(
+      fmt::format("exposure is steadied: from a frame to the next it changed by {:.2f} L in the "
+                  "mean, now by {:.2f}; the coloured film has the steady luminance",
+                  tones.flicker_before,
+                  tones.flicker_after));
+}
+
+void ImportFrames(const FrameStream& stream,
+                  const FilmOptions& options,
+                  const ImportOptions& import,
+                  StageContext& context) {
+  ReadFrames frames = ReadAll(stream, options.deflicker, context);
+  Scene& scene = frames.scene;
+  TellShots(FindShots(frames.thumbnails), &scene, context);
+  if (options.deflicker) WriteSteady(stream, frames, context);
+  const bool is_drawn = stream.is_video || options.deflicker;
   ImportFacts facts;
   facts.layout = "film";
   facts.photos_found = stream.count;
   facts.photos_registered = static_cast<int>(scene.views.size());
   if (options.poses == FilmPoses::kAuto) {
-    FindFilmPoses(stream.is_video ? context.scratch_folder() : context.scene_folder(),
+    FindFilmPoses(is_drawn ? context.scratch_folder() : context.scene_folder(),
                   import,
                   context,
                   &scene,
                   &facts);
   }
-  if (stream.is_video) {
+  if (is_drawn) {
     for (const View& view : scene.views) {
       context.TakeOutput(view.image_file, context.scratch_folder() / view.image_file);
     }
   }
+  std::vector<std::string> warnings;
   if (import.hold_out_every_eighth) HoldOutEveryEighth(&scene, &warnings);
   for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
@@ -151,13 +202,13 @@ void ImportVideo(const std::string& file,
                  const FilmOptions& options,
                  const ImportOptions& import,
                  StageContext& context) {
+  if (options.frames_per_second) {
+    throw InvalidArgument(
+        "film_frames_per_second is for frames that come as pictures; {} has times of its own",
+        file);
+  }
   FilmReader film(context.scene_folder() / file);
   const std::vector<int> wanted = Wanted(film.times(), options);
-  if (!film.facts().constant_rate) {
-    context.progress().OnWarning(
-        "the frames of the film do not follow each other evenly; the coloured film shows each for "
-        "the same time");
-  }
   if (film.facts().interlaced) {
     context.progress().OnWarning("the film is interlaced: one field of each frame is taken");
   }
@@ -180,8 +231,8 @@ void ImportPictures(const FilmOptions& options,
   }
   std::sort(files.begin(), files.end());
   std::vector<double> times;
-  for (size_t i = 0; i < files.size(); ++i)
-    times.push_back(static_cast<double>(i) / kFramesPerSecond);
+  const double rate = options.frames_per_second.value_or(kFramesPerSecond);
+  for (size_t i = 0; i < files.size(); ++i) times.push_back(static_cast<double>(i) / rate);
   const std::vector<int> wanted = Wanted(times, options);
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());
@@ -198,6 +249,7 @@ void FilmOptions::Validate() const {
   check("stride", stride, 1, 1000);
   check("begin_s", begin_s, 0, 1e6);
   if (end_s) check("end_s", *end_s, 0.01, 1e6);
+  if (frames_per_second) check("frames_per_second", *frames_per_second, 1, 120);
   if (end_s && *end_s <= begin_s) {
     throw InvalidArgument("the film's part ends ({} s) before it begins ({} s)", *end_s, begin_s);
   }

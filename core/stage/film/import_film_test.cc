@@ -1,5 +1,6 @@
 #include "core/stage/film/import_film.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -114,6 +115,104 @@ TEST_F(ImportFilmTest, PicturesInFramesAreAFilm) {
   EXPECT_THAT(observer_.text, HasSubstr("1 frame of one grey all over: n4.png"));
   WriteFrame("n7.png", Image(kWidth, kHeight + 8, 3, 0.5f));
   EXPECT_THAT(Complaint(), HasSubstr("n7.png"));
+}
+
+TEST_F(ImportFilmTest, PicturesHaveTheRateThatIsGiven) {
+  for (int i = 0; i < 5; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
+  EXPECT_NEAR(Import({.frames_per_second = 16}).views[4].moment->time_s, 0.25, 1e-12);
+  EXPECT_NEAR(Import({.frames_per_second = 18}).views[3].moment->time_s, 3 / 18.0, 1e-12);
+  EXPECT_THAT(Complaint({.frames_per_second = 0.0}), HasSubstr("frames_per_second"));
+  fs::remove_all(scratch_.path() / "frames");
+  WriteVideo(4, 4);
+  EXPECT_THAT(Complaint({.frames_per_second = 16}), HasSubstr("film.mp4 has times of its own"));
+}
+
+TEST_F(ImportFilmTest, FramesOfOneStemAreRefused) {
+  WriteFrame("a.png", FrameOf(1, 0));
+  WriteFrame("b.png", FrameOf(1, 1));
+  WriteFileAtomic(scratch_.path() / "frames/a.jpg", EncodeJpeg(FrameOf(1, 2), 90));
+  EXPECT_THAT(Complaint(), HasSubstr("a.jpg"));
+}
+
+TEST_F(ImportFilmTest, OneFrameIsNoFilm) {
+  WriteVideo(1, 1);
+  EXPECT_THAT(Complaint(), HasSubstr("one frame is no film"));
+}
+
+TEST_F(ImportFilmTest, FourHoursAreRefusedWithNumbers) {
+  ThreadPool pool(1);
+  Mp4Writer writer(scratch_.path() / "film.mp4",
+                   {.width = 32, .height = 16, .frames_per_second = 1, .ticks_per_second = 1000});
+  constexpr int kFrames = 4 * 3600 / 4;  // one in four seconds
+  const Image gray(32, 16, 3, 0.5f);
+  for (int i = 0; i < kFrames; ++i) writer.AddAt(4.0 * i, 4.0, gray, pool);
+  writer.Finish();
+  const std::string complaint = Complaint();
+  EXPECT_THAT(complaint, HasSubstr("3600 frames (14396 s)"));
+  EXPECT_THAT(complaint, HasSubstr("take every 2th"));
+  EXPECT_THAT(complaint, HasSubstr("part of 11996 s"));
+  EXPECT_EQ(Import({.begin_s = 100.0, .end_s = 140.0}).views.size(), 10u);
+}
+
+TEST_F(ImportFilmTest, DuplicateFramesAreNoCutAndNoFault) {
+  ThreadPool pool(1);
+  Mp4Writer writer(scratch_.path() / "film.mp4",
+                   {.width = kWidth, .height = kHeight, .frames_per_second = 24, .threads = 1});
+  for (int i = 0; i < 30; ++i) writer.Add(FrameOf(1, i / 3 * 5), pool);
+  writer.Finish();
+  for (const View& view : Import().views) EXPECT_EQ(view.moment->shot, 0) << view.name;
+  EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(ImportFilmTest, ADamagedPartIsLeftOutAndNamed) {
+  WriteVideo(90, 90);  // key frames every 2 s: 0, 20, 40, ...
+  std::string bytes = ReadFile(scratch_.path() / "film.mp4");
+  const size_t data = bytes.find("mdat");
+  const size_t middle = data + (bytes.size() - data) / 2;
+  for (size_t i = middle; i < middle + 600; ++i) bytes[i] = static_cast<char>(0x5a ^ (i * 37));
+  WriteFileAtomic(scratch_.path() / "film.mp4", bytes);
+  const Scene scene = Import();
+  EXPECT_LT(scene.views.size(), 90u);
+  EXPECT_GT(scene.views.size(), 50u);
+  EXPECT_THAT(observer_.text, HasSubstr("cannot be decoded and are left out: f0000"));
+  EXPECT_NEAR(scene.views.back().moment->time_s, 8.9, 1e-6) << "what follows keeps its time";
+}
+
+TEST_F(ImportFilmTest, ExposureIsSteadied) {
+  // Of pictures and of a video alike.
+  const auto exposed = [](int i) {
+    Image image = FrameOf(1, i);
+    for (float& v : image.data) v *= i % 2 == 0 ? 0.8f : 1.0f;
+    return image;
+  };
+  const auto flicker = [&](const Scene& scene) {
+    double sum = 0.0, last = 0.0;
+    for (const View& view : scene.views) {
+      EXPECT_EQ(view.image_file.substr(0, 12), "given_views/");
+      const Image image = ReadImage(scratch_.path() / "out" / view.image_file);
+      double mean = 0.0;
+      for (size_t i = 0; i < image.PlaneSize(); ++i) mean += image.data[i];
+      mean /= static_cast<double>(image.PlaneSize());
+      if (&view != &scene.views[0]) sum += std::abs(mean - last);
+      last = mean;
+    }
+    return sum / static_cast<double>(scene.views.size() - 1);
+  };
+  for (int i = 0; i < 16; ++i) {
+    fs::create_directories(scratch_.path() / "frames");
+    WriteFileAtomic(scratch_.path() / fmt::format("frames/n{:02}.jpg", i),
+                    EncodeJpeg(exposed(i), 95));
+  }
+  EXPECT_LT(flicker(Import({.deflicker = true})), 0.02);
+  EXPECT_THAT(observer_.text, HasSubstr("exposure is steadied"));
+  fs::remove_all(scratch_.path() / "frames");
+  ThreadPool pool(1);
+  Mp4Writer writer(scratch_.path() / "film.mp4",
+                   {.width = kWidth, .height = kHeight, .frames_per_second = 10, .threads = 1});
+  for (int i = 0; i < 16; ++i) writer.Add(exposed(i), pool);
+  writer.Finish();
+  EXPECT_LT(flicker(Import({.deflicker = true})), 0.02);
+  EXPECT_GT(flicker(Import()), 0.08);
 }
 
 TEST_F(ImportFilmTest, PhotosBesideAVideoAreNoFilm) {

@@ -31,6 +31,7 @@ std::vector<Footage> AllFootage(const FilmOptions& options, StageContext& contex
   };
   std::vector<Footage> all;
   size_t frames = 0;
+  double seconds = 0.0;
   for (PosedFilm& film : ReadPosedFilms(context.scene_folder(), size_of)) {
     context.cancel().ThrowIfCancelled();
     const FilmReader reader(context.scene_folder() / film.file);
@@ -40,9 +41,11 @@ std::vector<Footage> AllFootage(const FilmOptions& options, StageContext& contex
     } catch (const Error& e) {
       throw Error(e.code(), "{}: {}", all.back().film.file, e.what());
     }
-    frames += all.back().frames.size();
+    const std::vector<int>& asked = all.back().frames;
+    frames += asked.size();
+    seconds = std::max(seconds, reader.times()[asked.back()] - reader.times()[asked.front()]);
   }
-  CheckFrameCount(frames, options);
+  CheckFrameCount(frames, seconds, options);
   return all;
 }
 

@@ -56,6 +56,8 @@ std::string DescribeKeyView(const KeyViewRanking& ranking) {
   std::string text;
   if (kept < 2) {
     text = "The only view that can be coloured.";
+  } else if (!ranking.among.empty()) {
+    text = fmt::format("Best of {} by {}.", ranking.among, StrategyInWords(ranking.strategy));
   } else {
     const double margin = ranking.selection.decisiveness;
     text = fmt::format("Best of {} by {}, {} {}.",

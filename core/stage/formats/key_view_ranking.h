@@ -15,6 +15,7 @@ struct KeyViewRanking {
   std::vector<ViewFeatures> features;  // by index; empty when the user chose
   std::string strategy;                // that was used: "coverage", "entropy", "tracks", "manual"
   std::string fallback;                // why another one than was asked for; empty: as asked for
+  std::string among;                   // what it is the best of; empty: of all
   std::string encoder;                 // description; empty when no features were used
   // Where several were chosen together: all of them, best first, and the error that is expected
   // with the first, the first two, ... Else empty.

@@ -5,6 +5,7 @@
 
 #include "core/keyview/collect_features.h"
 #include "core/keyview/expected_error.h"
+#include "core/stage/film/film_keys.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/seen_samples.h"
 
@@ -13,9 +14,16 @@ namespace color3d {
 std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
                                                   const std::vector<std::string>& key_views,
                                                   StageContext& context) {
+  if (scene.IsFilm()) {
+    std::vector<int> of_film;
+    for (const std::string& name : key_views) of_film.push_back(scene.FindView(name));
+    const auto next = AdviseNextFilmKey(scene, of_film);
+    if (!next) return std::nullopt;
+    return NextKeyViewFacts{scene.views[next->view].name, next->error_now, next->error_with};
+  }
   constexpr size_t kMaxViews = 500;  // a minute of rendering; who has more knows what to add
   const std::vector<int> training = scene.TrainingViews();
-  if (scene.IsFilm() || !context.HasInput(artifact::kModel) || training.size() > kMaxViews) {
+  if (!context.HasInput(artifact::kModel) || training.size() > kMaxViews) {
     return std::nullopt;
   }
   std::vector<int> keys;

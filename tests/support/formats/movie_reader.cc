@@ -70,8 +70,8 @@ ReadMovie DecodeMovie(const std::filesystem::path& file) {
   AVFormatContext* container = nullptr;
   Require(avformat_open_input(&container, file.c_str(), nullptr, nullptr) == 0, "no container");
   Require(avformat_find_stream_info(container, nullptr) >= 0, "no streams");
-  Require(container->nb_streams == 1, "more than one stream");
   AVStream* stream = container->streams[0];
+  Require(stream->codecpar->codec_type == AVMEDIA_TYPE_VIDEO, "its first stream is no picture");
   const AVCodec* decoder = avcodec_find_decoder(stream->codecpar->codec_id);
   Require(decoder != nullptr, "no decoder");
   AVCodecContext* codec = avcodec_alloc_context3(decoder);
@@ -88,8 +88,10 @@ ReadMovie DecodeMovie(const std::filesystem::path& file) {
   AVFrame* frame = av_frame_alloc();
   const double tick = av_q2d(stream->time_base);
   while (av_read_frame(container, packet) >= 0) {
-    Require(avcodec_send_packet(codec, packet) == 0, "a packet is refused");
+    const bool is_picture = packet->stream_index == stream->index;
+    if (is_picture) Require(avcodec_send_packet(codec, packet) == 0, "a packet is refused");
     av_packet_unref(packet);
+    if (!is_picture) continue;
     Receive(codec, frame, tick, &movie);
   }
   avcodec_send_packet(codec, nullptr);

@@ -1,0 +1,138 @@
+#include "core/stage/film/colored_frames.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/stage/formats/artifacts.h"
+#include "core/video/film_reader.h"
+#include "core/video/mp4_writer.h"
+#include "tests/support/formats/sound_film.h"
+#include "tests/support/stages/stage_fixture.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr int kWidth = 64, kHeight = 48;
+
+Image FrameOf(int frame) {
+  Image image(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double u = x + 0.4 * frame;
+      const double v = 0.5 + 0.2 * std::sin(0.3 * u + 0.1 * y) + 0.15 * std::sin(0.23 * y);
+      for (int c = 0; c < 3; ++c) image.At(c, y, x) = static_cast<float>(v);
+    }
+  }
+  return image;
+}
+
+// Silence until a time, then a tone.
+double ToneFrom2s(double time_s) { return time_s < 2.0 ? 0.0 : 0.6 * std::sin(3000.0 * time_s); }
+
+double OnsetOf(const HeardSound& sound) {
+  for (size_t i = 0; i < sound.samples.size(); ++i) {
+    if (std::abs(sound.samples[i]) > 0.15f) return static_cast<double>(i) / sound.sample_rate;
+  }
+  return -1.0;
+}
+
+class ColoredFramesTest : public StageTest {
+ protected:
+  void WriteFilm(const std::vector<double>& times, const std::string& encoder) {
+    ScratchFolder elsewhere;
+    ThreadPool pool(1);
+    Mp4Writer writer(
+        elsewhere.path() / "silent.mp4",
+        {.width = kWidth, .height = kHeight, .frames_per_second = 10, .ticks_per_second = 24000});
+    for (size_t i = 0; i < times.size(); ++i) {
+      writer.AddAt(times[i], 0.1, FrameOf(static_cast<int>(i)), pool);
+    }
+    writer.Finish();
+    const GivenSound sound{.encoder = encoder, .seconds = times.back() + 0.1, .level = ToneFrom2s};
+    AddSound(elsewhere.path() / "silent.mp4", sound, scratch_.path() / "film.mov");
+  }
+  // Import, colours of one kind, movie.
+  fs::path Colored(const FilmOptions& options = {}) {
+    inputs_.clear();
+    fs::remove_all(scratch_.path() / "out");
+    fs::remove_all(scratch_.path() / "given_views");
+    {
+      StageContext context = MakeContext();
+      RunImportScene({}, context, {}, options);
+    }
+    fs::rename(scratch_.path() / "out/given_views", scratch_.path() / "given_views");
+    scene_ = SceneFromJson(ReadFile(scratch_.path() / "out/scene.json"));
+    AddInput(artifact::kScene, SceneToJson(scene_));
+    for (const View& view : scene_.views) {
+      AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"),
+               EncodeAbPng(Image(kWidth, kHeight, 2, 20.0f)));
+    }
+    StageContext context = MakeContext();
+    RunRender({.max_views = 2}, context);
+    return scratch_.path() / "out/scene.mp4";
+  }
+  Scene scene_;
+};
+
+std::vector<double> UnevenTimes() {
+  std::vector<double> times = {0.0};
+  for (int i = 1; i < 40; ++i) times.push_back(times.back() + (i % 7 < 3 ? 1 / 24.0 : 1 / 8.0));
+  return times;
+}
+
+TEST_F(ColoredFramesTest, TimesAndSoundAreTheFilmsOwn) {
+  const std::vector<double> times = UnevenTimes();
+  ASSERT_GT(times.back(), 3.0);
+  WriteFilm(times, "aac");
+  const fs::path movie = Colored();
+  FilmReader film(movie);
+  ASSERT_EQ(film.times().size(), times.size());
+  for (size_t i = 0; i < times.size(); ++i) EXPECT_NEAR(film.times()[i], times[i], 1e-6) << i;
+  const HeardSound sound = HearFilm(movie);
+  EXPECT_EQ(sound.codec, "aac");
+  EXPECT_NEAR(OnsetOf(sound), 2.0, 0.01);
+  EXPECT_NEAR(
+      static_cast<double>(sound.samples.size()) / sound.sample_rate, times.back() + 0.1, 0.08);
+  const Image frame = film.Read(20);
+  EXPECT_GT(frame.At(0, 24, 32), frame.At(1, 24, 32) + 0.05f) << "in colour";
+  EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(ColoredFramesTest, APartOfEverySecondFrameStaysInStep) {
+  const std::vector<double> times = UnevenTimes();
+  WriteFilm(times, "pcm_s16le");
+  const fs::path movie = Colored({.stride = 2, .begin_s = 1.0, .end_s = 3.0});
+  FilmReader film(movie);
+  ASSERT_EQ(film.times().size(), scene_.views.size());
+  const double begin = scene_.views[0].moment->time_s;
+  EXPECT_GE(begin, 1.0);
+  for (size_t i = 0; i < film.times().size(); ++i) {
+    const int frame = std::stoi(scene_.views[i].name.substr(1));
+    EXPECT_NEAR(film.times()[i] + begin, times[frame], 1e-6) << i;
+  }
+  const HeardSound sound = HearFilm(movie);
+  EXPECT_EQ(sound.codec, "aac");
+  EXPECT_NEAR(OnsetOf(sound), 2.0 - begin, 0.01);
+}
+
+TEST_F(ColoredFramesTest, SoundThatIsLeftOutIsNamed) {
+  ScratchFolder elsewhere;
+  WriteFilm(UnevenTimes(), "aac");
+  ThreadPool pool(1);
+  Mp4Writer writer(elsewhere.path() / "silent.mp4",
+                   {.width = kWidth, .height = kHeight, .frames_per_second = 10});
+  for (int i = 0; i < 10; ++i) writer.Add(FrameOf(i), pool);
+  writer.Finish();
+  const GivenSound odd{.encoder = "pcm_s16le", .sample_rate = 37000, .level = ToneFrom2s};
+  AddSound(elsewhere.path() / "silent.mp4", odd, scratch_.path() / "film.mov");
+  EXPECT_EQ(HearFilm(Colored()).codec, "");
+  EXPECT_THAT(observer_.text, HasSubstr("sound (pcm_s16le) is left out"));
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,197 @@
+#include "core/stage/film/film_keys.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+// All views of a shot, ascending.
+struct Shot {
+  int number = 0;
+  std::vector<int> views;
+};
+
+// The longest first; those of one frame (torn, blank) are left out where there are others.
+std::vector<Shot> ShotsOf(const Scene& scene) {
+  std::map<int, Shot> by_number;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    Shot& shot = by_number[scene.views[i].moment->shot];
+    shot.number = scene.views[i].moment->shot;
+    shot.views.push_back(static_cast<int>(i));
+  }
+  std::vector<Shot> shots, single;
+  for (auto& [number, shot] : by_number) {
+    (shot.views.size() > 1 ? shots : single).push_back(std::move(shot));
+  }
+  if (shots.empty()) shots = std::move(single);
+  std::stable_sort(shots.begin(), shots.end(), [](const Shot& x, const Shot& y) {
+    return x.views.size() > y.views.size();
+  });
+  return shots;
+}
+
+std::vector<int> TrainingViewsOf(const Shot& shot, const Scene& scene) {
+  std::vector<int> views;
+  for (const int view : shot.views) {
+    if (!scene.views[view].held_out) views.push_back(view);
+  }
+  return views;
+}
+
+// Where the next key frame goes: the longest shot without one, else the one with the most frames
+// for each. `keys`: those of each shot, `possible` at most. -1: every shot is full.
+int NextShot(const std::vector<Shot>& shots,
+             const std::vector<int>& keys,
+             const std::vector<int>& possible) {
+  int next = -1;
+  const auto frames_for_each = [&](int i) {
+    return static_cast<double>(shots[i].views.size()) / (keys[i] + 1);
+  };
+  for (int i = 0; i < static_cast<int>(shots.size()); ++i) {
+    if (keys[i] >= possible[i]) continue;
+    if (next < 0 || (keys[i] == 0) > (keys[next] == 0) ||
+        ((keys[i] == 0) == (keys[next] == 0) && frames_for_each(i) > frames_for_each(next))) {
+      next = i;
+    }
+  }
+  return next;
+}
+
+}  // namespace
+
+std::vector<int> CandidatesOfFilm(const Scene& scene, const std::string& named) {
+  constexpr size_t kMaxCandidates = 60;
+  const std::vector<Shot> shots = ShotsOf(scene);
+  std::vector<int> from;
+  for (const Shot& shot : shots) {
+    const std::vector<int> training = TrainingViewsOf(shot, scene);
+    from.insert(from.end(), training.begin(), training.end());
+  }
+  if (from.empty()) from = scene.TrainingViews();
+  std::sort(from.begin(), from.end());
+  const size_t wanted = std::min(kMaxCandidates, from.size());
+  std::set<int> candidates;
+  std::set<int> shots_with;
+  for (size_t i = 0; i < wanted; ++i) {
+    const int view = from[(2 * i + 1) * from.size() / (2 * wanted)];
+    candidates.insert(view);
+    shots_with.insert(scene.views[view].moment->shot);
+  }
+  for (size_t i = 0; i < std::min(kMaxCandidates, shots.size()); ++i) {
+    const std::vector<int> training = TrainingViewsOf(shots[i], scene);
+    if (training.empty() || shots_with.contains(shots[i].number)) continue;
+    candidates.insert(training[training.size() / 2]);
+  }
+  if (!named.empty()) {
+    const int view = scene.FindView(named);
+    if (!scene.views[view].held_out) candidates.insert(view);
+  }
+  return {candidates.begin(), candidates.end()};
+}
+
+bool TakeFromLongestShot(const Scene& scene,
+                         const std::vector<int>& candidates,
+                         KeyViewSelection* selection) {
+  for (const Shot& shot : ShotsOf(scene)) {
+    for (const RankedView& ranked : selection->ranking) {
+      if (!ranked.set_aside.empty()) continue;
+      if (scene.views[candidates[ranked.index]].moment->shot != shot.number) continue;
+      const bool is_other = selection->index != ranked.index;
+      selection->index = ranked.index;
+      return is_other;
+    }
+  }
+  return false;
+}
+
+ChosenKeyViews ChooseFilmKeys(const Scene& scene,
+                              const std::vector<int>& candidates,
+                              const std::vector<ViewFeatures>& features,
+                              const std::vector<bool>& kept,
+                              int count,
+                              int first,
+                              StageContext& context) {
+  const SeenSamples none(static_cast<int>(candidates.size()), 0);
+  const std::vector<Shot> shots = ShotsOf(scene);
+  const auto shot_of = [&](int candidate) {
+    return scene.views[candidates[candidate]].moment->shot;
+  };
+  std::vector<std::vector<bool>> may(shots.size());
+  std::vector<int> possible, keys(shots.size(), 0), firsts(shots.size(), -1), order;
+  for (size_t i = 0; i < shots.size(); ++i) {
+    for (size_t c = 0; c < candidates.size(); ++c) {
+      may[i].push_back(kept[c] && shot_of(static_cast<int>(c)) == shots[i].number);
+    }
+    possible.push_back(static_cast<int>(std::count(may[i].begin(), may[i].end(), true)));
+    if (first < 0 || shot_of(first) != shots[i].number) continue;
+    if (!may[i][first]) ++possible[i];
+    firsts[i] = first;
+    keys[i] = 1;
+    order.push_back(static_cast<int>(i));
+  }
+  while (static_cast<int>(order.size()) < count) {
+    const int next = NextShot(shots, keys, possible);
+    if (next < 0) {
+      throw InvalidArgument(
+          "{} key views are asked for, but only {} frames can be one (of those that are compared, "
+          "and show something); ask for fewer",
+          count,
+          order.size());
+    }
+    ++keys[next];
+    order.push_back(next);
+  }
+  std::vector<std::vector<int>> chosen(shots.size());
+  for (size_t i = 0; i < shots.size(); ++i) {
+    if (keys[i] == 0) continue;
+    // Only its own frames ask for it.
+    std::vector<bool> asked = may[i];
+    if (firsts[i] >= 0) asked[firsts[i]] = true;
+    chosen[i] = ChooseKeyViews(none,
+                               FindNearestDistances(features, asked, context.control()),
+                               may[i],
+                               keys[i],
+                               firsts[i])
+                    .views;
+  }
+  ChosenKeyViews result;
+  std::vector<size_t> taken(shots.size(), 0);
+  std::vector<bool> all = kept;
+  if (first >= 0) all[first] = true;
+  const NearestDistances distances = FindNearestDistances(features, all, context.control());
+  for (const int shot : order) {
+    result.views.push_back(chosen[shot][taken[shot]++]);
+    result.error.push_back(ExpectedError(none, distances, result.views));
+  }
+  return result;
+}
+
+std::optional<NextFilmKey> AdviseNextFilmKey(const Scene& scene, const std::vector<int>& keys) {
+  std::set<int> with_key;
+  for (const int key : keys) with_key.insert(scene.views[key].moment->shot);
+  double frames = 0.0, without = 0.0, gained = 0.0;
+  NextFilmKey next;
+  for (const Shot& shot : ShotsOf(scene)) {
+    const auto length = static_cast<double>(shot.views.size());
+    frames += length;
+    if (with_key.contains(shot.number)) continue;
+    without += length;
+    const std::vector<int> training = TrainingViewsOf(shot, scene);
+    if (gained > 0.0 || training.empty() || length < 2.0) continue;
+    gained = length;
+    next.view = training[training.size() / 2];
+  }
+  if (gained == 0.0) return std::nullopt;
+  const auto error = [&](double inferred) {
+    return kErrorSeen + (kErrorInferred - kErrorSeen) * inferred / frames;
+  };
+  next.error_now = error(without);
+  next.error_with = error(without - gained);
+  return next;
+}
+
+}  // namespace color3d

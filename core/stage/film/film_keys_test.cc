@@ -1,0 +1,131 @@
+#include "core/stage/film/film_keys.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/stages.h"
+#include "tests/support/stages/stage_fixture.h"
+
+namespace color3d {
+namespace {
+
+using testing::ElementsAre;
+
+// Shots of these lengths, one after the other; without pictures.
+Scene FilmOf(const std::vector<int>& lengths) {
+  Scene scene;
+  for (size_t shot = 0; shot < lengths.size(); ++shot) {
+    for (int i = 0; i < lengths[shot]; ++i) {
+      View view;
+      view.name = fmt::format("f{:04}.png", scene.views.size());
+      view.image_file = view.name;
+      view.camera = view.captured_camera = {64, 48, 70.0, 70.0, 32.0, 24.0};
+      view.moment = Moment{0.04 * static_cast<double>(scene.views.size()), static_cast<int>(shot)};
+      scene.views.push_back(view);
+    }
+  }
+  return scene;
+}
+
+TEST(FilmKeys, EveryShotHasACandidateAndFaultsHaveNone) {
+  const Scene scene = FilmOf({200, 1, 3, 90, 2});
+  const std::vector<int> candidates = CandidatesOfFilm(scene, "");
+  EXPECT_LE(candidates.size(), 64u);
+  std::vector<int> of_shot(5, 0);
+  for (const int view : candidates) ++of_shot[scene.views[view].moment->shot];
+  EXPECT_GT(of_shot[0], 30);
+  EXPECT_EQ(of_shot[1], 0);
+  EXPECT_GE(of_shot[2], 1);
+  EXPECT_GE(of_shot[4], 1);
+  EXPECT_THAT(CandidatesOfFilm(scene, "f0200"), testing::Contains(200));
+  // Nothing but faults.
+  EXPECT_EQ(CandidatesOfFilm(FilmOf({1, 1, 1}), "").size(), 3u);
+}
+
+TEST(FilmKeys, TheLongestShotWithoutAKeyFrameIsNext) {
+  const Scene scene = FilmOf({20, 40, 1, 30});
+  const auto next = AdviseNextFilmKey(scene, {45});
+  ASSERT_TRUE(next);
+  EXPECT_EQ(scene.views[next->view].moment->shot, 3);
+  EXPECT_EQ(next->view, 61 + 15);
+  EXPECT_GT(next->error_now, next->error_with);
+  EXPECT_EQ(scene.views[AdviseNextFilmKey(scene, {45, 70})->view].moment->shot, 0);
+  EXPECT_FALSE(AdviseNextFilmKey(scene, {45, 70, 3}));
+}
+
+// Pictures of three places, as a film.
+class FilmKeysStageTest : public StageTest {
+ protected:
+  void WriteFilm(const std::vector<int>& lengths) {
+    scene_ = FilmOf(lengths);
+    for (size_t i = 0; i < scene_.views.size(); ++i) {
+      const int place = scene_.views[i].moment->shot;
+      Image image(64, 48, 1);
+      for (int y = 0; y < 48; ++y) {
+        for (int x = 0; x < 64; ++x) {
+          double v = 0.5;
+          for (int k = 1; k <= 4; ++k) {
+            const double a = 1.7 * (place + 1) + 2.3 * k;
+            v += 0.1 *
+                 std::sin(0.2 * k *
+                              ((x + 0.5 * static_cast<double>(i)) * std::cos(a) + y * std::sin(a)) +
+                          3.1 * a);
+          }
+          image.At(0, y, x) = static_cast<float>(v);
+        }
+      }
+      WriteFileAtomic(scratch_.path() / scene_.views[i].image_file, EncodePng8(image));
+    }
+    AddInput(artifact::kScene, SceneToJson(scene_));
+  }
+  // Shots of the key views, in their order.
+  std::vector<int> Select(int count, const std::string& named = "") {
+    SelectKeyViewOptions options;
+    options.selection.count = count;
+    if (!named.empty()) {
+      options.selection.strategy = KeyViewStrategy::kManual;
+      options.view = named;
+    }
+    StageContext context = MakeContext();
+    RunSelectKeyView(options, context);
+    const auto json = nlohmann::json::parse(ReadFile(scratch_.path() / "out/key_view.json"));
+    std::vector<std::string> names = {json.at("view")};
+    if (json.contains("key_views")) {
+      names.clear();
+      for (const auto& key : json.at("key_views")) names.push_back(key.at("view"));
+      EXPECT_EQ(names[0], json.at("view"));
+    }
+    std::vector<int> shots;
+    std::set<std::string> different(names.begin(), names.end());
+    EXPECT_EQ(different.size(), names.size());
+    for (const std::string& name : names) {
+      shots.push_back(scene_.views[scene_.FindView(name)].moment->shot);
+    }
+    return shots;
+  }
+  Scene scene_;
+};
+
+TEST_F(FilmKeysStageTest, ShotsGetKeyFramesTheLongestFirst) {
+  WriteFilm({6, 14, 9});
+  EXPECT_THAT(Select(1), ElementsAre(1));
+  EXPECT_THAT(Select(2), ElementsAre(1, 2));
+  EXPECT_THAT(Select(3), ElementsAre(1, 2, 0));
+  EXPECT_THAT(Select(4), ElementsAre(1, 2, 0, 1));
+  EXPECT_THAT(Select(3, "f0002"), ElementsAre(0, 1, 2));
+}
+
+TEST_F(FilmKeysStageTest, MoreKeyFramesThanFramesAreRefused) {
+  WriteFilm({2, 2});
+  EXPECT_THROW(Select(5), Error);
+}
+
+}  // namespace
+}  // namespace color3d

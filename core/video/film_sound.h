@@ -1,0 +1,35 @@
+// The sound of a part of a film as MP4 takes it (METHOD.md "Film"): packets as they are where the
+// codec is one that MP4 holds, else coded again as AAC. For this folder only.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/video/libav.h"
+#include "core/video/mp4_writer.h"
+
+namespace color3d {
+
+// Of the first stream of sound. Not thread-safe.
+class FilmSound {
+ public:
+  // Throws nothing for a file without sound or with one that cannot be had.
+  explicit FilmSound(const SoundPart& part);
+  ~FilmSound();
+
+  // None: there is no sound.
+  const AVCodecParameters* parameters() const;
+  AVRational time_base() const;  // of Next
+  // Why there is none, or what was done to it; empty: it is whole, or there never was any.
+  const std::string& warning() const;
+
+  // The next packet; its time counts from the part's beginning and may lie up to two packets before
+  // it, for the decoder to begin with. False behind the last one.
+  bool Next(AVPacket* packet);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace color3d

@@ -1,0 +1,36 @@
+// Films with sound, made and heard by FFmpeg's libraries.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace color3d {
+
+struct GivenSound {
+  std::string encoder = "aac";  // FFmpeg's name
+  int sample_rate = 48000;
+  int channels = 2;
+  double begin_s = 0.0;  // from the film's first picture
+  double seconds = 1.0;
+  std::function<double(double)> level;  // -1..1 at a time (s, as begin_s)
+};
+
+// The pictures of `film` as they are, with sound; the container is told by the ending of `out`.
+// Throws std::runtime_error.
+void AddSound(const std::filesystem::path& film,
+              const GivenSound& sound,
+              const std::filesystem::path& out);
+
+struct HeardSound {
+  std::string codec;  // empty: there is none
+  int sample_rate = 0;
+  int channels = 0;
+  std::vector<float> samples;  // of the first channel; sample 0 is heard with the first picture
+};
+
+// As a player hears it. Throws std::runtime_error.
+HeardSound HearFilm(const std::filesystem::path& film);
+
+}  // namespace color3d
