@@ -151,6 +151,7 @@ void CollectImages(const fs::path& root, PhotoFolder* result) {
 }
 
 void CollectModel(const fs::path& root, PhotoFolder* result) {
+  std::vector<LocalFile> model;
   for (const std::string folder : kModelFolders) {
     std::vector<std::vector<LocalFile>> kinds;  // .bin, .txt
     for (const char* ending : {".bin", ".txt"}) {
@@ -164,13 +165,14 @@ void CollectModel(const fs::path& root, PhotoFolder* result) {
     // One whole model; parts of one go to the server too, which says what is missing.
     const bool whole_binary = kinds[0].size() == std::size(kModelStems);
     const bool whole_text = kinds[1].size() == std::size(kModelStems);
-    if (whole_binary || !whole_text) result->model_files = kinds[0];
+    if (whole_binary || !whole_text) model = kinds[0];
     if (!whole_binary) {
-      result->model_files.insert(result->model_files.end(), kinds[1].begin(), kinds[1].end());
+      model.insert(model.end(), kinds[1].begin(), kinds[1].end());
     }
-    if (whole_text && !whole_binary) result->model_files = kinds[1];
-    if (!result->model_files.empty()) break;
+    if (whole_text && !whole_binary) model = kinds[1];
+    if (!model.empty()) break;
   }
+  result->model_files.insert(result->model_files.end(), model.begin(), model.end());
   if (IsFile(root / kTransforms)) {
     result->model_files.push_back({kTransforms, root / kTransforms});
   }
