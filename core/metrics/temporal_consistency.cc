@@ -15,7 +15,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kStretch = 16;         // neighbouring frames that one thread compares
+constexpr int kStretch = 16;  // neighbouring frames that one thread compares
 constexpr size_t kMostStretches = 16;
 constexpr int kReach = kCdcDistances.back();
 
@@ -75,7 +75,7 @@ TemporalConsistency Result(const Sums& sums) {
 
 // What is kept of a frame while later ones are compared with it.
 struct Remembered {
-  Image ab;  // of the last frame only
+  Image ab;                               // of the last frame only
   std::deque<ColorHistogram> histograms;  // the last one in front
 };
 

@@ -31,10 +31,10 @@ FollowedPixels FollowBack(const Image& luminance, const Image& luminance_before)
 
 // A plain value; sums over pairs of neighbouring frames.
 struct ChromaAlongMotion {
-  int64_t pixels = 0;        // that were followed surely
-  int64_t all_pixels = 0;    // of the pairs
-  double difference = 0.0;   // sum of |ab - ab before|, Lab units
-  double chroma = 0.0;       // sum of |ab|
+  int64_t pixels = 0;       // that were followed surely
+  int64_t all_pixels = 0;   // of the pairs
+  double difference = 0.0;  // sum of |ab - ab before|, Lab units
+  double chroma = 0.0;      // sum of |ab|
   // `ab`: 2 channels of the size of `followed`.
   void Add(const Image& ab, const Image& ab_before, const FollowedPixels& followed);
   void Add(const ChromaAlongMotion& other);
@@ -43,11 +43,11 @@ struct ChromaAlongMotion {
 inline constexpr std::array<int, 3> kCdcDistances = {1, 2, 4};  // frames
 
 struct TemporalConsistency {
-  int pairs = 0;            // of neighbouring frames
-  double followed = 0.0;    // share of their pixels that were followed surely, 0..1
-  double tc_chroma = 0.0;   // mean |ab - ab before| of these, Lab units
-  double chroma = 0.0;      // mean |ab| of these: where it is small, so is tc_chroma
-  double cdc = 0.0;         // mean of cdc_at, of the distances that there are
+  int pairs = 0;                      // of neighbouring frames
+  double followed = 0.0;              // share of their pixels that were followed surely, 0..1
+  double tc_chroma = 0.0;             // mean |ab - ab before| of these, Lab units
+  double chroma = 0.0;                // mean |ab| of these: where it is small, so is tc_chroma
+  double cdc = 0.0;                   // mean of cdc_at, of the distances that there are
   std::array<double, 3> cdc_at = {};  // by kCdcDistances, nats
 };
 

@@ -75,7 +75,7 @@ TEST(TemporalConsistency, DivergenceIsThatOfJensenAndShannon) {
   EXPECT_NEAR(Divergence(p, q),
               0.5 * std::log(1 / 0.75) + 0.5 * (0.5 * std::log(0.5 / 0.75) + 0.5 * std::log(2.0)),
               1e-7);
-  EXPECT_EQ(Divergence(p, q), Divergence(q, p));
+  EXPECT_DOUBLE_EQ(Divergence(p, q), Divergence(q, p));
   EXPECT_NEAR(Divergence(p, HistogramOf(Image(4, 2, 3, 1.0f))), std::log(2.0), 1e-7);
   EXPECT_THROW(HistogramOf(Image(4, 2, 1)), Error);
 }
@@ -102,9 +102,8 @@ TEST(TemporalConsistency, ColorsThatGoWithThingsAreSteadyAndOthersAreNot) {
   // It flickers from frame to frame, not from one to the next but one.
   EXPECT_GT(flickers.cdc_at[0], 2.0 * flickers.cdc_at[1]);
   EXPECT_GT(flickers.cdc_at[0], 2.0 * steady.cdc_at[0]);
-  EXPECT_NEAR(flickers.cdc,
-              (flickers.cdc_at[0] + flickers.cdc_at[1] + flickers.cdc_at[2]) / 3.0,
-              1e-12);
+  EXPECT_NEAR(
+      flickers.cdc, (flickers.cdc_at[0] + flickers.cdc_at[1] + flickers.cdc_at[2]) / 3.0, 1e-12);
 }
 
 TEST(TemporalConsistency, NothingIsComparedAcrossCuts) {

@@ -1,6 +1,6 @@
-// color3d-bench film: what each step of colouring a film is worth, against its true colours, and how
-// steady it is: no colour, each frame by the automatic colourizer, flow alone, and the personalized
-// colorizer after several lengths of training.
+// color3d-bench film: what each step of colouring a film is worth, against its true colours, and
+// how steady it is: no colour, each frame by the automatic colourizer, flow alone, and the
+// personalized colorizer after several lengths of training.
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -159,8 +159,7 @@ class FilmBench {
       }
       RunEvaluate(options, context);
     });
-    const auto scores =
-        ordered_json::parse(ReadFile(pipeline_.ArtifactPath(artifact::kScores)));
+    const auto scores = ordered_json::parse(ReadFile(pipeline_.ArtifactPath(artifact::kScores)));
     const ordered_json& temporal = scores.at("temporal").at("colored_views");
     return {{"colors", "personalized"},
             {"iterations", iterations},
@@ -193,7 +192,8 @@ void RunFilm(const FilmArguments& args) {
 void AddFilmCommand(CLI::App& app) {
   auto args = std::make_shared<FilmArguments>();
   CLI::App* command = app.add_subcommand(
-      "film", "frames in colour -> error and steadiness of automatic, carried and inferred colours");
+      "film",
+      "frames in colour -> error and steadiness of automatic, carried and inferred colours");
   command->add_option("--frames", args->frames_folder, "folder of frames, in their order")
       ->required()
       ->check(CLI::ExistingDirectory);

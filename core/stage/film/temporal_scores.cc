@@ -77,9 +77,8 @@ ordered_json TemporalScores(const Scene& scene,
   }
   if (truth.size() == scene.views.size()) {
     names.emplace_back("truth");
-    source.colorings.emplace_back([&](int view) {
-      return LabFromSrgb(images.Undistort(view, ReadImage(truth.at(view))));
-    });
+    source.colorings.emplace_back(
+        [&](int view) { return LabFromSrgb(images.Undistort(view, ReadImage(truth.at(view)))); });
   }
   const std::vector<TemporalConsistency> figures =
       MeasureTemporalConsistency(source, context.pool(), context.cancel());
