@@ -177,7 +177,7 @@ CarriedColor CarriedToFrame(const FilmFrames& frames,
 
 // The key frames' colours along the film, by motion in place of geometry.
 void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageContext& context) {
-  constexpr int64_t kCacheBytes = int64_t{64} << 20;
+  constexpr int64_t kCacheBytes = int64_t{8} << 20;  // each frame is read once, in order
   const ViewImages images(scene, context.scene_folder(), options.max_side_px, kCacheBytes);
   FilmFrames frames;
   for (const View& view : scene.views) frames.shot.push_back(view.moment->shot);

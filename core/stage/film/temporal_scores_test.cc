@@ -66,7 +66,10 @@ TEST_F(TemporalScoresTest, FramesAreComparedInTheOrderOfTimeWithinTheirShots) {
   EXPECT_GT(frames.at("followed"), 0.5);
   // In time: 14, 10, 10, 14, 10; so three of four pairs differ by 4 in a and in b. 8 bits of ab.
   EXPECT_NEAR(frames.at("tc_chroma"), 0.75 * std::hypot(4.0, 4.0), 0.5);
-  EXPECT_GT(frames.at("cdc_1"), frames.at("cdc_4"));
+  const double unlike = frames.at("cdc_4");
+  EXPECT_GT(unlike, 0.01);
+  EXPECT_NEAR(frames.at("cdc_1"), 0.75 * unlike, 0.01 * unlike);
+  EXPECT_NEAR(frames.at("cdc_2"), 2.0 / 3.0 * unlike, 0.01 * unlike);
 }
 
 TEST_F(TemporalScoresTest, TheTruthOfAllFramesIsScoredBeside) {
@@ -81,9 +84,9 @@ TEST_F(TemporalScoresTest, TheTruthOfAllFramesIsScoredBeside) {
 
 TEST_F(TemporalScoresTest, PhotosHaveNoMoments) {
   for (View& view : scene_.views) view.moment.reset();
-  AddInput(artifact::kScene, SceneToJson(scene_));
-  GaussianModel model = SmallModel();
+  const GaussianModel model = SmallModel();
   AddInput(artifact::kModel, SerializeGaussians(model));
+  AddInput(artifact::kScene, SceneToJson(scene_));
   EXPECT_FALSE(Evaluated({}).contains("temporal"));
 }
 
