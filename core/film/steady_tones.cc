@@ -20,6 +20,7 @@ constexpr int kReach = 12;            // frames to either side
 constexpr int kKnots = 15;            // of a step: quantiles of what both frames show
 constexpr double kLeastShare = 0.15;  // of the pixels, that must be found again
 constexpr double kCyclePx = 1.0;
+constexpr double kSteadyL = 0.2;  // jumps that are no more than what measuring gives
 
 double ToneAt(int i) { return 100.0 * i / (kTones - 1); }
 
@@ -106,6 +107,21 @@ std::optional<ToneStep> StepBetween(const Image& one, const Image& next) {
     return std::nullopt;
   }
   return ToneStep{Quantiles(std::move(of_one)), Quantiles(std::move(of_next))};
+}
+
+// L by which steps differ from those before and after them, in the mean: exposure that jumps. What
+// goes on evenly, a fade or a bias of the measuring, counts nothing.
+double Jumps(const std::vector<std::optional<ToneStep>>& steps) {
+  double sum = 0.0;
+  int count = 0;
+  for (size_t k = 1; k + 1 < steps.size(); ++k) {
+    if (!steps[k - 1] || !steps[k] || !steps[k + 1]) continue;
+    for (int i = 0; i < kKnots; ++i, ++count) {
+      const auto change = [&](size_t s) { return steps[s]->to[i] - steps[s]->from[i]; };
+      sum += std::abs(change(k) - 0.5 * (change(k - 1) + change(k + 1)));
+    }
+  }
+  return count > 0 ? sum / count : 0.0;
 }
 
 // The value at 0 of the line through the points (offset, value), those far from it counting little.
@@ -203,10 +219,12 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
       cancel.ThrowIfCancelled();
       steps[k] = StepBetween(BoxMean(pictures[frames[k]], 1), BoxMean(pictures[frames[k + 1]], 1));
     });
-    pool.ForEach(count, [&](int64_t k, int) {
-      cancel.ThrowIfCancelled();
-      result.curves[frames[k]] = CurveOf(steps, static_cast<int>(k));
-    });
+    if (Jumps(steps) >= kSteadyL) {
+      pool.ForEach(count, [&](int64_t k, int) {
+        cancel.ThrowIfCancelled();
+        result.curves[frames[k]] = CurveOf(steps, static_cast<int>(k));
+      });
+    }
     for (int64_t k = 0; k + 1 < count; ++k) {
       if (!steps[k]) continue;
       for (int i = 0; i < kKnots; ++i) {
