@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/error.h"
@@ -205,6 +206,12 @@ TEST_F(FilmSoundTest, RealClipsAreHeardAsTheyWere) {
                 static_cast<double>(part.samples.size()) / part.sample_rate);
     EXPECT_EQ(part.codec, whole.codec);
     ASSERT_EQ(part.sample_rate, whole.sample_rate);
+    const auto is_zero = [](float sample) { return sample == 0.0f; };
+    if (std::all_of(whole.samples.begin(), whole.samples.end(), is_zero)) {
+      // A track of silence stays one.
+      EXPECT_TRUE(std::all_of(part.samples.begin(), part.samples.end(), is_zero));
+      continue;
+    }
     // Sample by sample, at its place.
     const auto shift = static_cast<int>(std::lround((facts.first_s + begin_s) * whole.sample_rate));
     double best = -1.0;
