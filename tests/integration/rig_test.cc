@@ -82,13 +82,13 @@ TEST_F(RigTest, WhatDoesNotFitIsNamed) {
   WriteFilms();
   fs::remove(Path("rig/cam01.mp4"));
   const ProcessResult missing = Colorize("rig", {"--auto"});
-  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_EQ(missing.exit_code, 2);
   EXPECT_THAT(missing.err, HasSubstr("transforms.json: frame 1: there is no film cam01.mp4"));
   json pictures = json::parse(ReadFile(Path("pictures") / "transforms.json"));
   pictures["frames"][4].erase("time");
   WriteFileAtomic(Path("pictures") / "transforms.json", pictures.dump());
   const ProcessResult timeless = Colorize("pictures", {"--auto"});
-  EXPECT_EQ(timeless.exit_code, 1);
+  EXPECT_EQ(timeless.exit_code, 2);
   EXPECT_THAT(timeless.err,
               HasSubstr("transforms.json: frame 4 (images/cam00/0004.png) has no time"));
 }
