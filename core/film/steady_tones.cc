@@ -211,7 +211,8 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
   result.curves.resize(pictures.size());
   double before = 0.0, after = 0.0;
   int64_t compared = 0;
-  for (const auto& [number, frames] : frames_of_shot) {
+  for (const auto& shot_frames : frames_of_shot) {
+    const std::vector<int>& frames = shot_frames.second;
     const auto count = static_cast<int64_t>(frames.size());
     if (count < 3) continue;
     std::vector<std::optional<ToneStep>> steps(count - 1);
