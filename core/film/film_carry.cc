@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <numeric>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
@@ -112,6 +113,78 @@ bool Inside(float x, float y, int width, int height) {
          y <= static_cast<float>(height) - 0.5f;
 }
 
+// How surely the pixels of a picture lie at `place` in another, 0..1; `back` leads from there to
+// the picture.
+Image ConfidenceOf(const Image& place,
+                   const Image& back,
+                   const Image& contrast,
+                   const Image& other_contrast,
+                   const FilmCarryOptions& options) {
+  const Image unlike = Unlike(contrast, Sampled(other_contrast, place));
+  const Image returned = Sampled(back, place);
+  const int width = contrast.width, height = contrast.height;
+  Image confidence(width, height, 1);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (!Inside(place.At(0, y, x), place.At(1, y, x), width, height)) continue;
+      const double cycle = std::hypot(returned.At(0, y, x) - static_cast<float>(x),
+                                      returned.At(1, y, x) - static_cast<float>(y)) /
+                           options.cycle_tolerance_px;
+      const double closed = 1.0 / (1.0 + cycle * cycle);
+      const double like =
+          std::exp(-std::max(0.0, unlike.At(0, y, x) - options.unlikeness) / options.unlikeness);
+      confidence.At(0, y, x) = static_cast<float>(closed * closed * like);
+    }
+  }
+  return confidence;
+}
+
+// Places of a picture in another, and how sure each is.
+struct Places {
+  Image place;
+  Image confidence;
+};
+
+void TakeWhereSurer(const Places& found, Places* followed) {
+  constexpr float kLeastGain = 0.1f;
+  for (size_t i = 0; i < found.confidence.data.size(); ++i) {
+    if (found.confidence.data[i] < followed->confidence.data[i] + kLeastGain) continue;
+    followed->confidence.data[i] = found.confidence.data[i];
+    for (int c = 0; c < 2; ++c) followed->place.Plane(c)[i] = found.place.Plane(c)[i];
+  }
+}
+
+constexpr double kFollowedEnough = 0.9;  // mean confidence from which nothing is looked for
+
+double MeanOf(const Image& image) {
+  const double sum = std::accumulate(image.data.begin(), image.data.end(), 0.0);
+  return sum / static_cast<double>(image.data.size());
+}
+
+// What features find again, where that is surer than what was followed.
+void TakeFoundAgain(const FoundAgain& again,
+                    const Image& frame,
+                    const Image& contrast,
+                    const Image& key_contrast,
+                    const FilmCarryOptions& options,
+                    const CancellationToken& cancel,
+                    FilmTrack* track) {
+  const auto in_key = [&](const FilmTrack& t) {
+    return Places{t.in_key, ConfidenceOf(t.in_key, t.in_frame, contrast, key_contrast, options)};
+  };
+  const auto in_frame = [&](const FilmTrack& t) {
+    return Places{t.in_frame, ConfidenceOf(t.in_frame, t.in_key, key_contrast, contrast, options)};
+  };
+  Places of_frame = in_key(*track), of_key = in_frame(*track);
+  if (MeanOf(of_frame.confidence) > kFollowedEnough) return;
+  for (const FilmTrack& other : again.TracksTo(frame, cancel)) {
+    cancel.ThrowIfCancelled();
+    TakeWhereSurer(in_key(other), &of_frame);
+    TakeWhereSurer(in_frame(other), &of_key);
+  }
+  *track = {std::move(of_frame.place), std::move(of_key.place)};
+}
+
 CarriedColor ColorOf(const FilmKey& key,
                      const Image& key_contrast,
                      const Image& contrast,
@@ -119,23 +192,13 @@ CarriedColor ColorOf(const FilmKey& key,
                      const FilmCarryOptions& options) {
   CarriedColor color{Sampled(key.color.ab, track.in_key),
                      Sampled(key.color.confidence, track.in_key)};
-  const Image unlike = Unlike(contrast, Sampled(key_contrast, track.in_key));
-  const Image back = Sampled(track.in_frame, track.in_key);
-  const int width = contrast.width, height = contrast.height;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const double cycle = std::hypot(back.At(0, y, x) - static_cast<float>(x),
-                                      back.At(1, y, x) - static_cast<float>(y)) /
-                           options.cycle_tolerance_px;
-      const double closed = 1.0 / (1.0 + cycle * cycle);
-      const double like =
-          std::exp(-std::max(0.0, unlike.At(0, y, x) - options.unlikeness) / options.unlikeness);
-      const bool inside = Inside(track.in_key.At(0, y, x), track.in_key.At(1, y, x), width, height);
-      float& confidence = color.confidence.At(0, y, x);
-      confidence *= inside ? static_cast<float>(closed * closed * like) : 0.0f;
-      if (confidence > kLeastConfidence) continue;
-      confidence = color.ab.At(0, y, x) = color.ab.At(1, y, x) = 0.0f;
-    }
+  const Image followed =
+      ConfidenceOf(track.in_key, track.in_frame, contrast, key_contrast, options);
+  for (size_t i = 0; i < followed.data.size(); ++i) {
+    float& confidence = color.confidence.data[i];
+    confidence *= followed.data[i];
+    if (confidence > kLeastConfidence) continue;
+    confidence = color.ab.Plane(0)[i] = color.ab.Plane(1)[i] = 0.0f;
   }
   return color;
 }
@@ -225,6 +288,7 @@ void CarryAlongFilm(const FilmFrames& frames,
     const Walk& walk = walks[index];
     const auto key = frames.luminance(walk.key->frame);
     const Image key_contrast = LocalContrast(*key);
+    const FoundAgain again(*key);
     auto now = key;
     auto track = walk.before.track;
     if (track) {
@@ -242,6 +306,7 @@ void CarryAlongFilm(const FilmFrames& frames,
       Register(*next, contrast, *key, key_contrast, &further.in_key);
       cancel.ThrowIfCancelled();
       Register(*key, key_contrast, *next, contrast, &further.in_frame);
+      TakeFoundAgain(again, *next, contrast, key_contrast, options, cancel, &further);
       track = std::make_shared<const FilmTrack>(std::move(further));
       const CarriedColor color = ColorOf(*walk.key, key_contrast, contrast, *track, options);
       now = next;

@@ -11,6 +11,7 @@
 #include "core/base/image.h"
 #include "core/base/parallel.h"
 #include "core/carry/carry.h"
+#include "core/film/found_again.h"
 
 namespace color3d {
 
@@ -33,12 +34,6 @@ struct FilmFrames {
   std::vector<int> shot;  // of each frame; colours are carried within a shot only
   // L in 0..100, 1 channel, all of one size. Called from several threads at once.
   std::function<std::shared_ptr<const Image>(int frame)> luminance;
-};
-
-// Both ways between a key frame and another: 2 channels, x and y in px.
-struct FilmTrack {
-  Image in_key;    // where each pixel of the frame lies in the key frame
-  Image in_frame;  // where each pixel of the key frame lies in the frame
 };
 
 // How far the walk away from a key frame is.

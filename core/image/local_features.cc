@@ -22,7 +22,7 @@ cv::Mat Bytes(const Image& gray) {
 
 }  // namespace
 
-LocalFeatures DetectLocalFeatures(const Image& gray, int max_count) {
+LocalFeatures DetectLocalFeatures(const Image& gray, int max_count, double least_contrast) {
   if (gray.Empty()) throw InvalidArgument("a picture without pixels has no features");
   if (max_count < 1) {
     throw InvalidArgument("{} features asked for; ask for at least 1", max_count);
@@ -32,7 +32,7 @@ LocalFeatures DetectLocalFeatures(const Image& gray, int max_count) {
   constexpr int kSmallestPx = 16;  // a descriptor's window; OpenCV's octaves need some pixels, too
   if (std::min(gray.width, gray.height) < kSmallestPx) return features;
   try {
-    const auto sift = cv::SIFT::create();
+    const auto sift = cv::SIFT::create(/*nfeatures=*/0, /*nOctaveLayers=*/3, least_contrast);
     const cv::Mat picture = Bytes(gray);
     std::vector<cv::KeyPoint> points;
     sift->detect(picture, points);

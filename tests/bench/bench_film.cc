@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "core/base/evenly.h"
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
 #include "core/color/lab.h"
@@ -137,6 +138,21 @@ class FilmBench {
     return rows;
   }
 
+  // Of some frames that are not held out: what constants are chosen by.
+  static double TrainingError(const StageContext& context) {
+    constexpr size_t kFrames = 8;
+    const Scene scene = ReadScene(context);
+    const ViewImages images(scene, context.scene_folder(), kConsistencySidePx, 0);
+    const std::vector<int> views = EvenlyOf(scene.TrainingViews(), kFrames);
+    double error = 0.0;
+    for (const int view : views) {
+      const auto luminance = images.Luminance(view);
+      const Image ab = ReadViewAb(context, scene.views[view], luminance->width, luminance->height);
+      error += ChromaError(images.Srgb(view), JoinLab(*luminance, ab));
+    }
+    return error / static_cast<double>(views.size());
+  }
+
   ordered_json Personalized(int iterations) {
     const double before = Seconds();
     pipeline_.Run(kind::kPersonalize, [&](StageContext& context) {
@@ -159,10 +175,14 @@ class FilmBench {
       }
       RunEvaluate(options, context);
     });
+    double training_error = 0.0;
+    pipeline_.Run("training scores",
+                  [&](StageContext& context) { training_error = TrainingError(context); });
     const auto scores = ordered_json::parse(ReadFile(pipeline_.ArtifactPath(artifact::kScores)));
     const ordered_json& temporal = scores.at("temporal").at("colored_views");
     return {{"colors", "personalized"},
             {"iterations", iterations},
+            {"training_delta_e00_chroma", training_error},
             {"delta_e00_chroma", scores.at("mean").at("delta_e00_chroma")},
             {"tc_chroma", temporal.at("tc_chroma")},
             {"chroma", temporal.at("chroma")},

@@ -1,0 +1,170 @@
+#include "core/film/found_again.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+
+#include "core/base/error.h"
+#include "core/image/optical_flow.h"
+#include "core/image/plane_sampling.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kFeatures = 3000;
+constexpr double kLeastContrast = 0.02;  // of features: plain surfaces count, too
+constexpr float kLeastDistinct = 0.8f;  // distance to the nearest of that to the second (Lowe 2004)
+constexpr int kMostPlanes = 5;
+constexpr size_t kLeastOfPlane = 12;  // features
+constexpr double kOnPlanePx = 4.0;
+constexpr int kTries = 2000;
+constexpr double kSurely = 0.999;
+constexpr double kMostScale = 5.0;  // of lengths
+
+LocalFeatures FeaturesOf(const Image& luminance) {
+  Image gray = luminance;
+  for (float& value : gray.data) value *= 0.01f;
+  return DetectLocalFeatures(gray, kFeatures, kLeastContrast);
+}
+
+struct Matches {
+  std::vector<cv::Point2f> in_key, in_frame;
+};
+
+cv::Mat Rows(const LocalFeatures& features) {
+  return cv::Mat(features.count(),
+                 LocalFeatures::kDimensions,
+                 CV_32F,
+                 const_cast<float*>(features.descriptors.data()));
+}
+
+// Those that are each other's nearest, and much nearer than the second.
+Matches MatchesOf(const LocalFeatures& key, const LocalFeatures& frame, const Image& picture) {
+  Matches matches;
+  if (key.count() < 2 || frame.count() < 2) return matches;
+  const cv::Mat products = Rows(frame) * Rows(key).t();
+  std::vector<int> best_of_key(key.count(), -1);
+  std::vector<float> best_product(key.count(), -1.0f);
+  for (int i = 0; i < products.rows; ++i) {
+    const float* row = products.ptr<float>(i);
+    for (int k = 0; k < products.cols; ++k) {
+      if (row[k] > best_product[k]) {
+        best_product[k] = row[k];
+        best_of_key[k] = i;
+      }
+    }
+  }
+  const auto place = [&](const LocalFeatures& features, int i) {
+    return cv::Point2f(features.positions[2 * i] + 0.5f * picture.width - 0.5f,
+                       features.positions[2 * i + 1] + 0.5f * picture.height - 0.5f);
+  };
+  for (int i = 0; i < products.rows; ++i) {
+    const float* row = products.ptr<float>(i);
+    int best = 0;
+    float second = -1.0f;
+    for (int k = 1; k < products.cols; ++k) {
+      if (row[k] > row[best]) {
+        second = row[best];
+        best = k;
+      } else {
+        second = std::max(second, row[k]);
+      }
+    }
+    if (best_of_key[best] != i) continue;
+    // Of unit length: |x - y|^2 = 2 - 2 x y.
+    if (1.0f - row[best] > kLeastDistinct * kLeastDistinct * (1.0f - second)) continue;
+    matches.in_key.push_back(place(key, best));
+    matches.in_frame.push_back(place(frame, i));
+  }
+  return matches;
+}
+
+bool IsPlausible(const cv::Matx33d& h) {
+  const double area = h(0, 0) * h(1, 1) - h(0, 1) * h(1, 0);
+  return area > 1.0 / (kMostScale * kMostScale) && area < kMostScale * kMostScale;
+}
+
+// From the frame to the key frame; what one plane has explained is left to the next.
+std::vector<cv::Matx33d> PlanesOf(Matches matches) {
+  std::vector<cv::Matx33d> planes;
+  for (int i = 0; i < kMostPlanes && matches.in_key.size() >= kLeastOfPlane; ++i) {
+    cv::Mat is_inlier;
+    const cv::Mat found = cv::findHomography(
+        matches.in_frame, matches.in_key, cv::USAC_MAGSAC, kOnPlanePx, is_inlier, kTries, kSurely);
+    if (found.rows != 3) break;
+    Matches rest;
+    size_t inliers = 0;
+    for (size_t k = 0; k < matches.in_key.size(); ++k) {
+      if (is_inlier.at<uchar>(static_cast<int>(k)) != 0) {
+        ++inliers;
+        continue;
+      }
+      rest.in_key.push_back(matches.in_key[k]);
+      rest.in_frame.push_back(matches.in_frame[k]);
+    }
+    if (inliers < kLeastOfPlane) break;
+    if (IsPlausible(found)) planes.emplace_back(found);
+    matches = std::move(rest);
+  }
+  return planes;
+}
+
+Image PlaceOnPlane(const cv::Matx33d& h, const Image& picture) {
+  Image place(picture.width, picture.height, 2);
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x) {
+      const cv::Vec3d p = h * cv::Vec3d(x, y, 1.0);
+      const double w = p[2] > 1e-6 ? p[2] : 1e-6;
+      // Far outside is far enough.
+      place.At(0, y, x) = static_cast<float>(std::clamp(p[0] / w, -1e4, 1e4));
+      place.At(1, y, x) = static_cast<float>(std::clamp(p[1] / w, -1e4, 1e4));
+    }
+  }
+  return place;
+}
+
+Image Sampled(const Image& image, const Image& place) {
+  Image out(place.width, place.height, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (size_t i = 0; i < place.PlaneSize(); ++i) {
+      out.Plane(c)[i] = SampleBilinear(image, c, place.Plane(0)[i], place.Plane(1)[i]);
+    }
+  }
+  return out;
+}
+
+// Where the pixels of `picture` lie in `other`: on the plane, and flow around it.
+Image Refined(const cv::Matx33d& h, const Image& picture, const Image& other) {
+  const Image place = PlaceOnPlane(h, picture);
+  const Image rest = DenseFlow(picture, Sampled(other, place));
+  Image out(picture.width, picture.height, 2);
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x) {
+      const float u = static_cast<float>(x) + rest.At(0, y, x);
+      const float v = static_cast<float>(y) + rest.At(1, y, x);
+      for (int c = 0; c < 2; ++c) out.At(c, y, x) = SampleBilinear(place, c, u, v);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+FoundAgain::FoundAgain(const Image& key) : key_(key), features_(FeaturesOf(key)) {}
+
+std::vector<FilmTrack> FoundAgain::TracksTo(const Image& frame,
+                                            const CancellationToken& cancel) const {
+  std::vector<FilmTrack> tracks;
+  try {
+    for (const cv::Matx33d& h : PlanesOf(MatchesOf(features_, FeaturesOf(frame), key_))) {
+      cancel.ThrowIfCancelled();
+      tracks.push_back({Refined(h, frame, key_), Refined(h.inv(), key_, frame)});
+    }
+  } catch (const cv::Exception& e) {
+    throw Error(ErrorCode::kInternal, "features of a film failed: {}", e.err);
+  }
+  return tracks;
+}
+
+}  // namespace color3d
