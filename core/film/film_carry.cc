@@ -4,6 +4,7 @@
 #include <cmath>
 #include <mutex>
 #include <numeric>
+#include <optional>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
@@ -198,7 +199,8 @@ CarriedColor ColorOf(const FilmKey& key,
     float& confidence = color.confidence.data[i];
     confidence *= followed.data[i];
     if (confidence > kLeastConfidence) continue;
-    confidence = color.ab.Plane(0)[i] = color.ab.Plane(1)[i] = 0.0f;
+    confidence = 0.0f;
+    for (int c = 0; c < color.ab.channels; ++c) color.ab.Plane(c)[i] = 0.0f;
   }
   return color;
 }
@@ -288,7 +290,8 @@ void CarryAlongFilm(const FilmFrames& frames,
     const Walk& walk = walks[index];
     const auto key = frames.luminance(walk.key->frame);
     const Image key_contrast = LocalContrast(*key);
-    const FoundAgain again(*key);
+    std::optional<FoundAgain> again;
+    if (options.find_again) again.emplace(*key);
     auto now = key;
     auto track = walk.before.track;
     if (track) {
@@ -306,7 +309,7 @@ void CarryAlongFilm(const FilmFrames& frames,
       Register(*next, contrast, *key, key_contrast, &further.in_key);
       cancel.ThrowIfCancelled();
       Register(*key, key_contrast, *next, contrast, &further.in_frame);
-      TakeFoundAgain(again, *next, contrast, key_contrast, options, cancel, &further);
+      if (again) TakeFoundAgain(*again, *next, contrast, key_contrast, options, cancel, &further);
       track = std::make_shared<const FilmTrack>(std::move(further));
       const CarriedColor color = ColorOf(*walk.key, key_contrast, contrast, *track, options);
       now = next;

@@ -17,7 +17,7 @@ namespace color3d {
 
 struct FilmKey {
   int frame = 0;
-  CarriedColor color;  // of the working size
+  CarriedColor color;  // of the working size; further channels are carried like the two of ab
 };
 
 struct FilmCarryOptions {
@@ -26,6 +26,8 @@ struct FilmCarryOptions {
   // Mean difference of the local contrast of both places from which confidence falls, 0.05..2; to
   // 1/e at twice that.
   double unlikeness = 0.4;
+  // Whether local features look for what steps from frame to frame have lost.
+  bool find_again = true;
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const FilmCarryOptions&) const = default;
 };

@@ -1,5 +1,6 @@
 #include "core/film/found_again.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
@@ -15,7 +16,7 @@ namespace {
 constexpr int kFeatures = 3000;
 constexpr double kLeastContrast = 0.02;  // of features: plain surfaces count, too
 constexpr float kLeastDistinct = 0.8f;  // distance to the nearest of that to the second (Lowe 2004)
-constexpr int kMostPlanes = 5;
+constexpr int kMostPlanes = 3;
 constexpr size_t kLeastOfPlane = 12;  // features
 constexpr double kOnPlanePx = 4.0;
 constexpr int kTries = 2000;
@@ -32,48 +33,46 @@ struct Matches {
   std::vector<cv::Point2f> in_key, in_frame;
 };
 
-cv::Mat Rows(const LocalFeatures& features) {
-  return cv::Mat(features.count(),
-                 LocalFeatures::kDimensions,
-                 CV_32F,
-                 const_cast<float*>(features.descriptors.data()));
+using Descriptors =
+    Eigen::Matrix<float, Eigen::Dynamic, LocalFeatures::kDimensions, Eigen::RowMajor>;
+
+Eigen::Map<const Descriptors> Rows(const LocalFeatures& features) {
+  return {features.descriptors.data(), features.count(), LocalFeatures::kDimensions};
 }
 
 // Those that are each other's nearest, and much nearer than the second.
 Matches MatchesOf(const LocalFeatures& key, const LocalFeatures& frame, const Image& picture) {
   Matches matches;
   if (key.count() < 2 || frame.count() < 2) return matches;
-  const cv::Mat products = Rows(frame) * Rows(key).t();
-  std::vector<int> best_of_key(key.count(), -1);
+  // Column i: likeness of feature i of the frame to each of the key frame.
+  const Eigen::MatrixXf products = Rows(key) * Rows(frame).transpose();
+  std::vector<Eigen::Index> best_of_key(key.count(), -1);
   std::vector<float> best_product(key.count(), -1.0f);
-  for (int i = 0; i < products.rows; ++i) {
-    const float* row = products.ptr<float>(i);
-    for (int k = 0; k < products.cols; ++k) {
-      if (row[k] > best_product[k]) {
-        best_product[k] = row[k];
-        best_of_key[k] = i;
-      }
+  for (Eigen::Index i = 0; i < products.cols(); ++i) {
+    for (Eigen::Index k = 0; k < products.rows(); ++k) {
+      if (!(products(k, i) > best_product[k])) continue;
+      best_product[k] = products(k, i);
+      best_of_key[k] = i;
     }
   }
-  const auto place = [&](const LocalFeatures& features, int i) {
+  const auto place = [&](const LocalFeatures& features, Eigen::Index i) {
     return cv::Point2f(features.positions[2 * i] + 0.5f * picture.width - 0.5f,
                        features.positions[2 * i + 1] + 0.5f * picture.height - 0.5f);
   };
-  for (int i = 0; i < products.rows; ++i) {
-    const float* row = products.ptr<float>(i);
-    int best = 0;
+  for (Eigen::Index i = 0; i < products.cols(); ++i) {
+    Eigen::Index best = 0;
     float second = -1.0f;
-    for (int k = 1; k < products.cols; ++k) {
-      if (row[k] > row[best]) {
-        second = row[best];
+    for (Eigen::Index k = 1; k < products.rows(); ++k) {
+      if (products(k, i) > products(best, i)) {
+        second = products(best, i);
         best = k;
       } else {
-        second = std::max(second, row[k]);
+        second = std::max(second, products(k, i));
       }
     }
     if (best_of_key[best] != i) continue;
     // Of unit length: |x - y|^2 = 2 - 2 x y.
-    if (1.0f - row[best] > kLeastDistinct * kLeastDistinct * (1.0f - second)) continue;
+    if (1.0f - products(best, i) > kLeastDistinct * kLeastDistinct * (1.0f - second)) continue;
     matches.in_key.push_back(place(key, best));
     matches.in_frame.push_back(place(frame, i));
   }

@@ -1,6 +1,7 @@
 #include "core/scene/scene.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "core/base/error.h"
 
@@ -71,6 +72,15 @@ int Scene::FindView(std::string_view name) const {
 bool Scene::IsFilm() const { return HasMoments(views) && !HasPoses(views); }
 
 bool Scene::IsDynamic() const { return HasMoments(views) && HasPoses(views); }
+
+std::vector<int> Scene::ViewsInOrderOfTime() const {
+  std::vector<int> order(views.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return views[a].time_s() < views[b].time_s();
+  });
+  return order;
+}
 
 double Scene::Extent() const {
   const std::vector<int> training = TrainingViews();

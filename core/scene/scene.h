@@ -65,6 +65,8 @@ struct Scene {
   bool IsFilm() const;
   // ... or of one or several cameras with poses: a scene that may move. Both false without views.
   bool IsDynamic() const;
+  // Indices of all views; those of one time, or without one, in their order.
+  std::vector<int> ViewsInOrderOfTime() const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
   double Extent() const;
   // In the world's units and frame.

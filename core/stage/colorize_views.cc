@@ -4,6 +4,7 @@
 #include "core/image/codec.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
+#include "core/stage/film/color_frames.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/view_positions.h"
 #include "core/stage/stages.h"
@@ -29,25 +30,33 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const ViewPositions positions(scene, context);
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
   const auto total = static_cast<int64_t>(scene.views.size());
-  std::mutex outputs;
-  int64_t done = 0;
-  context.pool().ForEach(total, [&](int64_t index, int) {
+  const auto alone = [&](int number) {
     context.cancel().ThrowIfCancelled();
-    const auto number = static_cast<int>(index);
-    const View& view = scene.views[index];
+    const View& view = scene.views[number];
     const auto luminance = images.Luminance(number);
     const CarriedColor carried = ReadCarried(context, view, luminance->width, luminance->height);
     const ColorSources sources = SourcesOf(
         *colorizer,
         positions.Of(number, images.WorkingCamera(number), *luminance, images.Mask(number).get()));
     ThreadPool one(1);
-    const FusedColor fused = ColorOfView(*luminance, carried, sources, one, context.cancel());
+    return ColorOfView(*luminance, carried, sources, one, context.cancel());
+  };
+  std::mutex outputs;
+  int64_t done = 0;
+  const auto deliver = [&](int number, const FusedColor& fused) {
+    const View& view = scene.views[number];
     const std::string ab = EncodeAbPng(fused.ab);
     const std::string provenance = EncodePng8(fused.provenance);
     const std::lock_guard lock(outputs);
     context.WriteOutput(ViewArtifact(artifact::kViewsAb, view, ".png"), ab);
     context.WriteOutput(ViewArtifact(artifact::kProvenance, view, ".png"), provenance);
     context.progress().OnProgress(++done, total, "colouring " + view.name);
+  };
+  if (scene.IsFilm() || scene.IsDynamic()) {
+    return ColorFrames(scene, images, {alone, colorizer->relative_chroma(), deliver}, context);
+  }
+  context.pool().ForEach(total, [&](int64_t index, int) {
+    deliver(static_cast<int>(index), alone(static_cast<int>(index)));
   });
 }
 

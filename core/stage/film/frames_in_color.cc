@@ -10,20 +10,6 @@
 #include "core/image/codec.h"
 
 namespace color3d {
-namespace {
-
-// Views as frames: in the order of time.
-std::vector<int> InOrderOfTime(const Scene& scene) {
-  std::vector<int> order;
-  for (size_t i = 0; i < scene.views.size(); ++i) order.push_back(static_cast<int>(i));
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return scene.views[a].time_s() < scene.views[b].time_s();
-  });
-  return order;
-}
-
-}  // namespace
-
 FramesInColor::FramesInColor(const Scene& scene,
                              const ViewImages& images,
                              const std::vector<ColoredKeyView>& keys,
@@ -33,7 +19,7 @@ FramesInColor::FramesInColor(const Scene& scene,
       folder_(context.scratch_folder() / "frames_in_color"),
       has_(scene.views.size(), 0) {
   std::filesystem::create_directories(folder_);
-  const std::vector<int> order = InOrderOfTime(scene);
+  const std::vector<int> order = scene.ViewsInOrderOfTime();
   FilmFrames frames;
   for (const int view : order) frames.shot.push_back(scene.views[view].moment->shot);
   frames.luminance = [&](int frame) { return images.Luminance(order[frame]); };
