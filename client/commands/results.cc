@@ -151,12 +151,16 @@ std::string Summary(const fs::path& out) {
   if (const auto seconds = number("seconds_total")) {
     text += Line("computing time", HumanSeconds(*seconds));
   }
-  const std::pair<const char*, const char*> files[] = {{"coloured film", artifact::kMovie},
-                                                       {"coloured scene", artifact::kPly},
-                                                       {"report", artifact::kReport},
-                                                       {"in the browser", artifact::kViewPage}};
+  std::error_code none;
+  // Of a film with poses the movie is a rendered one.
+  const bool has_film = fs::exists(out / artifact::kFilm, none);
+  const std::pair<const char*, const char*> files[] = {
+      {"coloured film", artifact::kFilm},
+      {has_film ? "rendered movie" : "coloured film", artifact::kMovie},
+      {"coloured scene", artifact::kPly},
+      {"report", artifact::kReport},
+      {"in the browser", artifact::kViewPage}};
   for (const auto& [label, name] : files) {
-    std::error_code none;
     if (fs::exists(out / name, none)) text += Line(label, (out / name).string());
   }
   return text;

@@ -50,6 +50,7 @@ inline constexpr char kMoments[] = "moments/";  // "00001.ply" and so on, of a s
 inline constexpr char kExportScores[] = "export.json";  // what they lose against our renders
 inline constexpr char kRenders[] = "renders/";          // view's stem + ".png"
 inline constexpr char kMovie[] = "scene.mp4";
+inline constexpr char kFilm[] = "film.mp4";   // the frames of a scene that moves, in colour
 inline constexpr char kFrames[] = "frames/";  // "00001.png" and so on, of the movie
 inline constexpr char kScores[] = "scores.json";
 inline constexpr char kTruths[] = "truths/";            // view's stem + ".jpg"

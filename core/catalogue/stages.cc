@@ -69,9 +69,9 @@ const std::vector<Stage>& StageCatalogue() {
        .results = {kPly, kSog, kSpz, kGlb, kSplat, kMoments, kViewPage}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
-       .reads = {kKeyView, kKeyColor, kViewsAb},  // of a film
-       .leaves = {kRenders, kMovie, kFrames},
-       .results = {kRenders, kMovie}},
+       .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb},  // of films and what moves
+       .leaves = {kRenders, kMovie, kFilm, kFrames},
+       .results = {kRenders, kMovie, kFilm}},
       {.kind = kind::kEvaluate,
        .needs = {kScene, kViewsAb, kModel},
        .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance},

@@ -19,8 +19,9 @@ struct LocalFeatures {
 
 // SIFT (Lowe 2004) of the first channel, 0..1, with the square roots of L1-normalised descriptors
 // (RootSIFT, Arandjelovic & Zisserman 2012): the `max_count` features of the strongest contrast,
-// strongest first, none below `least_contrast` (as OpenCV's SIFT counts it). Pictures without structure or smaller than 16 px have none. Throws
-// Error{kInvalidArgument} for an empty picture or max_count < 1.
+// strongest first, none below `least_contrast` (as OpenCV's SIFT counts it). Pictures without
+// structure or smaller than 16 px have none. Throws Error{kInvalidArgument} for an empty picture or
+// max_count < 1.
 LocalFeatures DetectLocalFeatures(const Image& gray, int max_count, double least_contrast = 0.04);
 
 }  // namespace color3d

@@ -82,6 +82,12 @@ std::vector<int> Scene::ViewsInOrderOfTime() const {
   return order;
 }
 
+std::vector<int> Scene::FramesOfShotOf(int view) const {
+  std::vector<int> frames = ViewsInOrderOfTime();
+  std::erase_if(frames, [&](int i) { return views[i].moment->shot != views[view].moment->shot; });
+  return frames;
+}
+
 double Scene::Extent() const {
   const std::vector<int> training = TrainingViews();
   if (training.empty()) return 1.0;

@@ -25,6 +25,12 @@ std::vector<int> ViewsToRender(const RenderOptions& options, const Scene& scene)
   return EvenlyOf(std::move(views), static_cast<size_t>(options.max_views));
 }
 
+// A model may come without the frames' colours, too.
+bool HasColors(const StageContext& context, const Scene& scene) {
+  return context.HasInput(artifact::kKeyView) && context.HasInput(artifact::kKeyColor) &&
+         context.HasInput(ViewAbArtifact(context, scene.views.front()));
+}
+
 }  // namespace
 
 void RenderOptions::Validate() const {
@@ -60,6 +66,10 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     movie.views.clear();
     movie.path = RenderOptions::Path::kPhotos;
     RenderMovie(movie, scene, model, context);
+    if (HasColors(context, scene)) {
+      WriteColoredFilm(
+          scene, scene.FramesOfShotOf(ReadKeyView(context, scene)), artifact::kFilm, context);
+    }
   }
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();

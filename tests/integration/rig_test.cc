@@ -6,6 +6,7 @@
 
 #include "core/base/files.h"
 #include "core/image/codec.h"
+#include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
 #include "tests/integration/service_fixture.h"
 #include "tests/support/scenes/dynamic_scene.h"
@@ -76,6 +77,11 @@ TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
   const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
   EXPECT_GT(metrics.at("gaussians"), 1000);
   EXPECT_TRUE(fs::exists(Path("out") / "scene.ply"));
+  // The key view's camera: its own frames in colour, and the scene as it saw it.
+  EXPECT_THAT(result.out, HasSubstr("film.mp4"));
+  for (const char* movie : {"film.mp4", "scene.mp4"}) {
+    EXPECT_EQ(FilmReader(Path("out") / movie).times().size(), 9u) << movie;
+  }
 }
 
 TEST_F(RigTest, WhatDoesNotFitIsNamed) {

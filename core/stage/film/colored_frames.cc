@@ -1,6 +1,7 @@
 #include "core/stage/film/colored_frames.h"
 
 #include <algorithm>
+#include <numeric>
 #include <optional>
 
 #include "core/base/files.h"
@@ -25,17 +26,18 @@ struct FrameTimes {
 };
 
 // Gaps that frames of no use have left stay gaps, so that what is heard fits what is seen.
-FrameTimes TimesOf(const Scene& scene) {
+FrameTimes TimesOf(const Scene& scene, const std::vector<int>& frames) {
+  const auto time_s = [&](size_t i) { return scene.views[frames[i]].time_s(); };
   std::vector<double> steps;
-  for (size_t i = 1; i < scene.views.size(); ++i) {
-    const double step = scene.views[i].time_s() - scene.views[i - 1].time_s();
+  for (size_t i = 1; i < frames.size(); ++i) {
+    const double step = time_s(i) - time_s(i - 1);
     if (step > 0.0) steps.push_back(step);
   }
   FrameTimes times;
   const double usual = steps.empty() ? 1.0 / times.frames_per_second : Median(std::move(steps));
   times.frames_per_second = std::clamp(1.0 / usual, 1.0, 120.0);
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    const double step = i > 0 ? scene.views[i].time_s() - scene.views[i - 1].time_s() : 0.0;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const double step = i > 0 ? time_s(i) - time_s(i - 1) : 0.0;
     // Another camera's film begins again.
     times.time_s.push_back(i == 0 ? 0.0 : times.time_s.back() + (step > 0.0 ? step : usual));
   }
@@ -52,6 +54,7 @@ FrameTimes TimesOf(const Scene& scene) {
 
 // None for frames that came as pictures, or from several cameras.
 std::optional<SoundPart> SoundOf(const Scene& scene,
+                                 const std::vector<int>& frames,
                                  const FrameTimes& times,
                                  const StageContext& context) {
   std::vector<std::string> films;
@@ -62,7 +65,7 @@ std::optional<SoundPart> SoundOf(const Scene& scene,
   const std::filesystem::path film = context.scene_folder() / films[0];
   const FilmFacts facts = FilmReader(film).facts();
   if (!facts.has_sound) return std::nullopt;
-  const double begin_s = facts.first_s + scene.views.front().time_s();
+  const double begin_s = facts.first_s + scene.views[frames.front()].time_s();
   return SoundPart{film, begin_s, begin_s + times.time_s.back() + times.seconds.back()};
 }
 
@@ -91,44 +94,58 @@ Image ColoredFrame(const View& view,
                  ReadTargetAb(context, view, is_key, luminance->width, luminance->height));
 }
 
-void RenderFilm(const RenderOptions& options,
-                const Scene& scene,
-                const std::vector<int>& views,
-                StageContext& context) {
+void WriteColoredFilm(const Scene& scene,
+                      const std::vector<int>& frames,
+                      const char* artifact,
+                      StageContext& context,
+                      const std::function<void(int view, const Image& srgb)>& written) {
   const ViewImages images(scene, context.scene_folder(), /*max_side_px=*/0, 0);
-  const Camera camera = images.WorkingCamera(0);
+  const Camera camera = images.WorkingCamera(frames.front());
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
-  const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
-  const FrameTimes times = TimesOf(scene);
+  const std::filesystem::path file = context.scratch_folder() / artifact;
+  const FrameTimes times = TimesOf(scene, frames);
   Mp4Writer movie(file,
                   {.width = camera.width - camera.width % 2,
                    .height = camera.height - camera.height % 2,
                    .frames_per_second = times.frames_per_second,
                    .ticks_per_second = times.ticks_per_second,
                    .threads = context.pool().thread_count(),
-                   .sound = SoundOf(scene, times, context)});
+                   .sound = SoundOf(scene, frames, times, context)});
   if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
-  const auto count = static_cast<int>(scene.views.size());
+  const auto count = static_cast<int>(frames.size());
   const int batch = context.pool().thread_count();
-  std::vector<Image> frames(batch);
+  std::vector<Image> pictures(batch);
   for (int begin = 0; begin < count; begin += batch) {
     context.cancel().ThrowIfCancelled();
     const int size = std::min(batch, count - begin);
     context.pool().ForEach(size, [&](int64_t i, int) {
-      const int view = begin + static_cast<int>(i);
-      frames[i] = SrgbFromLab(ColoredFrame(scene.views[view], view, view == key, images, context));
+      const int view = frames[begin + i];
+      pictures[i] =
+          SrgbFromLab(ColoredFrame(scene.views[view], view, view == key, images, context));
     });
     for (int i = 0; i < size; ++i) {
-      const int view = begin + i;
-      movie.AddAt(times.time_s[view], times.seconds[view], EvenSides(frames[i]), context.pool());
-      if (std::find(views.begin(), views.end(), view) == views.end()) continue;
-      context.WriteOutput(ViewArtifact(artifact::kRenders, scene.views[view], ".png"),
-                          EncodePng8(FitWithin(frames[i], options.max_side_px)));
+      const int frame = begin + i;
+      movie.AddAt(
+          times.time_s[frame], times.seconds[frame], EvenSides(pictures[i]), context.pool());
+      if (written) written(frames[frame], pictures[i]);
     }
     context.progress().OnProgress(begin + size, count, "writing frames");
   }
   movie.Finish();
-  context.TakeOutput(artifact::kMovie, file);
+  context.TakeOutput(artifact, file);
+}
+
+void RenderFilm(const RenderOptions& options,
+                const Scene& scene,
+                const std::vector<int>& views,
+                StageContext& context) {
+  std::vector<int> frames(scene.views.size());
+  std::iota(frames.begin(), frames.end(), 0);
+  WriteColoredFilm(scene, frames, artifact::kMovie, context, [&](int view, const Image& srgb) {
+    if (std::find(views.begin(), views.end(), view) == views.end()) return;
+    context.WriteOutput(ViewArtifact(artifact::kRenders, scene.views[view], ".png"),
+                        EncodePng8(FitWithin(srgb, options.max_side_px)));
+  });
 }
 
 }  // namespace color3d

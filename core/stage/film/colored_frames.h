@@ -2,6 +2,9 @@
 // the stages of this layer only.
 #pragma once
 
+#include <functional>
+#include <vector>
+
 #include "core/scene/view_images.h"
 #include "core/stage/stage.h"
 #include "core/stage/stages.h"
@@ -15,9 +18,16 @@ Image ColoredFrame(const View& view,
                    const ViewImages& images,
                    const StageContext& context);
 
-// Leaves artifact::kMovie, all frames at the film's own times and size, with its sound where it
-// came as a video file, and `views` (for the report) as artifact::kRenders. Throws
-// Error{kCancelled} and what Mp4Writer throws.
+// Leaves a movie: these frames, in order of time, in colour, at the film's own times and size, with
+// its sound where it came as a video file. `written`, which may be empty, is told each of them, in
+// sRGB. Throws Error{kCancelled} and what Mp4Writer throws.
+void WriteColoredFilm(const Scene& scene,
+                      const std::vector<int>& frames,
+                      const char* artifact,
+                      StageContext& context,
+                      const std::function<void(int view, const Image& srgb)>& written = {});
+
+// All frames of a film as artifact::kMovie, and `views` (for the report) as artifact::kRenders.
 void RenderFilm(const RenderOptions& options,
                 const Scene& scene,
                 const std::vector<int>& views,

@@ -24,16 +24,11 @@ constexpr int64_t kCacheBytes = int64_t{16} << 20;  // each frame is read twice,
 
 std::vector<std::vector<int>> ShotsInOrderOfTime(const Scene& scene) {
   std::map<int, std::vector<int>> shots;
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    shots[scene.views[i].moment->shot].push_back(static_cast<int>(i));
+  for (const int view : scene.ViewsInOrderOfTime()) {
+    shots[scene.views[view].moment->shot].push_back(view);
   }
   std::vector<std::vector<int>> ordered;
-  for (auto& [shot, frames] : shots) {
-    std::stable_sort(frames.begin(), frames.end(), [&](int a, int b) {
-      return scene.views[a].time_s() < scene.views[b].time_s();
-    });
-    ordered.push_back(std::move(frames));
-  }
+  for (auto& [shot, frames] : shots) ordered.push_back(std::move(frames));
   return ordered;
 }
 

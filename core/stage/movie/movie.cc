@@ -50,24 +50,10 @@ std::vector<PathCamera> CamerasOfFile(const RenderOptions& options,
   return cameras;
 }
 
-// The frames of that view's camera, one after the other.
-std::vector<int> FramesOfCamera(const Scene& scene, int home) {
-  std::vector<int> frames;
-  for (size_t i = 0; i < scene.views.size(); ++i) {
-    if (scene.views[i].moment->shot == scene.views[home].moment->shot) {
-      frames.push_back(static_cast<int>(i));
-    }
-  }
-  std::stable_sort(frames.begin(), frames.end(), [&](int a, int b) {
-    return scene.views[a].time_s() < scene.views[b].time_s();
-  });
-  return frames;
-}
-
 std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene& scene, int home) {
   std::vector<int> order;
   for (const std::string& name : options.views) order.push_back(scene.FindView(name));
-  if (order.empty()) order = scene.IsDynamic() ? FramesOfCamera(scene, home) : ViewsInOrder(scene);
+  if (order.empty()) order = scene.IsDynamic() ? scene.FramesOfShotOf(home) : ViewsInOrder(scene);
   std::vector<PathCamera> cameras;
   for (const int index : order) {
     const View& view = scene.views[index];
