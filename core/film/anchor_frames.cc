@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 
 constexpr int kSidePx = 160;        // pictures that are compared
-constexpr double kFastShare = 0.1;  // of the pixels
+constexpr double kFastShare = 0.03;  // of the pixels
 
 // What a tenth of the pixels exceeds, in longer sides.
 double MotionBetween(const Image& one, const Image& other) {

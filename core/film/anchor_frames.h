@@ -11,7 +11,7 @@
 namespace color3d {
 
 struct AnchorOptions {
-  // Of the frames around one anchor, from first to last: what a tenth of the pixels exceeds,
+  // Of the frames around one anchor, from first to last: what 3 % of the pixels exceed,
   // summed from frame to frame, in longer sides of the picture.
   double most_motion = 0.1;  // 0..1; 0: each frame is an anchor
   int most_frames = 12;      // 1..1000

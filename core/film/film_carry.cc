@@ -147,9 +147,11 @@ struct Places {
 };
 
 void TakeWhereSurer(const Places& found, Places* followed) {
-  constexpr float kLeastGain = 0.1f;
+  constexpr float kSure = 0.5f, kLeastGain = 0.3f;
   for (size_t i = 0; i < found.confidence.data.size(); ++i) {
-    if (found.confidence.data[i] < followed->confidence.data[i] + kLeastGain) continue;
+    if (found.confidence.data[i] < std::max(kSure, followed->confidence.data[i] + kLeastGain)) {
+      continue;
+    }
     followed->confidence.data[i] = found.confidence.data[i];
     for (int c = 0; c < 2; ++c) followed->place.Plane(c)[i] = found.place.Plane(c)[i];
   }

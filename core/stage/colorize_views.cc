@@ -30,16 +30,10 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const ViewPositions positions(scene, context);
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
   const auto total = static_cast<int64_t>(scene.views.size());
-  const auto alone = [&](int number) {
-    context.cancel().ThrowIfCancelled();
-    const View& view = scene.views[number];
-    const auto luminance = images.Luminance(number);
-    const CarriedColor carried = ReadCarried(context, view, luminance->width, luminance->height);
-    const ColorSources sources = SourcesOf(
+  const auto sources = [&](int number, const Image& luminance) {
+    return SourcesOf(
         *colorizer,
-        positions.Of(number, images.WorkingCamera(number), *luminance, images.Mask(number).get()));
-    ThreadPool one(1);
-    return ColorOfView(*luminance, carried, sources, one, context.cancel());
+        positions.Of(number, images.WorkingCamera(number), luminance, images.Mask(number).get()));
   };
   std::mutex outputs;
   int64_t done = 0;
@@ -53,10 +47,17 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     context.progress().OnProgress(++done, total, "colouring " + view.name);
   };
   if (scene.IsFilm() || scene.IsDynamic()) {
-    return ColorFrames(scene, images, {alone, colorizer->relative_chroma(), deliver}, context);
+    return ColorFrames(scene, images, {sources, deliver}, context);
   }
   context.pool().ForEach(total, [&](int64_t index, int) {
-    deliver(static_cast<int>(index), alone(static_cast<int>(index)));
+    context.cancel().ThrowIfCancelled();
+    const auto number = static_cast<int>(index);
+    const auto luminance = images.Luminance(number);
+    const CarriedColor carried =
+        ReadCarried(context, scene.views[index], luminance->width, luminance->height);
+    ThreadPool one(1);
+    deliver(number,
+            ColorOfView(*luminance, carried, sources(number, *luminance), one, context.cancel()));
   });
 }
 

@@ -15,10 +15,8 @@ namespace {
 
 constexpr int64_t kSectionBytes = int64_t{64} << 20;  // of colours that wait for each other
 constexpr int kColorChannels = 3;                     // a, b and the share that is guessed
-constexpr float kKnown = 0.1f;                        // confidence of what open places continue
-constexpr float kFollowed = 0.3f;                     // ... below which motion does not tell
-constexpr double kMostOpen = 0.25;                    // share of a frame that motion may leave open
-constexpr float kStranger = 3.0f;  // feature distance that stands for confidence 0
+constexpr float kFollowed = 0.5f;                     // confidence from which motion tells
+constexpr double kWorthAsking = 0.02;                // share of a frame that is open
 
 // An anchor's delivered colours, of which all are sure.
 CarriedColor AsKey(const FusedColor& fused) {
@@ -31,39 +29,62 @@ CarriedColor AsKey(const FusedColor& fused) {
   return {std::move(color), Image(fused.ab.width, fused.ab.height, 1, 1.0f)};
 }
 
-bool IsFollowed(const CarriedColor& from_anchor, const CarriedColor& carried) {
-  size_t open = 0;
-  for (size_t i = 0; i < carried.confidence.data.size(); ++i) {
-    open +=
-        std::max(from_anchor.confidence.data[i], carried.confidence.data[i]) < kFollowed ? 1 : 0;
+// 1 where the frame's own sources need not be asked.
+Image KnownOf(const CarriedColor& from_anchor, const Image& carried_surely) {
+  Image known = carried_surely;
+  for (size_t i = 0; i < known.data.size(); ++i) {
+    if (from_anchor.confidence.data[i] > kFollowed) known.data[i] = 1.0f;
   }
-  return static_cast<double>(open) <=
-         kMostOpen * static_cast<double>(carried.confidence.PlaneSize());
+  return known;
 }
 
-// What the anchor tells of a frame stands for what the colorizer would.
+double ShareOpen(const Image& known) {
+  const auto open = std::count(known.data.begin(), known.data.end(), 0.0f);
+  return static_cast<double>(open) / static_cast<double>(known.data.size());
+}
+
+// What the anchor tells of a frame stands for what its sources would.
+InferredColor AnswerOf(const CarriedColor& from_anchor,
+                       const Image& known,
+                       const Image& luminance,
+                       const ColorSources& sources) {
+  const size_t both = 2 * luminance.PlaneSize();
+  InferredColor answer{Image(luminance.width, luminance.height, 2),
+                       Image(luminance.width, luminance.height, 1)};
+  if (ShareOpen(known) > kWorthAsking) {
+    answer = sources.infer(luminance, known);
+  } else {
+    Image continued = from_anchor.ab, followed = from_anchor.confidence;
+    for (float& value : followed.data) value = value > kFollowed ? 1.0f : 0.0f;
+    FillHoles(followed, &continued);
+    std::copy_n(continued.data.begin(), both, answer.ab.data.begin());
+  }
+  for (size_t i = 0; i < luminance.PlaneSize(); ++i) {
+    if (from_anchor.confidence.data[i] <= kFollowed) continue;
+    for (int c = 0; c < 2; ++c) answer.ab.Plane(c)[i] = from_anchor.ab.Plane(c)[i];
+    if (!answer.distance.Empty()) answer.distance.data[i] = 0.0f;
+  }
+  return answer;
+}
+
 FusedColor ColorBetween(const Image& luminance,
                         const CarriedColor& carried,
-                        CarriedColor from_anchor,
-                        const RelativeChroma& relative_chroma,
+                        const CarriedColor& from_anchor,
+                        ColorSources sources,
                         const CancellationToken& cancel) {
-  Image known = from_anchor.confidence;
-  for (float& value : known.data) value = value > kKnown ? 1.0f : 0.0f;
-  FillHoles(known, &from_anchor.ab);
-  InferredColor inferred{Image(luminance.width, luminance.height, 2), from_anchor.confidence};
-  const size_t both = inferred.ab.data.size();
-  std::copy_n(from_anchor.ab.data.begin(), both, inferred.ab.data.begin());
-  for (float& value : inferred.distance.data) value = kStranger * (1.0f - value);
-  const ColorSources sources{[&](const Image&, const Image&) { return std::move(inferred); },
-                             [](const Image& l) { return Image(l.width, l.height, 2); },
-                             relative_chroma};
+  ColorSources with_anchor = sources;
+  with_anchor.infer = [&](const Image& l, const Image& carried_surely) {
+    return AnswerOf(from_anchor, KnownOf(from_anchor, carried_surely), l, sources);
+  };
   ThreadPool one(1);
-  FusedColor fused = ColorOfView(luminance, carried, sources, one, cancel);
+  FusedColor fused = ColorOfView(luminance, carried, with_anchor, one, cancel);
+  // What the anchor was given as a guess is one here, too.
   for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
-    float& guessed = fused.provenance.Plane(0)[i];
-    float& by_anchor = fused.provenance.Plane(2)[i];
-    guessed = by_anchor * std::clamp(from_anchor.ab.Plane(2)[i], 0.0f, 1.0f);
-    by_anchor -= guessed;
+    if (from_anchor.confidence.data[i] <= kFollowed) continue;
+    float& inferred = fused.provenance.Plane(2)[i];
+    const float guessed = inferred * std::clamp(from_anchor.ab.Plane(2)[i], 0.0f, 1.0f);
+    fused.provenance.Plane(0)[i] += guessed;
+    inferred -= guessed;
   }
   return fused;
 }
@@ -143,7 +164,7 @@ class FramesColorer {
     std::vector<FilmKey> keys(section.anchors.size());
     context_.pool().ForEach(static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
       const int frame = section.anchors[i];
-      const FusedColor color = coloring_.alone(order_[frame]);
+      const FusedColor color = ColorOf(order_[frame], nullptr);
       coloring_.deliver(order_[frame], color);
       keys[i] = {frame, AsKey(color)};
     });
@@ -162,18 +183,22 @@ class FramesColorer {
     keys.clear();
     context_.pool().ForEach(static_cast<int64_t>(between.size()), [&](int64_t i, int) {
       auto& [frame, from_anchor] = between[i];
-      coloring_.deliver(order_[frame], ColorOfFrame(order_[frame], std::move(from_anchor)));
+      coloring_.deliver(order_[frame], ColorOf(order_[frame], &from_anchor));
     });
   }
 
-  FusedColor ColorOfFrame(int view, CarriedColor from_anchor) const {
+  // `from_anchor`: null of an anchor.
+  FusedColor ColorOf(int view, const CarriedColor* from_anchor) const {
     context_.cancel().ThrowIfCancelled();
     const auto luminance = images_.Luminance(view);
     const CarriedColor carried =
         ReadCarried(context_, scene_.views[view], luminance->width, luminance->height);
-    if (!IsFollowed(from_anchor, carried)) return coloring_.alone(view);
-    return ColorBetween(
-        *luminance, carried, std::move(from_anchor), coloring_.relative_chroma, context_.cancel());
+    ColorSources sources = coloring_.sources(view, *luminance);
+    if (from_anchor != nullptr) {
+      return ColorBetween(*luminance, carried, *from_anchor, std::move(sources), context_.cancel());
+    }
+    ThreadPool one(1);
+    return ColorOfView(*luminance, carried, sources, one, context_.cancel());
   }
 
   const Scene& scene_;

@@ -11,17 +11,16 @@
 namespace color3d {
 
 struct FrameColoring {
-  // The colour of one view by itself, which takes longest. Thread-safe.
-  std::function<FusedColor(int view)> alone;
-  RelativeChroma relative_chroma;
+  // What a view's colour comes from beside what was carried into it. Thread-safe.
+  std::function<ColorSources(int view, const Image& luminance)> sources;
   // Takes each view's colour once, in any order. Thread-safe.
   std::function<void(int view, const FusedColor& color)> deliver;
 };
 
-// Anchors are coloured by themselves (core/film/anchor_frames.h); a frame between them has what was
-// carried into it, as they have, and where that leaves it open the colours of the nearest anchor,
-// followed by motion. Frames of which motion does not follow enough are coloured by themselves,
-// too. Memory does not grow with the number of frames.
+// Anchors are coloured by their sources (core/film/anchor_frames.h). A frame between them has what
+// was carried into it, as they have; where that leaves it open, the colours of the nearest anchor,
+// followed by motion; and where motion does not tell, its own sources are asked. Memory does not
+// grow with the number of frames.
 void ColorFrames(const Scene& scene,
                  const ViewImages& images,
                  const FrameColoring& coloring,

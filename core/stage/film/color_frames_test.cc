@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -15,7 +14,7 @@ namespace color3d {
 namespace {
 
 constexpr int kWidth = 96, kHeight = 64, kFrames = 30;
-constexpr float kGuessed = 0.25f;
+constexpr double kPanPx = 1.2;  // from frame to frame
 
 // A picture that moves to the left, with nothing carried into its frames.
 class ColorFramesTest : public StageTest {
@@ -40,7 +39,7 @@ class ColorFramesTest : public StageTest {
     Image ab(kWidth, kHeight, 2);
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
-        ab.At(0, y, x) = static_cast<float>(30.0 * std::sin(0.1 * (x + 1.2 * frame)));
+        ab.At(0, y, x) = static_cast<float>(30.0 * std::sin(0.1 * (x + kPanPx * frame)));
         ab.At(1, y, x) = static_cast<float>(30.0 * std::cos(0.1 * y));
       }
     }
@@ -59,15 +58,17 @@ class ColorFramesTest : public StageTest {
     const ViewImages images(scene_, scratch_.path(), 500, 0);
     std::mutex mutex;
     std::map<int, FusedColor> delivered;
-    alone_.clear();
+    asked_.clear();
     FrameColoring coloring;
-    coloring.alone = [&](int view) {
-      const std::lock_guard lock(mutex);
-      alone_.push_back(view);
-      FusedColor color{TrueAb(view), Image(kWidth, kHeight, 3)};
-      std::fill_n(color.provenance.Plane(0), kWidth * kHeight, kGuessed);
-      std::fill_n(color.provenance.Plane(2), kWidth * kHeight, 1.0f - kGuessed);
-      return color;
+    coloring.sources = [&](int view, const Image&) {
+      return ColorSources{
+          [this, &mutex, view](const Image& l, const Image&) {
+            const std::lock_guard lock(mutex);
+            asked_.push_back(view);
+            return InferredColor{TrueAb(view), Image(l.width, l.height, 1, distance_)};
+          },
+          [view](const Image&) { return TrueAb(view); },
+          {}};
     };
     coloring.deliver = [&](int view, const FusedColor& color) {
       const std::lock_guard lock(mutex);
@@ -79,39 +80,49 @@ class ColorFramesTest : public StageTest {
   }
 
   Scene scene_;
-  std::vector<int> alone_;
+  std::vector<int> asked_;
+  float distance_ = 0.0f;  // of what is asked, as features go
 };
 
 TEST_F(ColorFramesTest, FramesBetweenTakeTheColoursOfAnchors) {
   AddFrames([](int frame, int x, int y) {
-    const double u = x + 1.2 * frame;
+    const double u = x + kPanPx * frame;
     return static_cast<float>(0.5 + 0.15 * std::sin(0.31 * u + 0.1 * y) +
                               0.15 * std::sin(0.23 * y - 0.17 * u));
   });
   const std::map<int, FusedColor> colors = Run(2);
-  EXPECT_LE(alone_.size(), 6u) << "of " << kFrames;
-  double worst = 0.0;
+  EXPECT_LT(asked_.size(), static_cast<size_t>(kFrames));
   for (const auto& [view, color] : colors) {
     const Image truth = TrueAb(view);
     double error = 0.0;
     for (size_t i = 0; i < truth.data.size(); ++i) {
       error += std::abs(color.ab.data[i] - truth.data[i]);
     }
-    worst = std::max(worst, error / static_cast<double>(truth.data.size()));
-    EXPECT_NEAR(color.provenance.At(0, 30, 50), kGuessed, 0.02) << view;
+    EXPECT_LT(error / static_cast<double>(truth.data.size()), 2.0) << view;
     EXPECT_NEAR(color.provenance.At(1, 30, 50), 0.0, 1e-6) << "nothing was seen: " << view;
-    EXPECT_NEAR(color.provenance.At(2, 30, 50), 1.0 - kGuessed, 0.02) << view;
   }
-  EXPECT_LT(worst, 2.0);
   const std::map<int, FusedColor> again = Run(1);
   for (const auto& [view, color] : colors) EXPECT_EQ(again.at(view).ab.data, color.ab.data);
+}
+
+TEST_F(ColorFramesTest, WhatStandsStillIsAskedOnceARun) {
+  AddFrames([](int, int x, int y) {
+    return static_cast<float>(0.5 + 0.2 * std::sin(0.3 * x) * std::sin(0.4 * y));
+  });
+  distance_ = 7.0f;  // so strange that six tenths are guessed
+  const std::map<int, FusedColor> colors = Run(2);
+  EXPECT_LE(asked_.size(), 3u) << "of " << kFrames;
+  for (const auto& [view, color] : colors) {
+    EXPECT_NEAR(color.provenance.At(0, 30, 50), 0.6, 0.05) << "what is guessed stays so: " << view;
+    EXPECT_NEAR(color.provenance.At(2, 30, 50), 0.4, 0.05) << view;
+  }
 }
 
 TEST_F(ColorFramesTest, WhatCannotBeFollowedIsColouredByItself) {
   Random random(1);
   AddFrames([&](int, int, int) { return static_cast<float>(random.NextUniform()); });
   Run(2);
-  EXPECT_EQ(alone_.size(), static_cast<size_t>(kFrames));
+  EXPECT_EQ(asked_.size(), static_cast<size_t>(kFrames));
 }
 
 }  // namespace
