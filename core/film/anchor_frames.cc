@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kSidePx = 160;        // pictures that are compared
+constexpr int kSidePx = 160;         // pictures that are compared
 constexpr double kFastShare = 0.03;  // of the pixels
 
 // What a tenth of the pixels exceeds, in longer sides.

@@ -16,7 +16,7 @@ namespace {
 constexpr int64_t kSectionBytes = int64_t{64} << 20;  // of colours that wait for each other
 constexpr int kColorChannels = 3;                     // a, b and the share that is guessed
 constexpr float kFollowed = 0.5f;                     // confidence from which motion tells
-constexpr double kWorthAsking = 0.02;                // share of a frame that is open
+constexpr double kWorthAsking = 0.02;                 // share of a frame that is open
 
 // An anchor's delivered colours, of which all are sure.
 CarriedColor AsKey(const FusedColor& fused) {
