@@ -29,16 +29,6 @@ Image Identity(int width, int height) {
   return place;
 }
 
-Image Sampled(const Image& image, const Image& place) {
-  Image out(place.width, place.height, image.channels);
-  for (int c = 0; c < image.channels; ++c) {
-    for (size_t i = 0; i < place.PlaneSize(); ++i) {
-      out.Plane(c)[i] = SampleBilinear(image, c, place.Plane(0)[i], place.Plane(1)[i]);
-    }
-  }
-  return out;
-}
-
 // Pixels of `flow` moved by it.
 Image Moved(const Image& flow) {
   Image place = Identity(flow.width, flow.height);
@@ -53,8 +43,8 @@ FilmTrack Step(const FilmTrack& track,
                const CancellationToken& cancel) {
   const Image there = DenseFlow(now, next);
   cancel.ThrowIfCancelled();
-  FilmTrack further{Sampled(track.in_key, Moved(DenseFlow(next, now))), track.in_frame};
-  const Image step = Sampled(there, track.in_frame);
+  FilmTrack further{SampledAt(track.in_key, Moved(DenseFlow(next, now))), track.in_frame};
+  const Image step = SampledAt(there, track.in_frame);
   for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
   return further;
 }
@@ -94,15 +84,15 @@ void Register(const Image& picture,
               Image* place) {
   constexpr float kMostPx = 6.0f;  // more is no drift but another thing
   constexpr float kLeastGain = 0.02f;
-  Image rest = DenseFlow(picture, Sampled(other, *place));
+  Image rest = DenseFlow(picture, SampledAt(other, *place));
   for (size_t i = 0; i < rest.PlaneSize(); ++i) {
     float& x = rest.Plane(0)[i];
     float& y = rest.Plane(1)[i];
     if (x * x + y * y > kMostPx * kMostPx) x = y = 0.0f;
   }
-  const Image registered = Sampled(*place, Moved(rest));
-  const Image before = Unlike(contrast, Sampled(other_contrast, *place));
-  const Image after = Unlike(contrast, Sampled(other_contrast, registered));
+  const Image registered = SampledAt(*place, Moved(rest));
+  const Image before = Unlike(contrast, SampledAt(other_contrast, *place));
+  const Image after = Unlike(contrast, SampledAt(other_contrast, registered));
   for (size_t i = 0; i < before.data.size(); ++i) {
     if (after.data[i] >= before.data[i] - kLeastGain) continue;
     for (int c = 0; c < 2; ++c) place->Plane(c)[i] = registered.Plane(c)[i];
@@ -121,8 +111,8 @@ Image ConfidenceOf(const Image& place,
                    const Image& contrast,
                    const Image& other_contrast,
                    const FilmCarryOptions& options) {
-  const Image unlike = Unlike(contrast, Sampled(other_contrast, place));
-  const Image returned = Sampled(back, place);
+  const Image unlike = Unlike(contrast, SampledAt(other_contrast, place));
+  const Image returned = SampledAt(back, place);
   const int width = contrast.width, height = contrast.height;
   Image confidence(width, height, 1);
   for (int y = 0; y < height; ++y) {
@@ -193,8 +183,8 @@ CarriedColor ColorOf(const FilmKey& key,
                      const Image& contrast,
                      const FilmTrack& track,
                      const FilmCarryOptions& options) {
-  CarriedColor color{Sampled(key.color.ab, track.in_key),
-                     Sampled(key.color.confidence, track.in_key)};
+  CarriedColor color{SampledAt(key.color.ab, track.in_key),
+                     SampledAt(key.color.confidence, track.in_key)};
   const Image followed =
       ConfidenceOf(track.in_key, track.in_frame, contrast, key_contrast, options);
   for (size_t i = 0; i < followed.data.size(); ++i) {

@@ -123,20 +123,10 @@ Image PlaceOnPlane(const cv::Matx33d& h, const Image& picture) {
   return place;
 }
 
-Image Sampled(const Image& image, const Image& place) {
-  Image out(place.width, place.height, image.channels);
-  for (int c = 0; c < image.channels; ++c) {
-    for (size_t i = 0; i < place.PlaneSize(); ++i) {
-      out.Plane(c)[i] = SampleBilinear(image, c, place.Plane(0)[i], place.Plane(1)[i]);
-    }
-  }
-  return out;
-}
-
 // Where the pixels of `picture` lie in `other`: on the plane, and flow around it.
 Image Refined(const cv::Matx33d& h, const Image& picture, const Image& other) {
   const Image place = PlaceOnPlane(h, picture);
-  const Image rest = DenseFlow(picture, Sampled(other, place));
+  const Image rest = DenseFlow(picture, SampledAt(other, place));
   Image out(picture.width, picture.height, 2);
   for (int y = 0; y < picture.height; ++y) {
     for (int x = 0; x < picture.width; ++x) {

@@ -20,4 +20,15 @@ inline float SampleBilinear(const Image& image, int channel, double x, double y)
   return std::lerp(top, bottom, fy);
 }
 
+// `image` at the places `place`, 2 channels of the result's size: x and y in px.
+inline Image SampledAt(const Image& image, const Image& place) {
+  Image out(place.width, place.height, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (size_t i = 0; i < place.PlaneSize(); ++i) {
+      out.Plane(c)[i] = SampleBilinear(image, c, place.Plane(0)[i], place.Plane(1)[i]);
+    }
+  }
+  return out;
+}
+
 }  // namespace color3d
