@@ -168,8 +168,9 @@ void TakeFoundAgain(const FoundAgain& again,
   const auto in_frame = [&](const FilmTrack& t) {
     return Places{t.in_frame, ConfidenceOf(t.in_frame, t.in_key, key_contrast, contrast, options)};
   };
-  Places of_frame = in_key(*track), of_key = in_frame(*track);
+  Places of_frame = in_key(*track);
   if (MeanOf(of_frame.confidence) > kFollowedEnough) return;
+  Places of_key = in_frame(*track);
   for (const FilmTrack& other : again.TracksTo(frame, cancel)) {
     cancel.ThrowIfCancelled();
     TakeWhereSurer(in_key(other), &of_frame);
@@ -221,22 +222,16 @@ std::vector<Walk> WalksOf(const FilmFrames& frames,
                           const std::vector<FilmKey>& keys,
                           const std::vector<FilmWalk>& done) {
   const int count = static_cast<int>(frames.shot.size());
-  std::vector<const FilmKey*> nearest(count, nullptr);
-  for (int i = 0; i < count; ++i) {
-    for (const FilmKey& key : keys) {
-      if (frames.shot[key.frame] != frames.shot[i]) continue;
-      if (nearest[i] == nullptr || std::abs(key.frame - i) < std::abs(nearest[i]->frame - i)) {
-        nearest[i] = &key;
-      }
-    }
-  }
+  std::vector<int> key_frames;
+  for (const FilmKey& key : keys) key_frames.push_back(key.frame);
+  const std::vector<int> nearest = NearestKeyFrames(frames.shot, key_frames);
   std::vector<Walk> walks;
   for (const FilmKey& key : keys) {
     for (const int direction : {1, -1}) {
       Walk walk{&key, direction, {}, {}};
       for (int i = key.frame + direction; i >= 0 && i < count; i += direction) {
         // Frames with faults lie between those of a shot.
-        if (nearest[i] == &key) walk.frames.push_back(i);
+        if (nearest[i] == key.frame) walk.frames.push_back(i);
       }
       TakeUp(done, &walk);
       if (!walk.frames.empty()) walks.push_back(std::move(walk));
@@ -250,6 +245,18 @@ std::vector<Walk> WalksOf(const FilmFrames& frames,
 }
 
 }  // namespace
+
+std::vector<int> NearestKeyFrames(const std::vector<int>& shot, const std::vector<int>& keys) {
+  std::vector<int> nearest(shot.size(), -1);
+  for (size_t i = 0; i < shot.size(); ++i) {
+    const int frame = static_cast<int>(i);
+    for (const int key : keys) {
+      if (shot[key] != shot[i]) continue;
+      if (nearest[i] < 0 || std::abs(key - frame) < std::abs(nearest[i] - frame)) nearest[i] = key;
+    }
+  }
+  return nearest;
+}
 
 void FilmCarryOptions::Validate() const {
   const RangeCheck check("film carry option");

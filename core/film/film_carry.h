@@ -53,6 +53,10 @@ struct FilmResume {
   std::function<void(const FilmWalk& walk)> on_walk;
 };
 
+// Of each frame the nearest of `keys` (frames; of two as near the one given first) in its shot; -1
+// where that has none.
+std::vector<int> NearestKeyFrames(const std::vector<int>& shot, const std::vector<int>& keys);
+
 // Colours every frame of the shots that have a key frame from the nearest of them, and hands it to
 // `on_frame` in any order, from several threads, one after the other. Frames of other shots are not
 // handed over. Memory does not grow with the number of frames. What comes of resumed walks is the

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/median.h"
+#include "core/film/tones_of_picture.h"
 
 namespace color3d {
 namespace {
@@ -17,26 +18,11 @@ constexpr double kCutUnlikeness = 0.55;
 constexpr double kCutOverUsual = 2.5;
 constexpr int kUsualFrames = 6;  // to either side
 
-struct Moments {
-  double mean = 0.0, deviation = 0.0;
-};
-
-Moments MomentsOf(const Image& image) {
-  double sum = 0.0, squares = 0.0;
-  for (const float v : image.data) {
-    sum += v;
-    squares += static_cast<double>(v) * v;
-  }
-  const double n = static_cast<double>(image.data.size());
-  const double mean = sum / n;
-  return {mean, std::sqrt(std::max(0.0, squares / n - mean * mean))};
-}
-
 Image Normalised(const Image& image) {
-  const Moments moments = MomentsOf(image);
+  const TonesOfPicture tones(image);
   Image out = image;
-  const double scale = 1.0 / std::max(kBlankDeviation, moments.deviation);
-  for (float& v : out.data) v = static_cast<float>((v - moments.mean) * scale);
+  const double scale = 1.0 / std::max(kBlankDeviation, tones.deviation);
+  for (float& v : out.data) v = static_cast<float>((v - tones.mean) * scale);
   return out;
 }
 
@@ -100,7 +86,7 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
         image.height != thumbnails[0].height || image.Empty()) {
       throw InvalidArgument("shots are told from pictures of one channel and one size");
     }
-    if (MomentsOf(image).deviation < kBlankDeviation) {
+    if (TonesOfPicture(image).deviation < kBlankDeviation) {
       result.fault[i] = FrameFault::kBlank;
     } else {
       kept.push_back(i);

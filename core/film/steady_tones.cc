@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/median.h"
+#include "core/film/tones_of_picture.h"
 #include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
@@ -43,17 +44,11 @@ double Mapped(double tone,
 
 // For flow: exposure and contrast do not count.
 Image ForFlow(const Image& picture) {
-  double sum = 0.0, squares = 0.0;
-  for (const float v : picture.data) {
-    sum += v;
-    squares += static_cast<double>(v) * v;
-  }
-  const double n = static_cast<double>(picture.data.size());
-  const double mean = sum / n;
-  const double deviation = std::sqrt(std::max(1.0, squares / n - mean * mean));
+  const TonesOfPicture tones(picture);
+  const double deviation = std::max(1.0, tones.deviation);
   Image out = picture;
   for (float& v : out.data) {
-    v = static_cast<float>(std::clamp(50.0 + 20.0 * (v - mean) / deviation, 0.0, 100.0));
+    v = static_cast<float>(std::clamp(50.0 + 20.0 * (v - tones.mean) / deviation, 0.0, 100.0));
   }
   return out;
 }

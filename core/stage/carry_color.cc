@@ -148,30 +148,26 @@ CarriedColor CarriedToFrame(const FilmFrames& frames,
                             int frame,
                             const FilmCarryOptions& options,
                             StageContext& context) {
-  const FilmKey* nearest = nullptr;
-  for (const FilmKey& key : keys) {
-    if (frames.shot[key.frame] != frames.shot[frame]) continue;
-    if (nearest == nullptr || std::abs(key.frame - frame) < std::abs(nearest->frame - frame)) {
-      nearest = &key;
-    }
-  }
   CarriedColor color;
-  if (nearest == nullptr) return color;
+  const int nearest = NearestKeyFrames(frames.shot, ViewsOf(keys, &FilmKey::frame))[frame];
+  if (nearest < 0) return color;
   // Only the frames between are walked along.
   FilmFrames between = frames;
   for (int i = 0; i < static_cast<int>(between.shot.size()); ++i) {
-    if (i < std::min(frame, nearest->frame) || i > std::max(frame, nearest->frame)) {
+    if (i < std::min(frame, nearest) || i > std::max(frame, nearest)) {
       between.shot[i] = -1 - i;
     }
   }
-  CarryAlongFilm(between,
-                 {*nearest},
-                 options,
-                 context.pool(),
-                 context.cancel(),
-                 [&](int at, const CarriedColor& carried) {
-                   if (at == frame) color = carried;
-                 });
+  CarryAlongFilm(
+      between,
+      {*std::find_if(
+          keys.begin(), keys.end(), [&](const FilmKey& key) { return key.frame == nearest; })},
+      options,
+      context.pool(),
+      context.cancel(),
+      [&](int at, const CarriedColor& carried) {
+        if (at == frame) color = carried;
+      });
   return color;
 }
 

@@ -11,10 +11,12 @@
 
 namespace color3d {
 
-ColorSources SourcesOf(const Colorizer& colorizer, Image position) {
+ColorSources SourcesOf(const Colorizer& colorizer,
+                       std::function<Image(const Image& luminance)> position) {
   return {
       [&colorizer, position = std::move(position)](const Image& luminance, const Image& known) {
-        ColorPrediction predicted = colorizer.Predict(luminance, {known, position});
+        ColorPrediction predicted =
+            colorizer.Predict(luminance, {known, position ? position(luminance) : Image()});
         return InferredColor{std::move(predicted.ab), std::move(predicted.distance)};
       },
       [](const Image& luminance) { return AutomaticColorizer::Embedded()->Colorize(luminance).ab; },
@@ -30,10 +32,11 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const ViewPositions positions(scene, context);
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
   const auto total = static_cast<int64_t>(scene.views.size());
-  const auto sources = [&](int number, const Image& luminance) {
-    return SourcesOf(
-        *colorizer,
-        positions.Of(number, images.WorkingCamera(number), luminance, images.Mask(number).get()));
+  const auto sources = [&](int number) {
+    return SourcesOf(*colorizer, [&, number](const Image& luminance) {
+      return positions.Of(
+          number, images.WorkingCamera(number), luminance, images.Mask(number).get());
+    });
   };
   std::mutex outputs;
   int64_t done = 0;
@@ -56,8 +59,7 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     const CarriedColor carried =
         ReadCarried(context, scene.views[index], luminance->width, luminance->height);
     ThreadPool one(1);
-    deliver(number,
-            ColorOfView(*luminance, carried, sources(number, *luminance), one, context.cancel()));
+    deliver(number, ColorOfView(*luminance, carried, sources(number), one, context.cancel()));
   });
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -118,8 +119,9 @@ void RunPersonalize(const ColorizerOptions& options,
 // that the colorizer was trained with.
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
 // Whom it asks for colours: the scene's colorizer, which must outlive the answer, and the embedded
-// automatic one.
-ColorSources SourcesOf(const Colorizer& colorizer, Image position = {});
+// automatic one. `position` gives PictureFacts' of the luminance; asked for with the colour.
+ColorSources SourcesOf(const Colorizer& colorizer,
+                       std::function<Image(const Image& luminance)> position = {});
 
 struct CorrectColorsOptions {
   // Parts of photos in the colours that they should have, later ones over earlier ones, at most 64:

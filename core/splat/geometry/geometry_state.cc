@@ -1,8 +1,42 @@
 #include "core/splat/geometry/geometry_state.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace color3d {
+
+std::string GeometryFingerprint(const GeometryProblem& problem,
+                                const GeometryOptions& options,
+                                int moments,
+                                int64_t initial_count) {
+  int64_t pixels = 0;
+  for (const PosedCamera& view : problem.training) {
+    pixels += int64_t{view.camera.width} * view.camera.height;
+  }
+  std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+                                 problem.colors ? 3 : 1,
+                                 moments,
+                                 options.iterations,
+                                 options.max_gaussians,
+                                 options.sh_degree,
+                                 options.time_limit_seconds,
+                                 options.ssim_weight,
+                                 options.edge_weight,
+                                 options.densify_gradient,
+                                 options.learning_rate_scale,
+                                 options.seed,
+                                 problem.training.size(),
+                                 problem.held_out.size(),
+                                 pixels,
+                                 problem.extent,
+                                 initial_count);
+  const GeometryTuning tuning = TuningOf(options);
+  VisitFields(tuning, [&](const char* name, const auto& value) {
+    text += fmt::format(" {}={}", name, value);
+  });
+  return text;
+}
 
 std::string SerializeGeometryState(const GeometryState& state, std::string_view fingerprint) {
   CheckpointWriter writer(fingerprint);

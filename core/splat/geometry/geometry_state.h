@@ -18,6 +18,13 @@ struct GeometryState : TrainingState {
   Exposures exposures;       // of the training views, in their order; empty: none are fitted
 };
 
+// Everything that the course of training depends on, but for the pictures themselves. `moments`: 1
+// where nothing may move; `initial_count`: Gaussians at the beginning.
+std::string GeometryFingerprint(const GeometryProblem& problem,
+                                const GeometryOptions& options,
+                                int moments,
+                                int64_t initial_count);
+
 // `fingerprint` says what the state belongs to (options, scene); a state is only read back with the
 // same one.
 std::string SerializeGeometryState(const GeometryState& state, std::string_view fingerprint);

@@ -97,33 +97,8 @@ class GeometryTrainer {
     return schedule_.Fraction(state_.iteration, earlier_seconds_ + clock_.TrainingSeconds());
   }
 
-  // Everything that the course of training depends on, but for the pictures themselves.
   std::string Fingerprint() const {
-    int64_t pixels = 0;
-    for (const PosedCamera& view : problem_.training) {
-      pixels += int64_t{view.camera.width} * view.camera.height;
-    }
-    std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
-                                   channels_,
-                                   MayMove() ? times_.steps : 1,
-                                   options_.iterations,
-                                   options_.max_gaussians,
-                                   options_.sh_degree,
-                                   options_.time_limit_seconds,
-                                   options_.ssim_weight,
-                                   options_.edge_weight,
-                                   options_.densify_gradient,
-                                   options_.learning_rate_scale,
-                                   options_.seed,
-                                   problem_.training.size(),
-                                   problem_.held_out.size(),
-                                   pixels,
-                                   problem_.extent,
-                                   initial_count_);
-    VisitFields(schedule_.tuning(), [&](const char* name, const auto& value) {
-      text += fmt::format(" {}={}", name, value);
-    });
-    return text;
+    return GeometryFingerprint(problem_, options_, MayMove() ? times_.steps : 1, initial_count_);
   }
 
   void Resume() {
@@ -154,6 +129,7 @@ class GeometryTrainer {
   }
 
   float UnitTime(const PosedCamera& view) const { return times_.UnitTime(view.time_s); }
+
   // All Gaussians at the view's moment.
   const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
     if (state_.moving.parameters.count() == 0) return state_.parameters;

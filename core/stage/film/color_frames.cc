@@ -48,16 +48,16 @@ InferredColor AnswerOf(const CarriedColor& from_anchor,
                        const Image& known,
                        const Image& luminance,
                        const ColorSources& sources) {
-  const size_t both = 2 * luminance.PlaneSize();
-  InferredColor answer{Image(luminance.width, luminance.height, 2),
-                       Image(luminance.width, luminance.height, 1)};
+  InferredColor answer;
   if (ShareOpen(known) > kWorthAsking) {
     answer = sources.infer(luminance, known);
   } else {
-    Image continued = from_anchor.ab, followed = from_anchor.confidence;
+    answer = {Image(luminance.width, luminance.height, 2),
+              Image(luminance.width, luminance.height, 1)};
+    Image followed = from_anchor.confidence;
     for (float& value : followed.data) value = value > kFollowed ? 1.0f : 0.0f;
-    FillHoles(followed, &continued);
-    std::copy_n(continued.data.begin(), both, answer.ab.data.begin());
+    std::copy_n(from_anchor.ab.data.begin(), answer.ab.data.size(), answer.ab.data.begin());
+    FillHoles(followed, &answer.ab);
   }
   for (size_t i = 0; i < luminance.PlaneSize(); ++i) {
     if (from_anchor.confidence.data[i] <= kFollowed) continue;
@@ -70,7 +70,7 @@ InferredColor AnswerOf(const CarriedColor& from_anchor,
 FusedColor ColorBetween(const Image& luminance,
                         const CarriedColor& carried,
                         const CarriedColor& from_anchor,
-                        ColorSources sources,
+                        const ColorSources& sources,
                         const CancellationToken& cancel) {
   ColorSources with_anchor = sources;
   with_anchor.infer = [&](const Image& l, const Image& carried_surely) {
@@ -116,23 +116,8 @@ class FramesColorer {
   }
 
  private:
-  // Each frame's nearest anchor, as CarryAlongFilm will see it.
-  std::vector<int> OwnersOf(const std::vector<int>& anchors) const {
-    std::vector<int> owner(frames_.shot.size(), -1);
-    for (size_t i = 0; i < owner.size(); ++i) {
-      const int frame = static_cast<int>(i);
-      for (const int anchor : anchors) {
-        if (frames_.shot[anchor] != frames_.shot[i]) continue;
-        if (owner[i] < 0 || std::abs(anchor - frame) < std::abs(owner[i] - frame)) {
-          owner[i] = anchor;
-        }
-      }
-    }
-    return owner;
-  }
-
   std::vector<Section> SectionsOf(const std::vector<int>& anchors) const {
-    const std::vector<int> owner = OwnersOf(anchors);
+    const std::vector<int> owner = NearestKeyFrames(frames_.shot, anchors);
     const Camera camera = images_.WorkingCamera(0);
     const int64_t bytes = int64_t{camera.width} * camera.height * (kColorChannels + 1) * 4;
     const auto at_once = std::max<int64_t>(
@@ -193,9 +178,9 @@ class FramesColorer {
     const auto luminance = images_.Luminance(view);
     const CarriedColor carried =
         ReadCarried(context_, scene_.views[view], luminance->width, luminance->height);
-    ColorSources sources = coloring_.sources(view, *luminance);
+    const ColorSources sources = coloring_.sources(view);
     if (from_anchor != nullptr) {
-      return ColorBetween(*luminance, carried, *from_anchor, std::move(sources), context_.cancel());
+      return ColorBetween(*luminance, carried, *from_anchor, sources, context_.cancel());
     }
     ThreadPool one(1);
     return ColorOfView(*luminance, carried, sources, one, context_.cancel());

@@ -12,7 +12,7 @@ namespace color3d {
 
 struct FrameColoring {
   // What a view's colour comes from beside what was carried into it. Thread-safe.
-  std::function<ColorSources(int view, const Image& luminance)> sources;
+  std::function<ColorSources(int view)> sources;
   // Takes each view's colour once, in any order. Thread-safe.
   std::function<void(int view, const FusedColor& color)> deliver;
 };

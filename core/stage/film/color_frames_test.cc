@@ -60,7 +60,7 @@ class ColorFramesTest : public StageTest {
     std::map<int, FusedColor> delivered;
     asked_.clear();
     FrameColoring coloring;
-    coloring.sources = [&](int view, const Image&) {
+    coloring.sources = [&](int view) {
       return ColorSources{
           [this, &mutex, view](const Image& l, const Image&) {
             const std::lock_guard lock(mutex);
