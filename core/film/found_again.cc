@@ -1,12 +1,12 @@
 #include "core/film/found_again.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
 #include "core/base/error.h"
+#include "core/image/feature_matches.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
 
@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kFeatures = 3000;
 constexpr double kLeastContrast = 0.02;  // of features: plain surfaces count, too
-constexpr float kLeastDistinct = 0.8f;  // distance to the nearest of that to the second (Lowe 2004)
 constexpr int kMostPlanes = 3;
 constexpr size_t kLeastOfPlane = 12;  // features
 constexpr double kOnPlanePx = 4.0;
@@ -33,48 +32,15 @@ struct Matches {
   std::vector<cv::Point2f> in_key, in_frame;
 };
 
-using Descriptors =
-    Eigen::Matrix<float, Eigen::Dynamic, LocalFeatures::kDimensions, Eigen::RowMajor>;
-
-Eigen::Map<const Descriptors> Rows(const LocalFeatures& features) {
-  return {features.descriptors.data(), features.count(), LocalFeatures::kDimensions};
-}
-
-// Those that are each other's nearest, and much nearer than the second.
 Matches MatchesOf(const LocalFeatures& key, const LocalFeatures& frame, const Image& picture) {
-  Matches matches;
-  if (key.count() < 2 || frame.count() < 2) return matches;
-  // Column i: likeness of feature i of the frame to each of the key frame.
-  const Eigen::MatrixXf products = Rows(key) * Rows(frame).transpose();
-  std::vector<Eigen::Index> best_of_key(key.count(), -1);
-  std::vector<float> best_product(key.count(), -1.0f);
-  for (Eigen::Index i = 0; i < products.cols(); ++i) {
-    for (Eigen::Index k = 0; k < products.rows(); ++k) {
-      if (!(products(k, i) > best_product[k])) continue;
-      best_product[k] = products(k, i);
-      best_of_key[k] = i;
-    }
-  }
-  const auto place = [&](const LocalFeatures& features, Eigen::Index i) {
+  const auto place = [&](const LocalFeatures& features, int i) {
     return cv::Point2f(features.positions[2 * i] + 0.5f * picture.width - 0.5f,
                        features.positions[2 * i + 1] + 0.5f * picture.height - 0.5f);
   };
-  for (Eigen::Index i = 0; i < products.cols(); ++i) {
-    Eigen::Index best = 0;
-    float second = -1.0f;
-    for (Eigen::Index k = 1; k < products.rows(); ++k) {
-      if (products(k, i) > products(best, i)) {
-        second = products(best, i);
-        best = k;
-      } else {
-        second = std::max(second, products(k, i));
-      }
-    }
-    if (best_of_key[best] != i) continue;
-    // Of unit length: |x - y|^2 = 2 - 2 x y.
-    if (1.0f - products(best, i) > kLeastDistinct * kLeastDistinct * (1.0f - second)) continue;
-    matches.in_key.push_back(place(key, best));
-    matches.in_frame.push_back(place(frame, i));
+  Matches matches;
+  for (const auto& [in_key, in_frame] : MutualMatches(key, frame)) {
+    matches.in_key.push_back(place(key, in_key));
+    matches.in_frame.push_back(place(frame, in_frame));
   }
   return matches;
 }

@@ -11,7 +11,7 @@
 
 #include "core/base/median.h"
 #include "core/base/random.h"
-#include "core/scene/sfm/photo_similarity.h"
+#include "core/image/feature_matches.h"
 
 namespace color3d {
 namespace {

@@ -28,9 +28,7 @@ class SimilarityTable {
   std::vector<float> values_;
 };
 
-// Features of a and b, by index, that are each other's nearest and clearly nearer than the second
-// (Lowe's ratio 0.8).
-std::vector<std::pair<int, int>> MutualMatches(const LocalFeatures& a, const LocalFeatures& b);
+// How many MutualMatches there are.
 int CountMutualMatches(const LocalFeatures& a, const LocalFeatures& b);
 
 // Matches of every pair, as pre-emptive matching does it (Wu 2013, "Towards linear-time incremental
