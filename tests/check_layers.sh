@@ -111,7 +111,7 @@ public core/report contact_sheet curves report_page scene_plan
 public core/scene camera frame_times import posed_films scene view_images formats/camera_file masks/masked_points masks/photo_masks
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/motion raster/render \
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
-  export/export export/glb/glb export/rgb_refine export/sog/sog export/spz/spz import/splat_scene
+  export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene
 public core/stage stages film/import_film formats/artifacts
 public core/video film_reader mp4_writer ticks
 public core/view view_page path/camera_path

@@ -84,7 +84,10 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   auto nap = std::chrono::milliseconds(1);
   while (true) {
     const pid_t done = ::waitpid(child, &status, WNOHANG);
-    if (done == child || (done < 0 && errno != EINTR)) break;
+    if (done == child) break;
+    if (done < 0 && errno != EINTR) {
+      throw Error(ErrorCode::kInternal, "cannot wait for {}: {}", program, strerror(errno));
+    }
     const auto elapsed = std::chrono::steady_clock::now() - start;
     if (!killed && (cancel.IsCancelled() || elapsed > options.timeout)) {
       result.timed_out = !cancel.IsCancelled();
@@ -96,6 +99,7 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   if (killed && !result.timed_out) cancel.ThrowIfCancelled();
+  result.signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   return result;
 }

@@ -19,6 +19,7 @@ struct SubprocessOptions {
 
 struct SubprocessResult {
   int exit_code = 0;  // 128 + signal when killed
+  int signal = 0;     // that killed it; 0: it ended by itself
   bool timed_out = false;
   double seconds = 0.0;
 };

@@ -65,8 +65,8 @@ const std::vector<Stage>& StageCatalogue() {
       {.kind = kind::kExport,
        .needs = {kScene, kModel},
        .reads = {kKeyView},
-       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kMoments, kViewPage, kExportScores},
-       .results = {kPly, kSog, kSpz, kGlb, kSplat, kMoments, kViewPage}},
+       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments, kViewPage, kExportScores},
+       .results = {kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments, kViewPage}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
        .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb},  // of films and what moves

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 
 #include "core/base/error.h"
 
@@ -80,6 +81,12 @@ std::vector<int> Scene::ViewsInOrderOfTime() const {
     return views[a].time_s() < views[b].time_s();
   });
   return order;
+}
+
+std::vector<double> Scene::Times() const {
+  std::set<double> times;
+  for (const View& view : views) times.insert(view.time_s());
+  return {times.begin(), times.end()};
 }
 
 std::vector<int> Scene::FramesOfShotOf(int view) const {

@@ -67,6 +67,8 @@ struct Scene {
   bool IsDynamic() const;
   // Indices of all views; those of one time, or without one, in their order.
   std::vector<int> ViewsInOrderOfTime() const;
+  // The views' different times, seconds, ascending.
+  std::vector<double> Times() const;
   // The views of that view's shot, in order of time. It must have a moment.
   std::vector<int> FramesOfShotOf(int view) const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.

@@ -9,6 +9,7 @@
 #include "core/splat/export/glb/glb.h"
 #include "core/splat/export/rgb_refine.h"
 #include "core/splat/export/sog/sog.h"
+#include "core/splat/export/splat4d/splat4d.h"
 #include "core/splat/export/spz/spz.h"
 #include "core/splat/motion/motion.h"
 #include "core/stage/formats/artifacts.h"
@@ -152,6 +153,12 @@ void RunExport(const ExportOptions& options, StageContext& context) {
     const RgbRefinement rgb = refined(DegreeZero(fitted));
     scores["splat"] = ScoresOf(rgb, names);
     context.WriteOutput(artifact::kSplat, EncodeSplat(model, rgb.harmonics, frame, context.pool()));
+  }
+  if (options.splat4d && in_time.motion.size() > 0) {
+    const int frames = std::min<int>(scene.Times().size(), kMaxSplat4dFrames);
+    const RgbHarmonics rgb = DegreeZero(FitRgbHarmonics(in_time, context.pool()));
+    context.WriteOutput(artifact::kSplat4d,
+                        EncodeSplat4d(in_time, rgb, frame, frames, context.pool()));
   }
   WriteMoments(options, in_time, frame, context);
   context.WriteOutput(artifact::kExportScores, scores.dump(1) + "\n");

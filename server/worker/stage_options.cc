@@ -176,6 +176,7 @@ ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   if (spec.has_spz_version()) options.spz_version = spec.spz_version();
   options.glb = spec.glb();
   options.splat = spec.splat();
+  if (spec.has_splat4d()) options.splat4d = spec.splat4d();
   options.confidence = spec.confidence();
   options.moments = spec.moments();
   return options;

@@ -93,8 +93,12 @@ void Complete(WorkerArguments* arguments) {
 std::atomic<bool> g_draining{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
-// The first signal drains, the second ends the process at once.
-void OnStopSignal(int) {
+// Drains, however often it is told to: a stop may reach a worker from the service manager, from the
+// server and, when that dies, from the kernel. What does not end is killed by the supervisor.
+void OnTerminate(int) { g_draining = true; }
+
+// A person at the terminal who asks twice means it.
+void OnInterrupt(int) {
   if (g_draining.exchange(true)) ::_exit(1);
 }
 
@@ -102,9 +106,10 @@ void OnStopSignal(int) {
 // main could block anything, and a signal that reaches one of them would kill the process.
 void HandleStopSignals() {
   struct sigaction action {};
-  action.sa_handler = OnStopSignal;
   action.sa_flags = SA_RESTART;
+  action.sa_handler = OnTerminate;
   ::sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = OnInterrupt;
   ::sigaction(SIGINT, &action, nullptr);
   ::signal(SIGPIPE, SIG_IGN);
 }

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <future>
 #include <utility>
@@ -52,6 +53,11 @@ void ColmapProcess::Note(const std::string& line) const {
   std::ofstream(log_, std::ios::app) << "color3d: " << line << "\n";
 }
 
+void ColmapProcess::Warn(const std::string& line) const {
+  Note(line);
+  run_.progress.OnWarning(line);
+}
+
 std::string ColmapProcess::Threads() const { return std::to_string(run_.pool.thread_count()); }
 
 int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPhase& phase) {
@@ -85,6 +91,17 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   }
   const SubprocessResult result = running.get();
   if (result.timed_out) ThrowTooSlow();
+  if (result.signal != 0) {
+    throw Error(
+        ErrorCode::kUnavailable,
+        "colmap {} was ended by signal {} ({}), which says nothing of the photos; most often "
+        "memory has run out: use fewer photos or fewer features, or a machine with more; "
+        "log: {}",
+        arguments.at(0),
+        result.signal,
+        ::strsignal(result.signal),
+        log_.filename().string());
+  }
   return result.exit_code;
 }
 

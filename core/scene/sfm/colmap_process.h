@@ -27,11 +27,14 @@ class ColmapProcess {
   const std::filesystem::path& log() const { return log_; }
   // Adds a line of our own to the log.
   void Note(const std::string& line) const;
+  // ... and tells the user.
+  void Warn(const std::string& line) const;
   // The value of COLMAP's thread options.
   std::string Threads() const;
 
   // Runs `colmap arguments...` and returns the exit code. Throws Error: kDeadlineExceeded,
-  // kCancelled, kFailedPrecondition when COLMAP is not installed.
+  // kCancelled, kUnavailable when a signal ended it (that is no answer, and worth another attempt),
+  // kFailedPrecondition when COLMAP is not installed.
   int Run(const std::vector<std::string>& arguments, const ColmapPhase& phase);
   // Another exit code than 0 is Error{kInternal} with the last line of the log.
   void RunOrThrow(const std::vector<std::string>& arguments, const ColmapPhase& phase);

@@ -105,6 +105,7 @@ std::optional<ColmapModel> MapPhotos(ColmapProcess& colmap,
       {"refining cameras", "Bundle adjustment report", 1});
   std::optional<ColmapModel> better;
   if (code == 0) better = BestModel(refined.parent_path(), &where);
+  if (!better) colmap.Warn("the cameras could not be refined after they were placed");
   return better ? std::move(better) : std::move(best);
 }
 

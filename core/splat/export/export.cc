@@ -8,6 +8,7 @@
 #include <cstring>
 #include <numeric>
 
+#include "core/splat/export/bytes.h"
 #include "core/splat/model/spherical_harmonics.h"
 
 namespace color3d {
@@ -46,10 +47,6 @@ std::string PlyHeader(size_t count,
 }
 
 float Opacity(float logit) { return 1.0f / (1.0f + std::exp(-logit)); }
-
-uint8_t Byte(float value) {
-  return static_cast<uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f)));
-}
 
 // Largest volume times opacity first; ties by index.
 std::vector<uint32_t> ByImportance(const ViewerGaussians& g) {
@@ -113,9 +110,9 @@ std::string EncodeSplat(const GaussianModel& model,
     for (int k = 0; k < 3; ++k) floats[3 + k] = std::exp(g.log_scale[3 * i + k]);
     uint8_t tail[8];
     const float* sh = g.sh.data() + static_cast<size_t>(i) * coefficients * 3;
-    for (int c = 0; c < 3; ++c) tail[c] = Byte(255.0f * (0.5f + kShDc * sh[c]));
-    tail[3] = Byte(255.0f * Opacity(g.opacity_logit[i]));
-    for (int k = 0; k < 4; ++k) tail[4 + k] = Byte(128.0f + 128.0f * g.rotation[4 * i + k]);
+    for (int c = 0; c < 3; ++c) tail[c] = ColorByte(sh[c]);
+    tail[3] = OpacityByte(g.opacity_logit[i]);
+    for (int k = 0; k < 4; ++k) tail[4 + k] = RotationByte(g.rotation[4 * i + k]);
     std::memcpy(out, floats, sizeof(floats));
     std::memcpy(out + sizeof(floats), tail, sizeof(tail));
     out += kSplatBytes;

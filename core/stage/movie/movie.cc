@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <set>
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
@@ -23,13 +22,6 @@ namespace {
 constexpr int kFocusSidePx = 256;              // of the picture that tells how far the scene is
 constexpr int64_t kMaxFileBytes = 64ll << 20;  // of cameras
 constexpr int kLeastSidePx = 16;
-
-// Different ones, ascending.
-std::vector<double> TimesOf(const Scene& scene) {
-  std::set<double> times;
-  for (const View& view : scene.views) times.insert(view.time_s());
-  return {times.begin(), times.end()};
-}
 
 // The one whose picture says how the movie's looks and how far away things are.
 int HomeView(const Scene& scene, const StageContext& context) {
@@ -65,7 +57,7 @@ std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene
 // Where that view's camera stood, at all moments.
 std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
   std::vector<PathCamera> cameras;
-  for (const double time_s : TimesOf(scene)) {
+  for (const double time_s : scene.Times()) {
     cameras.push_back({scene.views[home].camera, scene.views[home].cam_from_world, time_s});
   }
   return cameras;
@@ -74,7 +66,7 @@ std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
 // The moment that each frame shows, where the frames are not those of the film: all of the scene's
 // time, and back where the path comes back.
 void SetTimes(const RenderOptions& options, const Scene& scene, std::vector<PathCamera>* frames) {
-  const std::vector<double> times = TimesOf(scene);
+  const std::vector<double> times = scene.Times();
   const double last = std::max<double>(1.0, static_cast<double>(frames->size()) - 1.0);
   for (size_t i = 0; i < frames->size(); ++i) {
     double share = static_cast<double>(i) / last;
@@ -170,7 +162,7 @@ double RateOf(const RenderOptions& options,
   if (!own) return options.frames_per_second;
   const double step = std::abs(frames[1].time_s - frames[0].time_s);
   // Times may also count from 0 to 1 for the whole.
-  const bool seconds = frames.size() > 2 && TimesOf(scene).back() > 1.0;
+  const bool seconds = frames.size() > 2 && scene.Times().back() > 1.0;
   return seconds && step > 0.0 ? std::clamp(1.0 / step, 1.0, 120.0) : options.frames_per_second;
 }
 

@@ -1,7 +1,6 @@
 #include "core/splat/export/spz/spz.h"
 
 #include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -9,8 +8,10 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/splat/export/bytes.h"
 #include "core/splat/export/little_endian.h"
 #include "core/splat/export/morton.h"
+#include "core/splat/export/zstd.h"
 #include "core/splat/model/spherical_harmonics.h"
 
 namespace color3d {
@@ -26,12 +27,7 @@ constexpr float kScaleSteps = 16.0f;  // a unit of the logarithm
 // Steps of bytes of which 128 are 1.
 constexpr int kFirstDegreeStep = 8;
 constexpr int kRestStep = 16;
-constexpr int kZstdLevel = 12;
 constexpr std::array<float, 3> kFlip = {1.0f, -1.0f, -1.0f};
-
-char Byte(float value) {
-  return static_cast<char>(static_cast<uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f))));
-}
 
 // As many as keep the farthest coordinate within 24 bits.
 int FractionalBits(const std::vector<float>& position) {
@@ -76,8 +72,7 @@ std::string Positions(const ViewerGaussians& g, int fractional_bits) {
 
 std::string Opacities(const ViewerGaussians& g) {
   std::string bytes;
-  for (const float logit : g.opacity_logit)
-    bytes.push_back(Byte(255.0f / (1.0f + std::exp(-logit))));
+  for (const float logit : g.opacity_logit) bytes.push_back(static_cast<char>(OpacityByte(logit)));
   return bytes;
 }
 
@@ -86,7 +81,7 @@ std::string Colors(const ViewerGaussians& g) {
   std::string bytes;
   for (size_t i = 0; i < g.size(); ++i) {
     for (int c = 0; c < 3; ++c) {
-      bytes.push_back(Byte(255.0f * (0.5f + kColorScale * g.sh[i * row + c])));
+      bytes.push_back(static_cast<char>(Byte(255.0f * (0.5f + kColorScale * g.sh[i * row + c]))));
     }
   }
   return bytes;
@@ -94,7 +89,8 @@ std::string Colors(const ViewerGaussians& g) {
 
 std::string Scales(const ViewerGaussians& g) {
   std::string bytes;
-  for (const float s : g.log_scale) bytes.push_back(Byte(kScaleSteps * (s - kLowestLogScale)));
+  for (const float s : g.log_scale)
+    bytes.push_back(static_cast<char>(Byte(kScaleSteps * (s - kLowestLogScale))));
   return bytes;
 }
 
@@ -131,7 +127,7 @@ std::string FirstThree(const ViewerGaussians& g) {
   for (size_t i = 0; i < g.size(); ++i) {
     const std::array<float, 4> q = FlippedRotation(g, i);
     const float factor = q[3] < 0.0f ? -127.5f : 127.5f;
-    for (int k = 0; k < 3; ++k) bytes.push_back(Byte(127.5f + factor * q[k]));
+    for (int k = 0; k < 3; ++k) bytes.push_back(static_cast<char>(Byte(127.5f + factor * q[k])));
   }
   return bytes;
 }
@@ -157,7 +153,7 @@ std::string Harmonics(const ViewerGaussians& g) {
       const auto step = static_cast<float>(k < 4 ? kFirstDegreeStep : kRestStep);
       for (int c = 0; c < 3; ++c) {
         const float value = std::clamp(sign[k] * sh[3 * k + c], -2.0f, 2.0f);
-        bytes.push_back(Byte(128.0f + step * std::round(128.0f * value / step)));
+        bytes.push_back(static_cast<char>(Byte(128.0f + step * std::round(128.0f * value / step))));
       }
     }
   }
@@ -181,17 +177,6 @@ std::string Gzip(const std::string& plain) {
   packed.resize(stream.total_out);
   deflateEnd(&stream);
   if (code != Z_STREAM_END) throw Error(ErrorCode::kInternal, "zlib ended with {}", code);
-  return packed;
-}
-
-std::string Zstd(const std::string& plain) {
-  std::string packed(ZSTD_compressBound(plain.size()), '\0');
-  const size_t size =
-      ZSTD_compress(packed.data(), packed.size(), plain.data(), plain.size(), kZstdLevel);
-  if (ZSTD_isError(size) != 0) {
-    throw Error(ErrorCode::kResourceExhausted, "zstd: {}", ZSTD_getErrorName(size));
-  }
-  packed.resize(size);
   return packed;
 }
 

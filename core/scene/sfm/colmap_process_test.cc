@@ -1,0 +1,57 @@
+#include "core/scene/sfm/colmap_process.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "tests/support/quiet_run.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+
+// A program of that name stands in for COLMAP, which cannot be made to die when it is asked to.
+class ColmapProcessTest : public testing::Test {
+ protected:
+  ColmapProcessTest() {
+    const char* path = std::getenv("PATH");
+    before_ = path != nullptr ? path : "";
+    ::setenv("PATH", (scratch_.path().string() + ":" + before_).c_str(), 1);
+  }
+  ~ColmapProcessTest() override { ::setenv("PATH", before_.c_str(), 1); }
+
+  int Run(const std::string& script) {
+    const fs::path program = scratch_.path() / "colmap";
+    std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
+    fs::permissions(program, fs::perms::owner_all);
+    ColmapProcess colmap(scratch_.path() / "log.txt", std::chrono::seconds(60), run_.control());
+    return colmap.Run({"mapper"}, {"placing cameras", "Registering image", 3});
+  }
+
+  ScratchFolder scratch_;
+  QuietRun run_;
+  std::string before_;
+};
+
+TEST_F(ColmapProcessTest, AnExitCodeIsAnAnswer) {
+  EXPECT_EQ(Run("exit 0"), 0);
+  EXPECT_EQ(Run("exit 3"), 3);
+}
+
+TEST_F(ColmapProcessTest, DeathByASignalIsNone) {
+  for (const char* signal : {"KILL", "ABRT", "TERM"}) {
+    try {
+      Run(std::string("kill -") + signal + " $$");
+      FAIL() << signal;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::kUnavailable) << signal;
+      EXPECT_NE(std::string(e.what()).find("colmap mapper"), std::string::npos) << e.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace color3d
