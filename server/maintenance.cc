@@ -3,7 +3,9 @@
 #include <signal.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <set>
 
 #include "core/base/error.h"
 
@@ -20,6 +22,36 @@ void ExpireDeadWorkers(JobStore& store) {
   }
 }
 
+Scrubber::Result Scrubber::Scrub(int64_t bytes, const std::function<bool()>& stop) {
+  std::vector<FileDigest> blobs;
+  blobs_.ForEach([&](const StoredBlob& blob) {
+    blobs.push_back(blob.digest);
+    return !stop();
+  });
+  std::sort(blobs.begin(), blobs.end(), [](const FileDigest& a, const FileDigest& b) {
+    return a.sha256 < b.sha256;
+  });
+  const auto first =
+      std::upper_bound(blobs.begin(), blobs.end(), last_, [](const auto& last, const auto& blob) {
+        return last < blob.sha256;
+      });
+  std::rotate(blobs.begin(), first, blobs.end());
+  Result result;
+  for (const FileDigest& blob : blobs) {
+    if (result.bytes >= bytes || stop()) break;
+    result.bytes += blob.size_bytes;
+    last_ = blob.sha256;
+    try {
+      if (IsIntact(blobs_, blob)) continue;
+      blobs_.SetAside(blob.sha256);
+      result.damaged.push_back(blob.sha256);
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::kNotFound) throw;  // removed since
+    }
+  }
+  return result;
+}
+
 Maintenance::Maintenance(JobStore& store,
                          BlobStore& blobs,
                          UploadStore& uploads,
@@ -31,8 +63,10 @@ Maintenance::Maintenance(JobStore& store,
       uploads_(uploads),
       paths_(paths),
       clock_(clock),
-      timing_(timing) {
-  thread_ = std::thread([this] { Loop(); });
+      timing_(timing),
+      scrubber_(blobs) {
+  reaper_ = std::thread([this] { Repeat([this] { return Reap(); }); });
+  sweeper_ = std::thread([this] { Repeat([this] { return Sweep(); }); });
 }
 
 Maintenance::~Maintenance() {
@@ -41,36 +75,77 @@ Maintenance::~Maintenance() {
     stopping_ = true;
   }
   wake_.notify_all();
-  thread_.join();
+  reaper_.join();
+  sweeper_.join();
 }
 
-void Maintenance::Loop() {
-  using SteadyClock = std::chrono::steady_clock;
-  auto next_sweep = SteadyClock::now();
-  std::unique_lock lock(mutex_);
-  do {
-    lock.unlock();
-    try {
-      const int reaped = store_.ReapExpired();
-      if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
-      if (SteadyClock::now() >= next_sweep) {
-        next_sweep = SteadyClock::now() + timing_.sweep;
-        Sweep();
-      }
-    } catch (const std::exception& e) {
-      spdlog::error("maintenance: {}", e.what());
+bool Maintenance::IsStopping() {
+  std::lock_guard lock(mutex_);
+  return stopping_;
+}
+
+void Maintenance::Repeat(const std::function<std::chrono::milliseconds()>& chore) {
+  while (true) {
+    const std::chrono::milliseconds pause = chore();
+    std::unique_lock lock(mutex_);
+    if (wake_.wait_for(lock, pause, [this] { return stopping_; })) return;
+  }
+}
+
+std::chrono::milliseconds Maintenance::Reap() {
+  try {
+    const int reaped = store_.ReapExpired();
+    if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
+  } catch (const std::exception& e) {
+    spdlog::error("cannot look after leases: {}", e.what());
+  }
+  return timing_.reap;
+}
+
+std::chrono::milliseconds Maintenance::Sweep() {
+  try {
+    const int uploads = uploads_.ReapOlderThan(timing_.grace);
+    if (uploads > 0) spdlog::info("swept {} unfinished uploads", uploads);
+    CollectBlobs();
+    SweepScratch();
+    const auto before = [this](std::chrono::milliseconds age) { return clock_() - age.count(); };
+    store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
+    const Scrubber::Result scrubbed =
+        scrubber_.Scrub(timing_.scrub_bytes, [this] { return IsStopping(); });
+    for (const std::string& sha256 : scrubbed.damaged) {
+      spdlog::error(
+          "the blob {} was damaged on the disk and is set aside{}",
+          sha256,
+          store_.IsReferenced(sha256) ? "; what names it needs it uploaded or made again" : "");
     }
-    lock.lock();
-  } while (!wake_.wait_for(lock, timing_.reap, [this] { return stopping_; }));
+    return timing_.sweep;
+  } catch (const std::exception& e) {
+    spdlog::error("the sweep failed and is tried again soon: {}", e.what());
+    return timing_.sweep_again;
+  }
 }
 
-void Maintenance::Sweep() {
-  const int uploads = uploads_.ReapOlderThan(timing_.grace);
-  const BlobStore::Sweep swept = blobs_.RemoveUnreferenced(store_.ReferencedBlobs(), timing_.grace);
-  SweepScratch();
-  const auto before = [this](std::chrono::milliseconds age) { return clock_() - age.count(); };
-  store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
-  spdlog::info("swept {} blobs ({} MiB) and {} uploads", swept.removed, swept.bytes >> 20, uploads);
+// In two phases: what nothing names is noted, and removed when it is still so, and untouched, after
+// the time of grace. Whoever puts or looks for a blob touches it, before he names it.
+void Maintenance::CollectBlobs() {
+  std::vector<StoredBlob> blobs;
+  blobs_.ForEach([&](const StoredBlob& blob) {
+    blobs.push_back(blob);
+    return !IsStopping();
+  });
+  if (IsStopping()) return;
+  const std::set<std::string> named = store_.ReferencedBlobs();
+  std::erase_if(blobs, [&](const StoredBlob& blob) { return named.contains(blob.digest.sha256); });
+  std::vector<BlobCandidate> unnamed;
+  for (const StoredBlob& blob : blobs) unnamed.push_back({blob.digest.sha256, blob.touched_ns});
+  int removed = 0;
+  const std::chrono::milliseconds grace = timing_.grace;
+  for (const BlobCandidate& due : store_.AgeCandidates(unnamed, grace.count())) {
+    if (store_.IsReferenced(due.sha256)) continue;
+    if (blobs_.RemoveIfUntouched({{due.sha256, 0}, due.touched_ns})) ++removed;
+  }
+  const int leftovers = blobs_.RemoveLeftovers(timing_.grace);
+  if (removed + leftovers > 0) spdlog::info("swept {} blobs, {} left-overs", removed, leftovers);
 }
 
 // Folders "<job id>-<epoch>" of attempts that no longer run.

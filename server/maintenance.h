@@ -1,10 +1,12 @@
-// The server's chores, on a thread of its own: expired leases, dead uploads, unreferenced blobs,
-// left-over scratch folders, old events.
+// The server's chores. Leases are looked after on a thread of their own, so that nothing that takes
+// long or waits can keep a lost job from going on.
 #pragma once
 
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <mutex>
+#include <string>
 #include <thread>
 
 #include "server/storage/blob_store.h"
@@ -16,15 +18,35 @@ namespace color3d {
 
 struct MaintenanceTiming {
   std::chrono::milliseconds reap{5'000};
-  std::chrono::hours sweep{24};
-  std::chrono::seconds grace{24 * 3600};    // of unreferenced blobs and dead uploads
-  std::chrono::hours keep_events{30 * 24};  // after the job's end
+  std::chrono::milliseconds sweep{3600 * 1000};
+  std::chrono::milliseconds sweep_again{60'000};  // after one that failed
+  std::chrono::seconds grace{24 * 3600};          // of unreferenced blobs and dead uploads
+  std::chrono::hours keep_events{30 * 24};        // after the job's end
   std::chrono::hours keep_request_ids{7 * 24};
+  int64_t scrub_bytes = int64_t{2} << 30;  // read and compared with their digests at each sweep
+};
+
+// Blobs whose bytes are no longer those of their digest are set aside, so that an upload or another
+// run puts good ones in their place. Goes round all blobs in the order of their digests. Not
+// thread-safe.
+class Scrubber {
+ public:
+  explicit Scrubber(BlobStore& blobs) : blobs_(blobs) {}
+  struct Result {
+    int64_t bytes = 0;
+    std::vector<std::string> damaged;
+  };
+  // Goes on where the last call ended, for about so many bytes; `stop` is asked between blobs.
+  Result Scrub(int64_t bytes, const std::function<bool()>& stop);
+
+ private:
+  BlobStore& blobs_;
+  std::string last_;
 };
 
 class Maintenance {
  public:
-  // Sweeps once at once, then every `sweep`. `store` is used from the chore thread.
+  // Sweeps once at once, then every `sweep`. What is given must outlive this object.
   Maintenance(JobStore& store,
               BlobStore& blobs,
               UploadStore& uploads,
@@ -36,9 +58,13 @@ class Maintenance {
   Maintenance& operator=(const Maintenance&) = delete;
 
  private:
-  void Loop();
-  void Sweep();
+  // Does the chore, waits as long as it says, and so on until the end.
+  void Repeat(const std::function<std::chrono::milliseconds()>& chore);
+  std::chrono::milliseconds Reap();
+  std::chrono::milliseconds Sweep();
+  void CollectBlobs();
   void SweepScratch();
+  bool IsStopping();
 
   JobStore& store_;
   BlobStore& blobs_;
@@ -46,10 +72,11 @@ class Maintenance {
   const DataPaths paths_;
   const Clock clock_;
   const MaintenanceTiming timing_;
+  Scrubber scrubber_;
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;
-  std::thread thread_;
+  std::thread reaper_, sweeper_;
 };
 
 // Leases of worker processes that are gone (the whole machine or the server was killed) end now.

@@ -19,8 +19,8 @@
 #include "server/ops/process.h"
 #include "server/ops/socket_folder.h"
 #include "server/rpc/rpc_server.h"
-#include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
+#include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/worker/supervisor.h"
@@ -83,6 +83,8 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   const std::vector<std::string> model_flags = ToFlags(models);
   setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
   setup.max_stopped = Milliseconds(3.0 * options.lease_seconds);
+  setup.max_stopped_holding = Milliseconds(options.lease_seconds / 6.0);
+  setup.max_silent = Milliseconds(std::max(3.0 * options.lease_seconds, 60.0));
   setup.max_backoff = std::chrono::milliseconds(options.worker_backoff_ms);
   setup.first_backoff = std::min(setup.first_backoff, setup.max_backoff);
   return setup;
@@ -179,14 +181,13 @@ void Serve(const ServeOptions& options) {
   const SocketFolder sockets(paths.Sockets());
   const Clock clock = SystemClock();
   StoreOptions store_options;
+  store_options.program_version = COLOR3D_VERSION;
   store_options.retry_backoff_ms = options.retry_backoff_ms;
   store_options.max_attempts = options.max_attempts;
-  // RPCs and background threads do not wait for each other's connection.
-  SqliteJobStore store(paths.Store(), clock, store_options);
-  SqliteJobStore background(paths.Store(), clock, store_options);
+  SqliteJobStore store(paths.Store(), StoreRole::kServer, SystemClocks(), store_options);
   BlobStoreOptions blob_options;
   blob_options.reserve_bytes = options.reserve_mib << 20;
-  BlobStore blobs(paths.Blobs(), blob_options);
+  FileBlobStore blobs(paths.Blobs(), blob_options);
   RpcServerOptions rpc;
   rpc.listen = options.listen;
   rpc.version = COLOR3D_VERSION;
@@ -196,7 +197,7 @@ void Serve(const ServeOptions& options) {
   const auto prober = std::make_shared<BackendProber>(models.backends);
   rpc.probe_backends = [prober] { return ProbeForInfo(*prober); };
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
-  ExpireDeadWorkers(background);
+  ExpireDeadWorkers(store);
 
   RpcServer server(rpc, store, blobs, uploads, clock);
   if (!options.port_file.empty()) WriteFileAtomic(options.port_file, server.address() + "\n");
@@ -204,8 +205,8 @@ void Serve(const ServeOptions& options) {
   chores.reap = std::clamp(Milliseconds(options.lease_seconds / 10.0),
                            std::chrono::milliseconds(100),
                            std::chrono::milliseconds(5'000));
-  Maintenance maintenance(background, blobs, uploads, paths, clock, chores);
-  Supervisor supervisor(worker_setup, background);
+  Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
+  Supervisor supervisor(worker_setup, store);
   spdlog::info("listening on {}, data in {}, {} workers",
                server.address(),
                paths.root.string(),

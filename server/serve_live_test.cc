@@ -223,6 +223,36 @@ TEST_F(LiveProcessTest, APictureThatKillsTheWorkerIsNotSentToTheNextOne) {
   EXPECT_TRUE(live.Close().ok());
 }
 
+// A client that sends what was lost again, as it is told to.
+TEST_F(LiveProcessTest, APictureThatKillsWorkersIsFoundAndTakesNoOtherWithItAgain) {
+  Start();
+  LiveStream live(client());
+  const Request example = Example();
+  std::map<std::string, std::string> words = {{"poison", "crash"}};
+  for (int i = 0; i < 6; ++i) words["good" + std::to_string(i)] = "slow," + std::to_string(i);
+  std::map<std::string, int> lost;
+  for (const auto& [id, word] : words) live.Send(example, id, word);
+  for (int answers = 0; !words.empty() && answers < 40; ++answers) {
+    const Response response = live.Read();
+    const std::string id = response.request_id();
+    if (!response.has_error()) {
+      EXPECT_TRUE(id.starts_with("good"));
+      words.erase(id);
+    } else if (ReasonOfError(response.error()) == "INFERENCE_LOST") {
+      EXPECT_LT(++lost[id], 3) << id;
+      live.Send(example, id, words.at(id));
+    } else {
+      EXPECT_EQ(ReasonOfError(response.error()), "PICTURE_KILLS_WORKER");
+      EXPECT_EQ(id, "poison");
+      words.erase(id);
+    }
+  }
+  EXPECT_TRUE(words.empty());
+  EXPECT_EQ(lost["poison"], 2);
+  for (const auto& [id, count] : lost) EXPECT_LE(count, id == "poison" ? 2 : 1) << id;
+  EXPECT_TRUE(live.Close().ok());
+}
+
 TEST_F(LiveProcessTest, ASlowReaderHoldsBoundedMemoryAndLosesNothing) {
   Start();
   constexpr int kPictures = 150;  // of 1 MiB each when coloured

@@ -215,7 +215,7 @@ TEST_F(ProcessTest, TerminationReleasesTheJobAndTheNextServerGoesOn) {
     EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
   }
   {
-    SqliteDatabase db(scratch_.path() / "data" / "jobs.db");
+    SqliteDatabase db(scratch_.path() / "data" / "jobs.db", SqliteAccess::kWrite);
     SqliteStatement job(db.handle(), "select state, attempt from job where name=?");
     job.Bind(name);
     ASSERT_TRUE(job.Step());
@@ -364,6 +364,46 @@ TEST_F(ProcessTest, FrozenWorkerIsKilled) {
   EXPECT_EQ(client.WaitFinished(name).state(), v1::Job::STATE_SUCCEEDED);
 }
 
+// One worker that stops in the middle of a write must not cost the others their attempts.
+TEST_F(ProcessTest, WorkerThatFreezesInsideAWriteCostsNobodyElseAnAttempt) {
+  ServerProcess server(scratch_.path(), {"--lease-seconds", "6", "--heartbeat-seconds", "1"}, 2);
+  TestClient& client = server.client();
+  const std::string scene = client.MakeScene().name();
+  const std::string healthy = client.Create(ScriptedSpec(scene, "steps=80,ms=100", 1)).name();
+  WaitForStep(client, healthy, 2);
+  const std::string freezing =
+      client.Create(ScriptedSpec(scene, "freeze_writing,steps=2", 2)).name();
+  // Reads are answered all the while.
+  for (int i = 0; i < 20; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    client.Get(healthy);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(1));
+    SleepMs(100);
+  }
+  const v1::Job job = client.WaitFinished(healthy);
+  EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
+  EXPECT_EQ(job.attempt(), 1);
+  EXPECT_EQ(client.WaitFinished(freezing).state(), v1::Job::STATE_SUCCEEDED);
+}
+
+// The service manager, the server and the kernel may each tell a worker to end.
+TEST_F(ProcessTest, WorkersDrainHoweverOftenTheyAreTold) {
+  ServerProcess server(scratch_.path(), {});
+  TestClient& client = server.client();
+  const std::string name =
+      client.Create(ScriptedSpec(client.MakeScene().name(), "steps=20,ms=100")).name();
+  WaitForStep(client, name, 3);
+  const pid_t worker = server.Workers().at(0);
+  for (int i = 0; i < 5; ++i) {
+    ::kill(worker, SIGTERM);
+    SleepMs(5);
+  }
+  const v1::Job job = client.WaitFinished(name);
+  EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
+  EXPECT_EQ(job.attempt(), 1) << "a drain does not count";
+  EXPECT_EQ(ParseTrace(client.Download(job.artifacts(0).digest())).processes.size(), 2u);
+}
+
 TEST_F(ProcessTest, ChaosEveryEffectExactlyOnce) {
   constexpr int kJobs = 8;
   constexpr int kSteps = 12;  // of 150 ms: every job outlives its lease of one second
@@ -402,7 +442,7 @@ TEST_F(ProcessTest, ChaosEveryEffectExactlyOnce) {
       << "negative control: what is not fenced does repeat";
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait(), 0);
-  SqliteDatabase db(scratch_.path() / "data" / "jobs.db");
+  SqliteDatabase db(scratch_.path() / "data" / "jobs.db", SqliteAccess::kWrite);
   SqliteStatement wins(db.handle(),
                        "select count(*), count(distinct job_id) from job_attempt "
                        "where outcome='SUCCEEDED'");

@@ -68,7 +68,7 @@ TEST(RpcError, TellsWhatMaySucceedLater) {
   EXPECT_TRUE(overloaded.IsTransient());
   EXPECT_FALSE(overloaded.IsUnreachable());
   const RpcError draining(DetailedStatus(grpc::StatusCode::UNAVAILABLE, "DRAINING"));
-  EXPECT_FALSE(draining.IsTransient());
+  EXPECT_TRUE(draining.IsTransient()) << "it may be back soon, with the same jobs";
   const RpcError wrong(grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "x", "not a status"));
   EXPECT_FALSE(wrong.IsTransient());
   EXPECT_EQ(wrong.reason(), "");

@@ -55,9 +55,7 @@ RpcError::RpcError(const grpc::Status& status)
   }
 }
 
-bool RpcError::IsTransient() const {
-  return grpc_code_ == grpc::StatusCode::UNAVAILABLE && reason_ != "DRAINING";
-}
+bool RpcError::IsTransient() const { return grpc_code_ == grpc::StatusCode::UNAVAILABLE; }
 
 bool RpcError::IsUnreachable() const {
   const bool code = grpc_code_ == grpc::StatusCode::UNAVAILABLE ||

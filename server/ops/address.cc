@@ -1,5 +1,8 @@
 #include "server/ops/address.h"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+
 #include "core/base/error.h"
 
 namespace color3d {
@@ -19,7 +22,11 @@ HostPort SplitHostPort(const std::string& text) {
 bool IsLoopback(const std::string& address) {
   if (address.starts_with("unix:")) return true;
   const std::string host = SplitHostPort(address).host;
-  return host == "localhost" || host == "::1" || host.starts_with("127.");
+  if (host == "localhost") return true;
+  in_addr v4{};
+  if (::inet_pton(AF_INET, host.c_str(), &v4) == 1) return ntohl(v4.s_addr) >> 24u == 127u;
+  in6_addr v6{};
+  return ::inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6) != 0;
 }
 
 }  // namespace color3d

@@ -56,7 +56,7 @@ grpc::ServerUnaryReactor* BlobServiceImpl::FindMissingBlobs(
     grpc::CallbackServerContext* context,
     const v1::FindMissingBlobsRequest* request,
     v1::FindMissingBlobsResponse* response) {
-  return AnswerUnary(parts_,
+  return AnswerUnary(parts_.slow,
                      context,
                      request,
                      response,

@@ -21,14 +21,14 @@ constexpr int64_t kReadChunkBytes = 256 << 10;
 class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
  public:
   BlobReader(const RpcParts& parts, const ReadRequest& request) : parts_(parts), request_(request) {
-    parts_.executor.Post([this] { Step(); });
+    parts_.quick.Post([this] { Step(); });
   }
   ~BlobReader() override {
     if (fd_ >= 0) ::close(fd_);
   }
   void OnWriteDone(bool ok) override {
     if (!ok) return Finish(grpc::Status::CANCELLED);
-    parts_.executor.Post([this] { Step(); });
+    parts_.quick.Post([this] { Step(); });
   }
   // Called after Finish and after the last Step, which was what finished.
   void OnDone() override { delete this; }
@@ -40,12 +40,14 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     const grpc::Status status = Guard([&] {
       if (fd_ < 0) Open();
       more = NextChunk();
+      if (!more) RequireIntact();
     });
     if (!status.ok() || !more) return Finish(status);
     StartWrite(&response_);
   }
 
   void Open() {
+    place_ = parts_.streams.reads.Take();
     const FileDigest digest = ParseBlobName(request_.resource_name());
     if (!parts_.blobs.Touch(digest)) {
       throw ServiceError(
@@ -62,8 +64,13 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
                          digest.size_bytes);
     }
     offset_ = request_.read_offset();
+    is_whole_ = offset_ == 0;
+    sha256_ = digest.sha256;
     end_ = digest.size_bytes;
-    if (request_.read_limit() > 0) end_ = std::min(end_, offset_ + request_.read_limit());
+    if (request_.read_limit() > 0) {
+      is_whole_ &= request_.read_limit() >= end_;
+      end_ = std::min(end_, offset_ + request_.read_limit());
+    }
     fd_ = ::open(parts_.blobs.Fetch(digest.sha256).c_str(), O_RDONLY | O_CLOEXEC);
     if (fd_ < 0) throw Error(ErrorCode::kInternal, "cannot open a stored blob");
   }
@@ -78,7 +85,21 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     }
     data->resize(static_cast<size_t>(got));
     offset_ += got;
+    if (is_whole_) sent_.Update(*data);
     return true;
+  }
+
+  // What was sent from its first to its last byte is known to be what was stored, or said not to
+  // be.
+  void RequireIntact() {
+    if (!is_whole_ || sent_.FinishHex() == sha256_) return;
+    parts_.blobs.SetAside(sha256_);
+    throw ServiceError(
+        ErrorCode::kDataLoss,
+        "BLOB_DAMAGED",
+        "'{}' was damaged on the server's disk and is set aside; upload it again, or "
+        "run the job anew with skip_cache",
+        request_.resource_name());
   }
 
   const RpcParts& parts_;
@@ -87,6 +108,10 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   int fd_ = -1;
   int64_t offset_ = 0;
   int64_t end_ = 0;
+  bool is_whole_ = false;
+  std::string sha256_;
+  Sha256 sent_;
+  StreamLimit::Place place_;
 };
 
 class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
@@ -95,7 +120,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     StartRead(&request_);
   }
   void OnReadDone(bool ok) override {
-    parts_.executor.Post([this, ok] { ok ? Consume() : EndOfStream(); });
+    parts_.slow.Post([this, ok] { ok ? Consume() : EndOfStream(); });
   }
   void OnDone() override { delete this; }
 
@@ -116,6 +141,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
                             parts_.limits.max_chunk_bytes);
     }
     if (!writer_) {
+      place_ = parts_.streams.writes.Take();
       const UploadName name = ParseUploadName(request_.resource_name());
       const UploadStatus status = parts_.uploads.Status(name);
       if (status.complete) {  // somebody else has stored the same bytes
@@ -149,6 +175,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   WriteRequest request_;
   std::string resource_;
   std::unique_ptr<UploadStore::Writer> writer_;
+  StreamLimit::Place place_;
 };
 
 }  // namespace
@@ -167,7 +194,7 @@ grpc::ServerUnaryReactor* ByteStreamServiceImpl::QueryWriteStatus(
     grpc::CallbackServerContext* context,
     const google::bytestream::QueryWriteStatusRequest* request,
     google::bytestream::QueryWriteStatusResponse* response) {
-  return AnswerUnary(parts_,
+  return AnswerUnary(parts_.slow,
                      context,
                      request,
                      response,

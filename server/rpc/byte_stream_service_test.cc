@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
@@ -76,6 +78,29 @@ TEST_F(ByteStreamServiceTest, HostileResourceNames) {
     EXPECT_EQ(WriteAt(resource, 0, "x", false).error_code(), grpc::StatusCode::INVALID_ARGUMENT)
         << resource;
   }
+}
+
+// A disk that returns other bytes: the client is told, and an upload heals it.
+TEST_F(ByteStreamServiceTest, DamagedBlobsAreSaidToBeAndHealed) {
+  const std::string content(700'000, 'x');
+  const v1::Digest digest = client_->Upload(content);
+  const auto file = blobs_.Fetch(digest.sha256());
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  std::fstream(file, std::ios::in | std::ios::out | std::ios::binary).seekp(5) << 'y';
+  const auto read = [&] {
+    grpc::ClientContext context;
+    google::bytestream::ReadRequest request;
+    request.set_resource_name("blobs/" + digest.sha256() + "/700000");
+    auto stream = client_->bytes->Read(&context, request);
+    google::bytestream::ReadResponse response;
+    while (stream->Read(&response)) {
+    }
+    return ReasonOfStatus(stream->Finish());
+  };
+  EXPECT_EQ(read(), "BLOB_DAMAGED");
+  EXPECT_EQ(read(), "BLOB_MISSING");
+  client_->Upload(content);
+  EXPECT_EQ(client_->Download(digest), content);
 }
 
 }  // namespace

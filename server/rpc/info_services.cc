@@ -59,7 +59,7 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::GetColorizer(grpc::CallbackServe
                                                              const v1::GetColorizerRequest* request,
                                                              v1::Colorizer* response) {
   return AnswerUnary(
-      parts_, context, request, response, [this](const auto& in, v1::Colorizer* out) {
+      parts_.quick, context, request, response, [this](const auto& in, v1::Colorizer* out) {
         CheckName(in.name(), "colorizers");
         *out = ToProto(parts_.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
       });
@@ -70,7 +70,11 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
     const v1::ListColorizersRequest* request,
     v1::ListColorizersResponse* response) {
   return AnswerUnary(
-      parts_, context, request, response, [this](const auto& in, v1::ListColorizersResponse* out) {
+      parts_.quick,
+      context,
+      request,
+      response,
+      [this](const auto& in, v1::ListColorizersResponse* out) {
         if (!in.scene().empty()) CheckName(in.scene(), "scenes");
         AnswerPage(
             in,
@@ -91,34 +95,35 @@ ColorizerServiceImpl::ColorizeImages(grpc::CallbackServerContext* context) {
 grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerContext* context,
                                                            const v1::GetServerInfoRequest* request,
                                                            v1::ServerInfo* response) {
-  return AnswerUnary(parts_, context, request, response, [this](const auto&, v1::ServerInfo* out) {
-    out->set_version(parts_.version);
-    for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
-    v1::Limits* limits = out->mutable_limits();
-    limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
-    limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);
-    limits->set_max_pixels_per_image(parts_.limits.max_pixels_per_image);
-    limits->set_max_image_side_px(parts_.limits.max_image_side_px);
-    limits->set_max_unfinished_jobs(parts_.limits.max_unfinished_jobs);
-    limits->set_max_chunk_bytes(parts_.limits.max_chunk_bytes);
-    for (const WorkerRecord& worker : parts_.store.ListWorkers()) {
-      v1::WorkerInfo* entry = out->add_workers();
-      entry->set_worker_id(worker.worker_id);
-      entry->set_pid(worker.pid);
-      entry->set_job(worker.job);
-      entry->set_memory_bytes(worker.memory_bytes);
-      entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
-    }
-    ListPresets(out);
-    ListModels(parts_, out);
-    ListBackends(parts_, out);
-    out->set_draining(parts_.draining.load());
-    out->set_memory_bytes(ResidentMemoryBytes());
-    out->set_disk_free_bytes(parts_.blobs.FreeBytes());
-    const JobCounts counts = parts_.store.CountJobs();
-    out->set_queued_jobs(counts.queued);
-    out->set_running_jobs(counts.running);
-  });
+  return AnswerUnary(
+      parts_.slow, context, request, response, [this](const auto&, v1::ServerInfo* out) {
+        out->set_version(parts_.version);
+        for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
+        v1::Limits* limits = out->mutable_limits();
+        limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
+        limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);
+        limits->set_max_pixels_per_image(parts_.limits.max_pixels_per_image);
+        limits->set_max_image_side_px(parts_.limits.max_image_side_px);
+        limits->set_max_unfinished_jobs(parts_.limits.max_unfinished_jobs);
+        limits->set_max_chunk_bytes(parts_.limits.max_chunk_bytes);
+        for (const WorkerRecord& worker : parts_.store.ListWorkers()) {
+          v1::WorkerInfo* entry = out->add_workers();
+          entry->set_worker_id(worker.worker_id);
+          entry->set_pid(worker.pid);
+          entry->set_job(worker.job);
+          entry->set_memory_bytes(worker.memory_bytes);
+          entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
+        }
+        ListPresets(out);
+        ListModels(parts_, out);
+        ListBackends(parts_, out);
+        out->set_draining(parts_.draining.load());
+        out->set_memory_bytes(ResidentMemoryBytes());
+        out->set_disk_free_bytes(parts_.blobs.FreeBytes());
+        const JobCounts counts = parts_.store.CountJobs();
+        out->set_queued_jobs(counts.queued);
+        out->set_running_jobs(counts.running);
+      });
 }
 
 }  // namespace color3d

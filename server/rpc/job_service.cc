@@ -162,7 +162,7 @@ void ListJobPage(const RpcParts& parts,
 grpc::ServerUnaryReactor* JobServiceImpl::CreateJob(grpc::CallbackServerContext* context,
                                                     const v1::CreateJobRequest* request,
                                                     v1::Job* response) {
-  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+  return AnswerUnary(parts_.slow, context, request, response, [this](const auto& in, v1::Job* out) {
     *out = ToProto(CreateJobRecord(parts_, in));
   });
 }
@@ -170,17 +170,18 @@ grpc::ServerUnaryReactor* JobServiceImpl::CreateJob(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* JobServiceImpl::GetJob(grpc::CallbackServerContext* context,
                                                  const v1::GetJobRequest* request,
                                                  v1::Job* response) {
-  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
-    CheckName(in.name(), "jobs");
-    *out = ToProto(parts_.store.GetJob(in.name()));
-  });
+  return AnswerUnary(
+      parts_.quick, context, request, response, [this](const auto& in, v1::Job* out) {
+        CheckName(in.name(), "jobs");
+        *out = ToProto(parts_.store.GetJob(in.name()));
+      });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::ListJobs(grpc::CallbackServerContext* context,
                                                    const v1::ListJobsRequest* request,
                                                    v1::ListJobsResponse* response) {
   return AnswerUnary(
-      parts_, context, request, response, [this](const auto& in, v1::ListJobsResponse* out) {
+      parts_.quick, context, request, response, [this](const auto& in, v1::ListJobsResponse* out) {
         ListJobPage(parts_, in, out);
       });
 }
@@ -188,7 +189,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::ListJobs(grpc::CallbackServerContext* 
 grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext* context,
                                                     const v1::CancelJobRequest* request,
                                                     v1::Job* response) {
-  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+  return AnswerUnary(parts_.slow, context, request, response, [this](const auto& in, v1::Job* out) {
     CheckName(in.name(), "jobs");
     *out = ToProto(parts_.store.Cancel(in.name(), KeyOf("CancelJob", in)));
     spdlog::info("[job={}] cancellation asked for", in.name());
@@ -198,10 +199,11 @@ grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext*
 grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* context,
                                                    const v1::RetryJobRequest* request,
                                                    v1::Job* response) {
-  return AnswerUnary(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+  return AnswerUnary(parts_.slow, context, request, response, [this](const auto& in, v1::Job* out) {
     CheckName(in.name(), "jobs");
     RequireNotDraining(parts_);
-    *out = ToProto(parts_.store.Retry(in.name(), in.from_scratch(), KeyOf("RetryJob", in)));
+    *out = ToProto(parts_.store.Retry(
+        in.name(), in.from_scratch(), KeyOf("RetryJob", in), parts_.limits.max_unfinished_jobs));
     spdlog::info("[job={}] retried", in.name());
   });
 }
@@ -210,7 +212,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext*
                                                     const v1::DeleteJobRequest* request,
                                                     v1::DeleteJobResponse* response) {
   return AnswerUnary(
-      parts_, context, request, response, [this](const auto& in, v1::DeleteJobResponse*) {
+      parts_.slow, context, request, response, [this](const auto& in, v1::DeleteJobResponse*) {
         CheckName(in.name(), "jobs");
         parts_.store.Delete(in.name(), KeyOf("DeleteJob", in));
       });

@@ -14,6 +14,7 @@
 
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/executor.h"
+#include "server/rpc/stream_limit.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/job_store.h"
@@ -28,6 +29,10 @@ struct ServiceLimits {
   int max_image_side_px = 30'000;
   int max_unfinished_jobs = 2'000;
   int max_chunk_bytes = 2 << 20;
+  // Streams that may be open at once.
+  int max_watches = 1'000;
+  int max_reads = 256;
+  int max_writes = 128;
 };
 
 // What a backend said of itself, or why it did not.
@@ -39,14 +44,20 @@ struct BackendState {
   int64_t max_pixels = 0;
   std::string problem;
 };
-// By name; blocks a few seconds at most, and is called from any thread of the executor.
+// By name; blocks a few seconds at most, and is called from any thread of an executor.
 using BackendProbe = std::function<std::map<std::string, BackendState>()>;
+
+struct StreamLimits {
+  StreamLimit watches, reads, writes;
+};
 
 struct RpcParts {
   JobStore& store;
   BlobStore& blobs;
   UploadStore& uploads;
-  Executor& executor;
+  Executor& quick;  // reads of the job store and of the disk's cache: what answers GetJob
+  Executor& slow;   // what hashes, syncs, writes or asks others
+  StreamLimits& streams;
   const std::atomic<bool>& draining;
   ServiceLimits limits;
   Clock clock;
@@ -56,15 +67,15 @@ struct RpcParts {
   BackendProbe probe_backends;
 };
 
-// Answers a unary call from the executor: `body(request, response)` may block and throw.
+// Answers a unary call from that executor: `body(request, response)` may block and throw.
 template <typename Request, typename Response, typename Body>
-grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
+grpc::ServerUnaryReactor* AnswerUnary(Executor& executor,
                                       grpc::CallbackServerContext* context,
                                       const Request* request,
                                       Response* response,
                                       Body body) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const bool accepted = parts.executor.TryPost([reactor, request, response, body] {
+  const bool accepted = executor.TryPost([reactor, request, response, body] {
     reactor->Finish(Guard([&] { body(*request, response); }));
   });
   if (!accepted) reactor->Finish(OverloadedStatus());

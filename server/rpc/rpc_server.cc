@@ -75,11 +75,17 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                      const Clock& clock) {
   CheckAddress(options.listen);
   digests_ = std::make_unique<FileDigests>();
-  executor_ = std::make_unique<Executor>(options.executor_threads);
+  quick_ = std::make_unique<Executor>(options.quick_threads);
+  slow_ = std::make_unique<Executor>(options.slow_threads);
+  streams_.reset(new StreamLimits{{"watches", options.limits.max_watches},
+                                  {"downloads", options.limits.max_reads},
+                                  {"uploads", options.limits.max_writes}});
   parts_.reset(new RpcParts{store,
                             blobs,
                             uploads,
-                            *executor_,
+                            *quick_,
+                            *slow_,
+                            *streams_,
                             draining_,
                             options.limits,
                             clock,
@@ -136,7 +142,8 @@ void RpcServer::Shutdown(std::chrono::milliseconds grace) {
   server_->Wait();
   server_.reset();
   hub_.reset();  // its streams are all done now
-  executor_.reset();
+  quick_.reset();
+  slow_.reset();
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// All gRPC services on one port. Owns the services, the executor and the watch hub.
+// All gRPC services on one port. Owns the services, the executors and the watch hub.
 #pragma once
 
 #include <atomic>
@@ -18,7 +18,8 @@ namespace color3d {
 
 struct RpcServerOptions {
   std::string listen = "127.0.0.1:50551";  // port 0: any free one
-  int executor_threads = 6;
+  int quick_threads = 4;
+  int slow_threads = 6;
   ServiceLimits limits;
   WatchTiming watch;
   std::string version = "0";
@@ -53,7 +54,8 @@ class RpcServer {
   std::string address_;
   std::atomic<bool> draining_{false};
   std::unique_ptr<FileDigests> digests_;
-  std::unique_ptr<Executor> executor_;
+  std::unique_ptr<Executor> quick_, slow_;
+  std::unique_ptr<StreamLimits> streams_;
   std::unique_ptr<RpcParts> parts_;
   std::unique_ptr<WatchHub> hub_;
   std::unique_ptr<ColorizeHub> colorize_hub_;

@@ -22,7 +22,11 @@ TEST_F(RpcServerTest, BusyAddressIsExplained) {
   EXPECT_TRUE(IsLoopback("127.0.0.1:1"));
   EXPECT_TRUE(IsLoopback("[::1]:1"));
   EXPECT_TRUE(IsLoopback("unix:color3d.sock"));
+  EXPECT_TRUE(IsLoopback("127.8.0.9:1"));
+  EXPECT_TRUE(IsLoopback("localhost:1"));
   EXPECT_FALSE(IsLoopback("0.0.0.0:1"));
+  EXPECT_FALSE(IsLoopback("127.0.0.1.example.org:1"));
+  EXPECT_FALSE(IsLoopback("127.1:1")) << "no address; names that begin so may be anybody's";
   EXPECT_THROW(IsLoopback("nonsense"), Error);
 }
 

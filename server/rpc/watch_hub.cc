@@ -29,7 +29,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   void Start(const std::shared_ptr<JobWatcher>& self) {
     self_ = self;
     hub_.Register(self);
-    parts_.executor.Post([self] { self->Begin(); });
+    parts_.quick.Post([self] { self->Begin(); });
   }
 
   // From the poller: something happened to these jobs.
@@ -96,6 +96,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   // On the executor: checks the request, then sends the present state or goes on from a revision.
   void Begin() {
     const grpc::Status status = Guard([&] {
+      place_ = parts_.streams.watches.Take();
       const int interval =
           request_.has_min_progress_interval_ms() ? request_.min_progress_interval_ms() : 500;
       if (interval < 50 || interval > 60'000) {
@@ -232,13 +233,14 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     }
     if (next == Next::kWrite) StartWrite(&current_);
     if (next == Next::kFinish) Finish(status);
-    if (next == Next::kFetch) parts_.executor.Post([self] { self->Fetch(); });
+    if (next == Next::kFetch) parts_.quick.Post([self] { self->Fetch(); });
   }
 
   WatchHub& hub_;
   const RpcParts& parts_;
   const v1::WatchJobsRequest request_;
   std::shared_ptr<JobWatcher> self_;
+  StreamLimit::Place place_;
 
   std::mutex mutex_;
   std::vector<int64_t> ids_;  // fixed once begun_
@@ -311,7 +313,7 @@ void WatchHub::Loop() {
     lock.unlock();
     try {
       Poll();
-    } catch (const Error& e) {
+    } catch (const std::exception& e) {
       spdlog::warn("cannot read job events: {}", e.what());
     }
     lock.lock();

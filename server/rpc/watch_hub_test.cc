@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <thread>
+
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
@@ -107,6 +110,37 @@ TEST_F(WatchHubTest, ManyWatchersOfWhichSomeStall) {
   }
   for (size_t i = 1; i < streams.size(); i += 2) contexts[i]->TryCancel();
   for (size_t i = 1; i < streams.size(); i += 2) streams[i]->Finish();
+}
+
+TEST_F(WatchHubTest, StreamsAreLimited) {
+  const std::string name =
+      client_->Create(ScriptedSpec(client_->MakeScene().name(), "steps=1")).name();
+  v1::WatchJobsRequest request;
+  request.add_names(name);
+  struct Open {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReader<v1::JobEvent>> stream;
+  };
+  std::vector<std::unique_ptr<Open>> open;
+  v1::JobEvent event;
+  const auto watch = [&] {
+    auto one = std::make_unique<Open>();
+    one->stream = client_->jobs->WatchJobs(&one->context, request);
+    if (!one->stream->Read(&event)) return one->stream->Finish();
+    open.push_back(std::move(one));
+    return grpc::Status::OK;
+  };
+  for (int i = 0; i < kMaxWatches; ++i) ASSERT_TRUE(watch().ok()) << i;
+  const grpc::Status refused = watch();
+  EXPECT_EQ(ReasonOfStatus(refused), "TOO_MANY_STREAMS");
+  EXPECT_TRUE(HasRetryInfo(refused));
+  open.back()->context.TryCancel();
+  open.pop_back();
+  grpc::Status again;
+  for (int i = 0; i < 200 && !(again = watch()).ok(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(again.ok());
 }
 
 }  // namespace

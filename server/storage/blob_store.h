@@ -1,55 +1,91 @@
-// Content-addressed files: blobs/ab/cd/<sha256>, read-only, each written to a temporary file on the
-// same filesystem, synced and renamed. Thread-safe; several processes may share the folder.
+// Content-addressed bytes: what is stored under a SHA-256 digest never changes. Thread-safe;
+// several processes may share a store.
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <set>
+#include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "core/base/digest.h"
 
 namespace color3d {
 
-struct BlobStoreOptions {
-  // Writes are refused (kResourceExhausted, STORAGE_FULL) when less than this would stay free.
-  int64_t reserve_bytes = int64_t{256} << 20;
+// Disk space that is promised to something that is still being written. Given back when it is
+// destroyed. Not thread-safe.
+class SpaceReservation {
+ public:
+  SpaceReservation() = default;
+  SpaceReservation(std::shared_ptr<std::atomic<int64_t>> total, int64_t bytes)
+      : total_(std::move(total)), bytes_(bytes) {}
+  ~SpaceReservation() { Use(bytes_); }
+  SpaceReservation(SpaceReservation&& other) noexcept
+      : total_(std::move(other.total_)), bytes_(std::exchange(other.bytes_, 0)) {}
+  SpaceReservation& operator=(SpaceReservation&& other) noexcept {
+    std::swap(total_, other.total_);
+    std::swap(bytes_, other.bytes_);
+    return *this;
+  }
+
+  // So many bytes are on the disk now.
+  void Use(int64_t bytes) {
+    const int64_t used = std::min(bytes, bytes_);
+    if (total_) *total_ -= used;
+    bytes_ -= used;
+  }
+
+ private:
+  std::shared_ptr<std::atomic<int64_t>> total_;
+  int64_t bytes_ = 0;
+};
+
+struct StoredBlob {
+  FileDigest digest;
+  int64_t touched_ns = 0;  // changes with every Put and Touch; only equality means something
 };
 
 class BlobStore {
  public:
-  explicit BlobStore(const std::filesystem::path& folder, BlobStoreOptions options = {});
+  virtual ~BlobStore() = default;
 
-  // Whether the blob is there with this size; keeps it from the sweep for another grace period.
-  bool Touch(const FileDigest& digest) const;
-  // Path of the read-only file. Throws Error{kNotFound, BLOB_MISSING}.
-  std::filesystem::path Fetch(const std::string& sha256) const;
-  FileDigest PutBytes(std::string_view bytes);
+  // Whether the blob is there with this size; also says that somebody counts on it
+  // (RemoveIfUntouched).
+  virtual bool Touch(const FileDigest& digest) const = 0;
+  // Path of a read-only file. Throws Error{kNotFound, BLOB_MISSING}.
+  virtual std::filesystem::path Fetch(const std::string& sha256) const = 0;
+  // Good bytes take the place of damaged ones.
+  virtual FileDigest PutBytes(std::string_view bytes) = 0;
   // Moves the file in (same filesystem; the original is gone afterwards).
-  FileDigest PutFile(const std::filesystem::path& file);
+  virtual FileDigest PutFile(const std::filesystem::path& file) = 0;
   // As PutFile, for a file whose digest the caller has just computed.
-  void Adopt(const std::filesystem::path& file, const FileDigest& digest);
-  void Remove(const std::string& sha256);
+  virtual void Adopt(const std::filesystem::path& file, const FileDigest& digest) = 0;
+  virtual void Remove(const std::string& sha256) = 0;
+  // Sets a blob aside of which the bytes are no longer those of its digest: it is missing from then
+  // on, so that an upload puts good bytes in its place.
+  virtual void SetAside(const std::string& sha256) = 0;
 
   // Throws Error{kResourceExhausted, STORAGE_FULL} when `bytes` more would not leave the reserve.
-  void RequireSpace(int64_t bytes) const;
-  int64_t FreeBytes() const;
+  virtual void RequireSpace(int64_t bytes) const = 0;
+  // The same, and keeps them from others of this process until they are used.
+  virtual SpaceReservation Reserve(int64_t bytes) = 0;
+  // Less what is reserved.
+  virtual int64_t FreeBytes() const = 0;
 
-  struct Sweep {
-    int removed = 0;
-    int64_t bytes = 0;
-  };
-  // Removes blobs older than `grace` that are not in `referenced`. What is put or touched after
-  // `referenced` was read is younger than that, and stays.
-  Sweep RemoveUnreferenced(const std::set<std::string>& referenced, std::chrono::seconds grace);
-
- private:
-  std::filesystem::path PathOf(const std::string& sha256) const;
-
-  std::filesystem::path folder_;
-  BlobStoreOptions options_;
+  // Every blob, until `visit` returns false.
+  virtual void ForEach(const std::function<bool(const StoredBlob&)>& visit) const = 0;
+  // False when it was touched since, when it is gone, or when somebody uses the store just now.
+  virtual bool RemoveIfUntouched(const StoredBlob& blob) = 0;
+  // Files that a crash left half-written, and what was set aside, older than `age`; how many.
+  virtual int RemoveLeftovers(std::chrono::seconds age) = 0;
 };
+
+// Whether the bytes are those of the digest. Throws Error{kNotFound, BLOB_MISSING}.
+bool IsIntact(const BlobStore& blobs, const FileDigest& digest);
 
 }  // namespace color3d

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -16,6 +17,7 @@ namespace fs = std::filesystem;
 
 void PrepareDataFolder(const DataPaths& paths) {
   std::error_code error;
+  const bool is_fresh = !fs::exists(paths.root, error);
   for (const fs::path& folder :
        {paths.root, paths.Blobs(), paths.Uploads(), paths.Scratch(), paths.Logs()}) {
     fs::create_directories(folder, error);
@@ -25,6 +27,11 @@ void PrepareDataFolder(const DataPaths& paths) {
                   "its permissions",
                   folder.string(),
                   error ? error.message() : "it is not a folder");
+    }
+    // Scenes are their owner's: the folder is closed to others, and a fresh one to the group, too.
+    struct stat status {};
+    if (folder == paths.root && ::stat(folder.c_str(), &status) == 0) {
+      ::chmod(folder.c_str(), is_fresh ? 0700 : status.st_mode & 07770u);
     }
     const fs::path probe = folder / ".write-test";
     const int fd = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
@@ -41,7 +48,7 @@ void PrepareDataFolder(const DataPaths& paths) {
 }
 
 DataFolderLock::DataFolderLock(const DataPaths& paths) {
-  fd_ = ::open(paths.Lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  fd_ = ::open(paths.Lock().c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (fd_ < 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot open {}: {}",

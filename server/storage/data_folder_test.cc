@@ -18,6 +18,23 @@ TEST(DataFolder, SecondServerIsKeptOut) {
   DataFolderLock again(paths);
 }
 
+TEST(DataFolder, OthersDoNotReadIt) {
+  ScratchFolder scratch;
+  const auto mode = [](const std::filesystem::path& path) {
+    struct stat status {};
+    EXPECT_EQ(::stat(path.c_str(), &status), 0);
+    return status.st_mode & 0777u;
+  };
+  const DataPaths fresh(scratch.path() / "fresh");
+  PrepareDataFolder(fresh);
+  EXPECT_EQ(mode(fresh.root), 0700u);
+  const DataPaths shared(scratch.path() / "shared");
+  ASSERT_EQ(::mkdir(shared.root.c_str(), 0755), 0);
+  ASSERT_EQ(::chmod(shared.root.c_str(), 0775), 0);
+  PrepareDataFolder(shared);
+  EXPECT_EQ(mode(shared.root), 0770u) << "a group that was let in stays";
+}
+
 TEST(DataFolder, UnusableFolderIsReported) {
   ScratchFolder scratch;
   WriteFileAtomic(scratch.path() / "file", "x");

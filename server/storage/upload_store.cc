@@ -101,7 +101,7 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name, i
                        writer->size_,
                        offset);
   }
-  blobs_.RequireSpace(name.digest.size_bytes - writer->size_);
+  writer->space_ = blobs_.Reserve(name.digest.size_bytes - writer->size_);
   writer->generation_ = ++writer->session_->generation;
   return writer;
 }
@@ -148,6 +148,7 @@ void UploadStore::Writer::Append(int64_t offset, std::string_view data) {
     if (put < 0) ThrowWriteError("cannot write an upload");
     data.remove_prefix(static_cast<size_t>(put));
     size_ += put;
+    space_.Use(put);
   }
 }
 
@@ -188,6 +189,10 @@ int UploadStore::ReapOlderThan(std::chrono::seconds age) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
     struct stat status {};
     if (::stat(entry.path().c_str(), &status) != 0 || status.st_mtime > oldest) continue;
+    {
+      std::lock_guard lock(mutex_);
+      if (sessions_.contains(entry.path().filename().string())) continue;
+    }
     if (::unlink(entry.path().c_str()) == 0) ++reaped;
   }
   return reaped;

@@ -59,12 +59,13 @@ class UploadStore {
     uint64_t generation_ = 0;
     int fd_ = -1;
     int64_t size_ = 0;
+    SpaceReservation space_;  // for what is still to come
   };
   // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). Check Status first: a
   // complete upload cannot be opened again, but needs no writing either.
   std::unique_ptr<Writer> Open(const UploadName& name, int64_t offset);
 
-  // Removes uploads that have not grown for `age`; returns how many.
+  // Removes uploads that nobody writes and that have not grown for `age`; returns how many.
   int ReapOlderThan(std::chrono::seconds age);
 
  private:

@@ -4,8 +4,24 @@
 
 #include <array>
 #include <chrono>
+#include <fstream>
 
 namespace color3d {
+
+Clocks SystemClocks() {
+  return {SystemClock(), [] {
+            return std::chrono::duration_cast<std::chrono::milliseconds>(
+                       std::chrono::steady_clock::now().time_since_epoch())
+                .count();
+          }};
+}
+
+std::string BootId() {
+  std::ifstream file("/proc/sys/kernel/random/boot_id");
+  std::string id;
+  std::getline(file, id);
+  return id;
+}
 
 Clock SystemClock() {
   return [] {

@@ -17,6 +17,17 @@ namespace color3d {
 using Clock = std::function<int64_t()>;
 Clock SystemClock();
 
+// Two clocks, milliseconds. By `wall`, since the epoch, go the times that people read, and how long
+// things are kept; it may be set. By `steady`, since the machine was started, go leases and pauses:
+// a clock that jumps ends none. All processes of a machine see the same.
+struct Clocks {
+  Clock wall;
+  Clock steady;
+};
+Clocks SystemClocks();
+// Changes with every start of the machine: steady times of another one mean nothing.
+std::string BootId();
+
 enum class JobState { kBlocked, kQueued, kRunning, kSucceeded, kFailed, kCancelled, kSkipped };
 
 // "BLOCKED", "QUEUED", ... as stored and as shown to people.

@@ -82,6 +82,12 @@ struct ColorizerRecord {
   int64_t create_ms = 0;
 };
 
+// A blob that nothing names, as it was last touched.
+struct BlobCandidate {
+  std::string sha256;
+  int64_t touched_ns = 0;
+};
+
 struct JobCounts {
   int64_t queued = 0;  // with those that wait for inputs
   int64_t running = 0;
@@ -124,12 +130,16 @@ class JobStore {
   virtual std::vector<JobRecord> ListChildren(const std::string& name) = 0;
   virtual JobRecord Cancel(const std::string& name, const RequestKey& request) = 0;
   // Retries the whole graph of the job: what failed, was cancelled, or was skipped for that.
+  // kFailedPrecondition (INPUT_DELETED) when what it read is gone; QUEUE_FULL as CreateGraph.
   virtual JobRecord Retry(const std::string& name,
                           bool from_scratch,
-                          const RequestKey& request) = 0;
+                          const RequestKey& request,
+                          int64_t max_unfinished) = 0;
   virtual void Delete(const std::string& name, const RequestKey& request) = 0;
 
   // Jobs, from the worker's side.
+  // The next job of the queue. Error{kFailedPrecondition, WORKER_VERSION} for a worker of another
+  // release than the server's.
   virtual std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) = 0;
   // A job of this kind to run beside those that the worker holds already: one that no worker was
   // lost with, that no waiting job of another kind comes before, of the submitted job with the
@@ -164,6 +174,8 @@ class JobStore {
   virtual int ReapExpired() = 0;
   // For a worker known to be dead: its leases run out now. Returns the jobs' names.
   virtual std::vector<std::string> ExpireLeasesOf(const std::string& worker) = 0;
+  // Whether somebody keeps all others from writing for as long as this looks, about a second.
+  virtual bool IsHeld() = 0;
   virtual void UpdateWorker(const WorkerRecord& worker) = 0;
   virtual void RemoveWorker(const std::string& worker_id) = 0;
   virtual std::vector<WorkerRecord> ListWorkers() = 0;
@@ -193,6 +205,11 @@ class JobStore {
   // Digests of artifacts, scene files, checkpoints and of blobs that specs name.
   virtual std::set<std::string> ReferencedBlobs() = 0;
   virtual bool IsReferenced(const std::string& sha256) = 0;
+  // First of the two phases of collection: takes note of blobs that nothing names, and forgets
+  // those that are not told again. Returns the ones that have been untouched, and this store open,
+  // for `grace_ms` by the steady clock since they were first told.
+  virtual std::vector<BlobCandidate> AgeCandidates(const std::vector<BlobCandidate>& unnamed,
+                                                   int64_t grace_ms) = 0;
   // Epoch of the job's present lease; 0 when it is not running or does not exist.
   virtual int64_t RunningEpoch(const std::string& job_name) = 0;
 };

@@ -1,13 +1,23 @@
-// Tables of the SQLite job store. Times are milliseconds since the epoch from the injected clock.
+// Tables of the SQLite job store. Times are milliseconds since the epoch from the injected
+// clock, but for lease_expires_ms and run_after_ms, which are by the steady one.
 #pragma once
 
 namespace color3d {
 
-constexpr int kSchemaVersion = 2;
+constexpr int kSchemaVersion = 3;
 
-// From version 1 to 2.
-constexpr char kAddKeyColorJob[] =
-    "alter table scene add column key_color_job text not null default ''";
+// From version 1 to 2, from 2 to 3 and so on.
+constexpr const char* kMigrations[kSchemaVersion - 1] = {
+    "alter table scene add column key_color_job text not null default ''",
+    "create index job_unfinished on job(job_id) where end_ms=0;"
+    "create index job_checkpoint on job(checkpoint_sha256) where checkpoint_sha256 <> '';"
+    "create index artifact_name on artifact(name, job_id);"
+    "create table server(id integer primary key check(id=1), version text not null, "
+    "boot_id text not null);"
+    "create table blob_candidate(sha256 text primary key, touched_ns integer not null, "
+    "age_ms integer not null) without rowid;"
+    "insert into meta values('collected_steady_ms', 0);"
+    "alter table job add column lost_input text not null default ''"};
 
 constexpr char kSchema[] = R"sql(
 create table scene(
@@ -48,6 +58,7 @@ create table job(
   create_ms integer not null, start_ms integer not null default 0,
   end_ms integer not null default 0,
   revision integer not null default 0, peak_memory_bytes integer not null default 0,
+  lost_input text not null default '',
   check((state='RUNNING') = (lease_expires_ms is not null)),
   check((state in('SUCCEEDED','FAILED','CANCELLED','SKIPPED')) = (end_ms <> 0)));
 create index job_claim on job(priority, job_id) where state='QUEUED';
@@ -55,6 +66,8 @@ create index job_lease on job(lease_expires_ms) where state='RUNNING';
 create index job_parent on job(parent, job_id);
 create index job_scene on job(scene, job_id);
 create index job_stage on job(stage_key) where stage_key <> '';
+create index job_unfinished on job(job_id) where end_ms=0;
+create index job_checkpoint on job(checkpoint_sha256) where checkpoint_sha256 <> '';
 
 create table job_dependency(
   input_id integer not null references job on delete cascade,
@@ -71,6 +84,7 @@ create table artifact(
   media_type text not null,
   primary key(job_id, name)) without rowid;
 create index artifact_blob on artifact(sha256);
+create index artifact_name on artifact(name, job_id);
 create table job_attempt(
   job_id integer not null references job on delete cascade, epoch integer not null,
   worker text not null, start_ms integer not null, end_ms integer not null default 0,
@@ -83,6 +97,8 @@ create table job_event(
   at_ms integer not null);
 create index job_event_job on job_event(job_id, revision);
 
+create table blob_candidate(
+  sha256 text primary key, touched_ns integer not null, age_ms integer not null) without rowid;
 create table request_id(
   method text not null, id text not null, body_sha256 text not null,
   resource text not null, at_ms integer not null,
@@ -90,8 +106,9 @@ create table request_id(
 create table worker(
   worker_id text primary key, pid integer not null, job text not null,
   memory_bytes integer not null, heartbeat_ms integer not null) without rowid;
+create table server(id integer primary key check(id=1), version text not null, boot_id text not null);
 create table meta(name text primary key, value integer not null) without rowid;
-insert into meta values('compacted_revision', 0);
+insert into meta values('compacted_revision', 0), ('collected_steady_ms', 0);
 )sql";
 
 }  // namespace color3d

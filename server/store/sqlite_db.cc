@@ -3,10 +3,14 @@
 #include <fmt/core.h>
 #include <sqlite3.h>
 
+#include <atomic>
+
 #include "server/service_error.h"
 
 namespace color3d {
 namespace {
+
+std::atomic<int64_t> g_full_scan_steps{0};
 
 [[noreturn]] void ThrowSqlite(sqlite3* db, int code, const std::string& what) {
   const std::string detail = db != nullptr ? sqlite3_errmsg(db) : sqlite3_errstr(code);
@@ -44,7 +48,12 @@ SqliteStatement::SqliteStatement(sqlite3* db, std::string_view sql) : db_(db) {
   if (code != SQLITE_OK) ThrowSqlite(db, code, "cannot prepare a statement");
 }
 
-SqliteStatement::~SqliteStatement() { sqlite3_finalize(statement_); }
+SqliteStatement::~SqliteStatement() {
+  if (statement_ != nullptr) {
+    g_full_scan_steps += sqlite3_stmt_status(statement_, SQLITE_STMTSTATUS_FULLSCAN_STEP, 0);
+  }
+  sqlite3_finalize(statement_);
+}
 
 void SqliteStatement::BindOne(int64_t value) {
   const int code = sqlite3_bind_int64(statement_, next_parameter_++, value);
@@ -87,16 +96,22 @@ std::string SqliteStatement::Text(int column) const {
   return data != nullptr ? std::string(static_cast<const char*>(data), size) : std::string();
 }
 
-SqliteDatabase::SqliteDatabase(const std::filesystem::path& path) {
-  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
+SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess access) {
+  const bool writes = access == SqliteAccess::kWrite;
+  // A reader opens for writing, too: without the right to write it could not share the log's index.
+  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | (writes ? SQLITE_OPEN_CREATE : 0);
   const int code = sqlite3_open_v2(path.c_str(), &db_, flags, nullptr);
   try {
     if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot open " + path.string());
     sqlite3_extended_result_codes(db_, 1);
-    sqlite3_busy_timeout(db_, 10'000);
-    Exec("pragma journal_mode=WAL");
-    Exec("pragma synchronous=FULL");
-    Exec("pragma foreign_keys=ON");
+    SetBusyTimeout(std::chrono::seconds(10));
+    if (writes) {
+      Exec("pragma journal_mode=WAL");
+      Exec("pragma synchronous=FULL");
+      Exec("pragma foreign_keys=ON");
+    } else {
+      Exec("pragma query_only=ON");
+    }
   } catch (...) {
     sqlite3_close(db_);
     throw;
@@ -105,11 +120,16 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path) {
 
 SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
 
+void SqliteDatabase::SetBusyTimeout(std::chrono::milliseconds timeout) {
+  sqlite3_busy_timeout(db_, static_cast<int>(timeout.count()));
+}
+
 void SqliteDatabase::Exec(const char* sql) {
   const int code = sqlite3_exec(db_, sql, nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) ThrowSqlite(db_, code, fmt::format("cannot run '{}'", sql));
 }
 
+int64_t SqliteDatabase::FullScanSteps() { return g_full_scan_steps; }
 int64_t SqliteDatabase::LastInsertId() const { return sqlite3_last_insert_rowid(db_); }
 int64_t SqliteDatabase::Changes() const { return sqlite3_changes64(db_); }
 

@@ -2,6 +2,7 @@
 // used by one thread at a time.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -48,15 +49,19 @@ class SqliteStatement {
   int next_parameter_ = 1;
 };
 
+enum class SqliteAccess { kRead, kWrite };
+
 class SqliteDatabase {
  public:
-  // Creates the file when there is none. WAL, synchronous=FULL, foreign keys on, busy time-out 10
-  // s.
-  explicit SqliteDatabase(const std::filesystem::path& path);
+  // WAL, synchronous=FULL, foreign keys on, busy time-out 10 s. To write: creates the file when
+  // there is none.
+  SqliteDatabase(const std::filesystem::path& path, SqliteAccess access);
   ~SqliteDatabase();
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
+  // How long a statement waits for others that write.
+  void SetBusyTimeout(std::chrono::milliseconds timeout);
   void Exec(const char* sql);
   // Prepares, binds and runs to the end; returns the number of rows changed.
   template <typename... Values>
@@ -69,6 +74,8 @@ class SqliteDatabase {
   sqlite3* handle() { return db_; }
   int64_t LastInsertId() const;
   int64_t Changes() const;
+  // Rows that all databases' statements have stepped over because there was no index, so far.
+  static int64_t FullScanSteps();
 
  private:
   sqlite3* db_ = nullptr;

@@ -25,22 +25,38 @@ bool IsRetryable(ErrorCode code) {
 
 }  // namespace
 
+void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
+  SqliteStatement server(db.handle(), "select version from server");
+  if (server.Step() && server.Text(0) != options_.program_version) {
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "WORKER_VERSION",
+                       "this worker is of version '{}', the server of '{}'; start workers of the "
+                       "server's own release",
+                       options_.program_version,
+                       server.Text(0));
+  }
+}
+
 std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_t lease_ms) {
-  std::lock_guard lock(mutex_);
   constexpr char kNext[] =
       "select job_id from job where state='QUEUED' and run_after_ms<=? "
       "order by priority, job_id limit 1";
   {  // An idle worker only reads.
-    SqliteStatement peek(db_->handle(), kNext);
-    peek.Bind(Now());
+    const auto held = connections_.Read();
+    RequireServersVersion(*held);
+    SqliteStatement peek((*held).handle(), kNext);
+    peek.Bind(SteadyNow());
     if (!peek.Step()) return std::nullopt;
   }
-  SqliteTransaction transaction(*db_);
-  SqliteStatement next(db_->handle(), kNext);
-  next.Bind(Now());
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  RequireServersVersion(db);
+  SqliteStatement next(db.handle(), kNext);
+  next.Bind(SteadyNow());
   if (!next.Step()) return std::nullopt;
   const int64_t id = next.Int(0);
-  JobRecord job = BeginAttempt(id, worker, lease_ms);
+  JobRecord job = BeginAttempt(db, id, worker, lease_ms);
   transaction.Commit();
   return job;
 }
@@ -50,7 +66,6 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     int64_t lease_ms,
     const std::string& kind,
     const std::function<bool(const JobRecord&)>& accept) {
-  std::lock_guard lock(mutex_);
   // "project" is the submitted job: scenes of one must not keep out another's.
   constexpr char kCandidates[] =
       "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
@@ -59,54 +74,61 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
       "order by priority, (select count(*) from job r where r.state='RUNNING' and "
       "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
       "limit 16";
-  const auto choose = [&]() -> std::optional<int64_t> {
-    SqliteStatement select(db_->handle(), SelectJob(kCandidates));
-    select.Bind(kind, Now());
+  const auto choose = [&](SqliteDatabase& db) -> std::optional<int64_t> {
+    RequireServersVersion(db);
+    SqliteStatement select(db.handle(), SelectJob(kCandidates));
+    select.Bind(kind, SteadyNow());
     while (select.Step()) {
       const JobRecord job = JobFromRow(select);
       if (accept(job)) return job.id;
     }
     return std::nullopt;
   };
-  if (!choose()) return std::nullopt;  // only reads
-  SqliteTransaction transaction(*db_);
-  const std::optional<int64_t> id = choose();
+  if (!choose(*connections_.Read())) return std::nullopt;
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  const std::optional<int64_t> id = choose(db);
   if (!id) return std::nullopt;
-  JobRecord job = BeginAttempt(*id, worker, lease_ms);
+  JobRecord job = BeginAttempt(db, *id, worker, lease_ms);
   transaction.Commit();
   return job;
 }
 
-JobRecord SqliteJobStore::BeginAttempt(int64_t id, const std::string& worker, int64_t lease_ms) {
-  db_->Run(
+JobRecord SqliteJobStore::BeginAttempt(SqliteDatabase& db,
+                                       int64_t id,
+                                       const std::string& worker,
+                                       int64_t lease_ms) {
+  db.Run(
       "update job set state='RUNNING', attempt=attempt+1, lease_epoch=lease_epoch+1, "
       "lease_owner=?, lease_expires_ms=?, eta_seconds=-1, progress_message='', "
       "start_ms=case when start_ms=0 then ? else start_ms end where job_id=?",
       worker,
-      Now() + lease_ms,
+      SteadyNow() + lease_ms,
       Now(),
       id);
-  db_->Run(
+  db.Run(
       "insert into job_attempt(job_id, epoch, worker, start_ms) "
       "select job_id, lease_epoch, lease_owner, ? from job where job_id=?",
       Now(),
       id);
-  AddEvent(id, /*progress=*/false);
-  return JobById(id);
+  AddEvent(db, id, /*progress=*/false);
+  return JobById(db, id);
 }
 
 std::vector<JobRecord> SqliteJobStore::GetInputs(int64_t job_id) {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   SqliteStatement select(
-      db_->handle(),
+      db.handle(),
       SelectJob("where job_id in (select input_id from job_dependency where job_id=?) "
                 "order by job_id"));
   select.Bind(job_id);
-  return ReadJobs(select);
+  return ReadJobs(db, select);
 }
 
-JobRecord SqliteJobStore::RequireLease(const Lease& lease) {
-  SqliteStatement select(db_->handle(),
+JobRecord SqliteJobStore::RequireLease(SqliteDatabase& db, const Lease& lease) {
+  SqliteStatement select(db.handle(),
                          SelectJob("where job_id=? and lease_epoch=? and state='RUNNING'"));
   select.Bind(lease.job_id, lease.epoch);
   if (!select.Step()) throw LeaseLost(lease);
@@ -117,14 +139,15 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
                                          const ProgressRecord& progress,
                                          const JobUsage& usage,
                                          int64_t lease_ms) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_, /*durable=*/false);
-  const JobRecord before = RequireLease(lease);
-  db_->Run(
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db, /*durable=*/false);
+  const JobRecord before = RequireLease(db, lease);
+  db.Run(
       "update job set lease_expires_ms=?, progress_step=?, progress_total=?, progress_message=?, "
       "progress_error_name=?, progress_error_value=?, seconds=?, eta_seconds=?, warnings=? "
       "where job_id=?",
-      Now() + lease_ms,
+      SteadyNow() + lease_ms,
       progress.step,
       progress.total_steps,
       progress.message,
@@ -137,39 +160,41 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
   const bool moved = before.progress.step != progress.step ||
                      before.progress.message != progress.message ||
                      before.progress.error_value != progress.error_value;
-  if (moved) AddEvent(lease.job_id, /*progress=*/true);
+  if (moved) AddEvent(db, lease.job_id, /*progress=*/true);
   transaction.Commit();
   return {before.cancel_requested};
 }
 
 HeartbeatReply SqliteJobStore::Peek(const Lease& lease) {
-  std::lock_guard lock(mutex_);
-  return {RequireLease(lease).cancel_requested};
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  return {RequireLease(db, lease).cancel_requested};
 }
 
 std::optional<FileDigest> SqliteJobStore::SetCheckpoint(const Lease& lease,
                                                         const FileDigest& blob) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  const JobRecord before = RequireLease(lease);
-  db_->Run("update job set checkpoint_sha256=?, checkpoint_bytes=? where job_id=?",
-           blob.sha256,
-           blob.size_bytes,
-           lease.job_id);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  const JobRecord before = RequireLease(db, lease);
+  db.Run("update job set checkpoint_sha256=?, checkpoint_bytes=? where job_id=?",
+         blob.sha256,
+         blob.size_bytes,
+         lease.job_id);
   transaction.Commit();
   return before.checkpoint;
 }
 
-void SqliteJobStore::FinishAttempt(const Lease& lease, const char* outcome) {
-  db_->Run("update job_attempt set end_ms=?, outcome=? where job_id=? and epoch=?",
-           Now(),
-           outcome,
-           lease.job_id,
-           lease.epoch);
+void SqliteJobStore::FinishAttempt(SqliteDatabase& db, const Lease& lease, const char* outcome) {
+  db.Run("update job_attempt set end_ms=?, outcome=? where job_id=? and epoch=?",
+         Now(),
+         outcome,
+         lease.job_id,
+         lease.epoch);
 }
 
-void SqliteJobStore::StoreUsage(int64_t job_id, const JobUsage& usage) {
-  db_->Run(
+void SqliteJobStore::StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsage& usage) {
+  db.Run(
       "update job set seconds=?, eta_seconds=-1, warnings=?, "
       "peak_memory_bytes=max(peak_memory_bytes, ?) where job_id=?",
       usage.seconds,
@@ -179,107 +204,114 @@ void SqliteJobStore::StoreUsage(int64_t job_id, const JobUsage& usage) {
 }
 
 void SqliteJobStore::Publish(const Lease& lease, const Publication& publication) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  RequireLease(lease);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  RequireLease(db, lease);
   for (const ArtifactRecord& artifact : publication.artifacts) {
-    db_->Run("insert into artifact values(?,?,?,?,?)",
-             lease.job_id,
-             artifact.name,
-             artifact.digest.sha256,
-             artifact.digest.size_bytes,
-             artifact.media_type);
+    db.Run("insert into artifact values(?,?,?,?,?)",
+           lease.job_id,
+           artifact.name,
+           artifact.digest.sha256,
+           artifact.digest.size_bytes,
+           artifact.media_type);
   }
-  StoreUsage(lease.job_id, publication.usage);
-  db_->Run(
+  StoreUsage(db, lease.job_id, publication.usage);
+  db.Run(
       "update job set stage_key=?, cached=?, checkpoint_sha256='', checkpoint_bytes=0 "
       "where job_id=?",
       publication.stage_key,
       publication.cached,
       lease.job_id);
-  FinishAttempt(lease, "SUCCEEDED");
-  SetState(lease.job_id, JobState::kSucceeded);
-  QueueReadyDependants(lease.job_id);
+  FinishAttempt(db, lease, "SUCCEEDED");
+  SetState(db, lease.job_id, JobState::kSucceeded);
+  QueueReadyDependants(db, lease.job_id);
   transaction.Commit();
 }
 
 // Back to the queue, later each time.
-void SqliteJobStore::Requeue(const JobRecord& job, bool count_as_lost) {
+void SqliteJobStore::Requeue(SqliteDatabase& db, const JobRecord& job, bool count_as_lost) {
   const int doublings = std::clamp(job.attempt - 1, 0, 10);
-  db_->Run("update job set run_after_ms=?, lost_attempts=lost_attempts+? where job_id=?",
-           Now() + (options_.retry_backoff_ms << doublings),
-           count_as_lost,
-           job.id);
-  SetState(job.id, JobState::kQueued);
+  db.Run("update job set run_after_ms=?, lost_attempts=lost_attempts+? where job_id=?",
+         SteadyNow() + (options_.retry_backoff_ms << doublings),
+         count_as_lost,
+         job.id);
+  SetState(db, job.id, JobState::kQueued);
 }
 
 void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const JobUsage& usage) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  const JobRecord job = RequireLease(lease);
-  StoreUsage(lease.job_id, usage);
-  FinishAttempt(lease, ErrorCodeName(error.code));
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  const JobRecord job = RequireLease(db, lease);
+  StoreUsage(db, lease.job_id, usage);
+  FinishAttempt(db, lease, ErrorCodeName(error.code));
   if (job.cancel_requested && error.code == ErrorCode::kCancelled) {
-    EndCancelled(job.id);
+    EndCancelled(db, job.id);
   } else if (IsRetryable(error.code) && job.attempt < job.max_attempts && !job.cancel_requested) {
-    Requeue(job, /*count_as_lost=*/false);
+    Requeue(db, job, /*count_as_lost=*/false);
   } else {
-    EndFailed(job.id, error);
+    EndFailed(db, job.id, error);
   }
   transaction.Commit();
 }
 
 void SqliteJobStore::Release(const Lease& lease, const JobUsage& usage) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  const JobRecord job = RequireLease(lease);
-  StoreUsage(lease.job_id, usage);
-  FinishAttempt(lease, "RELEASED");
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  const JobRecord job = RequireLease(db, lease);
+  StoreUsage(db, lease.job_id, usage);
+  FinishAttempt(db, lease, "RELEASED");
   if (job.cancel_requested) {
-    EndCancelled(job.id);
+    EndCancelled(db, job.id);
   } else {
-    db_->Run("update job set attempt=attempt-1, run_after_ms=0 where job_id=?", job.id);
-    SetState(job.id, JobState::kQueued);
+    db.Run("update job set attempt=attempt-1, run_after_ms=0 where job_id=?", job.id);
+    SetState(db, job.id, JobState::kQueued);
   }
   transaction.Commit();
 }
 
 std::optional<JobRecord> SqliteJobStore::FindStage(const std::string& stage_key) {
   if (stage_key.empty()) return std::nullopt;
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(
-      db_->handle(),
-      SelectJob("where stage_key=? and state='SUCCEEDED' order by job_id desc limit 1"));
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(),
+                         SelectJob("where stage_key=? and stage_key<>'' and state='SUCCEEDED' "
+                                   "order by job_id desc limit 1"));
   select.Bind(stage_key);
   if (!select.Step()) return std::nullopt;
   JobRecord job = JobFromRow(select);
-  job.artifacts = LoadArtifacts(job.id);
+  job.artifacts = LoadArtifacts(db, job.id);
   return job;
 }
 
 int SqliteJobStore::ReapExpired() {
-  std::lock_guard lock(mutex_);
   constexpr char kExpired[] = "where state='RUNNING' and lease_expires_ms<=? limit 50";
   {
-    SqliteStatement peek(db_->handle(), SelectJob(kExpired));
-    peek.Bind(Now());
+    const auto held = connections_.Read();
+    SqliteStatement peek((*held).handle(), SelectJob(kExpired));
+    peek.Bind(SteadyNow());
     if (!peek.Step()) return 0;
   }
-  SqliteTransaction transaction(*db_);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
   std::vector<JobRecord> expired;
   {
-    SqliteStatement select(db_->handle(), SelectJob(kExpired));
-    select.Bind(Now());
+    SqliteStatement select(db.handle(), SelectJob(kExpired));
+    select.Bind(SteadyNow());
     while (select.Step()) expired.push_back(JobFromRow(select));
   }
   for (const JobRecord& job : expired) {
-    FinishAttempt({job.id, job.lease_epoch}, "LOST");
+    FinishAttempt(db, {job.id, job.lease_epoch}, "LOST");
     if (job.cancel_requested) {
-      EndCancelled(job.id);
+      EndCancelled(db, job.id);
     } else if (job.attempt < job.max_attempts) {
-      Requeue(job, /*count_as_lost=*/true);
+      Requeue(db, job, /*count_as_lost=*/true);
     } else {
-      EndFailed(job.id,
+      EndFailed(db,
+                job.id,
                 {ErrorCode::kInternal,
                  "WORKER_LOST",
                  fmt::format("the worker died or hung in each of {} attempts (last: {}); see its "
@@ -293,10 +325,11 @@ int SqliteJobStore::ReapExpired() {
 }
 
 std::vector<std::string> SqliteJobStore::ExpireLeasesOf(const std::string& worker) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
   std::vector<std::string> names;
-  SqliteStatement update(db_->handle(),
+  SqliteStatement update(db.handle(),
                          "update job set lease_expires_ms=0 where state='RUNNING' and "
                          "lease_owner=? returning name");
   update.Bind(worker);

@@ -169,7 +169,7 @@ TEST_F(SqliteJobLeaseTest, TwoStoresNeverClaimTheSameJob) {
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
-      SqliteJobStore own(scratch_.path() / "jobs.db", [this] { return now_.load(); });
+      SqliteJobStore own(File(), StoreRole::kWorker, TestClocks());
       while (const auto job = own.Claim("w" + std::to_string(t), kLease)) {
         ++claims;
         std::lock_guard lock(mutex);

@@ -1,5 +1,6 @@
 // The job state machine: creation, cancelling, retrying, and what the end of one job means for
 // those that depend on it.
+#include <algorithm>
 #include <deque>
 
 #include "server/service_error.h"
@@ -26,70 +27,70 @@ bool CanBeRetried(const JobRecord& job) {
 
 }  // namespace
 
-void SqliteJobStore::AddEvent(int64_t job_id, bool progress) {
+void SqliteJobStore::AddEvent(SqliteDatabase& db, int64_t job_id, bool progress) {
   // Progress is coalesced: a job has at most one progress event, its newest.
-  db_->Run("delete from job_event where job_id=? and progress=1", job_id);
-  db_->Run(
+  db.Run("delete from job_event where job_id=? and progress=1", job_id);
+  db.Run(
       "insert into job_event(job_id, progress, state, attempt, at_ms) "
       "select job_id, ?, state, attempt, ? from job where job_id=?",
       progress,
       Now(),
       job_id);
-  db_->Run("update job set revision=? where job_id=?", db_->LastInsertId(), job_id);
+  db.Run("update job set revision=? where job_id=?", db.LastInsertId(), job_id);
 }
 
-void SqliteJobStore::SetState(int64_t job_id, JobState state) {
-  db_->Run(
+void SqliteJobStore::SetState(SqliteDatabase& db, int64_t job_id, JobState state) {
+  db.Run(
       "update job set state=?, end_ms=?, "
       "lease_expires_ms=case when ?='RUNNING' then lease_expires_ms else null end where job_id=?",
       JobStateName(state),
       IsFinished(state) ? Now() : int64_t{0},
       JobStateName(state),
       job_id);
-  AddEvent(job_id, /*progress=*/false);
+  AddEvent(db, job_id, /*progress=*/false);
 }
 
-bool SqliteJobStore::InputsAreReady(int64_t job_id) {
+bool SqliteJobStore::InputsAreReady(SqliteDatabase& db, int64_t job_id) {
   SqliteStatement waiting(
-      db_->handle(),
+      db.handle(),
       "select 1 from job_dependency d join job i on i.job_id=d.input_id where d.job_id=? and "
       "not (i.state='SUCCEEDED' or (i.state='SKIPPED' and i.skipped_by_plan=1)) limit 1");
   waiting.Bind(job_id);
   return !waiting.Step();
 }
 
-void SqliteJobStore::QueueReadyDependants(int64_t job_id) {
+void SqliteJobStore::QueueReadyDependants(SqliteDatabase& db, int64_t job_id) {
   std::vector<int64_t> dependants;
   {
-    SqliteStatement select(db_->handle(),
+    SqliteStatement select(db.handle(),
                            "select d.job_id from job_dependency d join job j on j.job_id=d.job_id "
                            "where d.input_id=? and j.state='BLOCKED' order by d.job_id");
     select.Bind(job_id);
     while (select.Step()) dependants.push_back(select.Int(0));
   }
   for (const int64_t dependant : dependants) {
-    if (InputsAreReady(dependant)) SetState(dependant, JobState::kQueued);
+    if (InputsAreReady(db, dependant)) SetState(db, dependant, JobState::kQueued);
   }
 }
 
-void SqliteJobStore::EndFailed(int64_t job_id, const JobError& error) {
-  db_->Run("update job set error_code=?, error_reason=?, error_message=? where job_id=?",
-           static_cast<int>(error.code),
-           error.reason.empty() ? std::string(ErrorCodeName(error.code)) : error.reason,
-           error.message,
-           job_id);
-  SetState(job_id, JobState::kFailed);
-  PropagateEnd(JobById(job_id));
+void SqliteJobStore::EndFailed(SqliteDatabase& db, int64_t job_id, const JobError& error) {
+  db.Run("update job set error_code=?, error_reason=?, error_message=? where job_id=?",
+         static_cast<int>(error.code),
+         error.reason.empty() ? std::string(ErrorCodeName(error.code)) : error.reason,
+         error.message,
+         job_id);
+  SetState(db, job_id, JobState::kFailed);
+  PropagateEnd(db, JobById(db, job_id));
 }
 
-void SqliteJobStore::EndCancelled(int64_t job_id) {
-  SetState(job_id, JobState::kCancelled);
-  PropagateEnd(JobById(job_id));
+void SqliteJobStore::EndCancelled(SqliteDatabase& db, int64_t job_id) {
+  SetState(db, job_id, JobState::kCancelled);
+  PropagateEnd(db, JobById(db, job_id));
 }
 
 // Everything that waits for `cause`, directly or not, can never run: the submitted job of the same
 // graph ends as `cause` did, all others are skipped.
-void SqliteJobStore::PropagateEnd(const JobRecord& cause) {
+void SqliteJobStore::PropagateEnd(SqliteDatabase& db, const JobRecord& cause) {
   const bool failed = cause.state == JobState::kFailed;
   const std::string why =
       failed ? " failed: " + cause.error->message : std::string(" was cancelled");
@@ -100,7 +101,7 @@ void SqliteJobStore::PropagateEnd(const JobRecord& cause) {
     std::vector<JobRecord> waiting;
     {
       SqliteStatement select(
-          db_->handle(),
+          db.handle(),
           SelectJob("where state='BLOCKED' and job_id in "
                     "(select job_id from job_dependency where input_id=?) order by job_id"));
       select.Bind(from.id);
@@ -108,18 +109,17 @@ void SqliteJobStore::PropagateEnd(const JobRecord& cause) {
     }
     for (const JobRecord& job : waiting) {
       if (job.name != from.parent) {
-        db_->Run(
-            "update job set skip_reason=? where job_id=?", "input " + cause.name + why, job.id);
-        SetState(job.id, JobState::kSkipped);
+        db.Run("update job set skip_reason=? where job_id=?", "input " + cause.name + why, job.id);
+        SetState(db, job.id, JobState::kSkipped);
       } else if (failed) {
-        db_->Run("update job set error_code=?, error_reason=?, error_message=? where job_id=?",
-                 static_cast<int>(cause.error->code),
-                 cause.error->reason,
-                 cause.kind + " (" + cause.name + ")" + why,
-                 job.id);
-        SetState(job.id, JobState::kFailed);
+        db.Run("update job set error_code=?, error_reason=?, error_message=? where job_id=?",
+               static_cast<int>(cause.error->code),
+               cause.error->reason,
+               cause.kind + " (" + cause.name + ")" + why,
+               job.id);
+        SetState(db, job.id, JobState::kFailed);
       } else {
-        SetState(job.id, JobState::kCancelled);
+        SetState(db, job.id, JobState::kCancelled);
       }
       ended.push_back(job);
     }
@@ -138,7 +138,8 @@ void RequireActive(const SceneRecord& scene) {
 
 }  // namespace
 
-void SqliteJobStore::InsertJob(const NewGraph& graph,
+void SqliteJobStore::InsertJob(SqliteDatabase& db,
+                               const NewGraph& graph,
                                size_t index,
                                const std::vector<std::string>& names,
                                std::vector<int64_t>* ids) {
@@ -158,84 +159,99 @@ void SqliteJobStore::InsertJob(const NewGraph& graph,
   record.skipped_by_plan = skipped;
   record.create_ms = Now();
   if (skipped) record.end_ms = record.create_ms;
-  const int64_t id = InsertJobRow(*db_, record);
+  const int64_t id = InsertJobRow(db, record);
   ids->push_back(id);
   std::set<int64_t> inputs;
   for (const int input : job.inputs) inputs.insert(ids->at(static_cast<size_t>(input)));
   for (const std::string& name : job.input_jobs) {
-    const JobRecord input = RequireJob(name);
+    const JobRecord input = RequireJob(db, name);
     if (CanBeRetried(input)) throw WrongState(input, "it cannot be an input; retry it first");
     inputs.insert(input.id);
   }
-  for (const int64_t input : inputs) db_->Run("insert into job_dependency values(?,?)", input, id);
+  for (const int64_t input : inputs) db.Run("insert into job_dependency values(?,?)", input, id);
   const std::set<std::string> blobs(job.blobs.begin(), job.blobs.end());
-  for (const std::string& blob : blobs) db_->Run("insert into job_blob values(?,?)", id, blob);
-  if (!skipped && InputsAreReady(id)) {
-    SetState(id, JobState::kQueued);
+  for (const std::string& blob : blobs) db.Run("insert into job_blob values(?,?)", id, blob);
+  if (!skipped && InputsAreReady(db, id)) {
+    SetState(db, id, JobState::kQueued);
   } else {
-    AddEvent(id, /*progress=*/false);
+    AddEvent(db, id, /*progress=*/false);
   }
+}
+
+void SqliteJobStore::RequireRoom(SqliteDatabase& db, int64_t jobs, int64_t max_unfinished) {
+  SqliteStatement unfinished(db.handle(), "select count(*) from job where end_ms=0");
+  unfinished.Step();
+  if (unfinished.Int(0) + jobs <= max_unfinished) return;
+  throw ServiceError(ErrorCode::kResourceExhausted,
+                     "QUEUE_FULL",
+                     "{} jobs wait or run, at most {} are allowed; try again later",
+                     unfinished.Int(0),
+                     max_unfinished);
 }
 
 JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
                                       const RequestKey& request,
                                       int64_t max_unfinished) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (const auto resource = CheckRequest(request)) return RequireJob(*resource);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   std::set<std::string> scenes = {graph.scene};
   for (const NewJob& job : graph.jobs) {
     if (!job.scene.empty()) scenes.insert(job.scene);
   }
-  for (const std::string& name : scenes) RequireActive(RequireScene(name, false));
-  SqliteStatement unfinished(db_->handle(), "select count(*) from job where end_ms=0");
-  unfinished.Step();
-  if (unfinished.Int(0) + static_cast<int64_t>(graph.jobs.size()) > max_unfinished) {
-    throw ServiceError(ErrorCode::kResourceExhausted,
-                       "QUEUE_FULL",
-                       "{} jobs wait or run, at most {} are allowed; try again later",
-                       unfinished.Int(0),
-                       max_unfinished);
-  }
+  for (const std::string& name : scenes) RequireActive(RequireScene(db, name, false));
+  RequireRoom(db, static_cast<int64_t>(graph.jobs.size()), max_unfinished);
   std::vector<std::string> names;
   for (size_t i = 0; i < graph.jobs.size(); ++i) names.push_back("jobs/" + NewId());
   std::vector<int64_t> ids;
-  for (size_t i = 0; i < graph.jobs.size(); ++i) InsertJob(graph, i, names, &ids);
-  RecordRequest(request, names.back());
-  JobRecord root = RequireJob(names.back());
+  for (size_t i = 0; i < graph.jobs.size(); ++i) InsertJob(db, graph, i, names, &ids);
+  RecordRequest(db, request, names.back());
+  JobRecord root = RequireJob(db, names.back());
   transaction.Commit();
   return root;
 }
 
 JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (const auto resource = CheckRequest(request)) return RequireJob(*resource);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   // The submitted job first: its children then find it finished and leave it alone.
-  const std::vector<JobRecord> graph = GraphOf(RequireJob(name));
+  const std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
   for (auto it = graph.rbegin(); it != graph.rend(); ++it) {
-    const JobRecord job = JobById(it->id);
+    const JobRecord job = JobById(db, it->id);
     if (IsFinished(job.state) || job.cancel_requested) continue;
-    db_->Run("update job set cancel_requested=1 where job_id=?", job.id);
+    db.Run("update job set cancel_requested=1 where job_id=?", job.id);
     if (job.state == JobState::kRunning) {
-      AddEvent(job.id, /*progress=*/false);
+      AddEvent(db, job.id, /*progress=*/false);
     } else {
-      SetState(job.id, JobState::kCancelled);
+      SetState(db, job.id, JobState::kCancelled);
     }
   }
   for (const JobRecord& job : graph) {
-    const JobRecord now = JobById(job.id);
-    if (now.state == JobState::kCancelled && job.state != JobState::kCancelled) PropagateEnd(now);
+    const JobRecord now = JobById(db, job.id);
+    if (now.state == JobState::kCancelled && job.state != JobState::kCancelled)
+      PropagateEnd(db, now);
   }
-  RecordRequest(request, name);
-  JobRecord result = RequireJob(name);
+  RecordRequest(db, request, name);
+  JobRecord result = RequireJob(db, name);
   transaction.Commit();
   return result;
 }
 
-void SqliteJobStore::ResetForRetry(const JobRecord& job, bool from_scratch) {
+void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch) {
+  SqliteStatement lost(db.handle(), "select lost_input from job where job_id=?");
+  lost.Bind(job.id);
+  if (lost.Step() && !lost.Text(0).empty()) {
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "INPUT_DELETED",
+                       "{} reads results of {}, which was deleted; submit the work anew",
+                       job.name,
+                       lost.Text(0));
+  }
   SqliteStatement bad(
-      db_->handle(),
+      db.handle(),
       SelectJob("where job_id in (select input_id from job_dependency where job_id=?) and "
                 "(state in('FAILED','CANCELLED') or (state='SKIPPED' and skipped_by_plan=0)) "
                 "limit 1"));
@@ -243,72 +259,83 @@ void SqliteJobStore::ResetForRetry(const JobRecord& job, bool from_scratch) {
   if (bad.Step()) {
     throw WrongState(JobFromRow(bad), "retry it before " + job.name + ", which reads its results");
   }
-  db_->Run(
+  db.Run(
       "update job set attempt=0, lost_attempts=0, cancel_requested=0, run_after_ms=0, "
       "error_code=null, error_reason='', error_message='', skip_reason='', warnings='' "
       "where job_id=?",
       job.id);
   if (from_scratch) {
-    db_->Run(
+    db.Run(
         "update job set checkpoint_sha256='', checkpoint_bytes=0, progress_step=0, seconds=0 "
         "where job_id=?",
         job.id);
   }
-  const bool ready = InputsAreReady(job.id);
-  SetState(job.id, ready ? JobState::kQueued : JobState::kBlocked);
+  const bool ready = InputsAreReady(db, job.id);
+  SetState(db, job.id, ready ? JobState::kQueued : JobState::kBlocked);
 }
 
 JobRecord SqliteJobStore::Retry(const std::string& name,
                                 bool from_scratch,
-                                const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (const auto resource = CheckRequest(request)) return RequireJob(*resource);
-  const JobRecord job = RequireJob(name);
+                                const RequestKey& request,
+                                int64_t max_unfinished) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
+  const JobRecord job = RequireJob(db, name);
   if (!CanBeRetried(job)) throw WrongState(job, "only failed or cancelled jobs can be retried");
-  RequireScene(job.scene, false);
-  const JobRecord root = job.parent.empty() ? job : RequireJob(job.parent);
-  const std::vector<JobRecord> graph = GraphOf(root);
+  RequireScene(db, job.scene, false);
+  const JobRecord root = job.parent.empty() ? job : RequireJob(db, job.parent);
+  const std::vector<JobRecord> graph = GraphOf(db, root);
   for (const JobRecord& member : graph) {
     if (member.state == JobState::kRunning && member.cancel_requested) {
       throw WrongState(member, "it is about to stop; retry when it is cancelled");
     }
   }
+  const auto retried = std::count_if(graph.begin(), graph.end(), CanBeRetried);
+  RequireRoom(db, retried, max_unfinished);
   // In order of creation, so that inputs are reset before those that read them.
   for (const JobRecord& member : graph) {
-    if (CanBeRetried(member)) ResetForRetry(member, from_scratch);
+    if (CanBeRetried(member)) ResetForRetry(db, member, from_scratch);
   }
-  RecordRequest(request, name);
-  JobRecord result = RequireJob(name);
+  RecordRequest(db, request, name);
+  JobRecord result = RequireJob(db, name);
   transaction.Commit();
   return result;
 }
 
 void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (CheckRequest(request)) return;
-  const JobRecord root = RequireJob(name);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (CheckRequest(db, request)) return;
+  const JobRecord root = RequireJob(db, name);
   std::vector<int64_t> ids;
-  for (const JobRecord& job : GraphOf(root)) {
+  for (const JobRecord& job : GraphOf(db, root)) {
     if (!IsFinished(job.state)) throw WrongState(job, "cancel it or wait for it before deleting");
     ids.push_back(job.id);
   }
   const std::string list = JoinIds(ids);
   SqliteStatement reader(
-      db_->handle(),
+      db.handle(),
       SelectJob("where end_ms=0 and job_id in (select job_id from job_dependency where input_id in "
                 "(" +
                 list + ")) limit 1"));
   if (reader.Step()) {
     throw WrongState(JobFromRow(reader), "it reads results of " + name + ", which must stay");
   }
-  db_->Run(
+  db.Run(
       "update scene set key_color_job='' where key_color_job in (select name from job where job_id "
       "in (" +
       list + "))");
-  db_->Run("delete from job where job_id in (" + list + ")");
-  RecordRequest(request, name);
+  // A reader that failed may be retried; without this input it would be other work.
+  db.Run(
+      "update job set lost_input=(select i.name from job_dependency d join job i on "
+      "i.job_id=d.input_id where d.job_id=job.job_id and d.input_id in (" +
+      list + ") limit 1) where job_id in (select job_id from job_dependency where input_id in (" +
+      list + "))");
+  db.Run("delete from job where job_id in (" + list + ")");
+  RecordRequest(db, request, name);
   transaction.Commit();
 }
 

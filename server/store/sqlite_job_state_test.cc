@@ -81,7 +81,7 @@ TEST_F(SqliteJobStateTest, CancelQueuedAtOnceAndRunningAtItsNextHeartbeat) {
   EXPECT_EQ(Child(root, "left").state, JobState::kCancelled);
   EXPECT_EQ(Child(root, "import").state, JobState::kRunning);
   EXPECT_TRUE(store_->Heartbeat(LeaseOf(import), {}, {}, kLease).cancel_requested);
-  EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}); }), "WRONG_STATE")
+  EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}, kNoLimit); }), "WRONG_STATE")
       << "import is still about to stop";
   FailWith(import, ErrorCode::kCancelled);
   EXPECT_EQ(Child(root, "import").state, JobState::kCancelled);
@@ -105,13 +105,13 @@ TEST_F(SqliteJobStateTest, RetryBringsBackWhatFailedAndKeepsPlannedSkips) {
                 Job("root", {0, 1, 2, 3})};
   graph.jobs[3].skip_reason = "planned";
   const JobRecord root = store_->CreateGraph(graph, {}, kNoLimit);
-  EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}); }), "WRONG_STATE");
+  EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}, kNoLimit); }), "WRONG_STATE");
   Succeed(ClaimOne());
   const JobRecord left = ClaimOne();
   store_->SetCheckpoint(LeaseOf(left), {Sha256Hex("c"), 1});
   FailWith(left, ErrorCode::kInternal);
   EXPECT_EQ(Child(root, "after").state, JobState::kSkipped);
-  EXPECT_EQ(store_->Retry(root.name, false, {}).state, JobState::kBlocked);
+  EXPECT_EQ(store_->Retry(root.name, false, {}, kNoLimit).state, JobState::kBlocked);
   EXPECT_EQ(Child(root, "after").state, JobState::kBlocked);
   EXPECT_EQ(Child(root, "no").state, JobState::kSkipped);
   EXPECT_EQ(Child(root, "import").state, JobState::kSucceeded);
@@ -131,7 +131,7 @@ TEST_F(SqliteJobStateTest, RetryFromScratchForgetsTheCheckpoint) {
   const JobRecord running = ClaimOne();
   store_->SetCheckpoint(LeaseOf(running), {Sha256Hex("c"), 1});
   FailWith(running, ErrorCode::kInternal);
-  store_->Retry(job.name, /*from_scratch=*/true, {});
+  store_->Retry(job.name, /*from_scratch=*/true, {}, kNoLimit);
   EXPECT_FALSE(ClaimOne().checkpoint.has_value());
 }
 
@@ -168,6 +168,30 @@ TEST_F(SqliteJobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   const auto children = store_->ListChildren(root.name);
   EXPECT_EQ(children[0].scene, "scenes/test");
   EXPECT_EQ(children[1].scene, "scenes/other");
+}
+
+TEST_F(SqliteJobStateTest, AReaderIsNotRetriedWithoutWhatItRead) {
+  const JobRecord input = CreateSingle();
+  Succeed(ClaimOne());
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  graph.jobs = {Job("reader")};
+  graph.jobs[0].input_jobs = {input.name};
+  const JobRecord reader = store_->CreateGraph(graph, {}, kNoLimit);
+  FailWith(ClaimOne(), ErrorCode::kInternal);
+  store_->Delete(input.name, {});
+  EXPECT_EQ(ReasonThrown([&] { store_->Retry(reader.name, false, {}, kNoLimit); }),
+            "INPUT_DELETED");
+  EXPECT_EQ(StateOf(reader.name), JobState::kFailed);
+}
+
+TEST_F(SqliteJobStateTest, ARetryKeepsToTheQueuesLimit) {
+  const JobRecord root = CreateDiamond();
+  FailWith(ClaimOne(), ErrorCode::kInternal);
+  EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}, 3); }), "QUEUE_FULL");
+  EXPECT_EQ(StateOf(root.name), JobState::kFailed);
+  store_->Retry(root.name, false, {}, 4);
+  EXPECT_EQ(StateOf(root.name), JobState::kBlocked);
 }
 
 }  // namespace

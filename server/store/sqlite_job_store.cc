@@ -3,81 +3,67 @@
 #include "server/store/sqlite_job_store.h"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "server/service_error.h"
-#include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_rows.h"
 
 namespace color3d {
+namespace {
 
-SqliteJobStore::SqliteJobStore(const std::filesystem::path& file, Clock clock, StoreOptions options)
-    : db_(std::make_unique<SqliteDatabase>(file)), clock_(std::move(clock)), options_(options) {
-  OpenSchema();
+const std::filesystem::path& Prepared(const std::filesystem::path& file,
+                                      StoreRole role,
+                                      const StoreOptions& options) {
+  PrepareStore(file, role, {options.program_version, options.boot_id});
+  return file;
 }
+
+}  // namespace
+
+SqliteJobStore::SqliteJobStore(const std::filesystem::path& file,
+                               StoreRole role,
+                               Clocks clocks,
+                               StoreOptions options)
+    : file_(file),
+      connections_(Prepared(file, role, options)),
+      clocks_(std::move(clocks)),
+      options_(options) {}
 
 SqliteJobStore::~SqliteJobStore() = default;
 
-void SqliteJobStore::OpenSchema() {
-  // Taken even when only reading the version: two processes may open a fresh file together.
-  SqliteTransaction transaction(*db_);
-  db_->Exec("create table if not exists schema_version(version integer not null)");
-  SqliteStatement version(db_->handle(), "select version from schema_version");
-  if (version.Step()) {
-    if (version.Int(0) == 1) {
-      db_->Exec(kAddKeyColorJob);
-      db_->Run("update schema_version set version=?", kSchemaVersion);
-      transaction.Commit();
-      return;
-    }
-    if (version.Int(0) != kSchemaVersion) {
-      throw ServiceError(
-          ErrorCode::kFailedPrecondition,
-          "STORE_VERSION",
-          "the job store has version {}, this program reads version {}; use the program "
-          "that wrote it, or another --data-dir",
-          version.Int(0),
-          kSchemaVersion);
-    }
-    return;
-  }
-  db_->Exec(kSchema);
-  db_->Run("insert into schema_version values(?)", kSchemaVersion);
-  transaction.Commit();
-}
-
-std::optional<JobRecord> SqliteJobStore::FindJob(const std::string& name) {
-  SqliteStatement select(db_->handle(), SelectJob("where name=?"));
+std::optional<JobRecord> SqliteJobStore::FindJob(SqliteDatabase& db, const std::string& name) {
+  SqliteStatement select(db.handle(), SelectJob("where name=?"));
   select.Bind(name);
   if (!select.Step()) return std::nullopt;
   JobRecord job = JobFromRow(select);
-  job.artifacts = LoadArtifacts(job.id);
+  job.artifacts = LoadArtifacts(db, job.id);
   return job;
 }
 
-JobRecord SqliteJobStore::RequireJob(const std::string& name) {
-  std::optional<JobRecord> job = FindJob(name);
+JobRecord SqliteJobStore::RequireJob(SqliteDatabase& db, const std::string& name) {
+  std::optional<JobRecord> job = FindJob(db, name);
   if (!job) {
     throw ServiceError(ErrorCode::kNotFound, "JOB_NOT_FOUND", "there is no job '{}'", name);
   }
   return *std::move(job);
 }
 
-JobRecord SqliteJobStore::JobById(int64_t job_id) {
-  SqliteStatement select(db_->handle(), SelectJob("where job_id=?"));
+JobRecord SqliteJobStore::JobById(SqliteDatabase& db, int64_t job_id) {
+  SqliteStatement select(db.handle(), SelectJob("where job_id=?"));
   select.Bind(job_id);
   if (!select.Step()) {
     throw Error(ErrorCode::kNotFound, "job {} was deleted", job_id);
   }
   JobRecord job = JobFromRow(select);
-  job.artifacts = LoadArtifacts(job.id);
+  job.artifacts = LoadArtifacts(db, job.id);
   return job;
 }
 
-std::vector<ArtifactRecord> SqliteJobStore::LoadArtifacts(int64_t job_id) {
+std::vector<ArtifactRecord> SqliteJobStore::LoadArtifacts(SqliteDatabase& db, int64_t job_id) {
   SqliteStatement select(
-      db_->handle(),
+      db.handle(),
       "select name, sha256, size_bytes, media_type from artifact where job_id=? order by name");
   select.Bind(job_id);
   std::vector<ArtifactRecord> artifacts;
@@ -87,16 +73,16 @@ std::vector<ArtifactRecord> SqliteJobStore::LoadArtifacts(int64_t job_id) {
   return artifacts;
 }
 
-std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteStatement& select) {
+std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteDatabase& db, SqliteStatement& select) {
   std::vector<JobRecord> jobs;
   while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(job.id);
+  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(db, job.id);
   return jobs;
 }
 
-std::vector<JobRecord> SqliteJobStore::GraphOf(const JobRecord& root) {
+std::vector<JobRecord> SqliteJobStore::GraphOf(SqliteDatabase& db, const JobRecord& root) {
   std::vector<JobRecord> jobs;
-  SqliteStatement select(db_->handle(), SelectJob("where parent=? order by job_id"));
+  SqliteStatement select(db.handle(), SelectJob("where parent=? order by job_id"));
   select.Bind(root.name);
   while (select.Step()) jobs.push_back(JobFromRow(select));
   jobs.push_back(root);
@@ -104,35 +90,39 @@ std::vector<JobRecord> SqliteJobStore::GraphOf(const JobRecord& root) {
 }
 
 JobRecord SqliteJobStore::GetJob(const std::string& name) {
-  std::lock_guard lock(mutex_);
-  return RequireJob(name);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  return RequireJob(db, name);
 }
 
 std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
                                                 int64_t before_id,
                                                 int limit) {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   std::string tail = "where job_id < ?";
   if (!filter.parent.empty()) tail += " and parent=?";
   if (!filter.scene.empty()) tail += " and scene=?";
-  SqliteStatement select(db_->handle(), SelectJob(tail + " order by job_id desc limit ?"));
+  SqliteStatement select(db.handle(), SelectJob(tail + " order by job_id desc limit ?"));
   select.Bind(before_id > 0 ? before_id : INT64_MAX);
   if (!filter.parent.empty()) select.Bind(filter.parent);
   if (!filter.scene.empty()) select.Bind(filter.scene);
   select.Bind(limit);
-  return ReadJobs(select);
+  return ReadJobs(db, select);
 }
 
 std::vector<JobRecord> SqliteJobStore::ListChildren(const std::string& name) {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(), SelectJob("where parent=? order by job_id"));
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(), SelectJob("where parent=? order by job_id"));
   select.Bind(name);
-  return ReadJobs(select);
+  return ReadJobs(db, select);
 }
 
-std::optional<std::string> SqliteJobStore::CheckRequest(const RequestKey& request) {
+std::optional<std::string> SqliteJobStore::CheckRequest(SqliteDatabase& db,
+                                                        const RequestKey& request) {
   if (request.id.empty()) return std::nullopt;
-  SqliteStatement select(db_->handle(),
+  SqliteStatement select(db.handle(),
                          "select body_sha256, resource from request_id where method=? and id=?");
   select.Bind(request.method, request.id);
   if (!select.Step()) return std::nullopt;
@@ -146,25 +136,29 @@ std::optional<std::string> SqliteJobStore::CheckRequest(const RequestKey& reques
   return select.Text(1);
 }
 
-void SqliteJobStore::RecordRequest(const RequestKey& request, const std::string& resource) {
+void SqliteJobStore::RecordRequest(SqliteDatabase& db,
+                                   const RequestKey& request,
+                                   const std::string& resource) {
   if (request.id.empty()) return;
-  db_->Run("insert into request_id values(?,?,?,?,?)",
-           request.method,
-           request.id,
-           request.body_sha256,
-           resource,
-           Now());
+  db.Run("insert into request_id values(?,?,?,?,?)",
+         request.method,
+         request.id,
+         request.body_sha256,
+         resource,
+         Now());
 }
 
 std::optional<std::string> SqliteJobStore::FindRequest(const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  return CheckRequest(request);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  return CheckRequest(db, request);
 }
 
 int64_t SqliteJobStore::NewestRevision() {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   // Not max(revision): the newest event may have been deleted with its job.
-  SqliteStatement select(db_->handle(), "select seq from sqlite_sequence where name='job_event'");
+  SqliteStatement select(db.handle(), "select seq from sqlite_sequence where name='job_event'");
   return select.Step() ? select.Int(0) : 0;
 }
 
@@ -188,8 +182,9 @@ std::vector<EventRecord> ReadEvents(SqliteStatement& select) {
 }  // namespace
 
 std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision, int limit) {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(),
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(),
                          "select revision, job_id, progress, state, attempt, at_ms from job_event "
                          "where revision > ? order by revision limit ?");
   select.Bind(revision, limit);
@@ -199,8 +194,9 @@ std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision, int limit
 std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision,
                                                      const std::vector<int64_t>& job_ids,
                                                      int limit) {
-  std::lock_guard lock(mutex_);
-  SqliteStatement bounds(db_->handle(),
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement bounds(db.handle(),
                          "select (select value from meta where name='compacted_revision'), "
                          "coalesce((select seq from sqlite_sequence where name='job_event'), 0)");
   bounds.Step();
@@ -213,7 +209,7 @@ std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision,
                        bounds.Int(0),
                        bounds.Int(1));
   }
-  SqliteStatement select(db_->handle(),
+  SqliteStatement select(db.handle(),
                          "select revision, job_id, progress, state, attempt, at_ms from job_event "
                          "where job_id in (" +
                              JoinIds(job_ids) + ") and revision > ? order by revision limit ?");
@@ -222,54 +218,66 @@ std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision,
 }
 
 bool SqliteJobStore::AllFinished(const std::vector<int64_t>& job_ids) {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   SqliteStatement select(
-      db_->handle(),
+      db.handle(),
       "select 1 from job where end_ms=0 and job_id in (" + JoinIds(job_ids) + ") limit 1");
   return !select.Step();
 }
 
 JobsSnapshot SqliteJobStore::Snapshot(const std::vector<int64_t>& job_ids) {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   JobsSnapshot snapshot;
-  db_->Exec("begin");  // one consistent read
-  try {
-    SqliteStatement sequence(db_->handle(),
-                             "select seq from sqlite_sequence where name='job_event'");
-    if (sequence.Step()) snapshot.revision = sequence.Int(0);
-    SqliteStatement select(
-        db_->handle(), SelectJob("where job_id in (" + JoinIds(job_ids) + ") order by revision"));
-    snapshot.jobs = ReadJobs(select);
-  } catch (...) {
-    db_->Exec("rollback");
-    throw;
-  }
-  db_->Exec("commit");
+  SqliteStatement sequence(db.handle(), "select seq from sqlite_sequence where name='job_event'");
+  if (sequence.Step()) snapshot.revision = sequence.Int(0);
+  SqliteStatement select(db.handle(),
+                         SelectJob("where job_id in (" + JoinIds(job_ids) + ") order by revision"));
+  snapshot.jobs = ReadJobs(db, select);
   return snapshot;
 }
 
 std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>& names) {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   std::set<int64_t> ids;
   for (const std::string& name : names) {
-    for (const JobRecord& job : GraphOf(RequireJob(name))) ids.insert(job.id);
+    for (const JobRecord& job : GraphOf(db, RequireJob(db, name))) ids.insert(job.id);
   }
   return {ids.begin(), ids.end()};
 }
 
 JobCounts SqliteJobStore::CountJobs() {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(),
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(),
                          "select coalesce(sum(state in('QUEUED','BLOCKED')),0), "
                          "coalesce(sum(state='RUNNING'),0) from job where end_ms=0");
   select.Step();
   return {select.Int(0), select.Int(1)};
 }
 
+bool SqliteJobStore::IsHeld() {
+  SqliteDatabase probe(file_, SqliteAccess::kWrite);
+  probe.SetBusyTimeout(std::chrono::milliseconds(0));
+  for (int look = 0; look < 20; ++look) {
+    try {
+      SqliteTransaction transaction(probe);
+      return false;
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::kUnavailable) throw;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return true;
+}
+
 void SqliteJobStore::UpdateWorker(const WorkerRecord& worker) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_, /*durable=*/false);
-  db_->Run(
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db, /*durable=*/false);
+  db.Run(
       "insert into worker values(?,?,?,?,?) on conflict(worker_id) do update set "
       "pid=excluded.pid, job=excluded.job, memory_bytes=excluded.memory_bytes, "
       "heartbeat_ms=excluded.heartbeat_ms",
@@ -282,16 +290,18 @@ void SqliteJobStore::UpdateWorker(const WorkerRecord& worker) {
 }
 
 void SqliteJobStore::RemoveWorker(const std::string& worker_id) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_, /*durable=*/false);
-  db_->Run("delete from worker where worker_id=?", worker_id);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db, /*durable=*/false);
+  db.Run("delete from worker where worker_id=?", worker_id);
   transaction.Commit();
 }
 
 std::vector<WorkerRecord> SqliteJobStore::ListWorkers() {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   SqliteStatement select(
-      db_->handle(),
+      db.handle(),
       "select worker_id, pid, job, memory_bytes, heartbeat_ms from worker order by worker_id");
   std::vector<WorkerRecord> workers;
   while (select.Step()) {
@@ -302,17 +312,18 @@ std::vector<WorkerRecord> SqliteJobStore::ListWorkers() {
 }
 
 void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_ms) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
   constexpr char kOld[] =
       "from job_event where at_ms < ? and job_id in (select job_id from job where end_ms <> 0)";
   SqliteStatement newest(
-      db_->handle(), std::string("select coalesce(max(revision), 0) ") + kOld + " and progress=0");
+      db.handle(), std::string("select coalesce(max(revision), 0) ") + kOld + " and progress=0");
   newest.Bind(events_before_ms);
   newest.Step();
-  db_->Run("update meta set value=max(value, ?) where name='compacted_revision'", newest.Int(0));
-  db_->Run(std::string("delete ") + kOld, events_before_ms);
-  db_->Run("delete from request_id where at_ms < ?", requests_before_ms);
+  db.Run("update meta set value=max(value, ?) where name='compacted_revision'", newest.Int(0));
+  db.Run(std::string("delete ") + kOld, events_before_ms);
+  db.Run("delete from request_id where at_ms < ?", requests_before_ms);
   transaction.Commit();
 }
 
@@ -324,17 +335,19 @@ constexpr char kReferences[] =
 }  // namespace
 
 std::set<std::string> SqliteJobStore::ReferencedBlobs() {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(), kReferences);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(), kReferences);
   std::set<std::string> digests;
   while (select.Step()) digests.insert(select.Text(0));
   return digests;
 }
 
 bool SqliteJobStore::IsReferenced(const std::string& sha256) {
-  std::lock_guard lock(mutex_);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
   SqliteStatement select(
-      db_->handle(),
+      db.handle(),
       "select exists(select 1 from artifact where sha256=?1) or "
       "exists(select 1 from scene_file where sha256=?1) or "
       "exists(select 1 from job_blob where sha256=?1) or "
@@ -344,9 +357,42 @@ bool SqliteJobStore::IsReferenced(const std::string& sha256) {
   return select.Int(0) != 0;
 }
 
+std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobCandidate>& unnamed,
+                                                         int64_t grace_ms) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  int64_t elapsed = 0;
+  {
+    SqliteStatement last(db.handle(), "select value from meta where name='collected_steady_ms'");
+    if (last.Step() && last.Int(0) > 0) elapsed = std::max<int64_t>(SteadyNow() - last.Int(0), 0);
+  }
+  db.Exec("create temp table told(sha256 text primary key, touched_ns integer) without rowid");
+  for (const BlobCandidate& blob : unnamed) {
+    db.Run("insert or ignore into told values(?,?)", blob.sha256, blob.touched_ns);
+  }
+  db.Exec(
+      "delete from blob_candidate where not exists(select 1 from told where "
+      "told.sha256=blob_candidate.sha256 and told.touched_ns=blob_candidate.touched_ns)");
+  db.Run("update blob_candidate set age_ms=age_ms+?", elapsed);
+  db.Exec("insert or ignore into blob_candidate select sha256, touched_ns, 0 from told");
+  db.Exec("drop table told");
+  db.Run("update meta set value=max(?, 1) where name='collected_steady_ms'", SteadyNow());
+  std::vector<BlobCandidate> due;
+  {
+    SqliteStatement select(db.handle(),
+                           "select sha256, touched_ns from blob_candidate where age_ms>=?");
+    select.Bind(grace_ms);
+    while (select.Step()) due.push_back({select.Text(0), select.Int(1)});
+  }
+  transaction.Commit();
+  return due;
+}
+
 int64_t SqliteJobStore::RunningEpoch(const std::string& job_name) {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(),
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(),
                          "select lease_epoch from job where name=? and state='RUNNING'");
   select.Bind(job_name);
   return select.Step() ? select.Int(0) : 0;

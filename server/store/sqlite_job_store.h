@@ -1,32 +1,35 @@
-// The job store in one SQLite file (WAL). One connection behind a mutex; open several stores on the
-// same file for more concurrency (threads or processes on one host).
+// The job store in one SQLite file (WAL), which several processes of one host may share. Reads wait
+// for nothing; writes of one process wait for each other, and for those of other processes.
 #pragma once
 
 #include <filesystem>
-#include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "server/store/job_store.h"
+#include "server/store/sqlite_connections.h"
+#include "server/store/store_schema.h"
 
 namespace color3d {
-
-class SqliteDatabase;
-class SqliteStatement;
 
 struct StoreOptions {
   int max_attempts = 3;
   // First delay before a failed or lost attempt is tried again; doubles with each attempt.
   int64_t retry_backoff_ms = 2'000;
+  // Of this program. A worker of another version than the server's is given no job.
+  std::string program_version;
+  // Leases of another start of the machine have ended when a server opens the store.
+  std::string boot_id = BootId();
 };
 
 class SqliteJobStore : public JobStore {
  public:
-  // Creates the tables in a fresh file. Throws Error{kFailedPrecondition} for a file of a newer
-  // version.
-  SqliteJobStore(const std::filesystem::path& file, Clock clock, StoreOptions options = {});
+  // Throws as PrepareStore.
+  SqliteJobStore(const std::filesystem::path& file,
+                 StoreRole role,
+                 Clocks clocks,
+                 StoreOptions options = {});
   ~SqliteJobStore() override;
 
   SceneRecord CreateScene(const SceneRecord& record, const RequestKey& request) override;
@@ -49,7 +52,10 @@ class SqliteJobStore : public JobStore {
   std::vector<JobRecord> ListJobs(const JobFilter& filter, int64_t before_id, int limit) override;
   std::vector<JobRecord> ListChildren(const std::string& name) override;
   JobRecord Cancel(const std::string& name, const RequestKey& request) override;
-  JobRecord Retry(const std::string& name, bool from_scratch, const RequestKey& request) override;
+  JobRecord Retry(const std::string& name,
+                  bool from_scratch,
+                  const RequestKey& request,
+                  int64_t max_unfinished) override;
   void Delete(const std::string& name, const RequestKey& request) override;
 
   std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
@@ -72,6 +78,7 @@ class SqliteJobStore : public JobStore {
 
   int ReapExpired() override;
   std::vector<std::string> ExpireLeasesOf(const std::string& worker) override;
+  bool IsHeld() override;
   void UpdateWorker(const WorkerRecord& worker) override;
   void RemoveWorker(const std::string& worker_id) override;
   std::vector<WorkerRecord> ListWorkers() override;
@@ -93,47 +100,58 @@ class SqliteJobStore : public JobStore {
   void Compact(int64_t events_before_ms, int64_t requests_before_ms) override;
   std::set<std::string> ReferencedBlobs() override;
   bool IsReferenced(const std::string& sha256) override;
+  std::vector<BlobCandidate> AgeCandidates(const std::vector<BlobCandidate>& unnamed,
+                                           int64_t grace_ms) override;
   int64_t RunningEpoch(const std::string& job_name) override;
 
  private:
-  // Reading (sqlite_job_store.cc). All private methods expect the mutex to be held.
-  void OpenSchema();
-  std::optional<JobRecord> FindJob(const std::string& name);
-  JobRecord RequireJob(const std::string& name);
-  JobRecord JobById(int64_t job_id);
-  std::vector<ArtifactRecord> LoadArtifacts(int64_t job_id);
+  // Reading (sqlite_job_store.cc).
+  std::optional<JobRecord> FindJob(SqliteDatabase& db, const std::string& name);
+  JobRecord RequireJob(SqliteDatabase& db, const std::string& name);
+  JobRecord JobById(SqliteDatabase& db, int64_t job_id);
+  std::vector<ArtifactRecord> LoadArtifacts(SqliteDatabase& db, int64_t job_id);
   // All rows of a SelectJob statement, with artifacts.
-  std::vector<JobRecord> ReadJobs(SqliteStatement& select);
-  std::vector<JobRecord> GraphOf(const JobRecord& root);
-  SceneRecord RequireScene(const std::string& name, bool with_files);
+  std::vector<JobRecord> ReadJobs(SqliteDatabase& db, SqliteStatement& select);
+  std::vector<JobRecord> GraphOf(SqliteDatabase& db, const JobRecord& root);
+  SceneRecord RequireScene(SqliteDatabase& db, const std::string& name, bool with_files);
 
   // Idempotency: the resource of an earlier equal request. Throws REQUEST_ID_REUSED.
-  std::optional<std::string> CheckRequest(const RequestKey& request);
-  void RecordRequest(const RequestKey& request, const std::string& resource);
+  std::optional<std::string> CheckRequest(SqliteDatabase& db, const RequestKey& request);
+  void RecordRequest(SqliteDatabase& db, const RequestKey& request, const std::string& resource);
+
+  // Throws WORKER_VERSION.
+  void RequireServersVersion(SqliteDatabase& db) const;
 
   // State machine (sqlite_job_state.cc).
-  void AddEvent(int64_t job_id, bool progress);
-  void SetState(int64_t job_id, JobState state);
-  JobRecord BeginAttempt(int64_t job_id, const std::string& worker, int64_t lease_ms);
-  void FinishAttempt(const Lease& lease, const char* outcome);
-  JobRecord RequireLease(const Lease& lease);
-  bool InputsAreReady(int64_t job_id);
-  void QueueReadyDependants(int64_t job_id);
-  void EndFailed(int64_t job_id, const JobError& error);
-  void EndCancelled(int64_t job_id);
-  void PropagateEnd(const JobRecord& cause);
-  void Requeue(const JobRecord& job, bool count_as_lost);
-  void InsertJob(const NewGraph& graph,
+  void AddEvent(SqliteDatabase& db, int64_t job_id, bool progress);
+  void SetState(SqliteDatabase& db, int64_t job_id, JobState state);
+  JobRecord BeginAttempt(SqliteDatabase& db,
+                         int64_t job_id,
+                         const std::string& worker,
+                         int64_t lease_ms);
+  void FinishAttempt(SqliteDatabase& db, const Lease& lease, const char* outcome);
+  JobRecord RequireLease(SqliteDatabase& db, const Lease& lease);
+  bool InputsAreReady(SqliteDatabase& db, int64_t job_id);
+  void QueueReadyDependants(SqliteDatabase& db, int64_t job_id);
+  void EndFailed(SqliteDatabase& db, int64_t job_id, const JobError& error);
+  void EndCancelled(SqliteDatabase& db, int64_t job_id);
+  void PropagateEnd(SqliteDatabase& db, const JobRecord& cause);
+  void Requeue(SqliteDatabase& db, const JobRecord& job, bool count_as_lost);
+  void InsertJob(SqliteDatabase& db,
+                 const NewGraph& graph,
                  size_t index,
                  const std::vector<std::string>& names,
                  std::vector<int64_t>* ids);
-  void ResetForRetry(const JobRecord& job, bool from_scratch);
-  void StoreUsage(int64_t job_id, const JobUsage& usage);
-  int64_t Now() const { return clock_(); }
+  // Throws QUEUE_FULL.
+  void RequireRoom(SqliteDatabase& db, int64_t jobs, int64_t max_unfinished);
+  void ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch);
+  void StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsage& usage);
+  int64_t Now() const { return clocks_.wall(); }
+  int64_t SteadyNow() const { return clocks_.steady(); }
 
-  std::mutex mutex_;
-  std::unique_ptr<SqliteDatabase> db_;
-  Clock clock_;
+  const std::filesystem::path file_;
+  SqliteConnections connections_;
+  Clocks clocks_;
   StoreOptions options_;
 };
 

@@ -23,13 +23,13 @@ TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
   const JobRecord import = ClaimOne();
   FailWith(import, ErrorCode::kInternal);
   const RequestKey retry{"RetryJob", "id-3", "b"};
-  store_->Retry(first.name, false, retry);
+  store_->Retry(first.name, false, retry, kNoLimit);
   FailWith(ClaimOne(), ErrorCode::kInternal);
-  EXPECT_EQ(store_->Retry(first.name, false, retry).state, JobState::kFailed);
+  EXPECT_EQ(store_->Retry(first.name, false, retry, kNoLimit).state, JobState::kFailed);
 }
 
 TEST_F(SqliteJobStoreTest, EqualRequestsAtOnceMakeOneJob) {
-  SqliteJobStore other(scratch_.path() / "jobs.db", [this] { return now_.load(); });
+  SqliteJobStore other(File(), StoreRole::kWorker, TestClocks());
   const RequestKey key{"CreateJob", "same", "body"};
   NewGraph graph;
   graph.scene = "scenes/test";
@@ -60,23 +60,8 @@ TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
 
 TEST_F(SqliteJobStoreTest, NewerSchemaIsRefused) {
   store_.reset();
-  SqliteDatabase(scratch_.path() / "jobs.db").Exec("update schema_version set version=99");
+  SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=99");
   EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_VERSION");
-}
-
-// A data directory of version 1 goes on with its scenes.
-TEST_F(SqliteJobStoreTest, StoreOfVersion1IsBroughtUpToDate) {
-  store_.reset();
-  {
-    SqliteDatabase old(scratch_.path() / "jobs.db");
-    old.Exec("alter table scene drop column key_color_job");
-    old.Exec("update schema_version set version=1");
-  }
-  Open();
-  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "");
-  store_.reset();
-  Open();  // and is read as the new version from then on
-  EXPECT_EQ(store_->ListScenes(0, 10).size(), 1u);
 }
 
 TEST_F(SqliteJobStoreTest, GarbageFileIsReportedNotCrashed) {
@@ -113,7 +98,7 @@ TEST_F(SqliteJobStoreTest, CompactedRevisionsAreReported) {
   const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
   Succeed(ClaimOne());
   const int64_t newest = store_->NewestRevision();
-  store_->Compact(now_ + 1, now_ + 1);
+  store_->Compact(wall_ + 1, wall_ + 1);
   EXPECT_EQ(ReasonThrown([&] { store_->EventsSince(0, ids, 10); }), "REVISION_COMPACTED");
   EXPECT_TRUE(store_->EventsSince(newest, ids, 10).empty());
   EXPECT_EQ(ReasonThrown([&] { store_->EventsSince(newest + 1, ids, 10); }), "REVISION_COMPACTED");

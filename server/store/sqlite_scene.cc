@@ -9,8 +9,10 @@
 #include "server/store/sqlite_rows.h"
 
 namespace color3d {
-SceneRecord SqliteJobStore::RequireScene(const std::string& name, bool with_files) {
-  SqliteStatement select(db_->handle(), SelectScene("where name=?"));
+SceneRecord SqliteJobStore::RequireScene(SqliteDatabase& db,
+                                         const std::string& name,
+                                         bool with_files) {
+  SqliteStatement select(db.handle(), SelectScene("where name=?"));
   select.Bind(name);
   if (!select.Step()) {
     throw ServiceError(ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '{}'", name);
@@ -18,7 +20,7 @@ SceneRecord SqliteJobStore::RequireScene(const std::string& name, bool with_file
   SceneRecord scene = SceneFromRow(select);
   if (!with_files) return scene;
   SqliteStatement files(
-      db_->handle(),
+      db.handle(),
       "select path, sha256, size_bytes from scene_file where scene_id=? order by path");
   files.Bind(scene.id);
   while (files.Step()) {
@@ -28,10 +30,11 @@ SceneRecord SqliteJobStore::RequireScene(const std::string& name, bool with_file
 }
 
 SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record, const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (const auto resource = CheckRequest(request)) return RequireScene(*resource, true);
-  SqliteStatement existing(db_->handle(), "select 1 from scene where name=?");
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
+  SqliteStatement existing(db.handle(), "select 1 from scene where name=?");
   existing.Bind(record.name);
   if (existing.Step()) {
     throw ServiceError(ErrorCode::kAlreadyExists,
@@ -43,28 +46,30 @@ SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record, const Request
   fresh.name = record.name;
   fresh.display_name = record.display_name;
   fresh.create_ms = Now();
-  const int64_t scene_id = InsertSceneRow(*db_, fresh);
+  const int64_t scene_id = InsertSceneRow(db, fresh);
   for (const SceneFileRecord& file : record.files) {
-    db_->Run("insert into scene_file values(?,?,?,?)",
-             scene_id,
-             file.path,
-             file.digest.sha256,
-             file.digest.size_bytes);
+    db.Run("insert into scene_file values(?,?,?,?)",
+           scene_id,
+           file.path,
+           file.digest.sha256,
+           file.digest.size_bytes);
   }
-  RecordRequest(request, record.name);
-  SceneRecord scene = RequireScene(record.name, true);
+  RecordRequest(db, request, record.name);
+  SceneRecord scene = RequireScene(db, record.name, true);
   transaction.Commit();
   return scene;
 }
 
 SceneRecord SqliteJobStore::GetScene(const std::string& name) {
-  std::lock_guard lock(mutex_);
-  return RequireScene(name, true);
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  return RequireScene(db, name, true);
 }
 
 std::vector<SceneRecord> SqliteJobStore::ListScenes(int64_t before_id, int limit) {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(),
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(),
                          SelectScene("where scene_id < ? order by scene_id desc limit ?"));
   select.Bind(before_id > 0 ? before_id : INT64_MAX, limit);
   std::vector<SceneRecord> scenes;
@@ -76,20 +81,21 @@ SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
                                           StoredLayout layout,
                                           int photo_count,
                                           const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (const auto resource = CheckRequest(request)) return RequireScene(*resource, true);
-  RequireScene(name, false);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
+  RequireScene(db, name, false);
   // Activating twice changes nothing: the scene is immutable.
-  db_->Run(
+  db.Run(
       "update scene set active=1, layout=?, photo_count=?, commit_ms=? where name=? and "
       "active=0",
       static_cast<int>(layout),
       photo_count,
       Now(),
       name);
-  RecordRequest(request, name);
-  SceneRecord scene = RequireScene(name, true);
+  RecordRequest(db, request, name);
+  SceneRecord scene = RequireScene(db, name, true);
   transaction.Commit();
   return scene;
 }
@@ -97,12 +103,13 @@ SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
 SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
                                            const std::string& job,
                                            const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (const auto resource = CheckRequest(request)) return RequireScene(*resource, true);
-  RequireScene(name, false);
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
+  RequireScene(db, name, false);
   if (!job.empty()) {
-    const JobRecord record = RequireJob(job);
+    const JobRecord record = RequireJob(db, job);
     if (record.kind != kind::kColorizeKeyView || record.scene != name) {
       throw InvalidArgument("{} is a {} job of {}; give a {} job of {}",
                             job,
@@ -119,19 +126,20 @@ SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
                          JobStateName(record.state));
     }
   }
-  db_->Run("update scene set key_color_job=? where name=?", job, name);
-  RecordRequest(request, name);
-  SceneRecord scene = RequireScene(name, true);
+  db.Run("update scene set key_color_job=? where name=?", job, name);
+  RecordRequest(db, request, name);
+  SceneRecord scene = RequireScene(db, name, true);
   transaction.Commit();
   return scene;
 }
 
 void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& request) {
-  std::lock_guard lock(mutex_);
-  SqliteTransaction transaction(*db_);
-  if (CheckRequest(request)) return;
-  const SceneRecord scene = RequireScene(name, false);
-  SqliteStatement busy(db_->handle(), "select name from job where scene=? and end_ms=0 limit 1");
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  if (CheckRequest(db, request)) return;
+  const SceneRecord scene = RequireScene(db, name, false);
+  SqliteStatement busy(db.handle(), "select name from job where scene=? and end_ms=0 limit 1");
   busy.Bind(name);
   if (busy.Step()) {
     throw ServiceError(ErrorCode::kFailedPrecondition,
@@ -140,8 +148,8 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
                        busy.Text(0),
                        name);
   }
-  db_->Run("delete from scene where scene_id=?", scene.id);
-  RecordRequest(request, name);
+  db.Run("delete from scene where scene_id=?", scene.id);
+  RecordRequest(db, request, name);
   transaction.Commit();
 }
 
@@ -167,8 +175,9 @@ ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
 std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(const std::string& scene,
                                                             int64_t before_id,
                                                             int limit) {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(),
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(),
                          SelectColorizer("and (?1='' or j.scene=?1) group by a.sha256 having "
                                          "min(j.job_id) < ?2 order by min(j.job_id) desc "
                                          "limit ?3"));
@@ -179,8 +188,9 @@ std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(const std::string& s
 }
 
 ColorizerRecord SqliteJobStore::GetColorizer(const std::string& sha256) {
-  std::lock_guard lock(mutex_);
-  SqliteStatement select(db_->handle(), SelectColorizer("and a.sha256=? group by a.sha256"));
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(), SelectColorizer("and a.sha256=? group by a.sha256"));
   select.Bind(sha256);
   if (!select.Step()) {
     throw ServiceError(ErrorCode::kNotFound,

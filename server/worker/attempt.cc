@@ -293,6 +293,15 @@ void Attempt::Publish(const StageOutput& output) {
     publication.artifacts.push_back({name, context_.blobs.PutFile(file), MediaType(name)});
     if (keeper_.stop_reason() == StopReason::kLeaseLost) keeper_.token().ThrowIfCancelled();
   }
+  // Touched, so that no sweep takes them before they are named; and there, whoever made them.
+  for (const ArtifactRecord& artifact : publication.artifacts) {
+    if (context_.blobs.Touch(artifact.digest)) continue;
+    throw ServiceError(ErrorCode::kUnavailable,
+                       "BLOB_MISSING",
+                       "the result {} of {} is gone from the blob store before it was published",
+                       artifact.name,
+                       job_.kind);
+  }
   publication.stage_key = stage_key_;
   publication.usage = keeper_.Usage();
   keeper_.Stop();  // a heartbeat after the end would look like a lost lease
@@ -376,9 +385,24 @@ void Attempt::GiveUp(StopReason reason) {
 
 }  // namespace
 
+void GiveBack(JobStore& store, const JobRecord& job) {
+  try {
+    store.Release({job.id, job.lease_epoch}, job.usage);
+  } catch (const std::exception& e) {
+    spdlog::error("{} cannot be given back; its lease will run out: {}", AttemptTag(job), e.what());
+  }
+}
+
 void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares_process) {
-  Attempt attempt(context, job, shares_process);
-  attempt.Run();
+  try {
+    Attempt attempt(context, job, shares_process);
+    attempt.Run();
+  } catch (const std::exception& e) {
+    // It was not begun, or its end could not be told: not the job's fault, and no attempt.
+    spdlog::error("{} could not be run here: {}", AttemptTag(job), e.what());
+    std::this_thread::sleep_for(kReportPause);
+    GiveBack(context.store, job);
+  }
 }
 
 }  // namespace color3d

@@ -34,6 +34,9 @@ struct AttemptContext {
   std::function<void(const JobRecord&)> on_heartbeat;
 };
 
+// Back to the queue, without counting the attempt. Never throws.
+void GiveBack(JobStore& store, const JobRecord& job);
+
 // Never throws: whatever happens is written to the store, or, when that is impossible, left to the
 // lease's end.
 // `shares_process`: other attempts run in it, too; peak memory is then that of all together.

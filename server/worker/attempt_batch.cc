@@ -1,5 +1,7 @@
 #include "server/worker/attempt_batch.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 
 namespace color3d {
@@ -11,12 +13,18 @@ AttemptBatch::~AttemptBatch() {
 void AttemptBatch::Start(const JobRecord& job) {
   const bool shares_process = !running_.empty();
   Running& running = running_.emplace_back();
-  running.thread = std::thread([this, job, shares_process, &running] {
-    RunAttempt(context_, job, shares_process);
-    std::lock_guard lock(mutex_);
-    running.ended = true;
-    ended_.notify_all();
-  });
+  try {
+    running.thread = std::thread([this, job, shares_process, &running] {
+      RunAttempt(context_, job, shares_process);
+      std::lock_guard lock(mutex_);
+      running.ended = true;
+      ended_.notify_all();
+    });
+  } catch (const std::exception& e) {  // no more threads
+    spdlog::error("{} cannot be run beside others: {}", AttemptTag(job), e.what());
+    running_.pop_back();
+    GiveBack(context_.store, job);
+  }
 }
 
 int AttemptBatch::Reap(std::chrono::milliseconds timeout) {

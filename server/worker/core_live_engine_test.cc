@@ -11,6 +11,7 @@
 #include "core/colorizer/tensor_file.h"
 #include "core/image/codec.h"
 #include "server/service_error.h"
+#include "server/storage/file_blob_store.h"
 #include "server/worker/live_engine.h"
 
 namespace color3d {
@@ -84,7 +85,7 @@ class CoreLiveEngineTest : public ::testing::Test {
   Image LabOf(size_t i) { return LabFromSrgb(DecodeImage(responses_[i].image(), "the answer")); }
 
   ScratchFolder scratch_;
-  BlobStore blobs_{scratch_.path() / "blobs", {0}};
+  FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
   std::unique_ptr<LiveEngine> engine_;
   std::vector<Response> responses_;
 };

@@ -28,7 +28,7 @@ class InferenceWorker {
                   const std::atomic<bool>& draining)
       : options_(options),
         id_(options.name + "-" + std::to_string(::getpid())),
-        store_(DataPaths(options.data_folder).Store(), SystemClock(), {}),
+        store_(DataPaths(options.data_folder).Store(), StoreRole::kWorker, SystemClocks()),
         sockets_(DataPaths(options.data_folder).Sockets()),
         draining_(draining),
         queue_(engine, options.max_batch, options.max_waiting) {}

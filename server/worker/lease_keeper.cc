@@ -132,8 +132,9 @@ void LeaseKeeper::Beat() {
       last_report_ = now;
       on_heartbeat_();
     }
-  } catch (const Error& e) {
-    if (e.code() == ErrorCode::kAborted) {
+  } catch (const std::exception& e) {
+    const auto* error = dynamic_cast<const Error*>(&e);
+    if (error != nullptr && error->code() == ErrorCode::kAborted) {
       StopStage(StopReason::kLeaseLost);
     } else {
       spdlog::warn("{} heartbeat failed: {}", tag_, e.what());

@@ -10,12 +10,14 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <map>
 
 extern char** environ;
 
 namespace color3d {
 namespace {
 constexpr auto kTick = std::chrono::milliseconds(50);
+constexpr auto kListening = std::chrono::seconds(2);
 // A worker that lived this long did not fail to start.
 constexpr auto kHealthyLife = std::chrono::seconds(60);
 
@@ -102,7 +104,7 @@ void Supervisor::StartWorker(Slot* slot) {
     return;
   }
   slot->pid = pid;
-  slot->last_moving = slot->started;
+  slot->last_moving = slot->last_heard = slot->started;
   spdlog::info("{} started (pid {})", slot->name, pid);
 }
 
@@ -157,16 +159,60 @@ void Supervisor::KillIfFrozen(Slot* slot) {
   const auto now = SteadyClock::now();
   if (!IsStopped(slot->pid)) {
     slot->last_moving = now;
-  } else if (now - slot->last_moving > options_.max_stopped) {
-    spdlog::error("{} (pid {}) has been stopped for too long; killing it", slot->name, slot->pid);
-    ::kill(slot->pid, SIGKILL);
-    slot->last_moving = now;
+    return;
+  }
+  const auto stopped = now - slot->last_moving;
+  const bool too_long = stopped > options_.max_stopped;
+  if (!too_long && (stopped <= options_.max_stopped_holding || !IsStoreHeld())) return;
+  spdlog::error("{} (pid {}) is stopped{}; killing it",
+                slot->name,
+                slot->pid,
+                too_long ? " for too long" : " and nobody can write to the store");
+  ::kill(slot->pid, SIGKILL);
+  slot->last_moving = now;
+}
+
+bool Supervisor::IsStoreHeld() const {
+  try {
+    return store_.IsHeld();
+  } catch (const Error& e) {
+    spdlog::warn("cannot look whether the store is held: {}", e.what());
+    return false;
+  }
+}
+
+// One that hangs outside of an attempt has no lease whose end would tell.
+void Supervisor::KillTheSilent() {
+  const auto now = SteadyClock::now();
+  if (now < next_listening_) return;
+  next_listening_ = now + kListening;
+  std::map<std::string, int64_t> reports;
+  try {
+    for (const WorkerRecord& worker : store_.ListWorkers()) {
+      reports[worker.worker_id] = worker.heartbeat_ms;
+    }
+  } catch (const Error& e) {
+    spdlog::warn("cannot look after workers: {}", e.what());
+    return;
+  }
+  for (Slot& slot : slots_) {
+    const auto report = reports.find(slot.name + "-" + std::to_string(slot.pid));
+    const int64_t heard = report != reports.end() ? report->second : 0;
+    if (slot.pid == 0 || heard != slot.report_ms) {
+      slot.report_ms = heard;
+      slot.last_heard = now;
+    } else if (now - slot.last_heard > options_.max_silent) {
+      spdlog::error("{} (pid {}) gives no sign of life; killing it", slot.name, slot.pid);
+      ::kill(slot.pid, SIGKILL);
+      slot.last_heard = now;
+    }
   }
 }
 
 void Supervisor::Loop() {
   while (true) {
     for (Slot& slot : slots_) CheckWorker(&slot);
+    KillTheSilent();
     if (draining_.load()) {
       const bool kill = SteadyClock::now() >= kill_at_.load();
       bool running = false;

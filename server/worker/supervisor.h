@@ -47,9 +47,13 @@ struct SupervisorOptions {
   std::shared_ptr<const InferenceDemand> inference_demand;
   std::chrono::milliseconds first_backoff{500};
   std::chrono::milliseconds max_backoff{10'000};
-  // A worker that is stopped (SIGSTOP, a debugger) for this long is killed: it has lost its lease,
-  // and may hold the store's write lock.
+  // A worker that is stopped (SIGSTOP, a debugger) for this long is killed: it has lost its lease.
   std::chrono::milliseconds max_stopped{180'000};
+  // ... or for this long while nobody can write to the store, which it may have stopped in: before
+  // the leases of all others run out with its own.
+  std::chrono::milliseconds max_stopped_holding{10'000};
+  // A worker that runs but has not reported itself for so long is killed, too.
+  std::chrono::milliseconds max_silent{180'000};
 };
 
 class Supervisor {
@@ -79,6 +83,8 @@ class Supervisor {
     SteadyClock::time_point next_start;
     std::chrono::milliseconds backoff{0};
     SteadyClock::time_point last_moving;  // not stopped when last seen
+    SteadyClock::time_point last_heard;   // its report was another one
+    int64_t report_ms = 0;
   };
   void Loop();
   bool IsWanted(const Slot& slot) const;
@@ -86,10 +92,13 @@ class Supervisor {
   void CheckWorker(Slot* slot);
   void OnExit(Slot* slot, int status);
   void KillIfFrozen(Slot* slot);
+  bool IsStoreHeld() const;
+  void KillTheSilent();
 
   const SupervisorOptions options_;
   JobStore& store_;
   std::vector<Slot> slots_;  // supervisor's thread only
+  SteadyClock::time_point next_listening_;
   std::atomic<bool> draining_{false};
   std::atomic<SteadyClock::time_point> kill_at_;
   std::thread thread_;

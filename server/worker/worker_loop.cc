@@ -9,6 +9,8 @@
 #include "core/base/memory.h"
 #include "core/catalogue/stages.h"
 #include "server/ops/process.h"
+#include "server/service_error.h"
+#include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/worker/attempt.h"
 #include "server/worker/attempt_batch.h"
@@ -32,8 +34,8 @@ class WorkerLoop {
       : options_(options),
         id_(options.name + "-" + std::to_string(::getpid())),
         paths_(options.data_folder),
-        store_(paths_.Store(), SystemClock(), Store(options)),
-        heartbeat_store_(paths_.Store(), SystemClock(), Store(options)),
+        store_(paths_.Store(), StoreRole::kWorker, SystemClocks(), Store(options)),
+        heartbeat_store_(paths_.Store(), StoreRole::kWorker, SystemClocks(), Store(options)),
         blobs_(paths_.Blobs(), {options.reserve_mib << 20}),
         draining_(draining),
         context_{store_,
@@ -56,6 +58,7 @@ class WorkerLoop {
   static StoreOptions Store(const WorkerOptions& options) {
     StoreOptions store;
     store.retry_backoff_ms = options.retry_backoff_ms;
+    store.program_version = options.release;
     return store;
   }
   bool Finished() const {
@@ -76,15 +79,20 @@ class WorkerLoop {
   const DataPaths paths_;
   SqliteJobStore store_;
   SqliteJobStore heartbeat_store_;
-  BlobStore blobs_;
+  FileBlobStore blobs_;
   FileDigests digests_;
   const std::atomic<bool>& draining_;
   const AttemptContext context_;
   int jobs_done_ = 0;
 };
 
+// For people, and for the supervisor, who sees that this process is alive. Nothing fails with it.
 void WorkerLoop::ReportSelf(JobStore& store, const std::string& job) const {
-  store.UpdateWorker({id_, ::getpid(), job, ResidentMemoryBytes(), 0});
+  try {
+    store.UpdateWorker({id_, ::getpid(), job, ResidentMemoryBytes(), 0});
+  } catch (const Error& e) {
+    spdlog::warn("{} cannot say what it does: {}", id_, e.what());
+  }
 }
 
 bool WorkerLoop::ShouldRecycle() const {
@@ -155,8 +163,9 @@ void WorkerLoop::Run() {
         next_report = std::chrono::steady_clock::now() + std::chrono::seconds(5);
       }
       worked = Turn();
-    } catch (const Error& e) {
-      // A job that was claimed but not run is taken up again when its lease has run out.
+    } catch (const std::exception& e) {
+      const auto* error = dynamic_cast<const ServiceError*>(&e);
+      if (error != nullptr && error->reason() == "WORKER_VERSION") throw;
       spdlog::error("{}: {}", id_, e.what());
     }
     if (!worked) std::this_thread::sleep_for(options_.poll);

@@ -32,6 +32,7 @@ struct WorkerOptions {
   int batch_scenes = 8;
   pid_t parent = 0;  // 0: started by hand
   std::string code_version;
+  std::string release;  // the server's, or no job is given
   UserModels models;
 };
 

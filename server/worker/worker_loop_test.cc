@@ -67,7 +67,7 @@ class MeetingRunner : public StageRunner {
 
 class WorkerLoopTest : public testing::Test {
  protected:
-  WorkerLoopTest() : store_(StoreIn(folder_.path()), SystemClock(), {}) {
+  WorkerLoopTest() : store_(StoreIn(folder_.path()), StoreRole::kServer, SystemClocks()) {
     SceneRecord scene;
     scene.name = "scenes/test";
     store_.CreateScene(scene, {});

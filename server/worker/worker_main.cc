@@ -11,6 +11,7 @@
 #include "core/base/memory.h"
 #include "server/ops/process.h"
 #include "server/storage/data_folder.h"
+#include "server/storage/file_blob_store.h"
 #include "server/worker/inference_worker.h"
 #include "server/worker/worker_loop.h"
 
@@ -77,6 +78,7 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
 
 void Complete(WorkerArguments* arguments) {
   WorkerOptions& options = arguments->options;
+  options.release = COLOR3D_VERSION;
   options.timing.lease = Milliseconds(arguments->lease_seconds);
   options.timing.heartbeat = Milliseconds(arguments->heartbeat_seconds);
   options.timing.stuck = Milliseconds(arguments->stuck_seconds);
@@ -116,7 +118,7 @@ void HandleStopSignals() {
 
 void ServeInference(const WorkerArguments& arguments, const WorkerProgram& program) {
   const DataPaths paths(arguments.options.data_folder);
-  BlobStore blobs(paths.Blobs(), {arguments.options.reserve_mib << 20});
+  FileBlobStore blobs(paths.Blobs(), {arguments.options.reserve_mib << 20});
   const std::unique_ptr<LiveEngine> engine = program.make_engine(
       {blobs, ParseUserModels(arguments.models, arguments.backends), arguments.options.threads});
   InferenceOptions options;

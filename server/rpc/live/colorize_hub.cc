@@ -67,7 +67,7 @@ class ColorizeStream final
       }
     }
     if (picture) {
-      parts_.executor.Post([self = shared_from_this(), picture] { self->Forward(picture); });
+      parts_.slow.Post([self = shared_from_this(), picture] { self->Forward(picture); });
     }
     Pump();
   }

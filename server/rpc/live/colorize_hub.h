@@ -38,7 +38,7 @@ class ColorizeHub {
   void Unregister(ColorizeStream* stream);
 
   const RpcParts& parts_;
-  const InferenceClient client_;
+  InferenceClient client_;
   const ColorizeLimits limits_;
   std::atomic<int> pictures_{0};
   std::mutex mutex_;

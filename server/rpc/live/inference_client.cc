@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "server/rpc/error_mapping.h"
+#include "server/rpc/rpc_parts.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -42,6 +44,20 @@ grpc::Status Explained(const grpc::Status& status, bool our_limit) {
       ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", "{}; send the picture again", what));
 }
 
+// A status without details is the transport's own word, after the worker had been reached.
+PoisonWatch::End EndOf(const grpc::Status& status) {
+  if (status.ok() || !status.error_details().empty()) return PoisonWatch::End::kAnswered;
+  return status.error_code() == grpc::StatusCode::UNAVAILABLE ? PoisonWatch::End::kWorkerDied
+                                                              : PoisonWatch::End::kUnknown;
+}
+
+grpc::Status PoisonStatus() {
+  return ToGrpcStatus(ServiceError(ErrorCode::kFailedPrecondition,
+                                   "PICTURE_KILLS_WORKER",
+                                   "the inference worker died of this picture, alone with it: see "
+                                   "the server's log; send it smaller, or as another file"));
+}
+
 }  // namespace
 
 InferenceClient::InferenceClient(InferenceLink link) : link_(std::move(link)) {
@@ -55,19 +71,50 @@ void InferenceClient::WarmUp() const {
 
 void InferenceClient::Start(const std::shared_ptr<Call>& call,
                             system_clock::time_point deadline,
-                            std::function<void(const grpc::Status&)> done) const {
+                            std::function<void(const grpc::Status&)> done) {
   WarmUp();
+  Order order{call, deadline, std::move(done), DigestOfMessage(call->request)};
+  bool is_poison = false;
+  {
+    std::lock_guard lock(mutex_);
+    is_poison = watch_.IsPoison(order.picture);
+    if (!is_poison) waiting_.push_back(order);
+  }
+  is_poison ? order.done(PoisonStatus()) : Pump();
+}
+
+void InferenceClient::Pump() {
+  std::vector<Order> sent;
+  {
+    std::lock_guard lock(mutex_);
+    // In their order: a suspect holds up those behind it until it has been sent.
+    while (!waiting_.empty() && watch_.MaySend(waiting_.front().picture)) {
+      watch_.OnSent(waiting_.front().picture);
+      sent.push_back(std::move(waiting_.front()));
+      waiting_.pop_front();
+    }
+  }
+  for (const Order& order : sent) Send(order);
+}
+
+void InferenceClient::Send(const Order& order) {
   const system_clock::time_point limit = system_clock::now() + link_.limit;
-  const bool our_limit = limit < deadline;
-  call->context.set_deadline(std::min(limit, deadline));
-  call->context.set_wait_for_ready(true);
-  stub_->async()->ColorizeImage(
-      &call->context,
-      &call->request,
-      &call->response,
-      [call, our_limit, done = std::move(done)](const grpc::Status& status) {
-        done(Explained(status, our_limit));
-      });
+  const bool our_limit = limit < order.deadline;
+  Call& call = *order.call;
+  call.context.set_deadline(std::min(limit, order.deadline));
+  call.context.set_wait_for_ready(true);
+  stub_->async()->ColorizeImage(&call.context,
+                                &call.request,
+                                &call.response,
+                                [this, order, our_limit](const grpc::Status& status) {
+                                  {
+                                    std::lock_guard lock(mutex_);
+                                    watch_.OnEnd(order.picture, EndOf(status));
+                                  }
+                                  Pump();
+                                  // The last: this object may be gone afterwards.
+                                  order.done(Explained(status, our_limit));
+                                });
 }
 
 }  // namespace color3d

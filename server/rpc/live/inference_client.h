@@ -6,11 +6,14 @@
 #include <grpcpp/support/status.h>
 
 #include <chrono>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "color3d/internal/v1/inference.grpc.pb.h"
+#include "server/rpc/live/poison_watch.h"
 
 namespace color3d {
 
@@ -42,16 +45,32 @@ class InferenceClient {
   void WarmUp() const;
   // Keeps the worker from being drained while what this returns lives.
   std::shared_ptr<void> Hold() const { return link_.hold ? link_.hold() : nullptr; }
-  // `done` is called once, on one of gRPC's threads, with the worker's status; a worker that dies
-  // or does not answer in time gives UNAVAILABLE with RetryInfo (INFERENCE_LOST). To cancel:
-  // call->context.TryCancel().
+  // `done` is called once, on one of gRPC's threads or the caller's, with the worker's status; a
+  // worker that dies or does not answer in time gives UNAVAILABLE with RetryInfo (INFERENCE_LOST).
+  // Pictures that were with a worker when it died are each sent alone when they come again, so that
+  // the one that kills it is found (FAILED_PRECONDITION, PICTURE_KILLS_WORKER) and takes no other
+  // with it. To cancel: call->context.TryCancel().
   void Start(const std::shared_ptr<Call>& call,
              std::chrono::system_clock::time_point deadline,
-             std::function<void(const grpc::Status&)> done) const;
+             std::function<void(const grpc::Status&)> done);
 
  private:
+  struct Order {
+    std::shared_ptr<Call> call;
+    std::chrono::system_clock::time_point deadline;
+    std::function<void(const grpc::Status&)> done;
+    LivePicture picture;
+    bool alone = false;
+  };
+  // Sends what may be sent now.
+  void Pump();
+  void Send(const Order& order);
+
   InferenceLink link_;
   std::unique_ptr<internal::v1::InferenceService::Stub> stub_;
+  std::mutex mutex_;
+  PoisonWatch watch_;
+  std::deque<Order> waiting_;
 };
 
 }  // namespace color3d

@@ -61,9 +61,9 @@ Head ReadHead(Bytes& bytes) {
 std::vector<uint32_t> ReadSymbols(const Head& head, Bytes& bytes) {
   const std::string_view packed = bytes.Take(head.packed);
   std::string planes(head.count * head.width, '\0');
-  Require(ZSTD_decompress(planes.data(), planes.size(), packed.data(), packed.size()) ==
-              planes.size(),
-          "a stream of another length");
+  Require(
+      ZSTD_decompress(planes.data(), planes.size(), packed.data(), packed.size()) == planes.size(),
+      "a stream of another length");
   std::vector<uint32_t> symbols(head.count, 0);
   for (int byte = 0; byte < head.width; ++byte) {
     for (size_t i = 0; i < head.count; ++i) {
@@ -80,7 +80,9 @@ std::vector<uint32_t> ReadStream(int attribute, size_t count, Bytes& bytes) {
   return ReadSymbols(head, bytes);
 }
 
-int UnZigZag(uint32_t symbol) { return static_cast<int>(symbol >> 1u) ^ -static_cast<int>(symbol & 1u); }
+int UnZigZag(uint32_t symbol) {
+  return static_cast<int>(symbol >> 1u) ^ -static_cast<int>(symbol & 1u);
+}
 
 std::vector<int> Sums(const std::vector<uint32_t>& symbols) {
   std::vector<int> sums;

@@ -33,8 +33,12 @@ class JobStoreTest : public ::testing::Test {
   void Open() {
     StoreOptions options;
     options.retry_backoff_ms = 100;
-    store_ = std::make_unique<SqliteJobStore>(
-        scratch_.path() / "jobs.db", [this] { return now_.load(); }, options);
+    options.boot_id = boot_id_;
+    store_ = std::make_unique<SqliteJobStore>(File(), StoreRole::kServer, TestClocks(), options);
+  }
+  std::filesystem::path File() const { return scratch_.path() / "jobs.db"; }
+  Clocks TestClocks() {
+    return {[this] { return wall_.load(); }, [this] { return now_.load(); }};
   }
   static NewJob Job(const std::string& kind, std::vector<int> inputs = {}) {
     NewJob job;
@@ -96,7 +100,9 @@ class JobStoreTest : public ::testing::Test {
   }
 
   ScratchFolder scratch_;
-  std::atomic<int64_t> now_{1'000'000};
+  std::atomic<int64_t> now_{1'000'000};   // leases and pauses go by it
+  std::atomic<int64_t> wall_{1'000'000};  // what people read
+  std::string boot_id_ = "boot 1";
   std::unique_ptr<SqliteJobStore> store_;
 };
 

@@ -14,11 +14,13 @@
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 #include "server/rpc/rpc_server.h"
+#include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
 #include "tests/support/service/rpc_support.h"
 
 namespace color3d::testing {
 
+constexpr int kMaxWatches = 60;
 constexpr char kUuid[] = "3f0c9a52-7e4b-4c1d-9b1e-2f6d8a7c5b40";
 
 class RpcTest : public ::testing::Test {
@@ -29,6 +31,7 @@ class RpcTest : public ::testing::Test {
     options.watch.poll = std::chrono::milliseconds(10);
     options.watch.keepalive = std::chrono::milliseconds(300);
     options.limits.max_unfinished_jobs = 40;
+    options.limits.max_watches = kMaxWatches;
     server_ = std::make_unique<RpcServer>(options, store_, blobs_, uploads_, SystemClock());
     client_ = std::make_unique<TestClient>(server_->address());
   }
@@ -91,9 +94,9 @@ class RpcTest : public ::testing::Test {
   }
 
   ScratchFolder scratch_;
-  BlobStore blobs_{scratch_.path() / "blobs", {0}};
+  FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
   UploadStore uploads_{scratch_.path() / "uploads", blobs_, 1 << 20};
-  SqliteJobStore store_{scratch_.path() / "jobs.db", SystemClock()};
+  SqliteJobStore store_{scratch_.path() / "jobs.db", StoreRole::kServer, SystemClocks()};
   std::unique_ptr<RpcServer> server_;
   std::unique_ptr<TestClient> client_;
 };

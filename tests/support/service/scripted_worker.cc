@@ -2,7 +2,9 @@
 // kind leaves the artifacts that its successors ask for. A select_key_view job with
 // STRATEGY_MANUAL takes its script from `view`: words separated by commas.
 //   steps=N  ms=N       N steps of so many milliseconds, a checkpoint after each
-//   crash, throw, oom, unavailable_once, hang (deaf to cancellation)
+//   crash, throw, oom, unavailable_once, hang (deaf to cancellation), freeze_writing (stops itself,
+//   once, while it holds the store's write lock)
+#include <signal.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,6 +18,8 @@
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 #include "server/planning/spec_check.h"
+#include "server/storage/data_folder.h"
+#include "server/store/sqlite_db.h"
 #include "server/worker/worker_loop.h"
 
 namespace color3d {
@@ -76,16 +80,26 @@ class ScriptedRunner : public StageRunner {
                   const CancellationToken& cancel) override;
 
  private:
-  static void Misbehave(const Script& script, CheckpointStore& checkpoints);
+  static void Misbehave(const Script& script, const StageRun& run, CheckpointStore& checkpoints);
 };
 
-void ScriptedRunner::Misbehave(const Script& script, CheckpointStore& checkpoints) {
+void ScriptedRunner::Misbehave(const Script& script,
+                               const StageRun& run,
+                               CheckpointStore& checkpoints) {
   if (script.Has("crash")) std::abort();
   if (script.Has("throw")) throw InvalidArgument("scripted failure");
   if (script.Has("oom")) throw std::bad_alloc();
   if (script.Has("unavailable_once") && !checkpoints.Load()) {
     checkpoints.Save("tried");
     throw Error(ErrorCode::kUnavailable, "scripted outage");
+  }
+  if (script.Has("freeze_writing") && !checkpoints.Load()) {
+    checkpoints.Save("");
+    // data/scratch/<attempt>/tmp
+    const DataPaths paths(run.scratch_folder.parent_path().parent_path().parent_path());
+    SqliteDatabase db(paths.Store(), SqliteAccess::kWrite);
+    SqliteTransaction held(db);
+    ::raise(SIGSTOP);
   }
   while (script.Has("hang")) std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
@@ -98,7 +112,7 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   const std::string kind = KindOf(run.spec);
   for (const FileDigest& digest : SpecBlobs(run.spec)) ReadFile(blobs.Fetch(digest.sha256));
   const Script script = ParseScript(run.spec.select_key_view().view());
-  Misbehave(script, checkpoints);
+  Misbehave(script, run, checkpoints);
   // The state is one line for each step: which process did it. Each Save is fenced, so whatever is
   // killed in between, the published trace holds every step once.
   std::string trace = checkpoints.Load().value_or("");

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -39,23 +40,22 @@ class ServerProcess {
                                           "--worker-program",
                                           COLOR3D_TEST_WORKER,
                                           "--workers",
-                                          std::to_string(workers),
-                                          "--threads",
-                                          "1",
-                                          "--lease-seconds",
-                                          "1",
-                                          "--heartbeat-seconds",
-                                          "0.2",
-                                          "--checkpoint-seconds",
-                                          "0",
-                                          "--retry-backoff-ms",
-                                          "50",
-                                          "--worker-backoff-ms",
-                                          "100",
-                                          "--reserve-mib",
-                                          "0",
-                                          "--log-level",
-                                          "warn"};
+                                          std::to_string(workers)};
+    // What a test does not say otherwise.
+    const std::vector<std::pair<const char*, const char*>> defaults = {
+        {"--threads", "1"},
+        {"--lease-seconds", "1"},
+        {"--heartbeat-seconds", "0.2"},
+        {"--checkpoint-seconds", "0"},
+        {"--retry-backoff-ms", "50"},
+        {"--worker-backoff-ms", "100"},
+        {"--reserve-mib", "0"},
+        {"--log-level", "warn"}};
+    for (const auto& [flag, value] : defaults) {
+      if (std::find(extra.begin(), extra.end(), flag) == extra.end()) {
+        arguments.insert(arguments.end(), {flag, value});
+      }
+    }
     arguments.insert(arguments.end(), extra.begin(), extra.end());
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());

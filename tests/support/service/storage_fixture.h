@@ -10,7 +10,7 @@
 
 #include "core/base/files.h"
 #include "server/service_error.h"
-#include "server/storage/blob_store.h"
+#include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 
 namespace color3d {
@@ -37,7 +37,7 @@ class StorageTest : public ::testing::Test {
     return {Sha256Hex(text), static_cast<int64_t>(text.size())};
   }
   ScratchFolder scratch_;
-  BlobStore blobs_{scratch_.path() / "blobs", {0}};
+  FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
   UploadStore uploads_{scratch_.path() / "uploads", blobs_, 1000};
 };
 

@@ -1,5 +1,5 @@
-// What moves in a model, in a file's frame and as bytes say it, one moment after another. Internal to
-// the export. Not thread-safe.
+// What moves in a model, in a file's frame and as bytes say it, one moment after another. Internal
+// to the export. Not thread-safe.
 #pragma once
 
 #include <vector>

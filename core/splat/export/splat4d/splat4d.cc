@@ -180,9 +180,8 @@ class Encoder {
                               : static_cast<uint32_t>(opacities().Base(i - first_mover_, 0));
     }));
     streams.push_back(Bytes(kRotation, 4, [&](uint32_t i, int k) {
-      return i < first_mover_
-                 ? RotationByte(g_.rotation[4 * i + k])
-                 : static_cast<uint32_t>(rotations().Base(i - first_mover_, k) + 128);
+      return i < first_mover_ ? RotationByte(g_.rotation[4 * i + k])
+                              : static_cast<uint32_t>(rotations().Base(i - first_mover_, k) + 128);
     }));
     std::string section;
     for (const Stream& stream : streams) {

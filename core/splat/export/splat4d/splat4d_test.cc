@@ -117,7 +117,7 @@ TEST_F(Splat4dTest, WhatStandsStillCostsNothingPerFrame) {
 
 TEST_F(Splat4dTest, WhatNoFrameShowsIsLeftOut) {
   GaussianModel model = MovingModel();
-  model.opacity_logit[0] = -20.0f;            // stands still
+  model.opacity_logit[0] = -20.0f;           // stands still
   model.opacity_logit[kCount - 1] = -20.0f;  // moves
   const Splat4dFile file = ReadSplat4d(Encode(model, 5));
   EXPECT_EQ(file.frames.front().opacity.size(), kCount - 2);

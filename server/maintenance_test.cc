@@ -1,0 +1,130 @@
+// Chores, at a pace that a test can wait for, under clocks that it sets.
+#include "server/maintenance.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+
+#include "server/storage/file_blob_store.h"
+#include "tests/support/service/job_store_fixture.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+class MaintenanceTest : public JobStoreTest {
+ protected:
+  MaintenanceTest() { PrepareDataFolder(paths_); }
+
+  static MaintenanceTiming Quick() {
+    MaintenanceTiming timing;
+    timing.reap = timing.sweep = timing.sweep_again = milliseconds(5);
+    return timing;
+  }
+  // Chores run until `done` says so.
+  void RunUntil(const std::function<bool()>& done) {
+    Maintenance chores(
+        *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, Quick());
+    for (int i = 0; i < 1000 && !done(); ++i) std::this_thread::sleep_for(milliseconds(5));
+    EXPECT_TRUE(done());
+  }
+  void RunForAWhile() {
+    Maintenance chores(
+        *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, Quick());
+    std::this_thread::sleep_for(milliseconds(100));
+  }
+
+  DataPaths paths_{scratch_.path() / "data"};
+  FileBlobStore blobs_{paths_.Blobs(), {0}};
+  UploadStore uploads_{paths_.Uploads(), blobs_, 1000};
+};
+
+TEST_F(MaintenanceTest, WhatNothingNamesGoesAfterItsTimeByTheSteadyClock) {
+  const FileDigest orphan = blobs_.PutBytes("orphan");
+  const FileDigest named = blobs_.PutBytes("resultsingle");
+  CreateSingle();
+  Publication publication;
+  publication.artifacts = {{"result", named, "text/plain"}};
+  store_->Publish(LeaseOf(ClaimOne()), publication);
+  RunForAWhile();
+  EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256))) << "noted, not removed";
+  wall_ += int64_t{100} * 24 * 3600 * 1000;
+  RunForAWhile();
+  EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256))) << "a clock that was set says nothing";
+  wall_ -= int64_t{100} * 24 * 3600 * 1000;
+  now_ += int64_t{25} * 3600 * 1000;
+  RunUntil([&] { return ReasonThrown([&] { blobs_.Fetch(orphan.sha256); }) == "BLOB_MISSING"; });
+  EXPECT_TRUE(fs::exists(blobs_.Fetch(named.sha256)));
+}
+
+TEST_F(MaintenanceTest, WhatIsTouchedBeginsItsTimeAnew) {
+  const FileDigest orphan = blobs_.PutBytes("orphan");
+  for (int day = 0; day < 5; ++day) {
+    RunForAWhile();
+    now_ += int64_t{23} * 3600 * 1000;
+    EXPECT_TRUE(blobs_.Touch(orphan)) << day;
+  }
+}
+
+TEST_F(MaintenanceTest, AMachineThatStartsAnewAddsNoTime) {
+  const FileDigest orphan = blobs_.PutBytes("orphan");
+  RunForAWhile();
+  store_.reset();
+  now_ += int64_t{1} << 40;
+  boot_id_ = "boot 2";
+  Open();
+  RunForAWhile();
+  EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256)));
+}
+
+TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
+  std::vector<FileDigest> all;
+  for (int i = 0; i < 20; ++i) all.push_back(blobs_.PutBytes("blob " + std::to_string(i)));
+  const fs::path damaged = blobs_.Fetch(all[7].sha256);
+  fs::permissions(damaged, fs::perms::owner_all);
+  std::ofstream(damaged, std::ios::binary) << "blob X";
+  Scrubber scrubber(blobs_);
+  const auto go_on = [] { return false; };
+  std::vector<std::string> found;
+  int64_t bytes = 0;
+  for (int round = 0; round < 10; ++round) {  // a few blobs each
+    const Scrubber::Result result = scrubber.Scrub(14, go_on);
+    EXPECT_LE(result.bytes, 14 + 7);
+    bytes += result.bytes;
+    found.insert(found.end(), result.damaged.begin(), result.damaged.end());
+  }
+  EXPECT_GE(bytes, 20 * 6) << "all of them";
+  EXPECT_EQ(found, std::vector<std::string>{all[7].sha256});
+  EXPECT_FALSE(blobs_.Touch(all[7]));
+  EXPECT_EQ(scrubber.Scrub(1000, [] { return true; }).bytes, 0);
+}
+
+// A sweep that hangs keeps no lost job from going on.
+TEST_F(MaintenanceTest, LeasesAreLookedAfterWhateverTheSweepDoes) {
+  class HangingBlobs : public FileBlobStore {
+   public:
+    using FileBlobStore::FileBlobStore;
+    void ForEach(const std::function<bool(const StoredBlob&)>&) const override {
+      while (!released) std::this_thread::sleep_for(milliseconds(1));
+      throw Error(ErrorCode::kInternal, "the disk is gone");
+    }
+    std::atomic<bool> released{false};
+  };
+  HangingBlobs hanging(paths_.Blobs(), BlobStoreOptions{0});
+  const JobRecord job = (CreateSingle(), ClaimOne());
+  {
+    Maintenance chores(
+        *store_, hanging, uploads_, paths_, [this] { return wall_.load(); }, Quick());
+    now_ += kLease + 1;
+    for (int i = 0; i < 1000 && StateOf(job.name) != JobState::kQueued; ++i) {
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    EXPECT_EQ(StateOf(job.name), JobState::kQueued);
+    hanging.released = true;
+  }
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,68 @@
+#include "server/rpc/transforms_outline.h"
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace color3d {
+namespace {
+
+using nlohmann::json;
+
+class Outliner : public nlohmann::json_sax<json> {
+ public:
+  bool null() override { return Value(); }
+  bool boolean(bool) override { return Value(); }
+  bool number_integer(number_integer_t) override { return Value(); }
+  bool number_unsigned(number_unsigned_t) override { return Value(); }
+  bool number_float(number_float_t, const string_t&) override { return Value(); }
+  bool string(string_t&) override { return Value(); }
+  bool binary(binary_t&) override { return Value(); }
+  bool key(string_t& name) override {
+    if (depth_ == 1) at_frames_ = name == "frames";
+    return true;
+  }
+  bool start_object(std::size_t) override {
+    if (depth_ == 0) outline_.is_object = true;
+    return Open(false);
+  }
+  bool start_array(std::size_t) override { return Open(true); }
+  bool end_object() override { return Close(); }
+  bool end_array() override { return Close(); }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
+    return false;
+  }
+  const TransformsOutline& outline() const { return outline_; }
+
+ private:
+  bool Value() {
+    if (depth_ == 1 && at_frames_) outline_.frames = 0;  // as readers do: the last one counts
+    if (depth_ == 2 && in_frames_) ++outline_.frames;
+    return true;
+  }
+  bool Open(bool is_array) {
+    Value();
+    if (depth_ == 1 && at_frames_) in_frames_ = is_array && outline_.is_object;
+    ++depth_;
+    return true;
+  }
+  bool Close() {
+    --depth_;
+    if (depth_ == 1) in_frames_ = false;
+    return true;
+  }
+
+  TransformsOutline outline_;
+  int depth_ = 0;
+  bool at_frames_ = false;
+  bool in_frames_ = false;
+};
+
+}  // namespace
+
+TransformsOutline OutlineOfTransforms(std::string_view json_text) {
+  Outliner outliner;
+  const bool good = json::sax_parse(json_text.begin(), json_text.end(), &outliner);
+  return good ? outliner.outline() : TransformsOutline();
+}
+
+}  // namespace color3d

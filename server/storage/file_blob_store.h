@@ -1,0 +1,43 @@
+// Blobs as files: blobs/ab/cd/<sha256>, read-only, each written to a temporary file on the same
+// filesystem, synced and renamed.
+#pragma once
+
+#include "server/storage/blob_store.h"
+
+namespace color3d {
+
+struct BlobStoreOptions {
+  // Writes are refused (kResourceExhausted, STORAGE_FULL) when less than this would stay free.
+  int64_t reserve_bytes = int64_t{256} << 20;
+};
+
+class FileBlobStore : public BlobStore {
+ public:
+  explicit FileBlobStore(const std::filesystem::path& folder, BlobStoreOptions options = {});
+
+  bool Touch(const FileDigest& digest) const override;
+  std::filesystem::path Fetch(const std::string& sha256) const override;
+  FileDigest PutBytes(std::string_view bytes) override;
+  FileDigest PutFile(const std::filesystem::path& file) override;
+  void Adopt(const std::filesystem::path& file, const FileDigest& digest) override;
+  void Remove(const std::string& sha256) override;
+  void SetAside(const std::string& sha256) override;
+  void RequireSpace(int64_t bytes) const override;
+  SpaceReservation Reserve(int64_t bytes) override;
+  int64_t FreeBytes() const override;
+  void ForEach(const std::function<bool(const StoredBlob&)>& visit) const override;
+  bool RemoveIfUntouched(const StoredBlob& blob) override;
+  int RemoveLeftovers(std::chrono::seconds age) override;
+
+ private:
+  [[noreturn]] void ThrowFull(int64_t bytes, int64_t free) const;
+  std::filesystem::path PathOf(const std::string& sha256) const;
+  // ... with its folder, of which every level is synced.
+  std::filesystem::path PlaceFor(const std::string& sha256) const;
+
+  std::filesystem::path folder_;
+  BlobStoreOptions options_;
+  std::shared_ptr<std::atomic<int64_t>> reserved_ = std::make_shared<std::atomic<int64_t>>(0);
+};
+
+}  // namespace color3d

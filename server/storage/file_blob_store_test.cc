@@ -1,0 +1,145 @@
+#include "server/storage/file_blob_store.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <map>
+#include <optional>
+
+#include "tests/support/service/storage_fixture.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+using FileBlobStoreTest = StorageTest;
+
+TEST_F(FileBlobStoreTest, BlobsAreNamedByDigestAndReadOnly) {
+  const FileDigest digest = blobs_.PutBytes("hello");
+  EXPECT_EQ(digest.sha256, Sha256Hex("hello"));
+  EXPECT_EQ(blobs_.PutBytes("hello").sha256, digest.sha256) << "twice is fine";
+  EXPECT_EQ(ReadFile(blobs_.Fetch(digest.sha256)), "hello");
+  struct stat status {};
+  ASSERT_EQ(::stat(blobs_.Fetch(digest.sha256).c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0444u);
+  EXPECT_TRUE(blobs_.Touch(digest));
+  EXPECT_FALSE(blobs_.Touch({digest.sha256, 4})) << "another size is another blob";
+  EXPECT_EQ(ReasonThrown([&] { blobs_.Fetch(Sha256Hex("no")); }), "BLOB_MISSING");
+  EXPECT_EQ(ReasonThrown([&] { blobs_.Fetch("../../etc/passwd"); }), "INVALID_ARGUMENT");
+}
+
+TEST_F(FileBlobStoreTest, FilesAreMovedIn) {
+  const fs::path file = scratch_.path() / "file";
+  WriteFileAtomic(file, "content");
+  const FileDigest digest = blobs_.PutFile(file);
+  EXPECT_FALSE(fs::exists(file));
+  WriteFileAtomic(file, "content");
+  EXPECT_EQ(blobs_.PutFile(file).sha256, digest.sha256);
+  EXPECT_FALSE(fs::exists(file)) << "a duplicate is dropped";
+}
+
+TEST_F(FileBlobStoreTest, OnlyWhatNobodyTouchedSinceIsRemoved) {
+  const auto stored = [&] {
+    std::map<std::string, StoredBlob> all;
+    blobs_.ForEach([&](const StoredBlob& blob) {
+      all[blob.digest.sha256] = blob;
+      return true;
+    });
+    return all;
+  };
+  const FileDigest idle = blobs_.PutBytes("idle"), touched = blobs_.PutBytes("touched");
+  const FileDigest put = blobs_.PutBytes("put");
+  for (const FileDigest& digest : {idle, touched, put}) MakeOld(blobs_.Fetch(digest.sha256), 48);
+  const auto before = stored();
+  EXPECT_EQ(before.size(), 3u);
+  EXPECT_EQ(before.at(idle.sha256).digest.size_bytes, 4);
+  EXPECT_TRUE(blobs_.Touch(touched)) << "FindMissingBlobs has promised that it stays";
+  blobs_.PutBytes("put");
+  EXPECT_TRUE(blobs_.RemoveIfUntouched(before.at(idle.sha256)));
+  EXPECT_FALSE(blobs_.RemoveIfUntouched(before.at(idle.sha256))) << "gone";
+  EXPECT_FALSE(blobs_.RemoveIfUntouched(before.at(touched.sha256)));
+  EXPECT_FALSE(blobs_.RemoveIfUntouched(before.at(put.sha256)));
+  EXPECT_EQ(stored().size(), 2u);
+}
+
+TEST_F(FileBlobStoreTest, SomebodyWhoHoldsTheStoreKeepsTheSweepWaitingForNothing) {
+  const FileDigest digest = blobs_.PutBytes("idle");
+  std::optional<StoredBlob> blob;
+  blobs_.ForEach([&](const StoredBlob& found) {
+    blob = found;
+    return true;
+  });
+  const int other = ::open((scratch_.path() / "blobs" / ".lock").c_str(), O_RDWR | O_CLOEXEC);
+  ASSERT_GE(other, 0);
+  ASSERT_EQ(::flock(other, LOCK_SH), 0);
+  EXPECT_FALSE(blobs_.RemoveIfUntouched(*blob));
+  ::close(other);
+  EXPECT_TRUE(blobs_.RemoveIfUntouched(*blob));
+  EXPECT_FALSE(blobs_.Touch(digest));
+}
+
+TEST_F(FileBlobStoreTest, LeftOversOfACrashGo) {
+  const fs::path folder = scratch_.path() / "blobs" / "ab";
+  fs::create_directories(folder);
+  for (const char* name : {".x.1.0.part", "y.damaged", "new.part"}) {
+    WriteFileAtomic(folder / name, "x");
+  }
+  MakeOld(folder / ".x.1.0.part", 48);
+  MakeOld(folder / "y.damaged", 48);
+  EXPECT_EQ(blobs_.RemoveLeftovers(std::chrono::hours(24)), 2);
+  EXPECT_TRUE(fs::exists(folder / "new.part"));
+}
+
+// The same number of other bytes, as a failing disk returns them.
+void Damage(const fs::path& blob) {
+  ASSERT_EQ(::chmod(blob.c_str(), 0644), 0);
+  std::string bytes = ReadFile(blob);
+  bytes[bytes.size() / 2] ^= 1;
+  std::ofstream(blob, std::ios::binary) << bytes;
+}
+
+TEST_F(FileBlobStoreTest, GoodBytesTakeThePlaceOfDamagedOnes) {
+  const FileDigest digest = blobs_.PutBytes("some bytes");
+  Damage(blobs_.Fetch(digest.sha256));
+  EXPECT_FALSE(IsIntact(blobs_, digest));
+  blobs_.PutBytes("some bytes");
+  EXPECT_TRUE(IsIntact(blobs_, digest));
+  Damage(blobs_.Fetch(digest.sha256));
+  const fs::path file = scratch_.path() / "again";
+  WriteFileAtomic(file, "some bytes");
+  blobs_.PutFile(file);
+  EXPECT_TRUE(IsIntact(blobs_, digest));
+  blobs_.SetAside(digest.sha256);
+  EXPECT_FALSE(blobs_.Touch(digest));
+  blobs_.PutBytes("some bytes");
+  EXPECT_TRUE(IsIntact(blobs_, digest));
+}
+
+TEST_F(FileBlobStoreTest, ReserveOfFreeSpaceIsKept) {
+  FileBlobStore full(scratch_.path() / "full", {int64_t{1} << 60});
+  EXPECT_EQ(ReasonThrown([&] { full.PutBytes("x"); }), "STORAGE_FULL");
+  UploadStore uploads(scratch_.path() / "uploads2", full, 1000);
+  EXPECT_EQ(ReasonThrown([&] { uploads.Open({"u", DigestOf("x")}, 0); }), "STORAGE_FULL");
+}
+
+TEST_F(FileBlobStoreTest, UploadsSideBySideArePromisedTheirSpace) {
+  const int64_t free = blobs_.FreeBytes();
+  // Leaves room for one and a half of two uploads; what else runs on this disk may move it a
+  // little.
+  const int64_t size = int64_t{512} << 20;
+  if (free < 2 * size) GTEST_SKIP() << "too little space on this disk";
+  FileBlobStore blobs(scratch_.path() / "tight", {free - size * 3 / 2});
+  UploadStore uploads(scratch_.path() / "uploads3", blobs, size);
+  auto first = uploads.Open({"a", {Sha256Hex("a"), size}}, 0);
+  EXPECT_EQ(ReasonThrown([&] { uploads.Open({"b", {Sha256Hex("b"), size}}, 0); }), "STORAGE_FULL");
+  first->Append(0, std::string(1000, 'x'));
+  EXPECT_EQ(ReasonThrown([&] { uploads.Open({"b", {Sha256Hex("b"), size}}, 0); }), "STORAGE_FULL");
+  first.reset();  // the client has gone
+  uploads.Open({"b", {Sha256Hex("b"), size}}, 0);
+}
+
+}  // namespace
+}  // namespace color3d

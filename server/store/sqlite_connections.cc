@@ -1,0 +1,58 @@
+#include "server/store/sqlite_connections.h"
+
+#include <utility>
+
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kMaxReaders = 4;
+
+}  // namespace
+
+SqliteConnections::SqliteConnections(const std::filesystem::path& file)
+    : file_(file), writer_(file, SqliteAccess::kWrite) {}
+
+std::unique_ptr<SqliteDatabase> SqliteConnections::TakeReader() {
+  std::unique_lock lock(reading_);
+  reader_is_back_.wait(lock,
+                       [this] { return !idle_readers_.empty() || readers_ < kMaxReaders; });
+  if (idle_readers_.empty()) {
+    auto fresh = std::make_unique<SqliteDatabase>(file_, SqliteAccess::kRead);
+    ++readers_;
+    return fresh;
+  }
+  std::unique_ptr<SqliteDatabase> reader = std::move(idle_readers_.back());
+  idle_readers_.pop_back();
+  return reader;
+}
+
+void SqliteConnections::PutBack(std::unique_ptr<SqliteDatabase> reader) {
+  {
+    std::lock_guard lock(reading_);
+    idle_readers_.push_back(std::move(reader));
+  }
+  reader_is_back_.notify_one();
+}
+
+SqliteConnections::Reader::Reader(SqliteConnections& connections)
+    : connections_(connections), db_(connections.TakeReader()) {
+  try {
+    db_->Exec("begin");
+  } catch (...) {
+    connections_.PutBack(std::move(db_));
+    throw;
+  }
+}
+
+SqliteConnections::Reader::~Reader() {
+  try {
+    db_->Exec("rollback");
+  } catch (const Error&) {
+    // SQLite has ended the transaction by itself (I/O error).
+  }
+  connections_.PutBack(std::move(db_));
+}
+
+}  // namespace color3d

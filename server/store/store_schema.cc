@@ -1,0 +1,111 @@
+#include "server/store/store_schema.h"
+
+#include <spdlog/spdlog.h>
+
+#include <optional>
+
+#include "core/base/files.h"
+#include "server/service_error.h"
+#include "server/store/schema.h"
+#include "server/store/sqlite_db.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+// Nothing: the file has no tables.
+std::optional<int64_t> VersionOf(SqliteDatabase& db) {
+  SqliteStatement table(
+      db.handle(), "select 1 from sqlite_master where type='table' and name='schema_version'");
+  if (!table.Step()) return std::nullopt;
+  SqliteStatement version(db.handle(), "select version from schema_version");
+  return version.Step() ? std::optional(version.Int(0)) : std::nullopt;
+}
+
+ServiceError WrongVersion(int64_t version, const char* remedy) {
+  return ServiceError(ErrorCode::kFailedPrecondition,
+                      "STORE_VERSION",
+                      "the job store has version {}, this program reads version {}; {}",
+                      version,
+                      kSchemaVersion,
+                      remedy);
+}
+
+// A whole copy, or none.
+void KeepCopy(SqliteDatabase& db, const fs::path& file, int64_t version) {
+  const fs::path copy = file.string() + ".v" + std::to_string(version);
+  const fs::path unfinished = copy.string() + ".part";
+  std::error_code error;
+  fs::remove(unfinished, error);
+  db.Run("vacuum into ?", unfinished.string());
+  PublishFile(unfinished, copy);
+  spdlog::info("the job store is of version {}; a copy is kept in {}", version, copy.string());
+}
+
+void Migrate(SqliteDatabase& db) {
+  SqliteTransaction transaction(db);
+  const int64_t from = VersionOf(db).value();
+  for (int64_t version = from; version < kSchemaVersion; ++version) {
+    db.Exec(kMigrations[version - 1]);
+  }
+  db.Run("update schema_version set version=?", kSchemaVersion);
+  transaction.Commit();
+  spdlog::info("the job store was brought from version {} to {}", from, kSchemaVersion);
+}
+
+void MakeTables(SqliteDatabase& db) {
+  SqliteTransaction transaction(db);
+  db.Exec("create table if not exists schema_version(version integer not null)");
+  if (VersionOf(db)) return;  // another store of this process was faster
+  db.Exec(kSchema);
+  db.Run("insert into schema_version values(?)", kSchemaVersion);
+  transaction.Commit();
+}
+
+void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
+  SqliteTransaction transaction(db);
+  SqliteStatement before(db.handle(), "select 1 from server where boot_id=?");
+  before.Bind(identity.boot_id);
+  if (!before.Step()) {
+    db.Exec("update job set lease_expires_ms=0 where state='RUNNING'");
+    db.Exec("update meta set value=0 where name='collected_steady_ms'");
+    db.Exec("update job set run_after_ms=0 where end_ms=0 and run_after_ms<>0");
+  }
+  db.Run("insert into server values(1, ?, ?) on conflict(id) do update set "
+         "version=excluded.version, boot_id=excluded.boot_id",
+         identity.program_version,
+         identity.boot_id);
+  transaction.Commit();
+}
+
+}  // namespace
+
+void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& identity) {
+  SqliteDatabase db(file, SqliteAccess::kWrite);
+  const std::optional<int64_t> version = VersionOf(db);
+  if (version && *version > kSchemaVersion) {
+    throw WrongVersion(*version, "use the program that wrote it, or another --data-dir");
+  }
+  if (role == StoreRole::kWorker) {
+    if (!version) {
+      throw ServiceError(ErrorCode::kFailedPrecondition,
+                         "STORE_NOT_READY",
+                         "{} has no tables; start color3d-server serve, which makes them",
+                         file.string());
+    }
+    if (*version < kSchemaVersion) {
+      throw WrongVersion(*version,
+                         "the server that runs is of an older release than this worker: restart it");
+    }
+    return;
+  }
+  if (!version) {
+    MakeTables(db);
+  } else if (*version < kSchemaVersion) {
+    KeepCopy(db, file, *version);
+    Migrate(db);
+  }
+  SayWhoServes(db, identity);
+}
+
+}  // namespace color3d

@@ -1,0 +1,164 @@
+// Who makes and changes the tables; clocks that jump; machines that start anew.
+#include "server/store/store_schema.h"
+
+#include <gtest/gtest.h>
+
+#include "server/store/sqlite_db.h"
+#include "tests/support/service/job_store_fixture.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+
+class StoreSchemaTest : public JobStoreTest {
+ protected:
+  void OpenAsWorker(const fs::path& file, const std::string& version = "") {
+    StoreOptions options;
+    options.program_version = version;
+    SqliteJobStore(file, StoreRole::kWorker, TestClocks(), options);
+  }
+  int64_t VersionOf(const fs::path& file) {
+    SqliteDatabase db(file, SqliteAccess::kWrite);
+    SqliteStatement version(db.handle(), "select version from schema_version");
+    return version.Step() ? version.Int(0) : 0;
+  }
+  // What a program of version 1 has written.
+  void MakeOld() {
+    store_.reset();
+    SqliteDatabase old(File(), SqliteAccess::kWrite);
+    old.Exec("drop index job_unfinished");
+    old.Exec("drop index job_checkpoint");
+    old.Exec("drop index artifact_name");
+    old.Exec("drop table server");
+    old.Exec("drop table blob_candidate");
+    old.Exec("delete from meta where name='collected_steady_ms'");
+    old.Exec("alter table job drop column lost_input");
+    old.Exec("alter table scene drop column key_color_job");
+    old.Exec("update schema_version set version=1");
+  }
+};
+
+TEST_F(StoreSchemaTest, TheServerBringsAnOldStoreUpToDateAndKeepsACopy) {
+  const JobRecord running = (CreateSingle(), ClaimOne());
+  MakeOld();
+  Open();
+  EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "");
+  EXPECT_EQ(StateOf(running.name), JobState::kRunning);
+  EXPECT_EQ(store_->ReapExpired(), 1) << "its lease was by another clock";
+  const fs::path copy = File().string() + ".v1";
+  EXPECT_EQ(VersionOf(copy), 1);
+  fs::remove(copy);
+  Open();  // nothing is left to be done
+  EXPECT_FALSE(fs::exists(copy));
+  EXPECT_EQ(store_->ListScenes(0, 10).size(), 1u);
+}
+
+TEST_F(StoreSchemaTest, AWorkerChangesNothing) {
+  EXPECT_EQ(ReasonThrown([&] { OpenAsWorker(scratch_.path() / "fresh.db"); }), "STORE_NOT_READY");
+  MakeOld();
+  EXPECT_EQ(ReasonThrown([&] { OpenAsWorker(File()); }), "STORE_VERSION");
+  EXPECT_EQ(VersionOf(File()), 1);
+}
+
+TEST_F(StoreSchemaTest, AWorkerOfAnotherReleaseIsGivenNoJob) {
+  CreateSingle();
+  StoreOptions options;
+  options.program_version = "0.0.1";
+  SqliteJobStore stranger(File(), StoreRole::kWorker, TestClocks(), options);
+  EXPECT_EQ(ReasonThrown([&] { stranger.Claim("stranger-1", kLease); }), "WORKER_VERSION");
+  EXPECT_EQ(ReasonThrown([&] {
+              stranger.ClaimForBatch("stranger-1", kLease, "single", [](const JobRecord&) {
+                return true;
+              });
+            }),
+            "WORKER_VERSION");
+  EXPECT_EQ(ClaimOne().attempt, 1) << "nothing was spent";
+}
+
+TEST_F(StoreSchemaTest, AClockThatIsSetEndsNoLeaseAndStallsNoRetry) {
+  const JobRecord job = (CreateSingle(), ClaimOne());
+  for (const int64_t jump : {int64_t{1} << 40, -(int64_t{1} << 40)}) {
+    wall_ += jump;
+    EXPECT_EQ(store_->ReapExpired(), 0);
+    store_->Heartbeat(LeaseOf(job), {}, {}, kLease);
+    wall_ -= jump;
+  }
+  wall_ += int64_t{1} << 40;
+  FailWith(job, ErrorCode::kUnavailable);
+  wall_ -= int64_t{1} << 40;
+  now_ += 1000;
+  EXPECT_EQ(ClaimOne().attempt, 2);
+}
+
+TEST_F(StoreSchemaTest, AMachineThatStartedAnewHasNoLeases) {
+  now_ = int64_t{1} << 40;
+  const JobRecord running = (CreateSingle(), ClaimOne());
+  const JobRecord waiting = (CreateSingle(), ClaimOne());
+  FailWith(waiting, ErrorCode::kUnavailable);  // to be tried again in a while
+  store_.reset();
+  now_ = 5;
+  boot_id_ = "boot 2";
+  Open();
+  EXPECT_EQ(store_->ReapExpired(), 1);
+  EXPECT_EQ(ClaimOne().name, waiting.name);
+  now_ += 1000;
+  EXPECT_EQ(ClaimOne().name, running.name);
+}
+
+TEST_F(StoreSchemaTest, ReadsDoNotWaitForAWriter) {
+  const JobRecord job = CreateSingle();
+  SqliteDatabase frozen(File(), SqliteAccess::kWrite);
+  SqliteTransaction held(frozen);
+  frozen.Exec("update job set priority=7");
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(store_->GetJob(job.name).priority, 100);
+  EXPECT_EQ(store_->ListJobs({}, 0, 10).size(), 1u);
+  EXPECT_EQ(store_->CountJobs().queued, 1);
+  // ... nor do they wait for a thread of ours that waits for it (its time-out is 10 s).
+  std::thread writer([&] { ReasonThrown([&] { store_->Cancel(job.name, {}); }); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(store_->GetJob(job.name).state, JobState::kQueued);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+  held.Commit();
+  writer.join();
+  EXPECT_EQ(StateOf(job.name), JobState::kCancelled);
+}
+
+// What the service does all day looks at no finished job of the past.
+TEST_F(StoreSchemaTest, CostDoesNotGrowWithHistory) {
+  constexpr int kPast = 300;
+  for (int i = 0; i < kPast; ++i) {
+    CreateSingle();
+    Succeed(ClaimOne(), "colorizer.safetensors");
+  }
+  const auto steps = [](const auto& body) {
+    const int64_t before = SqliteDatabase::FullScanSteps();
+    body();
+    return SqliteDatabase::FullScanSteps() - before;
+  };
+  JobRecord root, job;
+  EXPECT_LT(steps([&] { root = CreateDiamond(); }), 30);
+  EXPECT_LT(steps([&] { job = ClaimOne(); }), 30);
+  EXPECT_LT(steps([&] { store_->Heartbeat(LeaseOf(job), {1, 2, "x"}, {}, kLease); }), 30);
+  EXPECT_LT(steps([&] { store_->SetCheckpoint(LeaseOf(job), {Sha256Hex("c"), 1}); }), 30);
+  EXPECT_LT(steps([&] { store_->IsReferenced(Sha256Hex("c")); }), 30);
+  EXPECT_LT(steps([&] { store_->ReapExpired(); }), 30);
+  EXPECT_LT(steps([&] { store_->CountJobs(); }), 30);
+  EXPECT_LT(steps([&] { store_->GetJob(root.name); }), 30);
+  EXPECT_LT(steps([&] { store_->ListJobs({"", "scenes/test"}, 0, 5); }), 30);
+  EXPECT_LT(steps([&] { store_->ListChildren(root.name); }), 30);
+  EXPECT_LT(steps([&] { store_->Snapshot(store_->ResolveWatch({root.name})); }), 30);
+  EXPECT_LT(steps([&] { store_->EventsSince(store_->NewestRevision() - 3, 100); }), 30);
+  EXPECT_LT(steps([&] { store_->GetInputs(job.id); }), 30);
+  EXPECT_LT(steps([&] { store_->FindStage("key"); }), 30);
+  EXPECT_LT(steps([&] { ReasonThrown([&] { store_->GetColorizer(Sha256Hex("c")); }); }), 30);
+  EXPECT_LT(steps([&] { store_->ListColorizers("", 0, 5); }), 30);
+  EXPECT_LT(steps([&] { Succeed(job); }), 30);
+  EXPECT_LT(steps([&] { store_->Cancel(root.name, {}); }), 30);
+  EXPECT_LT(steps([&] { store_->Retry(root.name, false, {}, kNoLimit); }), 30);
+  EXPECT_LT(steps([&] { store_->Cancel(root.name, {}); }), 30);
+  EXPECT_LT(steps([&] { store_->Delete(root.name, {}); }), 30);
+}
+
+}  // namespace
+}  // namespace color3d
