@@ -1,10 +1,13 @@
 // color3d: the command line of the Color3D service. Exit codes: client/lib/exit_code.h.
 #include <signal.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <iostream>
 
 #include "client/commands/command.h"
 #include "client/commands/console.h"
+#include "core/base/files.h"
 
 namespace color3d::client {
 namespace {
@@ -31,6 +34,18 @@ std::string UnknownCommand(const CLI::App& app, const Context& context) {
   return "there is no command '" + context.arguments[0] + "'";
 }
 
+// Never on the command line, where others of the machine could read it.
+std::string TokenFrom(const std::filesystem::path& file) {
+  const char* given = std::getenv("COLOR3D_TOKEN");
+  std::string token = !file.empty() ? ReadFile(file) : given != nullptr ? given : "";
+  const size_t end = token.find_last_not_of(" \t\r\n");
+  token.resize(end == std::string::npos ? 0 : end + 1);
+  if (token.find_first_of(" \t\r\n") != std::string::npos) {
+    throw InvalidArgument("{} holds more than one token", file.string());
+  }
+  return token;
+}
+
 int Main(int argc, char** argv) {
   Context context;
   context.interrupt = &interrupt;
@@ -42,9 +57,20 @@ int Main(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done, 1 the job failed or was cancelled, 2 wrong usage or input, 3 no server, "
       "4 no room, 130 detached.");
-  app.add_option("--server", context.server, "Address of the server")
+  app.add_option("--server",
+                 context.server.address,
+                 "Address of the server: HOST:PORT, unix:PATH, or https://HOST:PORT for TLS")
       ->envname("COLOR3D_SERVER")
       ->capture_default_str();
+  app.add_option("--ca", context.server.ca, "PEM file: whom to believe the server's certificate")
+      ->envname("COLOR3D_CA");
+  app.add_option("--client-cert", context.server.certificate, "PEM file: your own certificate")
+      ->envname("COLOR3D_CLIENT_CERT");
+  app.add_option("--client-key", context.server.key, "PEM file: its key")
+      ->envname("COLOR3D_CLIENT_KEY");
+  std::filesystem::path token_file;
+  app.add_option("--token-file", token_file, "File that holds your token; or COLOR3D_TOKEN")
+      ->envname("COLOR3D_TOKEN_FILE");
   app.add_flag("--json", context.json, "Print one JSON object instead of text");
   AddColorizeCommand(app, context);
   AddInspectCommand(app, context);
@@ -69,6 +95,7 @@ int Main(int argc, char** argv) {
   }
   HandleInterrupt();
   try {
+    context.server.token = TokenFrom(token_file);
     return static_cast<int>(context.action());
   } catch (const std::exception& e) {
     return static_cast<int>(ReportException(context, e));

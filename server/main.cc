@@ -1,5 +1,7 @@
-// color3d-server: `serve` answers RPCs and supervises workers; `worker` becomes color3d-worker, the
-// program beside this one that links the method library.
+// color3d-server: `serve` answers RPCs and supervises workers; `token`, `backup`, `restore` and
+// `fsck` are for who runs it; `worker` becomes color3d-worker, the program beside this one that
+// links the method library.
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -7,10 +9,15 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <functional>
 #include <iostream>
 #include <sstream>
 
 #include "core/base/error.h"
+#include "server/access/tokens.h"
+#include "server/keeping/backup.h"
+#include "server/keeping/fsck.h"
 #include "server/ops/process.h"
 #include "server/serve.h"
 
@@ -39,10 +46,19 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");
   serve->add_option("--log-level", options->log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
-  serve->add_flag(
-      "--insecure-any-address",
-      options->insecure_any_address,
-      "Allow --listen on other than loopback addresses; there is no authentication yet");
+  serve->add_flag("--insecure-any-address",
+                  options->insecure_any_address,
+                  "Allow --listen on other than loopback addresses without TLS and tokens");
+  serve->add_option("--tls-cert", options->tls_certificate, "PEM file: the server's certificate");
+  serve->add_option("--tls-key", options->tls_key, "PEM file: its key");
+  serve->add_option("--tls-client-ca",
+                    options->tls_client_ca,
+                    "PEM file: clients must show a certificate that one of these signed");
+  serve->add_option(
+      "--tokens",
+      options->tokens,
+      "File of those who may call, written by `color3d-server token`; read again when "
+      "it changes");
   serve
       ->add_option("--model",
                    options->models,
@@ -90,6 +106,77 @@ void TakeFromEnvironment(const char* variable, std::vector<std::string>* values)
   }
 }
 
+struct KeepingArguments {
+  std::filesystem::path data_folder, copy;
+  bool repair = false;
+  std::function<int()> run;  // empty: another command was given
+};
+
+int RunBackUp(const KeepingArguments& arguments) {
+  const CopiedBlobs copied = BackUp(arguments.data_folder, arguments.copy);
+  std::cout << fmt::format("{}: {} blobs copied ({} MiB), {} were there\n",
+                           arguments.copy.string(),
+                           copied.copied,
+                           copied.bytes >> 20,
+                           copied.kept);
+  return 0;
+}
+
+int RunRestore(const KeepingArguments& arguments) {
+  const CopiedBlobs copied = Restore(arguments.copy, arguments.data_folder);
+  std::cout << fmt::format("{}: {} blobs, all read and whole; start color3d-server serve on it\n",
+                           arguments.data_folder.string(),
+                           copied.copied);
+  return 0;
+}
+
+int RunFsck(const KeepingArguments& arguments) {
+  const bool is_terminal = ::isatty(2) == 1;
+  const FsckResult result = Fsck(arguments.data_folder, arguments.repair, [&](int64_t blobs) {
+    if (is_terminal && blobs % 100 == 0) std::cerr << "\r" << blobs << " blobs" << std::flush;
+  });
+  if (is_terminal) std::cerr << "\r";
+  for (const std::string& problem : result.store_problems)
+    std::cout << "jobs.db: " << problem << "\n";
+  for (const std::string& sha256 : result.missing) std::cout << "missing: " << sha256 << "\n";
+  for (const std::string& sha256 : result.damaged) std::cout << "damaged: " << sha256 << "\n";
+  std::cout << fmt::format(
+      "{} blobs ({} MiB), {} named by nothing; {} missing, {} damaged, {} damaged and named by "
+      "nothing\n",
+      result.blobs,
+      result.bytes >> 20,
+      result.unnamed,
+      result.missing.size(),
+      result.damaged.size(),
+      result.damaged_unnamed);
+  if (!result.store_problems.empty()) {
+    std::cout << "restore jobs.db from a backup (color3d-server restore)\n";
+  } else if (!result.IsGood()) {
+    std::cout << (arguments.repair ? "what was damaged is set aside: "
+                                   : "say --repair to set aside what is damaged, then ")
+              << "upload the scene's files again, or run the jobs anew with skip_cache\n";
+  }
+  return result.IsGood() ? 0 : 1;
+}
+
+void AddKeeping(CLI::App* app, KeepingArguments* arguments) {
+  const auto add = [&](const char* name, const char* what, int (*run)(const KeepingArguments&)) {
+    CLI::App* command = app->add_subcommand(name, what);
+    command->add_option("--data-dir", arguments->data_folder, "The server's data directory")
+        ->required();
+    command->callback([arguments, run] { arguments->run = [=] { return run(*arguments); }; });
+    return command;
+  };
+  add("backup", "Copy all that jobs and scenes name; a server may run meanwhile", RunBackUp)
+      ->add_option("FOLDER", arguments->copy, "An empty folder, or an earlier backup")
+      ->required();
+  add("restore", "Make a fresh data directory of a backup", RunRestore)
+      ->add_option("FOLDER", arguments->copy, "The backup")
+      ->required();
+  add("fsck", "Read a data directory and say whether it is whole; no server may use it", RunFsck)
+      ->add_flag("--repair", arguments->repair, "Set damaged blobs aside");
+}
+
 // Replaces this process by color3d-worker with the arguments after "worker".
 int ExecWorker(char** argv) {
   const std::string program = (ProgramFolder() / "color3d-worker").string();
@@ -109,6 +196,16 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", COLOR3D_VERSION);
   CLI::App* serve = app.add_subcommand("serve", "Answer RPCs and run jobs");
   app.add_subcommand("worker", "Run jobs of a server's data directory (see worker --help)");
+  std::string token_name, token_role = "submit";
+  std::filesystem::path token_file;
+  CLI::App* token = app.add_subcommand("token", "Let somebody in: print a fresh token, once");
+  token->add_option("NAME", token_name, "Who will have it, for logs")->required();
+  token
+      ->add_option("--role", token_role, "read, submit or admin; each may do what those before may")
+      ->capture_default_str();
+  token->add_option("--tokens", token_file, "The file that serve --tokens reads")->required();
+  KeepingArguments keeping;
+  AddKeeping(&app, &keeping);
   app.require_subcommand(1);
   AddServe(serve, &options);
   CLI11_PARSE(app, argc, argv);
@@ -117,6 +214,11 @@ int Main(int argc, char** argv) {
   // Our own checks say more than gRPC's log does.
   ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   try {
+    if (keeping.run) return keeping.run();
+    if (token->parsed()) {
+      std::cout << AddToken(token_file, token_name, RoleFromName(token_role)) << "\n";
+      return 0;
+    }
     Serve(options);
     return 0;
   } catch (const Error& e) {

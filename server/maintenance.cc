@@ -96,6 +96,7 @@ std::chrono::milliseconds Maintenance::Reap() {
   try {
     const int reaped = store_.ReapExpired();
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
+    if (timing_.on_leases) timing_.on_leases();
   } catch (const std::exception& e) {
     spdlog::error("cannot look after leases: {}", e.what());
   }

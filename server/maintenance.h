@@ -24,6 +24,7 @@ struct MaintenanceTiming {
   std::chrono::hours keep_events{30 * 24};        // after the job's end
   std::chrono::hours keep_request_ids{7 * 24};
   int64_t scrub_bytes = int64_t{2} << 30;  // read and compared with their digests at each sweep
+  std::function<void()> on_leases = {};    // called whenever leases have been looked after
 };
 
 // Blobs whose bytes are no longer those of their digest are set aside, so that an upload or another

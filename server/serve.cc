@@ -12,10 +12,13 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "server/access/tls.h"
+#include "server/access/tokens.h"
 #include "server/backends/backend_address.h"
 #include "server/backends/backend_prober.h"
 #include "server/maintenance.h"
 #include "server/ops/address.h"
+#include "server/ops/notify.h"
 #include "server/ops/process.h"
 #include "server/ops/socket_folder.h"
 #include "server/rpc/rpc_server.h"
@@ -35,11 +38,14 @@ std::chrono::milliseconds Milliseconds(double seconds) {
 
 void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
-  if (!IsLoopback(options.listen) && !options.insecure_any_address) {
+  const bool is_safe = !options.tls_certificate.empty() &&
+                       (!options.tokens.empty() || !options.tls_client_ca.empty());
+  if (!IsLoopback(options.listen) && !is_safe && !options.insecure_any_address) {
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "refusing to listen on {}: there is no authentication yet, anybody who reaches the port "
-        "could use it; listen on 127.0.0.1, or say --insecure-any-address in a network you trust",
+        "refusing to listen on {}: anybody who reaches the port could use it, or read along; "
+        "give --tls-cert, --tls-key and --tokens (or --tls-client-ca), listen on 127.0.0.1, "
+        "or say --insecure-any-address in a network you trust",
         options.listen);
   }
 }
@@ -196,6 +202,9 @@ void Serve(const ServeOptions& options) {
   rpc.inference = InferenceSetup(options, models, sockets, &worker_setup);
   const auto prober = std::make_shared<BackendProber>(models.backends);
   rpc.probe_backends = [prober] { return ProbeForInfo(*prober); };
+  const TlsFiles tls{options.tls_certificate, options.tls_key, options.tls_client_ca};
+  if (!tls.empty()) rpc.credentials = MakeServerCredentials(tls);
+  if (!options.tokens.empty()) rpc.tokens = std::make_shared<TokenBook>(options.tokens);
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
   ExpireDeadWorkers(store);
 
@@ -205,14 +214,21 @@ void Serve(const ServeOptions& options) {
   chores.reap = std::clamp(Milliseconds(options.lease_seconds / 10.0),
                            std::chrono::milliseconds(100),
                            std::chrono::milliseconds(5'000));
+  // No sign of life while the store cannot be read: systemd's watchdog then starts us anew.
+  chores.on_leases = [] { NotifyServiceManager("WATCHDOG=1"); };
   Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
   Supervisor supervisor(worker_setup, store);
-  spdlog::info("listening on {}, data in {}, {} workers",
+  spdlog::info("listening on {}{}{}, data in {}, {} workers",
                server.address(),
+               tls.empty() ? "" : " with TLS",
+               options.tokens.empty() ? "" : ", for those with a token",
                paths.root.string(),
                options.workers);
 
+  NotifyServiceManager("READY=1");
+
   signals.Wait();
+  NotifyServiceManager("STOPPING=1");
   spdlog::info("draining: no new jobs, running ones are saved and released");
   signals.ExitOnNext();
   server.StartDraining();

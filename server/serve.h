@@ -11,6 +11,9 @@ namespace color3d {
 struct ServeOptions {
   std::string listen = "127.0.0.1:50551";
   bool insecure_any_address = false;
+  // PEM files; a certificate and its key: TLS. A client CA: clients must show a certificate, too.
+  std::filesystem::path tls_certificate, tls_key, tls_client_ca;
+  std::filesystem::path tokens;  // empty: nobody is asked for one
   std::filesystem::path data_folder;
   std::filesystem::path port_file;  // empty: none
   int workers = 1;

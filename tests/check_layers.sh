@@ -67,10 +67,12 @@ allow core/view/path 'core/(base|scene|view(/path)?)'
 allow core/stage 'core/[a-z]+(/[a-z]+)?'
 allow proto 'proto'
 allow server/store 'core/(base|catalogue)|server/store'
+allow server/keeping 'core/base|server/(store|storage|keeping)'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'
+allow server/access 'core/base|server/access'
 allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
-allow server/rpc 'core/(base|catalogue|image/probe)|server/(store|planning|storage|ops|rpc)'
+allow server/rpc 'core/(base|catalogue|image/probe)|server/(access|store|planning|storage|ops|rpc)'
 allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
@@ -116,11 +118,13 @@ public core/stage stages film/import_film formats/artifacts
 public core/video film_reader mp4_writer ticks
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
+public server/access tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
+public server/keeping backup fsck
 public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc error_mapping rpc_server
-public server/storage blob_store data_folder upload_store
-public server/store job job_store sqlite_job_store user_models
+public server/storage blob_store data_folder file_blob_store upload_store
+public server/store job job_store sqlite_job_store store_file user_models
 public server/worker supervisor
 
 if [ "$failed" -ne 0 ]; then exit 1; fi

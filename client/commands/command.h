@@ -13,7 +13,7 @@
 namespace color3d::client {
 
 struct Context {
-  std::string server = kDefaultServer;
+  ServerTarget server;
   bool json = false;
   // Set by the first Ctrl-C; the second one ends the program at once.
   const CancellationToken* interrupt = nullptr;

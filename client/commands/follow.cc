@@ -32,9 +32,9 @@ v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec) {
 
 std::string CommandLine(const Context& context, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "color3d");
-  if (context.server != kDefaultServer) {
+  if (context.server.address != kDefaultServer) {
     arguments.push_back("--server");
-    arguments.push_back(context.server);
+    arguments.push_back(context.server.address);
   }
   return ShellLine(arguments);
 }

@@ -1,7 +1,14 @@
 #include "client/lib/connection.h"
 
+#include <grpcpp/support/client_interceptor.h>
+
 #include <algorithm>
+#include <string_view>
 #include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/base/files.h"
 
 namespace color3d::client {
 namespace {
@@ -12,6 +19,7 @@ using std::chrono::steady_clock;
 constexpr milliseconds kFirstWait{200};
 constexpr milliseconds kLongestWait{3000};
 constexpr milliseconds kConnectLimit{4000};
+constexpr std::string_view kHttps = "https://";
 constexpr int kMaxMessageBytes = 64 << 20;  // a scene of 10,000 files with long names
 
 bool IsLoopback(const std::string& address) {
@@ -19,7 +27,53 @@ bool IsLoopback(const std::string& address) {
          address.starts_with("[::1]") || address.starts_with("unix:");
 }
 
-std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
+// Adds the token to every call. Credentials of calls would do so over TLS alone.
+class TokenBearer : public grpc::experimental::Interceptor {
+ public:
+  explicit TokenBearer(const std::string& value) : value_(value) {}
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    using grpc::experimental::InterceptionHookPoints;
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      methods->GetSendInitialMetadata()->insert({"authorization", value_});
+    }
+    methods->Proceed();
+  }
+
+ private:
+  const std::string& value_;
+};
+
+class TokenBearers : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit TokenBearers(const std::string& token) : value_("Bearer " + token) {}
+  grpc::experimental::Interceptor* CreateClientInterceptor(
+      grpc::experimental::ClientRpcInfo*) override {
+    return new TokenBearer(value_);
+  }
+
+ private:
+  const std::string value_;
+};
+
+std::string ReadPem(const std::filesystem::path& file) {
+  return file.empty() ? std::string() : ReadFile(file);
+}
+
+std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const ServerTarget& server) {
+  if (!server.UsesTls()) return grpc::InsecureChannelCredentials();
+  return grpc::SslCredentials(
+      {ReadPem(server.ca), ReadPem(server.key), ReadPem(server.certificate)});
+}
+
+std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
+  const std::string address = server.HostPort();
+  if (!server.token.empty() && !server.UsesTls() && !IsLoopback(address)) {
+    throw InvalidArgument(
+        "the token would travel to {} for everybody to read; say --server https://{}, with --ca "
+        "where the server's certificate is of your own making",
+        address,
+        address);
+  }
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxMessageBytes);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, static_cast<int>(kFirstWait.count()));
@@ -27,7 +81,18 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, static_cast<int>(kLongestWait.count()));
   // http_proxy in the environment is not meant for this machine.
   if (IsLoopback(address)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  if (!server.token.empty()) interceptors.push_back(std::make_unique<TokenBearers>(server.token));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(
+      address, CredentialsFor(server), arguments, std::move(interceptors));
+}
+
+// What a call says when there is no connection: over TLS, why the other side is not believed.
+std::string WhyUnreachable(const std::shared_ptr<grpc::Channel>& channel) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(2));
+  v1::ServerInfo info;
+  return v1::ServerService::NewStub(channel)->GetServerInfo(&context, {}, &info).error_message();
 }
 
 }  // namespace
@@ -51,15 +116,30 @@ bool Backoff::Wait(const CancellationToken& cancel) {
   return true;
 }
 
-Connection::Connection(const std::string& address, const CancellationToken& cancel)
-    : address_(address), cancel_(cancel), channel_(MakeChannel(address)) {
+bool ServerTarget::UsesTls() const {
+  return address.starts_with(kHttps) || !ca.empty() || !certificate.empty() || !key.empty();
+}
+
+std::string ServerTarget::HostPort() const {
+  return address.starts_with(kHttps) ? address.substr(kHttps.size()) : address;
+}
+
+Connection::Connection(const ServerTarget& server, const CancellationToken& cancel)
+    : address_(server.address), cancel_(cancel), channel_(MakeChannel(server)) {
   const auto end = std::chrono::system_clock::now() + kConnectLimit;
   bool connected = false;
   while (!connected && std::chrono::system_clock::now() < end) {
     cancel.ThrowIfCancelled();
     connected = channel_->WaitForConnected(std::chrono::system_clock::now() + milliseconds(200));
   }
-  if (!connected) throw UnreachableError(address);
+  if (!connected && server.UsesTls()) {
+    throw Error(ErrorCode::kUnavailable,
+                "cannot reach a server at {} over TLS: {}; look at --server, --ca and, where the "
+                "server asks for it, --client-cert",
+                server.address,
+                WhyUnreachable(channel_));
+  }
+  if (!connected) throw UnreachableError(server.address);
   scenes_ = v1::SceneService::NewStub(channel_);
   jobs_ = v1::JobService::NewStub(channel_);
   blobs_ = v1::BlobService::NewStub(channel_);

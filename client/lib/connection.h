@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -38,11 +39,25 @@ class Backoff {
   std::chrono::steady_clock::time_point since_;
 };
 
+// Which server, and how it is spoken to.
+struct ServerTarget {
+  std::string address = kDefaultServer;    // HOST:PORT, unix:PATH, or https://HOST:PORT for TLS
+  std::filesystem::path ca;                // PEM: roots in place of the system's; TLS
+  std::filesystem::path certificate, key;  // PEM: our own, where the server asks for one; TLS
+  std::string token;                       // empty: none
+
+  bool UsesTls() const;
+  // Without the scheme.
+  std::string HostPort() const;
+};
+
 class Connection {
  public:
   // Waits at most 4 s for the server. `cancel` must outlive the connection; it ends retries and
   // transfers. Throws Error{kUnavailable} that says how to start a server.
-  Connection(const std::string& address, const CancellationToken& cancel);
+  // kInvalidArgument for a token that would travel in the clear to another machine, and for files
+  // that cannot be read.
+  Connection(const ServerTarget& server, const CancellationToken& cancel);
 
   const std::string& address() const { return address_; }
   const CancellationToken& cancel() const { return cancel_; }

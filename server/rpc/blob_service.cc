@@ -56,7 +56,9 @@ grpc::ServerUnaryReactor* BlobServiceImpl::FindMissingBlobs(
     grpc::CallbackServerContext* context,
     const v1::FindMissingBlobsRequest* request,
     v1::FindMissingBlobsResponse* response) {
-  return AnswerUnary(parts_.slow,
+  return AnswerUnary(parts_,
+                     parts_.slow,
+                     Role::kSubmit,
                      context,
                      request,
                      response,

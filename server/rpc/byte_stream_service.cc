@@ -20,7 +20,10 @@ constexpr int64_t kReadChunkBytes = 256 << 10;
 
 class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
  public:
-  BlobReader(const RpcParts& parts, const ReadRequest& request) : parts_(parts), request_(request) {
+  BlobReader(const RpcParts& parts,
+             const grpc::CallbackServerContext& context,
+             const ReadRequest& request)
+      : parts_(parts), context_(context), request_(request) {
     parts_.quick.Post([this] { Step(); });
   }
   ~BlobReader() override {
@@ -47,6 +50,7 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   }
 
   void Open() {
+    parts_.access.Require(Role::kRead, context_);
     place_ = parts_.streams.reads.Take();
     const FileDigest digest = ParseBlobName(request_.resource_name());
     if (!parts_.blobs.Touch(digest)) {
@@ -103,6 +107,7 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   }
 
   const RpcParts& parts_;
+  const grpc::CallbackServerContext& context_;
   const ReadRequest request_;
   ReadResponse response_;
   int fd_ = -1;
@@ -116,7 +121,10 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
 
 class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
  public:
-  BlobWriter(const RpcParts& parts, WriteResponse* response) : parts_(parts), response_(response) {
+  BlobWriter(const RpcParts& parts,
+             const grpc::CallbackServerContext& context,
+             WriteResponse* response)
+      : parts_(parts), context_(context), response_(response) {
     StartRead(&request_);
   }
   void OnReadDone(bool ok) override {
@@ -141,6 +149,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
                             parts_.limits.max_chunk_bytes);
     }
     if (!writer_) {
+      parts_.access.Require(Role::kSubmit, context_);
       place_ = parts_.streams.writes.Take();
       const UploadName name = ParseUploadName(request_.resource_name());
       const UploadStatus status = parts_.uploads.Status(name);
@@ -171,6 +180,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   }
 
   const RpcParts& parts_;
+  const grpc::CallbackServerContext& context_;
   WriteResponse* response_;
   WriteRequest request_;
   std::string resource_;
@@ -180,21 +190,23 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
 
 }  // namespace
 
-grpc::ServerWriteReactor<ReadResponse>* ByteStreamServiceImpl::Read(grpc::CallbackServerContext*,
-                                                                    const ReadRequest* request) {
-  return new BlobReader(parts_, *request);
+grpc::ServerWriteReactor<ReadResponse>* ByteStreamServiceImpl::Read(
+    grpc::CallbackServerContext* context, const ReadRequest* request) {
+  return new BlobReader(parts_, *context, *request);
 }
 
-grpc::ServerReadReactor<WriteRequest>* ByteStreamServiceImpl::Write(grpc::CallbackServerContext*,
-                                                                    WriteResponse* response) {
-  return new BlobWriter(parts_, response);
+grpc::ServerReadReactor<WriteRequest>* ByteStreamServiceImpl::Write(
+    grpc::CallbackServerContext* context, WriteResponse* response) {
+  return new BlobWriter(parts_, *context, response);
 }
 
 grpc::ServerUnaryReactor* ByteStreamServiceImpl::QueryWriteStatus(
     grpc::CallbackServerContext* context,
     const google::bytestream::QueryWriteStatusRequest* request,
     google::bytestream::QueryWriteStatusResponse* response) {
-  return AnswerUnary(parts_.slow,
+  return AnswerUnary(parts_,
+                     parts_.slow,
+                     Role::kSubmit,
                      context,
                      request,
                      response,

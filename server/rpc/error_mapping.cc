@@ -19,6 +19,10 @@ grpc::StatusCode CodeOf(const std::string& reason, ErrorCode code) {
   if (reason == "REVISION_COMPACTED" || reason == "OFFSET_BEYOND_END") {
     return grpc::StatusCode::OUT_OF_RANGE;
   }
+  if (reason == "TOKEN_MISSING" || reason == "TOKEN_UNKNOWN") {
+    return grpc::StatusCode::UNAUTHENTICATED;
+  }
+  if (reason == "ROLE_TOO_LOW") return grpc::StatusCode::PERMISSION_DENIED;
   switch (code) {
     case ErrorCode::kCancelled:
       return grpc::StatusCode::CANCELLED;

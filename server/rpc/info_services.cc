@@ -59,7 +59,13 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::GetColorizer(grpc::CallbackServe
                                                              const v1::GetColorizerRequest* request,
                                                              v1::Colorizer* response) {
   return AnswerUnary(
-      parts_.quick, context, request, response, [this](const auto& in, v1::Colorizer* out) {
+      parts_,
+      parts_.quick,
+      Role::kRead,
+      context,
+      request,
+      response,
+      [this](const auto& in, v1::Colorizer* out) {
         CheckName(in.name(), "colorizers");
         *out = ToProto(parts_.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
       });
@@ -70,7 +76,9 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
     const v1::ListColorizersRequest* request,
     v1::ListColorizersResponse* response) {
   return AnswerUnary(
+      parts_,
       parts_.quick,
+      Role::kRead,
       context,
       request,
       response,
@@ -96,7 +104,13 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
                                                            const v1::GetServerInfoRequest* request,
                                                            v1::ServerInfo* response) {
   return AnswerUnary(
-      parts_.slow, context, request, response, [this](const auto&, v1::ServerInfo* out) {
+      parts_,
+      parts_.slow,
+      Role::kRead,
+      context,
+      request,
+      response,
+      [this](const auto&, v1::ServerInfo* out) {
         out->set_version(parts_.version);
         for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
         v1::Limits* limits = out->mutable_limits();

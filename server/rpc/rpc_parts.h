@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "server/rpc/access.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/executor.h"
 #include "server/rpc/stream_limit.h"
@@ -58,6 +59,7 @@ struct RpcParts {
   Executor& quick;  // reads of the job store and of the disk's cache: what answers GetJob
   Executor& slow;   // what hashes, syncs, writes or asks others
   StreamLimits& streams;
+  const Access& access;
   const std::atomic<bool>& draining;
   ServiceLimits limits;
   Clock clock;
@@ -67,16 +69,22 @@ struct RpcParts {
   BackendProbe probe_backends;
 };
 
-// Answers a unary call from that executor: `body(request, response)` may block and throw.
+// Answers a unary call from that executor, where the caller has the role: `body(request, response)`
+// may block and throw.
 template <typename Request, typename Response, typename Body>
-grpc::ServerUnaryReactor* AnswerUnary(Executor& executor,
+grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
+                                      Executor& executor,
+                                      Role role,
                                       grpc::CallbackServerContext* context,
                                       const Request* request,
                                       Response* response,
                                       Body body) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const bool accepted = executor.TryPost([reactor, request, response, body] {
-    reactor->Finish(Guard([&] { body(*request, response); }));
+  const bool accepted = executor.TryPost([&parts, role, context, reactor, request, response, body] {
+    reactor->Finish(Guard([&] {
+      parts.access.Require(role, *context);
+      body(*request, response);
+    }));
   });
   if (!accepted) reactor->Finish(OverloadedStatus());
   return reactor;

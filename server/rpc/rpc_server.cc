@@ -80,12 +80,14 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   streams_.reset(new StreamLimits{{"watches", options.limits.max_watches},
                                   {"downloads", options.limits.max_reads},
                                   {"uploads", options.limits.max_writes}});
+  access_ = std::make_unique<Access>(options.tokens);
   parts_.reset(new RpcParts{store,
                             blobs,
                             uploads,
                             *quick_,
                             *slow_,
                             *streams_,
+                            *access_,
                             draining_,
                             options.limits,
                             clock,
@@ -100,7 +102,10 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(options.listen, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(
+      options.listen,
+      options.credentials ? options.credentials : grpc::InsecureServerCredentials(),
+      &port);
   // Without this two servers could share a port, each answering half of the calls.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);

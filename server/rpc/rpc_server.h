@@ -20,6 +20,8 @@ struct RpcServerOptions {
   std::string listen = "127.0.0.1:50551";  // port 0: any free one
   int quick_threads = 4;
   int slow_threads = 6;
+  std::shared_ptr<grpc::ServerCredentials> credentials;  // null: in the clear
+  std::shared_ptr<TokenBook> tokens;                     // null: nobody is asked
   ServiceLimits limits;
   WatchTiming watch;
   std::string version = "0";
@@ -56,6 +58,7 @@ class RpcServer {
   std::unique_ptr<FileDigests> digests_;
   std::unique_ptr<Executor> quick_, slow_;
   std::unique_ptr<StreamLimits> streams_;
+  std::unique_ptr<Access> access_;
   std::unique_ptr<RpcParts> parts_;
   std::unique_ptr<WatchHub> hub_;
   std::unique_ptr<ColorizeHub> colorize_hub_;

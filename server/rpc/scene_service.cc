@@ -70,28 +70,40 @@ SceneRecord ToRecord(const v1::CreateSceneRequest& request, const ServiceLimits&
 grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerContext* context,
                                                         const v1::CreateSceneRequest* request,
                                                         v1::Scene* response) {
-  return AnswerUnary(
-      parts_.slow, context, request, response, [this](const auto& in, v1::Scene* out) {
-        const RequestKey key = KeyOf("CreateScene", in);
-        *out = ToProto(parts_.store.CreateScene(ToRecord(in, parts_.limits), key));
-      });
+  return AnswerUnary(parts_,
+                     parts_.slow,
+                     Role::kSubmit,
+                     context,
+                     request,
+                     response,
+                     [this](const auto& in, v1::Scene* out) {
+                       const RequestKey key = KeyOf("CreateScene", in);
+                       *out = ToProto(parts_.store.CreateScene(ToRecord(in, parts_.limits), key));
+                     });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::GetScene(grpc::CallbackServerContext* context,
                                                      const v1::GetSceneRequest* request,
                                                      v1::Scene* response) {
-  return AnswerUnary(
-      parts_.quick, context, request, response, [this](const auto& in, v1::Scene* out) {
-        CheckName(in.name(), "scenes");
-        *out = ToProto(parts_.store.GetScene(in.name()));
-      });
+  return AnswerUnary(parts_,
+                     parts_.quick,
+                     Role::kRead,
+                     context,
+                     request,
+                     response,
+                     [this](const auto& in, v1::Scene* out) {
+                       CheckName(in.name(), "scenes");
+                       *out = ToProto(parts_.store.GetScene(in.name()));
+                     });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerContext* context,
                                                        const v1::ListScenesRequest* request,
                                                        v1::ListScenesResponse* response) {
   return AnswerUnary(
+      parts_,
       parts_.quick,
+      Role::kRead,
       context,
       request,
       response,
@@ -109,7 +121,13 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerCont
                                                         const v1::CommitSceneRequest* request,
                                                         v1::Scene* response) {
   return AnswerUnary(
-      parts_.slow, context, request, response, [this](const auto& in, v1::Scene* out) {
+      parts_,
+      parts_.slow,
+      Role::kSubmit,
+      context,
+      request,
+      response,
+      [this](const auto& in, v1::Scene* out) {
         CheckName(in.name(), "scenes");
         const RequestKey key = KeyOf("CommitScene", in);
         const SceneRecord scene = parts_.store.GetScene(in.name());
@@ -126,23 +144,33 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SceneServiceImpl::AcceptKeyColor(grpc::CallbackServerContext* context,
                                                            const v1::AcceptKeyColorRequest* request,
                                                            v1::Scene* response) {
-  return AnswerUnary(
-      parts_.slow, context, request, response, [this](const auto& in, v1::Scene* out) {
-        CheckName(in.name(), "scenes");
-        if (!in.job().empty()) CheckName(in.job(), "jobs");
-        *out =
-            ToProto(parts_.store.AcceptKeyColor(in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
-      });
+  return AnswerUnary(parts_,
+                     parts_.slow,
+                     Role::kSubmit,
+                     context,
+                     request,
+                     response,
+                     [this](const auto& in, v1::Scene* out) {
+                       CheckName(in.name(), "scenes");
+                       if (!in.job().empty()) CheckName(in.job(), "jobs");
+                       *out = ToProto(parts_.store.AcceptKeyColor(
+                           in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
+                     });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::DeleteScene(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSceneRequest* request,
                                                         v1::DeleteSceneResponse* response) {
-  return AnswerUnary(
-      parts_.slow, context, request, response, [this](const auto& in, v1::DeleteSceneResponse*) {
-        CheckName(in.name(), "scenes");
-        parts_.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
-      });
+  return AnswerUnary(parts_,
+                     parts_.slow,
+                     Role::kSubmit,
+                     context,
+                     request,
+                     response,
+                     [this](const auto& in, v1::DeleteSceneResponse*) {
+                       CheckName(in.name(), "scenes");
+                       parts_.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
+                     });
 }
 
 }  // namespace color3d

@@ -10,8 +10,8 @@ namespace color3d {
 namespace {
 
 TEST(TransformsOutline, CountsFrames) {
-  EXPECT_EQ(OutlineOfTransforms(R"({"w": 1, "frames": [{"a": [1]}, {"frames": [1, 2]}, 3]})").frames,
-            3);
+  EXPECT_EQ(
+      OutlineOfTransforms(R"({"w": 1, "frames": [{"a": [1]}, {"frames": [1, 2]}, 3]})").frames, 3);
   EXPECT_EQ(OutlineOfTransforms(R"({"a": {"frames": [1, 2]}})").frames, 0);
   EXPECT_EQ(OutlineOfTransforms(R"({"frames": {"a": 1, "b": 2}})").frames, 0);
   EXPECT_EQ(OutlineOfTransforms(R"({"frames": [1, 2], "frames": [1]})").frames, 1);

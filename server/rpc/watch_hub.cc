@@ -26,9 +26,11 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       : hub_(hub), parts_(hub.parts_), request_(request) {}
 
   // Keeps itself alive until OnDone; the executor and the hub hold references too.
-  void Start(const std::shared_ptr<JobWatcher>& self) {
+  // `allowed`: whether it may begin.
+  void Start(const std::shared_ptr<JobWatcher>& self, const grpc::Status& allowed) {
     self_ = self;
     hub_.Register(self);
+    if (!allowed.ok()) return End(allowed);
     parts_.quick.Post([self] { self->Begin(); });
   }
 
@@ -275,9 +277,10 @@ WatchHub::~WatchHub() {
   thread_.join();
 }
 
-grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const v1::WatchJobsRequest& request) {
+grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const grpc::CallbackServerContext& context,
+                                                        const v1::WatchJobsRequest& request) {
   auto watcher = std::make_shared<JobWatcher>(*this, request);
-  watcher->Start(watcher);
+  watcher->Start(watcher, Guard([&] { parts_.access.Require(Role::kRead, context); }));
   bool draining = false;
   {
     std::lock_guard lock(mutex_);

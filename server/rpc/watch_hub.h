@@ -30,7 +30,8 @@ class WatchHub {
   WatchHub(const WatchHub&) = delete;
   WatchHub& operator=(const WatchHub&) = delete;
 
-  grpc::ServerWriteReactor<v1::JobEvent>* Watch(const v1::WatchJobsRequest& request);
+  grpc::ServerWriteReactor<v1::JobEvent>* Watch(const grpc::CallbackServerContext& context,
+                                                const v1::WatchJobsRequest& request);
   // Ends all streams, present and future, with UNAVAILABLE (DRAINING).
   void Drain();
 

@@ -16,8 +16,7 @@ SqliteConnections::SqliteConnections(const std::filesystem::path& file)
 
 std::unique_ptr<SqliteDatabase> SqliteConnections::TakeReader() {
   std::unique_lock lock(reading_);
-  reader_is_back_.wait(lock,
-                       [this] { return !idle_readers_.empty() || readers_ < kMaxReaders; });
+  reader_is_back_.wait(lock, [this] { return !idle_readers_.empty() || readers_ < kMaxReaders; });
   if (idle_readers_.empty()) {
     auto fresh = std::make_unique<SqliteDatabase>(file_, SqliteAccess::kRead);
     ++readers_;

@@ -8,6 +8,7 @@
 #include "server/service_error.h"
 #include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
+#include "server/store/store_file.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -15,8 +16,8 @@ namespace {
 
 // Nothing: the file has no tables.
 std::optional<int64_t> VersionOf(SqliteDatabase& db) {
-  SqliteStatement table(
-      db.handle(), "select 1 from sqlite_master where type='table' and name='schema_version'");
+  SqliteStatement table(db.handle(),
+                        "select 1 from sqlite_master where type='table' and name='schema_version'");
   if (!table.Step()) return std::nullopt;
   SqliteStatement version(db.handle(), "select version from schema_version");
   return version.Step() ? std::optional(version.Int(0)) : std::nullopt;
@@ -32,12 +33,10 @@ ServiceError WrongVersion(int64_t version, const char* remedy) {
 }
 
 // A whole copy, or none.
-void KeepCopy(SqliteDatabase& db, const fs::path& file, int64_t version) {
+void KeepCopy(const fs::path& file, int64_t version) {
   const fs::path copy = file.string() + ".v" + std::to_string(version);
   const fs::path unfinished = copy.string() + ".part";
-  std::error_code error;
-  fs::remove(unfinished, error);
-  db.Run("vacuum into ?", unfinished.string());
+  CopyStore(file, unfinished);
   PublishFile(unfinished, copy);
   spdlog::info("the job store is of version {}; a copy is kept in {}", version, copy.string());
 }
@@ -71,10 +70,11 @@ void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
     db.Exec("update meta set value=0 where name='collected_steady_ms'");
     db.Exec("update job set run_after_ms=0 where end_ms=0 and run_after_ms<>0");
   }
-  db.Run("insert into server values(1, ?, ?) on conflict(id) do update set "
-         "version=excluded.version, boot_id=excluded.boot_id",
-         identity.program_version,
-         identity.boot_id);
+  db.Run(
+      "insert into server values(1, ?, ?) on conflict(id) do update set "
+      "version=excluded.version, boot_id=excluded.boot_id",
+      identity.program_version,
+      identity.boot_id);
   transaction.Commit();
 }
 
@@ -94,15 +94,15 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
                          file.string());
     }
     if (*version < kSchemaVersion) {
-      throw WrongVersion(*version,
-                         "the server that runs is of an older release than this worker: restart it");
+      throw WrongVersion(
+          *version, "the server that runs is of an older release than this worker: restart it");
     }
     return;
   }
   if (!version) {
     MakeTables(db);
   } else if (*version < kSchemaVersion) {
-    KeepCopy(db, file, *version);
+    KeepCopy(file, *version);
     Migrate(db);
   }
   SayWhoServes(db, identity);

@@ -67,9 +67,8 @@ TEST_F(StoreSchemaTest, AWorkerOfAnotherReleaseIsGivenNoJob) {
   SqliteJobStore stranger(File(), StoreRole::kWorker, TestClocks(), options);
   EXPECT_EQ(ReasonThrown([&] { stranger.Claim("stranger-1", kLease); }), "WORKER_VERSION");
   EXPECT_EQ(ReasonThrown([&] {
-              stranger.ClaimForBatch("stranger-1", kLease, "single", [](const JobRecord&) {
-                return true;
-              });
+              stranger.ClaimForBatch(
+                  "stranger-1", kLease, "single", [](const JobRecord&) { return true; });
             }),
             "WORKER_VERSION");
   EXPECT_EQ(ClaimOne().attempt, 1) << "nothing was spent";

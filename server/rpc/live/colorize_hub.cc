@@ -214,6 +214,8 @@ ColorizeHub::ColorizeHub(const RpcParts& parts, InferenceLink link, ColorizeLimi
 
 grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* ColorizeHub::Open(
     grpc::CallbackServerContext* context) {
+  const grpc::Status allowed = Guard([&] { parts_.access.Require(Role::kSubmit, *context); });
+  if (!allowed.ok()) return new RefusedStream(allowed);
   if (!client_.available()) return new RefusedStream(NoWorkerStatus());
   client_.WarmUp();
   const auto stream = std::make_shared<ColorizeStream>(*this, context);

@@ -135,7 +135,8 @@ class BreakingServerTest : public ::testing::Test {
     builder.RegisterService(static_cast<v1::BlobService::Service*>(&blobs_));
     builder.RegisterService(&jobs_);
     server_ = builder.BuildAndStart();
-    connection_ = std::make_unique<Connection>("127.0.0.1:" + std::to_string(port), cancel_);
+    connection_ = std::make_unique<Connection>(
+        ServerTarget{.address = "127.0.0.1:" + std::to_string(port)}, cancel_);
     for (int i = 0; i < 3'000'000; ++i) bytes_ += static_cast<char>(i * 2654435761u >> 13);
     digest_ = {Sha256Hex(bytes_), static_cast<int64_t>(bytes_.size())};
     name_ = "blobs/" + digest_.sha256 + "/" + std::to_string(digest_.size_bytes);

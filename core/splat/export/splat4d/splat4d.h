@@ -1,5 +1,5 @@
 // A scene that moves in one file that web players stream and seek: .splat4d, version 1
-// (github.com/adamraudonis/splats4D: docs/FORMAT.md, and converter/src/streams.rs for the header of
+// (github.com/adamraudonis/splats4D: docs: FORMAT, and converter/src/streams.rs for the header of
 // a stream, which the document leaves out). A pure function.
 #pragma once
 

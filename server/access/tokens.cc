@@ -1,0 +1,171 @@
+#include "server/access/tokens.h"
+
+#include <fmt/format.h>
+#include <openssl/crypto.h>
+#include <spdlog/spdlog.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <sstream>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::array<const char*, 3> kRoleNames = {"read", "submit", "admin"};
+constexpr size_t kTokenBytes = 32;
+constexpr auto kLook = std::chrono::seconds(1);
+constexpr char kPrefix[] = "c3d_";  // by which leak scanners know one
+
+bool IsName(const std::string& name) {
+  return !name.empty() && name.size() <= 64 &&
+         std::all_of(name.begin(), name.end(), [](unsigned char c) {
+           return std::isalnum(c) != 0 || std::strchr(".-_@", c) != nullptr;
+         });
+}
+
+std::string RandomToken() {
+  std::array<unsigned char, kTokenBytes> bytes;
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
+    throw Error(ErrorCode::kInternal, "no random numbers: {}", std::strerror(errno));
+  }
+  std::string token = kPrefix;
+  for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
+  return token;
+}
+
+// Of its bytes and rights, as far as the disk tells.
+std::string IdentityOf(const fs::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return "";
+  return fmt::format("{} {} {} {} {}",
+                     status.st_ino,
+                     status.st_size,
+                     status.st_mtim.tv_sec,
+                     status.st_mtim.tv_nsec,
+                     status.st_mode);
+}
+
+std::vector<TokenRecord> ReadTokens(const fs::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) == 0 && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "others may write to the token file {}, and so let themselves in; chmod 600 {}",
+                file.string(),
+                file.string());
+  }
+  return ParseTokens(ReadFile(file), file.string());
+}
+
+}  // namespace
+
+const char* RoleName(Role role) { return kRoleNames[static_cast<size_t>(role)]; }
+
+Role RoleFromName(std::string_view name) {
+  for (size_t i = 0; i < kRoleNames.size(); ++i) {
+    if (name == kRoleNames[i]) return static_cast<Role>(i);
+  }
+  throw InvalidArgument("there is no role '{}'; say read, submit or admin", name);
+}
+
+std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file) {
+  std::vector<TokenRecord> records;
+  std::istringstream lines{std::string(text)};
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    std::istringstream words(line);
+    TokenRecord record;
+    std::string role, rest;
+    if (!(words >> record.name) || record.name[0] == '#') continue;
+    words >> role >> record.sha256;
+    if (!IsName(record.name) || !IsSha256Hex(record.sha256) || words >> rest) {
+      throw InvalidArgument(
+          "{}, line {}: it must be NAME ROLE SHA256, as `color3d-server token` writes it",
+          file,
+          number);
+    }
+    try {
+      record.role = RoleFromName(role);
+    } catch (const Error& e) {
+      throw InvalidArgument("{}, line {}: {}", file, number, e.what());
+    }
+    records.push_back(record);
+  }
+  return records;
+}
+
+std::string AddToken(const fs::path& file, const std::string& name, Role role) {
+  if (!IsName(name)) {
+    throw InvalidArgument("'{}' is no name: 1 to 64 of letters, digits, '.', '-', '_' and '@'",
+                          name.substr(0, 80));
+  }
+  std::string text;
+  std::error_code error;
+  const bool is_fresh = !fs::exists(file, error);
+  if (!is_fresh) {
+    text = ReadFile(file);
+    for (const TokenRecord& record : ParseTokens(text, file.string())) {
+      if (record.name != name) continue;
+      throw Error(ErrorCode::kAlreadyExists,
+                  "{} has a token for '{}' already; remove its line first, or choose another name",
+                  file.string(),
+                  name);
+    }
+    if (!text.empty() && text.back() != '\n') text += '\n';
+  }
+  const std::string token = RandomToken();
+  text += fmt::format("{} {} {}\n", name, RoleName(role), Sha256Hex(token));
+  const mode_t before = ::umask(0077);
+  try {
+    WriteFileAtomic(file, text);
+  } catch (...) {
+    ::umask(before);
+    throw;
+  }
+  ::umask(before);
+  return token;
+}
+
+TokenBook::TokenBook(const fs::path& file)
+    : file_(file), records_(ReadTokens(file)), identity_(IdentityOf(file)) {
+  if (records_.empty()) {
+    spdlog::warn("{} names nobody: every call will be refused", file.string());
+  }
+}
+
+void TokenBook::ReadAgain() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_look_) return;
+  next_look_ = now + kLook;
+  const std::string identity = IdentityOf(file_);
+  if (identity == identity_) return;
+  identity_ = identity;
+  try {
+    records_ = ReadTokens(file_);
+    spdlog::info("{} was read again: {} tokens", file_.string(), records_.size());
+  } catch (const Error& e) {
+    spdlog::error("the tokens stay as they were: {}", e.what());
+  }
+}
+
+std::optional<TokenRecord> TokenBook::Find(std::string_view token) {
+  const std::string digest = Sha256Hex(token);
+  std::lock_guard lock(mutex_);
+  ReadAgain();
+  std::optional<TokenRecord> found;
+  for (const TokenRecord& record : records_) {
+    if (CRYPTO_memcmp(record.sha256.data(), digest.data(), digest.size()) == 0) found = record;
+  }
+  return found;
+}
+
+}  // namespace color3d

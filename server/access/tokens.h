@@ -1,0 +1,59 @@
+// Who may call the server: a file of names, roles and digests of tokens. The tokens themselves are
+// nowhere on the server. Functions are pure but for the files that they name.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace color3d {
+
+// Each may do what those before it may.
+enum class Role {
+  kRead,    // look at everything, download, watch
+  kSubmit,  // upload, create, change, cancel and delete
+  kAdmin,   // how the server runs
+};
+const char* RoleName(Role role);
+// Throws Error{kInvalidArgument} that names the roles that there are.
+Role RoleFromName(std::string_view name);
+
+struct TokenRecord {
+  std::string name;    // of who has it, for logs: 1 to 64 of letters, digits, '.', '-', '_', '@'
+  Role role = Role::kRead;
+  std::string sha256;  // of the token
+};
+
+// Lines "NAME ROLE SHA256"; empty ones and those that begin with '#' are skipped. Throws
+// Error{kInvalidArgument} naming file and line.
+std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file);
+
+// A fresh token of 256 random bits, of which the record is added to the file; a new file can be
+// read by its owner alone. Throws Error{kAlreadyExists} when the name is there.
+std::string AddToken(const std::filesystem::path& file, const std::string& name, Role role);
+
+// The file as it is now: read again when it has changed, at most once a second. A file that has
+// become unreadable or wrong changes nothing, and is said in the log. Thread-safe.
+class TokenBook {
+ public:
+  // Throws Error for a file that cannot be read, is wrong, or that others than its owner may change.
+  explicit TokenBook(const std::filesystem::path& file);
+
+  // Takes the same time whichever token it is.
+  std::optional<TokenRecord> Find(std::string_view token);
+
+ private:
+  void ReadAgain();
+
+  const std::filesystem::path file_;
+  std::mutex mutex_;
+  std::vector<TokenRecord> records_;
+  std::string identity_;  // of the file that was read
+  std::chrono::steady_clock::time_point next_look_;
+};
+
+}  // namespace color3d

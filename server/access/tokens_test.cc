@@ -1,0 +1,88 @@
+#include "server/access/tokens.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <thread>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+
+class TokensTest : public testing::Test {
+ protected:
+  fs::path File() const { return scratch_.path() / "tokens"; }
+  // After more than the second for which a book trusts what it has read.
+  static std::optional<TokenRecord> FindLater(TokenBook& book, const std::string& token) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+    return book.Find(token);
+  }
+
+  ScratchFolder scratch_;
+};
+
+TEST_F(TokensTest, OneThatWasAddedIsFoundWithItsRole) {
+  const std::string anna = AddToken(File(), "anna", Role::kSubmit);
+  const std::string bert = AddToken(File(), "bert@lab.org", Role::kRead);
+  EXPECT_NE(anna, bert);
+  EXPECT_EQ(anna.size(), 4u + 64u);
+  EXPECT_EQ(ReadFile(File()).find(anna.substr(4)), std::string::npos) << "only its digest is kept";
+  struct stat status {};
+  ASSERT_EQ(::stat(File().c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777u, 0600u);
+  TokenBook book(File());
+  ASSERT_TRUE(book.Find(anna));
+  EXPECT_EQ(book.Find(anna)->name, "anna");
+  EXPECT_EQ(book.Find(anna)->role, Role::kSubmit);
+  EXPECT_EQ(book.Find(bert)->role, Role::kRead);
+  EXPECT_FALSE(book.Find(anna.substr(1)));
+  EXPECT_FALSE(book.Find(""));
+  EXPECT_FALSE(book.Find(Sha256Hex(anna))) << "who reads the file has no token";
+}
+
+TEST_F(TokensTest, ChangesAreHeededAndMistakesChangeNothing) {
+  const std::string anna = AddToken(File(), "anna", Role::kSubmit);
+  TokenBook book(File());
+  const std::string bert = AddToken(File(), "bert", Role::kAdmin);
+  EXPECT_TRUE(FindLater(book, bert));
+  WriteFileAtomic(File(), "nonsense\n");
+  ::chmod(File().c_str(), 0600);
+  EXPECT_TRUE(FindLater(book, anna));
+  fs::remove(File());
+  EXPECT_TRUE(FindLater(book, anna));
+  WriteFileAtomic(File(), "bert admin " + Sha256Hex(bert) + "\n");
+  ::chmod(File().c_str(), 0600);
+  EXPECT_FALSE(FindLater(book, anna)) << "her line was taken out";
+  EXPECT_TRUE(book.Find(bert));
+}
+
+TEST_F(TokensTest, WrongFilesAreNamed) {
+  const auto message = [](const std::string& text) {
+    try {
+      ParseTokens(text, "tokens");
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  const std::string digest = Sha256Hex("x");
+  EXPECT_EQ(ParseTokens("# who\n\nanna read " + digest + "\n", "tokens").size(), 1u);
+  EXPECT_NE(message("anna read " + digest + "\nbert read 12\n").find("tokens, line 2"),
+            std::string::npos);
+  EXPECT_NE(message("anna king " + digest).find("read, submit or admin"), std::string::npos);
+  EXPECT_NE(message("anna read " + digest + " more").find("line 1"), std::string::npos);
+  EXPECT_NE(message("an/na read " + digest).find("line 1"), std::string::npos);
+  AddToken(File(), "anna", Role::kRead);
+  EXPECT_THROW(AddToken(File(), "anna", Role::kAdmin), Error);
+  EXPECT_THROW(AddToken(File(), "a b", Role::kAdmin), Error);
+  ::chmod(File().c_str(), 0620);
+  EXPECT_THROW(TokenBook{File()}, Error) << "others may write to it";
+  EXPECT_THROW(TokenBook{scratch_.path() / "none"}, Error);
+}
+
+}  // namespace
+}  // namespace color3d

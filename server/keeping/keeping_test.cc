@@ -1,0 +1,143 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "server/keeping/backup.h"
+#include "server/keeping/fsck.h"
+#include "server/storage/data_folder.h"
+#include "server/storage/file_blob_store.h"
+#include "tests/support/service/job_store_fixture.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+
+// A data folder with one scene, one job and its result.
+class KeepingTest : public testing::Test {
+ protected:
+  KeepingTest() {
+    PrepareDataFolder(paths_);
+    SceneRecord scene;
+    scene.name = "scenes/test";
+    photo_ = blobs_.PutBytes("photo");
+    scene.files = {{"a.jpg", photo_}};
+    store_ = Open(paths_.root, StoreRole::kServer);
+    store_->CreateScene(scene, {});
+    store_->ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+    job_ = Run("result");
+    blobs_.PutBytes("named by nothing");
+  }
+  static std::unique_ptr<SqliteJobStore> Open(const fs::path& folder, StoreRole role) {
+    return std::make_unique<SqliteJobStore>(DataPaths(folder).Store(), role, SystemClocks());
+  }
+  std::string Run(const std::string& result) {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    graph.jobs.resize(1);
+    graph.jobs[0].kind = "single";
+    const std::string name = store_->CreateGraph(graph, {}, kNoLimit).name;
+    const JobRecord job = store_->Claim("w", kLease).value();
+    Publication publication;
+    publication.artifacts = {{"result", blobs_.PutBytes(result), "text/plain"}};
+    store_->Publish({job.id, job.lease_epoch}, publication);
+    return name;
+  }
+  static std::string ResultIn(const fs::path& folder, const std::string& job) {
+    const auto store = Open(folder, StoreRole::kServer);
+    const JobRecord record = store->GetJob(job);
+    return ReadFile(
+        FileBlobStore(DataPaths(folder).Blobs()).Fetch(record.artifacts.at(0).digest.sha256));
+  }
+  void Damage(const FileDigest& digest) {
+    const fs::path file = blobs_.Fetch(digest.sha256);
+    fs::permissions(file, fs::perms::owner_all);
+    std::ofstream(file, std::ios::binary) << std::string(digest.size_bytes, '!');
+  }
+  static FsckResult Check(const fs::path& folder, bool repair = false) {
+    return Fsck(folder, repair, [](int64_t) {});
+  }
+
+  ScratchFolder scratch_;
+  DataPaths paths_{scratch_.path() / "data"};
+  fs::path backup_ = scratch_.path() / "backup", fresh_ = scratch_.path() / "fresh";
+  FileBlobStore blobs_{paths_.Blobs(), {0}};
+  std::unique_ptr<SqliteJobStore> store_;
+  FileDigest photo_;
+  std::string job_;
+};
+
+TEST_F(KeepingTest, WhatWasBackedUpIsServedAgain) {
+  const CopiedBlobs first = BackUp(paths_.root, backup_);  // the store is open: a server may run
+  EXPECT_EQ(first.copied, 2) << "what nothing names stays behind";
+  EXPECT_EQ(first.bytes, 5 + 6);
+  const std::string later = Run("later");
+  const CopiedBlobs second = BackUp(paths_.root, backup_);
+  EXPECT_EQ(second.copied, 1);
+  EXPECT_EQ(second.kept, 2);
+  EXPECT_EQ(Restore(backup_, fresh_).copied, 3);
+  EXPECT_EQ(ResultIn(fresh_, job_), "result");
+  EXPECT_EQ(ResultIn(fresh_, later), "later");
+  EXPECT_TRUE(Check(fresh_).IsGood());
+  EXPECT_EQ(ReasonThrown([&] { Restore(backup_, fresh_); }), "FAILED_PRECONDITION") << "not empty";
+  for (const fs::path& folder : {backup_, fresh_}) {
+    EXPECT_EQ(fs::status(folder).permissions(), fs::perms::owner_all);
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      EXPECT_EQ(entry.path().string().find(".part"), std::string::npos) << entry.path();
+    }
+  }
+}
+
+TEST_F(KeepingTest, NothingDamagedIsTakenForABackup) {
+  BackUp(paths_.root, backup_);
+  Run("later");
+  Damage(store_->GetScene("scenes/test").files.at(0).digest);
+  EXPECT_EQ(ReasonThrown([&] { BackUp(paths_.root, scratch_.path() / "other"); }), "DATA_LOSS");
+  EXPECT_FALSE(fs::exists(scratch_.path() / "other" / "jobs.db"));
+  Restore(backup_, fresh_);
+  EXPECT_TRUE(Check(fresh_).IsGood()) << "the earlier one is whole";
+  blobs_.Remove(photo_.sha256);
+  EXPECT_EQ(ReasonThrown([&] { BackUp(paths_.root, scratch_.path() / "other"); }), "DATA_LOSS");
+  EXPECT_EQ(ReasonThrown([&] { BackUp(scratch_.path() / "none", backup_); }),
+            "FAILED_PRECONDITION");
+  const fs::path photos = scratch_.path() / "photos";
+  fs::create_directory(photos);
+  WriteFileAtomic(photos / "a.jpg", "x");
+  EXPECT_EQ(ReasonThrown([&] { BackUp(paths_.root, photos); }), "FAILED_PRECONDITION");
+}
+
+TEST_F(KeepingTest, FsckFindsWhatIsWrongAndRepairs) {
+  store_.reset();
+  FsckResult result = Check(paths_.root);
+  EXPECT_TRUE(result.IsGood());
+  EXPECT_EQ(result.blobs, 3);
+  EXPECT_EQ(result.unnamed, 1);
+  Damage(photo_);
+  result = Check(paths_.root, /*repair=*/true);
+  EXPECT_EQ(result.damaged, std::vector<std::string>{photo_.sha256});
+  EXPECT_TRUE(result.missing.empty());
+  result = Check(paths_.root);
+  EXPECT_EQ(result.missing, std::vector<std::string>{photo_.sha256});
+  blobs_.PutBytes("photo");
+  EXPECT_TRUE(Check(paths_.root).IsGood());
+  const DataFolderLock server(paths_);
+  EXPECT_EQ(ReasonThrown([&] { Check(paths_.root); }), "FAILED_PRECONDITION") << "a server runs";
+}
+
+TEST_F(KeepingTest, FsckSeesADamagedStore) {
+  store_.reset();
+  std::error_code error;
+  fs::remove(paths_.Store().string() + "-wal", error);
+  std::fstream file(paths_.Store(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(3 * 4096);
+  file << std::string(4096, '!');
+  file.close();
+  try {
+    const FsckResult result = Check(paths_.root);
+    EXPECT_FALSE(result.IsGood());
+  } catch (const Error& e) {
+    EXPECT_EQ(ReasonOf(e), "STORE_CORRUPT");
+  }
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,29 @@
+#include "server/store/store_file.h"
+
+#include "server/store/sqlite_db.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+
+void CopyStore(const fs::path& file, const fs::path& copy) {
+  std::error_code error;
+  fs::remove(copy, error);
+  SqliteDatabase(file, SqliteAccess::kWrite).Run("vacuum into ?", copy.string());
+}
+
+std::vector<std::string> StoreProblems(const fs::path& file) {
+  std::vector<std::string> problems;
+  SqliteDatabase db(file, SqliteAccess::kRead);
+  SqliteStatement integrity(db.handle(), "pragma integrity_check(20)");
+  while (integrity.Step()) {
+    if (integrity.Text(0) != "ok") problems.push_back(integrity.Text(0));
+  }
+  SqliteStatement references(db.handle(), "pragma foreign_key_check");
+  while (references.Step()) {
+    problems.push_back("a row of " + references.Text(0) + " names a " + references.Text(2) +
+                       " that is not there");
+  }
+  return problems;
+}
+
+}  // namespace color3d
