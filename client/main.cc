@@ -47,6 +47,8 @@ std::string TokenFrom(const std::filesystem::path& file) {
 }
 
 int Main(int argc, char** argv) {
+  // Our own words say more than gRPC's log does.
+  ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   Context context;
   context.interrupt = &interrupt;
   context.arguments.assign(argv + 1, argv + argc);

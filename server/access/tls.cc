@@ -76,11 +76,14 @@ void Check(const TlsFiles& files) {
 }  // namespace
 
 std::shared_ptr<grpc::ServerCredentials> MakeServerCredentials(const TlsFiles& files,
-                                                              std::chrono::seconds refresh) {
+                                                               std::chrono::seconds refresh) {
   namespace tls = grpc::experimental;
   Check(files);
-  const auto provider = std::make_shared<tls::FileWatcherCertificateProvider>(
-      files.key.string(), files.certificate.string(), files.client_ca.string(), static_cast<unsigned>(refresh.count()));
+  const auto provider =
+      std::make_shared<tls::FileWatcherCertificateProvider>(files.key.string(),
+                                                            files.certificate.string(),
+                                                            files.client_ca.string(),
+                                                            static_cast<unsigned>(refresh.count()));
   tls::TlsServerCredentialsOptions options(provider);
   options.watch_identity_key_cert_pairs();
   if (files.client_ca.empty()) {

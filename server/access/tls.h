@@ -18,9 +18,9 @@ struct TlsFiles {
   bool empty() const { return certificate.empty() && key.empty() && client_ca.empty(); }
 };
 
-// The files are looked at again every `refresh`, a second at least: certificates are renewed without a
-// restart. Throws Error{kFailedPrecondition} that names the file and what is wrong with it: not
-// there, no PEM, a key of another certificate, or a certificate that is not valid now.
+// The files are looked at again every `refresh`, a second at least: certificates are renewed
+// without a restart. Throws Error{kFailedPrecondition} that names the file and what is wrong with
+// it: not there, no PEM, a key of another certificate, or a certificate that is not valid now.
 std::shared_ptr<grpc::ServerCredentials> MakeServerCredentials(
     const TlsFiles& files, std::chrono::seconds refresh = std::chrono::seconds(10));
 

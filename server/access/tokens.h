@@ -23,7 +23,7 @@ const char* RoleName(Role role);
 Role RoleFromName(std::string_view name);
 
 struct TokenRecord {
-  std::string name;    // of who has it, for logs: 1 to 64 of letters, digits, '.', '-', '_', '@'
+  std::string name;  // of who has it, for logs: 1 to 64 of letters, digits, '.', '-', '_', '@'
   Role role = Role::kRead;
   std::string sha256;  // of the token
 };
@@ -40,7 +40,8 @@ std::string AddToken(const std::filesystem::path& file, const std::string& name,
 // become unreadable or wrong changes nothing, and is said in the log. Thread-safe.
 class TokenBook {
  public:
-  // Throws Error for a file that cannot be read, is wrong, or that others than its owner may change.
+  // Throws Error for a file that cannot be read, is wrong, or that others than its owner may
+  // change.
   explicit TokenBook(const std::filesystem::path& file);
 
   // Takes the same time whichever token it is.

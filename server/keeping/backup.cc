@@ -36,7 +36,10 @@ std::set<std::string> NamedBlobs(const fs::path& store) {
 }
 
 // The digest is taken of the copy, so that what was read and what was written are both checked.
-void CopyBlob(const BlobStore& from, const std::string& sha256, const fs::path& part, BlobStore& to) {
+void CopyBlob(const BlobStore& from,
+              const std::string& sha256,
+              const fs::path& part,
+              BlobStore& to) {
   fs::copy_file(from.Fetch(sha256), part, fs::copy_options::overwrite_existing);
   ::chmod(part.c_str(), 0600);
   const FileDigest digest = DigestFile(part);
@@ -57,7 +60,9 @@ bool IsThere(const BlobStore& blobs, const std::string& sha256) {
   }
 }
 
-CopiedBlobs CopyAll(const std::set<std::string>& named, const DataPaths& from, const DataPaths& to) {
+CopiedBlobs CopyAll(const std::set<std::string>& named,
+                    const DataPaths& from,
+                    const DataPaths& to) {
   const FileBlobStore source(from.Blobs());
   FileBlobStore target(to.Blobs());
   CopiedBlobs result;

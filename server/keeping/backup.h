@@ -15,12 +15,12 @@ struct CopiedBlobs {
 // Everything that jobs and scenes name, as it is at one moment; a server may run meanwhile. Into an
 // empty folder, or over an earlier backup, of which blobs that are there are not copied again. The
 // store is replaced last: a backup that was cut off is the earlier one still. Throws Error:
-// kFailedPrecondition where there is no store of this release or `target` is none of ours, kDataLoss
-// naming a blob that is missing or damaged.
+// kFailedPrecondition where there is no store of this release or `target` is none of ours,
+// kDataLoss naming a blob that is missing or damaged.
 CopiedBlobs BackUp(const std::filesystem::path& data_folder, const std::filesystem::path& target);
 
-// A backup as a fresh data folder. Every blob is read and compared with its digest. Throws as BackUp,
-// and kFailedPrecondition unless `data_folder` is empty or not there.
+// A backup as a fresh data folder. Every blob is read and compared with its digest. Throws as
+// BackUp, and kFailedPrecondition unless `data_folder` is empty or not there.
 CopiedBlobs Restore(const std::filesystem::path& backup, const std::filesystem::path& data_folder);
 
 }  // namespace color3d

@@ -146,10 +146,9 @@ TEST_F(AccessTest, TlsIsForThoseWhoBelieveEachOther) {
                                  "/color3d.v1.ServerService/GetServerInfo",
                                  "Bearer " + admin_);
   EXPECT_EQ(in_the_clear.error_code(), StatusCode::UNAVAILABLE);
-  EXPECT_TRUE(Call(Open(believing(ours)),
-                   "/color3d.v1.ServerService/GetServerInfo",
-                   "Bearer " + read_)
-                  .ok());
+  EXPECT_TRUE(
+      Call(Open(believing(ours)), "/color3d.v1.ServerService/GetServerInfo", "Bearer " + read_)
+          .ok());
 
   guarded_.reset();
   options_.credentials =

@@ -19,6 +19,12 @@ ServiceError LeaseLost(const Lease& lease) {
                       lease.epoch);
 }
 
+#ifdef COLOR3D_FENCE_OFF  // what the chaos suite must notice
+constexpr char kHeld[] = "where job_id=? and ?<>0";
+#else
+constexpr char kHeld[] = "where job_id=? and lease_epoch=? and state='RUNNING'";
+#endif
+
 bool IsRetryable(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kAborted;
 }
@@ -128,8 +134,7 @@ std::vector<JobRecord> SqliteJobStore::GetInputs(int64_t job_id) {
 }
 
 JobRecord SqliteJobStore::RequireLease(SqliteDatabase& db, const Lease& lease) {
-  SqliteStatement select(db.handle(),
-                         SelectJob("where job_id=? and lease_epoch=? and state='RUNNING'"));
+  SqliteStatement select(db.handle(), SelectJob(kHeld));
   select.Bind(lease.job_id, lease.epoch);
   if (!select.Step()) throw LeaseLost(lease);
   return JobFromRow(select);

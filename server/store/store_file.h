@@ -7,8 +7,8 @@
 
 namespace color3d {
 
-// All of it as it is at one moment, compact and without a log beside it; others may write meanwhile.
-// `copy` is replaced. Throws Error as opening a store does.
+// All of it as it is at one moment, compact and without a log beside it; others may write
+// meanwhile. `copy` is replaced. Throws Error as opening a store does.
 void CopyStore(const std::filesystem::path& file, const std::filesystem::path& copy);
 
 // What is wrong with it in SQLite's words, at most 20 things.

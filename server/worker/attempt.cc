@@ -23,9 +23,6 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Between attempts to tell the store how an attempt ended.
-constexpr auto kReportPause = std::chrono::seconds(1);
-
 // Read-only view of a blob under another name: a hard link, or a copy across filesystems.
 void LinkOrCopy(const fs::path& blob, const fs::path& target) {
   fs::create_directories(target.parent_path());
@@ -332,7 +329,7 @@ void Attempt::HandleError(const JobError& error) {
       return Conclude(context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
     } catch (const Error& e) {
       if (tries_left > 0 && e.code() != ErrorCode::kAborted) {
-        std::this_thread::sleep_for(kReportPause);
+        std::this_thread::sleep_for(context_.timing.report_pause);
         continue;
       }
       spdlog::error("{} cannot report its end ({}); its lease will run out", tag_, e.what());
@@ -400,7 +397,7 @@ void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares
   } catch (const std::exception& e) {
     // It was not begun, or its end could not be told: not the job's fault, and no attempt.
     spdlog::error("{} could not be run here: {}", AttemptTag(job), e.what());
-    std::this_thread::sleep_for(kReportPause);
+    std::this_thread::sleep_for(context.timing.report_pause);
     GiveBack(context.store, job);
   }
 }

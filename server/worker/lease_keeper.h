@@ -27,6 +27,8 @@ struct LeaseTiming {
   // A stage that has not stopped this long after it was told to is given up with its process.
   std::chrono::milliseconds stop_grace{60'000};
   std::chrono::milliseconds drain_grace{15'000};
+  // Between attempts to tell the store how it ended.
+  std::chrono::milliseconds report_pause{1'000};
 };
 
 // "[job=jobs/... attempt=1]", the beginning of every log line about the attempt.

@@ -69,8 +69,7 @@ CertificateFiles TestAuthority::Issue(const std::string& name, long from_s, long
   const Key key(EVP_EC_gen("P-256"), EVP_PKEY_free);
   const Certificate certificate = Make(name, key.get(), from_s, until_s, /*is_ca=*/false);
   const CertificateFiles files{folder_ / (name + ".pem"), folder_ / (name + ".key")};
-  WritePem(files.certificate,
-           [&](BIO* bio) { return PEM_write_bio_X509(bio, certificate.get()); });
+  WritePem(files.certificate, [&](BIO* bio) { return PEM_write_bio_X509(bio, certificate.get()); });
   WritePem(files.key, [&](BIO* bio) {
     return PEM_write_bio_PrivateKey(bio, key.get(), nullptr, nullptr, 0, nullptr, nullptr);
   });
