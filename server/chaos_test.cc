@@ -64,8 +64,7 @@ class ChaosTest : public ::testing::Test {
   void Submit() {
     TestClient& client = server_->client();
     if (scene_.empty()) scene_ = client.MakeScene().name();
-    const std::string script =
-        "steps=" + std::to_string(kSteps) + ",ms=" + std::to_string(kStepMs);
+    const std::string script = "steps=" + std::to_string(kSteps) + ",ms=" + std::to_string(kStepMs);
     const int seed = static_cast<int>(names_.size()) + 1;  // no two jobs are equal work
     names_.push_back(client.Create(ScriptedSpec(scene_, script, seed)).name());
   }
@@ -162,7 +161,8 @@ TEST_F(ChaosTest, EveryJobEndsAndEveryEffectIsThereOnce) {
             0)
       << "a job succeeded twice";
   for (const auto& [kind, count] : faults_) std::cout << count << " x " << kind << "\n";
-  std::cout << names_.size() << " submissions, " << taken_over_ << " taken over by another process, "
+  std::cout << names_.size() << " submissions, " << taken_over_
+            << " taken over by another process, "
             << Count("select count(*) from job_attempt where outcome='LOST'")
             << " attempts lost, losses 0\n";
 }

@@ -73,6 +73,7 @@ class ServerProcess {
     if (pid_ != 0) Signal(SIGKILL), Wait();
   }
   TestClient& client() { return *client_; }
+  const std::string& address() const { return address_; }
   pid_t pid() const { return pid_; }
   void Signal(int signal) { ::kill(pid_, signal); }
   // Exit status, or 128 + signal.
