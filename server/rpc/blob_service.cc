@@ -56,9 +56,7 @@ grpc::ServerUnaryReactor* BlobServiceImpl::FindMissingBlobs(
     grpc::CallbackServerContext* context,
     const v1::FindMissingBlobsRequest* request,
     v1::FindMissingBlobsResponse* response) {
-  return AnswerUnary(parts_,
-                     parts_.slow,
-                     Role::kSubmit,
+  return AnswerWrite(parts_,
                      context,
                      request,
                      response,

@@ -204,9 +204,7 @@ grpc::ServerUnaryReactor* ByteStreamServiceImpl::QueryWriteStatus(
     grpc::CallbackServerContext* context,
     const google::bytestream::QueryWriteStatusRequest* request,
     google::bytestream::QueryWriteStatusResponse* response) {
-  return AnswerUnary(parts_,
-                     parts_.slow,
-                     Role::kSubmit,
+  return AnswerWrite(parts_,
                      context,
                      request,
                      response,

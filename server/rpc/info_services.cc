@@ -58,31 +58,18 @@ void ListBackends(const RpcParts& parts, v1::ServerInfo* info) {
 grpc::ServerUnaryReactor* ColorizerServiceImpl::GetColorizer(grpc::CallbackServerContext* context,
                                                              const v1::GetColorizerRequest* request,
                                                              v1::Colorizer* response) {
-  return AnswerUnary(
-      parts_,
-      parts_.quick,
-      Role::kRead,
-      context,
-      request,
-      response,
-      [this](const auto& in, v1::Colorizer* out) {
-        CheckName(in.name(), "colorizers");
-        *out = ToProto(parts_.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
-      });
+  return AnswerRead(parts_, context, request, response, [this](const auto& in, v1::Colorizer* out) {
+    CheckName(in.name(), "colorizers");
+    *out = ToProto(parts_.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
+  });
 }
 
 grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
     grpc::CallbackServerContext* context,
     const v1::ListColorizersRequest* request,
     v1::ListColorizersResponse* response) {
-  return AnswerUnary(
-      parts_,
-      parts_.quick,
-      Role::kRead,
-      context,
-      request,
-      response,
-      [this](const auto& in, v1::ListColorizersResponse* out) {
+  return AnswerRead(
+      parts_, context, request, response, [this](const auto& in, v1::ListColorizersResponse* out) {
         if (!in.scene().empty()) CheckName(in.scene(), "scenes");
         AnswerPage(
             in,

@@ -162,93 +162,59 @@ void ListJobPage(const RpcParts& parts,
 grpc::ServerUnaryReactor* JobServiceImpl::CreateJob(grpc::CallbackServerContext* context,
                                                     const v1::CreateJobRequest* request,
                                                     v1::Job* response) {
-  return AnswerUnary(
-      parts_,
-      parts_.slow,
-      Role::kSubmit,
-      context,
-      request,
-      response,
-      [this](const auto& in, v1::Job* out) { *out = ToProto(CreateJobRecord(parts_, in)); });
+  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    *out = ToProto(CreateJobRecord(parts_, in));
+  });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::GetJob(grpc::CallbackServerContext* context,
                                                  const v1::GetJobRequest* request,
                                                  v1::Job* response) {
-  return AnswerUnary(parts_,
-                     parts_.quick,
-                     Role::kRead,
-                     context,
-                     request,
-                     response,
-                     [this](const auto& in, v1::Job* out) {
-                       CheckName(in.name(), "jobs");
-                       *out = ToProto(parts_.store.GetJob(in.name()));
-                     });
+  return AnswerRead(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    CheckName(in.name(), "jobs");
+    *out = ToProto(parts_.store.GetJob(in.name()));
+  });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::ListJobs(grpc::CallbackServerContext* context,
                                                    const v1::ListJobsRequest* request,
                                                    v1::ListJobsResponse* response) {
-  return AnswerUnary(
-      parts_,
-      parts_.quick,
-      Role::kRead,
-      context,
-      request,
-      response,
-      [this](const auto& in, v1::ListJobsResponse* out) { ListJobPage(parts_, in, out); });
+  return AnswerRead(
+      parts_, context, request, response, [this](const auto& in, v1::ListJobsResponse* out) {
+        ListJobPage(parts_, in, out);
+      });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext* context,
                                                     const v1::CancelJobRequest* request,
                                                     v1::Job* response) {
-  return AnswerUnary(parts_,
-                     parts_.slow,
-                     Role::kSubmit,
-                     context,
-                     request,
-                     response,
-                     [this](const auto& in, v1::Job* out) {
-                       CheckName(in.name(), "jobs");
-                       *out = ToProto(parts_.store.Cancel(in.name(), KeyOf("CancelJob", in)));
-                       spdlog::info("[job={}] cancellation asked for", in.name());
-                     });
+  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    CheckName(in.name(), "jobs");
+    *out = ToProto(parts_.store.Cancel(in.name(), KeyOf("CancelJob", in)));
+    spdlog::info("[job={}] cancellation asked for", in.name());
+  });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* context,
                                                    const v1::RetryJobRequest* request,
                                                    v1::Job* response) {
-  return AnswerUnary(parts_,
-                     parts_.slow,
-                     Role::kSubmit,
-                     context,
-                     request,
-                     response,
-                     [this](const auto& in, v1::Job* out) {
-                       CheckName(in.name(), "jobs");
-                       RequireNotDraining(parts_);
-                       *out = ToProto(parts_.store.Retry(in.name(),
-                                                         in.from_scratch(),
-                                                         KeyOf("RetryJob", in),
-                                                         parts_.limits.max_unfinished_jobs));
-                       spdlog::info("[job={}] retried", in.name());
-                     });
+  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
+    CheckName(in.name(), "jobs");
+    RequireNotDraining(parts_);
+    *out = ToProto(parts_.store.Retry(
+        in.name(), in.from_scratch(), KeyOf("RetryJob", in), parts_.limits.max_unfinished_jobs));
+    spdlog::info("[job={}] retried", in.name());
+  });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext* context,
                                                     const v1::DeleteJobRequest* request,
                                                     v1::DeleteJobResponse* response) {
-  return AnswerUnary(parts_,
-                     parts_.slow,
-                     Role::kSubmit,
-                     context,
-                     request,
-                     response,
-                     [this](const auto& in, v1::DeleteJobResponse*) {
-                       CheckName(in.name(), "jobs");
-                       parts_.store.Delete(in.name(), KeyOf("DeleteJob", in));
-                     });
+  return AnswerWrite(
+      parts_, context, request, response, [this](const auto& in, v1::DeleteJobResponse*) {
+        CheckName(in.name(), "jobs");
+        parts_.store.Delete(in.name(), KeyOf("DeleteJob", in));
+      });
 }
 
 grpc::ServerWriteReactor<v1::JobEvent>* JobServiceImpl::WatchJobs(

@@ -10,6 +10,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/rpc/access.h"
@@ -88,6 +89,24 @@ grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
   });
   if (!accepted) reactor->Finish(OverloadedStatus());
   return reactor;
+}
+
+// For what only looks, and for what writes, hashes or syncs.
+template <typename Request, typename Response, typename Body>
+grpc::ServerUnaryReactor* AnswerRead(const RpcParts& parts,
+                                     grpc::CallbackServerContext* context,
+                                     const Request* request,
+                                     Response* response,
+                                     Body body) {
+  return AnswerUnary(parts, parts.quick, Role::kRead, context, request, response, std::move(body));
+}
+template <typename Request, typename Response, typename Body>
+grpc::ServerUnaryReactor* AnswerWrite(const RpcParts& parts,
+                                      grpc::CallbackServerContext* context,
+                                      const Request* request,
+                                      Response* response,
+                                      Body body) {
+  return AnswerUnary(parts, parts.slow, Role::kSubmit, context, request, response, std::move(body));
 }
 
 // "8-4-4-4-12" hexadecimal digits, or empty. Throws Error{kInvalidArgument} otherwise.

@@ -98,6 +98,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
     ColmapImage image;
     image.camera_id = cursor.Read<uint32_t>();
     image.name = cursor.ReadName();
+    CheckColmapName(image.name, cursor.name());
     const std::string place = cursor.name() + ": image " + image.name;
     image.cam_from_world = MakeColmapPose(qvec, tvec, place);
     const uint64_t observations = cursor.ReadCount(24, "observations of image " + image.name);

@@ -116,6 +116,12 @@ Pose MakeColmapPose(const double (&q)[4], const double (&t)[3], const std::strin
   return pose;
 }
 
+void CheckColmapName(const std::string& name, const std::string& place) {
+  const bool bad =
+      std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 32 || c == 127; });
+  if (bad) throw InvalidArgument("{}: the name of an image holds control characters", place);
+}
+
 void CheckColmapPoint(const ColmapPoint& point, const std::string& place) {
   for (int i = 0; i < 3; ++i) {
     const double v = point.position[i];

@@ -62,6 +62,8 @@ ColmapCamera MakeColmapCamera(const std::string& model,
 Pose MakeColmapPose(const double (&qvec_wxyz)[4],
                     const double (&tvec)[3],
                     const std::string& place);
+// Refuses control characters, which would break lines of messages and logs.
+void CheckColmapName(const std::string& name, const std::string& place);
 void CheckColmapPoint(const ColmapPoint& point, const std::string& place);
 
 ColmapModel LoadColmapBinary(const std::filesystem::path& folder);

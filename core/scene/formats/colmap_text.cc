@@ -111,6 +111,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
     ColmapImage image;
     image.camera_id = lines.Number<uint32_t>();
     image.name = lines.Rest();
+    CheckColmapName(image.name, lines.Place());
     const std::string place = lines.Place() + ": image " + image.name;
     image.cam_from_world = MakeColmapPose(qvec, tvec, place);
     // The second line of an image may be empty, and missing at the end of the file.

@@ -46,12 +46,13 @@ void WriteHistory(const std::filesystem::path& data_folder, int64_t jobs) {
   const std::string numbers = fmt::format(
       "with recursive n(i) as (select 1 union all select i+1 from n where i<{}) ", jobs);
   const int64_t now = SystemClock()();
-  db.Run("insert into job(job_id,name,kind,scene,spec,state,stage_key,create_ms,start_ms,end_ms,"
-         "revision) " +
-             numbers +
-             "select i,printf('jobs/%016x',i),'import_scene','scenes/past',x'','SUCCEEDED',"
-             "printf('%064x',i),?1,?1,?1,i from n",
-         now);
+  db.Run(
+      "insert into job(job_id,name,kind,scene,spec,state,stage_key,create_ms,start_ms,end_ms,"
+      "revision) " +
+          numbers +
+          "select i,printf('jobs/%016x',i),'import_scene','scenes/past',x'','SUCCEEDED',"
+          "printf('%064x',i),?1,?1,?1,i from n",
+      now);
   db.Run("insert into artifact " + numbers +
          "select i,'scene.json',printf('%064x',i),1,'application/json' from n");
   db.Run("insert into job_attempt " + numbers + "select i,1,'w',?1,?1,'SUCCEEDED' from n", now);

@@ -1,0 +1,107 @@
+// Fuzz target: COLMAP's models. The first byte says text or binary, the next ones where the files
+// cameras, images and points3D end.
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+
+#include "core/base/files.h"
+#include "core/scene/formats/colmap_model.h"
+#include "tests/fuzz/fuzz_target.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::array<const char*, 3> kFiles = {"cameras", "images", "points3D"};
+constexpr size_t kHead = 5;
+
+size_t Number(const uint8_t* bytes) { return bytes[0] | bytes[1] << 8; }
+
+std::string Input(bool binary, const std::array<std::string, 3>& files) {
+  std::string input(1, binary ? 1 : 0);
+  for (int f = 0; f < 2; ++f) {
+    input += static_cast<char>(files[f].size() & 255u);
+    input += static_cast<char>(files[f].size() >> 8u);
+  }
+  return input + files[0] + files[1] + files[2];
+}
+
+// Little-endian numbers, one after another.
+template <class... Values>
+std::string Binary(const Values&... values) {
+  std::string bytes;
+  (bytes.append(reinterpret_cast<const char*>(&values), sizeof(values)), ...);
+  return bytes;
+}
+
+}  // namespace
+
+std::vector<std::string> FuzzSeeds() {
+  const std::array<std::string, 3> text = {
+      "# comment\n1 PINHOLE 640 480 500 500 320 240\n2 SIMPLE_RADIAL 64 48 50 32 24 0.01\n",
+      "1 1 0 0 0 0.5 0 1 1 a.jpg\n10 20 1 30 40 -1\n2 0.9 0.1 0 0 0 0 2 2 b c.jpg\n\n",
+      "1 0.5 0.25 4 128 128 128 0.7 1 0 2 0\n"};
+  const std::string cameras = Binary(uint64_t{1},
+                                     uint32_t{1},
+                                     int32_t{1},
+                                     uint64_t{640},
+                                     uint64_t{480},
+                                     500.0,
+                                     500.0,
+                                     320.0,
+                                     240.0);
+  const std::string images = Binary(uint64_t{1},
+                                    uint32_t{1},
+                                    1.0,
+                                    0.0,
+                                    0.0,
+                                    0.0,
+                                    0.5,
+                                    0.0,
+                                    1.0,
+                                    uint32_t{1}) +
+                             std::string("a.jpg\0", 6) +
+                             Binary(uint64_t{1}, 10.0, 20.0, uint64_t{1});
+  const std::string points = Binary(uint64_t{1},
+                                    uint64_t{1},
+                                    0.5,
+                                    0.25,
+                                    4.0,
+                                    uint8_t{128},
+                                    uint8_t{128},
+                                    uint8_t{128},
+                                    0.7,
+                                    uint64_t{1},
+                                    uint32_t{1},
+                                    uint32_t{0});
+  return {Input(false, text), Input(true, {cameras, images, points}), Input(true, {"", "", ""})};
+}
+
+}  // namespace color3d
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace color3d;
+  if (size < kHead) return 0;
+  static const ScratchFolder folder;
+  const bool binary = (data[0] & 1) != 0;
+  std::string_view rest(reinterpret_cast<const char*>(data) + kHead, size - kHead);
+  for (size_t f = 0; f < kFiles.size(); ++f) {
+    const size_t length = f < 2 ? std::min(Number(data + 1 + 2 * f), rest.size()) : rest.size();
+    const fs::path file = folder.path() / (std::string(kFiles[f]) + (binary ? ".bin" : ".txt"));
+    std::ofstream(file, std::ios::binary) << rest.substr(0, length);
+    rest.remove_prefix(length);
+  }
+  return ReadOrRefuse([&] {
+    const ColmapModel model =
+        binary ? LoadColmapBinary(folder.path()) : LoadColmapText(folder.path());
+    for (const auto& [id, image] : model.images) {
+      if (!image.cam_from_world.Center().allFinite()) std::abort();
+    }
+    for (const ColmapPoint& point : model.points) {
+      if (!point.position.allFinite()) std::abort();
+    }
+  });
+}
