@@ -234,7 +234,7 @@ TEST_F(LiveProcessTest, APictureThatKillsWorkersIsFoundAndTakesNoOtherWithItAgai
   for (const auto& [id, word] : words) live.Send(example, id, word);
   for (int answers = 0; !words.empty() && answers < 40; ++answers) {
     const Response response = live.Read();
-    const std::string id = response.request_id();
+    const std::string& id = response.request_id();
     if (!response.has_error()) {
       EXPECT_TRUE(id.starts_with("good"));
       words.erase(id);

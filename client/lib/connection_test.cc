@@ -14,7 +14,7 @@ TEST(Connection, SaysHowToStartAServer) {
   const CancellationToken cancel;
   const auto begun = std::chrono::steady_clock::now();
   try {
-    Connection({.address = "127.0.0.1:1"}, cancel);
+    const Connection nobody({.address = "127.0.0.1:1"}, cancel);
     FAIL();
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kUnavailable);

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "core/base/files.h"
 #include "server/planning/job_spec.h"
@@ -120,6 +121,20 @@ class FailingBlobs : public FileBlobStore {
   Faults& faults_;
 };
 
+// The first result is gone as soon as it was put: somebody cleared the disk.
+class ForgetfulBlobs : public FileBlobStore {
+ public:
+  explicit ForgetfulBlobs(const fs::path& folder) : FileBlobStore(folder, {0}) {}
+  FileDigest PutFile(const fs::path& file) override {
+    const FileDigest digest = FileBlobStore::PutFile(file);
+    if (!std::exchange(forgot_, true)) FileBlobStore::Remove(digest.sha256);
+    return digest;
+  }
+
+ private:
+  bool forgot_ = false;
+};
+
 // Steps with a checkpoint after each; the result tells every step once.
 class SteppingRunner : public StageRunner {
  public:
@@ -149,8 +164,9 @@ class FaultInjectionTest : public testing::Test {
     std::vector<JobRecord> jobs;
   };
 
-  // From submission until all jobs have ended, in a folder of its own.
-  Life Live(int target, bool after, ErrorCode code) {
+  // From submission until all jobs have ended, in a folder of its own. `forgetful`: with blobs that
+  // lose one.
+  Life Live(int target, bool after, ErrorCode code, bool forgetful = false) {
     const ScratchFolder scratch;
     const DataPaths paths(scratch.path() / "data");
     PrepareDataFolder(paths);
@@ -167,6 +183,7 @@ class FaultInjectionTest : public testing::Test {
     Faults faults(target, after, code);
     FailingStore failing_store(paths.Store(), clocks, faults);
     FailingBlobs failing_blobs(paths.Blobs(), faults);
+    ForgetfulBlobs forgetful_blobs(paths.Blobs());
     SqliteJobStore heartbeats(paths.Store(), StoreRole::kWorker, clocks);
     SteppingRunner runner;
     const UserModels models;
@@ -174,19 +191,20 @@ class FaultInjectionTest : public testing::Test {
     const std::atomic<bool> draining{false};
     LeaseTiming timing;
     timing.report_pause = std::chrono::milliseconds(1);
-    const AttemptContext context{failing_store,
-                                 heartbeats,
-                                 failing_blobs,
-                                 runner,
-                                 paths,
-                                 timing,
-                                 std::chrono::milliseconds(0),
-                                 1,
-                                 "code",
-                                 models,
-                                 digests,
-                                 draining,
-                                 [](const JobRecord&) {}};
+    const AttemptContext context{
+        failing_store,
+        heartbeats,
+        forgetful ? static_cast<BlobStore&>(forgetful_blobs) : failing_blobs,
+        runner,
+        paths,
+        timing,
+        std::chrono::milliseconds(0),
+        1,
+        "code",
+        models,
+        digests,
+        draining,
+        [](const JobRecord&) {}};
     const std::vector<int64_t> ids = store.ResolveWatch({root.name});
     for (int turn = 0; turn < 30 && !store.AllFinished(ids); ++turn) {
       store.ReapExpired();
@@ -269,6 +287,12 @@ TEST_F(FaultInjectionTest, WhateverFailsOnceInPassingCostsNoJob) {
       }
     }
   }
+}
+
+TEST_F(FaultInjectionTest, NoResultIsPublishedThatIsGone) {
+  const Life life = Live(0, false, ErrorCode::kUnavailable, /*forgetful=*/true);
+  for (const JobRecord& job : life.jobs) EXPECT_EQ(job.state, JobState::kSucceeded) << job.kind;
+  EXPECT_EQ(life.jobs.front().attempt, 2);
 }
 
 TEST_F(FaultInjectionTest, WhatFailsForGoodEndsTheJobWithItsReason) {

@@ -66,7 +66,6 @@ class WorkerLoop {
   }
   void ReportSelf(JobStore& store, const std::string& job) const;
   bool ShouldRecycle() const;
-  bool HasDisk();
   // Claims and runs one job, or a batch of them; false when there was none.
   bool Turn();
   void RunBatch(const JobRecord& first);
@@ -85,7 +84,6 @@ class WorkerLoop {
   const std::atomic<bool>& draining_;
   const AttemptContext context_;
   int jobs_done_ = 0;
-  std::chrono::steady_clock::time_point next_disk_warning_;
 };
 
 // For people, and for the supervisor, who sees that this process is alive. Nothing fails with it.
@@ -106,26 +104,7 @@ bool WorkerLoop::ShouldRecycle() const {
   return true;
 }
 
-// Jobs that could not end for want of room are not begun: the queue waits.
-bool WorkerLoop::HasDisk() {
-  const int64_t high_water = 2 * (options_.reserve_mib << 20);
-  const int64_t free = blobs_.FreeBytes();
-  if (free >= high_water) return true;
-  const auto now = std::chrono::steady_clock::now();
-  if (now >= next_disk_warning_) {
-    next_disk_warning_ = now + std::chrono::minutes(1);
-    spdlog::warn(
-        "{} takes no job: {} MiB are free on the disk, below {}; add disk space, or delete "
-        "jobs and scenes",
-        id_,
-        free >> 20,
-        high_water >> 20);
-  }
-  return false;
-}
-
 bool WorkerLoop::Turn() {
-  if (!HasDisk()) return false;
   const std::optional<JobRecord> job = store_.Claim(id_, options_.timing.lease.count());
   if (!job) return false;
   ReportSelf(store_, job->name);

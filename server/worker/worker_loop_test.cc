@@ -170,22 +170,5 @@ TEST_F(WorkerLoopTest, LittleMemoryMeansOneAtATime) {
   EXPECT_EQ(store_.GetJob(root.name).state, JobState::kSucceeded);
 }
 
-TEST_F(WorkerLoopTest, NoJobIsBegunOnADiskThatIsNearlyFull) {
-  const JobRecord root = Submit({1});
-  options_.reserve_mib = int64_t{1} << 40;
-  std::atomic<bool> draining{false};
-  std::thread worker([&] { RunWorker(options_, runner_, draining); });
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  draining = true;
-  worker.join();
-  for (const JobRecord& job : store_.ListChildren(root.name)) {
-    EXPECT_EQ(job.state, JobState::kQueued);
-    EXPECT_EQ(job.attempt, 0);
-  }
-  options_.reserve_mib = 0;
-  runner_.wanted = 1;
-  Work({root});
-}
-
 }  // namespace
 }  // namespace color3d

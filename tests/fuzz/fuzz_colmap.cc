@@ -53,18 +53,9 @@ std::vector<std::string> FuzzSeeds() {
                                      500.0,
                                      320.0,
                                      240.0);
-  const std::string images = Binary(uint64_t{1},
-                                    uint32_t{1},
-                                    1.0,
-                                    0.0,
-                                    0.0,
-                                    0.0,
-                                    0.5,
-                                    0.0,
-                                    1.0,
-                                    uint32_t{1}) +
-                             std::string("a.jpg\0", 6) +
-                             Binary(uint64_t{1}, 10.0, 20.0, uint64_t{1});
+  const std::string images =
+      Binary(uint64_t{1}, uint32_t{1}, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 1.0, uint32_t{1}) +
+      std::string("a.jpg\0", 6) + Binary(uint64_t{1}, 10.0, 20.0, uint64_t{1});
   const std::string points = Binary(uint64_t{1},
                                     uint64_t{1},
                                     0.5,

@@ -99,7 +99,7 @@ Splat4dFile ReadSplat4d(std::string_view bytes) {
   Require(start.Take(4) == "SP4D" && start.Number(2) == 1 && start.Number(2) == 0, "no .splat4d");
   const size_t header_bytes = start.Number(4);
   const auto header = nlohmann::json::parse(start.Take(header_bytes));
-  const auto steps = header["steps"];
+  const auto& steps = header["steps"];
   const size_t n = header["n"];
   size_t next = 12 + header_bytes;
   const auto section = [&](const nlohmann::json& span) {
