@@ -15,6 +15,7 @@ namespace color3d {
 namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr int kEventsPerFetch = 64;
+constexpr size_t kJobsAtOnce = 8;  // whole jobs that wait to be written
 }  // namespace
 
 // One stream. gRPC calls (StartWrite, Finish) are decided under the mutex and made outside it: they
@@ -119,7 +120,12 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       cursor_ = request_.after_revision() == 0 ? snapshot.revision : request_.after_revision();
       sent_revision_ = request_.after_revision();
       for (const JobRecord& job : snapshot.jobs) {
-        Queue(StateEvent(job, job.revision, job.end_ms != 0 ? job.end_ms : parts_.clock()));
+        QueueState({job.revision,
+                    job.id,
+                    EventKind::kState,
+                    job.state,
+                    job.attempt,
+                    job.end_ms != 0 ? job.end_ms : parts_.clock()});
       }
       begun_ = true;
       dirty_ = true;
@@ -134,20 +140,20 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       // Asked first: when all had finished before the events were read, those are complete.
       const bool all_finished = parts_.store.AllFinished(ids_);
       const auto events = parts_.store.EventsSince(cursor_, ids_, kEventsPerFetch);
-      std::vector<int64_t> changed;
-      for (const EventRecord& event : events) changed.push_back(event.job_id);
-      std::map<int64_t, JobRecord> jobs;
-      if (!changed.empty()) {
-        for (JobRecord& job : parts_.store.Snapshot(changed).jobs) {
-          const int64_t id = job.id;
-          jobs.emplace(id, std::move(job));
-        }
+      std::vector<int64_t> progressed;
+      for (const EventRecord& event : events) {
+        if (event.kind == EventKind::kProgress) progressed.push_back(event.job_id);
       }
+      const std::map<int64_t, JobRecord> jobs = Jobs(progressed);
       std::lock_guard lock(mutex_);
       for (const EventRecord& event : events) {
         cursor_ = event.revision;
-        const auto job = jobs.find(event.job_id);
-        if (job != jobs.end()) Take(event, job->second);
+        if (event.kind == EventKind::kState) {
+          deferred_.erase(event.job_id);
+          QueueState(event);
+        } else if (const auto job = jobs.find(event.job_id); job != jobs.end()) {
+          TakeProgress(event, job->second);
+        }
       }
       if (events.size() == kEventsPerFetch) {
         dirty_ = true;
@@ -162,21 +168,64 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     status.ok() ? Pump() : End(status);
   }
 
-  // With the mutex held.
-  void Take(const EventRecord& event, const JobRecord& job) {
-    if (event.kind == EventKind::kState) {
-      deferred_.erase(job.id);
-      JobRecord then = job;
-      if (then.state != event.state) {  // it has moved on since; what came later is not shown yet
-        then.state = event.state;
-        then.artifacts.clear();
-        then.error.reset();
-        then.end_ms = 0;
-      }
-      then.attempt = event.attempt;
-      Queue(StateEvent(then, event.revision, event.time_ms));
-      return;
+  std::map<int64_t, JobRecord> Jobs(const std::vector<int64_t>& ids) const {
+    std::map<int64_t, JobRecord> jobs;
+    if (ids.empty()) return jobs;
+    for (JobRecord& job : parts_.store.Snapshot(ids).jobs) {
+      const int64_t id = job.id;
+      jobs.emplace(id, std::move(job));
     }
+    return jobs;
+  }
+
+  // On the executor: the jobs of the states that are to be written next. Those behind them wait as
+  // what they are in the table of events, so that a reader who is slow holds few whole jobs.
+  void Load() {
+    const grpc::Status status = Guard([&] {
+      std::set<int64_t> wanted;
+      {
+        std::lock_guard lock(mutex_);
+        for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size()); ++i) {
+          if (queue_[i].state) wanted.insert(queue_[i].state->job_id);
+        }
+      }
+      const std::map<int64_t, JobRecord> jobs = Jobs({wanted.begin(), wanted.end()});
+      std::lock_guard lock(mutex_);
+      // What was queued meanwhile is behind; nothing with a state in front was taken.
+      for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size());) {
+        Item& item = queue_[i];
+        const auto job = item.state ? jobs.find(item.state->job_id) : jobs.end();
+        if (job != jobs.end()) {
+          item = {StateEvent(Then(job->second, *item.state), *item.state), std::nullopt};
+        } else if (item.state && wanted.contains(item.state->job_id)) {  // it was deleted
+          queue_.erase(queue_.begin() + static_cast<std::ptrdiff_t>(i));
+          continue;
+        }
+        ++i;
+      }
+    });
+    {
+      std::lock_guard lock(mutex_);
+      loading_ = false;
+    }
+    status.ok() ? Pump() : End(status);
+  }
+
+  // The job at the time of the event, as far as it is known.
+  static JobRecord Then(const JobRecord& job, const EventRecord& event) {
+    JobRecord then = job;
+    if (then.state != event.state) {  // it has moved on since; what came later is not shown yet
+      then.state = event.state;
+      then.artifacts.clear();
+      then.error.reset();
+      then.end_ms = 0;
+    }
+    then.attempt = event.attempt;
+    return then;
+  }
+
+  // With the mutex held.
+  void TakeProgress(const EventRecord& event, const JobRecord& job) {
     v1::JobEvent progress;
     progress.set_revision(event.revision);
     progress.set_kind(v1::JobEvent::KIND_PROGRESS);
@@ -192,13 +241,13 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     }
   }
 
-  static v1::JobEvent StateEvent(const JobRecord& job, int64_t revision, int64_t time_ms) {
+  static v1::JobEvent StateEvent(const JobRecord& job, const EventRecord& record) {
     v1::JobEvent event;
-    event.set_revision(revision);
+    event.set_revision(record.revision);
     event.set_kind(v1::JobEvent::KIND_STATE);
-    *event.mutable_time() = ToTimestamp(time_ms);
+    *event.mutable_time() = ToTimestamp(record.time_ms);
     *event.mutable_job() = ToProto(job);
-    event.mutable_job()->set_revision(revision);
+    event.mutable_job()->set_revision(record.revision);
     return event;
   }
 
@@ -206,20 +255,28 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   void Queue(v1::JobEvent event) {
     sent_revision_ = std::max(sent_revision_, event.revision());
     event.set_revision(sent_revision_);
-    queue_.push_back(std::move(event));
+    queue_.push_back({std::move(event), std::nullopt});
+  }
+  void QueueState(const EventRecord& event) {
+    sent_revision_ = std::max(sent_revision_, event.revision);
+    queue_.push_back({{}, event});
   }
 
   // Does the one thing that can be done next.
   void Pump() {
-    enum class Next { kNothing, kWrite, kFetch, kFinish } next = Next::kNothing;
+    enum class Next { kNothing, kWrite, kLoad, kFetch, kFinish } next = Next::kNothing;
     grpc::Status status;
     std::shared_ptr<JobWatcher> self;
     {
       std::lock_guard lock(mutex_);
       if (finished_ || writing_) return;  // self_ may be gone once finished
       self = self_;
-      if (!queue_.empty()) {
-        current_ = std::move(queue_.front());
+      if (!queue_.empty() && queue_.front().state) {
+        if (loading_) return;
+        loading_ = true;
+        next = Next::kLoad;
+      } else if (!queue_.empty()) {
+        current_ = std::move(queue_.front().event);
         queue_.pop_front();
         writing_ = true;
         next = Next::kWrite;
@@ -235,6 +292,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     }
     if (next == Next::kWrite) StartWrite(&current_);
     if (next == Next::kFinish) Finish(status);
+    if (next == Next::kLoad) parts_.quick.Post([self] { self->Load(); });
     if (next == Next::kFetch) parts_.quick.Post([self] { self->Fetch(); });
   }
 
@@ -249,7 +307,11 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   std::chrono::milliseconds interval_{500};
   int64_t cursor_ = 0;         // events up to here were taken
   int64_t sent_revision_ = 0;  // newest that was queued for the client
-  std::deque<v1::JobEvent> queue_;
+  struct Item {
+    v1::JobEvent event;
+    std::optional<EventRecord> state;  // its job is not loaded yet: `event` is empty
+  };
+  std::deque<Item> queue_;
   v1::JobEvent current_;  // being written
   std::map<int64_t, v1::JobEvent> deferred_;
   std::map<int64_t, SteadyClock::time_point> progress_sent_;
@@ -258,6 +320,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   bool begun_ = false;
   bool dirty_ = false;
   bool fetching_ = false;
+  bool loading_ = false;
   bool writing_ = false;
   bool finished_ = false;
 };
