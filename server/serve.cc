@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "core/base/address.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "server/access/tls.h"
@@ -17,7 +18,6 @@
 #include "server/backends/backend_address.h"
 #include "server/backends/backend_prober.h"
 #include "server/maintenance.h"
-#include "server/ops/address.h"
 #include "server/ops/notify.h"
 #include "server/ops/process.h"
 #include "server/ops/socket_folder.h"

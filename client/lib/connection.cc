@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/address.h"
 #include "core/base/files.h"
 
 namespace color3d::client {
@@ -21,11 +22,6 @@ constexpr milliseconds kLongestWait{3000};
 constexpr milliseconds kConnectLimit{4000};
 constexpr std::string_view kHttps = "https://";
 constexpr int kMaxMessageBytes = 64 << 20;  // a scene of 10,000 files with long names
-
-bool IsLoopback(const std::string& address) {
-  return address.starts_with("127.") || address.starts_with("localhost") ||
-         address.starts_with("[::1]") || address.starts_with("unix:");
-}
 
 // Adds the token to every call. Credentials of calls would do so over TLS alone.
 class TokenBearer : public grpc::experimental::Interceptor {
@@ -67,7 +63,8 @@ std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const ServerTarget& ser
 
 std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   const std::string address = server.HostPort();
-  if (!server.token.empty() && !server.UsesTls() && !IsLoopback(address)) {
+  const bool is_here = IsLoopback(address);
+  if (!server.token.empty() && !server.UsesTls() && !is_here) {
     throw InvalidArgument(
         "the token would travel to {} for everybody to read; say --server https://{}, with --ca "
         "where the server's certificate is of your own making",
@@ -80,7 +77,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, static_cast<int>(kLongestWait.count()));
   // http_proxy in the environment is not meant for this machine.
-  if (IsLoopback(address)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  if (is_here) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   if (!server.token.empty()) interceptors.push_back(std::make_unique<TokenBearers>(server.token));
   return grpc::experimental::CreateCustomChannelWithInterceptors(

@@ -55,8 +55,8 @@ class Connection {
  public:
   // Waits at most 4 s for the server. `cancel` must outlive the connection; it ends retries and
   // transfers. Throws Error{kUnavailable} that says how to start a server.
-  // kInvalidArgument for a token that would travel in the clear to another machine, and for files
-  // that cannot be read.
+  // kInvalidArgument for an address that is none, for a token that would travel in the clear to
+  // another machine, and for files that cannot be read.
   Connection(const ServerTarget& server, const CancellationToken& cancel);
 
   const std::string& address() const { return address_; }

@@ -24,5 +24,19 @@ TEST(Connection, SaysHowToStartAServer) {
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
 }
 
+TEST(Connection, NoTokenTravelsInTheClearToAnotherMachine) {
+  const CancellationToken cancel;
+  for (const char* elsewhere :
+       {"10.1.2.3:1", "127.0.0.1.example.org:1", "localhost.example.org:1", "[::2]:1"}) {
+    try {
+      const Connection nobody({.address = elsewhere, .token = "secret"}, cancel);
+      FAIL() << elsewhere;
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument) << elsewhere;
+      EXPECT_THAT(e.what(), ::testing::HasSubstr("https://"));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace color3d::client

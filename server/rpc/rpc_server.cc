@@ -10,7 +10,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "server/ops/address.h"
+#include "core/base/address.h"
 #include "server/rpc/blob_service.h"
 #include "server/rpc/info_services.h"
 #include "server/rpc/job_service.h"

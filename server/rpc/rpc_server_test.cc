@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/ops/address.h"
+#include "core/base/address.h"
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {

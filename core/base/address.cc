@@ -1,4 +1,4 @@
-#include "server/ops/address.h"
+#include "core/base/address.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
