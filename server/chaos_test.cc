@@ -4,27 +4,28 @@
 #include <signal.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <map>
 #include <memory>
-#include <set>
-#include <sstream>
 
 #include "core/base/digest.h"
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "server/store/sqlite_db.h"
 #include "tests/support/service/rpc_support.h"
+#include "tests/support/service/scripted_trace.h"
 #include "tests/support/service/server_process.h"
 
 namespace color3d {
 namespace {
 namespace fs = std::filesystem;
-using std::chrono::seconds;
+using testing::ParseTrace;
+using testing::Range;
+using testing::RepeatedEffects;
 using testing::ScriptedSpec;
 using testing::ServerProcess;
 using testing::SleepMs;
 using testing::TestClient;
+using testing::Trace;
 
 constexpr int kSteps = 8;
 constexpr int kStepMs = 150;  // every job outlives its lease of one second
@@ -34,16 +35,6 @@ constexpr int kSubmittedFirst = 20;
 int64_t FromEnvironment(const char* name, int64_t otherwise) {
   const char* text = std::getenv(name);
   return text != nullptr ? std::atoll(text) : otherwise;
-}
-
-// Lines that are there more than once.
-int Repeated(const fs::path& log) {
-  std::map<std::string, int> counts;
-  std::ifstream stream(log);
-  for (std::string line; std::getline(stream, line);) ++counts[line];
-  int repeated = 0;
-  for (const auto& [line, count] : counts) repeated += count > 1 ? 1 : 0;
-  return repeated;
 }
 
 class ChaosTest : public ::testing::Test {
@@ -101,16 +92,9 @@ class ChaosTest : public ::testing::Test {
     const v1::Job job = server_->client().WaitFinished(name, 300);
     ASSERT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.DebugString();
     ASSERT_EQ(job.artifacts_size(), 1);
-    const std::string trace = server_->client().Download(job.artifacts(0).digest());
-    std::stringstream lines(trace.substr(trace.find('\n') + 1));
-    std::set<int> processes;
-    int step = 0, process = 0, expected = 0;
-    while (lines >> step >> process) {
-      EXPECT_EQ(step, expected++) << name;
-      processes.insert(process);
-    }
-    EXPECT_EQ(expected, kSteps) << name;
-    taken_over_ += processes.size() > 1 ? 1 : 0;
+    const Trace trace = ParseTrace(server_->client().Download(job.artifacts(0).digest()));
+    EXPECT_EQ(trace.steps, Range(kSteps)) << name;
+    taken_over_ += trace.processes.size() > 1 ? 1 : 0;
   }
 
   int64_t Count(const char* sql) {
@@ -149,8 +133,8 @@ TEST_F(ChaosTest, EveryJobEndsAndEveryEffectIsThereOnce) {
   for (const std::string& name : names_) CheckResult(name);
   EXPECT_EQ(static_cast<int64_t>(names_.size()), jobs);
   EXPECT_GT(taken_over_, 0) << "no job was ever taken over: the test proves nothing";
-  EXPECT_EQ(Repeated(effects_.string() + ".saved"), 0) << "an effect is there twice";
-  EXPECT_GT(Repeated(effects_.string() + ".begun"), 0)
+  EXPECT_EQ(RepeatedEffects(effects_.string() + ".saved"), 0) << "an effect is there twice";
+  EXPECT_GT(RepeatedEffects(effects_.string() + ".begun"), 0)
       << "negative control: what is not fenced does repeat";
   server_->Signal(SIGTERM);
   EXPECT_EQ(server_->Wait(), 0);

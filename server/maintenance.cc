@@ -22,29 +22,21 @@ void ExpireDeadWorkers(JobStore& store) {
   }
 }
 
-Scrubber::Result Scrubber::Scrub(int64_t bytes, const std::function<bool()>& stop) {
-  std::vector<FileDigest> blobs;
-  blobs_.ForEach([&](const StoredBlob& blob) {
-    blobs.push_back(blob.digest);
-    return !stop();
-  });
-  std::sort(blobs.begin(), blobs.end(), [](const FileDigest& a, const FileDigest& b) {
-    return a.sha256 < b.sha256;
-  });
-  const auto first =
-      std::upper_bound(blobs.begin(), blobs.end(), last_, [](const auto& last, const auto& blob) {
-        return last < blob.sha256;
-      });
-  std::rotate(blobs.begin(), first, blobs.end());
+Scrubber::Result Scrubber::Scrub(std::vector<StoredBlob> blobs,
+                                 int64_t bytes,
+                                 const std::function<bool()>& stop) {
+  const auto name = [](const StoredBlob& blob) -> const std::string& { return blob.digest.sha256; };
+  std::ranges::sort(blobs, {}, name);
+  std::ranges::rotate(blobs, std::ranges::upper_bound(blobs, last_, {}, name));
   Result result;
-  for (const FileDigest& blob : blobs) {
+  for (const StoredBlob& blob : blobs) {
     if (result.bytes >= bytes || stop()) break;
-    result.bytes += blob.size_bytes;
-    last_ = blob.sha256;
+    result.bytes += blob.digest.size_bytes;
+    last_ = name(blob);
     try {
-      if (IsIntact(blobs_, blob)) continue;
-      blobs_.SetAside(blob.sha256);
-      result.damaged.push_back(blob.sha256);
+      if (IsIntact(blobs_, blob.digest)) continue;
+      blobs_.SetAside(last_);
+      result.damaged.push_back(last_);
     } catch (const Error& e) {
       if (e.code() != ErrorCode::kNotFound) throw;  // removed since
     }
@@ -107,12 +99,13 @@ std::chrono::milliseconds Maintenance::Sweep() {
   try {
     const int uploads = uploads_.ReapOlderThan(timing_.grace);
     if (uploads > 0) spdlog::info("swept {} unfinished uploads", uploads);
-    CollectBlobs();
+    const std::vector<StoredBlob> blobs = ListBlobs(blobs_, [this] { return IsStopping(); });
+    CollectBlobs(blobs);
     SweepScratch();
     const auto before = [this](std::chrono::milliseconds age) { return clock_() - age.count(); };
     store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
     const Scrubber::Result scrubbed =
-        scrubber_.Scrub(timing_.scrub_bytes, [this] { return IsStopping(); });
+        scrubber_.Scrub(blobs, timing_.scrub_bytes, [this] { return IsStopping(); });
     for (const std::string& sha256 : scrubbed.damaged) {
       spdlog::error(
           "the blob {} was damaged on the disk and is set aside{}",
@@ -128,17 +121,14 @@ std::chrono::milliseconds Maintenance::Sweep() {
 
 // In two phases: what nothing names is noted, and removed when it is still so, and untouched, after
 // the time of grace. Whoever puts or looks for a blob touches it, before he names it.
-void Maintenance::CollectBlobs() {
-  std::vector<StoredBlob> blobs;
-  blobs_.ForEach([&](const StoredBlob& blob) {
-    blobs.push_back(blob);
-    return !IsStopping();
-  });
+void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
   if (IsStopping()) return;
   const std::set<std::string> named = store_.ReferencedBlobs();
-  std::erase_if(blobs, [&](const StoredBlob& blob) { return named.contains(blob.digest.sha256); });
   std::vector<BlobCandidate> unnamed;
-  for (const StoredBlob& blob : blobs) unnamed.push_back({blob.digest.sha256, blob.touched_ns});
+  for (const StoredBlob& blob : blobs) {
+    if (named.contains(blob.digest.sha256)) continue;
+    unnamed.push_back({blob.digest.sha256, blob.touched_ns});
+  }
   int removed = 0;
   const std::chrono::milliseconds grace = timing_.grace;
   for (const BlobCandidate& due : store_.AgeCandidates(unnamed, grace.count())) {

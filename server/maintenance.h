@@ -8,6 +8,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
@@ -37,8 +38,9 @@ class Scrubber {
     int64_t bytes = 0;
     std::vector<std::string> damaged;
   };
-  // Goes on where the last call ended, for about so many bytes; `stop` is asked between blobs.
-  Result Scrub(int64_t bytes, const std::function<bool()>& stop);
+  // Goes on in `blobs`, which are all that there are, where the last call ended, for about so many
+  // bytes; `stop` is asked between blobs.
+  Result Scrub(std::vector<StoredBlob> blobs, int64_t bytes, const std::function<bool()>& stop);
 
  private:
   BlobStore& blobs_;
@@ -63,7 +65,7 @@ class Maintenance {
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
-  void CollectBlobs();
+  void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void SweepScratch();
   bool IsStopping();
 

@@ -90,7 +90,7 @@ TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
   std::vector<std::string> found;
   int64_t bytes = 0;
   for (int round = 0; round < 10; ++round) {  // a few blobs each
-    const Scrubber::Result result = scrubber.Scrub(14, go_on);
+    const Scrubber::Result result = scrubber.Scrub(ListBlobs(blobs_, go_on), 14, go_on);
     EXPECT_LE(result.bytes, 14 + 7);
     bytes += result.bytes;
     found.insert(found.end(), result.damaged.begin(), result.damaged.end());
@@ -98,7 +98,7 @@ TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
   EXPECT_GE(bytes, 20 * 6) << "all of them";
   EXPECT_EQ(found, std::vector<std::string>{all[7].sha256});
   EXPECT_FALSE(blobs_.Touch(all[7]));
-  EXPECT_EQ(scrubber.Scrub(1000, [] { return true; }).bytes, 0);
+  EXPECT_EQ(scrubber.Scrub(ListBlobs(blobs_, go_on), 1000, [] { return true; }).bytes, 0);
 }
 
 // A sweep that hangs keeps no lost job from going on.

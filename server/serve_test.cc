@@ -5,10 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <fstream>
-#include <map>
 #include <set>
-#include <sstream>
 #include <thread>
 
 #include "core/base/digest.h"
@@ -16,38 +13,21 @@
 #include "core/base/random.h"
 #include "server/store/sqlite_db.h"
 #include "tests/support/service/rpc_support.h"
+#include "tests/support/service/scripted_trace.h"
 #include "tests/support/service/server_process.h"
 
 namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using testing::ParseTrace;
+using testing::Range;
+using testing::RepeatedEffects;
 using testing::ScriptedSpec;
 using testing::ServerProcess;
 using testing::SleepMs;
 using testing::TestClient;
-
-// Steps of a trace ("step pid" lines) in order, and the processes that did them.
-struct Trace {
-  std::vector<int> steps;
-  std::set<int> processes;
-};
-Trace ParseTrace(const std::string& text) {
-  Trace trace;
-  std::stringstream stream(text.substr(text.find('\n') + 1));
-  int step = 0;
-  int process = 0;
-  while (stream >> step >> process) {
-    trace.steps.push_back(step);
-    trace.processes.insert(process);
-  }
-  return trace;
-}
-std::vector<int> Range(int count) {
-  std::vector<int> range;
-  for (int i = 0; i < count; ++i) range.push_back(i);
-  return range;
-}
+using testing::Trace;
 
 void WaitForStep(TestClient& client, const std::string& name, int64_t step) {
   for (int i = 0; i < 400; ++i) {
@@ -275,17 +255,6 @@ TEST_F(ProcessTest, IdleServerIsSmall) {
   ASSERT_TRUE(server.client().server->GetServerInfo(&context, {}, &info).ok());
   EXPECT_LT(info.memory_bytes(), int64_t{60} << 20);
   EXPECT_GT(info.memory_bytes(), int64_t{1} << 20);
-}
-
-// (job, step) lines that are there more than once.
-int RepeatedEffects(const fs::path& log) {
-  std::map<std::string, int> counts;
-  std::ifstream stream(log);
-  std::string line;
-  while (std::getline(stream, line)) ++counts[line];
-  int repeated = 0;
-  for (const auto& [effect, count] : counts) repeated += count > 1 ? 1 : 0;
-  return repeated;
 }
 
 // Stops the process at a moment when it does not hold the store's write lock.

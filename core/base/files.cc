@@ -47,12 +47,12 @@ class FileDescriptor {
   int fd_;
 };
 
+}  // namespace
+
 void SyncFolder(const fs::path& folder) {
   FileDescriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (fd.get() >= 0) ::fsync(fd.get());
 }
-
-}  // namespace
 
 std::string ReadFile(const fs::path& path, int64_t max_bytes) {
   FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));

@@ -17,6 +17,10 @@ std::string ReadFile(const std::filesystem::path& path, int64_t max_bytes = int6
 // kFailedPrecondition when the folder cannot be written.
 void WriteFileAtomic(const std::filesystem::path& path, std::string_view bytes);
 
+// Names that were made in the folder survive a power failure. Nothing happens where it cannot be
+// opened.
+void SyncFolder(const std::filesystem::path& folder);
+
 // Makes a finished temporary file durable under its final name (fsync, rename, fsync of folder).
 void PublishFile(const std::filesystem::path& temporary, const std::filesystem::path& final_path);
 

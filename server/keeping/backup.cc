@@ -21,11 +21,6 @@ Error Refused(const fs::path& folder, const char* why) {
   return Error(ErrorCode::kFailedPrecondition, "{} {}", folder.string(), why);
 }
 
-void RequireStore(const DataPaths& paths) {
-  std::error_code error;
-  if (!fs::is_regular_file(paths.Store(), error)) throw Refused(paths.root, "holds no jobs.db");
-}
-
 bool IsEmptyOrNone(const fs::path& folder) {
   std::error_code error;
   return !fs::exists(folder, error) || fs::is_empty(folder, error);
@@ -105,7 +100,7 @@ void MakePrivate(const fs::path& folder) {
 
 CopiedBlobs BackUp(const fs::path& data_folder, const fs::path& target) {
   const DataPaths from(data_folder), to(target);
-  RequireStore(from);
+  RequireStore(from.Store());
   std::error_code error;
   if (!IsEmptyOrNone(target) && !fs::is_regular_file(to.Store(), error) &&
       !fs::is_directory(to.Blobs(), error)) {
@@ -117,7 +112,7 @@ CopiedBlobs BackUp(const fs::path& data_folder, const fs::path& target) {
 
 CopiedBlobs Restore(const fs::path& backup, const fs::path& data_folder) {
   const DataPaths from(backup), to(data_folder);
-  RequireStore(from);
+  RequireStore(from.Store());
   if (!IsEmptyOrNone(data_folder)) {
     throw Refused(data_folder, "is not empty; move it away, or restore to another folder");
   }

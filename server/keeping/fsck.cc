@@ -3,7 +3,6 @@
 #include <set>
 
 #include "core/base/digest.h"
-#include "core/base/error.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
@@ -11,14 +10,12 @@
 
 namespace color3d {
 namespace fs = std::filesystem;
+
 FsckResult Fsck(const fs::path& data_folder,
                 bool repair,
                 const std::function<void(int64_t blobs)>& progress) {
   const DataPaths paths(data_folder);
-  std::error_code error;
-  if (!fs::is_regular_file(paths.Store(), error)) {
-    throw Error(ErrorCode::kFailedPrecondition, "{} holds no jobs.db", data_folder.string());
-  }
+  RequireStore(paths.Store());
   const DataFolderLock lock(paths);
   FsckResult result;
   result.store_problems = StoreProblems(paths.Store());

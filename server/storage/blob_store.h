@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/base/digest.h"
 
@@ -84,6 +85,9 @@ class BlobStore {
   // Files that a crash left half-written, and what was set aside, older than `age`; how many.
   virtual int RemoveLeftovers(std::chrono::seconds age) = 0;
 };
+
+// All of them, or those that were found until `stop` said so.
+std::vector<StoredBlob> ListBlobs(const BlobStore& blobs, const std::function<bool()>& stop);
 
 // Whether the bytes are those of the digest. Throws Error{kNotFound, BLOB_MISSING}.
 bool IsIntact(const BlobStore& blobs, const FileDigest& digest);

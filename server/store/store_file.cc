@@ -1,9 +1,19 @@
 #include "server/store/store_file.h"
 
+#include "core/base/error.h"
 #include "server/store/sqlite_db.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
+
+void RequireStore(const fs::path& file) {
+  std::error_code error;
+  if (fs::is_regular_file(file, error)) return;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "{} holds no {}",
+              file.parent_path().string(),
+              file.filename().string());
+}
 
 void CopyStore(const fs::path& file, const fs::path& copy) {
   std::error_code error;

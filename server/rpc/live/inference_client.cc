@@ -73,10 +73,12 @@ void InferenceClient::Start(const std::shared_ptr<Call>& call,
                             system_clock::time_point deadline,
                             std::function<void(const grpc::Status&)> done) {
   WarmUp();
-  Order order{call, deadline, std::move(done), DigestOfMessage(call->request)};
+  Order order{call, deadline, std::move(done), {}};
   bool is_poison = false;
   {
     std::lock_guard lock(mutex_);
+    // Taken of whole pictures only where a worker has died: else there is nothing to compare with.
+    if (!watch_.IsEmpty()) order.picture = DigestOfMessage(call->request);
     is_poison = watch_.IsPoison(order.picture);
     if (!is_poison) waiting_.push_back(order);
   }
@@ -107,9 +109,14 @@ void InferenceClient::Send(const Order& order) {
                                 &call.request,
                                 &call.response,
                                 [this, order, our_limit](const grpc::Status& status) {
+                                  const PoisonWatch::End end = EndOf(status);
+                                  const LivePicture picture =
+                                      end == PoisonWatch::End::kWorkerDied
+                                          ? DigestOfMessage(order.call->request)
+                                          : order.picture;
                                   {
                                     std::lock_guard lock(mutex_);
-                                    watch_.OnEnd(order.picture, EndOf(status));
+                                    watch_.OnEnd(picture, end);
                                   }
                                   Pump();
                                   // The last: this object may be gone afterwards.

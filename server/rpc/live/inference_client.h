@@ -59,8 +59,7 @@ class InferenceClient {
     std::shared_ptr<Call> call;
     std::chrono::system_clock::time_point deadline;
     std::function<void(const grpc::Status&)> done;
-    LivePicture picture;
-    bool alone = false;
+    LivePicture picture;  // empty: no worker had died when it came
   };
   // Sends what may be sent now.
   void Pump();

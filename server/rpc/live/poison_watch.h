@@ -12,6 +12,8 @@ using LivePicture = std::string;  // digest of all that the worker is sent
 
 class PoisonWatch {
  public:
+  // No worker has died with a picture that is remembered.
+  bool IsEmpty() const { return suspects_.empty() && poison_.empty(); }
   // It was alone with a worker that died.
   bool IsPoison(const LivePicture& picture) const { return poison_.contains(picture); }
   // It was with a worker that died, with others: it must be alone now.
