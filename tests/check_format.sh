@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 mode=(--dry-run -Werror)
 [ "${1:-}" != --fix ] || mode=(-i)
-git ls-files -z '*.h' '*.cc' | xargs -0 -P "$(nproc)" -n 40 clang-format "${mode[@]}" || {
+git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' | xargs -0 -P "$(nproc)" -n 40 clang-format "${mode[@]}" || {
   echo "check_format: run tests/check_format.sh --fix" >&2
   exit 1
 }

@@ -1,5 +1,5 @@
-// What scripted jobs leave behind (scripted_worker.cc): which steps were done by which processes, and
-// effects that may be there once only.
+// What scripted jobs leave behind (scripted_worker.cc): which steps were done by which processes,
+// and effects that may be there once only.
 #pragma once
 
 #include <filesystem>
