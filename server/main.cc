@@ -82,6 +82,43 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
                    "Jobs that may wait or run at one time")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
+  serve
+      ->add_option("--low-space-mib",
+                   options->low_space_mib,
+                   "Free space below which no job is begun or accepted, MiB")
+      ->check(CLI::Range(0, 1 << 30))
+      ->capture_default_str();
+  serve
+      ->add_option("--project-jobs",
+                   options->project_jobs,
+                   "Jobs of one project that may wait or run; 0: no limit of its own")
+      ->check(CLI::Range(0, 1'000'000))
+      ->capture_default_str();
+  serve
+      ->add_option("--project-gib",
+                   options->project_gib,
+                   "What one project may have stored, GiB; 0: no limit of its own")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  serve
+      ->add_option("--project-streams",
+                   options->project_streams,
+                   "Watches, uploads and downloads of one project, each; 0: no limit of its own")
+      ->check(CLI::Range(0, 10'000))
+      ->capture_default_str();
+  serve
+      ->add_option("--keep-days",
+                   options->keep_days,
+                   "Delete jobs this long after their end, with scenes that have none left, unless "
+                   "they are pinned; 0: never")
+      ->check(CLI::Range(0, 36'500))
+      ->capture_default_str();
+  serve
+      ->add_option("--notify-allow",
+                   options->notify_allow,
+                   "http[s]://HOST[:PORT][/PATH]: where jobs may ask to be told of their end; "
+                   "repeatable")
+      ->allow_extra_args(false);
   serve->add_option("--drain-seconds", options->drain_seconds, "Longest time to stop after SIGTERM")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
@@ -197,12 +234,15 @@ int Main(int argc, char** argv) {
   CLI::App* serve = app.add_subcommand("serve", "Answer RPCs and run jobs");
   app.add_subcommand("worker", "Run jobs of a server's data directory (see worker --help)");
   std::string token_name, token_role = "submit";
+  std::string token_project;
   std::filesystem::path token_file;
   CLI::App* token = app.add_subcommand("token", "Let somebody in: print a fresh token, once");
   token->add_option("NAME", token_name, "Who will have it, for logs")->required();
   token
       ->add_option("--role", token_role, "read, submit or admin; each may do what those before may")
       ->capture_default_str();
+  token->add_option(
+      "--project", token_project, "What it sees: scenes, jobs and files of this project alone");
   token->add_option("--tokens", token_file, "The file that serve --tokens reads")->required();
   KeepingArguments keeping;
   AddKeeping(&app, &keeping);
@@ -216,7 +256,8 @@ int Main(int argc, char** argv) {
   try {
     if (keeping.run) return keeping.run();
     if (token->parsed()) {
-      std::cout << AddToken(token_file, token_name, RoleFromName(token_role)) << "\n";
+      std::cout << AddToken(token_file, token_name, RoleFromName(token_role), token_project)
+                << "\n";
       return 0;
     }
     Serve(options);

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <set>
 
 #include "core/base/error.h"
+#include "server/storage/collector.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -88,6 +88,7 @@ std::chrono::milliseconds Maintenance::Reap() {
   try {
     const int reaped = store_.ReapExpired();
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
+    HoldBackWhenSpaceIsLow();
     if (timing_.on_leases) timing_.on_leases();
   } catch (const std::exception& e) {
     spdlog::error("cannot look after leases: {}", e.what());
@@ -95,13 +96,31 @@ std::chrono::milliseconds Maintenance::Reap() {
   return timing_.reap;
 }
 
+void Maintenance::HoldBackWhenSpaceIsLow() {
+  if (timing_.low_space_bytes == 0) return;
+  const bool held = store_.Holds().contains(Hold::kStorage);
+  const int64_t free = blobs_.FreeBytes();
+  const int64_t wanted = timing_.low_space_bytes + (held ? timing_.low_space_bytes / 10 : 0);
+  if (held == (free < wanted)) return;
+  store_.SetHold(Hold::kStorage, !held);
+  if (held) {
+    spdlog::info("{} MiB are free again: jobs are begun", free >> 20);
+  } else {
+    spdlog::error("only {} MiB are free: no job is begun until there are {}; free some disk space",
+                  free >> 20,
+                  timing_.low_space_bytes >> 20);
+  }
+}
+
 std::chrono::milliseconds Maintenance::Sweep() {
   try {
     const int uploads = uploads_.ReapOlderThan(timing_.grace);
     if (uploads > 0) spdlog::info("swept {} unfinished uploads", uploads);
     const std::vector<StoredBlob> blobs = ListBlobs(blobs_, [this] { return IsStopping(); });
+    ExpireJobs();
     CollectBlobs(blobs);
     SweepScratch();
+    SweepJobLogs();
     const auto before = [this](std::chrono::milliseconds age) { return clock_() - age.count(); };
     store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
     const Scrubber::Result scrubbed =
@@ -119,24 +138,45 @@ std::chrono::milliseconds Maintenance::Sweep() {
   }
 }
 
-// In two phases: what nothing names is noted, and removed when it is still so, and untouched, after
-// the time of grace. Whoever puts or looks for a blob touches it, before he names it.
 void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
   if (IsStopping()) return;
-  const std::set<std::string> named = store_.ReferencedBlobs();
-  std::vector<BlobCandidate> unnamed;
-  for (const StoredBlob& blob : blobs) {
-    if (named.contains(blob.digest.sha256)) continue;
-    unnamed.push_back({blob.digest.sha256, blob.touched_ns});
-  }
-  int removed = 0;
-  const std::chrono::milliseconds grace = timing_.grace;
-  for (const BlobCandidate& due : store_.AgeCandidates(unnamed, grace.count())) {
-    if (store_.IsReferenced(due.sha256)) continue;
-    if (blobs_.RemoveIfUntouched({{due.sha256, 0}, due.touched_ns})) ++removed;
-  }
+  const size_t removed = RemoveDue(store_, blobs_, DueBlobs(store_, blobs, timing_.grace)).size();
   const int leftovers = blobs_.RemoveLeftovers(timing_.grace);
-  if (removed + leftovers > 0) spdlog::info("swept {} blobs, {} left-overs", removed, leftovers);
+  if (removed + static_cast<size_t>(leftovers) > 0) {
+    spdlog::info("swept {} blobs, {} left-overs", removed, leftovers);
+  }
+}
+
+// In two phases, too: a clock that jumps makes nothing old.
+void Maintenance::ExpireJobs() {
+  if (timing_.keep_jobs.count() == 0) return;
+  const std::chrono::milliseconds age = timing_.keep_jobs, grace = timing_.grace;
+  for (const std::string& name : store_.AgeExpired(clock_() - age.count(), grace.count())) {
+    if (IsStopping()) return;
+    try {
+      const std::string scene = store_.GetJob(name).scene;
+      store_.Delete(name, {});
+      spdlog::info("[job={}] was old and is deleted", name);
+      if (!store_.ListJobs({"", scene, std::nullopt}, 0, 1).empty()) continue;
+      store_.DeleteScene(scene, {});
+      spdlog::info("{} had no job left and is deleted", scene);
+    } catch (const Error& e) {
+      // Retried, read or deleted meanwhile.
+      if (e.code() != ErrorCode::kFailedPrecondition && e.code() != ErrorCode::kNotFound) throw;
+    }
+  }
+}
+
+void Maintenance::SweepJobLogs() {
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(paths_.JobLogs(), error)) {
+    if (IsStopping()) return;
+    try {
+      store_.GetJob("jobs/" + entry.path().stem().string());
+    } catch (const Error& e) {
+      if (e.code() == ErrorCode::kNotFound) fs::remove(entry.path(), error);
+    }
+  }
 }
 
 // Folders "<job id>-<epoch>" of attempts that no longer run.

@@ -24,6 +24,8 @@ struct MaintenanceTiming {
   std::chrono::seconds grace{24 * 3600};          // of unreferenced blobs and dead uploads
   std::chrono::hours keep_events{30 * 24};        // after the job's end
   std::chrono::hours keep_request_ids{7 * 24};
+  std::chrono::hours keep_jobs{0};  // after their end, unless pinned; 0: for ever
+  int64_t low_space_bytes = 0;      // free; below it no job is begun, until there is a tenth more
   int64_t scrub_bytes = int64_t{2} << 30;  // read and compared with their digests at each sweep
   std::function<void()> on_leases = {};    // called whenever leases have been looked after
 };
@@ -65,8 +67,11 @@ class Maintenance {
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
+  void HoldBackWhenSpaceIsLow();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
+  void ExpireJobs();
   void SweepScratch();
+  void SweepJobLogs();
   bool IsStopping();
 
   JobStore& store_;

@@ -13,6 +13,7 @@
 #include "core/base/address.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "server/access/notify_targets.h"
 #include "server/access/tls.h"
 #include "server/access/tokens.h"
 #include "server/backends/backend_address.h"
@@ -38,6 +39,7 @@ std::chrono::milliseconds Milliseconds(double seconds) {
 
 void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
+  for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
   const bool is_safe = !options.tls_certificate.empty() &&
                        (!options.tokens.empty() || !options.tls_client_ca.empty());
   if (!IsLoopback(options.listen) && !is_safe && !options.insecure_any_address) {
@@ -198,6 +200,12 @@ void Serve(const ServeOptions& options) {
   rpc.listen = options.listen;
   rpc.version = COLOR3D_VERSION;
   rpc.limits.max_unfinished_jobs = options.max_unfinished_jobs;
+  rpc.limits.project_max_unfinished_jobs = options.project_jobs;
+  rpc.limits.project_max_streams = options.project_streams;
+  rpc.limits.project_max_stored_bytes = static_cast<int64_t>(options.project_gib * (1 << 30));
+  rpc.job_logs = paths.JobLogs();
+  rpc.notify_allowed = options.notify_allow;
+  rpc.drain = [] { ::kill(::getpid(), SIGTERM); };
   rpc.models = models;
   rpc.inference = InferenceSetup(options, models, sockets, &worker_setup);
   const auto prober = std::make_shared<BackendProber>(models.backends);
@@ -215,6 +223,8 @@ void Serve(const ServeOptions& options) {
                            std::chrono::milliseconds(100),
                            std::chrono::milliseconds(5'000));
   // No sign of life while the store cannot be read: systemd's watchdog then starts us anew.
+  chores.keep_jobs = std::chrono::hours(24) * options.keep_days;
+  chores.low_space_bytes = options.low_space_mib << 20;
   chores.on_leases = [] { NotifyServiceManager("WATCHDOG=1"); };
   Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
   Supervisor supervisor(worker_setup, store);

@@ -23,9 +23,16 @@ struct ServeOptions {
   std::string log_level = "info";
   double drain_seconds = 20.0;
   int64_t reserve_mib = 256;
+  int64_t low_space_mib =
+      512;  // free; below it no job is begun; 0: jobs are begun until it is full
   int max_unfinished_jobs = 2'000;
-  std::vector<std::string> models;    // "NAME=FILE"
-  std::vector<std::string> backends;  // "NAME=ADDRESS"
+  // Of each project; 0: no limit of its own.
+  int project_jobs = 0, project_streams = 0;
+  double project_gib = 0.0;
+  int keep_days = 0;                      // of jobs after their end, unless pinned; 0: for ever
+  std::vector<std::string> notify_allow;  // addresses that may be told of ended jobs
+  std::vector<std::string> models;        // "NAME=FILE"
+  std::vector<std::string> backends;      // "NAME=ADDRESS"
   // For tests.
   std::filesystem::path worker_program;  // empty: color3d-worker beside this program
   double lease_seconds = 60.0;

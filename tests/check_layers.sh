@@ -118,13 +118,13 @@ public core/stage stages film/import_film formats/artifacts
 public core/video film_reader mp4_writer ticks
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
-public server/access tls tokens
+public server/access notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc error_mapping rpc_server
-public server/storage blob_store data_folder file_blob_store upload_store
-public server/store job job_store sqlite_job_store store_file user_models
+public server/storage blob_store collector data_folder file_blob_store upload_store
+public server/store job job_store project_store sqlite_job_store store_file user_models
 public server/worker supervisor
 
 if [ "$failed" -ne 0 ]; then exit 1; fi

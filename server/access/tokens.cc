@@ -76,6 +76,17 @@ Role RoleFromName(std::string_view name) {
   throw InvalidArgument("there is no role '{}'; say read, submit or admin", name);
 }
 
+void CheckProject(const std::string& project) {
+  const bool good =
+      project.empty() ||
+      (project.size() <= 40 && project[0] >= 'a' && project[0] <= 'z' &&
+       project.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos);
+  if (!good) {
+    throw InvalidArgument("'{}' is no project: 1 to 40 of a-z, 0-9 and '-', the first a letter",
+                          project.substr(0, 80));
+  }
+}
+
 std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file) {
   std::vector<TokenRecord> records;
   std::istringstream lines{std::string(text)};
@@ -86,15 +97,16 @@ std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& f
     TokenRecord record;
     std::string role, rest;
     if (!(words >> record.name) || record.name[0] == '#') continue;
-    words >> role >> record.sha256;
+    words >> role >> record.sha256 >> record.project;
     if (!IsName(record.name) || !IsSha256Hex(record.sha256) || words >> rest) {
       throw InvalidArgument(
-          "{}, line {}: it must be NAME ROLE SHA256, as `color3d-server token` writes it",
+          "{}, line {}: it must be NAME ROLE SHA256 [PROJECT], as `color3d-server token` writes it",
           file,
           number);
     }
     try {
       record.role = RoleFromName(role);
+      CheckProject(record.project);
     } catch (const Error& e) {
       throw InvalidArgument("{}, line {}: {}", file, number, e.what());
     }
@@ -103,7 +115,11 @@ std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& f
   return records;
 }
 
-std::string AddToken(const fs::path& file, const std::string& name, Role role) {
+std::string AddToken(const fs::path& file,
+                     const std::string& name,
+                     Role role,
+                     const std::string& project) {
+  CheckProject(project);
   if (!IsName(name)) {
     throw InvalidArgument("'{}' is no name: 1 to 64 of letters, digits, '.', '-', '_' and '@'",
                           name.substr(0, 80));
@@ -123,7 +139,12 @@ std::string AddToken(const fs::path& file, const std::string& name, Role role) {
     if (!text.empty() && text.back() != '\n') text += '\n';
   }
   const std::string token = RandomToken();
-  text += fmt::format("{} {} {}\n", name, RoleName(role), Sha256Hex(token));
+  text += fmt::format("{} {} {}{}{}\n",
+                      name,
+                      RoleName(role),
+                      Sha256Hex(token),
+                      project.empty() ? "" : " ",
+                      project);
   const mode_t before = ::umask(0077);
   try {
     WriteFileAtomic(file, text);

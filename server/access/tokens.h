@@ -25,16 +25,24 @@ Role RoleFromName(std::string_view name);
 struct TokenRecord {
   std::string name;  // of who has it, for logs: 1 to 64 of letters, digits, '.', '-', '_', '@'
   Role role = Role::kRead;
-  std::string sha256;  // of the token
+  std::string sha256;   // of the token
+  std::string project;  // that it belongs to; empty: the one of all without a project
 };
 
-// Lines "NAME ROLE SHA256"; empty ones and those that begin with '#' are skipped. Throws
+// Throws Error{kInvalidArgument} unless it is empty or 1 to 40 of a-z, 0-9 and '-', the first a
+// letter.
+void CheckProject(const std::string& project);
+
+// Lines "NAME ROLE SHA256 [PROJECT]"; empty ones and those that begin with '#' are skipped. Throws
 // Error{kInvalidArgument} naming file and line.
 std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file);
 
 // A fresh token of 256 random bits, of which the record is added to the file; a new file can be
 // read by its owner alone. Throws Error{kAlreadyExists} when the name is there.
-std::string AddToken(const std::filesystem::path& file, const std::string& name, Role role);
+std::string AddToken(const std::filesystem::path& file,
+                     const std::string& name,
+                     Role role,
+                     const std::string& project = "");
 
 // The file as it is now: read again when it has changed, at most once a second. A file that has
 // become unreadable or wrong changes nothing, and is said in the log. Thread-safe.

@@ -74,9 +74,12 @@ TEST_F(TokensTest, WrongFilesAreNamed) {
   EXPECT_NE(message("anna read " + digest + "\nbert read 12\n").find("tokens, line 2"),
             std::string::npos);
   EXPECT_NE(message("anna king " + digest).find("read, submit or admin"), std::string::npos);
-  EXPECT_NE(message("anna read " + digest + " more").find("line 1"), std::string::npos);
+  EXPECT_EQ(ParseTokens("anna read " + digest + " attic", "tokens").at(0).project, "attic");
+  EXPECT_NE(message("anna read " + digest + " attic more").find("line 1"), std::string::npos);
+  EXPECT_NE(message("anna read " + digest + " At@tic").find("is no project"), std::string::npos);
   EXPECT_NE(message("an/na read " + digest).find("line 1"), std::string::npos);
-  AddToken(File(), "anna", Role::kRead);
+  const std::string token = AddToken(File(), "anna", Role::kRead, "cellar");
+  EXPECT_EQ(TokenBook{File()}.Find(token)->project, "cellar");
   EXPECT_THROW(AddToken(File(), "anna", Role::kAdmin), Error);
   EXPECT_THROW(AddToken(File(), "a b", Role::kAdmin), Error);
   ::chmod(File().c_str(), 0620);

@@ -5,10 +5,12 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
 #include "core/base/error.h"
+#include "server/ops/job_log.h"
 
 namespace color3d {
 std::filesystem::path ProgramFolder() {
@@ -38,6 +40,13 @@ void SetUpLog(const std::string& name,
   logger->flush_on(spdlog::level::info);
   logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %n %v");
   spdlog::set_default_logger(logger);
+}
+
+void LogJobsTo(const std::filesystem::path& folder) {
+  const std::shared_ptr<spdlog::logger> logger = spdlog::default_logger();
+  for (const spdlog::sink_ptr& sink : logger->sinks()) sink->set_level(logger->level());
+  logger->sinks().push_back(MakeJobLogSink(folder));
+  logger->set_level(std::min(logger->level(), spdlog::level::debug));
 }
 
 }  // namespace color3d

@@ -14,4 +14,8 @@ std::filesystem::path ProgramFolder();
 // that is none of trace, debug, info, warn, error, off.
 void SetUpLog(const std::string& name, const std::string& level, const std::filesystem::path& file);
 
+// From now on what is said of single jobs goes to files of their own, too (job_log.h), progress
+// included.
+void LogJobsTo(const std::filesystem::path& folder);
+
 }  // namespace color3d

@@ -31,8 +31,8 @@ void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContex
   }
 }
 
-void Access::Require(Role role, const grpc::CallbackServerContext& context) const {
-  if (!tokens_) return;
+Caller Access::Require(Role role, const grpc::CallbackServerContext& context) const {
+  if (!tokens_) return {};
   const std::string_view token = TokenOf(context);
   if (token.empty()) {
     LogRefusal("it brings no token", context);
@@ -56,6 +56,7 @@ void Access::Require(Role role, const grpc::CallbackServerContext& context) cons
                        RoleName(record->role),
                        RoleName(role));
   }
+  return {record->name, record->role, record->project};
 }
 
 }  // namespace color3d

@@ -6,10 +6,23 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <string>
 
 #include "server/access/tokens.h"
 
 namespace color3d {
+
+// Who calls, and for which project.
+struct Caller {
+  std::string name;  // empty: the server asks nobody who he is
+  Role role = Role::kAdmin;
+  std::string project;
+};
+
+// For logs.
+inline const char* NameOf(const Caller& caller) {
+  return caller.name.empty() ? "somebody" : caller.name.c_str();
+}
 
 class Access {
  public:
@@ -18,7 +31,7 @@ class Access {
 
   // The token stands in the call's metadata: "authorization: Bearer TOKEN". Throws ServiceError
   // TOKEN_MISSING or TOKEN_UNKNOWN (UNAUTHENTICATED), ROLE_TOO_LOW (PERMISSION_DENIED).
-  void Require(Role role, const grpc::CallbackServerContext& context) const;
+  Caller Require(Role role, const grpc::CallbackServerContext& context) const;
 
  private:
   void LogRefusal(const std::string& why, const grpc::CallbackServerContext& context) const;

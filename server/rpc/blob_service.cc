@@ -60,15 +60,21 @@ grpc::ServerUnaryReactor* BlobServiceImpl::FindMissingBlobs(
                      context,
                      request,
                      response,
-                     [this](const auto& in, v1::FindMissingBlobsResponse* out) {
+                     [this](const Call& call, const auto& in, v1::FindMissingBlobsResponse* out) {
                        if (in.digests_size() > 10'000) {
                          throw InvalidArgument("digests has {} entries; at most 10000 are allowed",
                                                in.digests_size());
                        }
+                       std::vector<std::string> asked;
+                       for (const v1::Digest& proto : in.digests()) {
+                         asked.push_back(FromProto(proto).sha256);
+                       }
+                       const std::set<std::string> held = call.store.HeldBlobs(asked);
                        std::set<std::string> seen;
                        for (const v1::Digest& proto : in.digests()) {
                          const FileDigest digest = FromProto(proto);
-                         if (seen.insert(digest.sha256).second && !parts_.blobs.Touch(digest)) {
+                         if (!seen.insert(digest.sha256).second) continue;
+                         if (!held.contains(digest.sha256) || !parts_.blobs.Touch(digest)) {
                            *out->add_missing() = proto;
                          }
                        }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "server/rpc/blob_service.h"
 #include "server/service_error.h"
@@ -50,10 +51,10 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   }
 
   void Open() {
-    parts_.access.Require(Role::kRead, context_);
-    place_ = parts_.streams.reads.Take();
+    const Call call = Admit(parts_, Role::kRead, context_);
+    place_ = parts_.streams.reads.Take(call.caller.project);
     const FileDigest digest = ParseBlobName(request_.resource_name());
-    if (!parts_.blobs.Touch(digest)) {
+    if (!HasBlob(parts_, call.store, digest)) {
       throw ServiceError(
           ErrorCode::kNotFound, "BLOB_MISSING", "'{}' is not stored", request_.resource_name());
     }
@@ -149,15 +150,18 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
                             parts_.limits.max_chunk_bytes);
     }
     if (!writer_) {
-      parts_.access.Require(Role::kSubmit, context_);
-      place_ = parts_.streams.writes.Take();
-      const UploadName name = ParseUploadName(request_.resource_name());
-      const UploadStatus status = parts_.uploads.Status(name);
-      if (status.complete) {  // somebody else has stored the same bytes
-        response_->set_committed_size(status.committed_size);
+      const Call call = Admit(parts_, Role::kSubmit, context_);
+      store_ = call.store;
+      place_ = parts_.streams.writes.Take(call.caller.project);
+      name_ = ParseUploadName(request_.resource_name());
+      name_.owner = call.caller.project;
+      // Others may have stored the same bytes: whoever has not shown them sends them.
+      if (HasBlob(parts_, call.store, name_.digest)) {
+        response_->set_committed_size(name_.digest.size_bytes);
         return true;
       }
-      writer_ = parts_.uploads.Open(name, request_.write_offset());
+      RequireQuota(parts_, call.store, name_.digest.size_bytes);
+      writer_ = parts_.uploads.Open(name_, request_.write_offset());
       resource_ = request_.resource_name();
     } else if (!request_.resource_name().empty() && request_.resource_name() != resource_) {
       throw InvalidArgument("resource_name changes within the stream");
@@ -166,6 +170,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     if (!request_.finish_write()) return false;
     response_->set_committed_size(writer_->Sync());
     writer_->Finish();
+    store_->HoldBlob(name_.digest);
     return true;
   }
 
@@ -184,6 +189,8 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   WriteResponse* response_;
   WriteRequest request_;
   std::string resource_;
+  UploadName name_;
+  std::optional<ProjectStore> store_;  // since the first message
   std::unique_ptr<UploadStore::Writer> writer_;
   StreamLimit::Place place_;
 };
@@ -204,16 +211,19 @@ grpc::ServerUnaryReactor* ByteStreamServiceImpl::QueryWriteStatus(
     grpc::CallbackServerContext* context,
     const google::bytestream::QueryWriteStatusRequest* request,
     google::bytestream::QueryWriteStatusResponse* response) {
-  return AnswerWrite(parts_,
-                     context,
-                     request,
-                     response,
-                     [this](const auto& in, google::bytestream::QueryWriteStatusResponse* out) {
-                       const UploadStatus status =
-                           parts_.uploads.Status(ParseUploadName(in.resource_name()));
-                       out->set_committed_size(status.committed_size);
-                       out->set_complete(status.complete);
-                     });
+  return AnswerWrite(
+      parts_,
+      context,
+      request,
+      response,
+      [this](const Call& call, const auto& in, google::bytestream::QueryWriteStatusResponse* out) {
+        UploadName name = ParseUploadName(in.resource_name());
+        name.owner = call.caller.project;
+        const bool complete = HasBlob(parts_, call.store, name.digest);
+        out->set_complete(complete);
+        out->set_committed_size(complete ? name.digest.size_bytes
+                                         : parts_.uploads.CommittedSize(name));
+      });
 }
 
 }  // namespace color3d

@@ -83,6 +83,8 @@ v1::Job ToProto(const JobRecord& job) {
   if (job.end_ms != 0) *proto.mutable_end_time() = ToTimestamp(job.end_ms);
   proto.set_worker(job.worker);
   proto.set_peak_memory_bytes(job.usage.peak_memory_bytes);
+  proto.set_queued_seconds(static_cast<double>(job.queued_ms) / 1000.0);
+  proto.set_pinned(job.pinned);
   return proto;
 }
 

@@ -67,7 +67,15 @@ google::rpc::Status Build(ErrorCode code,
   info.set_reason(reason);
   info.set_domain("color3d");
   status.add_details()->PackFrom(info);
-  if (!violations.empty()) {
+  if (reason == "QUOTA_EXCEEDED") {
+    google::rpc::QuotaFailure failure;
+    for (const FieldViolation& violation : violations) {
+      auto* entry = failure.add_violations();
+      entry->set_subject(CleanUtf8(violation.field));
+      entry->set_description(CleanUtf8(violation.description));
+    }
+    status.add_details()->PackFrom(failure);
+  } else if (!violations.empty()) {
     google::rpc::BadRequest bad;
     size_t bytes = 0;
     for (const FieldViolation& violation : violations) {

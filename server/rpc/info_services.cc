@@ -53,15 +53,32 @@ void ListBackends(const RpcParts& parts, v1::ServerInfo* info) {
   }
 }
 
+// What others do is nobody's business but the operator's.
+bool IsOf(const Call& call, const std::string& job) {
+  if (call.caller.role == Role::kAdmin || job.empty()) return true;
+  try {
+    call.store.GetJob(job);
+    return true;
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::kNotFound) throw;
+    return false;
+  }
+}
+
 }  // namespace
 
 grpc::ServerUnaryReactor* ColorizerServiceImpl::GetColorizer(grpc::CallbackServerContext* context,
                                                              const v1::GetColorizerRequest* request,
                                                              v1::Colorizer* response) {
-  return AnswerRead(parts_, context, request, response, [this](const auto& in, v1::Colorizer* out) {
-    CheckName(in.name(), "colorizers");
-    *out = ToProto(parts_.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
-  });
+  return AnswerRead(
+      parts_,
+      context,
+      request,
+      response,
+      [this](const Call& call, const auto& in, v1::Colorizer* out) {
+        CheckName(in.name(), "colorizers");
+        *out = ToProto(call.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
+      });
 }
 
 grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
@@ -69,14 +86,18 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
     const v1::ListColorizersRequest* request,
     v1::ListColorizersResponse* response) {
   return AnswerRead(
-      parts_, context, request, response, [this](const auto& in, v1::ListColorizersResponse* out) {
+      parts_,
+      context,
+      request,
+      response,
+      [this](const Call& call, const auto& in, v1::ListColorizersResponse* out) {
         if (!in.scene().empty()) CheckName(in.scene(), "scenes");
         AnswerPage(
             in,
             "colorizers of " + in.scene(),
             out,
             [&](int64_t before_id, int limit) {
-              return parts_.store.ListColorizers(in.scene(), before_id, limit);
+              return call.store.ListColorizers(in.scene(), before_id, limit);
             },
             [&](const ColorizerRecord& colorizer) { *out->add_colorizers() = ToProto(colorizer); });
       });
@@ -97,7 +118,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
       context,
       request,
       response,
-      [this](const auto&, v1::ServerInfo* out) {
+      [this](const Call& call, const auto&, v1::ServerInfo* out) {
         out->set_version(parts_.version);
         for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
         v1::Limits* limits = out->mutable_limits();
@@ -111,7 +132,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
           v1::WorkerInfo* entry = out->add_workers();
           entry->set_worker_id(worker.worker_id);
           entry->set_pid(worker.pid);
-          entry->set_job(worker.job);
+          if (IsOf(call, worker.job)) entry->set_job(worker.job);
           entry->set_memory_bytes(worker.memory_bytes);
           entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
         }
@@ -124,6 +145,10 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
         const JobCounts counts = parts_.store.CountJobs();
         out->set_queued_jobs(counts.queued);
         out->set_running_jobs(counts.running);
+        out->set_project(call.caller.project);
+        out->set_role(RoleName(call.caller.role));
+        *out->mutable_usage() = ToProto(call.store.Usage(), parts_.limits);
+        out->set_waits_for(WhyHeld(parts_));
       });
 }
 

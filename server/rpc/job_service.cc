@@ -7,11 +7,13 @@
 
 #include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
+#include "server/access/notify_targets.h"
 #include "server/planning/plan_scenes.h"
 #include "server/planning/planner.h"
 #include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
 #include "server/rpc/convert.h"
+#include "server/rpc/job_log_stream.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -25,10 +27,21 @@ void RequireNotDraining(const RpcParts& parts) {
       "the server is shutting down and takes no new jobs; try again when it is back");
 }
 
-void CheckBlobs(const RpcParts& parts, const v1::JobSpec& spec) {
+// Whoever asks for work hears at once what would keep it waiting for a long time.
+void RequireRoomOnDisk(const RpcParts& parts, const ProjectStore& store) {
+  RequireQuota(parts, store, 0);
+  if (!parts.store.Holds().contains(Hold::kStorage)) return;
+  throw ServiceError(ErrorCode::kResourceExhausted,
+                     "STORAGE_FULL",
+                     "the server's disk is nearly full ({} MiB are free) and no job is begun; free "
+                     "some space there, or try again later",
+                     parts.blobs.FreeBytes() >> 20);
+}
+
+void CheckBlobs(const RpcParts& parts, const ProjectStore& store, const v1::JobSpec& spec) {
   std::vector<FieldViolation> missing;
   for (const FileDigest& digest : SpecBlobs(spec)) {
-    if (!parts.blobs.Touch(digest)) {
+    if (!HasBlob(parts, store, digest)) {
       missing.push_back(
           {digest.sha256, fmt::format("is not stored with {} bytes", digest.size_bytes)});
     }
@@ -45,7 +58,7 @@ void CheckBlobs(const RpcParts& parts, const v1::JobSpec& spec) {
 }
 
 // The jobs that spec.inputs names, with their children.
-std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec) {
+std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& spec) {
   if (spec.inputs_size() > 100) {
     throw InvalidArgument("spec.inputs has {} entries; at most 100 are allowed",
                           spec.inputs_size());
@@ -53,8 +66,8 @@ std::vector<JobRecord> LoadInputs(const RpcParts& parts, const v1::JobSpec& spec
   std::vector<JobRecord> inputs;
   for (const std::string& name : spec.inputs()) {
     CheckName(name, "jobs");
-    inputs.push_back(parts.store.GetJob(name));
-    for (JobRecord& child : parts.store.ListChildren(name)) inputs.push_back(std::move(child));
+    inputs.push_back(store.GetJob(name));
+    for (JobRecord& child : store.ListChildren(name)) inputs.push_back(std::move(child));
   }
   return inputs;
 }
@@ -73,10 +86,10 @@ SceneFacts FactsOf(const SceneRecord& scene) {
 
 // The route's colorize_key_view job, by default the one that its scene's user accepted, and what it
 // read.
-SceneRouteInputs LoadRoute(const RpcParts& parts,
+SceneRouteInputs LoadRoute(const ProjectStore& store,
                            const v1::PersonalizeScenesSpec::SceneRoute& route) {
   CheckName(route.scene(), "scenes");
-  const SceneRecord scene = parts.store.GetScene(route.scene());
+  const SceneRecord scene = store.GetScene(route.scene());
   const std::string name =
       route.key_color_job().empty() ? scene.key_color_job : route.key_color_job();
   if (name.empty()) {
@@ -89,7 +102,7 @@ SceneRouteInputs LoadRoute(const RpcParts& parts,
         kind::kColorizeKeyView);
   }
   CheckName(name, "jobs");
-  const JobRecord key_color = parts.store.GetJob(name);
+  const JobRecord key_color = store.GetJob(name);
   if (key_color.kind != kind::kColorizeKeyView) {
     throw InvalidArgument("the key_color_job {} of {} is a {} job; name a {} job",
                           name,
@@ -97,25 +110,28 @@ SceneRouteInputs LoadRoute(const RpcParts& parts,
                           key_color.kind,
                           kind::kColorizeKeyView);
   }
-  SceneRouteInputs inputs{parts.store.GetInputs(key_color.id), FactsOf(scene)};
+  SceneRouteInputs inputs{store.GetInputs(key_color), FactsOf(scene)};
   inputs.jobs.push_back(key_color);
   return inputs;
 }
 
-NewGraph PlanRequest(const RpcParts& parts, const v1::JobSpec& spec) {
+NewGraph PlanRequest(const ProjectStore& store, const v1::JobSpec& spec) {
   if (!spec.has_personalize_scenes()) {
-    return PlanJob(spec, LoadInputs(parts, spec), FactsOf(parts.store.GetScene(spec.scene())));
+    return PlanJob(spec, LoadInputs(store, spec), FactsOf(store.GetScene(spec.scene())));
   }
   std::vector<SceneRouteInputs> routes;
   for (const auto& route : spec.personalize_scenes().routes()) {
-    routes.push_back(LoadRoute(parts, route));
+    routes.push_back(LoadRoute(store, route));
   }
   return PlanPersonalizeScenes(spec, routes);
 }
 
-JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& request) {
+JobRecord CreateJobRecord(const RpcParts& parts,
+                          const Call& call,
+                          const v1::CreateJobRequest& request) {
+  const ProjectStore& store = call.store;
   const RequestKey key = KeyOf("CreateJob", request);
-  if (const auto existing = parts.store.FindRequest(key)) return parts.store.GetJob(*existing);
+  if (const auto existing = store.FindRequest(key)) return store.GetJob(*existing);
   RequireNotDraining(parts);
   if (!request.has_spec()) throw InvalidArgument("spec is required");
   v1::JobSpec spec = request.spec();
@@ -127,18 +143,30 @@ JobRecord CreateJobRecord(const RpcParts& parts, const v1::CreateJobRequest& req
   if (priority < 0 || priority > 1000) {
     throw InvalidArgument("priority is {}; the range is 0 to 1000", priority);
   }
+  if (!request.notify_url().empty()) CheckNotifyUrl(request.notify_url(), parts.notify_allowed);
+  RequireRoomOnDisk(parts, store);
   CheckSpec(spec);
   CheckNames(spec, parts.models);
-  CheckBlobs(parts, spec);
-  NewGraph graph = PlanRequest(parts, spec);
+  CheckBlobs(parts, store, spec);
+  NewGraph graph = PlanRequest(store, spec);
   graph.priority = priority;
-  JobRecord job = parts.store.CreateGraph(graph, key, parts.limits.max_unfinished_jobs);
+  graph.notify_url = request.notify_url();
+  JobRecord job = store.CreateGraph(graph, key, LimitsOfQueue(parts));
   spdlog::info(
       "[job={}] accepted {} of {} ({} jobs)", job.name, job.kind, job.scene, graph.jobs.size());
   return job;
 }
 
-void ListJobPage(const RpcParts& parts,
+// With its place in the queue.
+v1::Job ToWaitingProto(const ProjectStore& store, const JobRecord& job) {
+  v1::Job proto = ToProto(job);
+  const QueuePlace place = store.PlaceInQueue(job);
+  proto.set_queue_position(static_cast<int>(place.position));
+  proto.set_waits_for(place.waits_for);
+  return proto;
+}
+
+void ListJobPage(const ProjectStore& store,
                  const v1::ListJobsRequest& request,
                  v1::ListJobsResponse* response) {
   JobFilter filter;
@@ -153,8 +181,8 @@ void ListJobPage(const RpcParts& parts,
       request,
       "jobs of " + request.parent(),
       response,
-      [&](int64_t before_id, int limit) { return parts.store.ListJobs(filter, before_id, limit); },
-      [&](const JobRecord& job) { *response->add_jobs() = ToProto(job); });
+      [&](int64_t before_id, int limit) { return store.ListJobs(filter, before_id, limit); },
+      [&](const JobRecord& job) { *response->add_jobs() = ToWaitingProto(store, job); });
 }
 
 }  // namespace
@@ -162,59 +190,84 @@ void ListJobPage(const RpcParts& parts,
 grpc::ServerUnaryReactor* JobServiceImpl::CreateJob(grpc::CallbackServerContext* context,
                                                     const v1::CreateJobRequest* request,
                                                     v1::Job* response) {
-  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
-    *out = ToProto(CreateJobRecord(parts_, in));
-  });
+  return AnswerWrite(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
+        *out = ToProto(CreateJobRecord(parts_, call, in));
+      });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::GetJob(grpc::CallbackServerContext* context,
                                                  const v1::GetJobRequest* request,
                                                  v1::Job* response) {
-  return AnswerRead(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
-    CheckName(in.name(), "jobs");
-    *out = ToProto(parts_.store.GetJob(in.name()));
-  });
+  return AnswerRead(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
+        CheckName(in.name(), "jobs");
+        *out = ToWaitingProto(call.store, call.store.GetJob(in.name()));
+      });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::ListJobs(grpc::CallbackServerContext* context,
                                                    const v1::ListJobsRequest* request,
                                                    v1::ListJobsResponse* response) {
-  return AnswerRead(
-      parts_, context, request, response, [this](const auto& in, v1::ListJobsResponse* out) {
-        ListJobPage(parts_, in, out);
-      });
+  return AnswerRead(parts_,
+                    context,
+                    request,
+                    response,
+                    [this](const Call& call, const auto& in, v1::ListJobsResponse* out) {
+                      ListJobPage(call.store, in, out);
+                    });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext* context,
                                                     const v1::CancelJobRequest* request,
                                                     v1::Job* response) {
-  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
-    CheckName(in.name(), "jobs");
-    *out = ToProto(parts_.store.Cancel(in.name(), KeyOf("CancelJob", in)));
-    spdlog::info("[job={}] cancellation asked for", in.name());
-  });
+  return AnswerWrite(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
+        CheckName(in.name(), "jobs");
+        *out = ToProto(call.store.Cancel(in.name(), KeyOf("CancelJob", in)));
+        spdlog::info("[job={}] cancellation asked for", in.name());
+      });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* context,
                                                    const v1::RetryJobRequest* request,
                                                    v1::Job* response) {
-  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Job* out) {
-    CheckName(in.name(), "jobs");
-    RequireNotDraining(parts_);
-    *out = ToProto(parts_.store.Retry(
-        in.name(), in.from_scratch(), KeyOf("RetryJob", in), parts_.limits.max_unfinished_jobs));
-    spdlog::info("[job={}] retried", in.name());
-  });
+  return AnswerWrite(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
+        CheckName(in.name(), "jobs");
+        RequireNotDraining(parts_);
+        *out = ToProto(call.store.Retry(
+            in.name(), in.from_scratch(), KeyOf("RetryJob", in), LimitsOfQueue(parts_)));
+        spdlog::info("[job={}] retried", in.name());
+      });
 }
 
 grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext* context,
                                                     const v1::DeleteJobRequest* request,
                                                     v1::DeleteJobResponse* response) {
+  return AnswerWrite(parts_,
+                     context,
+                     request,
+                     response,
+                     [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
+                       CheckName(in.name(), "jobs");
+                       call.store.Delete(in.name(), KeyOf("DeleteJob", in));
+                     });
+}
+
+grpc::ServerUnaryReactor* JobServiceImpl::PinJob(grpc::CallbackServerContext* context,
+                                                 const v1::PinJobRequest* request,
+                                                 v1::Job* response) {
   return AnswerWrite(
-      parts_, context, request, response, [this](const auto& in, v1::DeleteJobResponse*) {
+      parts_, context, request, response, [](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
-        parts_.store.Delete(in.name(), KeyOf("DeleteJob", in));
+        *out = ToProto(call.store.Pin(in.name(), in.pinned()));
       });
+}
+
+grpc::ServerWriteReactor<v1::JobLogChunk>* JobServiceImpl::ReadJobLog(
+    grpc::CallbackServerContext* context, const v1::ReadJobLogRequest* request) {
+  return StreamJobLog(parts_, *context, *request);
 }
 
 grpc::ServerWriteReactor<v1::JobEvent>* JobServiceImpl::WatchJobs(

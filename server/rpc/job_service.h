@@ -29,6 +29,11 @@ class JobServiceImpl final : public v1::JobService::CallbackService {
   grpc::ServerUnaryReactor* DeleteJob(grpc::CallbackServerContext* context,
                                       const v1::DeleteJobRequest* request,
                                       v1::DeleteJobResponse* response) override;
+  grpc::ServerUnaryReactor* PinJob(grpc::CallbackServerContext* context,
+                                   const v1::PinJobRequest* request,
+                                   v1::Job* response) override;
+  grpc::ServerWriteReactor<v1::JobLogChunk>* ReadJobLog(
+      grpc::CallbackServerContext* context, const v1::ReadJobLogRequest* request) override;
   grpc::ServerWriteReactor<v1::JobEvent>* WatchJobs(grpc::CallbackServerContext* context,
                                                     const v1::WatchJobsRequest* request) override;
 

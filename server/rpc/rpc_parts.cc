@@ -1,9 +1,13 @@
 #include "server/rpc/rpc_parts.h"
 
+#include <fmt/core.h>
+
 #include <cctype>
+#include <set>
 
 #include "core/base/digest.h"
 #include "server/planning/job_spec.h"
+#include "server/service_error.h"
 
 namespace color3d {
 
@@ -20,6 +24,53 @@ void CheckRequestId(const std::string& request_id) {
         "request_id '{}' is not a UUID, e.g. 3f0c9a52-7e4b-4c1d-9b1e-2f6d8a7c5b40",
         request_id.substr(0, 80));
   }
+}
+
+Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context) {
+  const Caller caller = parts.access.Require(role, context);
+  return {caller, ProjectStore(parts.store, caller.project)};
+}
+
+bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest& blob) {
+  return store.HoldsBlob(blob) && parts.blobs.Touch(blob);
+}
+
+void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes) {
+  const int64_t most = parts.limits.project_max_stored_bytes;
+  if (most == 0) return;
+  const int64_t stored = store.Usage().stored_bytes;
+  if (stored + more_bytes <= most) return;
+  throw ServiceError(
+      ErrorCode::kResourceExhausted,
+      "QUOTA_EXCEEDED",
+      fmt::format("your project has {} MiB on the server and {} MiB would come, at most {} MiB are "
+                  "allowed; delete jobs and scenes that you need no more",
+                  stored >> 20,
+                  more_bytes >> 20,
+                  most >> 20),
+      {{"project:" + store.project() + " stored_bytes", fmt::format("{} of {}", stored, most)}});
+}
+
+QueueLimits LimitsOfQueue(const RpcParts& parts) {
+  const int of_project = parts.limits.project_max_unfinished_jobs;
+  return {parts.limits.max_unfinished_jobs, of_project > 0 ? of_project : INT64_MAX};
+}
+
+v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limits) {
+  v1::ProjectUsage usage;
+  usage.set_project(project.name);
+  usage.set_stored_bytes(project.stored_bytes);
+  usage.set_max_stored_bytes(limits.project_max_stored_bytes);
+  usage.set_unfinished_jobs(project.unfinished_jobs);
+  usage.set_max_unfinished_jobs(limits.project_max_unfinished_jobs);
+  return usage;
+}
+
+std::string WhyHeld(const RpcParts& parts) {
+  const std::set<Hold> holds = parts.store.Holds();
+  if (holds.contains(Hold::kPaused)) return "the operator has paused the queue";
+  if (holds.contains(Hold::kStorage)) return "the disk is nearly full";
+  return "";
 }
 
 std::string DigestOfMessage(const google::protobuf::Message& message) {

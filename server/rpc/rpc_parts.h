@@ -7,12 +7,14 @@
 
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "color3d/v1/server.pb.h"
 #include "server/rpc/access.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/executor.h"
@@ -20,6 +22,7 @@
 #include "server/storage/blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/job_store.h"
+#include "server/store/project_store.h"
 #include "server/store/user_models.h"
 
 namespace color3d {
@@ -35,6 +38,10 @@ struct ServiceLimits {
   int max_watches = 1'000;
   int max_reads = 256;
   int max_writes = 128;
+  // Of each project; 0: no limit but those above.
+  int project_max_unfinished_jobs = 0;
+  int64_t project_max_stored_bytes = 0;
+  int project_max_streams = 0;  // of each kind
 };
 
 // What a backend said of itself, or why it did not.
@@ -54,7 +61,7 @@ struct StreamLimits {
 };
 
 struct RpcParts {
-  JobStore& store;
+  JobStore& store;  // of all projects; clients see theirs by Call::store
   BlobStore& blobs;
   UploadStore& uploads;
   Executor& quick;  // reads of the job store and of the disk's cache: what answers GetJob
@@ -68,10 +75,30 @@ struct RpcParts {
   UserModels models;
   FileDigests& digests;
   BackendProbe probe_backends;
+  std::filesystem::path job_logs;           // folder; empty: there are none
+  std::vector<std::string> notify_allowed;  // as CheckNotifyUrl
+  std::function<void()> drain;              // asks the program to end
 };
 
-// Answers a unary call from that executor, where the caller has the role: `body(request, response)`
-// may block and throw.
+// One call of somebody who may make it, and what his project sees.
+struct Call {
+  Caller caller;
+  ProjectStore store;
+};
+// Throws as Access::Require.
+Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context);
+
+// Whether the project holds the blob and it is there; it then stays for the time of grace.
+bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest& blob);
+// Throws QUOTA_EXCEEDED where the project would have more bytes than it may.
+void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes);
+QueueLimits LimitsOfQueue(const RpcParts& parts);
+v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limits);
+// Why workers are given no job, for people; empty: they are.
+std::string WhyHeld(const RpcParts& parts);
+
+// Answers a unary call from that executor, where the caller has the role:
+// `body(call, request, response)` may block and throw.
 template <typename Request, typename Response, typename Body>
 grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Executor& executor,
@@ -82,10 +109,7 @@ grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Body body) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const bool accepted = executor.TryPost([&parts, role, context, reactor, request, response, body] {
-    reactor->Finish(Guard([&] {
-      parts.access.Require(role, *context);
-      body(*request, response);
-    }));
+    reactor->Finish(Guard([&] { body(Admit(parts, role, *context), *request, response); }));
   });
   if (!accepted) reactor->Finish(OverloadedStatus());
   return reactor;

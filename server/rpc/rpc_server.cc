@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "core/base/address.h"
+#include "server/rpc/admin_service.h"
 #include "server/rpc/blob_service.h"
 #include "server/rpc/info_services.h"
 #include "server/rpc/job_service.h"
@@ -59,13 +60,15 @@ struct RpcServer::Services {
         bytes(parts),
         jobs(parts, hub),
         colorizers(parts, colorize_hub),
-        server(parts) {}
+        server(parts),
+        admin(parts) {}
   SceneServiceImpl scenes;
   BlobServiceImpl blobs;
   ByteStreamServiceImpl bytes;
   JobServiceImpl jobs;
   ColorizerServiceImpl colorizers;
   ServerServiceImpl server;
+  AdminServiceImpl admin;
 };
 
 RpcServer::RpcServer(const RpcServerOptions& options,
@@ -77,9 +80,10 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   digests_ = std::make_unique<FileDigests>();
   quick_ = std::make_unique<Executor>(options.quick_threads);
   slow_ = std::make_unique<Executor>(options.slow_threads);
-  streams_.reset(new StreamLimits{{"watches", options.limits.max_watches},
-                                  {"downloads", options.limits.max_reads},
-                                  {"uploads", options.limits.max_writes}});
+  const int of_project = options.limits.project_max_streams;
+  streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project},
+                                  {"downloads", options.limits.max_reads, of_project},
+                                  {"uploads", options.limits.max_writes, of_project}});
   access_ = std::make_unique<Access>(options.tokens);
   parts_.reset(new RpcParts{store,
                             blobs,
@@ -94,7 +98,10 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             options.version,
                             options.models,
                             *digests_,
-                            options.probe_backends});
+                            options.probe_backends,
+                            options.job_logs,
+                            options.notify_allowed,
+                            options.drain});
   hub_ = std::make_unique<WatchHub>(*parts_, options.watch);
   colorize_hub_ = std::make_unique<ColorizeHub>(*parts_, options.inference, options.live);
   services_ = std::make_unique<Services>(*parts_, *hub_, *colorize_hub_);
@@ -116,7 +123,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                                  static_cast<grpc::Service*>(&services_->bytes),
                                  static_cast<grpc::Service*>(&services_->jobs),
                                  static_cast<grpc::Service*>(&services_->colorizers),
-                                 static_cast<grpc::Service*>(&services_->server)}) {
+                                 static_cast<grpc::Service*>(&services_->server),
+                                 static_cast<grpc::Service*>(&services_->admin)}) {
     builder.RegisterService(service);
   }
   server_ = builder.BuildAndStart();

@@ -26,7 +26,10 @@ struct RpcServerOptions {
   WatchTiming watch;
   std::string version = "0";
   UserModels models;
-  BackendProbe probe_backends;  // may be empty: then backends are listed unprobed
+  BackendProbe probe_backends;              // may be empty: then backends are listed unprobed
+  std::filesystem::path job_logs;           // folder of DataPaths::JobLogs; empty: there are none
+  std::vector<std::string> notify_allowed;  // as CheckNotifyUrl
+  std::function<void()> drain = [] {};      // what AdminService.Drain does
   InferenceLink inference;
   ColorizeLimits live;
 };

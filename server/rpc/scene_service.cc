@@ -70,31 +70,37 @@ SceneRecord ToRecord(const v1::CreateSceneRequest& request, const ServiceLimits&
 grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerContext* context,
                                                         const v1::CreateSceneRequest* request,
                                                         v1::Scene* response) {
-  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
-    const RequestKey key = KeyOf("CreateScene", in);
-    *out = ToProto(parts_.store.CreateScene(ToRecord(in, parts_.limits), key));
-  });
+  return AnswerWrite(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
+        const RequestKey key = KeyOf("CreateScene", in);
+        *out = ToProto(call.store.CreateScene(ToRecord(in, parts_.limits), key));
+      });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::GetScene(grpc::CallbackServerContext* context,
                                                      const v1::GetSceneRequest* request,
                                                      v1::Scene* response) {
-  return AnswerRead(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
-    CheckName(in.name(), "scenes");
-    *out = ToProto(parts_.store.GetScene(in.name()));
-  });
+  return AnswerRead(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
+        CheckName(in.name(), "scenes");
+        *out = ToProto(call.store.GetScene(in.name()));
+      });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerContext* context,
                                                        const v1::ListScenesRequest* request,
                                                        v1::ListScenesResponse* response) {
   return AnswerRead(
-      parts_, context, request, response, [this](const auto& in, v1::ListScenesResponse* out) {
+      parts_,
+      context,
+      request,
+      response,
+      [this](const Call& call, const auto& in, v1::ListScenesResponse* out) {
         AnswerPage(
             in,
             "scenes",
             out,
-            [&](int64_t before_id, int limit) { return parts_.store.ListScenes(before_id, limit); },
+            [&](int64_t before_id, int limit) { return call.store.ListScenes(before_id, limit); },
             [&](const SceneRecord& scene) { *out->add_scenes() = ToProto(scene); });
       });
 }
@@ -102,37 +108,42 @@ grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerConte
 grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerContext* context,
                                                         const v1::CommitSceneRequest* request,
                                                         v1::Scene* response) {
-  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
-    CheckName(in.name(), "scenes");
-    const RequestKey key = KeyOf("CommitScene", in);
-    const SceneRecord scene = parts_.store.GetScene(in.name());
-    if (scene.state == SceneState::kActive) {  // committed before: immutable, nothing to check
-      *out = ToProto(scene);
-      return;
-    }
-    const SceneCheck check = CheckScene(scene, parts_.blobs, parts_.limits);
-    *out = ToProto(parts_.store.ActivateScene(scene.name, check.layout, check.photo_count, key));
-  });
+  return AnswerWrite(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
+        CheckName(in.name(), "scenes");
+        const RequestKey key = KeyOf("CommitScene", in);
+        const SceneRecord scene = call.store.GetScene(in.name());
+        if (scene.state == SceneState::kActive) {  // committed before: immutable, nothing to check
+          *out = ToProto(scene);
+          return;
+        }
+        const SceneCheck check = CheckScene(scene, parts_.blobs, call.store, parts_.limits);
+        *out = ToProto(call.store.ActivateScene(scene.name, check.layout, check.photo_count, key));
+      });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::AcceptKeyColor(grpc::CallbackServerContext* context,
                                                            const v1::AcceptKeyColorRequest* request,
                                                            v1::Scene* response) {
-  return AnswerWrite(parts_, context, request, response, [this](const auto& in, v1::Scene* out) {
-    CheckName(in.name(), "scenes");
-    if (!in.job().empty()) CheckName(in.job(), "jobs");
-    *out = ToProto(parts_.store.AcceptKeyColor(in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
-  });
+  return AnswerWrite(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
+        CheckName(in.name(), "scenes");
+        if (!in.job().empty()) CheckName(in.job(), "jobs");
+        *out = ToProto(call.store.AcceptKeyColor(in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
+      });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::DeleteScene(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSceneRequest* request,
                                                         v1::DeleteSceneResponse* response) {
-  return AnswerWrite(
-      parts_, context, request, response, [this](const auto& in, v1::DeleteSceneResponse*) {
-        CheckName(in.name(), "scenes");
-        parts_.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
-      });
+  return AnswerWrite(parts_,
+                     context,
+                     request,
+                     response,
+                     [this](const Call& call, const auto& in, v1::DeleteSceneResponse*) {
+                       CheckName(in.name(), "scenes");
+                       call.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
+                     });
 }
 
 }  // namespace color3d

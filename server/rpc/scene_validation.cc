@@ -126,10 +126,11 @@ bool HasFrames(const std::vector<SceneFileRecord>& files) {
 // One file's violations; counts it when it is a good photograph.
 void CheckFile(const SceneFileRecord& file,
                const BlobStore& blobs,
+               const std::set<std::string>& held,
                const ServiceLimits& limits,
                SceneCheck* check,
                std::vector<FieldViolation>* violations) {
-  if (!blobs.Touch(file.digest)) {
+  if (!held.contains(file.digest.sha256) || !blobs.Touch(file.digest)) {
     violations->push_back(
         {file.path, fmt::format("was not uploaded (blob {})", file.digest.sha256)});
     return;
@@ -201,8 +202,12 @@ StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
 
 SceneCheck CheckScene(const SceneRecord& scene,
                       const BlobStore& blobs,
+                      const ProjectStore& store,
                       const ServiceLimits& limits) {
   SceneCheck check;
+  std::vector<std::string> named;
+  for (const SceneFileRecord& file : scene.files) named.push_back(file.digest.sha256);
+  const std::set<std::string> held = store.HeldBlobs(named);
   std::vector<FieldViolation> violations;
   check.layout = DetectLayout(scene.files);
   const auto folders = ModelFolders(scene.files);
@@ -218,7 +223,7 @@ SceneCheck CheckScene(const SceneRecord& scene,
   size_t missing = 0;
   for (const SceneFileRecord& file : scene.files) {
     const size_t before = violations.size();
-    CheckFile(file, blobs, limits, &check, &violations);
+    CheckFile(file, blobs, held, limits, &check, &violations);
     missing += violations.size() - before;
   }
   if (check.layout == StoredLayout::kSplat) {

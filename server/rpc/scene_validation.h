@@ -13,10 +13,11 @@ struct SceneCheck {
   int photo_count = 0;
 };
 
-// Throws ServiceError{kInvalidArgument, SCENE_INVALID} with one violation for each bad file; its
-// message names the first three and counts the rest.
+// Of blobs that the project of `store` holds. Throws ServiceError{kInvalidArgument, SCENE_INVALID}
+// with one violation for each bad file; its message names the first three and counts the rest.
 SceneCheck CheckScene(const SceneRecord& scene,
                       const BlobStore& blobs,
+                      const ProjectStore& store,
                       const ServiceLimits& limits);
 
 // Which kind of input the paths look like; COLMAP wins over other poses.

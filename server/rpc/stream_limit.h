@@ -1,7 +1,9 @@
-// How many streams of a kind may be open at once. Thread-safe.
+// How many streams of a kind may be open at once, in all and of one project. Thread-safe.
 #pragma once
 
-#include <atomic>
+#include <map>
+#include <mutex>
+#include <string>
 #include <utility>
 
 #include "server/service_error.h"
@@ -10,43 +12,70 @@ namespace color3d {
 
 class StreamLimit {
  public:
-  // `what`, in the plural, is for the message.
-  StreamLimit(const char* what, int max) : what_(what), max_(max) {}
+  // `what`, in the plural, is for the message. `max_of_project` 0: no limit of its own.
+  StreamLimit(const char* what, int max, int max_of_project)
+      : what_(what), max_(max), max_of_project_(max_of_project) {}
 
   // One open stream; its place is free again when this is destroyed.
   class Place {
    public:
     Place() = default;
-    explicit Place(std::atomic<int>* open) : open_(open) {}
+    Place(StreamLimit* limit, std::string project) : limit_(limit), project_(std::move(project)) {}
     ~Place() {
-      if (open_ != nullptr) --*open_;
+      if (limit_ != nullptr) limit_->Free(project_);
     }
-    Place(Place&& other) noexcept : open_(std::exchange(other.open_, nullptr)) {}
+    Place(Place&& other) noexcept
+        : limit_(std::exchange(other.limit_, nullptr)), project_(std::move(other.project_)) {}
     Place& operator=(Place&& other) noexcept {
-      std::swap(open_, other.open_);
+      std::swap(limit_, other.limit_);
+      std::swap(project_, other.project_);
       return *this;
     }
 
    private:
-    std::atomic<int>* open_ = nullptr;
+    StreamLimit* limit_ = nullptr;
+    std::string project_;
   };
 
-  // Throws Error{kResourceExhausted, TOO_MANY_STREAMS}.
-  Place Take() {
-    Place place(&open_);
-    if (++open_ <= max_) return place;
-    throw ServiceError(ErrorCode::kResourceExhausted,
-                       "TOO_MANY_STREAMS",
-                       "{} {} are open, which is as many as this server allows; close some, or try "
-                       "again later",
-                       max_,
-                       what_);
+  // Throws Error{kResourceExhausted}: TOO_MANY_STREAMS, or QUOTA_EXCEEDED of the project.
+  Place Take(const std::string& project) {
+    std::lock_guard lock(mutex_);
+    const auto of_project = open_.find(project);
+    const int own = of_project == open_.end() ? 0 : of_project->second;
+    if (max_of_project_ > 0 && own >= max_of_project_) {
+      throw ServiceError(
+          ErrorCode::kResourceExhausted,
+          "QUOTA_EXCEEDED",
+          fmt::format("{} {} of your project are open, which is as many as it may have; close some",
+                      own,
+                      what_),
+          {{"project:" + project + " " + what_, fmt::format("{} of {}", own, max_of_project_)}});
+    }
+    if (all_ >= max_) {
+      throw ServiceError(ErrorCode::kResourceExhausted,
+                         "TOO_MANY_STREAMS",
+                         "{} {} are open, which is as many as this server allows; close some, or "
+                         "try again later",
+                         max_,
+                         what_);
+    }
+    ++all_;
+    ++open_[project];
+    return Place(this, project);
   }
 
  private:
+  void Free(const std::string& project) {
+    std::lock_guard lock(mutex_);
+    --all_;
+    if (--open_[project] == 0) open_.erase(project);
+  }
+
   const char* what_;
-  const int max_;
-  std::atomic<int> open_{0};
+  const int max_, max_of_project_;
+  std::mutex mutex_;
+  int all_ = 0;
+  std::map<std::string, int> open_;  // by project
 };
 
 }  // namespace color3d

@@ -27,11 +27,14 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       : hub_(hub), parts_(hub.parts_), request_(request) {}
 
   // Keeps itself alive until OnDone; the executor and the hub hold references too.
-  // `allowed`: whether it may begin.
-  void Start(const std::shared_ptr<JobWatcher>& self, const grpc::Status& allowed) {
+  // `store`: what the caller sees, where he is `allowed` to begin.
+  void Start(const std::shared_ptr<JobWatcher>& self,
+             const grpc::Status& allowed,
+             std::optional<ProjectStore> store) {
     self_ = self;
     hub_.Register(self);
     if (!allowed.ok()) return End(allowed);
+    store_ = std::move(store);
     parts_.quick.Post([self] { self->Begin(); });
   }
 
@@ -99,7 +102,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   // On the executor: checks the request, then sends the present state or goes on from a revision.
   void Begin() {
     const grpc::Status status = Guard([&] {
-      place_ = parts_.streams.watches.Take();
+      place_ = parts_.streams.watches.Take(store_->project());
       const int interval =
           request_.has_min_progress_interval_ms() ? request_.min_progress_interval_ms() : 500;
       if (interval < 50 || interval > 60'000) {
@@ -111,9 +114,9 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       if (request_.after_revision() < 0) throw InvalidArgument("after_revision is negative");
       for (const std::string& name : request_.names()) CheckName(name, "jobs");
       const std::vector<int64_t> ids =
-          parts_.store.ResolveWatch({request_.names().begin(), request_.names().end()});
+          store_->ResolveWatch({request_.names().begin(), request_.names().end()});
       JobsSnapshot snapshot;
-      if (request_.after_revision() == 0) snapshot = parts_.store.Snapshot(ids);
+      if (request_.after_revision() == 0) snapshot = store_->Snapshot(ids);
       std::lock_guard lock(mutex_);
       interval_ = std::chrono::milliseconds(interval);
       ids_ = ids;
@@ -171,7 +174,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   std::map<int64_t, JobRecord> Jobs(const std::vector<int64_t>& ids) const {
     std::map<int64_t, JobRecord> jobs;
     if (ids.empty()) return jobs;
-    for (JobRecord& job : parts_.store.Snapshot(ids).jobs) {
+    for (JobRecord& job : store_->Snapshot(ids).jobs) {
       const int64_t id = job.id;
       jobs.emplace(id, std::move(job));
     }
@@ -317,6 +320,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   std::map<int64_t, SteadyClock::time_point> progress_sent_;
   SteadyClock::time_point last_write_;
   std::optional<grpc::Status> end_;
+  std::optional<ProjectStore> store_;
   bool begun_ = false;
   bool dirty_ = false;
   bool fetching_ = false;
@@ -343,7 +347,9 @@ WatchHub::~WatchHub() {
 grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const grpc::CallbackServerContext& context,
                                                         const v1::WatchJobsRequest& request) {
   auto watcher = std::make_shared<JobWatcher>(*this, request);
-  watcher->Start(watcher, Guard([&] { parts_.access.Require(Role::kRead, context); }));
+  std::optional<ProjectStore> store;
+  const grpc::Status allowed = Guard([&] { store = Admit(parts_, Role::kRead, context).store; });
+  watcher->Start(watcher, allowed, store);
   bool draining = false;
   {
     std::lock_guard lock(mutex_);

@@ -19,7 +19,7 @@ void PrepareDataFolder(const DataPaths& paths) {
   std::error_code error;
   const bool is_fresh = !fs::exists(paths.root, error);
   for (const fs::path& folder :
-       {paths.root, paths.Blobs(), paths.Uploads(), paths.Scratch(), paths.Logs()}) {
+       {paths.root, paths.Blobs(), paths.Uploads(), paths.Scratch(), paths.JobLogs()}) {
     fs::create_directories(folder, error);
     if (error || !fs::is_directory(folder)) {
       throw Error(ErrorCode::kFailedPrecondition,

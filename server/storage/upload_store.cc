@@ -57,19 +57,18 @@ UploadStore::UploadStore(const fs::path& folder, BlobStore& blobs, int64_t max_b
 }
 
 fs::path UploadStore::PartPath(const UploadName& name) const {
-  return folder_ / (name.uuid + "." + name.digest.sha256 + "." +
-                    std::to_string(name.digest.size_bytes) + ".part");
+  return folder_ / (name.uuid + (name.owner.empty() ? "" : "@") + name.owner + "." +
+                    name.digest.sha256 + "." + std::to_string(name.digest.size_bytes) + ".part");
 }
 
-UploadStatus UploadStore::Status(const UploadName& name) {
+int64_t UploadStore::CommittedSize(const UploadName& name) {
   CheckName(name, max_blob_bytes_);
-  if (blobs_.Touch(name.digest)) return {name.digest.size_bytes, true};
   const int fd = ::open(PartPath(name).c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return {0, false};
+  if (fd < 0) return 0;
   struct stat status {};
   const bool known = ::fsync(fd) == 0 && ::fstat(fd, &status) == 0;
   ::close(fd);
-  return {known ? static_cast<int64_t>(status.st_size) : 0, false};
+  return known ? static_cast<int64_t>(status.st_size) : 0;
 }
 
 std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name, int64_t offset) {

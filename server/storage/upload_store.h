@@ -1,5 +1,5 @@
-// Resumable uploads into the blob store: uploads/<uuid>.<sha256>.<size>.part grows until it is
-// whole; the digest is then verified and the file becomes a blob. Thread-safe.
+// Resumable uploads into the blob store: uploads/<uuid>[@project].<sha256>.<size>.part grows until
+// it is whole; the digest is then verified and the file becomes a blob. Thread-safe.
 #pragma once
 
 #include <chrono>
@@ -19,19 +19,16 @@ namespace color3d {
 struct UploadName {
   std::string uuid;  // chosen by the client: letters, digits, '-', 1 to 64 of them
   FileDigest digest;
-};
-
-struct UploadStatus {
-  int64_t committed_size = 0;
-  bool complete = false;
+  std::string owner = {};  // project: uploads of others are not gone on with
 };
 
 class UploadStore {
  public:
   UploadStore(const std::filesystem::path& folder, BlobStore& blobs, int64_t max_blob_bytes);
 
-  // Bytes that survive a crash (synced before they are reported); 0 for an unknown upload.
-  UploadStatus Status(const UploadName& name);
+  // Bytes of an unfinished upload that survive a crash (synced before they are reported); 0 for one
+  // that is unknown or has become a blob.
+  int64_t CommittedSize(const UploadName& name);
 
   // One open write. A second Open of the same upload takes it over: the client has reconnected, and
   // the older writer gets Error{kAborted}.
@@ -61,8 +58,8 @@ class UploadStore {
     int64_t size_ = 0;
     SpaceReservation space_;  // for what is still to come
   };
-  // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). Check Status first: a
-  // complete upload cannot be opened again, but needs no writing either.
+  // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). A blob that is there
+  // need not be written again.
   std::unique_ptr<Writer> Open(const UploadName& name, int64_t offset);
 
   // Removes uploads that nobody writes and that have not grown for `age`; returns how many.

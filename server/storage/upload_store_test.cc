@@ -10,12 +10,12 @@ using UploadStoreTest = StorageTest;
 
 TEST_F(UploadStoreTest, UploadResumesWhereItStopped) {
   const UploadName name{"3f0c", DigestOf("hello world")};
-  EXPECT_EQ(uploads_.Status(name).committed_size, 0);
+  EXPECT_EQ(uploads_.CommittedSize(name), 0);
   {
     auto writer = uploads_.Open(name, 0);
     writer->Append(0, "hello");
   }  // the connection breaks
-  EXPECT_EQ(uploads_.Status(name).committed_size, 5);
+  EXPECT_EQ(uploads_.CommittedSize(name), 5);
   EXPECT_EQ(ReasonThrown([&] { uploads_.Open(name, 0); }), "OFFSET_MISMATCH");
   auto writer = uploads_.Open(name, 5);
   writer->Append(5, " wor");
@@ -24,7 +24,7 @@ TEST_F(UploadStoreTest, UploadResumesWhereItStopped) {
   writer->Append(9, "ld");
   EXPECT_EQ(ReasonThrown([&] { writer->Append(11, "!"); }), "SIZE_MISMATCH");
   writer->Finish();
-  EXPECT_TRUE(uploads_.Status(name).complete);
+  EXPECT_TRUE(blobs_.Touch(name.digest));
   EXPECT_EQ(ReadFile(blobs_.Fetch(name.digest.sha256)), "hello world");
   EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());
 }
@@ -36,7 +36,7 @@ TEST_F(UploadStoreTest, WrongBytesAreDropped) {
   EXPECT_EQ(ReasonThrown([&] { writer->Finish(); }), "DIGEST_MISMATCH");
   writer.reset();
   EXPECT_FALSE(blobs_.Touch(name.digest));
-  EXPECT_EQ(uploads_.Status(name).committed_size, 0) << "starts afresh";
+  EXPECT_EQ(uploads_.CommittedSize(name), 0) << "starts afresh";
 }
 
 TEST_F(UploadStoreTest, ReconnectedClientTakesItsUploadOver) {
@@ -68,13 +68,13 @@ TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
     MakeOld(scratch_.path() / "uploads" / file, 25);
   }
   EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)), 1);
-  EXPECT_EQ(uploads_.Status(name).committed_size, 0);
+  EXPECT_EQ(uploads_.CommittedSize(name), 0);
 }
 
 TEST_F(UploadStoreTest, EmptyBlobs) {
   const UploadName name{"u", DigestOf("")};
   uploads_.Open(name, 0)->Finish();
-  EXPECT_TRUE(uploads_.Status(name).complete);
+  EXPECT_TRUE(blobs_.Touch(name.digest));
 }
 
 }  // namespace

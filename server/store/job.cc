@@ -47,6 +47,12 @@ JobState JobStateFromName(std::string_view name) {
               name);
 }
 
+std::string StoredScene(const std::string& name, const std::string& project) {
+  return name.empty() || project.empty() ? name : name + '@' + project;
+}
+
+std::string PublicScene(const std::string& stored) { return stored.substr(0, stored.find('@')); }
+
 std::string NewId() {
   unsigned char bytes[8];
   size_t have = 0;

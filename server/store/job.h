@@ -72,8 +72,9 @@ struct JobRecord {
   std::string name;    // "jobs/..."
   std::string parent;  // name of the submitted job that this one was made for; empty: submitted
   std::string kind;
-  std::string scene;  // "scenes/..."
+  std::string scene;  // "scenes/...", as StoredScene makes it
   std::string spec;   // opaque bytes of the job's options
+  std::string project;
   JobState state = JobState::kBlocked;
   bool cancel_requested = false;
   int priority = 100;
@@ -87,7 +88,11 @@ struct JobRecord {
   std::string skip_reason;
   bool skipped_by_plan = false;  // at creation; not because an input failed
   bool cached = false;
+  bool pinned = false;
+  std::string notify_url;  // told when it has ended; empty: nobody
   std::optional<FileDigest> checkpoint;
+  int64_t queued_ms = 0;        // waited for a worker, until the present wait began
+  int64_t queued_since_ms = 0;  // 0: does not wait for one
   int64_t create_ms = 0;
   int64_t start_ms = 0;  // 0: not yet
   int64_t end_ms = 0;
@@ -121,7 +126,8 @@ struct SceneFileRecord {
 
 struct SceneRecord {
   int64_t id = 0;
-  std::string name;  // "scenes/..."
+  std::string name;  // "scenes/...", as StoredScene makes it
+  std::string project;
   std::string display_name;
   SceneState state = SceneState::kUploading;
   StoredLayout layout = StoredLayout::kUnknown;
@@ -138,6 +144,18 @@ struct WorkerRecord {
   std::string job;  // empty: idle
   int64_t memory_bytes = 0;
   int64_t heartbeat_ms = 0;
+};
+
+// Scenes of different projects may have the same name: a scene of a project is stored under
+// "scenes/ID@PROJECT", one of those without a project as it is named.
+std::string StoredScene(const std::string& name, const std::string& project);
+// As its owners name it.
+std::string PublicScene(const std::string& stored);
+
+struct ProjectRecord {
+  std::string name;          // empty: of all without a project
+  int64_t stored_bytes = 0;  // of the blobs that it holds
+  int64_t unfinished_jobs = 0;
 };
 
 // 16 random lower-case hexadecimal digits, from the system's random source.

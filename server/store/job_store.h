@@ -26,7 +26,7 @@ struct RequestKey {
 
 struct NewJob {
   std::string kind;
-  std::string scene;  // empty: the graph's
+  std::string scene;  // stored; empty: the graph's
   std::string spec;
   std::vector<int> inputs;              // positions in NewGraph::jobs, all smaller than its own
   std::vector<std::string> input_jobs;  // names of jobs that exist
@@ -36,14 +36,46 @@ struct NewJob {
 
 // The submitted job is the last one; all others become its children.
 struct NewGraph {
-  std::string scene;
+  std::string project;
+  std::string scene;  // stored
+  std::string notify_url;
   int priority = 100;
   std::vector<NewJob> jobs;
 };
 
+// How many jobs may wait or run.
+struct QueueLimits {
+  QueueLimits(int64_t of_all, int64_t of_one_project = INT64_MAX)  // NOLINT: a number is one
+      : all(of_all), of_project(of_one_project) {}
+  int64_t all;
+  int64_t of_project;
+};
+
 struct JobFilter {
-  std::string parent;  // "jobs/..."
-  std::string scene;   // "scenes/..."
+  std::string parent;                  // "jobs/..."
+  std::string scene;                   // stored
+  std::optional<std::string> project;  // nothing: all
+};
+
+// Why workers are given no job.
+enum class Hold {
+  kPaused,   // by the operator
+  kStorage,  // the disk is nearly full
+};
+
+// Of a job that waits.
+struct QueuePlace {
+  int64_t position = 0;   // 1: the next; 0: it does not wait for a worker
+  std::string waits_for;  // empty: for its turn
+};
+
+// Somebody who wants to know that a job has ended.
+struct Notification {
+  int64_t job_id = 0;
+  std::string job;
+  std::string url;
+  int tries = 0;
+  int64_t first_ms = 0;  // when it ended
 };
 
 struct HeartbeatReply {
@@ -100,8 +132,10 @@ class JobStore {
   // Scenes. `record.name` must be set; its id and times are not read.
   virtual SceneRecord CreateScene(const SceneRecord& record, const RequestKey& request) = 0;
   virtual SceneRecord GetScene(const std::string& name) = 0;
-  // Newest first, ids below `before_id` (0: from the newest).
-  virtual std::vector<SceneRecord> ListScenes(int64_t before_id, int limit) = 0;
+  // Newest first, ids below `before_id` (0: from the newest); of a project, or of all.
+  virtual std::vector<SceneRecord> ListScenes(const std::optional<std::string>& project,
+                                              int64_t before_id,
+                                              int limit) = 0;
   virtual SceneRecord ActivateScene(const std::string& name,
                                     StoredLayout layout,
                                     int photo_count,
@@ -115,11 +149,11 @@ class JobStore {
   virtual void DeleteScene(const std::string& name, const RequestKey& request) = 0;
 
   // Jobs, from the client's side.
-  // Creates all jobs of the graph or none. kResourceExhausted (QUEUE_FULL) when more than
-  // `max_unfinished` jobs would wait or run.
+  // Creates all jobs of the graph or none. kResourceExhausted (QUEUE_FULL, QUOTA_EXCEEDED) when
+  // more jobs than `limits` allow would wait or run.
   virtual JobRecord CreateGraph(const NewGraph& graph,
                                 const RequestKey& request,
-                                int64_t max_unfinished) = 0;
+                                const QueueLimits& limits) = 0;
   // The job made by an earlier request, if it was made: lets a repeated call skip planning.
   virtual std::optional<std::string> FindRequest(const RequestKey& request) = 0;
   virtual JobRecord GetJob(const std::string& name) = 0;
@@ -130,16 +164,22 @@ class JobStore {
   virtual std::vector<JobRecord> ListChildren(const std::string& name) = 0;
   virtual JobRecord Cancel(const std::string& name, const RequestKey& request) = 0;
   // Retries the whole graph of the job: what failed, was cancelled, or was skipped for that.
-  // kFailedPrecondition (INPUT_DELETED) when what it read is gone; QUEUE_FULL as CreateGraph.
+  // kFailedPrecondition (INPUT_DELETED) when what it read is gone; full queues as CreateGraph.
   virtual JobRecord Retry(const std::string& name,
                           bool from_scratch,
                           const RequestKey& request,
-                          int64_t max_unfinished) = 0;
+                          const QueueLimits& limits) = 0;
   virtual void Delete(const std::string& name, const RequestKey& request) = 0;
+  // Ends the job and its children as CANCELLED now: what its workers still write is refused.
+  virtual JobRecord Kill(const std::string& name) = 0;
+  // kInvalidArgument for a job that was not submitted.
+  virtual JobRecord Pin(const std::string& name, bool pinned) = 0;
+  virtual QueuePlace PlaceInQueue(const JobRecord& job) = 0;
 
   // Jobs, from the worker's side.
-  // The next job of the queue. Error{kFailedPrecondition, WORKER_VERSION} for a worker of another
-  // release than the server's.
+  // The next job of the queue, where nothing holds it back: of the smallest priority, of the
+  // project that has waited longest since its last turn. Error{kFailedPrecondition, WORKER_VERSION}
+  // for a worker of another release than the server's.
   virtual std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) = 0;
   // A job of this kind to run beside those that the worker holds already: one that no worker was
   // lost with, that no waiting job of another kind comes before, of the submitted job with the
@@ -160,6 +200,9 @@ class JobStore {
   virtual HeartbeatReply Peek(const Lease& lease) = 0;
   // Returns the checkpoint that this one replaces.
   virtual std::optional<FileDigest> SetCheckpoint(const Lease& lease, const FileDigest& blob) = 0;
+  // False: nobody else does equal work now, and others will join this job when they do. True: the
+  // job was put back, to be claimed when the other has ended, without counting the attempt.
+  virtual bool JoinEqual(const Lease& lease, const std::string& stage_key) = 0;
   virtual void Publish(const Lease& lease, const Publication& publication) = 0;
   // kUnavailable and kAborted are tried again, with back-off, while attempts are left; kCancelled
   // ends as CANCELLED when cancellation was asked for.
@@ -194,12 +237,42 @@ class JobStore {
   // The named jobs and their children.
   virtual std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) = 0;
 
+  // Projects.
+  // By name. A project is there once it has had a job or a blob.
+  virtual std::vector<ProjectRecord> ListProjects() = 0;
+  virtual ProjectRecord GetProject(const std::string& name) = 0;
+  // From now on the project may read the blob; it pays for it.
+  virtual void HoldBlob(const std::string& project, const FileDigest& blob) = 0;
+  // Those of the blobs that it may read.
+  virtual std::set<std::string> HeldBlobs(const std::string& project,
+                                          const std::vector<std::string>& sha256) = 0;
+  // The blob is gone: nobody holds it any more.
+  virtual void ForgetBlob(const std::string& sha256) = 0;
+
+  // Notifications.
+  virtual std::vector<Notification> DueNotifications(int limit) = 0;
+  // Delivered or given up.
+  virtual void EndNotification(int64_t job_id) = 0;
+  virtual void DelayNotification(int64_t job_id, int64_t pause_ms) = 0;
+
   // Others.
+  // Kept over restarts.
+  virtual void SetHold(Hold hold, bool on) = 0;
+  virtual std::set<Hold> Holds() = 0;
   virtual JobCounts CountJobs() = 0;
-  virtual std::vector<ColorizerRecord> ListColorizers(const std::string& scene,
+  // `scene`: stored, or empty; of a project, or of all.
+  virtual std::vector<ColorizerRecord> ListColorizers(const std::optional<std::string>& project,
+                                                      const std::string& scene,
                                                       int64_t before_id,
                                                       int limit) = 0;
-  virtual ColorizerRecord GetColorizer(const std::string& sha256) = 0;
+  virtual ColorizerRecord GetColorizer(const std::optional<std::string>& project,
+                                       const std::string& sha256) = 0;
+  // First of the two phases in which old jobs go: takes note of submitted jobs that ended before
+  // this time, are not pinned and are read by no unfinished job, and forgets those that are no
+  // longer so. Returns the ones noted for `grace_ms` by the steady clock.
+  virtual std::vector<std::string> AgeExpired(int64_t ended_before_ms, int64_t grace_ms) = 0;
+  // Active scenes of before this time of which no job is left.
+  virtual std::vector<std::string> ScenesWithoutJobs(int64_t committed_before_ms) = 0;
   // Deletes events and request ids that ended before the given time.
   virtual void Compact(int64_t events_before_ms, int64_t requests_before_ms) = 0;
   // Digests of artifacts, scene files, checkpoints and of blobs that specs name.

@@ -4,7 +4,26 @@
 
 namespace color3d {
 
-constexpr int kSchemaVersion = 3;
+constexpr int kSchemaVersion = 4;
+
+// Since version 4. A project holds the blobs that it uploaded and that its jobs left.
+#define COLOR3D_PROJECT_TABLES                                                                  \
+  "create table project(name text primary key, turn integer not null default 0, "               \
+  "bytes integer not null default 0) without rowid;"                                            \
+  "create table blob_holding(project text not null, sha256 text not null, "                     \
+  "size_bytes integer not null, primary key(project, sha256)) without rowid;"                   \
+  "create index blob_holding_digest on blob_holding(sha256);"                                   \
+  "create trigger blob_held after insert on blob_holding begin "                                \
+  "insert into project(name, bytes) values(new.project, new.size_bytes) "                       \
+  "on conflict(name) do update set bytes=bytes+excluded.bytes; end;"                            \
+  "create trigger blob_let_go after delete on blob_holding begin "                              \
+  "update project set bytes=bytes-old.size_bytes where name=old.project; end;"                  \
+  "create table notification(job_id integer primary key references job on delete cascade, "     \
+  "url text not null, tries integer not null, first_ms integer not null, "                      \
+  "next_ms integer not null);"                                                                  \
+  "create table expiry_candidate(job_id integer primary key references job on delete cascade, " \
+  "age_ms integer not null);"                                                                   \
+  "insert into meta values('hold_paused', 0), ('hold_storage', 0), ('expiry_steady_ms', 0);"
 
 // From version 1 to 2, from 2 to 3 and so on.
 constexpr const char* kMigrations[kSchemaVersion - 1] = {
@@ -17,7 +36,23 @@ constexpr const char* kMigrations[kSchemaVersion - 1] = {
     "create table blob_candidate(sha256 text primary key, touched_ns integer not null, "
     "age_ms integer not null) without rowid;"
     "insert into meta values('collected_steady_ms', 0);"
-    "alter table job add column lost_input text not null default ''"};
+    "alter table job add column lost_input text not null default ''",
+    "alter table scene add column project text not null default '';"
+    "alter table job add column project text not null default '';"
+    "alter table job add column pinned integer not null default 0;"
+    "alter table job add column queued_ms integer not null default 0;"
+    "alter table job add column queued_since_ms integer not null default 0;"
+    "alter table job add column running_key text not null default '';"
+    "alter table job add column joins_key text not null default '';"
+    "alter table job add column notify_url text not null default '';"
+    "create index scene_project on scene(project, scene_id);"
+    "create index job_project on job(project, job_id);"
+    "create index job_running_key on job(running_key) where running_key <> '';"
+    "create index job_ended on job(end_ms) where parent='' and end_ms<>0 and "
+    "pinned=0;" COLOR3D_PROJECT_TABLES
+    "insert or ignore into blob_holding select '', sha256, size_bytes from artifact;"
+    "insert or ignore into blob_holding select '', sha256, size_bytes from scene_file;"
+    "insert or ignore into blob_holding select '', sha256, 0 from job_blob;"};
 
 constexpr char kSchema[] = R"sql(
 create table scene(
@@ -26,7 +61,8 @@ create table scene(
   active integer not null default 0, layout integer not null default 0,
   photo_count integer not null default 0,
   create_ms integer not null, commit_ms integer not null default 0,
-  key_color_job text not null default '');
+  key_color_job text not null default '', project text not null default '');
+create index scene_project on scene(project, scene_id);
 create table scene_file(
   scene_id integer not null references scene on delete cascade,
   path text not null, sha256 text not null, size_bytes integer not null,
@@ -58,7 +94,10 @@ create table job(
   create_ms integer not null, start_ms integer not null default 0,
   end_ms integer not null default 0,
   revision integer not null default 0, peak_memory_bytes integer not null default 0,
-  lost_input text not null default '',
+  lost_input text not null default '', project text not null default '',
+  pinned integer not null default 0, queued_ms integer not null default 0,
+  queued_since_ms integer not null default 0, running_key text not null default '',
+  joins_key text not null default '', notify_url text not null default '',
   check((state='RUNNING') = (lease_expires_ms is not null)),
   check((state in('SUCCEEDED','FAILED','CANCELLED','SKIPPED')) = (end_ms <> 0)));
 create index job_claim on job(priority, job_id) where state='QUEUED';
@@ -68,6 +107,9 @@ create index job_scene on job(scene, job_id);
 create index job_stage on job(stage_key) where stage_key <> '';
 create index job_unfinished on job(job_id) where end_ms=0;
 create index job_checkpoint on job(checkpoint_sha256) where checkpoint_sha256 <> '';
+create index job_project on job(project, job_id);
+create index job_running_key on job(running_key) where running_key <> '';
+create index job_ended on job(end_ms) where parent='' and end_ms<>0 and pinned=0;
 
 create table job_dependency(
   input_id integer not null references job on delete cascade,
@@ -109,6 +151,6 @@ create table worker(
 create table server(id integer primary key check(id=1), version text not null, boot_id text not null);
 create table meta(name text primary key, value integer not null) without rowid;
 insert into meta values('compacted_revision', 0), ('collected_steady_ms', 0);
-)sql";
+)sql" COLOR3D_PROJECT_TABLES;
 
 }  // namespace color3d

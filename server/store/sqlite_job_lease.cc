@@ -44,9 +44,14 @@ void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
 }
 
 std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_t lease_ms) {
+  // A project that has just had a turn comes after all others of the same priority.
   constexpr char kNext[] =
-      "select job_id from job where state='QUEUED' and run_after_ms<=? "
-      "order by priority, job_id limit 1";
+      "select job_id from job left join project on project.name=job.project "
+      "where state='QUEUED' and run_after_ms<=? and not exists(select 1 from job r where "
+      "job.joins_key<>'' and r.running_key=job.joins_key and r.running_key<>'') and "
+      "not exists(select 1 from meta where meta.name in('hold_paused','hold_storage') and "
+      "value<>0) "
+      "order by priority, coalesce(turn, 0), job_id limit 1";
   {  // An idle worker only reads.
     const auto held = connections_.Read();
     RequireServersVersion(*held);
@@ -72,11 +77,13 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     int64_t lease_ms,
     const std::string& kind,
     const std::function<bool(const JobRecord&)>& accept) {
-  // "project" is the submitted job: scenes of one must not keep out another's.
+  // Scenes of one submitted job must not keep out another's.
   constexpr char kCandidates[] =
       "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
       "select 1 from job o where o.state='QUEUED' and o.kind<>?1 and o.run_after_ms<=?2 and "
-      "(o.priority, o.job_id)<(job.priority, job.job_id)) "
+      "o.joins_key='' and (o.priority, o.job_id)<(job.priority, job.job_id)) and joins_key='' and "
+      "not exists(select 1 from meta where meta.name in('hold_paused','hold_storage') and "
+      "value<>0) "
       "order by priority, (select count(*) from job r where r.state='RUNNING' and "
       "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
       "limit 16";
@@ -107,11 +114,16 @@ JobRecord SqliteJobStore::BeginAttempt(SqliteDatabase& db,
                                        int64_t lease_ms) {
   db.Run(
       "update job set state='RUNNING', attempt=attempt+1, lease_epoch=lease_epoch+1, "
-      "lease_owner=?, lease_expires_ms=?, eta_seconds=-1, progress_message='', "
-      "start_ms=case when start_ms=0 then ? else start_ms end where job_id=?",
+      "lease_owner=?, lease_expires_ms=?, eta_seconds=-1, progress_message='', joins_key='', "
+      "queued_ms=queued_ms+max(?3-queued_since_ms, 0), queued_since_ms=0, "
+      "start_ms=case when start_ms=0 then ?3 else start_ms end where job_id=?4",
       worker,
       SteadyNow() + lease_ms,
       Now(),
+      id);
+  db.Run(
+      "update project set turn=(select max(turn)+1 from project) where name="
+      "(select project from job where job_id=?)",
       id);
   db.Run(
       "insert into job_attempt(job_id, epoch, worker, start_ms) "
@@ -208,6 +220,28 @@ void SqliteJobStore::StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsa
       job_id);
 }
 
+bool SqliteJobStore::JoinEqual(const Lease& lease, const std::string& stage_key) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  RequireLease(db, lease);
+  SqliteStatement other(db.handle(),
+                        "select 1 from job where running_key=? and running_key<>'' and job_id<>?");
+  other.Bind(stage_key, lease.job_id);
+  const bool joins = other.Step();
+  if (joins) {
+    FinishAttempt(db, lease, "JOINED");
+    db.Run("update job set attempt=attempt-1, run_after_ms=0, joins_key=? where job_id=?",
+           stage_key,
+           lease.job_id);
+    SetState(db, lease.job_id, JobState::kQueued);
+  } else {
+    db.Run("update job set running_key=? where job_id=?", stage_key, lease.job_id);
+  }
+  transaction.Commit();
+  return joins;
+}
+
 void SqliteJobStore::Publish(const Lease& lease, const Publication& publication) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
@@ -221,6 +255,10 @@ void SqliteJobStore::Publish(const Lease& lease, const Publication& publication)
            artifact.digest.size_bytes,
            artifact.media_type);
   }
+  db.Run(
+      "insert or ignore into blob_holding select j.project, a.sha256, a.size_bytes from artifact a "
+      "join job j on j.job_id=a.job_id where a.job_id=?",
+      lease.job_id);
   StoreUsage(db, lease.job_id, publication.usage);
   db.Run(
       "update job set stage_key=?, cached=?, checkpoint_sha256='', checkpoint_bytes=0 "

@@ -1,5 +1,7 @@
 // The job state machine: creation, cancelling, retrying, and what the end of one job means for
 // those that depend on it.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <deque>
 
@@ -40,13 +42,23 @@ void SqliteJobStore::AddEvent(SqliteDatabase& db, int64_t job_id, bool progress)
 }
 
 void SqliteJobStore::SetState(SqliteDatabase& db, int64_t job_id, JobState state) {
+  const bool queued = state == JobState::kQueued;
   db.Run(
-      "update job set state=?, end_ms=?, "
-      "lease_expires_ms=case when ?='RUNNING' then lease_expires_ms else null end where job_id=?",
+      "update job set state=?1, end_ms=?2, running_key='', "
+      "joins_key=case when ?3 then joins_key else '' end, "
+      "queued_ms=queued_ms+case when queued_since_ms>0 then max(?4-queued_since_ms, 0) else 0 end, "
+      "queued_since_ms=case when ?3 then ?4 else 0 end, lease_expires_ms=null where job_id=?5",
       JobStateName(state),
       IsFinished(state) ? Now() : int64_t{0},
-      JobStateName(state),
+      queued,
+      Now(),
       job_id);
+  if (IsFinished(state)) {
+    db.Run(
+        "insert or replace into notification select job_id, notify_url, 0, end_ms, end_ms from job "
+        "where job_id=? and notify_url<>''",
+        job_id);
+  }
   AddEvent(db, job_id, /*progress=*/false);
 }
 
@@ -133,7 +145,7 @@ void RequireActive(const SceneRecord& scene) {
   throw ServiceError(ErrorCode::kFailedPrecondition,
                      "SCENE_NOT_ACTIVE",
                      "the scene '{}' is not committed; upload its files and call CommitScene first",
-                     scene.name);
+                     PublicScene(scene.name));
 }
 
 }  // namespace
@@ -148,7 +160,12 @@ void SqliteJobStore::InsertJob(SqliteDatabase& db,
   const bool skipped = !job.skip_reason.empty();
   JobRecord record;
   record.name = names[index];
-  if (!is_root) record.parent = names.back();
+  record.project = graph.project;
+  if (is_root) {
+    record.notify_url = graph.notify_url;
+  } else {
+    record.parent = names.back();
+  }
   record.kind = job.kind;
   record.scene = job.scene.empty() ? graph.scene : job.scene;
   record.spec = job.spec;
@@ -178,20 +195,39 @@ void SqliteJobStore::InsertJob(SqliteDatabase& db,
   }
 }
 
-void SqliteJobStore::RequireRoom(SqliteDatabase& db, int64_t jobs, int64_t max_unfinished) {
-  SqliteStatement unfinished(db.handle(), "select count(*) from job where end_ms=0");
+void SqliteJobStore::RequireRoom(SqliteDatabase& db,
+                                 const std::string& project,
+                                 int64_t jobs,
+                                 const QueueLimits& limits) {
+  SqliteStatement unfinished(
+      db.handle(), "select count(*), coalesce(sum(project=?), 0) from job where end_ms=0");
+  unfinished.Bind(project);
   unfinished.Step();
-  if (unfinished.Int(0) + jobs <= max_unfinished) return;
-  throw ServiceError(ErrorCode::kResourceExhausted,
-                     "QUEUE_FULL",
-                     "{} jobs wait or run, at most {} are allowed; try again later",
-                     unfinished.Int(0),
-                     max_unfinished);
+  if (unfinished.Int(0) + jobs > limits.all) {
+    throw ServiceError(ErrorCode::kResourceExhausted,
+                       "QUEUE_FULL",
+                       "{} jobs wait or run, at most {} are allowed; try again later",
+                       unfinished.Int(0),
+                       limits.all);
+  }
+  if (unfinished.Int(1) + jobs > limits.of_project) {
+    throw ServiceError(
+        ErrorCode::kResourceExhausted,
+        "QUOTA_EXCEEDED",
+        fmt::format(
+            "{} jobs of your project wait or run and {} would come, at most {} are allowed; "
+            "wait for some, or cancel them",
+            unfinished.Int(1),
+            jobs,
+            limits.of_project),
+        {{"project:" + project + " unfinished_jobs",
+          fmt::format("{} of {}", unfinished.Int(1), limits.of_project)}});
+  }
 }
 
 JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
                                       const RequestKey& request,
-                                      int64_t max_unfinished) {
+                                      const QueueLimits& limits) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
@@ -201,7 +237,8 @@ JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
     if (!job.scene.empty()) scenes.insert(job.scene);
   }
   for (const std::string& name : scenes) RequireActive(RequireScene(db, name, false));
-  RequireRoom(db, static_cast<int64_t>(graph.jobs.size()), max_unfinished);
+  RequireRoom(db, graph.project, static_cast<int64_t>(graph.jobs.size()), limits);
+  db.Run("insert or ignore into project(name) values(?)", graph.project);
   std::vector<std::string> names;
   for (size_t i = 0; i < graph.jobs.size(); ++i) names.push_back("jobs/" + NewId());
   std::vector<int64_t> ids;
@@ -240,6 +277,41 @@ JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& requ
   return result;
 }
 
+JobRecord SqliteJobStore::Kill(const std::string& name) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
+  // The submitted job first: its children then find it finished and leave it alone.
+  std::ranges::reverse(graph);
+  std::vector<int64_t> killed;
+  for (const JobRecord& job : graph) {
+    if (IsFinished(job.state)) continue;
+    if (job.state == JobState::kRunning) FinishAttempt(db, {job.id, job.lease_epoch}, "KILLED");
+    db.Run("update job set cancel_requested=1 where job_id=?", job.id);
+    SetState(db, job.id, JobState::kCancelled);
+    killed.push_back(job.id);
+  }
+  for (const int64_t id : killed) PropagateEnd(db, JobById(db, id));
+  JobRecord result = RequireJob(db, name);
+  transaction.Commit();
+  return result;
+}
+
+JobRecord SqliteJobStore::Pin(const std::string& name, bool pinned) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  const JobRecord job = RequireJob(db, name);
+  if (!job.parent.empty()) {
+    throw InvalidArgument("{} is a stage of {}; pin that", name, job.parent);
+  }
+  db.Run("update job set pinned=? where job_id=?", pinned, job.id);
+  JobRecord result = RequireJob(db, name);
+  transaction.Commit();
+  return result;
+}
+
 void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch) {
   SqliteStatement lost(db.handle(), "select lost_input from job where job_id=?");
   lost.Bind(job.id);
@@ -264,6 +336,7 @@ void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, boo
       "error_code=null, error_reason='', error_message='', skip_reason='', warnings='' "
       "where job_id=?",
       job.id);
+  db.Run("delete from notification where job_id=?", job.id);
   if (from_scratch) {
     db.Run(
         "update job set checkpoint_sha256='', checkpoint_bytes=0, progress_step=0, seconds=0 "
@@ -277,7 +350,7 @@ void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, boo
 JobRecord SqliteJobStore::Retry(const std::string& name,
                                 bool from_scratch,
                                 const RequestKey& request,
-                                int64_t max_unfinished) {
+                                const QueueLimits& limits) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
@@ -293,7 +366,7 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
     }
   }
   const auto retried = std::count_if(graph.begin(), graph.end(), CanBeRetried);
-  RequireRoom(db, retried, max_unfinished);
+  RequireRoom(db, root.project, retried, limits);
   // In order of creation, so that inputs are reset before those that read them.
   for (const JobRecord& member : graph) {
     if (CanBeRetried(member)) ResetForRetry(db, member, from_scratch);
@@ -334,7 +407,15 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
       "i.job_id=d.input_id where d.job_id=job.job_id and d.input_id in (" +
       list + ") limit 1) where job_id in (select job_id from job_dependency where input_id in (" +
       list + "))");
+  std::vector<std::string> blobs;
+  {
+    SqliteStatement named(db.handle(),
+                          "select sha256 from artifact where job_id in (" + list +
+                              ") union select sha256 from job_blob where job_id in (" + list + ")");
+    while (named.Step()) blobs.push_back(named.Text(0));
+  }
   db.Run("delete from job where job_id in (" + list + ")");
+  LetGo(db, root.project, blobs);
   RecordRequest(db, request, name);
   transaction.Commit();
 }

@@ -103,10 +103,12 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
   std::string tail = "where job_id < ?";
   if (!filter.parent.empty()) tail += " and parent=?";
   if (!filter.scene.empty()) tail += " and scene=?";
+  if (filter.project) tail += " and project=?";
   SqliteStatement select(db.handle(), SelectJob(tail + " order by job_id desc limit ?"));
   select.Bind(before_id > 0 ? before_id : INT64_MAX);
   if (!filter.parent.empty()) select.Bind(filter.parent);
   if (!filter.scene.empty()) select.Bind(filter.scene);
+  if (filter.project) select.Bind(*filter.project);
   select.Bind(limit);
   return ReadJobs(db, select);
 }
@@ -357,16 +359,20 @@ bool SqliteJobStore::IsReferenced(const std::string& sha256) {
   return select.Int(0) != 0;
 }
 
+int64_t SqliteJobStore::ElapsedSinceLast(SqliteDatabase& db, const char* name) {
+  SqliteStatement last(db.handle(), "select value from meta where name=?");
+  last.Bind(name);
+  const int64_t before = last.Step() ? last.Int(0) : 0;
+  db.Run("update meta set value=max(?, 1) where name=?", SteadyNow(), name);
+  return before > 0 ? std::max<int64_t>(SteadyNow() - before, 0) : 0;
+}
+
 std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobCandidate>& unnamed,
                                                          int64_t grace_ms) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
-  int64_t elapsed = 0;
-  {
-    SqliteStatement last(db.handle(), "select value from meta where name='collected_steady_ms'");
-    if (last.Step() && last.Int(0) > 0) elapsed = std::max<int64_t>(SteadyNow() - last.Int(0), 0);
-  }
+  const int64_t elapsed = ElapsedSinceLast(db, "collected_steady_ms");
   db.Exec("create temp table told(sha256 text primary key, touched_ns integer) without rowid");
   for (const BlobCandidate& blob : unnamed) {
     db.Run("insert or ignore into told values(?,?)", blob.sha256, blob.touched_ns);
@@ -377,7 +383,6 @@ std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobC
   db.Run("update blob_candidate set age_ms=age_ms+?", elapsed);
   db.Exec("insert or ignore into blob_candidate select sha256, touched_ns, 0 from told");
   db.Exec("drop table told");
-  db.Run("update meta set value=max(?, 1) where name='collected_steady_ms'", SteadyNow());
   std::vector<BlobCandidate> due;
   {
     SqliteStatement select(db.handle(),

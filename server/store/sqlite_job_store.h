@@ -34,7 +34,9 @@ class SqliteJobStore : public JobStore {
 
   SceneRecord CreateScene(const SceneRecord& record, const RequestKey& request) override;
   SceneRecord GetScene(const std::string& name) override;
-  std::vector<SceneRecord> ListScenes(int64_t before_id, int limit) override;
+  std::vector<SceneRecord> ListScenes(const std::optional<std::string>& project,
+                                      int64_t before_id,
+                                      int limit) override;
   SceneRecord ActivateScene(const std::string& name,
                             StoredLayout layout,
                             int photo_count,
@@ -46,7 +48,7 @@ class SqliteJobStore : public JobStore {
 
   JobRecord CreateGraph(const NewGraph& graph,
                         const RequestKey& request,
-                        int64_t max_unfinished) override;
+                        const QueueLimits& limits) override;
   std::optional<std::string> FindRequest(const RequestKey& request) override;
   JobRecord GetJob(const std::string& name) override;
   std::vector<JobRecord> ListJobs(const JobFilter& filter, int64_t before_id, int limit) override;
@@ -55,8 +57,11 @@ class SqliteJobStore : public JobStore {
   JobRecord Retry(const std::string& name,
                   bool from_scratch,
                   const RequestKey& request,
-                  int64_t max_unfinished) override;
+                  const QueueLimits& limits) override;
   void Delete(const std::string& name, const RequestKey& request) override;
+  JobRecord Kill(const std::string& name) override;
+  JobRecord Pin(const std::string& name, bool pinned) override;
+  QueuePlace PlaceInQueue(const JobRecord& job) override;
 
   std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
   std::optional<JobRecord> ClaimForBatch(
@@ -71,6 +76,7 @@ class SqliteJobStore : public JobStore {
                            int64_t lease_ms) override;
   HeartbeatReply Peek(const Lease& lease) override;
   std::optional<FileDigest> SetCheckpoint(const Lease& lease, const FileDigest& blob) override;
+  bool JoinEqual(const Lease& lease, const std::string& stage_key) override;
   void Publish(const Lease& lease, const Publication& publication) override;
   void Fail(const Lease& lease, const JobError& error, const JobUsage& usage) override;
   void Release(const Lease& lease, const JobUsage& usage) override;
@@ -92,11 +98,28 @@ class SqliteJobStore : public JobStore {
   JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) override;
   std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) override;
 
+  std::vector<ProjectRecord> ListProjects() override;
+  ProjectRecord GetProject(const std::string& name) override;
+  void HoldBlob(const std::string& project, const FileDigest& blob) override;
+  std::set<std::string> HeldBlobs(const std::string& project,
+                                  const std::vector<std::string>& sha256) override;
+  void ForgetBlob(const std::string& sha256) override;
+
+  std::vector<Notification> DueNotifications(int limit) override;
+  void EndNotification(int64_t job_id) override;
+  void DelayNotification(int64_t job_id, int64_t pause_ms) override;
+
+  void SetHold(Hold hold, bool on) override;
+  std::set<Hold> Holds() override;
   JobCounts CountJobs() override;
-  std::vector<ColorizerRecord> ListColorizers(const std::string& scene,
+  std::vector<ColorizerRecord> ListColorizers(const std::optional<std::string>& project,
+                                              const std::string& scene,
                                               int64_t before_id,
                                               int limit) override;
-  ColorizerRecord GetColorizer(const std::string& sha256) override;
+  ColorizerRecord GetColorizer(const std::optional<std::string>& project,
+                               const std::string& sha256) override;
+  std::vector<std::string> AgeExpired(int64_t ended_before_ms, int64_t grace_ms) override;
+  std::vector<std::string> ScenesWithoutJobs(int64_t committed_before_ms) override;
   void Compact(int64_t events_before_ms, int64_t requests_before_ms) override;
   std::set<std::string> ReferencedBlobs() override;
   bool IsReferenced(const std::string& sha256) override;
@@ -142,10 +165,19 @@ class SqliteJobStore : public JobStore {
                  size_t index,
                  const std::vector<std::string>& names,
                  std::vector<int64_t>* ids);
-  // Throws QUEUE_FULL.
-  void RequireRoom(SqliteDatabase& db, int64_t jobs, int64_t max_unfinished);
+  // Throws QUEUE_FULL or QUOTA_EXCEEDED.
+  void RequireRoom(SqliteDatabase& db,
+                   const std::string& project,
+                   int64_t jobs,
+                   const QueueLimits& limits);
   void ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch);
   void StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsage& usage);
+  // Steady time since the last call of this name; 0 at the first one after a start of the machine.
+  int64_t ElapsedSinceLast(SqliteDatabase& db, const char* name);
+  // Of the digests that `select` gives, the project lets those go that nothing of it names.
+  void LetGo(SqliteDatabase& db,
+             const std::string& project,
+             const std::vector<std::string>& sha256);
   int64_t Now() const { return clocks_.wall(); }
   int64_t SteadyNow() const { return clocks_.steady(); }
 

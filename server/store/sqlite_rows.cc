@@ -20,6 +20,7 @@ void VisitColumns(JobRecord& job, Visit&& visit) {
   visit("kind", job.kind);
   visit("scene", job.scene);
   visit("spec", job.spec);
+  visit("project", job.project);
   visit("state", job.state);
   visit("cancel_requested", job.cancel_requested);
   visit("priority", job.priority);
@@ -42,6 +43,10 @@ void VisitColumns(JobRecord& job, Visit&& visit) {
   visit("skip_reason", job.skip_reason);
   visit("skipped_by_plan", job.skipped_by_plan);
   visit("cached", job.cached);
+  visit("pinned", job.pinned);
+  visit("notify_url", job.notify_url);
+  visit("queued_ms", job.queued_ms);
+  visit("queued_since_ms", job.queued_since_ms);
   visit("checkpoint_sha256", checkpoint.sha256);
   visit("checkpoint_bytes", checkpoint.size_bytes);
   visit("create_ms", job.create_ms);
@@ -56,6 +61,7 @@ template <typename Visit>
 void VisitColumns(SceneRecord& scene, Visit&& visit) {
   visit("scene_id", scene.id);
   visit("name", scene.name);
+  visit("project", scene.project);
   visit("display_name", scene.display_name);
   visit("active", scene.state);
   visit("layout", scene.layout);

@@ -15,7 +15,8 @@ SceneRecord SqliteJobStore::RequireScene(SqliteDatabase& db,
   SqliteStatement select(db.handle(), SelectScene("where name=?"));
   select.Bind(name);
   if (!select.Step()) {
-    throw ServiceError(ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '{}'", name);
+    throw ServiceError(
+        ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '{}'", PublicScene(name));
   }
   SceneRecord scene = SceneFromRow(select);
   if (!with_files) return scene;
@@ -40,10 +41,11 @@ SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record, const Request
     throw ServiceError(ErrorCode::kAlreadyExists,
                        "SCENE_EXISTS",
                        "the scene '{}' exists; choose another scene_id",
-                       record.name);
+                       PublicScene(record.name));
   }
   SceneRecord fresh;
   fresh.name = record.name;
+  fresh.project = record.project;
   fresh.display_name = record.display_name;
   fresh.create_ms = Now();
   const int64_t scene_id = InsertSceneRow(db, fresh);
@@ -66,12 +68,17 @@ SceneRecord SqliteJobStore::GetScene(const std::string& name) {
   return RequireScene(db, name, true);
 }
 
-std::vector<SceneRecord> SqliteJobStore::ListScenes(int64_t before_id, int limit) {
+std::vector<SceneRecord> SqliteJobStore::ListScenes(const std::optional<std::string>& project,
+                                                    int64_t before_id,
+                                                    int limit) {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(),
-                         SelectScene("where scene_id < ? order by scene_id desc limit ?"));
-  select.Bind(before_id > 0 ? before_id : INT64_MAX, limit);
+  std::string tail = "where scene_id < ?";
+  if (project) tail += " and project=?";
+  SqliteStatement select(db.handle(), SelectScene(tail + " order by scene_id desc limit ?"));
+  select.Bind(before_id > 0 ? before_id : INT64_MAX);
+  if (project) select.Bind(*project);
+  select.Bind(limit);
   std::vector<SceneRecord> scenes;
   while (select.Step()) scenes.push_back(SceneFromRow(select));
   return scenes;
@@ -114,9 +121,9 @@ SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
       throw InvalidArgument("{} is a {} job of {}; give a {} job of {}",
                             job,
                             record.kind,
-                            record.scene,
+                            PublicScene(record.scene),
                             kind::kColorizeKeyView,
-                            name);
+                            PublicScene(name));
     }
     if (record.state != JobState::kSucceeded) {
       throw ServiceError(ErrorCode::kFailedPrecondition,
@@ -146,9 +153,16 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
                        "SCENE_IN_USE",
                        "{} of the scene '{}' is not finished; cancel it or wait for it",
                        busy.Text(0),
-                       name);
+                       PublicScene(name));
+  }
+  std::vector<std::string> files;
+  {
+    SqliteStatement select(db.handle(), "select sha256 from scene_file where scene_id=?");
+    select.Bind(scene.id);
+    while (select.Step()) files.push_back(select.Text(0));
   }
   db.Run("delete from scene where scene_id=?", scene.id);
+  LetGo(db, scene.project, files);
   RecordRequest(db, request, name);
   transaction.Commit();
 }
@@ -172,26 +186,30 @@ ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
 
 }  // namespace
 
-std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(const std::string& scene,
-                                                            int64_t before_id,
-                                                            int limit) {
+std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(
+    const std::optional<std::string>& project,
+    const std::string& scene,
+    int64_t before_id,
+    int limit) {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
   SqliteStatement select(db.handle(),
-                         SelectColorizer("and (?1='' or j.scene=?1) group by a.sha256 having "
-                                         "min(j.job_id) < ?2 order by min(j.job_id) desc "
-                                         "limit ?3"));
-  select.Bind(scene, before_id > 0 ? before_id : INT64_MAX, limit);
+                         SelectColorizer("and (?1='' or j.scene=?1) and (?2 or j.project=?3) "
+                                         "group by a.sha256 having min(j.job_id) < ?4 "
+                                         "order by min(j.job_id) desc limit ?5"));
+  select.Bind(scene, !project, project.value_or(""), before_id > 0 ? before_id : INT64_MAX, limit);
   std::vector<ColorizerRecord> colorizers;
   while (select.Step()) colorizers.push_back(ColorizerFromRow(select));
   return colorizers;
 }
 
-ColorizerRecord SqliteJobStore::GetColorizer(const std::string& sha256) {
+ColorizerRecord SqliteJobStore::GetColorizer(const std::optional<std::string>& project,
+                                             const std::string& sha256) {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(), SelectColorizer("and a.sha256=? group by a.sha256"));
-  select.Bind(sha256);
+  SqliteStatement select(
+      db.handle(), SelectColorizer("and a.sha256=? and (? or j.project=?) group by a.sha256"));
+  select.Bind(sha256, !project, project.value_or(""));
   if (!select.Step()) {
     throw ServiceError(ErrorCode::kNotFound,
                        "COLORIZER_NOT_FOUND",

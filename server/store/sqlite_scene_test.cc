@@ -39,11 +39,12 @@ TEST_F(SqliteSceneTest, ColorizersAreListedOncePerFile) {
     store_->CreateGraph(graph, {}, kNoLimit);
     Succeed(ClaimOne(), "colorizer.c3c");
   }
-  const auto colorizers = store_->ListColorizers("", 0, 10);
+  const auto colorizers = store_->ListColorizers({}, "", 0, 10);
   ASSERT_EQ(colorizers.size(), 1u);
-  EXPECT_EQ(store_->GetColorizer(colorizers[0].digest.sha256).job, colorizers[0].job);
-  EXPECT_TRUE(store_->ListColorizers("scenes/other", 0, 10).empty());
-  EXPECT_EQ(ReasonThrown([&] { store_->GetColorizer(Sha256Hex("no")); }), "COLORIZER_NOT_FOUND");
+  EXPECT_EQ(store_->GetColorizer({}, colorizers[0].digest.sha256).job, colorizers[0].job);
+  EXPECT_TRUE(store_->ListColorizers({}, "scenes/other", 0, 10).empty());
+  EXPECT_EQ(ReasonThrown([&] { store_->GetColorizer({}, Sha256Hex("no")); }),
+            "COLORIZER_NOT_FOUND");
 }
 
 }  // namespace

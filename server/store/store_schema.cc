@@ -67,7 +67,7 @@ void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
   before.Bind(identity.boot_id);
   if (!before.Step()) {
     db.Exec("update job set lease_expires_ms=0 where state='RUNNING'");
-    db.Exec("update meta set value=0 where name='collected_steady_ms'");
+    db.Exec("update meta set value=0 where name in('collected_steady_ms', 'expiry_steady_ms')");
     db.Exec("update job set run_after_ms=0 where end_ms=0 and run_after_ms<>0");
   }
   db.Run(

@@ -26,6 +26,26 @@ class StoreSchemaTest : public JobStoreTest {
   void MakeOld() {
     store_.reset();
     SqliteDatabase old(File(), SqliteAccess::kWrite);
+    for (const char* trigger : {"blob_held", "blob_let_go"}) {
+      old.Exec((std::string("drop trigger ") + trigger).c_str());
+    }
+    for (const char* table : {"project", "blob_holding", "notification", "expiry_candidate"}) {
+      old.Exec((std::string("drop table ") + table).c_str());
+    }
+    for (const char* index : {"scene_project", "job_project", "job_running_key", "job_ended"}) {
+      old.Exec((std::string("drop index ") + index).c_str());
+    }
+    for (const char* column : {"project",
+                               "pinned",
+                               "queued_ms",
+                               "queued_since_ms",
+                               "running_key",
+                               "joins_key",
+                               "notify_url"}) {
+      old.Exec((std::string("alter table job drop column ") + column).c_str());
+    }
+    old.Exec("alter table scene drop column project");
+    old.Exec("delete from meta where name in('hold_paused', 'hold_storage', 'expiry_steady_ms')");
     old.Exec("drop index job_unfinished");
     old.Exec("drop index job_checkpoint");
     old.Exec("drop index artifact_name");
@@ -39,9 +59,15 @@ class StoreSchemaTest : public JobStoreTest {
 };
 
 TEST_F(StoreSchemaTest, TheServerBringsAnOldStoreUpToDateAndKeepsACopy) {
+  CreateSingle();
+  const JobRecord done = ClaimOne();
+  Succeed(done);
   const JobRecord running = (CreateSingle(), ClaimOne());
   MakeOld();
   Open();
+  const std::string result = store_->GetJob(done.name).artifacts[0].digest.sha256;
+  EXPECT_EQ(store_->HeldBlobs("", {result}).size(), 1u) << "what was there can still be read";
+  EXPECT_EQ(store_->GetProject("").stored_bytes, 4) << "a scene of 1 byte, a result of 3";
   EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "");
   EXPECT_EQ(StateOf(running.name), JobState::kRunning);
   EXPECT_EQ(store_->ReapExpired(), 1) << "its lease was by another clock";
@@ -50,7 +76,7 @@ TEST_F(StoreSchemaTest, TheServerBringsAnOldStoreUpToDateAndKeepsACopy) {
   fs::remove(copy);
   Open();  // nothing is left to be done
   EXPECT_FALSE(fs::exists(copy));
-  EXPECT_EQ(store_->ListScenes(0, 10).size(), 1u);
+  EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 1u);
 }
 
 TEST_F(StoreSchemaTest, AWorkerChangesNothing) {
@@ -150,8 +176,8 @@ TEST_F(StoreSchemaTest, CostDoesNotGrowWithHistory) {
   EXPECT_LT(steps([&] { store_->EventsSince(store_->NewestRevision() - 3, 100); }), 30);
   EXPECT_LT(steps([&] { store_->GetInputs(job.id); }), 30);
   EXPECT_LT(steps([&] { store_->FindStage("key"); }), 30);
-  EXPECT_LT(steps([&] { ReasonThrown([&] { store_->GetColorizer(Sha256Hex("c")); }); }), 30);
-  EXPECT_LT(steps([&] { store_->ListColorizers("", 0, 5); }), 30);
+  EXPECT_LT(steps([&] { ReasonThrown([&] { store_->GetColorizer({}, Sha256Hex("c")); }); }), 30);
+  EXPECT_LT(steps([&] { store_->ListColorizers({}, "", 0, 5); }), 30);
   EXPECT_LT(steps([&] { Succeed(job); }), 30);
   EXPECT_LT(steps([&] { store_->Cancel(root.name, {}); }), 30);
   EXPECT_LT(steps([&] { store_->Retry(root.name, false, {}, kNoLimit); }), 30);

@@ -93,6 +93,8 @@ class Attempt {
   void NoteModels(const std::vector<std::string>& names);
   void RequireModelsUnchanged() const;
   bool ServeFromCache();
+  // Whether the job was put back because another that runs does the same.
+  bool JoinEqual();
   void Compute();
   void Publish(const StageOutput& output);
   void HandleError(const JobError& error);
@@ -122,7 +124,7 @@ void Attempt::Run() {
   spdlog::info("{} begins {} of {}", tag_, job_.kind, job_.scene);
   try {
     Prepare();
-    if (!ServeFromCache()) Compute();
+    if (!ServeFromCache() && !JoinEqual()) Compute();
   } catch (const Error& e) {
     HandleError({e.code(), ReasonOf(e), e.what()});
   } catch (const std::bad_alloc&) {
@@ -145,7 +147,7 @@ void Attempt::Run() {
 void Attempt::Prepare() {
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
-  run_.project = job_.parent.empty() ? job_.name : job_.parent;
+  run_.submission = job_.parent.empty() ? job_.name : job_.parent;
   run_.spec = ParseSpec(job_.spec, job_.name);
   run_.threads = context_.threads;
   run_.attempt = job_.attempt;
@@ -186,7 +188,9 @@ void Attempt::Prepare() {
   const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;
-  std::string material = context_.code_version + '\n' + Sha256Hex(manifest) + '\n';
+  // Whether somebody else has done the same is nothing that a project may learn.
+  std::string material =
+      context_.code_version + '\n' + job_.project + '\n' + Sha256Hex(manifest) + '\n';
   for (const auto& [name, artifact] : input_artifacts_) {
     material += name + '\n' + artifact.digest.sha256 + '\n';
   }
@@ -257,6 +261,14 @@ bool Attempt::ServeFromCache() {
   publication.usage = earlier->usage;
   context_.store.Publish(keeper_.lease(), publication);
   spdlog::info("{} served from the stage cache ({})", tag_, earlier->name);
+  return true;
+}
+
+bool Attempt::JoinEqual() {
+  if (run_.spec.skip_cache() || stage_key_.empty()) return false;
+  if (!context_.store.JoinEqual(keeper_.lease(), stage_key_)) return false;
+  keeper_.Stop();
+  spdlog::info("{} waits for a job that does the same", tag_);
   return true;
 }
 

@@ -62,8 +62,13 @@ void LeaseKeeper::OnProgress(int64_t step, int64_t total_steps, const std::strin
   const bool fresh = total_steps != progress_.total_steps || step < progress_.step;
   progress_.step = step;
   progress_.total_steps = total_steps;
-  progress_.message = message;
   last_progress_ = SteadyClock::now();
+  // For the job's own log; a message may change with every step.
+  if (message != progress_.message && last_progress_ - last_said_ >= std::chrono::seconds(1)) {
+    last_said_ = last_progress_;
+    spdlog::debug("{} {}", tag_, message);
+  }
+  progress_.message = message;
   if (fresh) {
     eta_base_step_ = step;
     eta_base_time_ = last_progress_;

@@ -91,6 +91,7 @@ class LeaseKeeper : public ProgressObserver {
   ProgressRecord progress_;
   std::vector<std::string> warnings_;
   SteadyClock::time_point last_progress_ = start_;
+  SteadyClock::time_point last_said_;
   // Where the present run of steps began, for the expected time to its end.
   int64_t eta_base_step_ = 0;
   SteadyClock::time_point eta_base_time_ = start_;

@@ -149,7 +149,7 @@ class CoreStageRunner : public StageRunner {
     };
     setup.attempt = run.job_name + "/" + std::to_string(run.attempt);
     setup.batch = Batch(run.threads);
-    setup.project = run.project;
+    setup.project = run.submission;
     StageContext context(std::move(setup), recorder, recorder, cancel);
     RunStage(run, blobs, context);
     const auto points = recorder.points();

@@ -26,8 +26,8 @@ class BlobSource {
 };
 
 struct StageRun {
-  std::string job_name;  // "jobs/..."
-  std::string project;   // the submitted job: what fairness is between
+  std::string job_name;    // "jobs/..."
+  std::string submission;  // the submitted job: what fairness in a batch is between
   v1::JobSpec spec;
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
   // Artifacts of the jobs that this one depends on, by artifact name (read-only files).

@@ -35,7 +35,7 @@ class MeetingRunner : public StageRunner {
     std::unique_lock lock(mutex_);
     ++running_;
     most_ = std::max(most_, running_);
-    projects_[run.job_name] = run.project;
+    projects_[run.job_name] = run.submission;
     met_.notify_all();
     met_.wait_for(lock, std::chrono::seconds(3), [&] { return running_ >= wanted; });
     lock.unlock();

@@ -154,6 +154,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
              paths.Logs() / (arguments.options.name + ".log"));
     if (arguments.inference.empty()) {
       Complete(&arguments);
+      LogJobsTo(paths.JobLogs());
       const std::unique_ptr<StageRunner> runner = program.make_runner();
       RunWorker(arguments.options, *runner, g_draining);
     } else {

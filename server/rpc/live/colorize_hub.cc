@@ -18,8 +18,8 @@ class ColorizeStream final
     : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>,
       public std::enable_shared_from_this<ColorizeStream> {
  public:
-  ColorizeStream(ColorizeHub& hub, grpc::CallbackServerContext* context)
-      : hub_(hub), parts_(hub.parts_), deadline_(context->deadline()) {}
+  ColorizeStream(ColorizeHub& hub, grpc::CallbackServerContext* context, ProjectStore store)
+      : hub_(hub), parts_(hub.parts_), store_(std::move(store)), deadline_(context->deadline()) {}
 
   // Takes no more pictures, answers those that are here, then ends with `status`.
   void End(const grpc::Status& status) {
@@ -119,7 +119,7 @@ class ColorizeStream final
   void Forward(const std::shared_ptr<Picture>& picture) {
     const grpc::Status status = Guard([&] {
       ResolveColorizeRequest(
-          parts_, &picture->request, &picture->call->request, &picture->response);
+          parts_, store_, &picture->request, &picture->call->request, &picture->response);
     });
     if (!status.ok()) return Answer(picture, status);
     hub_.client_.Start(
@@ -128,18 +128,12 @@ class ColorizeStream final
         });
   }
 
-  void Answer(const std::shared_ptr<Picture>& picture, const grpc::Status& status) {
+  void Answer(const std::shared_ptr<Picture>& picture, const grpc::Status& answered) {
     v1::ColorizeImagesResponse& response = picture->response;
+    const grpc::Status status = answered.ok() ? TakeAnswer(picture) : answered;
     response.set_request_id(picture->request.request_id().substr(0, 128));
     if (status.ok()) {
-      internal::v1::ColorizeImageResponse& answer = picture->call->response;
-      response.mutable_image()->swap(*answer.mutable_image());
-      if (!answer.image_sha256().empty()) {
-        *response.mutable_image_digest() =
-            ToProto(FileDigest{answer.image_sha256(), answer.image_size_bytes()});
-      }
-      response.set_encoder_digest(answer.encoder_digest());
-      response.set_batch_size(answer.batch_size());
+      response.clear_error();
     } else if (!response.mutable_error()->ParseFromString(status.error_details()) ||
                response.error().code() == 0) {
       response.mutable_error()->set_code(status.error_code());
@@ -155,6 +149,19 @@ class ColorizeStream final
       }
     }
     Pump();
+  }
+
+  // What is too large for a message is the project's blob from now on.
+  grpc::Status TakeAnswer(const std::shared_ptr<Picture>& picture) {
+    v1::ColorizeImagesResponse& response = picture->response;
+    internal::v1::ColorizeImageResponse& answer = picture->call->response;
+    response.mutable_image()->swap(*answer.mutable_image());
+    response.set_encoder_digest(answer.encoder_digest());
+    response.set_batch_size(answer.batch_size());
+    if (answer.image_sha256().empty()) return grpc::Status::OK;
+    const FileDigest blob{answer.image_sha256(), answer.image_size_bytes()};
+    *response.mutable_image_digest() = ToProto(blob);
+    return Guard([&] { store_.HoldBlob(blob); });
   }
 
   // Nobody reads any more: what is under way is cancelled, what is done is thrown away.
@@ -174,6 +181,7 @@ class ColorizeStream final
 
   ColorizeHub& hub_;
   const RpcParts& parts_;
+  const ProjectStore store_;
   const std::chrono::system_clock::time_point deadline_;
   v1::ColorizeImagesRequest incoming_;
   v1::ColorizeImagesResponse outgoing_;
@@ -214,11 +222,12 @@ ColorizeHub::ColorizeHub(const RpcParts& parts, InferenceLink link, ColorizeLimi
 
 grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* ColorizeHub::Open(
     grpc::CallbackServerContext* context) {
-  const grpc::Status allowed = Guard([&] { parts_.access.Require(Role::kSubmit, *context); });
+  std::optional<Call> call;
+  const grpc::Status allowed = Guard([&] { call = Admit(parts_, Role::kSubmit, *context); });
   if (!allowed.ok()) return new RefusedStream(allowed);
   if (!client_.available()) return new RefusedStream(NoWorkerStatus());
   client_.WarmUp();
-  const auto stream = std::make_shared<ColorizeStream>(*this, context);
+  const auto stream = std::make_shared<ColorizeStream>(*this, context, call->store);
   {
     std::lock_guard lock(mutex_);
     if (draining_) return new RefusedStream(DrainingStatus());

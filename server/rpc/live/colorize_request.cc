@@ -14,9 +14,12 @@ constexpr size_t kMaxRequestIdBytes = 128;
 constexpr int kMinSidePx = 16;
 constexpr int kMaxSidePx = 8192;
 
-std::string RequireBlob(const RpcParts& parts, const v1::Digest& digest, const std::string& field) {
+std::string RequireBlob(const RpcParts& parts,
+                        const ProjectStore& store,
+                        const v1::Digest& digest,
+                        const std::string& field) {
   const FileDigest blob = FromProto(digest);
-  if (!parts.blobs.Touch(blob)) {
+  if (!HasBlob(parts, store, blob)) {
     throw ServiceError(
         ErrorCode::kNotFound,
         "BLOB_MISSING",
@@ -29,6 +32,7 @@ std::string RequireBlob(const RpcParts& parts, const v1::Digest& digest, const s
 }
 
 void TakePicture(const RpcParts& parts,
+                 const ProjectStore& store,
                  v1::ColorizeImagesRequest* request,
                  internal::v1::ColorizeImageRequest* call) {
   if (request->image().empty() == !request->has_image_digest()) {
@@ -42,7 +46,7 @@ void TakePicture(const RpcParts& parts,
                        request->image().size());
   }
   if (request->has_image_digest()) {
-    call->set_image_sha256(RequireBlob(parts, request->image_digest(), "image_digest"));
+    call->set_image_sha256(RequireBlob(parts, store, request->image_digest(), "image_digest"));
   } else {
     call->mutable_image()->swap(*request->mutable_image());
   }
@@ -54,11 +58,11 @@ void TakePicture(const RpcParts& parts,
   call->set_max_side_px(side);
 }
 
-ColorizerRecord NewestOf(const RpcParts& parts, const std::string& scene) {
+ColorizerRecord NewestOf(const ProjectStore& store, const std::string& scene) {
   CheckName(scene, "scenes");
-  const auto newest = parts.store.ListColorizers(scene, 0, 1);
+  const auto newest = store.ListColorizers(scene, 0, 1);
   if (!newest.empty()) return newest[0];
-  parts.store.GetScene(scene);  // says so when there is no such scene
+  store.GetScene(scene);  // says so when there is no such scene
   throw ServiceError(
       ErrorCode::kNotFound,
       "COLORIZER_NOT_FOUND",
@@ -69,11 +73,11 @@ ColorizerRecord NewestOf(const RpcParts& parts, const std::string& scene) {
       kind::kColorizeScene);
 }
 
-ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesRequest& request) {
-  if (request.colorizer().empty()) return NewestOf(parts, request.scene());
+ColorizerRecord FindColorizer(const ProjectStore& store, const v1::ColorizeImagesRequest& request) {
+  if (request.colorizer().empty()) return NewestOf(store, request.scene());
   CheckName(request.colorizer(), "colorizers");
   ColorizerRecord record =
-      parts.store.GetColorizer(request.colorizer().substr(request.colorizer().find('/') + 1));
+      store.GetColorizer(request.colorizer().substr(request.colorizer().find('/') + 1));
   if (!request.scene().empty() && request.scene() != record.scene) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "OTHER_SCENE",
@@ -86,13 +90,14 @@ ColorizerRecord FindColorizer(const RpcParts& parts, const v1::ColorizeImagesReq
 }
 
 // Which weights it was trained with. They may have changed since: the worker compares digests.
-std::string EncoderOf(const RpcParts& parts, const ColorizerRecord& record) {
-  return ParseSpec(parts.store.GetJob(record.job).spec, record.job).personalize().encoder();
+std::string EncoderOf(const ProjectStore& store, const ColorizerRecord& record) {
+  return ParseSpec(store.GetJob(record.job).spec, record.job).personalize().encoder();
 }
 
 }  // namespace
 
 void ResolveColorizeRequest(const RpcParts& parts,
+                            const ProjectStore& store,
                             v1::ColorizeImagesRequest* request,
                             internal::v1::ColorizeImageRequest* call,
                             v1::ColorizeImagesResponse* response) {
@@ -105,16 +110,16 @@ void ResolveColorizeRequest(const RpcParts& parts,
   if (trained == request->has_example()) {
     throw InvalidArgument("name what colours the picture: a colorizer, a scene, or an example");
   }
-  TakePicture(parts, request, call);
+  TakePicture(parts, store, request, call);
   if (request->has_example()) {
-    call->set_example_sha256(RequireBlob(parts, request->example(), "example"));
+    call->set_example_sha256(RequireBlob(parts, store, request->example(), "example"));
     return;
   }
-  const ColorizerRecord record = FindColorizer(parts, *request);
+  const ColorizerRecord record = FindColorizer(store, *request);
   response->set_colorizer("colorizers/" + record.digest.sha256);
   response->set_scene(record.scene);
   call->set_colorizer_sha256(record.digest.sha256);
-  call->set_encoder(EncoderOf(parts, record));
+  call->set_encoder(EncoderOf(store, record));
 }
 
 }  // namespace color3d

@@ -12,6 +12,7 @@ namespace color3d {
 // what is known before: request_id, colorizer, scene. Throws ServiceError: no such colorizer, a
 // scene without one, a colorizer of another scene, a missing blob, a picture of more than 3 MiB.
 void ResolveColorizeRequest(const RpcParts& parts,
+                            const ProjectStore& store,
                             v1::ColorizeImagesRequest* request,
                             internal::v1::ColorizeImageRequest* call,
                             v1::ColorizeImagesResponse* response);

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "core/base/digest.h"
 
@@ -30,13 +31,17 @@ bool IsDone(const v1::Job& job) { return job.state() >= v1::Job::STATE_SUCCEEDED
 }  // namespace
 
 TestClient::TestClient(const std::string& address)
-    : channel(grpc::CreateChannel(address, grpc::InsecureChannelCredentials())),
+    : TestClient(grpc::CreateChannel(address, grpc::InsecureChannelCredentials())) {}
+
+TestClient::TestClient(std::shared_ptr<grpc::Channel> open_channel)
+    : channel(std::move(open_channel)),
       scenes(v1::SceneService::NewStub(channel)),
       blobs(v1::BlobService::NewStub(channel)),
       bytes(google::bytestream::ByteStream::NewStub(channel)),
       jobs(v1::JobService::NewStub(channel)),
       colorizers(v1::ColorizerService::NewStub(channel)),
-      server(v1::ServerService::NewStub(channel)) {}
+      server(v1::ServerService::NewStub(channel)),
+      admin(v1::AdminService::NewStub(channel)) {}
 
 v1::Digest DigestOf(const std::string& content) {
   v1::Digest digest;

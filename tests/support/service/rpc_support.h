@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "color3d/v1/admin.grpc.pb.h"
 #include "color3d/v1/blob.grpc.pb.h"
 #include "color3d/v1/colorizer.grpc.pb.h"
 #include "color3d/v1/job.grpc.pb.h"
@@ -20,6 +21,7 @@ namespace color3d::testing {
 
 struct TestClient {
   explicit TestClient(const std::string& address);
+  explicit TestClient(std::shared_ptr<grpc::Channel> open_channel);
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<v1::SceneService::Stub> scenes;
   std::unique_ptr<v1::BlobService::Stub> blobs;
@@ -27,6 +29,7 @@ struct TestClient {
   std::unique_ptr<v1::JobService::Stub> jobs;
   std::unique_ptr<v1::ColorizerService::Stub> colorizers;
   std::unique_ptr<v1::ServerService::Stub> server;
+  std::unique_ptr<v1::AdminService::Stub> admin;
 
   // All throw std::runtime_error with the status when an RPC fails.
   v1::Digest Upload(const std::string& content);

@@ -1,0 +1,81 @@
+#include "server/ops/job_log.h"
+
+#include <fcntl.h>
+#include <spdlog/fmt/chrono.h>
+#include <spdlog/sinks/base_sink.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <string_view>
+
+#include "core/base/utf8.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::string_view kTag = "[job=jobs/";
+constexpr int64_t kMaxBytes = 1 << 20;
+constexpr std::string_view kFull = "the log is full; what follows is in the worker's own\n";
+
+// One line; control characters would end it or hide what it says.
+std::string LineOf(const spdlog::details::log_msg& message, std::string_view text) {
+  using std::chrono::duration_cast;
+  const auto since = message.time.time_since_epoch();
+  const auto seconds = duration_cast<std::chrono::seconds>(since);
+  const auto rest = duration_cast<std::chrono::milliseconds>(since - seconds);
+  const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
+  std::string clean = CleanUtf8(std::string(text));
+  std::replace_if(
+      clean.begin(), clean.end(), [](unsigned char c) { return c < 32; }, ' ');
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z {} {}\n",
+                     fmt::gmtime(static_cast<std::time_t>(seconds.count())),
+                     rest.count(),
+                     std::string_view(level.data(), level.size()),
+                     clean);
+}
+
+class JobLogSink : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit JobLogSink(fs::path folder) : folder_(std::move(folder)) {}
+
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    const std::string_view text(message.payload.data(), message.payload.size());
+    if (!text.starts_with(kTag)) return;
+    const size_t end = text.find_first_of(" ]", kTag.size());
+    const size_t close = text.find("] ");
+    if (end == std::string_view::npos || close == std::string_view::npos) return;
+    const std::string job(text.substr(5, end - 5));
+    const int fd =
+        ::open(JobLogFile(folder_, job).c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    if (fd < 0) return;
+    struct stat status {};
+    if (::fstat(fd, &status) == 0 && status.st_size < kMaxBytes) {
+      std::string line = LineOf(message, text.substr(close + 2));
+      if (status.st_size + static_cast<int64_t>(line.size()) >= kMaxBytes) line += kFull;
+      [[maybe_unused]] const ssize_t written = ::write(fd, line.data(), line.size());
+    }
+    ::close(fd);
+  }
+  void flush_() override {}
+
+ private:
+  const fs::path folder_;
+};
+
+}  // namespace
+
+fs::path JobLogFile(const fs::path& folder, const std::string& job) {
+  return folder / (job.substr(job.find('/') + 1) + ".log");
+}
+
+spdlog::sink_ptr MakeJobLogSink(const fs::path& folder) {
+  return std::make_shared<JobLogSink>(folder);
+}
+
+}  // namespace color3d

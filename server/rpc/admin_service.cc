@@ -1,0 +1,125 @@
+#include "server/rpc/admin_service.h"
+
+#include <spdlog/spdlog.h>
+
+#include "server/rpc/convert.h"
+#include "server/storage/collector.h"
+
+namespace color3d {
+namespace {
+
+constexpr int64_t kLeastGraceSeconds = 3600;
+constexpr int64_t kGraceSeconds = 24 * 3600;
+constexpr int kMaxListed = 1000;
+
+template <typename Request, typename Response, typename Body>
+grpc::ServerUnaryReactor* AnswerAdmin(const RpcParts& parts,
+                                      grpc::CallbackServerContext* context,
+                                      const Request* request,
+                                      Response* response,
+                                      Body body) {
+  return AnswerUnary(parts, parts.slow, Role::kAdmin, context, request, response, std::move(body));
+}
+
+void SetPause(const RpcParts& parts, const Call& call, bool on) {
+  parts.store.SetHold(Hold::kPaused, on);
+  spdlog::warn("{} has {} the queue", NameOf(call.caller), on ? "paused" : "resumed");
+}
+
+void CollectNow(const RpcParts& parts,
+                const v1::CollectRequest& request,
+                v1::CollectResponse* response) {
+  const int64_t grace = request.has_grace_seconds() ? request.grace_seconds() : kGraceSeconds;
+  if (grace < kLeastGraceSeconds) {
+    throw InvalidArgument("grace_seconds is {}; at least {} are needed, for uploads under way",
+                          grace,
+                          kLeastGraceSeconds);
+  }
+  const auto never = [] { return false; };
+  const std::vector<StoredBlob> due =
+      DueBlobs(parts.store, ListBlobs(parts.blobs, never), std::chrono::seconds(grace));
+  std::vector<FileDigest> gone;
+  if (request.dry_run()) {
+    for (const StoredBlob& blob : due) gone.push_back(blob.digest);
+  } else {
+    gone = RemoveDue(parts.store, parts.blobs, due);
+  }
+  response->set_blobs(static_cast<int>(gone.size()));
+  int64_t bytes = 0;
+  for (const FileDigest& blob : gone) {
+    bytes += blob.size_bytes;
+    if (response->digests_size() < kMaxListed) *response->add_digests() = ToProto(blob);
+  }
+  response->set_bytes(bytes);
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* AdminServiceImpl::PauseQueue(grpc::CallbackServerContext* context,
+                                                       const v1::PauseQueueRequest* request,
+                                                       v1::PauseQueueResponse* response) {
+  return AnswerAdmin(
+      parts_, context, request, response, [this](const Call& call, const auto&, auto*) {
+        SetPause(parts_, call, true);
+      });
+}
+
+grpc::ServerUnaryReactor* AdminServiceImpl::ResumeQueue(grpc::CallbackServerContext* context,
+                                                        const v1::ResumeQueueRequest* request,
+                                                        v1::ResumeQueueResponse* response) {
+  return AnswerAdmin(
+      parts_, context, request, response, [this](const Call& call, const auto&, auto*) {
+        SetPause(parts_, call, false);
+      });
+}
+
+grpc::ServerUnaryReactor* AdminServiceImpl::Drain(grpc::CallbackServerContext* context,
+                                                  const v1::DrainRequest* request,
+                                                  v1::DrainResponse* response) {
+  return AnswerAdmin(
+      parts_, context, request, response, [this](const Call& call, const auto&, auto*) {
+        spdlog::warn("{} drains the server", NameOf(call.caller));
+        parts_.drain();
+      });
+}
+
+grpc::ServerUnaryReactor* AdminServiceImpl::KillJob(grpc::CallbackServerContext* context,
+                                                    const v1::KillJobRequest* request,
+                                                    v1::Job* response) {
+  return AnswerAdmin(
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
+        CheckName(in.name(), "jobs");
+        JobRecord job = parts_.store.Kill(in.name());
+        spdlog::warn("[job={}] killed by {}", job.name, NameOf(call.caller));
+        job.scene = PublicScene(job.scene);
+        *out = ToProto(job);
+      });
+}
+
+grpc::ServerUnaryReactor* AdminServiceImpl::Collect(grpc::CallbackServerContext* context,
+                                                    const v1::CollectRequest* request,
+                                                    v1::CollectResponse* response) {
+  return AnswerAdmin(parts_,
+                     context,
+                     request,
+                     response,
+                     [this](const Call&, const auto& in, v1::CollectResponse* out) {
+                       CollectNow(parts_, in, out);
+                     });
+}
+
+grpc::ServerUnaryReactor* AdminServiceImpl::ListProjects(grpc::CallbackServerContext* context,
+                                                         const v1::ListProjectsRequest* request,
+                                                         v1::ListProjectsResponse* response) {
+  return AnswerAdmin(parts_,
+                     context,
+                     request,
+                     response,
+                     [this](const Call&, const auto&, v1::ListProjectsResponse* out) {
+                       for (const ProjectRecord& project : parts_.store.ListProjects()) {
+                         *out->add_projects() = ToProto(project, parts_.limits);
+                       }
+                     });
+}
+
+}  // namespace color3d

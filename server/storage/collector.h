@@ -1,0 +1,23 @@
+// What nothing names any more: found in two phases, with their state in the store, and removed.
+#pragma once
+
+#include <chrono>
+#include <vector>
+
+#include "server/storage/blob_store.h"
+#include "server/store/job_store.h"
+
+namespace color3d {
+
+// Blobs of `blobs`, which are all that there are, that nothing names and that were noted so, and
+// untouched since, for the time of grace. Takes note of those that are found for the first time.
+std::vector<StoredBlob> DueBlobs(JobStore& store,
+                                 const std::vector<StoredBlob>& blobs,
+                                 std::chrono::milliseconds grace);
+
+// Those of `due` that were removed: still unnamed and untouched.
+std::vector<FileDigest> RemoveDue(JobStore& store,
+                                  BlobStore& blobs,
+                                  const std::vector<StoredBlob>& due);
+
+}  // namespace color3d

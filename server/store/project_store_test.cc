@@ -1,0 +1,138 @@
+// What projects see of each other, and what they may have.
+#include "server/store/project_store.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/service/job_store_fixture.h"
+
+namespace color3d {
+namespace {
+
+class ProjectStoreTest : public JobStoreTest {
+ protected:
+  ProjectStoreTest() {
+    for (const ProjectStore& project : {a_, b_}) {
+      SceneRecord scene;
+      scene.name = "scenes/house";
+      scene.files = {{"a.jpg", {Sha256Hex("photo"), 5}}};
+      project.CreateScene(scene, {"CreateScene", "same id", "same body"});
+      project.ActivateScene("scenes/house", StoredLayout::kPhotos, 1, {});
+    }
+  }
+  static NewGraph Graph() {
+    NewGraph graph;
+    graph.scene = "scenes/house";
+    graph.jobs = {Job("single")};
+    return graph;
+  }
+  static JobRecord Create(const ProjectStore& project, const QueueLimits& limits = kNoLimit) {
+    return project.CreateGraph(Graph(), {}, limits);
+  }
+
+  ProjectStore a_{*store_, "a"}, b_{*store_, "b"}, none_{*store_, ""};
+};
+
+TEST_F(ProjectStoreTest, EachHasItsOwn) {
+  const JobRecord job = Create(a_);
+  EXPECT_EQ(job.scene, "scenes/house");
+  EXPECT_EQ(a_.GetJob(job.name).scene, "scenes/house");
+  EXPECT_EQ(a_.ListJobs({"", "scenes/house", {}}, 0, 10).size(), 1u);
+  EXPECT_EQ(a_.ListScenes(0, 10).size(), 1u);
+  EXPECT_EQ(a_.GetScene("scenes/house").name, "scenes/house");
+  EXPECT_EQ(none_.ListScenes(0, 10).size(), 1u) << "that of the fixture";
+  EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 3u);
+  for (const ProjectStore& other : {b_, none_}) {
+    EXPECT_TRUE(other.ListJobs({}, 0, 10).empty());
+    const std::vector<std::function<void()>> looks = {
+        [&] { other.GetJob(job.name); },
+        [&] { other.ListChildren(job.name); },
+        [&] { other.GetInputs(job); },
+        [&] { other.Cancel(job.name, {}); },
+        [&] { other.Retry(job.name, false, {}, kNoLimit); },
+        [&] { other.Delete(job.name, {}); },
+        [&] { other.Pin(job.name, true); },
+        [&] { other.ResolveWatch({job.name}); },
+        [&] { other.AcceptKeyColor("scenes/house", job.name, {}); },
+        [&] {
+          NewGraph graph = Graph();
+          graph.jobs[0].input_jobs = {job.name};
+          other.CreateGraph(graph, {}, kNoLimit);
+        }};
+    for (const auto& look : looks) EXPECT_EQ(ReasonThrown(look), "JOB_NOT_FOUND");
+  }
+  EXPECT_EQ(ReasonThrown([&] { none_.GetScene("scenes/house"); }), "SCENE_NOT_FOUND");
+  EXPECT_EQ(ReasonThrown([&] { none_.GetScene("scenes/house@a"); }), "SCENE_NOT_FOUND");
+  EXPECT_EQ(StateOf(job.name), JobState::kQueued);
+}
+
+TEST_F(ProjectStoreTest, ScenesAndColorizersGoByTheirOwnNames) {
+  Create(a_);
+  const JobRecord job = ClaimOne();
+  EXPECT_EQ(store_->GetScene(job.scene).files.size(), 1u) << "as workers look for it";
+  EXPECT_EQ(ReasonThrown([&] { a_.DeleteScene("scenes/house", {}); }), "SCENE_IN_USE");
+  b_.DeleteScene("scenes/house", {});
+  EXPECT_EQ(a_.GetScene("scenes/house").name, "scenes/house");
+}
+
+TEST_F(ProjectStoreTest, RequestIdsAreTheirOwn) {
+  const RequestKey key{"CreateJob", "id", "body"};
+  const JobRecord of_a = a_.CreateGraph(Graph(), key, kNoLimit);
+  const JobRecord of_b = b_.CreateGraph(Graph(), {"CreateJob", "id", "another body"}, kNoLimit);
+  EXPECT_NE(of_a.name, of_b.name);
+  EXPECT_EQ(a_.CreateGraph(Graph(), key, kNoLimit).name, of_a.name);
+  EXPECT_EQ(a_.FindRequest(key), of_a.name);
+  EXPECT_FALSE(none_.FindRequest(key).has_value());
+  a_.Cancel(of_a.name, {});
+  const RequestKey away{"DeleteJob", "id", "body"};
+  a_.Delete(of_a.name, away);
+  EXPECT_NO_THROW(a_.Delete(of_a.name, away));
+  EXPECT_EQ(ReasonThrown([&] { a_.Delete(of_a.name, {}); }), "JOB_NOT_FOUND");
+}
+
+TEST_F(ProjectStoreTest, ABlobIsForThoseWhoBroughtOrMadeIt) {
+  const FileDigest photo{Sha256Hex("photo"), 5};
+  EXPECT_FALSE(a_.HoldsBlob(photo)) << "to know its digest is not to have it";
+  a_.HoldBlob(photo);
+  a_.HoldBlob(photo);
+  EXPECT_TRUE(a_.HoldsBlob(photo));
+  EXPECT_FALSE(b_.HoldsBlob(photo));
+  EXPECT_EQ(a_.Usage().stored_bytes, 5);
+  const JobRecord job = Create(a_);
+  Succeed(ClaimOne());
+  const FileDigest result = a_.GetJob(job.name).artifacts[0].digest;
+  EXPECT_TRUE(a_.HoldsBlob(result));
+  EXPECT_FALSE(b_.HoldsBlob(result));
+  EXPECT_EQ(a_.Usage().stored_bytes, 8);
+  a_.Delete(job.name, {});
+  EXPECT_FALSE(a_.HoldsBlob(result));
+  EXPECT_TRUE(a_.HoldsBlob(photo)) << "the scene names it";
+  a_.DeleteScene("scenes/house", {});
+  EXPECT_EQ(a_.Usage().stored_bytes, 0);
+  b_.HoldBlob(photo);
+  store_->ForgetBlob(photo.sha256);
+  EXPECT_EQ(b_.Usage().stored_bytes, 0);
+}
+
+TEST_F(ProjectStoreTest, OneDoesNotFillTheQueueOfAll) {
+  const QueueLimits limits(5, 2);
+  Create(a_, limits);
+  Create(a_, limits);
+  EXPECT_EQ(ReasonThrown([&] { Create(a_, limits); }), "QUOTA_EXCEEDED");
+  for (int i = 0; i < 2; ++i) Create(b_, limits);
+  EXPECT_EQ(a_.Usage().unfinished_jobs, 2);
+  CreateSingle();
+  EXPECT_EQ(ReasonThrown([&] { none_.CreateGraph(Graph(), {}, limits); }), "SCENE_NOT_FOUND");
+  EXPECT_EQ(ReasonThrown([&] { Create(b_, QueueLimits(5, 9)); }), "QUEUE_FULL");
+}
+
+TEST_F(ProjectStoreTest, TheyTakeTurns) {
+  for (int i = 0; i < 4; ++i) Create(a_);
+  for (int i = 0; i < 2; ++i) Create(b_);
+  std::string order;
+  for (int i = 0; i < 6; ++i) order += ClaimOne().project;
+  EXPECT_EQ(order, "ababaa");
+  EXPECT_EQ(store_->ListProjects().size(), 2u);
+}
+
+}  // namespace
+}  // namespace color3d

@@ -1,0 +1,216 @@
+// Projects and what they hold; what holds the queue back; what grows old.
+#include <fmt/core.h>
+
+#include "server/store/sqlite_db.h"
+#include "server/store/sqlite_job_store.h"
+#include "server/store/sqlite_rows.h"
+
+namespace color3d {
+namespace {
+
+const char* NameOf(Hold hold) { return hold == Hold::kPaused ? "hold_paused" : "hold_storage"; }
+
+constexpr char kProject[] =
+    "select name, bytes, (select count(*) from job where end_ms=0 and +job.project=project.name) "
+    "from project ";
+
+ProjectRecord ProjectFromRow(const SqliteStatement& row) {
+  return {row.Text(0), row.Int(1), row.Int(2)};
+}
+
+}  // namespace
+
+std::vector<ProjectRecord> SqliteJobStore::ListProjects() {
+  const auto held = connections_.Read();
+  SqliteStatement select((*held).handle(), std::string(kProject) + "order by name");
+  std::vector<ProjectRecord> projects;
+  while (select.Step()) projects.push_back(ProjectFromRow(select));
+  return projects;
+}
+
+ProjectRecord SqliteJobStore::GetProject(const std::string& name) {
+  const auto held = connections_.Read();
+  SqliteStatement select((*held).handle(), std::string(kProject) + "where name=?");
+  select.Bind(name);
+  return select.Step() ? ProjectFromRow(select) : ProjectRecord{name, 0, 0};
+}
+
+void SqliteJobStore::HoldBlob(const std::string& project, const FileDigest& blob) {
+  if (!HeldBlobs(project, {blob.sha256}).empty()) return;
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  db.Run("insert or ignore into blob_holding values(?,?,?)", project, blob.sha256, blob.size_bytes);
+  transaction.Commit();
+}
+
+std::set<std::string> SqliteJobStore::HeldBlobs(const std::string& project,
+                                                const std::vector<std::string>& sha256) {
+  const auto held = connections_.Read();
+  std::set<std::string> known;
+  for (const std::string& digest : sha256) {
+    SqliteStatement select((*held).handle(),
+                           "select 1 from blob_holding where project=? and sha256=?");
+    select.Bind(project, digest);
+    if (select.Step()) known.insert(digest);
+  }
+  return known;
+}
+
+void SqliteJobStore::ForgetBlob(const std::string& sha256) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  db.Run("delete from blob_holding where sha256=?", sha256);
+  transaction.Commit();
+}
+
+void SqliteJobStore::LetGo(SqliteDatabase& db,
+                           const std::string& project,
+                           const std::vector<std::string>& sha256) {
+  for (const std::string& digest : sha256) {
+    db.Run(
+        "delete from blob_holding where project=?1 and sha256=?2 and not exists("
+        "select 1 from artifact n join job j on j.job_id=n.job_id "
+        "where n.sha256=?2 and j.project=?1) and not exists("
+        "select 1 from job_blob n join job j on j.job_id=n.job_id "
+        "where n.sha256=?2 and j.project=?1) and not exists("
+        "select 1 from scene_file n join scene s on s.scene_id=n.scene_id "
+        "where n.sha256=?2 and s.project=?1)",
+        project,
+        digest);
+  }
+}
+
+void SqliteJobStore::SetHold(Hold hold, bool on) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  db.Run("update meta set value=? where name=?", on, NameOf(hold));
+  transaction.Commit();
+}
+
+std::set<Hold> SqliteJobStore::Holds() {
+  const auto held = connections_.Read();
+  std::set<Hold> holds;
+  for (const Hold hold : {Hold::kPaused, Hold::kStorage}) {
+    SqliteStatement select((*held).handle(), "select 1 from meta where name=? and value<>0");
+    select.Bind(NameOf(hold));
+    if (select.Step()) holds.insert(hold);
+  }
+  return holds;
+}
+
+QueuePlace SqliteJobStore::PlaceInQueue(const JobRecord& job) {
+  if (job.state != JobState::kQueued && job.state != JobState::kBlocked) return {};
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  // Of a submitted job whose stages all wait, the first of them.
+  SqliteStatement first(
+      db.handle(),
+      "select priority, job_id, run_after_ms, joins_key from job where (name=?1 or parent=?1) and "
+      "state='QUEUED' and not exists(select 1 from job where parent=?1 and state='RUNNING') "
+      "order by priority, job_id limit 1");
+  first.Bind(job.name);
+  if (!first.Step()) return {};
+  QueuePlace place;
+  SqliteStatement before(
+      db.handle(), "select count(*) from job where state='QUEUED' and (priority, job_id)<(?, ?)");
+  before.Bind(first.Int(0), first.Int(1));
+  before.Step();
+  place.position = before.Int(0) + 1;
+  SqliteStatement holds(db.handle(),
+                        "select name from meta where name in('hold_paused','hold_storage') and "
+                        "value<>0 order by name limit 1");
+  SqliteStatement worker(db.handle(), "select 1 from worker limit 1");
+  const int64_t pause_ms = first.Int(2) - SteadyNow();
+  if (holds.Step()) {
+    place.waits_for = holds.Text(0) == NameOf(Hold::kPaused)
+                          ? "the server's operator, who has paused the queue"
+                          : "space on the server's disk, which is nearly full";
+  } else if (!worker.Step()) {
+    place.waits_for = "a worker: none runs";
+  } else if (pause_ms > 0) {
+    place.waits_for = fmt::format("its next try, in {} s", (pause_ms + 999) / 1000);
+  } else if (!first.Text(3).empty()) {
+    place.waits_for = "equal work, which another job does now";
+  }
+  return place;
+}
+
+std::vector<std::string> SqliteJobStore::AgeExpired(int64_t ended_before_ms, int64_t grace_ms) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  constexpr char kExpired[] =
+      "select job_id from job where parent='' and end_ms<>0 and pinned=0 and end_ms<? and "
+      "not exists(select 1 from job member join job_dependency d on d.input_id=member.job_id "
+      "join job reader on reader.job_id=d.job_id where (member.job_id=job.job_id or "
+      "member.parent=job.name) and reader.end_ms=0)";
+  const int64_t elapsed = ElapsedSinceLast(db, "expiry_steady_ms");
+  db.Run(std::string("delete from expiry_candidate where job_id not in (") + kExpired + ")",
+         ended_before_ms);
+  db.Run("update expiry_candidate set age_ms=age_ms+?", elapsed);
+  db.Run(std::string("insert or ignore into expiry_candidate select job_id, 0 from (") + kExpired +
+             ")",
+         ended_before_ms);
+  std::vector<std::string> due;
+  {
+    SqliteStatement select(db.handle(),
+                           "select job.name from expiry_candidate e join job on "
+                           "job.job_id=e.job_id where e.age_ms>=? order by e.job_id limit 1000");
+    select.Bind(grace_ms);
+    while (select.Step()) due.push_back(select.Text(0));
+  }
+  transaction.Commit();
+  return due;
+}
+
+std::vector<std::string> SqliteJobStore::ScenesWithoutJobs(int64_t committed_before_ms) {
+  const auto held = connections_.Read();
+  SqliteStatement select((*held).handle(),
+                         "select name from scene where active=1 and commit_ms<? and not exists("
+                         "select 1 from job where job.scene=scene.name) limit 1000");
+  select.Bind(committed_before_ms);
+  std::vector<std::string> names;
+  while (select.Step()) names.push_back(select.Text(0));
+  return names;
+}
+
+std::vector<Notification> SqliteJobStore::DueNotifications(int limit) {
+  const auto held = connections_.Read();
+  SqliteStatement select(
+      (*held).handle(),
+      "select n.job_id, job.name, n.url, n.tries, n.first_ms from notification n "
+      "join job on job.job_id=n.job_id where n.next_ms<=? order by n.next_ms "
+      "limit ?");
+  select.Bind(Now(), limit);
+  std::vector<Notification> due;
+  while (select.Step()) {
+    due.push_back({select.Int(0),
+                   select.Text(1),
+                   select.Text(2),
+                   static_cast<int>(select.Int(3)),
+                   select.Int(4)});
+  }
+  return due;
+}
+
+void SqliteJobStore::EndNotification(int64_t job_id) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  db.Run("delete from notification where job_id=?", job_id);
+  transaction.Commit();
+}
+
+void SqliteJobStore::DelayNotification(int64_t job_id, int64_t pause_ms) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  db.Run(
+      "update notification set tries=tries+1, next_ms=? where job_id=?", Now() + pause_ms, job_id);
+  transaction.Commit();
+}
+
+}  // namespace color3d

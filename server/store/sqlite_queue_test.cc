@@ -1,0 +1,155 @@
+// What keeps jobs waiting, what lets them share work, and how old ones go.
+#include <gtest/gtest.h>
+
+#include "tests/support/service/job_store_fixture.h"
+
+namespace color3d {
+namespace {
+using QueueTest = JobStoreTest;
+
+TEST_F(QueueTest, AHeldQueueGivesNothingAndSaysWhy) {
+  const JobRecord job = CreateSingle();
+  store_->UpdateWorker({"w", 1, "", 0, 0});
+  for (const Hold hold : {Hold::kPaused, Hold::kStorage}) {
+    store_->SetHold(hold, true);
+    EXPECT_FALSE(store_->Claim("w", kLease).has_value());
+    EXPECT_FALSE(store_->ClaimForBatch("w", kLease, "single", [](const auto&) { return true; }));
+    EXPECT_NE(store_->PlaceInQueue(job).waits_for, "");
+    Open();
+    EXPECT_EQ(store_->Holds().count(hold), 1u) << "over a restart, too";
+    store_->SetHold(hold, false);
+  }
+  EXPECT_EQ(store_->PlaceInQueue(job).waits_for, "");
+  EXPECT_EQ(ClaimOne().name, job.name);
+}
+
+TEST_F(QueueTest, AWaitingJobKnowsItsPlaceAndItsTime) {
+  const JobRecord first = CreateSingle(), second = CreateSingle();
+  const JobRecord root = CreateDiamond();
+  EXPECT_EQ(store_->PlaceInQueue(first).waits_for, "a worker: none runs");
+  store_->UpdateWorker({"w", 1, "", 0, 0});
+  EXPECT_EQ(store_->PlaceInQueue(first).position, 1);
+  EXPECT_EQ(store_->PlaceInQueue(second).position, 2);
+  EXPECT_EQ(store_->PlaceInQueue(root).position, 3) << "that of its first stage";
+  EXPECT_EQ(store_->PlaceInQueue(Child(root, "left")).position, 0) << "waits for an input";
+  wall_ += 700;
+  FailWith(ClaimOne(), ErrorCode::kUnavailable);
+  const JobRecord waiting = store_->GetJob(first.name);
+  EXPECT_EQ(waiting.queued_ms, 700);
+  EXPECT_EQ(store_->PlaceInQueue(waiting).waits_for, "its next try, in 1 s");
+  wall_ += 300;
+  now_ += 1000;
+  const JobRecord running = ClaimOne();
+  EXPECT_EQ(running.queued_ms, 1000);
+  EXPECT_EQ(store_->PlaceInQueue(running).position, 0);
+  EXPECT_EQ(store_->PlaceInQueue(second).position, 1);
+}
+
+TEST_F(QueueTest, EqualWorkIsDoneOnce) {
+  CreateSingle();
+  CreateSingle();
+  store_->UpdateWorker({"w", 1, "", 0, 0});
+  const JobRecord leader = ClaimOne(), follower = ClaimOne();
+  EXPECT_FALSE(store_->JoinEqual(LeaseOf(leader), "key"));
+  EXPECT_TRUE(store_->JoinEqual(LeaseOf(follower), "key"));
+  const JobRecord waiting = store_->GetJob(follower.name);
+  EXPECT_EQ(waiting.state, JobState::kQueued);
+  EXPECT_EQ(waiting.attempt, 0) << "nothing was spent";
+  EXPECT_NE(store_->PlaceInQueue(waiting).waits_for.find("equal work"), std::string::npos);
+  EXPECT_FALSE(store_->Claim("w", kLease).has_value());
+  Succeed(leader);
+  const JobRecord again = ClaimOne();
+  EXPECT_EQ(again.name, follower.name);
+  EXPECT_FALSE(store_->JoinEqual(LeaseOf(again), "key")) << "nobody else does it now";
+}
+
+TEST_F(QueueTest, WhoeverWaitsForEqualWorkDoesItWhenTheOtherDoesNot) {
+  for (const char* end : {"fails", "is lost", "is cancelled", "is killed"}) {
+    SCOPED_TRACE(end);
+    const JobRecord first = CreateSingle(), second = CreateSingle();
+    const JobRecord leader = ClaimOne(), follower = ClaimOne();
+    store_->JoinEqual(LeaseOf(leader), "key");
+    ASSERT_TRUE(store_->JoinEqual(LeaseOf(follower), "key"));
+    if (end == std::string("fails")) FailWith(leader, ErrorCode::kInvalidArgument);
+    if (end == std::string("is lost")) {
+      now_ += 2 * kLease;
+      store_->ReapExpired();
+    }
+    if (end == std::string("is cancelled")) {
+      store_->Cancel(leader.name, {});
+      FailWith(leader, ErrorCode::kCancelled);
+    }
+    if (end == std::string("is killed")) store_->Kill(leader.name);
+    const JobRecord again = ClaimOne();
+    EXPECT_EQ(again.name, second.name);
+    Succeed(again, std::string("of ") + end);
+    store_->Kill(first.name);
+  }
+}
+
+TEST_F(QueueTest, AKilledJobEndsAtOnce) {
+  const JobRecord root = CreateDiamond();
+  const JobRecord running = ClaimOne();
+  EXPECT_EQ(store_->Kill(root.name).state, JobState::kCancelled);
+  for (const JobRecord& child : store_->ListChildren(root.name)) {
+    EXPECT_EQ(child.state, JobState::kCancelled) << child.kind;
+  }
+  EXPECT_EQ(ReasonThrown([&] { Succeed(running); }), "LEASE_LOST");
+  EXPECT_EQ(store_->Kill(root.name).state, JobState::kCancelled) << "twice is once";
+  EXPECT_EQ(store_->Retry(root.name, false, {}, kNoLimit).state, JobState::kBlocked);
+}
+
+TEST_F(QueueTest, OldJobsGoInTwoPhases) {
+  constexpr int64_t kGrace = 1000;
+  CreateSingle();
+  const JobRecord old = ClaimOne();
+  Succeed(old);
+  const JobRecord pinned = CreateSingle();
+  Succeed(ClaimOne());
+  store_->Pin(pinned.name, true);
+  const auto expired = [&](int64_t before) { return store_->AgeExpired(before, kGrace); };
+  EXPECT_TRUE(expired(wall_ + (int64_t{1} << 40)).empty()) << "the clock jumped: noted only";
+  now_ += kGrace;
+  EXPECT_TRUE(expired(wall_).empty()) << "the clock was set right: forgotten";
+  now_ += kGrace;
+  wall_ += 10;
+  EXPECT_TRUE(expired(wall_).empty());
+  now_ += kGrace;
+  EXPECT_EQ(expired(wall_), std::vector<std::string>{old.name});
+  NewGraph reader;
+  reader.scene = "scenes/test";
+  reader.jobs = {Job("reader")};
+  reader.jobs[0].input_jobs = {old.name};
+  store_->CreateGraph(reader, {}, kNoLimit);
+  EXPECT_TRUE(expired(wall_).empty()) << "it is read";
+  EXPECT_EQ(ReasonThrown([&] { store_->Pin(Child(CreateDiamond(), "left").name, true); }),
+            "INVALID_ARGUMENT");
+}
+
+TEST_F(QueueTest, WordOfAnEndIsOwedUntilItIsDelivered) {
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  graph.notify_url = "https://hooks.example.org";
+  graph.jobs = {Job("first"), Job("root", {0})};
+  const JobRecord root = store_->CreateGraph(graph, {}, kNoLimit);
+  EXPECT_TRUE(store_->DueNotifications(10).empty());
+  FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
+  Open();
+  ASSERT_EQ(store_->DueNotifications(10).size(), 1u);
+  const Notification due = store_->DueNotifications(10)[0];
+  EXPECT_EQ(due.job, root.name);
+  EXPECT_EQ(due.url, graph.notify_url);
+  store_->DelayNotification(due.job_id, 500);
+  EXPECT_TRUE(store_->DueNotifications(10).empty());
+  wall_ += 500;
+  EXPECT_EQ(store_->DueNotifications(10)[0].tries, 1);
+  store_->Retry(root.name, false, {}, kNoLimit);
+  EXPECT_TRUE(store_->DueNotifications(10).empty()) << "it has not ended";
+  Succeed(ClaimOne());
+  Succeed(ClaimOne());
+  store_->EndNotification(store_->DueNotifications(10).at(0).job_id);
+  EXPECT_TRUE(store_->DueNotifications(10).empty());
+}
+
+}  // namespace
+}  // namespace color3d
