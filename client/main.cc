@@ -98,6 +98,7 @@ int Main(int argc, char** argv) {
   HandleInterrupt();
   try {
     context.server.token = TokenFrom(token_file);
+    context.server.on_wait = [&context](const std::string& line) { PrintNote(context, line); };
     return static_cast<int>(context.action());
   } catch (const std::exception& e) {
     return static_cast<int>(ReportException(context, e));

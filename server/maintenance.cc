@@ -97,7 +97,6 @@ std::chrono::milliseconds Maintenance::Reap() {
 }
 
 void Maintenance::HoldBackWhenSpaceIsLow() {
-  if (timing_.low_space_bytes == 0) return;
   const bool held = store_.Holds().contains(Hold::kStorage);
   const int64_t free = blobs_.FreeBytes();
   const int64_t wanted = timing_.low_space_bytes + (held ? timing_.low_space_bytes / 10 : 0);

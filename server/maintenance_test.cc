@@ -24,9 +24,9 @@ class MaintenanceTest : public JobStoreTest {
     return timing;
   }
   // Chores run until `done` says so.
-  void RunUntil(const std::function<bool()>& done) {
+  void RunUntil(const std::function<bool()>& done, const MaintenanceTiming& timing = Quick()) {
     Maintenance chores(
-        *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, Quick());
+        *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
     for (int i = 0; i < 1000 && !done(); ++i) std::this_thread::sleep_for(milliseconds(5));
     EXPECT_TRUE(done());
   }
@@ -77,6 +77,46 @@ TEST_F(MaintenanceTest, AMachineThatStartsAnewAddsNoTime) {
   Open();
   RunForAWhile();
   EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256)));
+}
+
+TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
+  const JobRecord old = (CreateSingle(), ClaimOne());
+  Succeed(old);
+  std::ofstream(paths_.JobLogs() / (old.name.substr(5) + ".log")) << "it began\n";
+  MaintenanceTiming timing = Quick();
+  timing.keep_jobs = std::chrono::hours(24 * 30);
+  wall_ += int64_t{31} * 24 * 3600 * 1000;
+  store_->Pin(old.name, true);
+  const auto a_day = [&] {  // of sweeps, as the steady clock sees it
+    Maintenance chores(
+        *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
+    for (int i = 0; i < 25; ++i) {
+      std::this_thread::sleep_for(milliseconds(20));
+      now_ += 3600 * 1000;
+    }
+  };
+  a_day();
+  EXPECT_EQ(StateOf(old.name), JobState::kSucceeded) << "pinned";
+  store_->Pin(old.name, false);
+  RunForAWhile();  // one more sweep begins where the last one ended
+  const auto gone = [&] { return ReasonThrown([&] { store_->GetJob(old.name); }); };
+  EXPECT_EQ(gone(), "nothing");
+  a_day();
+  a_day();
+  EXPECT_EQ(gone(), "JOB_NOT_FOUND");
+  EXPECT_EQ(ReasonThrown([&] { store_->GetScene("scenes/test"); }), "SCENE_NOT_FOUND");
+  RunUntil([&] { return fs::is_empty(paths_.JobLogs()); }, timing);
+}
+
+TEST_F(MaintenanceTest, NoJobIsBegunWhileSpaceIsLow) {
+  CreateSingle();
+  MaintenanceTiming timing = Quick();
+  timing.low_space_bytes = int64_t{1} << 60;
+  RunUntil([&] { return store_->Holds().contains(Hold::kStorage); }, timing);
+  EXPECT_FALSE(store_->Claim("w", kLease).has_value());
+  timing.low_space_bytes = 1;
+  RunUntil([&] { return store_->Holds().empty(); }, timing);
+  EXPECT_TRUE(store_->Claim("w", kLease).has_value());
 }
 
 TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {

@@ -56,7 +56,7 @@ bool Follow(Connection& connection,
   // A job that has failed may have stages that go on: their results are kept, but not waited for.
   std::set<std::string> unfinished(jobs.begin(), jobs.end()), done;
   const auto keep_going = [&] {
-    display.OnTick();
+    display.OnTick([&] { return GetJob(connection, jobs.back()); });
     return !unfinished.empty() && !context.interrupt->IsCancelled();
   };
   const auto on_event = [&](const v1::JobEvent& event) {

@@ -119,6 +119,15 @@ ExitCode RunShow(const Context& context, const std::string& name) {
       job.max_attempts(),
       job.artifacts_size());
   if (!job.parent().empty()) text += "parent     " + job.parent() + "\n";
+  if (job.pinned()) text += "pinned     stays however old it is\n";
+  if (job.queue_position() > 0) {
+    text += fmt::format("queue      place {}{}\n",
+                        job.queue_position(),
+                        job.waits_for().empty() ? "" : ", waits for " + job.waits_for());
+  }
+  if (job.queued_seconds() > 0) {
+    text += "waited     " + HumanSeconds(job.queued_seconds()) + " for a worker\n";
+  }
   if (job.state() == v1::Job::STATE_RUNNING) text += "progress   " + ProgressLine(job, 200) + "\n";
   if (job.has_error()) text += "error      " + DescribeStatus(job.error()) + "\n";
   if (!job.skip_reason().empty()) text += "left out   " + job.skip_reason() + "\n";
@@ -180,6 +189,47 @@ ExitCode RunDelete(const Context& context, const std::string& name) {
     PrintText("deleted " + request.name() + "\n");
   }
   return ExitCode::kOk;
+}
+
+ExitCode RunPin(const Context& context, const std::string& name, bool pinned) {
+  Connection connection(context.server, *context.interrupt);
+  v1::PinJobRequest request;
+  request.set_name(ResourceName(name, "jobs"));
+  request.set_pinned(pinned);
+  PrintJob(context, connection.Call(&v1::JobService::Stub::PinJob, connection.jobs(), request));
+  return ExitCode::kOk;
+}
+
+ExitCode RunKill(const Context& context, const std::string& name) {
+  Connection connection(context.server, *context.interrupt);
+  v1::KillJobRequest request;
+  request.set_name(ResourceName(name, "jobs"));
+  PrintJob(context, connection.Call(&v1::AdminService::Stub::KillJob, connection.admin(), request));
+  return ExitCode::kOk;
+}
+
+// Goes on from where it was when the connection breaks.
+ExitCode RunLog(const Context& context, const std::string& name, bool follow) {
+  Connection connection(context.server, *context.interrupt);
+  v1::ReadJobLogRequest request;
+  request.set_name(ResourceName(name, "jobs"));
+  request.set_follow(follow);
+  Backoff backoff;
+  while (true) {
+    grpc::ClientContext call;
+    const auto stream = connection.jobs().ReadJobLog(&call, request);
+    v1::JobLogChunk chunk;
+    while (stream->Read(&chunk)) {
+      std::cout << chunk.data() << std::flush;
+      request.set_offset(chunk.offset() + static_cast<int64_t>(chunk.data().size()));
+      backoff.Reset();
+      if (context.interrupt->IsCancelled()) return ExitCode::kDetached;
+    }
+    const grpc::Status status = stream->Finish();
+    if (status.ok()) return ExitCode::kOk;
+    const RpcError error(status);
+    if (!error.IsTransient() || !backoff.Wait(*context.interrupt, error.RetryDelay())) throw error;
+  }
 }
 
 // A subcommand of `job` that takes one job's name.
@@ -248,6 +298,21 @@ void AddJobCommands(CLI::App& app, Context& context) {
   AddNamed(job, context, "watch", "Follow a job to its end", RunWatch);
   AddNamed(job, context, "cancel", "Cancel a job and its stages", RunCancel);
   AddNamed(job, context, "delete", "Delete a finished job", RunDelete);
+  AddNamed(
+      job, context, "pin", "Keep a job however old it is", [](const auto& c, const auto& name) {
+        return RunPin(c, name, true);
+      });
+  AddNamed(job, context, "unpin", "Let it go when it is old", [](const auto& c, const auto& name) {
+    return RunPin(c, name, false);
+  });
+  AddNamed(job, context, "kill", "End a job of any project at once (role admin)", RunKill);
+  const auto follow = std::make_shared<bool>(false);
+  AddNamed(job,
+           context,
+           "log",
+           "What its attempts wrote to the log; of a stage, which `job show` names",
+           [follow](const Context& c, const std::string& name) { return RunLog(c, name, *follow); })
+      ->add_flag("-f,--follow", *follow, "Go on until it has ended");
   AddNamed(job,
            context,
            "retry",

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <google/protobuf/text_format.h>
 
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -36,6 +37,25 @@ std::string DescribeBackend(const v1::BackendStatus& backend) {
   return text + "\n";
 }
 
+std::string OfLimit(const std::string& used, const std::string& limit, bool is_limited) {
+  return is_limited ? used + " of " + limit : used;
+}
+
+std::string DescribeUsage(const v1::ProjectUsage& usage,
+                          const std::string& label,
+                          const std::string& role) {
+  return fmt::format("{} {}{}, {} stored, {} jobs unfinished\n",
+                     label,
+                     role.empty() ? "" : role + " in ",
+                     usage.project().empty() ? "no project" : "the project " + usage.project(),
+                     OfLimit(HumanBytes(usage.stored_bytes()),
+                             HumanBytes(usage.max_stored_bytes()),
+                             usage.max_stored_bytes() > 0),
+                     OfLimit(fmt::to_string(usage.unfinished_jobs()),
+                             fmt::to_string(usage.max_unfinished_jobs()),
+                             usage.max_unfinished_jobs() > 0));
+}
+
 std::string Describe(const v1::ServerInfo& info) {
   std::string kinds;
   for (const std::string& kind : info.job_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
@@ -49,6 +69,8 @@ std::string Describe(const v1::ServerInfo& info) {
       info.running_jobs(),
       info.queued_jobs(),
       kinds);
+  if (!info.waits_for().empty()) text += "queue      held back: " + info.waits_for() + "\n";
+  text += DescribeUsage(info.usage(), "you are   ", info.role());
   for (const v1::ModelInfo& model : info.models()) text += DescribeModel(model);
   for (const v1::BackendStatus& backend : info.backends()) text += DescribeBackend(backend);
   for (const v1::WorkerInfo& worker : info.workers()) {
@@ -103,6 +125,86 @@ ExitCode RunServerPresets(const Context& context, const std::string& name) {
   return ExitCode::kOk;
 }
 
+// A call of AdminService that answers nothing, and what is said when it has.
+template <typename Request, typename Response>
+ExitCode RunAdmin(const Context& context,
+                  grpc::Status (v1::AdminService::Stub::*method)(grpc::ClientContext*,
+                                                                 const Request&,
+                                                                 Response*),
+                  const std::string& said) {
+  Connection connection(context.server, *context.interrupt);
+  const Response response = connection.Call(method, connection.admin(), Request());
+  if (context.json) {
+    PrintJson(response);
+  } else {
+    PrintText(said + "\n");
+  }
+  return ExitCode::kOk;
+}
+
+ExitCode RunCollect(const Context& context, const v1::CollectRequest& request) {
+  Connection connection(context.server, *context.interrupt);
+  const v1::CollectResponse gone = connection.Call(
+      &v1::AdminService::Stub::Collect, connection.admin(), request, std::chrono::minutes(10));
+  if (context.json) {
+    PrintJson(gone);
+  } else {
+    PrintText(fmt::format("{} blobs ({}) that nothing names {}\n",
+                          gone.blobs(),
+                          HumanBytes(gone.bytes()),
+                          request.dry_run() ? "would go" : "are gone"));
+  }
+  return ExitCode::kOk;
+}
+
+ExitCode RunProjects(const Context& context) {
+  Connection connection(context.server, *context.interrupt);
+  const v1::ListProjectsResponse all = connection.Call(
+      &v1::AdminService::Stub::ListProjects, connection.admin(), v1::ListProjectsRequest());
+  if (context.json) {
+    PrintJson(all);
+    return ExitCode::kOk;
+  }
+  std::string text;
+  for (const v1::ProjectUsage& usage : all.projects()) text += DescribeUsage(usage, "-", "");
+  PrintText(text);
+  return ExitCode::kOk;
+}
+
+void AddAdminCommands(CLI::App* server, Context& context) {
+  const auto add = [&](const char* name, const char* help, std::function<ExitCode()> run) {
+    CLI::App* command = server->add_subcommand(name, help);
+    command->fallthrough()->callback([&context, run] { context.action = run; });
+    return command;
+  };
+  using Admin = v1::AdminService::Stub;
+  add("pause", "No job is begun until `resume`; running ones go on (role admin)", [&context] {
+    return RunAdmin(context, &Admin::PauseQueue, "the queue is paused");
+  });
+  add("resume", "Jobs are begun again (role admin)", [&context] {
+    return RunAdmin(context, &Admin::ResumeQueue, "the queue goes on");
+  });
+  add("drain", "Save running jobs and end the server, as SIGTERM does (role admin)", [&context] {
+    return RunAdmin(context, &Admin::Drain, "the server drains and ends");
+  });
+  add("projects", "What each project has (role admin)", [&context] {
+    return RunProjects(context);
+  });
+  const auto dry_run = std::make_shared<bool>(false);
+  const auto hours = std::make_shared<int>(24);
+  CLI::App* collect =
+      add("collect", "Remove blobs that nothing names (role admin)", [&context, dry_run, hours] {
+        v1::CollectRequest collect_request;
+        collect_request.set_dry_run(*dry_run);
+        collect_request.set_grace_seconds(int64_t{3600} * *hours);
+        return RunCollect(context, collect_request);
+      });
+  collect->add_flag("--dry-run", *dry_run, "Only say what would go");
+  collect->add_option("--hours", *hours, "Noted as unnamed for this long")
+      ->check(CLI::Range(1, 24 * 365))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void AddServerCommands(CLI::App& app, Context& context) {
@@ -111,6 +213,7 @@ void AddServerCommands(CLI::App& app, Context& context) {
   server->add_subcommand("info", "Version, job kinds, workers, memory")
       ->fallthrough()
       ->callback([&context] { context.action = [&context] { return RunServerInfo(context); }; });
+  AddAdminCommands(server, context);
   const auto name = std::make_shared<std::string>();
   CLI::App* presets = server->add_subcommand(
       "presets",

@@ -20,6 +20,7 @@ using std::chrono::steady_clock;
 constexpr milliseconds kFirstWait{200};
 constexpr milliseconds kLongestWait{3000};
 constexpr milliseconds kConnectLimit{4000};
+constexpr std::chrono::minutes kPatienceWithFullServer{10};
 constexpr std::string_view kHttps = "https://";
 constexpr int kMaxMessageBytes = 64 << 20;  // a scene of 10,000 files with long names
 
@@ -101,9 +102,9 @@ void Backoff::Reset() {
   since_ = steady_clock::now();
 }
 
-bool Backoff::Wait(const CancellationToken& cancel) {
+bool Backoff::Wait(const CancellationToken& cancel, milliseconds at_least) {
   if (steady_clock::now() - since_ > patience_) return false;
-  const auto end = steady_clock::now() + next_;
+  const auto end = steady_clock::now() + std::max(next_, at_least);
   while (steady_clock::now() < end) {
     cancel.ThrowIfCancelled();
     std::this_thread::sleep_for(std::min(next_, milliseconds(50)));
@@ -122,7 +123,10 @@ std::string ServerTarget::HostPort() const {
 }
 
 Connection::Connection(const ServerTarget& server, const CancellationToken& cancel)
-    : address_(server.address), cancel_(cancel), channel_(MakeChannel(server)) {
+    : address_(server.address),
+      on_wait_(server.on_wait),
+      cancel_(cancel),
+      channel_(MakeChannel(server)) {
   const auto end = std::chrono::system_clock::now() + kConnectLimit;
   bool connected = false;
   while (!connected && std::chrono::system_clock::now() < end) {
@@ -141,20 +145,28 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
   jobs_ = v1::JobService::NewStub(channel_);
   blobs_ = v1::BlobService::NewStub(channel_);
   server_ = v1::ServerService::NewStub(channel_);
+  admin_ = v1::AdminService::NewStub(channel_);
   colorizers_ = v1::ColorizerService::NewStub(channel_);
   bytes_ = google::bytestream::ByteStream::NewStub(channel_);
 }
 
 void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& call,
                        std::chrono::seconds time_limit) {
-  Backoff backoff;
+  Backoff backoff, turned_away(kPatienceWithFullServer);
   while (true) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + time_limit);
     const grpc::Status status = call(&context);
     if (status.ok()) return;
     const RpcError error(status);
-    if (error.IsTransient() && backoff.Wait(cancel_)) continue;
+    if (error.IsTransient() && backoff.Wait(cancel_, error.RetryDelay())) continue;
+    if (error.IsTurnedAway()) {
+      if (on_wait_) {
+        on_wait_(std::string(error.what()) + " (waiting " +
+                 std::to_string(error.RetryDelay().count()) + " s)");
+      }
+      if (turned_away.Wait(cancel_, error.RetryDelay())) continue;
+    }
     if (error.grpc_code() == grpc::StatusCode::UNAVAILABLE && error.IsUnreachable()) {
       throw UnreachableError(address_);
     }

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "client/lib/rpc_error.h"
+#include "color3d/v1/admin.grpc.pb.h"
 #include "color3d/v1/blob.grpc.pb.h"
 #include "color3d/v1/colorizer.grpc.pb.h"
 #include "color3d/v1/job.grpc.pb.h"
@@ -30,8 +31,10 @@ class Backoff {
   explicit Backoff(std::chrono::milliseconds patience = std::chrono::seconds(30));
   // Something worked: be patient anew.
   void Reset();
-  // False when patience is over; else sleeps. Throws Error{kCancelled} as soon as `cancel` is set.
-  bool Wait(const CancellationToken& cancel);
+  // False when patience is over; else sleeps, not less than `at_least`. Throws Error{kCancelled} as
+  // soon as `cancel` is set.
+  bool Wait(const CancellationToken& cancel,
+            std::chrono::milliseconds at_least = std::chrono::milliseconds(0));
 
  private:
   std::chrono::milliseconds patience_;
@@ -45,6 +48,8 @@ struct ServerTarget {
   std::filesystem::path ca;                // PEM: roots in place of the system's; TLS
   std::filesystem::path certificate, key;  // PEM: our own, where the server asks for one; TLS
   std::string token;                       // empty: none
+  // Told when a server that is full lets us wait; empty: nobody.
+  std::function<void(const std::string&)> on_wait = {};
 
   bool UsesTls() const;
   // Without the scheme.
@@ -66,12 +71,13 @@ class Connection {
   v1::JobService::Stub& jobs() { return *jobs_; }
   v1::BlobService::Stub& blobs() { return *blobs_; }
   v1::ServerService::Stub& server() { return *server_; }
+  v1::AdminService::Stub& admin() { return *admin_; }
   v1::ColorizerService::Stub& colorizers() { return *colorizers_; }
   google::bytestream::ByteStream::Stub& bytes() { return *bytes_; }
 
   // One unary call, e.g. Call(&v1::JobService::Stub::GetJob, connection.jobs(), request). Repeated
-  // while the server cannot be reached (requests that create something carry a request_id, so that
-  // is safe). Throws RpcError.
+  // while the server cannot be reached, and for ten minutes while it is too full for more (requests
+  // that create something carry a request_id, so that is safe). Throws RpcError.
   template <typename Stub, typename Request, typename Response>
   Response Call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                 Stub& stub,
@@ -92,12 +98,14 @@ class Connection {
              std::chrono::seconds time_limit);
 
   std::string address_;
+  const std::function<void(const std::string&)> on_wait_;
   const CancellationToken& cancel_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::SceneService::Stub> scenes_;
   std::unique_ptr<v1::JobService::Stub> jobs_;
   std::unique_ptr<v1::BlobService::Stub> blobs_;
   std::unique_ptr<v1::ServerService::Stub> server_;
+  std::unique_ptr<v1::AdminService::Stub> admin_;
   std::unique_ptr<v1::ColorizerService::Stub> colorizers_;
   std::unique_ptr<google::bytestream::ByteStream::Stub> bytes_;
 };

@@ -9,6 +9,7 @@
 
 #include "client/lib/job_watch.h"
 #include "client/lib/text.h"
+#include "core/base/error.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {
@@ -62,9 +63,22 @@ bool ProgressDisplay::SomethingRuns() const {
   });
 }
 
-void ProgressDisplay::OnTick() {
-  if (unfinished_.empty() || SomethingRuns() || steady_clock::now() - idle_since_ < kIdle) return;
-  Draw(fmt::format("waiting for a worker ({} stages to go)", unfinished_.size()));
+void ProgressDisplay::OnTick(const std::function<v1::Job()>& look) {
+  const auto now = steady_clock::now();
+  if (unfinished_.empty() || SomethingRuns() || now - idle_since_ < kIdle) return;
+  if (now - last_look_ >= kIdle) {
+    last_look_ = now;
+    try {
+      const v1::Job job = look();
+      if (!job.waits_for().empty()) {
+        waits_for_ = job.waits_for();
+      } else if (job.queue_position() > 0) {
+        waits_for_ = fmt::format("its turn, at place {} in the queue", job.queue_position());
+      }
+    } catch (const Error&) {  // the watch says so when the server is gone
+    }
+  }
+  Draw(fmt::format("waiting for {} ({} stages to go)", waits_for_, unfinished_.size()));
 }
 
 void ProgressDisplay::OnTransfer(const std::string& what, int64_t done, int64_t total) {

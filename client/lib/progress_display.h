@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 
@@ -20,8 +21,9 @@ class ProgressDisplay {
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
   void OnEvent(const v1::JobEvent& event);
-  // Now and then while jobs are followed: says so when nothing runs for a while.
-  void OnTick();
+  // Now and then while jobs are followed: says what they wait for when nothing runs for a while.
+  // `look` gets the followed job as it is now, or throws; called at most every 5 s.
+  void OnTick(const std::function<v1::Job()>& look);
   // A transfer or another loop of ours, in bytes.
   void OnTransfer(const std::string& what, int64_t done_bytes, int64_t total_bytes);
   // A line of its own.
@@ -42,6 +44,8 @@ class ProgressDisplay {
   std::map<std::string, bool> ended_;  // by job name
   std::map<std::string, v1::Job::State> unfinished_;
   std::chrono::steady_clock::time_point idle_since_;
+  std::chrono::steady_clock::time_point last_look_;
+  std::string waits_for_ = "a worker";
 };
 
 }  // namespace color3d::client

@@ -1,5 +1,7 @@
 #include "client/lib/rpc_error.h"
 
+#include <algorithm>
+
 #include "google/rpc/error_details.pb.h"
 
 namespace color3d::client {
@@ -45,8 +47,16 @@ RpcError::RpcError(const grpc::Status& status)
   for (const google::protobuf::Any& any : details.details()) {
     google::rpc::ErrorInfo info;
     google::rpc::BadRequest bad;
+    google::rpc::QuotaFailure quota;
+    google::rpc::RetryInfo retry;
     if (any.UnpackTo(&info)) {
       reason_ = info.reason();
+    } else if (any.UnpackTo(&retry)) {
+      retry_delay_ = std::chrono::seconds(retry.retry_delay().seconds());
+    } else if (any.UnpackTo(&quota)) {
+      for (const auto& violation : quota.violations()) {
+        violations_.push_back({violation.subject(), violation.description()});
+      }
     } else if (any.UnpackTo(&bad)) {
       for (const auto& violation : bad.field_violations()) {
         violations_.push_back({violation.field(), violation.description()});
@@ -56,6 +66,15 @@ RpcError::RpcError(const grpc::Status& status)
 }
 
 bool RpcError::IsTransient() const { return grpc_code_ == grpc::StatusCode::UNAVAILABLE; }
+
+bool RpcError::IsTurnedAway() const {
+  if (grpc_code_ != grpc::StatusCode::RESOURCE_EXHAUSTED || retry_delay_.count() <= 0) return false;
+  // What is stored grows less by nothing but its owner's doing.
+  const bool is_full = std::ranges::any_of(
+      violations_, [](const auto& entry) { return entry.field.ends_with("stored_bytes"); });
+  return reason_ == "QUEUE_FULL" || reason_ == "TOO_MANY_STREAMS" ||
+         (reason_ == "QUOTA_EXCEEDED" && !is_full);
+}
 
 bool RpcError::IsUnreachable() const {
   const bool code = grpc_code_ == grpc::StatusCode::UNAVAILABLE ||

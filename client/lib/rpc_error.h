@@ -4,6 +4,7 @@
 
 #include <grpcpp/support/status.h>
 
+#include <chrono>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,16 +27,21 @@ class RpcError : public Error {
   grpc::StatusCode grpc_code() const { return grpc_code_; }
   // google.rpc.ErrorInfo.reason, e.g. "DRAINING"; empty when the error is the transport's.
   const std::string& reason() const { return reason_; }
-  // google.rpc.BadRequest, in the server's order.
+  // google.rpc.BadRequest or QuotaFailure, in the server's order.
   const std::vector<FieldViolation>& violations() const { return violations_; }
   // The same call may succeed later: the connection broke, or the server is overloaded.
   bool IsTransient() const;
+  // Too much was asked for just now: the same call may succeed after RetryDelay().
+  bool IsTurnedAway() const;
+  // google.rpc.RetryInfo; 0: the server did not say.
+  std::chrono::seconds RetryDelay() const { return retry_delay_; }
   // Nobody answered: there is no server, or the connection broke.
   bool IsUnreachable() const;
 
  private:
   grpc::StatusCode grpc_code_;
   std::string reason_;
+  std::chrono::seconds retry_delay_{0};
   std::vector<FieldViolation> violations_;
 };
 

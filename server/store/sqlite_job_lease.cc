@@ -115,7 +115,8 @@ JobRecord SqliteJobStore::BeginAttempt(SqliteDatabase& db,
   db.Run(
       "update job set state='RUNNING', attempt=attempt+1, lease_epoch=lease_epoch+1, "
       "lease_owner=?, lease_expires_ms=?, eta_seconds=-1, progress_message='', joins_key='', "
-      "queued_ms=queued_ms+max(?3-queued_since_ms, 0), queued_since_ms=0, "
+      "queued_ms=queued_ms+case when queued_since_ms>0 then max(?3-queued_since_ms, 0) else 0 end, "
+      "queued_since_ms=0, "
       "start_ms=case when start_ms=0 then ?3 else start_ms end where job_id=?4",
       worker,
       SteadyNow() + lease_ms,

@@ -63,8 +63,10 @@ TEST_F(StoreSchemaTest, TheServerBringsAnOldStoreUpToDateAndKeepsACopy) {
   const JobRecord done = ClaimOne();
   Succeed(done);
   const JobRecord running = (CreateSingle(), ClaimOne());
+  CreateSingle();
   MakeOld();
   Open();
+  EXPECT_EQ(ClaimOne().queued_ms, 0) << "since when it waited was not written down";
   const std::string result = store_->GetJob(done.name).artifacts[0].digest.sha256;
   EXPECT_EQ(store_->HeldBlobs("", {result}).size(), 1u) << "what was there can still be read";
   EXPECT_EQ(store_->GetProject("").stored_bytes, 4) << "a scene of 1 byte, a result of 3";
