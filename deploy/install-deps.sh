@@ -11,12 +11,13 @@ packages=(
   libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libabsl-dev
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
+  prometheus-cpp-dev
   libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev libzstd-dev
   libavcodec-dev libavformat-dev libavutil-dev libswscale-dev # film
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy prometheus
     python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
   *) echo "install-deps: unknown option $1; there is --tests" >&2; exit 2 ;;
 esac

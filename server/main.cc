@@ -46,6 +46,11 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");
   serve->add_option("--log-level", options->log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
+  serve->add_option("--log-format", options->log_format, "text, or json: one object a line")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  serve->add_option(
+      "--metrics-listen", options->metrics_listen, "HOST:PORT that Prometheus may read (/metrics)");
   serve->add_flag("--insecure-any-address",
                   options->insecure_any_address,
                   "Allow --listen on other than loopback addresses without TLS and tokens");

@@ -87,6 +87,7 @@ void Maintenance::Repeat(const std::function<std::chrono::milliseconds()>& chore
 std::chrono::milliseconds Maintenance::Reap() {
   try {
     const int reaped = store_.ReapExpired();
+    counts_.attempts_lost += reaped;
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
     HoldBackWhenSpaceIsLow();
     if (timing_.on_leases) timing_.on_leases();
@@ -124,6 +125,7 @@ std::chrono::milliseconds Maintenance::Sweep() {
     store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
     const Scrubber::Result scrubbed =
         scrubber_.Scrub(blobs, timing_.scrub_bytes, [this] { return IsStopping(); });
+    counts_.blobs_damaged += static_cast<int64_t>(scrubbed.damaged.size());
     for (const std::string& sha256 : scrubbed.damaged) {
       spdlog::error(
           "the blob {} was damaged on the disk and is set aside{}",
@@ -132,6 +134,7 @@ std::chrono::milliseconds Maintenance::Sweep() {
     }
     return timing_.sweep;
   } catch (const std::exception& e) {
+    ++counts_.sweeps_failed;
     spdlog::error("the sweep failed and is tried again soon: {}", e.what());
     return timing_.sweep_again;
   }
@@ -140,6 +143,7 @@ std::chrono::milliseconds Maintenance::Sweep() {
 void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
   if (IsStopping()) return;
   const size_t removed = RemoveDue(store_, blobs_, DueBlobs(store_, blobs, timing_.grace)).size();
+  counts_.blobs_removed += static_cast<int64_t>(removed);
   const int leftovers = blobs_.RemoveLeftovers(timing_.grace);
   if (removed + static_cast<size_t>(leftovers) > 0) {
     spdlog::info("swept {} blobs, {} left-overs", removed, leftovers);
@@ -155,6 +159,7 @@ void Maintenance::ExpireJobs() {
     try {
       const std::string scene = store_.GetJob(name).scene;
       store_.Delete(name, {});
+      ++counts_.jobs_expired;
       spdlog::info("[job={}] was old and is deleted", name);
       if (!store_.ListJobs({"", scene, std::nullopt}, 0, 1).empty()) continue;
       store_.DeleteScene(scene, {});

@@ -2,6 +2,7 @@
 // long or waits can keep a lost job from going on.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <functional>
@@ -49,8 +50,19 @@ class Scrubber {
   std::string last_;
 };
 
+// Since the start.
+struct ChoreCounts {
+  std::atomic<int64_t> attempts_lost{0};
+  std::atomic<int64_t> blobs_removed{0};
+  std::atomic<int64_t> blobs_damaged{0};
+  std::atomic<int64_t> jobs_expired{0};
+  std::atomic<int64_t> sweeps_failed{0};
+};
+
 class Maintenance {
  public:
+  const ChoreCounts& counts() const { return counts_; }
+
   // Sweeps once at once, then every `sweep`. What is given must outlive this object.
   Maintenance(JobStore& store,
               BlobStore& blobs,
@@ -81,6 +93,7 @@ class Maintenance {
   const Clock clock_;
   const MaintenanceTiming timing_;
   Scrubber scrubber_;
+  ChoreCounts counts_;
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;

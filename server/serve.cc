@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "server/backends/backend_address.h"
 #include "server/backends/backend_prober.h"
 #include "server/maintenance.h"
+#include "server/metrics/server_metrics.h"
 #include "server/ops/notify.h"
 #include "server/ops/process.h"
 #include "server/ops/socket_folder.h"
@@ -40,6 +42,13 @@ std::chrono::milliseconds Milliseconds(double seconds) {
 void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
+  if (!options.metrics_listen.empty() && !IsLoopback(options.metrics_listen) &&
+      !options.insecure_any_address) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "refusing to show metrics on {} to everybody who reaches the port; say "
+                "--metrics-listen 127.0.0.1:PORT, or --insecure-any-address in a network you trust",
+                options.metrics_listen);
+  }
   const bool is_safe = !options.tls_certificate.empty() &&
                        (!options.tokens.empty() || !options.tls_client_ca.empty());
   if (!IsLoopback(options.listen) && !is_safe && !options.insecure_any_address) {
@@ -72,6 +81,8 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
                      fmt::to_string(threads),
                      "--log-level",
                      options.log_level,
+                     "--log-format",
+                     options.log_format,
                      "--lease-seconds",
                      fmt::to_string(options.lease_seconds),
                      "--heartbeat-seconds",
@@ -130,6 +141,8 @@ InferenceLink InferenceSetup(const ServeOptions& options,
       fmt::to_string(options.live_threads > 0 ? options.live_threads : machine),
       "--log-level",
       options.log_level,
+      "--log-format",
+      options.log_format,
       "--drain-grace-seconds",
       fmt::to_string(options.drain_seconds * 0.5),
       "--reserve-mib",
@@ -144,6 +157,30 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   link.demand = [demand] { demand->Request(); };
   link.hold = [demand] { return demand->Hold(); };
   return link;
+}
+
+ServerSample SampleOf(const ServeOptions& options,
+                      const RpcServer& server,
+                      const Maintenance& maintenance,
+                      bool draining) {
+  const RpcServer::Open open = server.open();
+  const ChoreCounts& counts = maintenance.counts();
+  ServerSample sample;
+  sample.watches = open.watches;
+  sample.downloads = open.downloads;
+  sample.uploads = open.uploads;
+  sample.live_pictures = open.live_pictures;
+  sample.draining = draining;
+  sample.attempts_lost = counts.attempts_lost;
+  sample.blobs_removed = counts.blobs_removed;
+  sample.blobs_damaged = counts.blobs_damaged;
+  sample.jobs_expired = counts.jobs_expired;
+  sample.sweeps_failed = counts.sweeps_failed;
+  sample.reserve_bytes = options.reserve_mib << 20;
+  if (!options.tls_certificate.empty()) {
+    sample.certificate_end_s = CertificateEnd(options.tls_certificate);
+  }
+  return sample;
 }
 
 // Blocks the stop signals for all threads that start later, and waits for them here.
@@ -176,7 +213,7 @@ class StopSignals {
 }  // namespace
 
 void Serve(const ServeOptions& options) {
-  SetUpLog("server", options.log_level, {});
+  SetUpLog("server", options.log_level, options.log_format, {});
   CheckOptions(options);
   const UserModels models = ParseUserModels(options.models, options.backends);
   RequireReadable(models);
@@ -216,6 +253,10 @@ void Serve(const ServeOptions& options) {
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
   ExpireDeadWorkers(store);
 
+  ServerMetrics metrics(COLOR3D_VERSION);
+  rpc.on_call = [&metrics](const std::string& method, grpc::StatusCode code, double seconds) {
+    metrics.CountCall(method, StatusName(code), seconds);
+  };
   RpcServer server(rpc, store, blobs, uploads, clock);
   if (!options.port_file.empty()) WriteFileAtomic(options.port_file, server.address() + "\n");
   MaintenanceTiming chores;
@@ -228,6 +269,14 @@ void Serve(const ServeOptions& options) {
   chores.on_leases = [] { NotifyServiceManager("WATCHDOG=1"); };
   Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
   Supervisor supervisor(worker_setup, store);
+  std::atomic<bool> draining{false};
+  const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });
+  if (!options.metrics_listen.empty()) {
+    const int port = metrics.Listen(options.metrics_listen, store, blobs, [&] {
+      return SampleOf(options, server, maintenance, draining);
+    });
+    spdlog::info("metrics on port {}", port);
+  }
   spdlog::info("listening on {}{}{}, data in {}, {} workers",
                server.address(),
                tls.empty() ? "" : " with TLS",
@@ -241,6 +290,7 @@ void Serve(const ServeOptions& options) {
   NotifyServiceManager("STOPPING=1");
   spdlog::info("draining: no new jobs, running ones are saved and released");
   signals.ExitOnNext();
+  draining = true;
   server.StartDraining();
   supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
   supervisor.Wait();

@@ -30,6 +30,8 @@ struct ServeOptions {
   int project_jobs = 0, project_streams = 0;
   double project_gib = 0.0;
   int keep_days = 0;                      // of jobs after their end, unless pinned; 0: for ever
+  std::string metrics_listen;             // HOST:PORT for Prometheus; empty: none
+  std::string log_format = "text";        // or "json"
   std::vector<std::string> notify_allow;  // addresses that may be told of ended jobs
   std::vector<std::string> models;        // "NAME=FILE"
   std::vector<std::string> backends;      // "NAME=ADDRESS"

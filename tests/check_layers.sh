@@ -70,6 +70,7 @@ allow server/store 'core/(base|catalogue)|server/store'
 allow server/keeping 'core/base|server/(store|storage|keeping)'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'
 allow server/access 'core/base|server/access'
+allow server/metrics 'core/base|server/(store|storage|metrics)'
 allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(access|store|planning|storage|ops|rpc)'
@@ -121,6 +122,7 @@ public core/weights byte_source safetensors weight_file weight_map weight_reader
 public server/access notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
+public server/metrics server_metrics
 public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc error_mapping rpc_server
 public server/storage blob_store collector data_folder file_blob_store upload_store

@@ -85,6 +85,22 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
       address, CredentialsFor(server), arguments, std::move(interceptors));
 }
 
+// A failure of the server's own is in its log under the call's id.
+RpcError WithRequestId(const RpcError& error,
+                       const grpc::Status& status,
+                       const grpc::ClientContext& context) {
+  const bool is_its_own = status.error_code() == grpc::StatusCode::INTERNAL ||
+                          status.error_code() == grpc::StatusCode::DATA_LOSS ||
+                          status.error_code() == grpc::StatusCode::UNKNOWN;
+  const auto& trailers = context.GetServerTrailingMetadata();
+  const auto id = trailers.find("x-request-id");
+  if (!is_its_own || id == trailers.end()) return error;
+  return RpcError({status.error_code(),
+                   status.error_message() + " (request " +
+                       std::string(id->second.data(), id->second.size()) + " in the server's log)",
+                   status.error_details()});
+}
+
 // What a call says when there is no connection: over TLS, why the other side is not believed.
 std::string WhyUnreachable(const std::shared_ptr<grpc::Channel>& channel) {
   grpc::ClientContext context;
@@ -170,7 +186,7 @@ void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& 
     if (error.grpc_code() == grpc::StatusCode::UNAVAILABLE && error.IsUnreachable()) {
       throw UnreachableError(address_);
     }
-    throw error;
+    throw WithRequestId(error, status, context);
   }
 }
 

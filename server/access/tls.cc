@@ -75,6 +75,15 @@ void Check(const TlsFiles& files) {
 
 }  // namespace
 
+int64_t CertificateEnd(const fs::path& file) {
+  const Certificate certificate = ReadCertificate(file, "--tls-cert");
+  std::tm end{};
+  if (ASN1_TIME_to_tm(X509_get0_notAfter(certificate.get()), &end) != 1) {
+    throw Unusable(file, "the certificate's end is no time");
+  }
+  return ::timegm(&end);
+}
+
 std::shared_ptr<grpc::ServerCredentials> MakeServerCredentials(const TlsFiles& files,
                                                                std::chrono::seconds refresh) {
   namespace tls = grpc::experimental;

@@ -4,6 +4,7 @@
 #include <grpcpp/security/server_credentials.h>
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 
@@ -23,5 +24,8 @@ struct TlsFiles {
 // it: not there, no PEM, a key of another certificate, or a certificate that is not valid now.
 std::shared_ptr<grpc::ServerCredentials> MakeServerCredentials(
     const TlsFiles& files, std::chrono::seconds refresh = std::chrono::seconds(10));
+
+// When the certificate in this file ends, seconds since the epoch. Throws as above.
+int64_t CertificateEnd(const std::filesystem::path& certificate);
 
 }  // namespace color3d

@@ -1,18 +1,18 @@
 #include "server/ops/job_log.h"
 
 #include <fcntl.h>
-#include <spdlog/fmt/chrono.h>
+#include <fmt/format.h>
 #include <spdlog/sinks/base_sink.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <mutex>
 #include <string_view>
 
 #include "core/base/utf8.h"
+#include "server/ops/log_time.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -24,19 +24,12 @@ constexpr std::string_view kFull = "the log is full; what follows is in the work
 
 // One line; control characters would end it or hide what it says.
 std::string LineOf(const spdlog::details::log_msg& message, std::string_view text) {
-  using std::chrono::duration_cast;
-  const auto since = message.time.time_since_epoch();
-  const auto seconds = duration_cast<std::chrono::seconds>(since);
-  const auto rest = duration_cast<std::chrono::milliseconds>(since - seconds);
   const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
   std::string clean = CleanUtf8(std::string(text));
   std::replace_if(
       clean.begin(), clean.end(), [](unsigned char c) { return c < 32; }, ' ');
-  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z {} {}\n",
-                     fmt::gmtime(static_cast<std::time_t>(seconds.count())),
-                     rest.count(),
-                     std::string_view(level.data(), level.size()),
-                     clean);
+  return fmt::format(
+      "{} {} {}\n", LogTime(message.time), std::string_view(level.data(), level.size()), clean);
 }
 
 class JobLogSink : public spdlog::sinks::base_sink<std::mutex> {

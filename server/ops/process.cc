@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "server/ops/job_log.h"
+#include "server/ops/json_lines.h"
 
 namespace color3d {
 std::filesystem::path ProgramFolder() {
@@ -20,6 +21,7 @@ std::filesystem::path ProgramFolder() {
 
 void SetUpLog(const std::string& name,
               const std::string& level,
+              const std::string& format,
               const std::filesystem::path& file) {
   const spdlog::level::level_enum parsed = spdlog::level::from_str(level);
   if (parsed == spdlog::level::off && level != "off") {
@@ -38,7 +40,11 @@ void SetUpLog(const std::string& name,
   auto logger = std::make_shared<spdlog::logger>(name, sinks.begin(), sinks.end());
   logger->set_level(parsed);
   logger->flush_on(spdlog::level::info);
-  logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %n %v");
+  if (format == "json") {
+    logger->set_formatter(MakeJsonLines());
+  } else {
+    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %n %v");
+  }
   spdlog::set_default_logger(logger);
 }
 

@@ -151,9 +151,15 @@ JobRecord CreateJobRecord(const RpcParts& parts,
   NewGraph graph = PlanRequest(store, spec);
   graph.priority = priority;
   graph.notify_url = request.notify_url();
+  graph.trace = call.trace;
   JobRecord job = store.CreateGraph(graph, key, LimitsOfQueue(parts));
-  spdlog::info(
-      "[job={}] accepted {} of {} ({} jobs)", job.name, job.kind, job.scene, graph.jobs.size());
+  spdlog::info("[job={}{}{}] accepted {} of {} ({} jobs)",
+               job.name,
+               call.trace.empty() ? "" : " trace=",
+               call.trace,
+               job.kind,
+               job.scene,
+               graph.jobs.size());
   return job;
 }
 

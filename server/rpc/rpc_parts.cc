@@ -7,6 +7,7 @@
 
 #include "core/base/digest.h"
 #include "server/planning/job_spec.h"
+#include "server/rpc/call_watch.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -28,7 +29,12 @@ void CheckRequestId(const std::string& request_id) {
 
 Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context) {
   const Caller caller = parts.access.Require(role, context);
-  return {caller, ProjectStore(parts.store, caller.project)};
+  const auto trace = context.client_metadata().find("traceparent");
+  return {caller,
+          ProjectStore(parts.store, caller.project),
+          trace == context.client_metadata().end()
+              ? ""
+              : TraceIdOf({trace->second.data(), trace->second.size()})};
 }
 
 bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest& blob) {

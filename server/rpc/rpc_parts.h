@@ -84,6 +84,7 @@ struct RpcParts {
 struct Call {
   Caller caller;
   ProjectStore store;
+  std::string trace;  // W3C trace id that the call brings; empty: none
 };
 // Throws as Access::Require.
 Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context);

@@ -127,6 +127,9 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                                  static_cast<grpc::Service*>(&services_->admin)}) {
     builder.RegisterService(service);
   }
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
+  interceptors.push_back(MakeCallWatch(options.on_call));
+  builder.experimental().SetInterceptorCreators(std::move(interceptors));
   server_ = builder.BuildAndStart();
   if (!server_) {
     throw Error(ErrorCode::kFailedPrecondition,
@@ -139,6 +142,13 @@ RpcServer::RpcServer(const RpcServerOptions& options,
 }
 
 RpcServer::~RpcServer() { Shutdown(std::chrono::milliseconds(0)); }
+
+RpcServer::Open RpcServer::open() const {
+  return {streams_->watches.open(),
+          streams_->reads.open(),
+          streams_->writes.open(),
+          colorize_hub_->pictures()};
+}
 
 void RpcServer::StartDraining() {
   draining_ = true;

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "server/rpc/call_watch.h"
 #include "server/rpc/live/colorize_hub.h"
 #include "server/rpc/rpc_parts.h"
 #include "server/rpc/watch_hub.h"
@@ -30,6 +31,7 @@ struct RpcServerOptions {
   std::filesystem::path job_logs;           // folder of DataPaths::JobLogs; empty: there are none
   std::vector<std::string> notify_allowed;  // as CheckNotifyUrl
   std::function<void()> drain = [] {};      // what AdminService.Drain does
+  CallObserver on_call;                     // may be empty
   InferenceLink inference;
   ColorizeLimits live;
 };
@@ -49,6 +51,11 @@ class RpcServer {
 
   // "127.0.0.1:50551" with the port that was bound.
   const std::string& address() const { return address_; }
+  // Streams that are open, and pictures that are not answered yet.
+  struct Open {
+    int watches = 0, downloads = 0, uploads = 0, live_pictures = 0;
+  };
+  Open open() const;
   // Health turns NOT_SERVING, new jobs are refused, streams end with UNAVAILABLE.
   void StartDraining();
   // Waits for open RPCs at most this long, then cancels them.

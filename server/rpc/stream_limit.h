@@ -37,6 +37,11 @@ class StreamLimit {
     std::string project_;
   };
 
+  int open() {
+    std::lock_guard lock(mutex_);
+    return all_;
+  }
+
   // Throws Error{kResourceExhausted}: TOO_MANY_STREAMS, or QUOTA_EXCEEDED of the project.
   Place Take(const std::string& project) {
     std::lock_guard lock(mutex_);

@@ -90,6 +90,7 @@ struct JobRecord {
   bool cached = false;
   bool pinned = false;
   std::string notify_url;  // told when it has ended; empty: nobody
+  std::string trace;       // of the call that made it: 32 hexadecimal digits (W3C), or empty
   std::optional<FileDigest> checkpoint;
   int64_t queued_ms = 0;        // waited for a worker, until the present wait began
   int64_t queued_since_ms = 0;  // 0: does not wait for one

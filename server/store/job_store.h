@@ -39,6 +39,7 @@ struct NewGraph {
   std::string project;
   std::string scene;  // stored
   std::string notify_url;
+  std::string trace;  // of the call that made it, for logs; may be empty
   int priority = 100;
   std::vector<NewJob> jobs;
 };
@@ -123,6 +124,10 @@ struct BlobCandidate {
 struct JobCounts {
   int64_t queued = 0;  // with those that wait for inputs
   int64_t running = 0;
+  int64_t blocked = 0;  // wait for inputs
+  int64_t oldest_queued_ms =
+      0;                      // since when the first of those waits that wait for a worker; 0: none
+  int64_t notifications = 0;  // not delivered yet
 };
 
 class JobStore {

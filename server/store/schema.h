@@ -45,6 +45,7 @@ constexpr const char* kMigrations[kSchemaVersion - 1] = {
     "alter table job add column running_key text not null default '';"
     "alter table job add column joins_key text not null default '';"
     "alter table job add column notify_url text not null default '';"
+    "alter table job add column trace text not null default '';"
     "create index scene_project on scene(project, scene_id);"
     "create index job_project on job(project, job_id);"
     "create index job_running_key on job(running_key) where running_key <> '';"
@@ -98,6 +99,7 @@ create table job(
   pinned integer not null default 0, queued_ms integer not null default 0,
   queued_since_ms integer not null default 0, running_key text not null default '',
   joins_key text not null default '', notify_url text not null default '',
+  trace text not null default '',
   check((state='RUNNING') = (lease_expires_ms is not null)),
   check((state in('SUCCEEDED','FAILED','CANCELLED','SKIPPED')) = (end_ms <> 0)));
 create index job_claim on job(priority, job_id) where state='QUEUED';

@@ -161,6 +161,7 @@ void SqliteJobStore::InsertJob(SqliteDatabase& db,
   JobRecord record;
   record.name = names[index];
   record.project = graph.project;
+  record.trace = graph.trace;
   if (is_root) {
     record.notify_url = graph.notify_url;
   } else {

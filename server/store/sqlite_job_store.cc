@@ -253,11 +253,14 @@ std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>
 JobCounts SqliteJobStore::CountJobs() {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(),
-                         "select coalesce(sum(state in('QUEUED','BLOCKED')),0), "
-                         "coalesce(sum(state='RUNNING'),0) from job where end_ms=0");
+  SqliteStatement select(
+      db.handle(),
+      "select coalesce(sum(state in('QUEUED','BLOCKED')),0), coalesce(sum(state='RUNNING'),0), "
+      "coalesce(sum(state='BLOCKED'),0), "
+      "coalesce(min(case when queued_since_ms>0 then queued_since_ms end),0), "
+      "(select count(*) from notification) from job where end_ms=0");
   select.Step();
-  return {select.Int(0), select.Int(1)};
+  return {select.Int(0), select.Int(1), select.Int(2), select.Int(3), select.Int(4)};
 }
 
 bool SqliteJobStore::IsHeld() {

@@ -45,6 +45,7 @@ void VisitColumns(JobRecord& job, Visit&& visit) {
   visit("cached", job.cached);
   visit("pinned", job.pinned);
   visit("notify_url", job.notify_url);
+  visit("trace", job.trace);
   visit("queued_ms", job.queued_ms);
   visit("queued_since_ms", job.queued_since_ms);
   visit("checkpoint_sha256", checkpoint.sha256);

@@ -41,7 +41,8 @@ class StoreSchemaTest : public JobStoreTest {
                                "queued_since_ms",
                                "running_key",
                                "joins_key",
-                               "notify_url"}) {
+                               "notify_url",
+                               "trace"}) {
       old.Exec((std::string("alter table job drop column ") + column).c_str());
     }
     old.Exec("alter table scene drop column project");

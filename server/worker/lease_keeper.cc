@@ -15,7 +15,11 @@ constexpr size_t kMaxWarnings = 100;
 }  // namespace
 
 std::string AttemptTag(const JobRecord& job) {
-  return fmt::format("[job={} attempt={}]", job.name, job.attempt);
+  return fmt::format("[job={} attempt={}{}{}]",
+                     job.name,
+                     job.attempt,
+                     job.trace.empty() ? "" : " trace=",
+                     job.trace);
 }
 
 LeaseKeeper::LeaseKeeper(JobStore& store,

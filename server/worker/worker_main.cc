@@ -20,7 +20,7 @@ namespace {
 
 struct WorkerArguments {
   WorkerOptions options;
-  std::string log_level = "info";
+  std::string log_level = "info", log_format = "text";
   double lease_seconds = 60.0;
   double heartbeat_seconds = 10.0;
   double checkpoint_seconds = 20.0;
@@ -52,6 +52,8 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
                   "Scenes that are personalized at once, sharing the encoder")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  app->add_option("--log-format", arguments->log_format, "text or json")
+      ->check(CLI::IsMember({"text", "json"}));
   app->add_option("--log-level", arguments->log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
   app->add_option("--model", arguments->models, "NAME=FILE: weights that jobs may name")
@@ -151,6 +153,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
     const DataPaths paths(arguments.options.data_folder);
     SetUpLog(arguments.options.name,
              arguments.log_level,
+             arguments.log_format,
              paths.Logs() / (arguments.options.name + ".log"));
     if (arguments.inference.empty()) {
       Complete(&arguments);

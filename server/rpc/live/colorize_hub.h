@@ -24,6 +24,8 @@ struct ColorizeLimits {
 
 class ColorizeHub {
  public:
+  // Taken and not answered yet, of all streams.
+  int pictures() const { return pictures_.load(); }
   ColorizeHub(const RpcParts& parts, InferenceLink link, ColorizeLimits limits = {});
   ColorizeHub(const ColorizeHub&) = delete;
   ColorizeHub& operator=(const ColorizeHub&) = delete;

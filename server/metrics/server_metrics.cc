@@ -1,0 +1,266 @@
+#include "server/metrics/server_metrics.h"
+
+#include <prometheus/counter.h>
+#include <prometheus/exposer.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/memory.h"
+
+namespace color3d {
+namespace {
+using prometheus::ClientMetric;
+using prometheus::Labels;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+
+constexpr int kEventsAtOnce = 500;
+const prometheus::Histogram::BucketBoundaries kSeconds = {
+    0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.5, 1, 5, 30, 300};
+
+int64_t OpenDescriptors() {
+  std::error_code error;
+  const std::filesystem::directory_iterator all("/proc/self/fd", error);
+  return error ? 0 : std::distance(begin(all), end(all));
+}
+
+ClientMetric Value(MetricType type, double value, const Labels& labels = {}) {
+  ClientMetric metric;
+  for (const auto& [name, text] : labels) metric.label.push_back({name, text});
+  (type == MetricType::Counter ? metric.counter.value : metric.gauge.value) = value;
+  return metric;
+}
+
+// Read when somebody asks.
+class Sampled : public prometheus::Collectable {
+ public:
+  Sampled(JobStore& store,
+          const BlobStore& blobs,
+          std::function<ServerSample()> sample,
+          prometheus::Family<prometheus::Counter>& jobs_ended,
+          prometheus::Family<prometheus::Counter>& job_seconds)
+      : store_(store),
+        blobs_(blobs),
+        sample_(std::move(sample)),
+        jobs_ended_(jobs_ended),
+        job_seconds_(job_seconds),
+        revision_(store.NewestRevision()) {}
+
+  std::vector<MetricFamily> Collect() const override {
+    std::vector<MetricFamily> families;
+    try {
+      CountEnded();
+      AddQueue(&families);
+      AddServer(&families);
+    } catch (const std::exception& e) {
+      spdlog::warn("the metrics cannot be read: {}", e.what());
+    }
+    return families;
+  }
+
+ private:
+  // The jobs that ended since somebody asked last.
+  void CountEnded() const {
+    std::lock_guard lock(mutex_);
+    while (true) {
+      const auto events = store_.EventsSince(revision_, kEventsAtOnce);
+      std::vector<int64_t> ended;
+      for (const EventRecord& event : events) {
+        if (event.kind == EventKind::kState && IsFinished(event.state)) {
+          ended.push_back(event.job_id);
+        }
+      }
+      for (const JobRecord& job : store_.Snapshot(ended).jobs) {
+        jobs_ended_.Add({{"kind", job.kind}, {"state", JobStateName(job.state)}}).Increment();
+        if (!job.cached) job_seconds_.Add({{"kind", job.kind}}).Increment(job.usage.seconds);
+      }
+      if (!events.empty()) revision_ = events.back().revision;
+      if (events.size() < static_cast<size_t>(kEventsAtOnce)) return;
+    }
+  }
+
+  static MetricFamily& Add(std::vector<MetricFamily>* families,
+                           const char* name,
+                           const char* help,
+                           MetricType type,
+                           double value) {
+    families->push_back({name, help, type, {Value(type, value)}});
+    return families->back();
+  }
+
+  void AddQueue(std::vector<MetricFamily>* families) const {
+    const JobCounts counts = store_.CountJobs();
+    MetricFamily jobs{"color3d_jobs", "Jobs that are not finished.", MetricType::Gauge, {}};
+    for (const auto& [state, count] :
+         std::vector<std::pair<std::string, int64_t>>{{"blocked", counts.blocked},
+                                                      {"queued", counts.queued - counts.blocked},
+                                                      {"running", counts.running}}) {
+      jobs.metric.push_back(
+          Value(MetricType::Gauge, static_cast<double>(count), {{"state", state}}));
+    }
+    families->push_back(std::move(jobs));
+    const int64_t now = SystemClock()();
+    const int64_t oldest = counts.oldest_queued_ms;
+    Add(families,
+        "color3d_oldest_queued_seconds",
+        "How long the first of those jobs has waited for a worker.",
+        MetricType::Gauge,
+        oldest > 0 ? static_cast<double>(std::max<int64_t>(now - oldest, 0)) / 1000.0 : 0.0);
+    Add(families,
+        "color3d_notifications",
+        "Ends of jobs of which word could not be delivered yet.",
+        MetricType::Gauge,
+        static_cast<double>(counts.notifications));
+    const std::set<Hold> holds = store_.Holds();
+    MetricFamily held{"color3d_queue_held", "1: no job is begun.", MetricType::Gauge, {}};
+    held.metric.push_back(
+        Value(MetricType::Gauge, holds.contains(Hold::kPaused), {{"reason", "paused"}}));
+    held.metric.push_back(
+        Value(MetricType::Gauge, holds.contains(Hold::kStorage), {{"reason", "storage"}}));
+    families->push_back(std::move(held));
+    int idle = 0, busy = 0;
+    double silent = 0.0;
+    for (const WorkerRecord& worker : store_.ListWorkers()) {
+      ++(worker.job.empty() ? idle : busy);
+      silent = std::max(silent, static_cast<double>(now - worker.heartbeat_ms) / 1000.0);
+    }
+    MetricFamily workers{"color3d_workers", "Worker processes.", MetricType::Gauge, {}};
+    workers.metric.push_back(Value(MetricType::Gauge, idle, {{"state", "idle"}}));
+    workers.metric.push_back(Value(MetricType::Gauge, busy, {{"state", "busy"}}));
+    families->push_back(std::move(workers));
+    Add(families,
+        "color3d_worker_silence_seconds",
+        "Since the last sign of life of the worker that has been silent for longest.",
+        MetricType::Gauge,
+        silent);
+  }
+
+  void AddServer(std::vector<MetricFamily>* families) const {
+    const ServerSample sample = sample_();
+    MetricFamily open{"color3d_open_streams", "Streams that are open.", MetricType::Gauge, {}};
+    open.metric.push_back(Value(MetricType::Gauge, sample.watches, {{"kind", "watch"}}));
+    open.metric.push_back(Value(MetricType::Gauge, sample.downloads, {{"kind", "download"}}));
+    open.metric.push_back(Value(MetricType::Gauge, sample.uploads, {{"kind", "upload"}}));
+    families->push_back(std::move(open));
+    const auto gauge = [&](const char* name, const char* help, double value) {
+      Add(families, name, help, MetricType::Gauge, value);
+    };
+    const auto counter = [&](const char* name, const char* help, int64_t value) {
+      Add(families, name, help, MetricType::Counter, static_cast<double>(value));
+    };
+    gauge("color3d_live_pictures", "Live pictures not answered yet.", sample.live_pictures);
+    gauge("color3d_draining", "1: the server ends.", sample.draining);
+    gauge("color3d_disk_free_bytes",
+          "Free where the data folder is, less what uploads are promised.",
+          static_cast<double>(blobs_.FreeBytes()));
+    gauge("color3d_disk_reserve_bytes",
+          "Below it uploads and jobs fail.",
+          static_cast<double>(sample.reserve_bytes));
+    gauge("color3d_memory_bytes",
+          "Resident, of the server without its workers.",
+          static_cast<double>(ResidentMemoryBytes()));
+    gauge("color3d_open_descriptors",
+          "Of the server's process.",
+          static_cast<double>(OpenDescriptors()));
+    if (sample.certificate_end_s > 0) {
+      gauge("color3d_certificate_end_seconds",
+            "When the TLS certificate ends, since the epoch.",
+            static_cast<double>(sample.certificate_end_s));
+    }
+    counter("color3d_attempts_lost_total",
+            "Attempts that ended with their worker.",
+            sample.attempts_lost);
+    counter("color3d_blobs_removed_total", "Blobs that nothing named.", sample.blobs_removed);
+    counter("color3d_blobs_damaged_total",
+            "Blobs that the disk had damaged, as the sweep found.",
+            sample.blobs_damaged);
+    counter("color3d_jobs_expired_total", "Jobs deleted for their age.", sample.jobs_expired);
+    counter("color3d_sweeps_failed_total", "Sweeps that did not end well.", sample.sweeps_failed);
+  }
+
+  JobStore& store_;
+  const BlobStore& blobs_;
+  const std::function<ServerSample()> sample_;
+  prometheus::Family<prometheus::Counter>& jobs_ended_;
+  prometheus::Family<prometheus::Counter>& job_seconds_;
+  mutable std::mutex mutex_;
+  mutable int64_t revision_;
+};
+
+}  // namespace
+
+struct ServerMetrics::Parts {
+  std::shared_ptr<prometheus::Registry> registry = std::make_shared<prometheus::Registry>();
+  prometheus::Family<prometheus::Counter>& calls = prometheus::BuildCounter()
+                                                       .Name("color3d_rpc_calls_total")
+                                                       .Help("Calls that have ended, by how.")
+                                                       .Register(*registry);
+  prometheus::Family<prometheus::Histogram>& seconds =
+      prometheus::BuildHistogram()
+          .Name("color3d_rpc_seconds")
+          .Help("From a call's beginning to its end; streams as long as they were open.")
+          .Register(*registry);
+  prometheus::Family<prometheus::Counter>& jobs_ended = prometheus::BuildCounter()
+                                                            .Name("color3d_jobs_ended_total")
+                                                            .Help("Jobs that have ended.")
+                                                            .Register(*registry);
+  prometheus::Family<prometheus::Counter>& job_seconds =
+      prometheus::BuildCounter()
+          .Name("color3d_job_seconds_total")
+          .Help("Seconds of computing of jobs that have ended, over all their attempts.")
+          .Register(*registry);
+  std::shared_ptr<Sampled> sampled;
+  std::unique_ptr<prometheus::Exposer> exposer;  // the first to go: it reads the others
+};
+
+ServerMetrics::ServerMetrics(const std::string& version) : parts_(std::make_unique<Parts>()) {
+  prometheus::BuildGauge()
+      .Name("color3d_build_info")
+      .Help("Always 1.")
+      .Register(*parts_->registry)
+      .Add({{"version", version}})
+      .Set(1);
+}
+
+ServerMetrics::~ServerMetrics() = default;
+
+void ServerMetrics::CountCall(const std::string& method, const std::string& code, double seconds) {
+  const std::string name = method.substr(method.find_first_not_of('/'));
+  parts_->calls.Add({{"method", name}, {"code", code}}).Increment();
+  parts_->seconds.Add({{"method", name}}, kSeconds).Observe(seconds);
+}
+
+int ServerMetrics::Listen(const std::string& address,
+                          JobStore& store,
+                          const BlobStore& blobs,
+                          std::function<ServerSample()> sample) {
+  try {
+    parts_->exposer = std::make_unique<prometheus::Exposer>(address);
+  } catch (const std::runtime_error&) {  // it does not say why
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "cannot listen for --metrics-listen on {}: it must be HOST:PORT of this machine, and "
+        "free",
+        address);
+  }
+  parts_->sampled = std::make_shared<Sampled>(
+      store, blobs, std::move(sample), parts_->jobs_ended, parts_->job_seconds);
+  // In this order: what is sampled counts the jobs that have ended.
+  parts_->exposer->RegisterCollectable(parts_->sampled);
+  parts_->exposer->RegisterCollectable(parts_->registry);
+  return parts_->exposer->GetListeningPorts().at(0);
+}
+
+void ServerMetrics::StopListening() { parts_->exposer.reset(); }
+
+}  // namespace color3d

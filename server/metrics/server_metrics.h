@@ -1,0 +1,51 @@
+// What Prometheus reads of the server: https://prometheus.io/docs/instrumenting/exposition_formats/
+// Names begin with "color3d_"; labels are of our own making, never what users chose.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "server/storage/blob_store.h"
+#include "server/store/job_store.h"
+
+namespace color3d {
+
+// What the parts of the server say of themselves at a moment.
+struct ServerSample {
+  int watches = 0, downloads = 0, uploads = 0, live_pictures = 0;  // open
+  bool draining = false;
+  // Since the start.
+  int64_t attempts_lost = 0, blobs_removed = 0, blobs_damaged = 0, jobs_expired = 0,
+          sweeps_failed = 0;
+  int64_t reserve_bytes = 0;      // of the disk, that is kept free
+  int64_t certificate_end_s = 0;  // since the epoch; 0: no TLS
+};
+
+// Thread-safe.
+class ServerMetrics {
+ public:
+  explicit ServerMetrics(const std::string& version);
+  ~ServerMetrics();
+  ServerMetrics(const ServerMetrics&) = delete;
+  ServerMetrics& operator=(const ServerMetrics&) = delete;
+
+  // `method`: "/color3d.v1.JobService/GetJob"; `code`: "OK", "NOT_FOUND", ...
+  void CountCall(const std::string& method, const std::string& code, double seconds);
+
+  // Answers GET /metrics on HOST:PORT (port 0: any free one), from stores that outlive this object.
+  // Returns the port. Throws Error{kFailedPrecondition} when the address cannot be used.
+  int Listen(const std::string& address,
+             JobStore& store,
+             const BlobStore& blobs,
+             std::function<ServerSample()> sample);
+  // Before what `sample` looks at is gone.
+  void StopListening();
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace color3d

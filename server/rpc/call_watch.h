@@ -1,0 +1,31 @@
+// What every call of the server has: an id in its trailers, a line in the log, and somebody who
+// counts it. A gRPC interceptor; thread-safe.
+#pragma once
+
+#include <grpcpp/support/server_interceptor.h>
+#include <grpcpp/support/status_code_enum.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace color3d {
+
+// A call has ended: "/color3d.v1.JobService/GetJob", how, after so many seconds.
+using CallObserver =
+    std::function<void(const std::string& method, grpc::StatusCode code, double seconds)>;
+
+// "OK", "NOT_FOUND", ...
+const char* StatusName(grpc::StatusCode code);
+
+// The trace id of a W3C "traceparent", 32 hexadecimal digits; empty for one that is malformed or
+// all zeros. https://www.w3.org/TR/trace-context/
+std::string TraceIdOf(std::string_view traceparent);
+
+// Trailers of each call carry "x-request-id": the client's own of that name when it is 1 to 64
+// letters, digits, '-', '_' or '.', else a fresh one.
+std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
+    CallObserver observer);
+
+}  // namespace color3d
