@@ -37,12 +37,11 @@ class ServerProcess {
                                           port_file,
                                           "--data-dir",
                                           folder / "data",
-                                          "--worker-program",
-                                          COLOR3D_TEST_WORKER,
                                           "--workers",
                                           std::to_string(workers)};
     // What a test does not say otherwise.
     const std::vector<std::pair<const char*, const char*>> defaults = {
+        {"--worker-program", COLOR3D_TEST_WORKER},
         {"--threads", "1"},
         {"--lease-seconds", "1"},
         {"--heartbeat-seconds", "0.2"},
