@@ -247,6 +247,9 @@ TEST_F(ProcessTest, KilledServerTakesItsWorkersAlongAndLosesNothing) {
 }
 
 TEST_F(ProcessTest, IdleServerIsSmall) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "most of the memory is ThreadSanitizer's";
+#endif
   ServerProcess server(scratch_.path(), {});
   server.client().MakeScene();
   v1::ServerInfo info;

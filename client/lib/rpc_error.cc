@@ -55,7 +55,10 @@ RpcError::RpcError(const grpc::Status& status)
   }
 }
 
-bool RpcError::IsTransient() const { return grpc_code_ == grpc::StatusCode::UNAVAILABLE; }
+bool RpcError::IsTransient() const {
+  return grpc_code_ == grpc::StatusCode::UNAVAILABLE ||
+         (grpc_code_ == grpc::StatusCode::CANCELLED && reason_.empty());
+}
 
 bool RpcError::IsUnreachable() const {
   const bool code = grpc_code_ == grpc::StatusCode::UNAVAILABLE ||

@@ -28,7 +28,8 @@ class RpcError : public Error {
   const std::string& reason() const { return reason_; }
   // google.rpc.BadRequest, in the server's order.
   const std::vector<FieldViolation>& violations() const { return violations_; }
-  // The same call may succeed later: the connection broke, or the server is overloaded.
+  // The same call may succeed later: the connection broke, the server is overloaded or has ended
+  // the call with itself (CANCELLED; whoever cancels calls looks at that first).
   bool IsTransient() const;
   // Nobody answered: there is no server, or the connection broke.
   bool IsUnreachable() const;

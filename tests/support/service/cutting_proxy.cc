@@ -64,13 +64,9 @@ void CuttingProxy::SetTarget(const std::string& address) {
   target_port_ = std::stoi(address.substr(address.rfind(':') + 1));
 }
 
-std::string CuttingProxy::Fates() {
+std::map<std::string, int> CuttingProxy::Fates() {
   std::lock_guard lock(mutex_);
-  std::string text;
-  for (const auto& [name, count] : fates_) {
-    text += fmt::format("{}{} x {}", text.empty() ? "" : ", ", count, name);
-  }
-  return text;
+  return fates_;
 }
 
 CuttingProxy::Fate CuttingProxy::DrawFate() {
@@ -78,7 +74,7 @@ CuttingProxy::Fate CuttingProxy::DrawFate() {
   Fate fate;
   fate.after_bytes = random_.NextBelow(2 << 20);
   fate.after_ms = 100 + static_cast<int>(random_.NextBelow(3000));
-  switch (random_.NextBelow(4)) {
+  switch (random_.NextBelow(6)) {
     case 0:
       fate.name = "half open";
       fate.swallowed = static_cast<int>(random_.NextBelow(2));

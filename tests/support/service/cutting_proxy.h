@@ -30,8 +30,8 @@ class CuttingProxy {
   const std::string& address() const { return address_; }
   // Where connections lead from now on: HOST:PORT; until then they are refused.
   void SetTarget(const std::string& address);
-  // "40 x cut, ..."
-  std::string Fates();
+  // How often each has come over a connection.
+  std::map<std::string, int> Fates();
 
  private:
   struct Fate {

@@ -31,8 +31,6 @@ class ServerProcess {
     std::filesystem::remove(port_file);
     std::vector<std::string> arguments = {COLOR3D_SERVER,
                                           "serve",
-                                          "--listen",
-                                          "127.0.0.1:0",
                                           "--port-file",
                                           port_file,
                                           "--data-dir",
@@ -41,6 +39,7 @@ class ServerProcess {
                                           std::to_string(workers)};
     // What a test does not say otherwise.
     const std::vector<std::pair<const char*, const char*>> defaults = {
+        {"--listen", "127.0.0.1:0"},
         {"--worker-program", COLOR3D_TEST_WORKER},
         {"--threads", "1"},
         {"--lease-seconds", "1"},
