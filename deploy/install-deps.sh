@@ -17,7 +17,7 @@ packages=(
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy prometheus
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus
     python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
   *) echo "install-deps: unknown option $1; there is --tests" >&2; exit 2 ;;
 esac

@@ -1,17 +1,18 @@
 #!/usr/bin/env bash
 # Builds Color3D and runs its test suite. Installs what is missing (as root or with sudo).
 #   tests/run.sh            everything: format, layers, documents, API, lint, then every test but chaos
+#                           and soak
 #   tests/run.sh -L fast    only the tests with this CTest label (fast, stability, integration, slow,
-#                           process, chaos)
+#                           process, chaos, soak)
 # BUILD_DIR names another build folder (default: build). With CI=true nothing is asked or coloured.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-label_args=(-LE chaos)
+label_args=(-LE "chaos|soak")
 while getopts "L:h" option; do
   case "$option" in
     L) label_args=(-L "$OPTARG") ;;
-    h) sed -n '2,6p' "$0" | cut -c3-; exit 0 ;;
+    h) sed -n '2,7p' "$0" | cut -c3-; exit 0 ;;
     *) exit 2 ;;
   esac
 done

@@ -3,6 +3,7 @@
 #include <grpcpp/support/client_interceptor.h>
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -77,6 +78,10 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, static_cast<int>(kFirstWait.count()));
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, static_cast<int>(kLongestWait.count()));
+  // A connection that swallows what is sent is given up after 20 s, not at each call's time limit.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   // http_proxy in the environment is not meant for this machine.
   if (is_here) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
@@ -168,14 +173,16 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
 
 void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& call,
                        std::chrono::seconds time_limit) {
-  Backoff backoff, turned_away(kPatienceWithFullServer);
+  std::optional<Backoff> backoff;  // since the first failure, which may have taken long to be seen
+  Backoff turned_away(kPatienceWithFullServer);
   while (true) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + time_limit);
     const grpc::Status status = call(&context);
     if (status.ok()) return;
     const RpcError error(status);
-    if (error.IsTransient() && backoff.Wait(cancel_, error.RetryDelay())) continue;
+    if (!backoff) backoff.emplace();
+    if (error.IsTransient() && backoff->Wait(cancel_, error.RetryDelay())) continue;
     if (error.IsTurnedAway()) {
       if (on_wait_) {
         on_wait_(std::string(error.what()) + " (waiting " +

@@ -123,7 +123,7 @@ WatchEnd WatchJobs(Connection& connection,
       continue;
     }
     // A draining server may be back soon, with the same jobs.
-    if (error.grpc_code() != grpc::StatusCode::UNAVAILABLE) throw error;
+    if (!error.IsTransient()) throw error;
     if (!keep_going()) return WatchEnd::kStopped;
     if (!backoff.Wait(never)) throw error;
   }

@@ -33,6 +33,13 @@ TEST_F(JobWatchTest, WatchTakesTheWholeStateAgainWhenTheFirstStreamBroke) {
   EXPECT_THAT(jobs_.asked, ElementsAre(0, 0));
 }
 
+TEST_F(JobWatchTest, WatchGoesOnWhereTheServerHasEndedTheCallWithItself) {
+  jobs_.script = {{{7}, grpc::Status(grpc::StatusCode::CANCELLED, "")}, {{7}, grpc::Status::OK}};
+  WatchJobs(
+      *connection_, {"jobs/1"}, [](const v1::JobEvent&) {}, [] { return true; });
+  EXPECT_THAT(jobs_.asked, ElementsAre(0, 0));
+}
+
 TEST_F(JobWatchTest, WatchStartsAnewWhenItsRevisionIsGone) {
   const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
   const grpc::Status gone(grpc::StatusCode::OUT_OF_RANGE, "compacted");

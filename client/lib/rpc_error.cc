@@ -65,7 +65,10 @@ RpcError::RpcError(const grpc::Status& status)
   }
 }
 
-bool RpcError::IsTransient() const { return grpc_code_ == grpc::StatusCode::UNAVAILABLE; }
+bool RpcError::IsTransient() const {
+  return grpc_code_ == grpc::StatusCode::UNAVAILABLE ||
+         (grpc_code_ == grpc::StatusCode::CANCELLED && reason_.empty());
+}
 
 bool RpcError::IsTurnedAway() const {
   if (grpc_code_ != grpc::StatusCode::RESOURCE_EXHAUSTED || retry_delay_.count() <= 0) return false;

@@ -29,7 +29,8 @@ class RpcError : public Error {
   const std::string& reason() const { return reason_; }
   // google.rpc.BadRequest or QuotaFailure, in the server's order.
   const std::vector<FieldViolation>& violations() const { return violations_; }
-  // The same call may succeed later: the connection broke, or the server is overloaded.
+  // The same call may succeed later: the connection broke, the server is overloaded or has ended
+  // the call with itself (CANCELLED; whoever cancels calls looks at that first).
   bool IsTransient() const;
   // Too much was asked for just now: the same call may succeed after RetryDelay().
   bool IsTurnedAway() const;

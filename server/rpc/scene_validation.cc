@@ -13,6 +13,7 @@
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 #include "server/planning/scene_facts.h"
+#include "server/rpc/convert.h"
 #include "server/rpc/transforms_outline.h"
 #include "server/service_error.h"
 
@@ -178,7 +179,60 @@ void CheckFile(const SceneFileRecord& file,
   throw ServiceError(ErrorCode::kInvalidArgument, "SCENE_INVALID", message, violations);
 }
 
+void CheckSceneId(const std::string& id) {
+  if (id.empty()) return;
+  const bool good =
+      id.size() >= 4 && id.size() <= 63 && id[0] >= 'a' && id[0] <= 'z' &&
+      id.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
+  if (!good) {
+    throw InvalidArgument(
+        "scene_id '{}' must be 4 to 63 characters of [a-z0-9-], the first a letter",
+        id.substr(0, 80));
+  }
+}
+
 }  // namespace
+
+SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLimits& limits) {
+  CheckSceneId(request.scene_id());
+  if (request.display_name().size() > 200) {
+    throw InvalidArgument("display_name has {} bytes; at most 200 are allowed",
+                          request.display_name().size());
+  }
+  if (request.files_size() < 1 || request.files_size() > limits.max_files_per_scene) {
+    throw InvalidArgument("files has {} entries; the range is 1 to {}",
+                          request.files_size(),
+                          limits.max_files_per_scene);
+  }
+  SceneRecord record;
+  record.name = "scenes/" + (request.scene_id().empty() ? "s" + NewId() : request.scene_id());
+  record.display_name = request.display_name();
+  std::set<std::string> paths;
+  for (const v1::SceneFile& file : request.files()) {
+    if (!IsSafeRelativePath(file.path())) {
+      throw ServiceError(
+          ErrorCode::kInvalidArgument,
+          "UNSAFE_PATH",
+          fmt::format("the path '{}' must be relative, with '/' separators and without '..'",
+                      file.path().substr(0, 200)),
+          {{"files.path", file.path().substr(0, 200)}});
+    }
+    if (!paths.insert(file.path()).second) {
+      throw InvalidArgument("the path '{}' is there twice", file.path());
+    }
+    record.files.push_back({file.path(), FromProto(file.digest())});
+  }
+  // "a" and "a/b" cannot both be files.
+  for (const std::string& path : paths) {
+    for (size_t slash = path.find('/'); slash != std::string::npos;
+         slash = path.find('/', slash + 1)) {
+      if (paths.count(path.substr(0, slash)) > 0) {
+        throw InvalidArgument("'{}' is both a file and a folder", path.substr(0, slash));
+      }
+    }
+  }
+  return record;
+}
 
 StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
   const bool has_photos = std::any_of(files.begin(), files.end(), [](const auto& file) {

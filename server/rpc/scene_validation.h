@@ -1,12 +1,18 @@
-// What CommitScene checks before a scene becomes immutable: every blob there, every file what it
-// claims to be, enough photographs, a layout we know.
+// What CreateScene takes, and what CommitScene checks before a scene becomes immutable: every blob
+// there, every file what it claims to be, enough photographs, a layout we know.
 #pragma once
 
+#include "color3d/v1/scene.pb.h"
 #include "server/rpc/rpc_parts.h"
 #include "server/storage/blob_store.h"
 #include "server/store/job.h"
 
 namespace color3d {
+
+// The scene that a request declares, under a new id where it names none. Throws
+// Error{kInvalidArgument}: bad id, too many files, a path that is unsafe (UNSAFE_PATH), there twice
+// or both file and folder, no digest.
+SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLimits& limits);
 
 struct SceneCheck {
   StoredLayout layout = StoredLayout::kPhotos;

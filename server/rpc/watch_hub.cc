@@ -133,6 +133,8 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       begun_ = true;
       dirty_ = true;
       last_write_ = SteadyClock::now();
+      // Whoever goes on is told at once that he is heard, though nothing may happen for long.
+      if (request_.after_revision() > 0) last_write_ -= hub_.timing_.keepalive;
     });
     status.ok() ? Pump() : End(status);
   }

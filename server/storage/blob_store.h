@@ -82,7 +82,8 @@ class BlobStore {
   virtual void ForEach(const std::function<bool(const StoredBlob&)>& visit) const = 0;
   // False when it was touched since, when it is gone, or when somebody uses the store just now.
   virtual bool RemoveIfUntouched(const StoredBlob& blob) = 0;
-  // Files that a crash left half-written, and what was set aside, older than `age`; how many.
+  // Files that a crash left half-written, and what was set aside, older than `age` at this
+  // call and at the last one; how many.
   virtual int RemoveLeftovers(std::chrono::seconds age) = 0;
 };
 

@@ -182,13 +182,12 @@ bool FileBlobStore::RemoveIfUntouched(const StoredBlob& blob) {
 int FileBlobStore::RemoveLeftovers(std::chrono::seconds age) {
   int removed = 0;
   std::error_code error;
-  const std::time_t oldest = ::time(nullptr) - age.count();
+  stale_.Look(age);
   for (fs::recursive_directory_iterator it(folder_, error), end; it != end; it.increment(error)) {
     if (error) break;
     const std::string name = it->path().filename().string();
-    struct stat status {};
     if (!name.ends_with(".part") && !name.ends_with(kSetAside)) continue;
-    if (::stat(it->path().c_str(), &status) != 0 || status.st_mtime > oldest) continue;
+    if (!stale_.IsStale(it->path())) continue;
     if (::unlink(it->path().c_str()) == 0) ++removed;
   }
   return removed;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "server/storage/blob_store.h"
+#include "server/storage/stale_files.h"
 
 namespace color3d {
 
@@ -37,6 +38,7 @@ class FileBlobStore : public BlobStore {
 
   std::filesystem::path folder_;
   BlobStoreOptions options_;
+  StaleFiles stale_;
   std::shared_ptr<std::atomic<int64_t>> reserved_ = std::make_shared<std::atomic<int64_t>>(0);
 };
 

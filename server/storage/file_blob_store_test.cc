@@ -89,6 +89,7 @@ TEST_F(FileBlobStoreTest, LeftOversOfACrashGo) {
   }
   MakeOld(folder / ".x.1.0.part", 48);
   MakeOld(folder / "y.damaged", 48);
+  EXPECT_EQ(blobs_.RemoveLeftovers(std::chrono::hours(24)), 0) << "the clock may have been set";
   EXPECT_EQ(blobs_.RemoveLeftovers(std::chrono::hours(24)), 2);
   EXPECT_TRUE(fs::exists(folder / "new.part"));
 }

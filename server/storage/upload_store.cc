@@ -184,10 +184,9 @@ void UploadStore::Writer::Finish() {
 int UploadStore::ReapOlderThan(std::chrono::seconds age) {
   int reaped = 0;
   std::error_code error;
-  const std::time_t oldest = ::time(nullptr) - age.count();
+  stale_.Look(age);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
-    struct stat status {};
-    if (::stat(entry.path().c_str(), &status) != 0 || status.st_mtime > oldest) continue;
+    if (!stale_.IsStale(entry.path())) continue;
     {
       std::lock_guard lock(mutex_);
       if (sessions_.contains(entry.path().filename().string())) continue;

@@ -13,6 +13,7 @@
 
 #include "core/base/digest.h"
 #include "server/storage/blob_store.h"
+#include "server/storage/stale_files.h"
 
 namespace color3d {
 
@@ -62,7 +63,8 @@ class UploadStore {
   // need not be written again.
   std::unique_ptr<Writer> Open(const UploadName& name, int64_t offset);
 
-  // Removes uploads that nobody writes and that have not grown for `age`; returns how many.
+  // Removes uploads that nobody writes and that have not grown for `age`, at this call and at the
+  // last one; returns how many.
   int ReapOlderThan(std::chrono::seconds age);
 
  private:
@@ -71,6 +73,7 @@ class UploadStore {
   std::filesystem::path folder_;
   BlobStore& blobs_;
   int64_t max_blob_bytes_;
+  StaleFiles stale_;
   std::mutex mutex_;
   std::map<std::string, std::weak_ptr<Writer::Session>> sessions_;
 };

@@ -4,24 +4,7 @@
 #include "server/access/tokens.h"
 #include "server/rpc/blob_service.h"
 #include "server/rpc/convert.h"
-#include "server/rpc/error_mapping.h"
-#include "tests/fuzz/fuzz_target.h"
-
-namespace {
-
-// What clients are told is of one line, whatever they had sent.
-template <class Reader>
-int AnswerOrRefuse(Reader&& reader) {
-  const grpc::Status status = color3d::Guard(reader);
-  const bool good = status.ok() || status.error_code() == grpc::StatusCode::INVALID_ARGUMENT;
-  if (!good || status.error_message().find('\n') != std::string::npos) {
-    std::fprintf(stderr, "not a refusal: %s\n", status.error_message().c_str());
-    std::abort();
-  }
-  return 0;
-}
-
-}  // namespace
+#include "tests/fuzz/request_checks.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace color3d;

@@ -30,6 +30,17 @@ inline Trace ParseTrace(const std::string& text) {
   return trace;
 }
 
+// The same text without the processes: equal work leaves equal text, whoever did it.
+inline std::string WithoutProcesses(const std::string& text) {
+  std::string plain;
+  std::stringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const bool is_step = !line.empty() && line[0] >= '0' && line[0] <= '9';
+    plain += (is_step ? line.substr(0, line.find(' ')) : line) + "\n";
+  }
+  return plain;
+}
+
 inline std::vector<int> Range(int count) {
   std::vector<int> range;
   for (int i = 0; i < count; ++i) range.push_back(i);

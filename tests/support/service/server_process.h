@@ -31,18 +31,16 @@ class ServerProcess {
     std::filesystem::remove(port_file);
     std::vector<std::string> arguments = {COLOR3D_SERVER,
                                           "serve",
-                                          "--listen",
-                                          "127.0.0.1:0",
                                           "--port-file",
                                           port_file,
                                           "--data-dir",
                                           folder / "data",
-                                          "--worker-program",
-                                          COLOR3D_TEST_WORKER,
                                           "--workers",
                                           std::to_string(workers)};
     // What a test does not say otherwise.
     const std::vector<std::pair<const char*, const char*>> defaults = {
+        {"--listen", "127.0.0.1:0"},
+        {"--worker-program", COLOR3D_TEST_WORKER},
         {"--threads", "1"},
         {"--lease-seconds", "1"},
         {"--heartbeat-seconds", "0.2"},

@@ -1,0 +1,195 @@
+// The disk of the data folder fills up while jobs run, and is given space again. The folder is a
+// small file system of its own, which needs root or user namespaces; label "chaos".
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <fstream>
+
+#include "core/base/files.h"
+#include "tests/support/service/chaos_service.h"
+
+namespace color3d {
+namespace {
+namespace fs = std::filesystem;
+using testing::ChaosService;
+using ::testing::IsEmpty;
+using testing::ResultOf;
+using testing::ScriptedSpec;
+using testing::SleepMs;
+using testing::TestClient;
+
+constexpr int kJobs = 8;
+constexpr char kScript[] = "steps=30,ms=100";
+constexpr char kDiskSize[] = "size=8m";
+
+// What this thread and its children mount from now on, they alone see. Says why not, or nothing.
+std::string LeaveTheMountsOfOthers() {
+  const uid_t user = ::geteuid();
+  if (::unshare(user == 0 ? CLONE_NEWNS : CLONE_NEWNS | CLONE_NEWUSER) != 0) {
+    return std::string("unshare: ") + std::strerror(errno);
+  }
+  if (user != 0) std::ofstream("/proc/self/uid_map") << "0 " << user << " 1";
+  if (::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) {
+    return std::string("mount: ") + std::strerror(errno);
+  }
+  return "";
+}
+
+class ChaosDiskTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string why = LeaveTheMountsOfOthers();
+    fs::create_directory(disk_);
+    if (why.empty() && ::mount("none", disk_.c_str(), "tmpfs", 0, kDiskSize) != 0) {
+      why = std::string("mount: ") + std::strerror(errno);
+    }
+    if (!why.empty()) GTEST_SKIP() << "A FULL DISK WAS NOT TESTED: " << why;
+    is_mounted_ = true;
+  }
+  void TearDown() override {
+    if (is_mounted_) ::umount2(disk_.c_str(), MNT_DETACH);
+  }
+
+  // So that `free_bytes` are left; for 0: to the last byte.
+  void Fill(int64_t free_bytes) const {
+    const std::string page(4096, 'x');
+    std::ofstream file(filler_, std::ios::binary | std::ios::app);
+    while (static_cast<int64_t>(fs::space(disk_).available) >= free_bytes) {
+      if (!file.write(page.data(), static_cast<std::streamsize>(page.size())).flush()) return;
+    }
+  }
+
+  // Jobs run while `free_bytes` are left for some seconds.
+  struct Outcome {
+    int failed = 0, refused = 0, lost_attempts = 0;
+  };
+  Outcome Endure(const std::string& reserve_mib, int64_t free_bytes);
+
+  ScratchFolder scratch_;
+  const fs::path disk_ = scratch_.path() / "data";
+  const fs::path filler_ = disk_ / "filler";
+  bool is_mounted_ = false;
+};
+
+std::string ReasonOfJob(const v1::Job& job) {
+  google::rpc::ErrorInfo info;
+  for (const auto& detail : job.error().details()) {
+    if (detail.UnpackTo(&info)) return info.reason();
+  }
+  return "";
+}
+
+void ExpectAnAnswer(TestClient& client, const std::string& job) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(1));
+  v1::GetJobRequest request;
+  request.set_name(job);
+  v1::Job answer;
+  const grpc::Status status = client.jobs->GetJob(&context, request, &answer);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+}
+
+// A write may be refused, for its reason and at once.
+void ExpectRoomOrRefusal(const grpc::Status& status) {
+  if (status.ok()) return;
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+  EXPECT_EQ(testing::ReasonOfStatus(status), "STORAGE_FULL") << status.error_message();
+}
+
+grpc::Status TryCreate(TestClient& client, const v1::JobSpec& spec) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(5));
+  v1::CreateJobRequest request;
+  *request.mutable_spec() = spec;
+  v1::Job job;
+  return client.jobs->CreateJob(&context, request, &job);
+}
+
+// Ends in its state, whole or for want of space.
+bool EndsWhole(TestClient& client, const std::string& name, const std::string& undisturbed) {
+  const v1::Job job = client.WaitFinished(name);
+  if (job.state() == v1::Job::STATE_SUCCEEDED) {
+    EXPECT_EQ(ResultOf(client, name), undisturbed) << name;
+    return true;
+  }
+  std::vector<v1::Job> jobs = client.Children(name);
+  jobs.push_back(job);
+  for (const v1::Job& one : jobs) {
+    if (one.state() != v1::Job::STATE_FAILED) continue;
+    EXPECT_EQ(ReasonOfJob(one), "STORAGE_FULL") << one.DebugString();
+  }
+  return false;
+}
+
+void Retry(TestClient& client, const std::string& name) {
+  v1::RetryJobRequest request;
+  request.set_name(name);
+  grpc::ClientContext context;
+  v1::Job job;
+  const grpc::Status status = client.jobs->RetryJob(&context, request, &job);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+}
+
+ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib, int64_t free_bytes) {
+  Outcome outcome;
+  ChaosService service(scratch_.path(), {"--reserve-mib", reserve_mib});
+  TestClient& client = service.client();
+  const std::string scene = client.MakeScene().name();
+  int seed = 0;
+  const auto submit = [&] { return client.Create(ScriptedSpec(scene, kScript, ++seed)).name(); };
+  const std::string first = submit();
+  client.WaitFinished(first);
+  const std::string undisturbed = ResultOf(client, first);
+
+  std::vector<std::string> names;
+  for (int i = 0; i < kJobs; ++i) names.push_back(submit());
+  SleepMs(1000);
+  for (int i = 0; i < 60; ++i) {
+    Fill(free_bytes);  // what is freed meanwhile is taken at once
+    ExpectAnAnswer(client, names[static_cast<size_t>(i) % names.size()]);
+    if (i % 10 == 0) {
+      const grpc::Status status = TryCreate(client, ScriptedSpec(scene, "steps=1", 100 + i));
+      ExpectRoomOrRefusal(status);
+      outcome.refused += status.ok() ? 0 : 1;
+    }
+    SleepMs(50);
+  }
+  EXPECT_THROW(client.Upload(std::string(2'000'000, 'u')), std::runtime_error);
+  fs::remove(filler_);
+
+  for (const std::string& name : names) {
+    if (EndsWhole(client, name, undisturbed)) continue;
+    ++outcome.failed;
+    Retry(client, name);
+    EXPECT_TRUE(EndsWhole(client, name, undisturbed)) << "there is space again";
+  }
+  EXPECT_THAT(service.EndAndAudit(), IsEmpty());
+  outcome.lost_attempts =
+      static_cast<int>(service.Count("select count(*) from job_attempt where outcome='LOST'"));
+  for (const auto& entry : fs::recursive_directory_iterator(disk_ / "blobs")) {
+    EXPECT_NE(entry.path().extension(), ".part") << "a half-written blob was left";
+  }
+  std::cout << kJobs << " jobs: " << outcome.failed << " failed with STORAGE_FULL and succeeded "
+            << "when they were retried with space; " << outcome.lost_attempts << " attempts lost; "
+            << outcome.refused << " of 6 submissions refused\n";
+  return outcome;
+}
+
+TEST_F(ChaosDiskTest, BelowTheReserveJobsFailByItsNameAndTheStoreGoesOn) {
+  const Outcome outcome = Endure("2", 1 << 20);
+  EXPECT_GT(outcome.failed, 0) << "the disk was never full: the test proves nothing";
+  EXPECT_EQ(outcome.lost_attempts, 0);
+}
+
+TEST_F(ChaosDiskTest, WithoutALastByteJobsWaitOrFailAndReadsAreAnswered) {
+  const Outcome outcome = Endure("0", 0);
+  EXPECT_GT(outcome.failed + outcome.lost_attempts + outcome.refused, 0)
+      << "the disk was never full: the test proves nothing";
+}
+
+}  // namespace
+}  // namespace color3d
