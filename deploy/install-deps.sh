@@ -11,7 +11,7 @@ packages=(
   libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libabsl-dev
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
-  prometheus-cpp-dev
+  prometheus-cpp-dev libcurl4-openssl-dev
   libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev libzstd-dev
   libavcodec-dev libavformat-dev libavutil-dev libswscale-dev # film
 )

@@ -124,6 +124,9 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
                    "http[s]://HOST[:PORT][/PATH]: where jobs may ask to be told of their end; "
                    "repeatable")
       ->allow_extra_args(false);
+  serve->add_option("--notify-secret",
+                    options->notify_secret,
+                    "File with the key that signs such word: base64 of 24 to 64 bytes");
   serve->add_option("--drain-seconds", options->drain_seconds, "Longest time to stop after SIGTERM")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -21,6 +22,8 @@
 #include "server/backends/backend_prober.h"
 #include "server/maintenance.h"
 #include "server/metrics/server_metrics.h"
+#include "server/notify/notifier.h"
+#include "server/notify/webhook.h"
 #include "server/ops/notify.h"
 #include "server/ops/process.h"
 #include "server/ops/socket_folder.h"
@@ -42,6 +45,9 @@ std::chrono::milliseconds Milliseconds(double seconds) {
 void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
+  if (options.notify_allow.empty() == !options.notify_secret.empty()) {
+    throw InvalidArgument("--notify-allow and --notify-secret need each other");
+  }
   if (!options.metrics_listen.empty() && !IsLoopback(options.metrics_listen) &&
       !options.insecure_any_address) {
     throw Error(ErrorCode::kFailedPrecondition,
@@ -219,6 +225,9 @@ void Serve(const ServeOptions& options) {
   RequireReadable(models);
   for (const auto& [name, address] : models.backends) ParseBackendAddress(name, address);
   SupervisorOptions worker_setup = WorkerSetup(options, models);
+  NotifierOptions notify;
+  notify.allowed = options.notify_allow;
+  if (!options.notify_secret.empty()) notify.secret = ReadWebhookSecret(options.notify_secret);
   const StopSignals signals;
   const DataPaths paths(options.data_folder);
   PrepareDataFolder(paths);
@@ -268,6 +277,8 @@ void Serve(const ServeOptions& options) {
   chores.low_space_bytes = options.low_space_mib << 20;
   chores.on_leases = [] { NotifyServiceManager("WATCHDOG=1"); };
   Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
+  std::optional<Notifier> notifier;
+  if (!options.notify_allow.empty()) notifier.emplace(store, clock, notify);
   Supervisor supervisor(worker_setup, store);
   std::atomic<bool> draining{false};
   const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });

@@ -32,6 +32,7 @@ struct ServeOptions {
   int keep_days = 0;                      // of jobs after their end, unless pinned; 0: for ever
   std::string metrics_listen;             // HOST:PORT for Prometheus; empty: none
   std::string log_format = "text";        // or "json"
+  std::filesystem::path notify_secret;    // file; needed with the next
   std::vector<std::string> notify_allow;  // addresses that may be told of ended jobs
   std::vector<std::string> models;        // "NAME=FILE"
   std::vector<std::string> backends;      // "NAME=ADDRESS"

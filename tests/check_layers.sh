@@ -70,6 +70,7 @@ allow server/store 'core/(base|catalogue)|server/store'
 allow server/keeping 'core/base|server/(store|storage|keeping)'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'
 allow server/access 'core/base|server/access'
+allow server/notify 'core/base|server/(access|store|ops|notify)'
 allow server/metrics 'core/base|server/(store|storage|metrics)'
 allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
@@ -123,6 +124,7 @@ public server/access notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
+public server/notify notifier webhook
 public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc error_mapping rpc_server
 public server/storage blob_store collector data_folder file_blob_store upload_store

@@ -157,7 +157,7 @@ class Colorize {
 
   // Submits, follows and downloads; or returns at once with --detach.
   ExitCode Finish(const v1::JobSpec& spec) {
-    const v1::Job submitted = SubmitJob(*connection_, spec);
+    const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
     if (options_.detach) return Detached(submitted);
     const v1::Job job =
         FollowToSuccess(*connection_, context_, {submitted.name()}, out_.string(), display_);
@@ -183,7 +183,7 @@ class Colorize {
       jobs.push_back(SubmitJob(*connection_, import).name());
       spec.add_inputs(jobs.back());
     }
-    const v1::Job submitted = SubmitJob(*connection_, spec);
+    const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
     if (options_.detach) return Detached(submitted);
     jobs.push_back(submitted.name());
     const v1::Job job = FollowToSuccess(*connection_, context_, jobs, out_.string(), display_);

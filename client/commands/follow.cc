@@ -23,10 +23,11 @@ void PrintWarnings(Connection& connection, const Context& context, const v1::Job
 
 }  // namespace
 
-v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec) {
+v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec, const std::string& notify_url) {
   v1::CreateJobRequest request;
   *request.mutable_spec() = spec;
   request.set_request_id(NewUuid());
+  request.set_notify_url(notify_url);
   return connection.Call(&v1::JobService::Stub::CreateJob, connection.jobs(), request);
 }
 

@@ -12,7 +12,10 @@
 
 namespace color3d::client {
 
-v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec);
+// `notify_url`: told when it has ended; empty: nobody.
+v1::Job SubmitJob(Connection& connection,
+                  const v1::JobSpec& spec,
+                  const std::string& notify_url = "");
 
 // True when all of them have ended (stages that go on after a failure are not waited for); false
 // when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable} that says how to attach again

@@ -42,7 +42,7 @@ void PrintJob(const Context& context, const v1::Job& job) {
   }
 }
 
-ExitCode RunSubmit(const Context& context, const std::string& file) {
+ExitCode RunSubmit(const Context& context, const std::string& file, const std::string& notify) {
   const std::string text = file == "-" ? std::string(std::istreambuf_iterator<char>(std::cin), {})
                                        : ReadFile(file, kMaxSpecBytes);
   v1::JobSpec spec;
@@ -51,7 +51,7 @@ ExitCode RunSubmit(const Context& context, const std::string& file) {
     throw InvalidArgument("{} is not a JobSpec in JSON: {}", file, std::string(status.message()));
   }
   Connection connection(context.server, *context.interrupt);
-  PrintJob(context, SubmitJob(connection, spec));
+  PrintJob(context, SubmitJob(connection, spec, notify));
   return ExitCode::kOk;
 }
 
@@ -59,6 +59,7 @@ struct AllInOneArguments {
   std::vector<std::string> scenes;  // scenes/ID, or scenes/ID=jobs/ID with the key view's job
   std::optional<int> iterations;
   bool again = false;
+  std::string notify;  // empty: nobody is told
 };
 
 ExitCode RunAllInOne(const Context& context, const AllInOneArguments& arguments) {
@@ -76,7 +77,7 @@ ExitCode RunAllInOne(const Context& context, const AllInOneArguments& arguments)
   if (arguments.iterations) scenes->mutable_options()->set_iterations(*arguments.iterations);
   spec.set_scene(scenes->routes(0).scene());
   Connection connection(context.server, *context.interrupt);
-  PrintJob(context, SubmitJob(connection, spec));
+  PrintJob(context, SubmitJob(connection, spec, arguments.notify));
   return ExitCode::kOk;
 }
 
@@ -274,12 +275,13 @@ void AddJobCommands(CLI::App& app, Context& context) {
       ->needs(scenes_option);
   submit->add_flag("--again", all_in_one->again, "With --all-in-one: not from the stage cache")
       ->needs(scenes_option);
+  submit->add_option("--notify", all_in_one->notify, "Address that is told when it has ended");
   submit->callback([&context, file, all_in_one] {
     if (file->empty() && all_in_one->scenes.empty()) {
       throw CLI::RequiredError("SPEC or --all-in-one");
     }
     context.action = [&context, file, all_in_one] {
-      return all_in_one->scenes.empty() ? RunSubmit(context, *file)
+      return all_in_one->scenes.empty() ? RunSubmit(context, *file, all_in_one->notify)
                                         : RunAllInOne(context, *all_in_one);
     };
   });

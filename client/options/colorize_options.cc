@@ -237,6 +237,9 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
                o->poses,
                "Of a film by one moving camera: find the frames' poses by what stands still");
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
+  app.add_option("--notify",
+                 o->notify,
+                 "Address that is told when the job has ended; the server's operator allows which");
   app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");
   DeclareOptionFlags(app, o);

@@ -30,6 +30,7 @@ struct ColorizeOptions {
   int keys = 1;        // of the benchmark: key views in their true colours, chosen together
   bool bound = false;  // of the benchmark: upload all true colours, and score what they would give
   bool detach = false;
+  std::string notify;  // address that is told when the job has ended; empty: none
   bool hold_out = false;
   uint64_t seed = 0;                  // 0: the server's default
   double time_budget_seconds = 0.0;   // 0: none

@@ -1,0 +1,238 @@
+#include "server/notify/notifier.h"
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "server/notify/webhook.h"
+#include "tests/support/service/job_store_fixture.h"
+
+namespace color3d {
+namespace {
+using std::chrono::milliseconds;
+
+// Takes requests one after the other, and answers each with the next of `answers`, the last one for
+// ever. "hang" answers nothing.
+class Receiver {
+ public:
+  struct Request {
+    std::string line;
+    std::map<std::string, std::string> headers;  // names in small letters
+    std::string body;
+  };
+
+  explicit Receiver(std::vector<std::string> answers) : answers_(std::move(answers)) {
+    fd_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    ::bind(fd_, reinterpret_cast<sockaddr*>(&address), sizeof(address));
+    ::listen(fd_, 16);
+    socklen_t size = sizeof(address);
+    ::getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size);
+    port_ = ntohs(address.sin_port);
+    thread_ = std::thread([this] { Loop(); });
+  }
+  ~Receiver() {
+    ::shutdown(fd_, SHUT_RDWR);
+    ::close(fd_);
+    thread_.join();
+    for (const int hanging : hanging_) ::close(hanging);
+  }
+  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_) + "/hook"; }
+  std::vector<Request> requests() {
+    std::lock_guard lock(mutex_);
+    return requests_;
+  }
+  bool WaitFor(size_t count) {
+    for (int i = 0; i < 2000 && requests().size() < count; ++i) {
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    return requests().size() >= count;
+  }
+
+ private:
+  void Loop() {
+    for (int fd = 0; (fd = ::accept(fd_, nullptr, nullptr)) >= 0;) {
+      const Request request = ReadOne(fd);
+      std::string answer;
+      {
+        std::lock_guard lock(mutex_);
+        answer = answers_[std::min(requests_.size(), answers_.size() - 1)];
+        requests_.push_back(request);
+      }
+      if (answer == "hang") {
+        hanging_.push_back(fd);
+        continue;
+      }
+      const std::string text = "HTTP/1.1 " + answer + "\r\nContent-Length: 0\r\n\r\n";
+      [[maybe_unused]] const ssize_t written = ::write(fd, text.data(), text.size());
+      ::close(fd);
+    }
+  }
+  static Request ReadOne(int fd) {
+    std::string text;
+    char bytes[4096];
+    size_t end = 0, length = 0;
+    while ((end = text.find("\r\n\r\n")) == std::string::npos || text.size() < end + 4 + length) {
+      const ssize_t got = ::read(fd, bytes, sizeof(bytes));
+      if (got <= 0) break;
+      text.append(bytes, static_cast<size_t>(got));
+      const size_t header = text.find("Content-Length: ");
+      if (header != std::string::npos) length = std::stoul(text.substr(header + 16));
+    }
+    Request request;
+    std::istringstream lines(text.substr(0, end));
+    std::getline(lines, request.line);
+    for (std::string line; std::getline(lines, line);) {
+      line.erase(line.find_last_not_of('\r') + 1);
+      const size_t colon = line.find(": ");
+      if (colon == std::string::npos) continue;
+      std::string name = line.substr(0, colon);
+      for (char& c : name) c = static_cast<char>(std::tolower(c));
+      request.headers[name] = line.substr(colon + 2);
+    }
+    request.body = text.substr(std::min(text.size(), end + 4));
+    return request;
+  }
+
+  std::vector<std::string> answers_;
+  int fd_ = -1, port_ = 0;
+  std::mutex mutex_;
+  std::vector<Request> requests_;
+  std::vector<int> hanging_;
+  std::thread thread_;
+};
+
+class NotifierTest : public JobStoreTest {
+ protected:
+  // A job that has failed and owes word of it.
+  JobRecord EndedJob(const std::string& url) {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    graph.notify_url = url;
+    graph.jobs = {Job("single")};
+    const JobRecord job = store_->CreateGraph(graph, {}, kNoLimit);
+    FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
+    return store_->GetJob(job.name);
+  }
+  std::unique_ptr<Notifier> Start(const std::vector<std::string>& allowed) {
+    NotifierOptions options;
+    options.allowed = allowed;
+    options.secret = secret_;
+    options.poll = milliseconds(5);
+    options.pauses = {milliseconds(0)};
+    return std::make_unique<Notifier>(
+        *store_, [this] { return wall_.load(); }, options);
+  }
+  bool NothingIsOwed() {
+    wall_ += int64_t{3600} * 1000;  // whatever pause there is
+    for (int i = 0; i < 1000 && store_->CountJobs().notifications > 0; ++i) {
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    return store_->CountJobs().notifications == 0;
+  }
+
+  const std::string secret_ = "secret of twenty-four by";
+};
+
+TEST_F(NotifierTest, SentAgainUntilItIsTakenAndSigned) {
+  Receiver receiver({"500 Oops", "302 Found\r\nLocation: http://127.0.0.1:1/", "200 OK"});
+  const JobRecord job = EndedJob(receiver.url());
+  const auto notifier = Start({receiver.url()});
+  ASSERT_TRUE(receiver.WaitFor(3));
+  EXPECT_TRUE(NothingIsOwed());
+  const auto requests = receiver.requests();
+  EXPECT_EQ(requests.size(), 3u) << "once it is taken it is not sent again";
+  for (const Receiver::Request& request : requests) {
+    EXPECT_EQ(request.line, "POST /hook HTTP/1.1\r");
+    const std::string id = request.headers.at("webhook-id");
+    EXPECT_EQ(id, requests[0].headers.at("webhook-id"));
+    EXPECT_EQ(request.headers.at("webhook-signature"),
+              WebhookSignature(
+                  secret_, id, std::stoll(request.headers.at("webhook-timestamp")), request.body));
+    const nlohmann::json body = nlohmann::json::parse(request.body);
+    EXPECT_EQ(body.at("type"), "job.failed");
+    EXPECT_EQ(body.at("data").at("name"), job.name);
+    EXPECT_EQ(body.at("data").at("scene"), "scenes/test");
+    EXPECT_EQ(body.at("data").at("error").at("reason"), "TEST");
+  }
+}
+
+TEST_F(NotifierTest, ARestartForgetsNothingAndWaitsForNobody) {
+  Receiver hanging({"hang"}), good({"204 No Content"});
+  EndedJob(hanging.url());
+  {
+    const auto notifier = Start({hanging.url()});
+    ASSERT_TRUE(hanging.WaitFor(1));
+    EndedJob(good.url());
+  }  // ends at once, though an answer is awaited
+  EXPECT_EQ(store_->CountJobs().notifications, 2);
+  Open();
+  const auto notifier = Start({hanging.url(), good.url()});
+  EXPECT_TRUE(good.WaitFor(1)) << "though another does not answer";
+  EXPECT_TRUE(hanging.WaitFor(2));
+}
+
+TEST_F(NotifierTest, WhoWantsToHearNoMoreIsLeftAlone) {
+  Receiver receiver({"410 Gone"});
+  EndedJob(receiver.url());
+  const auto notifier = Start({receiver.url()});
+  ASSERT_TRUE(receiver.WaitFor(1));
+  EXPECT_TRUE(NothingIsOwed());
+}
+
+TEST_F(NotifierTest, AfterADayItIsGivenUp) {
+  EndedJob("http://127.0.0.1:1/nobody");
+  const auto notifier = Start({"http://127.0.0.1:1"});
+  std::this_thread::sleep_for(milliseconds(50));
+  EXPECT_EQ(store_->CountJobs().notifications, 1);
+  wall_ += int64_t{25} * 3600 * 1000;
+  EXPECT_TRUE(NothingIsOwed());
+}
+
+TEST_F(NotifierTest, OnlyWhoIsStillAllowed) {
+  Receiver receiver({"200 OK"});
+  EndedJob(receiver.url());
+  const auto notifier = Start({"https://elsewhere.example.org"});
+  std::this_thread::sleep_for(milliseconds(100));
+  EXPECT_TRUE(receiver.requests().empty());
+}
+
+// The example of the specification's own libraries.
+TEST(WebhookTest, SignsAsOthersDo) {
+  ScratchFolder scratch;
+  const auto file = scratch.path() / "secret";
+  std::ofstream(file) << "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n";
+  ::chmod(file.c_str(), 0600);
+  EXPECT_EQ(WebhookSignature(ReadWebhookSecret(file),
+                             "msg_p5jXN8AQM9LWM0D4loKWxJek",
+                             1614265330,
+                             "{\"test\": 2432232314}"),
+            "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=");
+}
+
+TEST(WebhookTest, SecretsThatAreNoneAreNamed) {
+  ScratchFolder scratch;
+  const auto file = scratch.path() / "secret";
+  EXPECT_THROW(ReadWebhookSecret(file), Error);
+  for (const char* text :
+       {"", "short", "AAAA", "not base64 at all, but long enough to be one!!!"}) {
+    std::ofstream(file) << text;
+    ::chmod(file.c_str(), 0600);
+    EXPECT_THROW(ReadWebhookSecret(file), Error) << text;
+  }
+  std::ofstream(file) << "MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
+  ::chmod(file.c_str(), 0640);
+  EXPECT_THROW(ReadWebhookSecret(file), Error) << "others may read it";
+}
+
+}  // namespace
+}  // namespace color3d
