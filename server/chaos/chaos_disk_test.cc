@@ -24,7 +24,7 @@ using testing::TestClient;
 
 constexpr int kJobs = 8;
 constexpr char kScript[] = "steps=30,ms=100";
-constexpr char kDiskSize[] = "size=8m";
+constexpr char kDiskSize[] = "size=16m";
 
 // What this thread and its children mount from now on, they alone see. Says why not, or nothing.
 std::string LeaveTheMountsOfOthers() {
@@ -67,7 +67,9 @@ class ChaosDiskTest : public ::testing::Test {
   struct Outcome {
     int failed = 0, refused = 0, lost_attempts = 0;
   };
-  Outcome Endure(const std::string& reserve_mib, int64_t free_bytes);
+  Outcome Endure(const std::string& reserve_mib,
+                 const std::string& low_space_mib,
+                 int64_t free_bytes);
 
   ScratchFolder scratch_;
   const fs::path disk_ = scratch_.path() / "data";
@@ -134,9 +136,12 @@ void Retry(TestClient& client, const std::string& name) {
   EXPECT_TRUE(status.ok()) << status.error_message();
 }
 
-ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib, int64_t free_bytes) {
+ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib,
+                                             const std::string& low_space_mib,
+                                             int64_t free_bytes) {
   Outcome outcome;
-  ChaosService service(scratch_.path(), {"--reserve-mib", reserve_mib});
+  ChaosService service(scratch_.path(),
+                       {"--reserve-mib", reserve_mib, "--low-space-mib", low_space_mib});
   TestClient& client = service.client();
   const std::string scene = client.MakeScene().name();
   int seed = 0;
@@ -158,7 +163,9 @@ ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib, int
     }
     SleepMs(50);
   }
-  EXPECT_THROW(client.Upload(std::string(2'000'000, 'u')), std::runtime_error);
+  if (free_bytes < 2'000'000) {
+    EXPECT_THROW(client.Upload(std::string(2'000'000, 'u')), std::runtime_error);
+  }
   fs::remove(filler_);
 
   for (const std::string& name : names) {
@@ -180,13 +187,19 @@ ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib, int
 }
 
 TEST_F(ChaosDiskTest, BelowTheReserveJobsFailByItsNameAndTheStoreGoesOn) {
-  const Outcome outcome = Endure("2", 1 << 20);
+  const Outcome outcome = Endure("2", "0", 1 << 20);
   EXPECT_GT(outcome.failed, 0) << "the disk was never full: the test proves nothing";
   EXPECT_EQ(outcome.lost_attempts, 0);
 }
 
+TEST_F(ChaosDiskTest, BelowTheMarkNothingIsBegunAndNothingFails) {
+  const Outcome outcome = Endure("1", "6", 4 << 20);
+  EXPECT_EQ(outcome.failed, 0);
+  EXPECT_GT(outcome.refused, 0) << "the mark was never reached: the test proves nothing";
+}
+
 TEST_F(ChaosDiskTest, WithoutALastByteJobsWaitOrFailAndReadsAreAnswered) {
-  const Outcome outcome = Endure("0", 0);
+  const Outcome outcome = Endure("0", "0", 0);
   EXPECT_GT(outcome.failed + outcome.lost_attempts + outcome.refused, 0)
       << "the disk was never full: the test proves nothing";
 }

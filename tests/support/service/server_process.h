@@ -48,6 +48,7 @@ class ServerProcess {
         {"--retry-backoff-ms", "50"},
         {"--worker-backoff-ms", "100"},
         {"--reserve-mib", "0"},
+        {"--low-space-mib", "0"},
         {"--log-level", "warn"}};
     for (const auto& [flag, value] : defaults) {
       if (std::find(extra.begin(), extra.end(), flag) == extra.end()) {
