@@ -96,7 +96,7 @@ class DrainTest : public ::testing::Test {
   const std::string listen_ = "unix:" + (scratch_.path() / "socket").string();
   const std::filesystem::path file_ = scratch_.path() / "file";
   const std::string content_ = std::string(kUploadBytes, 'u');
-  const CancellationToken never_;
+  CancellationToken never_;
   Gate gate_;
   std::atomic<int> heard_{0}, finished_{0}, saw_another_attempt_{0};
   std::atomic<bool> is_over_{false}, is_uploaded_{false};

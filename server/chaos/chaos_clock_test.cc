@@ -15,7 +15,6 @@ namespace fs = std::filesystem;
 using testing::ChaosService;
 using testing::Fault;
 using ::testing::IsEmpty;
-using testing::ResultOf;
 using testing::ScriptedSpec;
 using testing::SleepMs;
 using testing::TestClient;

@@ -26,13 +26,22 @@ constexpr int kJobs = 8;
 constexpr char kScript[] = "steps=30,ms=100";
 constexpr char kDiskSize[] = "size=16m";
 
+bool Says(const char* file, const std::string& text) {
+  return static_cast<bool>(std::ofstream(file) << text << std::flush);
+}
+
 // What this thread and its children mount from now on, they alone see. Says why not, or nothing.
 std::string LeaveTheMountsOfOthers() {
   const uid_t user = ::geteuid();
+  const gid_t group = ::getegid();
   if (::unshare(user == 0 ? CLONE_NEWNS : CLONE_NEWNS | CLONE_NEWUSER) != 0) {
     return std::string("unshare: ") + std::strerror(errno);
   }
-  if (user != 0) std::ofstream("/proc/self/uid_map") << "0 " << user << " 1";
+  if (user != 0 && (!Says("/proc/self/setgroups", "deny") ||
+                    !Says("/proc/self/uid_map", "0 " + std::to_string(user) + " 1") ||
+                    !Says("/proc/self/gid_map", "0 " + std::to_string(group) + " 1"))) {
+    return "this user cannot be root in a namespace of his own";
+  }
   if (::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) {
     return std::string("mount: ") + std::strerror(errno);
   }

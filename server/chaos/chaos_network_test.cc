@@ -98,7 +98,7 @@ class User {
     fs::remove(folder_ / digest.sha256);
   }
 
-  const CancellationToken never_;
+  CancellationToken never_;
   const fs::path folder_;
   Connection connection_;
 };

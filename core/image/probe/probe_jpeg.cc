@@ -41,8 +41,10 @@ void ReadFrameHeader(const ProbeContext& context,
 
 }  // namespace
 
+// Another marker has to follow at once: what begins otherwise is no JPEG to OpenCV, which would try
+// its readers of other formats (DICOM, all of GDAL's) on it.
 bool IsJpeg(std::string_view bytes) {
-  return bytes.size() >= 2 && bytes[0] == '\xFF' && bytes[1] == '\xD8';
+  return bytes.substr(0, 3) == "\xFF\xD8\xFF" || bytes == "\xFF\xD8";
 }
 
 ImageInfo ProbeJpeg(const ProbeContext& context) {

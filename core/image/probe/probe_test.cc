@@ -151,6 +151,9 @@ TEST(Probe, OtherFilesAreNotImages) {
   EXPECT_EQ(Refusal([] { ProbeImage("", "empty.png"); }),
             "empty.png is empty, not an image (JPEG, PNG or TIFF)");
   EXPECT_THAT(Refusal([] { ProbeImage("\xFF", "one.jpg"); }), HasSubstr("is not an image"));
+  EXPECT_THAT(Refusal([] { ProbeImage("\xFF\xD8 DICM \xFF\xD9", "dicom.jpg"); }),
+              HasSubstr("is not an image"))
+      << "OpenCV would look for another reader";
   EXPECT_THAT(Refusal([] { ProbeImage(std::string("II*\0", 4), "four.tif"); }),
               HasSubstr("is truncated"));
   EXPECT_THAT(Refusal([] { ProbeImage(std::string("II+\0\x08\0\0\0", 8), "big.tif"); }),
