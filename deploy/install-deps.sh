@@ -12,7 +12,7 @@ packages=(
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
   prometheus-cpp-dev libcurl4-openssl-dev
-  libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev libzstd-dev
+  libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev libzstd-dev libseccomp-dev
   libavcodec-dev libavformat-dev libavutil-dev libswscale-dev # film
 )
 case "${1:-}" in

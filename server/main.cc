@@ -51,6 +51,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       ->capture_default_str();
   serve->add_option(
       "--metrics-listen", options->metrics_listen, "HOST:PORT that Prometheus may read (/metrics)");
+  serve->add_flag("!--no-sandbox", options->sandbox, "Do not lock workers, COLMAP and scripts in");
   serve->add_flag("--insecure-any-address",
                   options->insecure_any_address,
                   "Allow --listen on other than loopback addresses without TLS and tokens");

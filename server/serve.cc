@@ -107,6 +107,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
                      fmt::to_string(options.reserve_mib)};
   const std::vector<std::string> model_flags = ToFlags(models);
   setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
+  if (!options.sandbox) setup.arguments.emplace_back("--no-sandbox");
   setup.max_stopped = Milliseconds(3.0 * options.lease_seconds);
   setup.max_stopped_holding = Milliseconds(options.lease_seconds / 6.0);
   setup.max_silent = Milliseconds(std::max(3.0 * options.lease_seconds, 60.0));
@@ -156,6 +157,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   const std::vector<std::string> model_flags = ToFlags(models);
   setup->inference_arguments.insert(
       setup->inference_arguments.end(), model_flags.begin(), model_flags.end());
+  if (!options.sandbox) setup->inference_arguments.emplace_back("--no-sandbox");
   const auto demand = std::make_shared<InferenceDemand>();
   setup->inference_demand = demand;
   InferenceLink link;

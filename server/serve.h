@@ -31,6 +31,7 @@ struct ServeOptions {
   double project_gib = 0.0;
   int keep_days = 0;                      // of jobs after their end, unless pinned; 0: for ever
   std::string metrics_listen;             // HOST:PORT for Prometheus; empty: none
+  bool sandbox = true;                    // workers are locked in, where the machine can
   std::string log_format = "text";        // or "json"
   std::filesystem::path notify_secret;    // file; needed with the next
   std::vector<std::string> notify_allow;  // addresses that may be told of ended jobs

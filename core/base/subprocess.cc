@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
+#include <string_view>
 #include <thread>
 
 #include "core/base/error.h"
@@ -34,6 +36,40 @@ std::string FindProgram(const std::string& name) {
   return "";
 }
 
+// What every program may know: no token, key or password is among it.
+bool IsHarmless(std::string_view variable) {
+  for (const std::string_view name : {"PATH=", "LANG=", "LC_", "TZ=", "LD_LIBRARY_PATH=", "OMP_"}) {
+    if (variable.starts_with(name)) return true;
+  }
+  return false;
+}
+
+std::vector<char*> Environment(const SubprocessOptions& options) {
+  std::vector<char*> environment;
+  for (const std::string& e : options.environment) {
+    environment.push_back(const_cast<char*>(e.c_str()));
+  }
+  for (char** e = environ; *e != nullptr; ++e) {
+    if (options.inherits_all || IsHarmless(*e)) environment.push_back(*e);
+  }
+  environment.push_back(nullptr);
+  return environment;
+}
+
+std::unique_ptr<Sandbox> PrepareSandbox(const SubprocessOptions& options,
+                                        const std::string& program) {
+  if (!options.sandbox) return nullptr;
+  SandboxRules rules = *options.sandbox;
+  rules.readable.emplace_back(program);
+  return std::make_unique<Sandbox>(rules);
+}
+
+// In the child, between fork and exec: what is to be said is written out beforehand.
+[[noreturn]] void GiveUp(std::string_view message) {
+  [[maybe_unused]] const ssize_t written = ::write(2, message.data(), message.size());
+  ::_exit(127);
+}
+
 }  // namespace
 
 SubprocessResult RunSubprocess(const SubprocessOptions& options, const CancellationToken& cancel) {
@@ -47,12 +83,8 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   std::vector<char*> arguments;
   for (const std::string& a : options.arguments) arguments.push_back(const_cast<char*>(a.c_str()));
   arguments.push_back(nullptr);
-  std::vector<char*> environment;
-  for (const std::string& e : options.environment) {
-    environment.push_back(const_cast<char*>(e.c_str()));
-  }
-  for (char** e = environ; *e != nullptr; ++e) environment.push_back(*e);
-  environment.push_back(nullptr);
+  const std::vector<char*> environment = Environment(options);
+  const std::unique_ptr<Sandbox> sandbox = PrepareSandbox(options, program);
   const std::string log = options.log_path.empty() ? "/dev/null" : options.log_path.string();
   const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (log_fd < 0) {
@@ -69,6 +101,11 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
     ::dup2(null_fd, 0);
     ::dup2(log_fd, 1);
     ::dup2(log_fd, 2);
+    // Ignored ones stay so in programs; the first ends those that write without end.
+    ::signal(SIGXFSZ, SIG_DFL);
+    ::signal(SIGPIPE, SIG_DFL);
+    if (!LimitProcess(options.limits)) GiveUp("color3d: the kernel refuses the limits\n");
+    if (sandbox && !sandbox->Enter()) GiveUp("color3d: the kernel refuses the sandbox\n");
     ::execve(program.c_str(), arguments.data(), environment.data());
     ::_exit(127);
   }

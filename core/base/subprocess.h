@@ -1,20 +1,28 @@
-// Runs a child program with a time limit, a log file and cancellation; never leaves one behind.
+// Runs a child program with limits, a log file and cancellation, in a sandbox where one is given;
+// never leaves one behind.
 #pragma once
 
 #include <chrono>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/cancellation.h"
+#include "core/base/process_limits.h"
+#include "core/base/sandbox.h"
 
 namespace color3d {
 
 struct SubprocessOptions {
   std::vector<std::string> arguments;    // arguments[0] is looked up on PATH
-  std::vector<std::string> environment;  // "NAME=value", added to ours
-  std::filesystem::path log_path;        // stdout and stderr are appended here; empty: discarded
+  std::vector<std::string> environment;  // "NAME=value", added to what it inherits
+  // Of ours: all, or only what tells where things are and which language is spoken.
+  bool inherits_all = true;
+  std::filesystem::path log_path;  // stdout and stderr are appended here; empty: discarded
   std::chrono::seconds timeout{3600};
+  ProcessLimits limits;
+  std::optional<SandboxRules> sandbox;  // the program itself may be read besides
 };
 
 struct SubprocessResult {

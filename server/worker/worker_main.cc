@@ -6,9 +6,14 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <cerrno>
+#include <cstring>
 
 #include "core/base/digest.h"
+#include "core/base/error.h"
 #include "core/base/memory.h"
+#include "core/base/process_limits.h"
+#include "core/base/sandbox.h"
 #include "server/ops/process.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
@@ -18,9 +23,13 @@
 namespace color3d {
 namespace {
 
+// The largest blob, twice: what is made of it may be larger.
+constexpr int64_t kMaxFileBytes = int64_t{16} << 30;
+
 struct WorkerArguments {
   WorkerOptions options;
   std::string log_level = "info", log_format = "text";
+  bool sandbox = true;
   double lease_seconds = 60.0;
   double heartbeat_seconds = 10.0;
   double checkpoint_seconds = 20.0;
@@ -52,6 +61,7 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
                   "Scenes that are personalized at once, sharing the encoder")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  app->add_flag("!--no-sandbox", arguments->sandbox, "Do not lock this process in");
   app->add_option("--log-format", arguments->log_format, "text or json")
       ->check(CLI::IsMember({"text", "json"}));
   app->add_option("--log-level", arguments->log_level, "trace, debug, info, warn, error, off")
@@ -118,6 +128,33 @@ void HandleStopSignals() {
   ::signal(SIGPIPE, SIG_IGN);
 }
 
+// What this process decodes is strangers'. Threads that were there before are OpenBLAS's own.
+void LockIn(const WorkerArguments& arguments) {
+  SetSandboxing(arguments.sandbox);
+  if (!arguments.sandbox) return;
+  ProcessLimits limits;  // cores would hold what strangers uploaded
+  limits.file_bytes = kMaxFileBytes;
+  SandboxRules rules;
+  rules.readable = {ProgramFolder().parent_path()};
+  const UserModels models = ParseUserModels(arguments.models, arguments.backends);
+  for (const auto& [name, file] : models.files) {
+    for (const std::filesystem::path& part : FilesOfModel(file)) rules.readable.push_back(part);
+  }
+  rules.writable = {arguments.options.data_folder, std::filesystem::temp_directory_path()};
+  rules.sockets = Sockets::kAll;  // model servers
+  rules.may_start_processes = true;
+  const Sandbox sandbox(rules);
+  if (!LimitProcess(limits) || !sandbox.Enter()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "the kernel does not let this worker lock itself in ({}); say --no-sandbox",
+                std::strerror(errno));
+  }
+  if (!sandbox.missing().empty()) {
+    spdlog::warn("not locked in by {}, which this machine does not have", sandbox.missing());
+  }
+  if (!sandbox.active().empty()) spdlog::info("locked in by {}", sandbox.active());
+}
+
 void ServeInference(const WorkerArguments& arguments, const WorkerProgram& program) {
   const DataPaths paths(arguments.options.data_folder);
   FileBlobStore blobs(paths.Blobs(), {arguments.options.reserve_mib << 20});
@@ -155,6 +192,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
              arguments.log_level,
              arguments.log_format,
              paths.Logs() / (arguments.options.name + ".log"));
+    LockIn(arguments);
     if (arguments.inference.empty()) {
       Complete(&arguments);
       LogJobsTo(paths.JobLogs());

@@ -6,9 +6,11 @@
 #include <cstring>
 #include <fstream>
 #include <future>
+#include <thread>
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/memory.h"
 #include "core/base/subprocess.h"
 
 namespace color3d {
@@ -16,6 +18,22 @@ namespace fs = std::filesystem;
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// Of the database of thousands of photos; never seen.
+constexpr int64_t kMaxFileBytes = int64_t{16} << 30;
+// The least that is worth trying, though less may be free at the moment.
+constexpr int64_t kLeastMemoryBytes = int64_t{1} << 30;
+
+ProcessLimits LimitsOf(std::chrono::seconds timeout) {
+  ProcessLimits limits;
+  limits.memory_bytes = std::max(AvailableMemoryBytes(), kLeastMemoryBytes);
+  limits.file_bytes = kMaxFileBytes;
+  // Every thread may compute all the time; the time limit of the whole comes first.
+  limits.cpu_seconds = (timeout.count() + 60) * std::max(1u, std::thread::hardware_concurrency());
+  limits.descriptors = 1024;
+  limits.processes = 8192;
+  return limits;
+}
 
 // Counts new lines that hold `mark` in a growing log.
 class LogCounter {
@@ -64,10 +82,18 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   SubprocessOptions child;
   child.arguments = {"colmap"};
   child.arguments.insert(child.arguments.end(), arguments.begin(), arguments.end());
-  child.environment = {"QT_QPA_PLATFORM=offscreen"};
+  // Its work lies beside its log, and nothing else is its business.
+  const fs::path folder = fs::absolute(log_).parent_path();
+  child.environment = {"QT_QPA_PLATFORM=offscreen", "TMPDIR=" + folder.string()};
+  child.inherits_all = false;
+  if (IsSandboxing()) {
+    child.sandbox = SandboxRules();
+    child.sandbox->writable = {folder};
+  }
   child.log_path = log_;
   child.timeout = std::chrono::duration_cast<std::chrono::seconds>(deadline_ - Clock::now());
   if (child.timeout.count() <= 0) ThrowTooSlow();
+  child.limits = LimitsOf(child.timeout);
   LogCounter counter(log_, phase.mark);
   run_.progress.OnProgress(0, phase.total, phase.message);
   // The child runs on a thread of its own, so that progress is reported from ours, and with a token
@@ -94,12 +120,12 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   if (result.signal != 0) {
     throw Error(
         ErrorCode::kUnavailable,
-        "colmap {} was ended by signal {} ({}), which says nothing of the photos; most often "
-        "memory has run out: use fewer photos or fewer features, or a machine with more; "
-        "log: {}",
+        "colmap {} was ended by signal {} ({}), which says nothing of the photos; {}: use fewer "
+        "photos or fewer features, or a machine with more; log: {}",
         arguments.at(0),
         result.signal,
         ::strsignal(result.signal),
+        LikelyCause(result.signal, child.limits),
         log_.filename().string());
   }
   return result.exit_code;

@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/sandbox.h"
 #include "tests/support/quiet_run.h"
 
 namespace color3d {
@@ -50,6 +51,30 @@ TEST_F(ColmapProcessTest, DeathByASignalIsNone) {
       EXPECT_EQ(e.code(), ErrorCode::kUnavailable) << signal;
       EXPECT_NE(std::string(e.what()).find("colmap mapper"), std::string::npos) << e.what();
     }
+  }
+}
+
+TEST_F(ColmapProcessTest, SeesNoTokenAndWritesBesideItsLogAlone) {
+  ::setenv("COLOR3D_TOKEN", "secret", 1);
+  EXPECT_EQ(Run("test -z \"$COLOR3D_TOKEN\""), 0);
+  ::unsetenv("COLOR3D_TOKEN");
+  if (!Sandbox(SandboxRules()).missing().empty()) GTEST_SKIP() << "not on this machine";
+  const ScratchFolder other;
+  EXPECT_EQ(Run("echo in > '" + (scratch_.path() / "in").string() + "'"), 0);
+  EXPECT_NE(Run("echo out > '" + (other.path() / "out").string() + "'"), 0);
+  SetSandboxing(false);
+  EXPECT_EQ(Run("echo out > '" + (other.path() / "out").string() + "'"), 0);
+  SetSandboxing(true);
+}
+
+TEST_F(ColmapProcessTest, WritingWithoutEndIsNamed) {
+  try {
+    Run("kill -XFSZ $$");
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("it wrote a file of more than 16384 MiB"),
+              std::string::npos)
+        << e.what();
   }
 }
 
