@@ -129,6 +129,7 @@ void GrpcColorizer::Retry(milliseconds deadline,
     cancel.ThrowIfCancelled();
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + deadline);
+    if (!options_.traceparent.empty()) context.AddMetadata("traceparent", options_.traceparent);
     grpc::Status status;
     {
       const CancelWatch watch(context, cancel);
@@ -291,9 +292,11 @@ std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(const std::string& name,
 }
 
 std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(
-    const std::map<std::string, std::string>& backends, const std::string& name) {
+    const std::map<std::string, std::string>& backends,
+    const std::string& name,
+    const GrpcColorizerOptions& options) {
   const auto found = backends.find(name);
-  if (found != backends.end()) return MakeGrpcColorizer(name, found->second);
+  if (found != backends.end()) return MakeGrpcColorizer(name, found->second, options);
   std::string known;
   for (const auto& [other, address] : backends) known += (known.empty() ? "" : ", ") + other;
   throw Error(ErrorCode::kFailedPrecondition,

@@ -22,6 +22,7 @@ struct GrpcColorizerOptions {
   int tries = 4;
   std::chrono::milliseconds first_backoff{300};
   int max_message_bytes = 256 << 20;
+  std::string traceparent;  // W3C, sent with the calls of a job; empty: none
 };
 
 // Connects when it is first used. Throws Error{kInvalidArgument} for a bad address.
@@ -31,6 +32,8 @@ std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(const std::string& name,
 
 // One of the configured ones. Throws Error{kFailedPrecondition} naming those that there are.
 std::unique_ptr<RemoteColorizer> MakeGrpcColorizer(
-    const std::map<std::string, std::string>& backends, const std::string& name);
+    const std::map<std::string, std::string>& backends,
+    const std::string& name,
+    const GrpcColorizerOptions& options = {});
 
 }  // namespace color3d

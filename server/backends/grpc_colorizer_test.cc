@@ -52,6 +52,10 @@ class FakeBackend : public backend::v1::ColorBackend::Service {
                         Writer* writer) override {
     ++calls;
     key = request->idempotency_key();
+    const auto parent = context->client_metadata().find("traceparent");
+    if (parent != context->client_metadata().end()) {
+      traceparent.assign(parent->second.data(), parent->second.size());
+    }
     return behave(context, writer);
   }
   grpc::Status Generate(grpc::ServerContext*,
@@ -74,7 +78,7 @@ class FakeBackend : public backend::v1::ColorBackend::Service {
   std::atomic<int> info_calls{0};
   std::atomic<int> calls{0};
   int ready_after = 1;
-  std::string key;
+  std::string key, traceparent;
   std::function<grpc::Status(grpc::ServerContext*, Writer*)> behave = [](grpc::ServerContext*,
                                                                          Writer* writer) {
     writer->Write(Share(0.25));
@@ -283,6 +287,15 @@ TEST_F(GrpcColorizerTest, ItsOwnErrorIsQuotedInOneLine) {
   };
   Start();
   EXPECT_THAT(Complaint([&] { Colorize(); }), HasSubstr("\"CUDA out of memory\""));
+}
+
+TEST_F(GrpcColorizerTest, CallsArePartOfTheJobsTrace) {
+  Start();
+  Colorize();
+  EXPECT_EQ(backend_.traceparent, "");
+  options_.traceparent = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
+  Colorize();
+  EXPECT_EQ(backend_.traceparent, options_.traceparent);
 }
 
 TEST_F(GrpcColorizerTest, AnUnknownNameListsTheKnownOnes) {

@@ -16,6 +16,7 @@
 
 #include "color3d/v1/server.pb.h"
 #include "server/rpc/access.h"
+#include "server/rpc/call_memory.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/executor.h"
 #include "server/rpc/stream_limit.h"
@@ -38,6 +39,10 @@ struct ServiceLimits {
   int max_watches = 1'000;
   int max_reads = 256;
   int max_writes = 128;
+  int max_connection_calls = 2'000;  // at once; further ones wait on the client's side
+  // Of unary calls, shared among connections (CallMemory), and gRPC's own buffers.
+  int64_t call_memory_bytes = int64_t{128} << 20;
+  int64_t transport_memory_bytes = int64_t{512} << 20;
   // Of each project; 0: no limit but those above.
   int project_max_unfinished_jobs = 0;
   int64_t project_max_stored_bytes = 0;
@@ -67,6 +72,7 @@ struct RpcParts {
   Executor& quick;  // reads of the job store and of the disk's cache: what answers GetJob
   Executor& slow;   // what hashes, syncs, writes or asks others
   StreamLimits& streams;
+  CallMemory& memory;
   const Access& access;
   const std::atomic<bool>& draining;
   ServiceLimits limits;
@@ -108,9 +114,14 @@ grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       const Request* request,
                                       Response* response,
                                       Body body) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  auto* reactor = new UnaryReactor(parts.memory, context->peer());
+  reactor->Hold(*request);
   const bool accepted = executor.TryPost([&parts, role, context, reactor, request, response, body] {
-    reactor->Finish(Guard([&] { body(Admit(parts, role, *context), *request, response); }));
+    reactor->Finish(Guard([&] {
+      reactor->RequireShare();
+      body(Admit(parts, role, *context), *request, response);
+      reactor->Hold(*response);
+    }));
   });
   if (!accepted) reactor->Finish(OverloadedStatus());
   return reactor;

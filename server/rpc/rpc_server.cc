@@ -3,6 +3,7 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 #include <netdb.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -84,6 +85,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project},
                                   {"downloads", options.limits.max_reads, of_project},
                                   {"uploads", options.limits.max_writes, of_project}});
+  memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
   access_ = std::make_unique<Access>(options.tokens);
   parts_.reset(new RpcParts{store,
                             blobs,
@@ -91,6 +93,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             *quick_,
                             *slow_,
                             *streams_,
+                            *memory_,
                             *access_,
                             draining_,
                             options.limits,
@@ -118,6 +121,11 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 60'000);
   builder.SetMaxReceiveMessageSize(16 << 20);
+  // What gRPC itself keeps of connections and calls: beyond it no connection is accepted.
+  grpc::ResourceQuota quota("rpc");
+  quota.Resize(static_cast<size_t>(options.limits.transport_memory_bytes));
+  builder.SetResourceQuota(quota);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.limits.max_connection_calls);
   for (grpc::Service* service : {static_cast<grpc::Service*>(&services_->scenes),
                                  static_cast<grpc::Service*>(&services_->blobs),
                                  static_cast<grpc::Service*>(&services_->bytes),

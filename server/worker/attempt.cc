@@ -150,6 +150,7 @@ void Attempt::Prepare() {
   run_.submission = job_.parent.empty() ? job_.name : job_.parent;
   run_.spec = ParseSpec(job_.spec, job_.name);
   run_.threads = context_.threads;
+  run_.trace = job_.trace;
   run_.attempt = job_.attempt;
   run_.models = context_.models;
   run_.scene_folder = scratch_ / "scene";

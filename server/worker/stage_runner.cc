@@ -9,6 +9,7 @@
 #include "core/stage/stages.h"
 #include "server/backends/grpc_colorizer.h"
 #include "server/planning/spec_check.h"
+#include "server/store/job.h"
 #include "server/worker/stage_options.h"
 
 namespace color3d {
@@ -145,7 +146,10 @@ class CoreStageRunner : public StageRunner {
     setup.cache_folder = run.cache_folder;
     setup.models = run.models.files;
     setup.remote_colorizers = [&run](const std::string& name) {
-      return MakeGrpcColorizer(run.models.backends, name);
+      GrpcColorizerOptions options;
+      // Each attempt is a span.
+      if (!run.trace.empty()) options.traceparent = "00-" + run.trace + "-" + NewId() + "-01";
+      return MakeGrpcColorizer(run.models.backends, name, options);
     };
     setup.attempt = run.job_name + "/" + std::to_string(run.attempt);
     setup.batch = Batch(run.threads);

@@ -27,6 +27,7 @@ class BlobSource {
 
 struct StageRun {
   std::string job_name;    // "jobs/..."
+  std::string trace;       // W3C trace id of the call that made the job; empty: none
   std::string submission;  // the submitted job: what fairness in a batch is between
   v1::JobSpec spec;
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only

@@ -23,6 +23,7 @@ struct Fixture {
   SqliteJobStore store{scratch.path() / "jobs.db", StoreRole::kServer, SystemClocks()};
   Executor quick{1}, slow{1};
   StreamLimits streams{{"watches", 1, 0}, {"downloads", 1, 0}, {"uploads", 1, 0}};
+  CallMemory memory{1 << 20};
   Access access{nullptr};
   FileDigests digests;
   const std::atomic<bool> draining{false};
@@ -34,6 +35,7 @@ struct Fixture {
                  quick,
                  slow,
                  streams,
+                 memory,
                  access,
                  draining,
                  {},

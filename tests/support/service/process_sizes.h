@@ -13,7 +13,7 @@
 namespace color3d::testing {
 
 struct ProcessSizes {
-  double resident_mib = 0.0, descriptors = 0.0, threads = 0.0;
+  double resident_mib = 0.0, peak_mib = 0.0, descriptors = 0.0, threads = 0.0;
 };
 
 // Of all `pids` together; those that have ended count as nothing.
@@ -28,6 +28,7 @@ inline ProcessSizes SizesOf(const std::vector<pid_t>& pids) {
       double value = 0.0;
       words >> name >> value;
       if (name == "VmRSS:") sum.resident_mib += value / 1024.0;
+      if (name == "VmHWM:") sum.peak_mib += value / 1024.0;
       if (name == "Threads:") sum.threads += value;
     }
     std::error_code none;
