@@ -89,9 +89,12 @@ CopiedBlobs CopyWhole(const DataPaths& from, const DataPaths& to) {
 }
 
 void MakePrivate(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::create_directories(folder, error) && !fs::is_directory(folder)) {
-    throw Refused(folder, "cannot be created");
+  std::error_code error, unknown;
+  if (!fs::create_directories(folder, error) && !fs::is_directory(folder, unknown)) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot create {}: {}; name another folder, or change who may write there",
+                folder.string(),
+                error.message());
   }
   ::chmod(folder.c_str(), 0700);
 }

@@ -103,6 +103,8 @@ TEST_F(KeepingTest, NothingDamagedIsTakenForABackup) {
   fs::create_directory(photos);
   WriteFileAtomic(photos / "a.jpg", "x");
   EXPECT_EQ(ReasonThrown([&] { BackUp(paths_.root, photos); }), "FAILED_PRECONDITION");
+  EXPECT_EQ(ReasonThrown([&] { BackUp(paths_.root, photos / "a.jpg" / "below"); }),
+            "FAILED_PRECONDITION");
 }
 
 TEST_F(KeepingTest, FsckFindsWhatIsWrongAndRepairs) {

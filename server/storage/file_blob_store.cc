@@ -107,6 +107,12 @@ void FileBlobStore::RequireSpace(int64_t bytes) const {
 }
 
 void FileBlobStore::ThrowFull(int64_t bytes, int64_t free) const {
+  std::error_code error;
+  if (!fs::exists(folder_, error)) {
+    throw Error(ErrorCode::kUnavailable,
+                "the folder {} is gone; is its disk still there?",
+                folder_.string());
+  }
   throw ServiceError(ErrorCode::kResourceExhausted,
                      "STORAGE_FULL",
                      "{} more bytes do not fit: {} are free on the server's disk and promised to "

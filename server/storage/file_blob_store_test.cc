@@ -126,6 +126,18 @@ TEST_F(FileBlobStoreTest, ReserveOfFreeSpaceIsKept) {
   EXPECT_EQ(ReasonThrown([&] { uploads.Open({"u", DigestOf("x")}, 0); }), "STORAGE_FULL");
 }
 
+TEST_F(FileBlobStoreTest, AFolderThatIsGoneIsNoFullDisk) {
+  FileBlobStore lost(scratch_.path() / "lost", {0});
+  fs::remove_all(scratch_.path() / "lost");
+  try {
+    lost.RequireSpace(1);
+    FAIL() << "there is no folder";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kUnavailable);
+    EXPECT_NE(std::string(e.what()).find("is gone"), std::string::npos);
+  }
+}
+
 TEST_F(FileBlobStoreTest, UploadsSideBySideArePromisedTheirSpace) {
   const int64_t free = blobs_.FreeBytes();
   // Leaves room for one and a half of two uploads; what else runs on this disk may move it a

@@ -4,7 +4,6 @@
 #include <sqlite3.h>
 
 #include <atomic>
-#include <thread>
 
 #include "server/service_error.h"
 
@@ -122,18 +121,7 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
 SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
 
 void SqliteDatabase::SetBusyTimeout(std::chrono::milliseconds timeout) {
-  busy_timeout_ = timeout;
-  sqlite3_busy_handler(db_, &SqliteDatabase::WaitWhileBusy, this);
-}
-
-// SQLite's own handler sleeps for up to 100 ms at a time, where most writers take one.
-int SqliteDatabase::WaitWhileBusy(void* self, int waits) {
-  auto* db = static_cast<SqliteDatabase*>(self);
-  const auto now = std::chrono::steady_clock::now();
-  if (waits == 0) db->busy_since_ = now;
-  if (now - db->busy_since_ >= db->busy_timeout_) return 0;
-  std::this_thread::sleep_for(std::chrono::microseconds(waits < 100 ? 200 : 2'000));
-  return 1;
+  sqlite3_busy_timeout(db_, static_cast<int>(timeout.count()));
 }
 
 void SqliteDatabase::Exec(const char* sql) {

@@ -78,11 +78,7 @@ class SqliteDatabase {
   static int64_t FullScanSteps();
 
  private:
-  static int WaitWhileBusy(void* self, int waits);
-
   sqlite3* db_ = nullptr;
-  std::chrono::milliseconds busy_timeout_{0};
-  std::chrono::steady_clock::time_point busy_since_;
 };
 
 // BEGIN IMMEDIATE ... COMMIT; rolled back unless committed. `durable`: synced to disk when Commit

@@ -84,7 +84,9 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
   SqliteDatabase db(file, SqliteAccess::kWrite);
   const std::optional<int64_t> version = VersionOf(db);
   if (version && *version > kSchemaVersion) {
-    throw WrongVersion(*version, "use the program that wrote it, or another --data-dir");
+    throw WrongVersion(*version,
+                       "use the program that wrote it, or put back the copy that an upgrade left "
+                       "beside it (jobs.db.vN)");
   }
   if (role == StoreRole::kWorker) {
     if (!version) {

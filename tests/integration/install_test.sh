@@ -22,7 +22,8 @@ for program in color3d color3d-server color3d-worker; do
   said=$("$prefix/bin/$program" --version)
   [ "$said" = "$version" ] || fail "$program --version says '$said', not $version"
 done
-for file in share/doc/color3d/README.md share/color3d/proto/color3d/v1/job.proto; do
+for file in share/doc/color3d/README.md share/doc/color3d/deploy/README.md \
+  share/doc/color3d/deploy/systemd/color3d.service share/color3d/proto/color3d/v1/job.proto; do
   [ -s "$prefix/$file" ] || fail "$file was not installed"
 done
 
