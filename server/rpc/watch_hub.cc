@@ -14,7 +14,6 @@
 namespace color3d {
 namespace {
 using SteadyClock = std::chrono::steady_clock;
-constexpr int kEventsPerFetch = 64;
 constexpr size_t kJobsAtOnce = 8;  // whole jobs that wait to be written
 }  // namespace
 
@@ -142,27 +141,21 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   // On the executor: the next events of the watched jobs.
   void Fetch() {
     const grpc::Status status = Guard([&] {
-      // Asked first: when all had finished before the events were read, those are complete.
-      const bool all_finished = parts_.store.AllFinished(ids_);
-      const auto events = parts_.store.EventsSince(cursor_, ids_, kEventsPerFetch);
-      std::vector<int64_t> progressed;
-      for (const EventRecord& event : events) {
-        if (event.kind == EventKind::kProgress) progressed.push_back(event.job_id);
-      }
-      const std::map<int64_t, JobRecord> jobs = Jobs(progressed);
+      const std::shared_ptr<const WatchBatch> batch = hub_.batches_.After(cursor_, ids_, *store_);
       std::lock_guard lock(mutex_);
-      for (const EventRecord& event : events) {
+      for (const EventRecord& event : batch->events) {
         cursor_ = event.revision;
         if (event.kind == EventKind::kState) {
           deferred_.erase(event.job_id);
           QueueState(event);
-        } else if (const auto job = jobs.find(event.job_id); job != jobs.end()) {
+        } else if (const auto job = batch->progressed.find(event.job_id);
+                   job != batch->progressed.end()) {
           TakeProgress(event, job->second);
         }
       }
-      if (events.size() == kEventsPerFetch) {
+      if (batch->events.size() == WatchBatches::kMaxEvents) {
         dirty_ = true;
-      } else if (all_finished && !end_) {
+      } else if (batch->all_finished && !end_) {
         end_ = grpc::Status::OK;
       }
     });
@@ -331,7 +324,8 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   bool finished_ = false;
 };
 
-WatchHub::WatchHub(const RpcParts& parts, WatchTiming timing) : parts_(parts), timing_(timing) {
+WatchHub::WatchHub(const RpcParts& parts, WatchTiming timing)
+    : parts_(parts), timing_(timing), batches_(parts.store) {
   revision_ = parts_.store.NewestRevision();
   thread_ = std::thread([this] { Loop(); });
 }
@@ -402,6 +396,7 @@ void WatchHub::Poll() {
     if (!events.empty()) revision_ = events.back().revision;
     if (events.size() < 500) break;
   }
+  if (!changed.empty()) batches_.Forget();
   std::vector<std::shared_ptr<JobWatcher>> all;
   {
     std::lock_guard lock(mutex_);

@@ -12,6 +12,7 @@
 
 #include "color3d/v1/job.grpc.pb.h"
 #include "server/rpc/rpc_parts.h"
+#include "server/rpc/watch_batches.h"
 
 namespace color3d {
 
@@ -44,6 +45,7 @@ class WatchHub {
 
   const RpcParts& parts_;
   const WatchTiming timing_;
+  WatchBatches batches_;
   std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;

@@ -97,6 +97,9 @@ std::string SqliteStatement::Text(int column) const {
 }
 
 SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess access) {
+  // Otherwise all connections count their memory under one lock.
+  static const int uncounted = sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 0);
+  static_cast<void>(uncounted);
   const bool writes = access == SqliteAccess::kWrite;
   // A reader opens for writing, too: without the right to write it could not share the log's index.
   const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | (writes ? SQLITE_OPEN_CREATE : 0);
