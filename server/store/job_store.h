@@ -206,7 +206,8 @@ class JobStore {
   // Returns the checkpoint that this one replaces.
   virtual std::optional<FileDigest> SetCheckpoint(const Lease& lease, const FileDigest& blob) = 0;
   // False: nobody else does equal work now, and others will join this job when they do. True: the
-  // job was put back, to be claimed when the other has ended, without counting the attempt.
+  // job was put back, to be claimed when the other has ended, without counting the attempt; or has
+  // ended as CANCELLED, where cancellation was asked for.
   virtual bool JoinEqual(const Lease& lease, const std::string& stage_key) = 0;
   virtual void Publish(const Lease& lease, const Publication& publication) = 0;
   // kUnavailable and kAborted are tried again, with back-off, while attempts are left; kCancelled

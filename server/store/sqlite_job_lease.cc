@@ -225,13 +225,15 @@ bool SqliteJobStore::JoinEqual(const Lease& lease, const std::string& stage_key)
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
-  RequireLease(db, lease);
+  const JobRecord job = RequireLease(db, lease);
   SqliteStatement other(db.handle(),
                         "select 1 from job where running_key=? and running_key<>'' and job_id<>?");
   other.Bind(stage_key, lease.job_id);
   const bool joins = other.Step();
-  if (joins) {
-    FinishAttempt(db, lease, "JOINED");
+  if (joins) FinishAttempt(db, lease, "JOINED");
+  if (joins && job.cancel_requested) {
+    EndCancelled(db, job.id);
+  } else if (joins) {
     db.Run("update job set attempt=attempt-1, run_after_ms=0, joins_key=? where job_id=?",
            stage_key,
            lease.job_id);

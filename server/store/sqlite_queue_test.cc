@@ -87,6 +87,19 @@ TEST_F(QueueTest, WhoeverWaitsForEqualWorkDoesItWhenTheOtherDoesNot) {
   }
 }
 
+TEST_F(QueueTest, WhoeverIsCancelledWaitsForNoEqualWork) {
+  CreateSingle();
+  const JobRecord root = CreateSingle();
+  const JobRecord leader = ClaimOne(), follower = ClaimOne();
+  store_->JoinEqual(LeaseOf(leader), "key");
+  store_->Cancel(root.name, {});
+  EXPECT_TRUE(store_->JoinEqual(LeaseOf(follower), "key"));
+  EXPECT_EQ(StateOf(root.name), JobState::kCancelled);
+  store_->Retry(root.name, false, {}, kNoLimit);
+  EXPECT_FALSE(store_->Heartbeat(LeaseOf(ClaimOne()), {}, {}, kLease).cancel_requested)
+      << "the retry is another wish";
+}
+
 TEST_F(QueueTest, AKilledJobEndsAtOnce) {
   const JobRecord root = CreateDiamond();
   const JobRecord running = ClaimOne();
