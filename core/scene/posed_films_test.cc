@@ -124,6 +124,9 @@ TEST_F(PosedFilms, WrongPosesBoundsAreRefused) {
   rows[17] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(SaidOfPoses(NpyOf({3, 17}, rows)), HasSubstr("not finite"));
   rows = PosesOfThree();
+  rows[34 + 3] = 1e308;
+  EXPECT_THAT(SaidOfPoses(NpyOf({3, 17}, rows)), HasSubstr("row 2: the camera stands too far"));
+  rows = PosesOfThree();
   rows[34 + 14] = -5.0;
   EXPECT_THAT(SaidOfPoses(NpyOf({3, 17}, rows)),
               HasSubstr("row 2: 96 x 64 px with a focal length"));

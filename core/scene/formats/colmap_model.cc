@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/scene/formats/within_reach.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -109,6 +110,7 @@ Pose MakeColmapPose(const double (&q)[4], const double (&t)[3], const std::strin
   if (!std::isfinite(norm) || !translation.allFinite()) {
     throw InvalidArgument("{} has a pose that is not finite", place);
   }
+  RequireWithinReach(translation, place);
   if (norm < 1e-6) throw InvalidArgument("{} has a zero rotation quaternion", place);
   Pose pose;
   pose.rotation = rotation.normalized();

@@ -12,6 +12,7 @@
 #include "core/image/probe/probe.h"
 #include "core/scene/formats/npy.h"
 #include "core/scene/formats/transforms_frame.h"
+#include "core/scene/formats/within_reach.h"
 #include "core/scene/frame_times.h"
 #include "core/scene/photos.h"
 #include "core/scene/sparse_cloud.h"
@@ -28,6 +29,8 @@ constexpr double kStepsPerSecond = 25.0;
 constexpr size_t kMaxPoints = 500'000;
 
 json ParseObject(const fs::path& folder, const std::string& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(folder / file, error)) throw InvalidArgument("{} is missing", file);
   json root = json::parse(ReadFile(folder / file), nullptr, /*allow_exceptions=*/false);
   if (!root.is_object()) throw InvalidArgument("{} is not a JSON object", file);
   return root;
@@ -80,8 +83,9 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
   const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
   view->cam_from_world.rotation = Eigen::Quaterniond(rotation).normalized();
   const std::vector<double> position = NumbersOf(fields, "position", 3);
-  view->cam_from_world.translation =
-      -(view->cam_from_world.rotation * Eigen::Vector3d(position[0], position[1], position[2]));
+  const Eigen::Vector3d place(position[0], position[1], position[2]);
+  RequireWithinReach(place, file);
+  view->cam_from_world.translation = -(view->cam_from_world.rotation * place);
   const std::vector<double> size = NumbersOf(fields, "image_size", 2);
   const std::vector<double> center = NumbersOf(fields, "principal_point", 2);
   if (!(size[0] >= 1.0 && size[1] >= 1.0 && size[0] <= 1e6 && size[1] <= 1e6)) {

@@ -18,8 +18,8 @@ bool IsNerfiesFolder(const std::filesystem::path& folder);
 // and centre do not matter: cameras and points share a frame without them. `warnings` (may be null)
 // receives which frames were left out because their picture does not exist, `cameras` (may be null)
 // the names of the cameras by Moment::shot. Throws Error{kInvalidArgument} that names the file: no
-// JSON, a field that is missing or not finite, fewer than two frames, points that are none, and
-// what MomentsOf refuses.
+// such file, no JSON, a field that is missing or not finite, a camera too far away, fewer than two
+// frames, points that are none, and what MomentsOf refuses.
 Scene ReadNerfies(const std::filesystem::path& scene_folder,
                   std::vector<std::string>* warnings = nullptr,
                   std::vector<std::string>* cameras = nullptr);

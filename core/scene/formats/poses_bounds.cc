@@ -10,6 +10,7 @@
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/scene/formats/npy.h"
+#include "core/scene/formats/within_reach.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -38,6 +39,7 @@ View ViewOf(const double* row, const std::string& place) {
                           height,
                           focal);
   }
+  RequireWithinReach(column(3), place);
   View view;
   view.captured_camera = {static_cast<int>(std::lround(width)),
                           static_cast<int>(std::lround(height)),

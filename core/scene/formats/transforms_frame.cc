@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/scene/formats/within_reach.h"
 
 namespace color3d {
 namespace {
@@ -164,6 +165,7 @@ Pose ReadTransform(const FrameFields& fields) {
                           fields.place(),
                           axes.determinant());
   }
+  RequireWithinReach(m.col(3), fields.place());
   // The nearest rotation, then y and z reversed.
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Matrix3d world_from_gl = svd.matrixU() * svd.matrixV().transpose();

@@ -181,6 +181,7 @@ TEST_F(TransformsFile, BrokenFilesAreRefusedByPlace) {
   EXPECT_THAT(Said(Json("\"fl_x\":50", "", "[1,0,0]")), HasSubstr("4 columns"));
   EXPECT_THAT(Said(Json("\"fl_x\":50", "", "[0,0,0,0]")), HasSubstr("not a rotation"));
   EXPECT_THAT(Said(Json("\"fl_x\":50", "", "[-1,0,0,0]")), HasSubstr("not a rotation"));
+  EXPECT_THAT(Said(Json("\"fl_x\":50", "", "[1,0,0,1e308]")), HasSubstr("too far away"));
   std::string twice = Json("\"fl_x\":50");
   twice.replace(twice.find("images/b.png"), 12, "images/a.png");
   EXPECT_THAT(Said(twice), HasSubstr("names the photo a.png twice"));

@@ -1,0 +1,23 @@
+// Places of cameras as files give them. For this folder only.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+#include "core/base/error.h"
+
+namespace color3d {
+
+// Throws Error{kInvalidArgument} that names `place` for a position so far from the origin that sums
+// of coordinates would not be numbers any more.
+inline void RequireWithinReach(const Eigen::Vector3d& position, const std::string& place) {
+  constexpr double kFarthest = 1e100;
+  if (position.cwiseAbs().maxCoeff() < kFarthest) return;
+  throw InvalidArgument("{}: the camera stands too far away ({:g}, {:g}, {:g})",
+                        place,
+                        position.x(),
+                        position.y(),
+                        position.z());
+}
+
+}  // namespace color3d
