@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <fstream>
+#include <memory>
 #include <optional>
 
 #include "server/ops/job_log.h"
@@ -16,27 +17,27 @@ constexpr size_t kChunkBytes = 64 << 10;
 constexpr std::chrono::milliseconds kPause{500};
 
 // One step at a time, each on the executor or after a pause; the step that has nothing more to do
-// finishes.
+// finishes. A step holds a reference: what it sets off may finish the stream while it still runs.
 class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
  public:
   JobLogStream(const RpcParts& parts,
                const grpc::CallbackServerContext& context,
                const v1::ReadJobLogRequest& request)
-      : parts_(parts), context_(context), request_(request), offset_(request.offset()) {
+      : parts_(parts), context_(context), request_(request), offset_(request.offset()) {}
+  // Keeps itself alive until OnDone.
+  void Start(const std::shared_ptr<JobLogStream>& self) {
+    self_ = self;
     PostStep();
   }
   void OnWriteDone(bool ok) override { ok ? PostStep() : Finish(grpc::Status::CANCELLED); }
-  void OnCancel() override {
-    cancelled_ = true;
-    alarm_.Cancel();
-  }
-  void OnDone() override { delete this; }
+  void OnCancel() override { cancelled_ = true; }  // seen after the pause
+  void OnDone() override { self_.reset(); }
 
  private:
   enum class Next { kWrite, kPause, kEnd };
 
   void PostStep() {
-    parts_.quick.Post([this] { Step(); });
+    parts_.quick.Post([self = self_] { self->Step(); });
   }
 
   void Step() {
@@ -46,9 +47,10 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
     if (next == Next::kWrite) return StartWrite(&chunk_);
     if (parts_.draining) return Finish(DrainingStatus());
     if (cancelled_) return Finish(grpc::Status::CANCELLED);
-    alarm_.Set(std::chrono::system_clock::now() + kPause,
-               [this](bool) { cancelled_ ? Finish(grpc::Status::CANCELLED) : PostStep(); });
-    if (cancelled_) alarm_.Cancel();
+    // A fresh one: the last one's callback may not have returned yet.
+    alarm_ = std::make_unique<grpc::Alarm>();
+    alarm_->Set(std::chrono::system_clock::now() + kPause,
+                [this](bool) { cancelled_ ? Finish(grpc::Status::CANCELLED) : PostStep(); });
   }
 
   Next Read() {
@@ -76,11 +78,12 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
   const RpcParts& parts_;
   const grpc::CallbackServerContext& context_;
   const v1::ReadJobLogRequest request_;
+  std::shared_ptr<JobLogStream> self_;
   std::optional<ProjectStore> store_;  // since the first step
   StreamLimit::Place place_;
   int64_t offset_;
   v1::JobLogChunk chunk_;
-  grpc::Alarm alarm_;
+  std::unique_ptr<grpc::Alarm> alarm_;
   std::atomic<bool> cancelled_{false};
 };
 
@@ -89,7 +92,9 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
 grpc::ServerWriteReactor<v1::JobLogChunk>* StreamJobLog(const RpcParts& parts,
                                                         const grpc::CallbackServerContext& context,
                                                         const v1::ReadJobLogRequest& request) {
-  return new JobLogStream(parts, context, request);
+  const auto stream = std::make_shared<JobLogStream>(parts, context, request);
+  stream->Start(stream);
+  return stream.get();
 }
 
 }  // namespace color3d

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <deque>
 #include <fstream>
+#include <functional>
+#include <memory>
 #include <thread>
 
 #include "server/ops/job_log.h"
@@ -33,6 +36,13 @@ class JobLogStreamTest : public RpcTest {
     const grpc::Status end = stream->Finish();
     if (status != nullptr) *status = end;
     return text;
+  }
+
+  static bool Becomes(const std::function<bool()>& done) {
+    for (int i = 0; i < 1000 && !done(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return done();
   }
 
   v1::Job job_ = client_->Create(ScriptedSpec(client_->MakeScene().name(), "a"));
@@ -72,6 +82,25 @@ TEST_F(JobLogStreamTest, ADrainEndsIt) {
   ReadAll(0, true, &status);
   EXPECT_EQ(ReasonOfStatus(status), "DRAINING");
   later.join();
+}
+
+// Those who go in the middle of a pause take nothing away from under the step that began it.
+TEST_F(JobLogStreamTest, ReadersThatGoAwayEndTheirStreams) {
+  constexpr int kReaders = 50;
+  std::deque<grpc::ClientContext> contexts(kReaders);
+  std::vector<std::unique_ptr<grpc::ClientReader<v1::JobLogChunk>>> streams;
+  v1::ReadJobLogRequest request;
+  request.set_name(job_.name());
+  request.set_follow(true);
+  for (grpc::ClientContext& context : contexts) {
+    streams.push_back(client_->jobs->ReadJobLog(&context, request));
+  }
+  EXPECT_TRUE(Becomes([&] { return server_->open().watches == kReaders; }));
+  for (grpc::ClientContext& context : contexts) context.TryCancel();
+  for (auto& stream : streams) {
+    EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+  EXPECT_TRUE(Becomes([&] { return server_->open().watches == 0; }));
 }
 
 }  // namespace
