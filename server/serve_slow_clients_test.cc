@@ -107,6 +107,34 @@ TEST_F(SlowClientsTest, StreamsThatNobodyReads) {
   EXPECT_LT(GrowthMib(), 300.0);
 }
 
+// More uploads than may be open, each with the largest message that gRPC takes.
+TEST_F(SlowClientsTest, UploadsThatNobodyWants) {
+  constexpr int kThreads = 24, kUploads = 20;
+  google::bytestream::WriteRequest request;
+  request.set_resource_name("uploads/u/blobs/" + DigestOf("x").sha256() + "/100000000");
+  request.set_data(std::string(15 << 20, 'x'));
+  for (int i = 0; i < kThreads * kUploads; ++i) contexts_.emplace_back();
+  std::atomic<int> refused{0};
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < kThreads; ++i) {
+    threads.emplace_back([&, i] {
+      std::vector<std::unique_ptr<grpc::ClientWriter<google::bytestream::WriteRequest>>> streams;
+      google::bytestream::WriteResponse response;
+      for (int k = 0; k < kUploads; ++k) {
+        grpc::ClientContext& context = contexts_[static_cast<size_t>(i * kUploads + k)];
+        streams.push_back(Connection(i).bytes->Write(&context, &response));
+        streams.back()->Write(request);
+      }
+      for (const auto& stream : streams) refused += stream->Finish().ok() ? 0 : 1;
+    });
+  }
+  const milliseconds slowest = SlowestOfOthers();
+  for (std::jthread& thread : threads) thread.join();
+  EXPECT_EQ(refused, kThreads * kUploads);
+  EXPECT_LT(slowest, milliseconds(5'000));
+  EXPECT_LT(GrowthMib(), 800.0) << "of 7,200 that were sent";
+}
+
 TEST_F(SlowClientsTest, AnswersThatNobodyReads) {
   constexpr int kCalls = 800, kFiles = 8'000;
   v1::Scene scene;

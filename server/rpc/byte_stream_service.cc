@@ -18,6 +18,7 @@ using google::bytestream::WriteRequest;
 using google::bytestream::WriteResponse;
 
 constexpr int64_t kReadChunkBytes = 256 << 10;
+constexpr size_t kNameBytes = 1024;  // of a message besides its data
 
 class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
  public:
@@ -125,11 +126,22 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   BlobWriter(const RpcParts& parts,
              const grpc::CallbackServerContext& context,
              WriteResponse* response)
-      : parts_(parts), context_(context), response_(response) {
-    StartRead(&request_);
+      : parts_(parts), response_(response) {
+    // Nothing is read for whoever may not write, or has as many streams as he may.
+    const grpc::Status allowed = Guard([&] {
+      call_ = Admit(parts_, Role::kSubmit, context);
+      place_ = parts_.streams.writes.Take(call_->caller.project);
+    });
+    allowed.ok() ? StartRead(&request_) : Finish(allowed);
   }
   void OnReadDone(bool ok) override {
-    parts_.slow.Post([this, ok] { ok ? Consume() : EndOfStream(); });
+    // Refused here, so that no large message waits for its turn.
+    const grpc::Status fits = Guard([&] {
+      if (ok) RequireSmallChunk();
+    });
+    if (fits.ok()) return parts_.slow.Post([this, ok] { ok ? Consume() : EndOfStream(); });
+    WriteRequest().Swap(&request_);
+    parts_.slow.Post([this, fits] { End(fits); });
   }
   void OnDone() override { delete this; }
 
@@ -138,29 +150,35 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     bool finished = false;
     const grpc::Status status = Guard([&] { finished = Store(); });
     if (status.ok() && !finished) return StartRead(&request_);
+    End(status);
+  }
+
+  void End(const grpc::Status& status) {
     writer_.reset();
     Finish(status);
   }
 
+  void RequireSmallChunk() const {
+    if (request_.ByteSizeLong() <=
+        static_cast<size_t>(parts_.limits.max_chunk_bytes) + kNameBytes) {
+      return;
+    }
+    throw InvalidArgument("a chunk of {} bytes; at most {} are allowed",
+                          request_.data().size(),
+                          parts_.limits.max_chunk_bytes);
+  }
+
   // True when the RPC is answered.
   bool Store() {
-    if (static_cast<int64_t>(request_.data().size()) > parts_.limits.max_chunk_bytes) {
-      throw InvalidArgument("a chunk of {} bytes; at most {} are allowed",
-                            request_.data().size(),
-                            parts_.limits.max_chunk_bytes);
-    }
     if (!writer_) {
-      const Call call = Admit(parts_, Role::kSubmit, context_);
-      store_ = call.store;
-      place_ = parts_.streams.writes.Take(call.caller.project);
       name_ = ParseUploadName(request_.resource_name());
-      name_.owner = call.caller.project;
+      name_.owner = call_->caller.project;
       // Others may have stored the same bytes: whoever has not shown them sends them.
-      if (HasBlob(parts_, call.store, name_.digest)) {
+      if (HasBlob(parts_, call_->store, name_.digest)) {
         response_->set_committed_size(name_.digest.size_bytes);
         return true;
       }
-      RequireQuota(parts_, call.store, name_.digest.size_bytes);
+      RequireQuota(parts_, call_->store, name_.digest.size_bytes);
       writer_ = parts_.uploads.Open(name_, request_.write_offset());
       resource_ = request_.resource_name();
     } else if (!request_.resource_name().empty() && request_.resource_name() != resource_) {
@@ -170,7 +188,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     if (!request_.finish_write()) return false;
     response_->set_committed_size(writer_->Sync());
     writer_->Finish();
-    store_->HoldBlob(name_.digest);
+    call_->store.HoldBlob(name_.digest);
     return true;
   }
 
@@ -180,17 +198,15 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
       if (!writer_) throw InvalidArgument("the stream ended before its first message");
       response_->set_committed_size(writer_->Sync());
     });
-    writer_.reset();
-    Finish(status);
+    End(status);
   }
 
   const RpcParts& parts_;
-  const grpc::CallbackServerContext& context_;
   WriteResponse* response_;
   WriteRequest request_;
   std::string resource_;
   UploadName name_;
-  std::optional<ProjectStore> store_;  // since the first message
+  std::optional<Call> call_;  // nothing: refused
   std::unique_ptr<UploadStore::Writer> writer_;
   StreamLimit::Place place_;
 };

@@ -1,6 +1,9 @@
 // Two projects on one server: no call of the one tells or touches what the other has.
 #include <gtest/gtest.h>
 
+#include <deque>
+#include <thread>
+
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
@@ -192,6 +195,26 @@ TEST_F(ProjectsTest, StreamsOfAProjectAreCounted) {
   EXPECT_EQ(ReasonOfStatus(refused->Finish()), "QUOTA_EXCEEDED");
   for (int i = 0; i < 2; ++i) contexts[i].TryCancel();
   Work();
+}
+
+// Of whoever may not write nothing is read; he hears so before he has sent a byte.
+TEST_F(ProjectsTest, UploadsAreRefusedBeforeTheyBegin) {
+  std::deque<grpc::ClientContext> contexts;
+  google::bytestream::WriteResponse response;
+  const auto write = [&](TestClient& client) {
+    grpc::ClientContext& context = contexts.emplace_back();
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
+    return client.bytes->Write(&context, &response);
+  };
+  EXPECT_EQ(ReasonOfStatus(write(*Open("no such token"))->Finish()), "TOKEN_UNKNOWN");
+  const auto first = write(*attic_), second = write(*attic_);
+  for (int i = 0; i < 500 && guarded_->open().uploads < 2; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_EQ(ReasonOfStatus(write(*attic_)->Finish()), "QUOTA_EXCEEDED");
+  for (grpc::ClientContext& context : contexts) context.TryCancel();
+  first->Finish();
+  second->Finish();
 }
 
 TEST_F(ProjectsTest, WhoRunsTheServerPausesKillsAndCollects) {
