@@ -158,6 +158,20 @@ struct KeepingArguments {
   std::function<int()> run;  // empty: another command was given
 };
 
+// Exit status 1: the copy lacks blobs, which are listed.
+int SayWhatLacks(const CopiedBlobs& copied, const std::filesystem::path& from) {
+  for (const std::string& sha256 : copied.missing) std::cout << "missing: " << sha256 << "\n";
+  for (const std::string& sha256 : copied.damaged) std::cout << "damaged: " << sha256 << "\n";
+  if (copied.IsWhole()) return 0;
+  std::cout << fmt::format(
+      "{} blobs of {} are missing and {} damaged, the copy is without them: upload their scenes' "
+      "files again, or run their jobs anew with skip_cache\n",
+      copied.missing.size(),
+      from.string(),
+      copied.damaged.size());
+  return 1;
+}
+
 int RunBackUp(const KeepingArguments& arguments) {
   const CopiedBlobs copied = BackUp(arguments.data_folder, arguments.copy);
   std::cout << fmt::format("{}: {} blobs copied ({} MiB), {} were there\n",
@@ -165,15 +179,15 @@ int RunBackUp(const KeepingArguments& arguments) {
                            copied.copied,
                            copied.bytes >> 20,
                            copied.kept);
-  return 0;
+  return SayWhatLacks(copied, arguments.data_folder);
 }
 
 int RunRestore(const KeepingArguments& arguments) {
   const CopiedBlobs copied = Restore(arguments.copy, arguments.data_folder);
-  std::cout << fmt::format("{}: {} blobs, all read and whole; start color3d-server serve on it\n",
+  std::cout << fmt::format("{}: {} blobs, read and whole; start color3d-server serve on it\n",
                            arguments.data_folder.string(),
                            copied.copied);
-  return 0;
+  return SayWhatLacks(copied, arguments.copy);
 }
 
 int RunFsck(const KeepingArguments& arguments) {

@@ -2,8 +2,9 @@
 
 #include <sys/stat.h>
 
-#include <set>
+#include <optional>
 #include <string>
+#include <system_error>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
@@ -26,53 +27,60 @@ bool IsEmptyOrNone(const fs::path& folder) {
   return !fs::exists(folder, error) || fs::is_empty(folder, error);
 }
 
-std::set<std::string> NamedBlobs(const fs::path& store) {
-  return SqliteJobStore(store, StoreRole::kWorker, SystemClocks()).ReferencedBlobs();
-}
+enum class Copy { kWhole, kMissing, kDamaged };
 
 // The digest is taken of the copy, so that what was read and what was written are both checked.
-void CopyBlob(const BlobStore& from,
-              const std::string& sha256,
-              const fs::path& part,
-              BlobStore& to) {
-  fs::copy_file(from.Fetch(sha256), part, fs::copy_options::overwrite_existing);
+Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& part) {
+  std::error_code error;
+  fs::copy_file(from, part, fs::copy_options::overwrite_existing, error);
+  if (error == std::errc::no_such_file_or_directory) return Copy::kMissing;
+  if (error == std::errc::io_error) return Copy::kDamaged;
+  if (error) {
+    throw Error(ErrorCode::kUnavailable,
+                "cannot copy the blob {} to {}: {}",
+                sha256,
+                part.parent_path().string(),
+                error.message());
+  }
   ::chmod(part.c_str(), 0600);
-  const FileDigest digest = DigestFile(part);
-  if (digest.sha256 != sha256) {
-    throw Error(ErrorCode::kDataLoss,
-                "the blob {} is damaged; color3d-server fsck says what names it",
-                sha256);
-  }
-  to.Adopt(part, digest);
+  return DigestFile(part).sha256 == sha256 ? Copy::kWhole : Copy::kDamaged;
 }
 
-bool IsThere(const BlobStore& blobs, const std::string& sha256) {
+std::optional<fs::path> Find(const BlobStore& blobs, const std::string& sha256) {
   try {
-    blobs.Fetch(sha256);
-    return true;
+    return blobs.Fetch(sha256);
   } catch (const Error&) {
-    return false;
+    return std::nullopt;
   }
 }
 
-CopiedBlobs CopyAll(const std::set<std::string>& named,
-                    const DataPaths& from,
-                    const DataPaths& to) {
+// Blobs that the copied store names. It drops checkpoints that could not be copied.
+CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const DataPaths& to) {
+  SqliteJobStore store(copied_store, StoreRole::kWorker, SystemClocks());
   const FileBlobStore source(from.Blobs());
   FileBlobStore target(to.Blobs());
+  const fs::path part = to.root / ".blob.part";
   CopiedBlobs result;
-  for (const std::string& sha256 : named) {
-    if (IsThere(target, sha256)) {
+  for (const std::string& sha256 : store.ReferencedBlobs()) {
+    if (Find(target, sha256)) {
       ++result.kept;
       continue;
     }
-    if (!IsThere(source, sha256)) {
-      throw Error(ErrorCode::kDataLoss, "{} lacks the blob {}", from.root.string(), sha256);
+    const std::optional<fs::path> file = Find(source, sha256);
+    const Copy copy = file ? CopyBlob(*file, sha256, part) : Copy::kMissing;
+    if (copy == Copy::kWhole) {
+      const auto size = static_cast<int64_t>(fs::file_size(part));
+      target.Adopt(part, {sha256, size});
+      ++result.copied;
+      result.bytes += size;
+      continue;
     }
-    CopyBlob(source, sha256, to.root / ".blob.part", target);
-    ++result.copied;
-    result.bytes += static_cast<int64_t>(fs::file_size(target.Fetch(sha256)));
+    DropCheckpoint(copied_store, sha256);
+    if (!store.IsReferenced(sha256)) continue;
+    (copy == Copy::kMissing ? result.missing : result.damaged).push_back(sha256);
   }
+  std::error_code error;
+  fs::remove(part, error);
   return result;
 }
 
@@ -80,7 +88,7 @@ CopiedBlobs CopyAll(const std::set<std::string>& named,
 CopiedBlobs CopyWhole(const DataPaths& from, const DataPaths& to) {
   const fs::path part = to.root / "jobs.db.part";
   CopyStore(from.Store(), part);
-  const CopiedBlobs result = CopyAll(NamedBlobs(part), from, to);
+  const CopiedBlobs result = CopyAll(part, from, to);
   // Looking into it has left a log beside it, which is empty.
   std::error_code error;
   for (const char* log : {"-wal", "-shm"}) fs::remove(part.string() + log, error);

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 namespace color3d {
 
@@ -10,17 +12,21 @@ struct CopiedBlobs {
   int64_t copied = 0;
   int64_t kept = 0;  // there already, from an earlier copy
   int64_t bytes = 0;
+  std::vector<std::string> missing, damaged;  // digests that jobs or scenes name; not in the copy
+
+  bool IsWhole() const { return missing.empty() && damaged.empty(); }
 };
 
 // Everything that jobs and scenes name, as it is at one moment; a server may run meanwhile. Into an
 // empty folder, or over an earlier backup, of which blobs that are there are not copied again. The
-// store is replaced last: a backup that was cut off is the earlier one still. Throws Error:
-// kFailedPrecondition where there is no store of this release or `target` is none of ours,
-// kDataLoss naming a blob that is missing or damaged.
+// store is replaced last: a backup that was cut off is the earlier one still. Blobs that are
+// missing or damaged are left out and listed; a job whose checkpoint was one, or was replaced
+// meanwhile, begins anew in the copy. Throws Error: kFailedPrecondition where there is no store of
+// this release or `target` is none of ours.
 CopiedBlobs BackUp(const std::filesystem::path& data_folder, const std::filesystem::path& target);
 
-// A backup as a fresh data folder. Every blob is read and compared with its digest. Throws as
-// BackUp, and kFailedPrecondition unless `data_folder` is empty or not there.
+// A backup as a fresh data folder. Every blob is read and compared with its digest. As BackUp, and
+// throws kFailedPrecondition unless `data_folder` is empty or not there.
 CopiedBlobs Restore(const std::filesystem::path& backup, const std::filesystem::path& data_folder);
 
 }  // namespace color3d

@@ -87,16 +87,40 @@ TEST_F(KeepingTest, WhatWasBackedUpIsServedAgain) {
   }
 }
 
-TEST_F(KeepingTest, NothingDamagedIsTakenForABackup) {
+TEST_F(KeepingTest, WhatIsDamagedIsLeftOutAndListed) {
+  const std::vector<std::string> photo = {photo_.sha256};
+  const fs::path other = scratch_.path() / "other";
   BackUp(paths_.root, backup_);
-  Run("later");
-  Damage(store_->GetScene("scenes/test").files.at(0).digest);
-  EXPECT_EQ(ReasonThrown([&] { BackUp(paths_.root, scratch_.path() / "other"); }), "DATA_LOSS");
-  EXPECT_FALSE(fs::exists(scratch_.path() / "other" / "jobs.db"));
-  Restore(backup_, fresh_);
-  EXPECT_TRUE(Check(fresh_).IsGood()) << "the earlier one is whole";
+  const std::string later = Run("later");
+  Damage(photo_);
+  const CopiedBlobs partial = BackUp(paths_.root, other);
+  EXPECT_EQ(partial.damaged, photo);
+  EXPECT_EQ(partial.copied, 2);
+  EXPECT_FALSE(fs::exists(other / ".blob.part"));
+  EXPECT_TRUE(BackUp(paths_.root, backup_).IsWhole()) << "the earlier one has it whole";
   blobs_.Remove(photo_.sha256);
-  EXPECT_EQ(ReasonThrown([&] { BackUp(paths_.root, scratch_.path() / "other"); }), "DATA_LOSS");
+  EXPECT_EQ(BackUp(paths_.root, other).missing, photo);
+  EXPECT_EQ(Restore(other, fresh_).missing, photo);
+  EXPECT_EQ(ResultIn(fresh_, later), "later");
+}
+
+// A worker replaces its checkpoint while the backup runs.
+TEST_F(KeepingTest, ACheckpointThatIsGoneIsBegunAnew) {
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  graph.jobs.resize(1);
+  graph.jobs[0].kind = "single";
+  store_->CreateGraph(graph, {}, kNoLimit);
+  const JobRecord job = store_->Claim("w", kLease).value();
+  store_->SetCheckpoint({job.id, job.lease_epoch}, {Sha256Hex("replaced"), 8});
+  EXPECT_TRUE(BackUp(paths_.root, backup_).IsWhole());
+  EXPECT_TRUE(store_->GetJob(job.name).checkpoint) << "it goes on where it is";
+  EXPECT_TRUE(Restore(backup_, fresh_).IsWhole());
+  EXPECT_FALSE(Open(fresh_, StoreRole::kServer)->GetJob(job.name).checkpoint);
+  EXPECT_TRUE(Check(fresh_).IsGood());
+}
+
+TEST_F(KeepingTest, ABackupGoesNowhereElse) {
   EXPECT_EQ(ReasonThrown([&] { BackUp(scratch_.path() / "none", backup_); }),
             "FAILED_PRECONDITION");
   const fs::path photos = scratch_.path() / "photos";

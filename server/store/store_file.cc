@@ -21,6 +21,12 @@ void CopyStore(const fs::path& file, const fs::path& copy) {
   SqliteDatabase(file, SqliteAccess::kWrite).Run("vacuum into ?", copy.string());
 }
 
+void DropCheckpoint(const fs::path& file, const std::string& sha256) {
+  SqliteDatabase(file, SqliteAccess::kWrite)
+      .Run("update job set checkpoint_sha256='', checkpoint_bytes=0 where checkpoint_sha256=?",
+           sha256);
+}
+
 std::vector<std::string> StoreProblems(const fs::path& file) {
   std::vector<std::string> problems;
   SqliteDatabase db(file, SqliteAccess::kRead);

@@ -14,6 +14,9 @@ void RequireStore(const std::filesystem::path& file);
 // meanwhile. `copy` is replaced. Throws Error as opening a store does.
 void CopyStore(const std::filesystem::path& file, const std::filesystem::path& copy);
 
+// Jobs of the store, which nobody uses, that would go on from this checkpoint begin anew.
+void DropCheckpoint(const std::filesystem::path& file, const std::string& sha256);
+
 // What is wrong with it in SQLite's words, at most 20 things.
 std::vector<std::string> StoreProblems(const std::filesystem::path& file);
 
