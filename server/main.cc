@@ -107,9 +107,11 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   serve
-      ->add_option("--project-streams",
-                   options->project_streams,
-                   "Watches, uploads and downloads of one project, each; 0: no limit of its own")
+      ->add_option(
+          "--project-streams",
+          options->project_streams,
+          "Watches, uploads, downloads and live streams of one project, each; 0: no limit of its "
+          "own")
       ->check(CLI::Range(0, 10'000))
       ->capture_default_str();
   serve

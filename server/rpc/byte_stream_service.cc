@@ -178,8 +178,9 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
         response_->set_committed_size(name_.digest.size_bytes);
         return true;
       }
-      RequireQuota(parts_, call_->store, name_.digest.size_bytes);
-      writer_ = parts_.uploads.Open(name_, request_.write_offset());
+      writer_ = parts_.uploads.Open(name_, request_.write_offset(), [this](int64_t bytes) {
+        RequireQuota(parts_, call_->store, bytes);
+      });
       resource_ = request_.resource_name();
     } else if (!request_.resource_name().empty() && request_.resource_name() != resource_) {
       throw InvalidArgument("resource_name changes within the stream");

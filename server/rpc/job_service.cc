@@ -241,9 +241,10 @@ grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* 
   return AnswerWrite(
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
+        const RequestKey key = KeyOf("RetryJob", in);
         RequireNotDraining(parts_);
-        *out = ToProto(call.store.Retry(
-            in.name(), in.from_scratch(), KeyOf("RetryJob", in), LimitsOfQueue(parts_)));
+        if (!call.store.FindRequest(key)) RequireRoomOnDisk(parts_, call.store);
+        *out = ToProto(call.store.Retry(in.name(), in.from_scratch(), key, LimitsOfQueue(parts_)));
         spdlog::info("[job={}] retried", in.name());
       });
 }

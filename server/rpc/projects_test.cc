@@ -178,6 +178,51 @@ TEST_F(ProjectsTest, QuotasSayWhatIsFullAndWhenToTryAgain) {
   EXPECT_EQ(projects.projects_size(), 2);
 }
 
+TEST_F(ProjectsTest, UploadsSideBySideShareTheQuota) {
+  std::deque<grpc::ClientContext> contexts;
+  google::bytestream::WriteResponse responses[2];
+  const auto write = [&](const char* uuid) {
+    google::bytestream::WriteResponse* response = &responses[contexts.size()];
+    grpc::ClientContext& context = contexts.emplace_back();
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
+    auto stream = attic_->bytes->Write(&context, response);
+    const std::string content(3000, uuid[0]);
+    google::bytestream::WriteRequest request;
+    request.set_resource_name("uploads/" + std::string(uuid) + "/blobs/" + Sha256Hex(content) +
+                              "/3000");
+    request.set_data(content.substr(0, 1000));
+    stream->Write(request);
+    return stream;
+  };
+  const auto first = write("a");
+  for (int i = 0; i < 500 && std::filesystem::is_empty(scratch_.path() / "uploads"); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_EQ(ReasonOfStatus(write("b")->Finish()), "QUOTA_EXCEEDED");
+  cellar_->Upload(std::string(3000, 'c'));  // its quota is its own
+  contexts[0].TryCancel();
+  first->Finish();
+}
+
+TEST_F(ProjectsTest, NothingIsRetriedBeyondTheQuotaOrOnAFullDisk) {
+  const v1::Job job = attic_->Create(ScriptedSpec(attic_->MakeScene().name(), "a"));
+  v1::RetryJobRequest retry = Named<v1::RetryJobRequest>(job.name());
+  Call(*attic_->jobs, &v1::JobService::Stub::CancelJob, Named<v1::CancelJobRequest>(job.name()));
+  const auto reason = [&] {
+    return ReasonOfStatus(Call(*attic_->jobs, &v1::JobService::Stub::RetryJob, retry));
+  };
+  store_.SetHold(Hold::kStorage, true);
+  EXPECT_EQ(reason(), "STORAGE_FULL");
+  store_.SetHold(Hold::kStorage, false);
+  store_.HoldBlob("attic", {Sha256Hex("much"), 5000});
+  EXPECT_EQ(reason(), "QUOTA_EXCEEDED");
+  store_.ForgetBlob(Sha256Hex("much"));
+  retry.set_request_id(kUuid);
+  EXPECT_EQ(reason(), "");
+  store_.SetHold(Hold::kStorage, true);
+  EXPECT_EQ(reason(), "") << "the same call, made before";
+}
+
 TEST_F(ProjectsTest, StreamsOfAProjectAreCounted) {
   const std::string scene = attic_->MakeScene().name();
   const v1::Job job = attic_->Create(ScriptedSpec(scene, "a"));

@@ -62,7 +62,7 @@ struct BackendState {
 using BackendProbe = std::function<std::map<std::string, BackendState>()>;
 
 struct StreamLimits {
-  StreamLimit watches, reads, writes;
+  StreamLimit watches, reads, writes, live;
 };
 
 struct RpcParts {

@@ -84,7 +84,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   const int of_project = options.limits.project_max_streams;
   streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project},
                                   {"downloads", options.limits.max_reads, of_project},
-                                  {"uploads", options.limits.max_writes, of_project}});
+                                  {"uploads", options.limits.max_writes, of_project},
+                                  {"live streams", options.live.max_streams, of_project}});
   memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
   access_ = std::make_unique<Access>(options.tokens);
   parts_.reset(new RpcParts{store,

@@ -37,6 +37,13 @@ void CheckName(const UploadName& name, int64_t max_blob_bytes) {
   }
 }
 
+// Of a file as PartPath names it.
+std::string OwnerOf(const std::string& part) {
+  const std::string before = part.substr(0, part.find('.'));
+  const size_t at = before.find('@');
+  return at == std::string::npos ? "" : before.substr(at + 1);
+}
+
 [[noreturn]] void ThrowWriteError(const std::string& what) {
   const int error = errno;
   if (error == ENOSPC || error == EDQUOT) {
@@ -54,6 +61,20 @@ UploadStore::UploadStore(const fs::path& folder, BlobStore& blobs, int64_t max_b
     : folder_(folder), blobs_(blobs), max_blob_bytes_(max_blob_bytes) {
   std::error_code error;
   fs::create_directories(folder_, error);
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
+    CountOnDisk(entry.path().filename().string());
+  }
+}
+
+void UploadStore::CountOnDisk(const std::string& part) {
+  const std::string owner = OwnerOf(part);
+  std::error_code error;
+  const auto size = static_cast<int64_t>(fs::file_size(folder_ / part, error));
+  if (!error) {
+    bytes_[owner][part] = size;
+  } else if (bytes_[owner].erase(part) > 0 && bytes_[owner].empty()) {
+    bytes_.erase(owner);
+  }
 }
 
 fs::path UploadStore::PartPath(const UploadName& name) const {
@@ -71,15 +92,24 @@ int64_t UploadStore::CommittedSize(const UploadName& name) {
   return known ? static_cast<int64_t>(status.st_size) : 0;
 }
 
-std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name, int64_t offset) {
+std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
+                                                       int64_t offset,
+                                                       const Admission& admit) {
   CheckName(name, max_blob_bytes_);
   const fs::path path = PartPath(name);
-  std::unique_ptr<Writer> writer(new Writer());
-  writer->store_ = this;
-  writer->name_ = name;
+  std::unique_ptr<Writer> writer;
   {
+    const std::string part = path.filename().string();
     std::lock_guard lock(mutex_);
-    std::weak_ptr<Writer::Session>& entry = sessions_[path.filename().string()];
+    std::map<std::string, int64_t>& owned = bytes_[name.owner];
+    int64_t others = 0;
+    for (const auto& [other, bytes] : owned) others += other == part ? 0 : bytes;
+    admit(others + name.digest.size_bytes);
+    owned[part] = name.digest.size_bytes;
+    writer.reset(new Writer());
+    writer->store_ = this;
+    writer->name_ = name;
+    std::weak_ptr<Writer::Session>& entry = sessions_[part];
     writer->session_ = entry.lock();
     if (!writer->session_) {
       writer->session_ = std::make_shared<Writer::Session>();
@@ -111,10 +141,12 @@ UploadStore::Writer::~Writer() {
     ::close(fd_);
   }
   const std::string key = store_->PartPath(name_).filename().string();
-  session_.reset();
   std::lock_guard lock(store_->mutex_);
+  session_.reset();
   const auto entry = store_->sessions_.find(key);
-  if (entry != store_->sessions_.end() && entry->second.expired()) store_->sessions_.erase(entry);
+  if (entry == store_->sessions_.end() || !entry->second.expired()) return;
+  store_->sessions_.erase(entry);
+  store_->CountOnDisk(key);
 }
 
 void UploadStore::Writer::RequireOwner() const {
@@ -187,11 +219,11 @@ int UploadStore::ReapOlderThan(std::chrono::seconds age) {
   stale_.Look(age);
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
     if (!stale_.IsStale(entry.path())) continue;
-    {
-      std::lock_guard lock(mutex_);
-      if (sessions_.contains(entry.path().filename().string())) continue;
-    }
+    const std::string part = entry.path().filename().string();
+    std::lock_guard lock(mutex_);
+    if (sessions_.contains(part)) continue;
     if (::unlink(entry.path().c_str()) == 0) ++reaped;
+    CountOnDisk(part);
   }
   return reaped;
 }

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -59,9 +60,13 @@ class UploadStore {
     int64_t size_ = 0;
     SpaceReservation space_;  // for what is still to come
   };
+  // May refuse an upload, by throwing, that would bring what its owner's unfinished uploads take to
+  // so many bytes. Decides for one upload at a time.
+  using Admission = std::function<void(int64_t owner_bytes)>;
   // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). A blob that is there
   // need not be written again.
-  std::unique_ptr<Writer> Open(const UploadName& name, int64_t offset);
+  std::unique_ptr<Writer> Open(
+      const UploadName& name, int64_t offset, const Admission& admit = [](int64_t) {});
 
   // Removes uploads that nobody writes and that have not grown for `age`, at this call and at the
   // last one; returns how many.
@@ -69,6 +74,8 @@ class UploadStore {
 
  private:
   std::filesystem::path PartPath(const UploadName& name) const;
+  // With the mutex held: what is on the disk of an upload that nobody writes.
+  void CountOnDisk(const std::string& part);
 
   std::filesystem::path folder_;
   BlobStore& blobs_;
@@ -76,6 +83,8 @@ class UploadStore {
   StaleFiles stale_;
   std::mutex mutex_;
   std::map<std::string, std::weak_ptr<Writer::Session>> sessions_;
+  // By owner and file: what is announced of uploads that are being written, else what is there.
+  std::map<std::string, std::map<std::string, int64_t>> bytes_;
 };
 
 }  // namespace color3d

@@ -72,6 +72,38 @@ TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
   EXPECT_EQ(uploads_.CommittedSize(name), 0);
 }
 
+// What is announced counts while it comes, what is left of it afterwards, also over a restart.
+TEST_F(UploadStoreTest, WhatAnOwnerHasUnderWayIsCounted) {
+  const UploadName abc{"u1", DigestOf("abc"), "attic"}, de{"u2", DigestOf("de"), "attic"};
+  int64_t seen = -1;
+  const auto look = [&](UploadStore& uploads, const std::string& owner = "attic") {
+    uploads.Open({"look", DigestOf(""), owner}, 0, [&](int64_t bytes) { seen = bytes; });
+    return seen;
+  };
+  const auto refuse = [](int64_t) {
+    throw ServiceError(ErrorCode::kResourceExhausted, "TOO_MUCH", "no");
+  };
+  auto first = uploads_.Open(abc, 0), second = uploads_.Open(de, 0);
+  EXPECT_EQ(look(uploads_), 5);
+  EXPECT_EQ(look(uploads_, "cellar"), 0);
+  EXPECT_EQ(ReasonThrown([&] {
+              uploads_.Open({"u3", DigestOf("x"), "attic"}, 0, refuse);
+            }),
+            "TOO_MUCH");
+  EXPECT_EQ(look(uploads_), 5) << "what was refused takes nothing";
+  first->Append(0, "a");
+  first.reset();
+  EXPECT_EQ(look(uploads_), 1 + 2);
+  UploadStore again(scratch_.path() / "uploads", blobs_, 1000);
+  EXPECT_EQ(look(again), 1);
+  second->Append(0, "de");
+  second->Finish();
+  second.reset();
+  EXPECT_EQ(look(uploads_), 1) << "it is a blob now";
+  first = uploads_.Open(abc, 1);
+  EXPECT_EQ(look(uploads_), 3);
+}
+
 TEST_F(UploadStoreTest, EmptyBlobs) {
   const UploadName name{"u", DigestOf("")};
   uploads_.Open(name, 0)->Finish();

@@ -18,8 +18,15 @@ class ColorizeStream final
     : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>,
       public std::enable_shared_from_this<ColorizeStream> {
  public:
-  ColorizeStream(ColorizeHub& hub, grpc::CallbackServerContext* context, ProjectStore store)
-      : hub_(hub), parts_(hub.parts_), store_(std::move(store)), deadline_(context->deadline()) {}
+  ColorizeStream(ColorizeHub& hub,
+                 grpc::CallbackServerContext* context,
+                 ProjectStore store,
+                 StreamLimit::Place place)
+      : hub_(hub),
+        parts_(hub.parts_),
+        store_(std::move(store)),
+        place_(std::move(place)),
+        deadline_(context->deadline()) {}
 
   // Takes no more pictures, answers those that are here, then ends with `status`.
   void End(const grpc::Status& status) {
@@ -161,7 +168,10 @@ class ColorizeStream final
     if (answer.image_sha256().empty()) return grpc::Status::OK;
     const FileDigest blob{answer.image_sha256(), answer.image_size_bytes()};
     *response.mutable_image_digest() = ToProto(blob);
-    return Guard([&] { store_.HoldBlob(blob); });
+    return Guard([&] {
+      RequireQuota(parts_, store_, blob.size_bytes);
+      store_.HoldBlob(blob);
+    });
   }
 
   // Nobody reads any more: what is under way is cancelled, what is done is thrown away.
@@ -182,6 +192,7 @@ class ColorizeStream final
   ColorizeHub& hub_;
   const RpcParts& parts_;
   const ProjectStore store_;
+  const StreamLimit::Place place_;
   const std::chrono::system_clock::time_point deadline_;
   v1::ColorizeImagesRequest incoming_;
   v1::ColorizeImagesResponse outgoing_;
@@ -223,17 +234,19 @@ ColorizeHub::ColorizeHub(const RpcParts& parts, InferenceLink link, ColorizeLimi
 grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* ColorizeHub::Open(
     grpc::CallbackServerContext* context) {
   std::optional<Call> call;
-  const grpc::Status allowed = Guard([&] { call = Admit(parts_, Role::kSubmit, *context); });
+  StreamLimit::Place place;
+  const grpc::Status allowed = Guard([&] {
+    call = Admit(parts_, Role::kSubmit, *context);
+    place = parts_.streams.live.Take(call->caller.project);
+  });
   if (!allowed.ok()) return new RefusedStream(allowed);
   if (!client_.available()) return new RefusedStream(NoWorkerStatus());
   client_.WarmUp();
-  const auto stream = std::make_shared<ColorizeStream>(*this, context, call->store);
+  const auto stream =
+      std::make_shared<ColorizeStream>(*this, context, call->store, std::move(place));
   {
     std::lock_guard lock(mutex_);
     if (draining_) return new RefusedStream(DrainingStatus());
-    if (streams_.size() >= static_cast<size_t>(limits_.max_streams)) {
-      return new RefusedStream(OverloadedStatus());
-    }
     streams_.insert(stream);
   }
   stream->Pump();

@@ -18,7 +18,7 @@ class ColorizeStream;
 
 struct ColorizeLimits {
   int window = 16;         // pictures of one stream that are read and not yet answered
-  int max_streams = 64;    // further ones: UNAVAILABLE (OVERLOADED)
+  int max_streams = 64;    // further ones: RESOURCE_EXHAUSTED (TOO_MANY_STREAMS)
   int max_pictures = 128;  // of all streams; each may have one in any case
 };
 
