@@ -135,6 +135,18 @@ bool Backoff::Wait(const CancellationToken& cancel, milliseconds at_least) {
   return true;
 }
 
+bool FullServerWait::Wait(const RpcError& error, const std::function<bool()>& keep_going) {
+  const auto now = steady_clock::now();
+  if (!error.IsTurnedAway() || now - since_ > kPatienceWithFullServer) return false;
+  connection_.SayWait(error);
+  while (steady_clock::now() < now + error.RetryDelay()) {
+    if (keep_going && !keep_going()) return true;
+    if (!keep_going) connection_.cancel().ThrowIfCancelled();
+    std::this_thread::sleep_for(milliseconds(50));
+  }
+  return true;
+}
+
 bool ServerTarget::UsesTls() const {
   return address.starts_with(kHttps) || !ca.empty() || !certificate.empty() || !key.empty();
 }
@@ -171,10 +183,16 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
   bytes_ = google::bytestream::ByteStream::NewStub(channel_);
 }
 
+void Connection::SayWait(const RpcError& error) const {
+  if (!on_wait_) return;
+  on_wait_(std::string(error.what()) + " (waiting " + std::to_string(error.RetryDelay().count()) +
+           " s)");
+}
+
 void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& call,
                        std::chrono::seconds time_limit) {
   std::optional<Backoff> backoff;  // since the first failure, which may have taken long to be seen
-  Backoff turned_away(kPatienceWithFullServer);
+  FullServerWait turned_away(*this);
   while (true) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + time_limit);
@@ -183,13 +201,7 @@ void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& 
     const RpcError error(status);
     if (!backoff) backoff.emplace();
     if (error.IsTransient() && backoff->Wait(cancel_, error.RetryDelay())) continue;
-    if (error.IsTurnedAway()) {
-      if (on_wait_) {
-        on_wait_(std::string(error.what()) + " (waiting " +
-                 std::to_string(error.RetryDelay().count()) + " s)");
-      }
-      if (turned_away.Wait(cancel_, error.RetryDelay())) continue;
-    }
+    if (turned_away.Wait(error)) continue;
     if (error.grpc_code() == grpc::StatusCode::UNAVAILABLE && error.IsUnreachable()) {
       throw UnreachableError(address_);
     }

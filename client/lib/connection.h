@@ -66,6 +66,8 @@ class Connection {
 
   const std::string& address() const { return address_; }
   const CancellationToken& cancel() const { return cancel_; }
+  // Says that a full server lets us wait, to whoever wants to know.
+  void SayWait(const RpcError& error) const;
 
   v1::SceneService::Stub& scenes() { return *scenes_; }
   v1::JobService::Stub& jobs() { return *jobs_; }
@@ -108,6 +110,23 @@ class Connection {
   std::unique_ptr<v1::AdminService::Stub> admin_;
   std::unique_ptr<v1::ColorizerService::Stub> colorizers_;
   std::unique_ptr<google::bytestream::ByteStream::Stub> bytes_;
+};
+
+// Waits while a server is too full for more, ten minutes at most. The connection outlives it. Not
+// thread-safe.
+class FullServerWait {
+ public:
+  explicit FullServerWait(const Connection& connection) : connection_(connection) { Reset(); }
+  // Something worked: be patient anew.
+  void Reset() { since_ = std::chrono::steady_clock::now(); }
+  // True when it has waited as long as the server asked for, or until `keep_going` said no; false
+  // at once for other errors, and when patience is over. Throws Error{kCancelled} as Backoff,
+  // unless there is a `keep_going`.
+  bool Wait(const RpcError& error, const std::function<bool()>& keep_going = {});
+
+ private:
+  const Connection& connection_;
+  std::chrono::steady_clock::time_point since_;
 };
 
 // "cannot reach a server at ...: start one with ...".

@@ -25,12 +25,14 @@ class Download {
     received_ = fs::exists(part_, none) ? static_cast<int64_t>(fs::file_size(part_, none)) : 0;
     if (received_ > digest_.size_bytes) fs::remove(part_, none), received_ = 0;
     Backoff backoff;
+    FullServerWait turned_away(connection_);
     while (received_ < digest_.size_bytes) {
       connection_.cancel().ThrowIfCancelled();
       const int64_t before = received_;
-      const grpc::Status status = ReceiveRange(progress);
-      if (received_ > before) backoff.Reset();
+      const grpc::Status status = Receive(kRangeBytes, kRangeTimeLimit, progress);
+      if (received_ > before) backoff.Reset(), turned_away.Reset();
       if (status.ok() && received_ > before) continue;
+      if (!status.ok() && turned_away.Wait(RpcError(status))) continue;
       if (!status.ok() && !RpcError(status).IsTransient() &&
           status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) {
         throw RpcError(status);
@@ -39,6 +41,8 @@ class Download {
     }
     if (digest_.size_bytes == 0) std::ofstream(part_, std::ios::binary);
     if (DigestFile(part_).sha256 == digest_.sha256) return;
+    if (digest_.size_bytes > 0) ReceiveWhole(progress);
+    if (fs::exists(part_, none) && DigestFile(part_).sha256 == digest_.sha256) return;
     fs::remove(part_, none);
     throw Error(ErrorCode::kDataLoss,
                 "the bytes received for blob {} do not have this digest; run the command again",
@@ -46,14 +50,29 @@ class Download {
   }
 
  private:
-  grpc::Status ReceiveRange(const std::function<void(int64_t)>& progress) {
+  // Only of what it sends from the first to the last byte the server sees that it is damaged; it
+  // then sets it aside, for the next upload or run to heal. Throws what it says.
+  void ReceiveWhole(const std::function<void(int64_t)>& progress) {
+    std::error_code none;
+    fs::remove(part_, none);
+    received_ = 0;
+    const auto limit = kRangeTimeLimit * (1 + digest_.size_bytes / kRangeBytes);
+    const grpc::Status status = Receive(/*most_bytes=*/0, limit, progress);
+    if (!status.ok()) fs::remove(part_, none);
+    ThrowIfFailed(status);
+  }
+
+  // Goes on where the last one ended; 0 `most_bytes`: to the end.
+  grpc::Status Receive(int64_t most_bytes,
+                       std::chrono::seconds time_limit,
+                       const std::function<void(int64_t)>& progress) {
     std::ofstream output(part_, std::ios::binary | std::ios::app);
     grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + kRangeTimeLimit);
+    context.set_deadline(std::chrono::system_clock::now() + time_limit);
     bs::ReadRequest request;
     request.set_resource_name(BlobResource(digest_));
     request.set_read_offset(received_);
-    request.set_read_limit(std::min(kRangeBytes, digest_.size_bytes - received_));
+    request.set_read_limit(std::min(most_bytes, digest_.size_bytes - received_));
     const auto stream = connection_.bytes().Read(&context, request);
     bs::ReadResponse response;
     while (stream->Read(&response)) {

@@ -32,6 +32,31 @@ TEST_F(DownloadTest, DownloadRefusesOtherBytes) {
   EXPECT_FALSE(fs::exists(target_));
 }
 
+TEST_F(DownloadTest, TheServerIsLedToSeeWhatIsDamaged) {
+  blobs_.blobs[name_] = bytes_;
+  blobs_.corrupt = true;
+  try {
+    Download();
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kDataLoss);
+    EXPECT_STREQ(e.what(), "damaged and set aside");
+  }
+  EXPECT_TRUE(blobs_.blobs.empty());
+  EXPECT_TRUE(fs::is_empty(target_.parent_path()));
+  blobs_.corrupt = false;
+  Upload(bytes_);
+  Download();
+  EXPECT_EQ(ReadFile(target_), bytes_) << "healed";
+}
+
+TEST_F(DownloadTest, DownloadWaitsWhileTheServerIsFull) {
+  blobs_.blobs[name_] = bytes_;
+  blobs_.turned_away = 1;
+  Download();
+  EXPECT_EQ(ReadFile(target_), bytes_);
+}
+
 TEST_F(DownloadTest, DownloadOfAMissingBlobIsNotFound) {
   try {
     Download();

@@ -11,6 +11,8 @@
 #include "client/lib/blob_transfer.h"
 #include "client/lib/job_watch.h"
 #include "core/base/files.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
 
 namespace color3d::client {
 
@@ -18,6 +20,19 @@ namespace bs = google::bytestream;
 
 inline std::string Digits(const std::string& resource) {
   return resource.substr(resource.find("blobs/"));
+}
+
+// "Try again in a second."
+inline grpc::Status TurnedAway() {
+  google::rpc::Status details;
+  details.set_code(grpc::StatusCode::RESOURCE_EXHAUSTED);
+  google::rpc::ErrorInfo info;
+  info.set_reason("TOO_MANY_STREAMS");
+  details.add_details()->PackFrom(info);
+  google::rpc::RetryInfo retry;
+  retry.mutable_retry_delay()->set_seconds(1);
+  details.add_details()->PackFrom(retry);
+  return {grpc::StatusCode::RESOURCE_EXHAUSTED, "too many streams", details.SerializeAsString()};
 }
 
 // Holds blobs by "blobs/{sha}/{size}"; drops every stream but the last after `limit` bytes.
@@ -28,7 +43,8 @@ class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobServi
   int drops = 0;  // streams that still are to be dropped
   size_t limit = 0;
   int writes = 0;
-  bool corrupt = false;
+  bool corrupt = false;  // the first byte is another; seen by who sends a blob whole
+  int turned_away = 0;   // streams that still are to be refused for now
 
   grpc::Status FindMissingBlobs(grpc::ServerContext*,
                                 const v1::FindMissingBlobsRequest* request,
@@ -44,6 +60,7 @@ class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobServi
                      grpc::ServerReader<bs::WriteRequest>* reader,
                      bs::WriteResponse* response) override {
     ++writes;
+    if (turned_away-- > 0) return TurnedAway();
     bs::WriteRequest request;
     std::string name;
     size_t taken = 0;
@@ -76,6 +93,7 @@ class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobServi
   grpc::Status Read(grpc::ServerContext*,
                     const bs::ReadRequest* request,
                     grpc::ServerWriter<bs::ReadResponse>* writer) override {
+    if (turned_away-- > 0) return TurnedAway();
     const auto found = blobs.find(request->resource_name());
     if (found == blobs.end()) return {grpc::StatusCode::NOT_FOUND, "no such blob"};
     std::string bytes = found->second.substr(static_cast<size_t>(request->read_offset()));
@@ -88,6 +106,10 @@ class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobServi
       bs::ReadResponse response;
       response.set_data(bytes.substr(at, 1000));
       writer->Write(response);
+    }
+    if (corrupt && request->read_limit() == 0) {
+      blobs.erase(found);
+      return {grpc::StatusCode::DATA_LOSS, "damaged and set aside"};
     }
     return drop ? grpc::Status(grpc::StatusCode::UNAVAILABLE, "dropped on purpose")
                 : grpc::Status::OK;
