@@ -91,6 +91,7 @@ WatchEnd WatchJobs(Connection& connection,
                    const std::function<void(const v1::JobEvent&)>& on_event,
                    const std::function<bool()>& keep_going) {
   Backoff backoff(kPatience);
+  FullServerWait turned_away(connection);
   const CancellationToken never;
   int64_t revision = 0;
   while (true) {
@@ -111,6 +112,7 @@ WatchEnd WatchJobs(Connection& connection,
       }
       heard = steady_clock::now();
       backoff.Reset();
+      turned_away.Reset();
       newest = std::max(newest, event->revision());
       if (event->has_job()) on_event(*event);
     }
@@ -122,9 +124,14 @@ WatchEnd WatchJobs(Connection& connection,
       revision = 0;  // the events in between are gone: take the present state
       continue;
     }
+    const bool again = turned_away.Wait(error, keep_going);
     // A draining server may be back soon, with the same jobs.
-    if (!error.IsTransient()) throw error;
+    if (!again && !error.IsTransient()) throw error;
     if (!keep_going()) return WatchEnd::kStopped;
+    if (again) {
+      backoff.Reset();
+      continue;
+    }
     if (!backoff.Wait(never)) throw error;
   }
 }

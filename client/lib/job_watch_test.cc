@@ -40,6 +40,16 @@ TEST_F(JobWatchTest, WatchGoesOnWhereTheServerHasEndedTheCallWithItself) {
   EXPECT_THAT(jobs_.asked, ElementsAre(0, 0));
 }
 
+TEST_F(JobWatchTest, WatchWaitsWhileTheServerIsFullUnlessAskedToStop) {
+  jobs_.script = {{{}, TurnedAway()}, {{7}, grpc::Status::OK}, {{}, TurnedAway()}};
+  const auto watch = [&](const std::function<bool()>& keep_going) {
+    return WatchJobs(
+        *connection_, {"jobs/1"}, [](const v1::JobEvent&) {}, keep_going);
+  };
+  EXPECT_EQ(watch([] { return true; }), WatchEnd::kFinished);
+  EXPECT_EQ(watch([&] { return jobs_.asked.size() < 3; }), WatchEnd::kStopped);
+}
+
 TEST_F(JobWatchTest, WatchStartsAnewWhenItsRevisionIsGone) {
   const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
   const grpc::Status gone(grpc::StatusCode::OUT_OF_RANGE, "compacted");

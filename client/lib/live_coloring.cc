@@ -143,12 +143,17 @@ void ColorizeLive(Connection& connection,
   std::set<size_t> pending;
   for (size_t i = 0; i < pictures.size(); ++i) pending.insert(i);
   Backoff backoff;
+  FullServerWait turned_away(connection);
   while (!pending.empty()) {
     const size_t before = pending.size();
     LiveRound round(connection, source, options);
     const grpc::Status status = round.Run(pictures, &pending, on_answer);
+    if (pending.size() < before) backoff.Reset(), turned_away.Reset();
+    if (!status.ok() && turned_away.Wait(RpcError(status))) {
+      backoff.Reset();
+      continue;
+    }
     if (!status.ok() && !RpcError(status).IsTransient()) throw RpcError(status);
-    if (pending.size() < before) backoff.Reset();
     if (pending.empty() || backoff.Wait(connection.cancel())) continue;
     if (!status.ok()) throw RpcError(status);
     throw Error(ErrorCode::kUnavailable,

@@ -50,15 +50,18 @@ class Upload {
 
   void Run(const std::function<void(int64_t committed_bytes)>& progress) {
     Backoff backoff;
+    FullServerWait turned_away(connection_);
     int64_t best = 0;
     while (!complete_) {
       connection_.cancel().ThrowIfCancelled();
       const grpc::Status status = Send(progress);
       if (complete_) return;
-      if (!status.ok()) ThrowIfFinal(status);
-      if (committed_ > best) backoff.Reset();
+      if (committed_ > best) backoff.Reset(), turned_away.Reset();
       best = std::max(best, committed_);
-      if (!backoff.Wait(connection_.cancel())) GiveUp(status);
+      if (status.ok() || !turned_away.Wait(RpcError(status))) {
+        if (!status.ok()) ThrowIfFinal(status);
+        if (!backoff.Wait(connection_.cancel())) GiveUp(status);
+      }
       AskCommitted();
     }
   }

@@ -21,6 +21,13 @@ TEST_F(UploadTest, UploadGoesOnWhereTheConnectionBroke) {
   EXPECT_EQ(blobs_.writes, 3);
 }
 
+TEST_F(UploadTest, UploadWaitsWhileTheServerIsFull) {
+  blobs_.turned_away = 2;
+  Upload(bytes_);
+  EXPECT_EQ(blobs_.blobs[name_], bytes_);
+  EXPECT_EQ(blobs_.writes, 3);
+}
+
 TEST_F(UploadTest, EmptyFilesTravelToo) {
   bytes_.clear();
   digest_ = {Sha256Hex(""), 0};
