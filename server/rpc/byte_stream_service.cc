@@ -26,14 +26,14 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
              const grpc::CallbackServerContext& context,
              const ReadRequest& request)
       : parts_(parts), context_(context), request_(request) {
-    parts_.quick.Post([this] { Step(); });
+    parts_.bulk.Post([this] { Step(); });
   }
   ~BlobReader() override {
     if (fd_ >= 0) ::close(fd_);
   }
   void OnWriteDone(bool ok) override {
     if (!ok) return Finish(grpc::Status::CANCELLED);
-    parts_.quick.Post([this] { Step(); });
+    parts_.bulk.Post([this] { Step(); });
   }
   // Called after Finish and after the last Step, which was what finished.
   void OnDone() override { delete this; }
@@ -139,9 +139,9 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     const grpc::Status fits = Guard([&] {
       if (ok) RequireSmallChunk();
     });
-    if (fits.ok()) return parts_.slow.Post([this, ok] { ok ? Consume() : EndOfStream(); });
+    if (fits.ok()) return parts_.bulk.Post([this, ok] { ok ? Consume() : EndOfStream(); });
     WriteRequest().Swap(&request_);
-    parts_.slow.Post([this, fits] { End(fits); });
+    parts_.bulk.Post([this, fits] { End(fits); });
   }
   void OnDone() override { delete this; }
 

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <deque>
 #include <fstream>
+#include <thread>
 
 #include "tests/support/service/rpc_fixture.h"
 
@@ -101,6 +104,50 @@ TEST_F(ByteStreamServiceTest, DamagedBlobsAreSaidToBeAndHealed) {
   EXPECT_EQ(read(), "BLOB_MISSING");
   client_->Upload(content);
   EXPECT_EQ(client_->Download(digest), content);
+}
+
+// A disk that does not answer those who transfer keeps nobody else waiting.
+TEST_F(ByteStreamServiceTest, TransfersKeepNoOtherCallWaiting) {
+  constexpr int kTransfers = 12;
+  class HangingBlobs : public FileBlobStore {
+   public:
+    using FileBlobStore::FileBlobStore;
+    std::filesystem::path Fetch(const std::string& sha256) const override {
+      while (!released) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      return FileBlobStore::Fetch(sha256);
+    }
+    std::atomic<bool> released{false};
+  };
+  HangingBlobs hanging(scratch_.path() / "blobs", BlobStoreOptions{0});
+  RpcServerOptions options;
+  options.listen = "127.0.0.1:0";
+  RpcServer server(options, store_, hanging, uploads_, SystemClock());
+  TestClient client(server.address());
+  const std::string scene = client_->MakeScene().name();
+  const v1::Digest digest = client_->Upload("0123456789");
+  std::deque<grpc::ClientContext> contexts(kTransfers);
+  std::vector<std::unique_ptr<grpc::ClientReader<google::bytestream::ReadResponse>>> reads;
+  google::bytestream::ReadRequest request;
+  request.set_resource_name("blobs/" + digest.sha256() + "/10");
+  for (grpc::ClientContext& context : contexts) {
+    reads.push_back(client.bytes->Read(&context, request));
+  }
+  for (int i = 0; i < 500 && server.open().downloads < options.bulk_threads; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
+  v1::GetSceneRequest get;
+  get.set_name(scene);
+  v1::Scene got;
+  EXPECT_TRUE(client.scenes->GetScene(&context, get, &got).ok());
+  hanging.released = true;
+  google::bytestream::ReadResponse response;
+  for (const auto& read : reads) {
+    EXPECT_TRUE(read->Read(&response));
+    EXPECT_FALSE(read->Read(&response));
+    EXPECT_TRUE(read->Finish().ok());
+  }
 }
 
 }  // namespace

@@ -19,14 +19,6 @@
 namespace color3d {
 namespace {
 
-void RequireNotDraining(const RpcParts& parts) {
-  if (!parts.draining.load()) return;
-  throw ServiceError(
-      ErrorCode::kUnavailable,
-      "DRAINING",
-      "the server is shutting down and takes no new jobs; try again when it is back");
-}
-
 // Whoever asks for work hears at once what would keep it waiting for a long time.
 void RequireRoomOnDisk(const RpcParts& parts, const ProjectStore& store) {
   RequireQuota(parts, store, 0);

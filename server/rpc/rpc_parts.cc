@@ -37,6 +37,14 @@ Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& 
               : TraceIdOf({trace->second.data(), trace->second.size()})};
 }
 
+void RequireNotDraining(const RpcParts& parts) {
+  if (!parts.draining.load()) return;
+  throw ServiceError(
+      ErrorCode::kUnavailable,
+      "DRAINING",
+      "the server is shutting down and takes no new jobs; try again when it is back");
+}
+
 bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest& blob) {
   return store.HoldsBlob(blob) && parts.blobs.Touch(blob);
 }

@@ -71,6 +71,7 @@ struct RpcParts {
   UploadStore& uploads;
   Executor& quick;  // reads of the job store and of the disk's cache: what answers GetJob
   Executor& slow;   // what hashes, syncs, writes or asks others
+  Executor& bulk;   // blobs on their way: down- and uploads, of which one may hash 8 GiB
   StreamLimits& streams;
   CallMemory& memory;
   const Access& access;
@@ -95,6 +96,8 @@ struct Call {
 // Throws as Access::Require.
 Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context);
 
+// Throws DRAINING.
+void RequireNotDraining(const RpcParts& parts);
 // Whether the project holds the blob and it is there; it then stays for the time of grace.
 bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest& blob);
 // Throws QUOTA_EXCEEDED where the project would have more bytes than it may.

@@ -81,6 +81,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   digests_ = std::make_unique<FileDigests>();
   quick_ = std::make_unique<Executor>(options.quick_threads);
   slow_ = std::make_unique<Executor>(options.slow_threads);
+  bulk_ = std::make_unique<Executor>(options.bulk_threads);
   const int of_project = options.limits.project_max_streams;
   streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project},
                                   {"downloads", options.limits.max_reads, of_project},
@@ -93,6 +94,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             uploads,
                             *quick_,
                             *slow_,
+                            *bulk_,
                             *streams_,
                             *memory_,
                             *access_,
@@ -176,6 +178,7 @@ void RpcServer::Shutdown(std::chrono::milliseconds grace) {
   hub_.reset();  // its streams are all done now
   quick_.reset();
   slow_.reset();
+  bulk_.reset();
 }
 
 }  // namespace color3d

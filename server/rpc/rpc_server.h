@@ -21,6 +21,7 @@ struct RpcServerOptions {
   std::string listen = "127.0.0.1:50551";  // port 0: any free one
   int quick_threads = 4;
   int slow_threads = 6;
+  int bulk_threads = 6;
   std::shared_ptr<grpc::ServerCredentials> credentials;  // null: in the clear
   std::shared_ptr<TokenBook> tokens;                     // null: nobody is asked
   ServiceLimits limits;
@@ -66,7 +67,7 @@ class RpcServer {
   std::string address_;
   std::atomic<bool> draining_{false};
   std::unique_ptr<FileDigests> digests_;
-  std::unique_ptr<Executor> quick_, slow_;
+  std::unique_ptr<Executor> quick_, slow_, bulk_;
   std::unique_ptr<StreamLimits> streams_;
   std::unique_ptr<CallMemory> memory_;
   std::unique_ptr<Access> access_;
