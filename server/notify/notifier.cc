@@ -89,13 +89,12 @@ std::optional<Notification> Notifier::TakeDue() {
 
 void Notifier::Deliver(const Notification& due) {
   const JobRecord job = store_.GetJob(due.job);
-  const int64_t now = clock_();
   WebhookAnswer answer;
   try {
     CheckNotifyUrl(due.url, options_.allowed);
     const WebhookMessage message{due.url,
                                  fmt::format("{}-{}", due.job.substr(5), due.first_ms),
-                                 now / 1000,
+                                 clock_() / 1000,
                                  NotificationBody(job)};
     answer = SendWebhook(message, options_.secret, stopping_);
   } catch (const Error& e) {
@@ -105,7 +104,7 @@ void Notifier::Deliver(const Notification& due) {
   const bool delivered = answer.status >= 200 && answer.status < 300;
   const std::string how =
       answer.status != 0 ? fmt::format("HTTP status {}", answer.status) : answer.problem;
-  if (delivered || answer.status == kGone || now - due.first_ms > options_.give_up.count()) {
+  if (delivered || answer.status == kGone || due.tries + 1 >= options_.max_tries) {
     store_.EndNotification(due.job_id);
     spdlog::log(delivered ? spdlog::level::info : spdlog::level::warn,
                 "[job={}] word of its end {} {} ({})",

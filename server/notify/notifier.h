@@ -25,7 +25,7 @@ struct NotifierOptions {
                                                    std::chrono::minutes(2),
                                                    std::chrono::minutes(10),
                                                    std::chrono::minutes(30)};
-  std::chrono::milliseconds give_up = std::chrono::hours(24);  // after the job's end
+  int max_tries = 52;  // with these pauses, a day
   int at_once = 4;
 };
 
