@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <vector>
 
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
@@ -23,12 +24,24 @@ namespace {
 
 constexpr int64_t kMaxTransformsBytes = int64_t{64} << 20;  // 10,000 photos need about 10
 
+// Reads it all. Mapped, what a disk does not give would be a signal that ends the server.
+bool IsReadable(int fd, size_t size) {
+  std::vector<char> piece(std::min<size_t>(size, 1 << 20));
+  for (size_t at = 0; at < size;) {
+    const ssize_t got = ::pread(fd, piece.data(), piece.size(), static_cast<off_t>(at));
+    if (got <= 0) return false;
+    at += static_cast<size_t>(got);
+  }
+  return true;
+}
+
 // A file's bytes mapped read-only: pages come and go, the heap does not grow.
 class MappedFile {
  public:
   MappedFile(const fs::path& path, int64_t size) : size_(static_cast<size_t>(size)) {
     const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (fd >= 0 && size_ > 0) data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, fd, 0);
+    is_readable_ = fd >= 0 && IsReadable(fd, size_);
+    if (is_readable_ && size_ > 0) data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, fd, 0);
     if (fd >= 0) ::close(fd);
   }
   ~MappedFile() {
@@ -36,6 +49,7 @@ class MappedFile {
   }
   MappedFile(const MappedFile&) = delete;
   MappedFile& operator=(const MappedFile&) = delete;
+  bool is_readable() const { return is_readable_; }
   std::string_view bytes() const {
     if (data_ == MAP_FAILED) return {};
     return {static_cast<const char*>(data_), size_};
@@ -43,6 +57,7 @@ class MappedFile {
 
  private:
   void* data_ = MAP_FAILED;
+  bool is_readable_ = false;
   size_t size_;
 };
 
@@ -150,6 +165,10 @@ void CheckFile(const SceneFileRecord& file,
   }
   if (!is_photo && !is_transforms) return;
   const MappedFile mapped(blobs.Fetch(file.digest.sha256), file.digest.size_bytes);
+  if (!mapped.is_readable()) {
+    violations->push_back({file.path, "cannot be read from the server's disk; upload it again"});
+    return;
+  }
   if (is_transforms) return CheckTransforms(file.path, mapped.bytes(), violations);
   try {
     ImageLimits image_limits;

@@ -1,3 +1,5 @@
+#include "server/rpc/scene_validation.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,6 +32,31 @@ TEST_F(SceneValidationTest, CommitChecksEveryFile) {
             grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(Commit({{"a", "1"}, {"a/b", "2"}}, &scene).error_code(),
             grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+// What a disk does not give is said; mapped, it would end the server.
+TEST_F(SceneValidationTest, APhotoThatCannotBeReadIsNamed) {
+  class LossyBlobs : public FileBlobStore {
+   public:
+    using FileBlobStore::FileBlobStore;
+    bool Touch(const FileDigest&) const override { return true; }  // it was whole a moment ago
+  };
+  const LossyBlobs lossy(scratch_.path() / "blobs", BlobStoreOptions{0});
+  const FileDigest blob = blobs_.PutBytes(TinyPng());
+  const auto file = blobs_.Fetch(blob.sha256);
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  std::filesystem::resize_file(file, 0);
+  const ProjectStore store(store_, "");
+  store.HoldBlob(blob);
+  SceneRecord scene;
+  scene.name = "scenes/test";
+  scene.files = {{"a.png", blob}};
+  try {
+    CheckScene(scene, lossy, store, {});
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("a.png cannot be read"));
+  }
 }
 
 TEST_F(SceneValidationTest, ManyBadFilesFitIntoTheStatus) {

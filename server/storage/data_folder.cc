@@ -20,7 +20,7 @@ void PrepareDataFolder(const DataPaths& paths) {
   const bool is_fresh = !fs::exists(paths.root, error);
   for (const fs::path& folder :
        {paths.root, paths.Blobs(), paths.Uploads(), paths.Scratch(), paths.JobLogs()}) {
-    fs::create_directories(folder, error);
+    if (fs::create_directories(folder, error)) SyncFolder(folder.parent_path());
     if (error || !fs::is_directory(folder)) {
       throw Error(ErrorCode::kFailedPrecondition,
                   "cannot create the data directory {}: {}; choose another --data-dir or change "
