@@ -15,10 +15,15 @@ namespace fs = std::filesystem;
 void ExpireDeadWorkers(JobStore& store) {
   for (const WorkerRecord& worker : store.ListWorkers()) {
     if (::kill(static_cast<pid_t>(worker.pid), 0) == 0 || errno != ESRCH) continue;
-    for (const std::string& job : store.ExpireLeasesOf(worker.worker_id)) {
-      spdlog::info("[job={}] its worker {} is gone", job, worker.worker_id);
+    try {
+      for (const std::string& job : store.ExpireLeasesOf(worker.worker_id)) {
+        spdlog::info("[job={}] its worker {} is gone", job, worker.worker_id);
+      }
+      store.RemoveWorker(worker.worker_id);
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::kResourceExhausted) throw;
+      spdlog::error("{} is gone, its leases run out by themselves: {}", worker.worker_id, e.what());
     }
-    store.RemoveWorker(worker.worker_id);
   }
 }
 
@@ -86,11 +91,13 @@ void Maintenance::Repeat(const std::function<std::chrono::milliseconds()>& chore
 
 std::chrono::milliseconds Maintenance::Reap() {
   try {
+    // What can be read can be answered, though the disk may be full.
+    store_.NewestRevision();
+    if (timing_.on_life) timing_.on_life();
     const int reaped = store_.ReapExpired();
     counts_.attempts_lost += reaped;
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
     HoldBackWhenSpaceIsLow();
-    if (timing_.on_leases) timing_.on_leases();
   } catch (const std::exception& e) {
     spdlog::error("cannot look after leases: {}", e.what());
   }
@@ -142,7 +149,8 @@ std::chrono::milliseconds Maintenance::Sweep() {
 
 void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
   if (IsStopping()) return;
-  const size_t removed = RemoveDue(store_, blobs_, DueBlobs(store_, blobs, timing_.grace)).size();
+  const std::vector<StoredBlob> due = DueBlobs(store_, blobs, timing_.grace);
+  const size_t removed = RemoveDue(store_, blobs_, due, [this] { return IsStopping(); }).size();
   counts_.blobs_removed += static_cast<int64_t>(removed);
   const int leftovers = blobs_.RemoveLeftovers(timing_.grace);
   if (removed + static_cast<size_t>(leftovers) > 0) {
@@ -154,7 +162,18 @@ void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
 void Maintenance::ExpireJobs() {
   if (timing_.keep_jobs.count() == 0) return;
   const std::chrono::milliseconds age = timing_.keep_jobs, grace = timing_.grace;
-  for (const std::string& name : store_.AgeExpired(clock_() - age.count(), grace.count())) {
+  const int64_t before = clock_() - age.count();
+  for (const std::string& scene : store_.AgeUnusedScenes(before, grace.count())) {
+    if (IsStopping()) return;
+    try {
+      store_.DeleteScene(scene, {});
+      spdlog::info("{} was old, without a job, and is deleted", scene);
+    } catch (const Error& e) {
+      // Used or deleted meanwhile.
+      if (e.code() != ErrorCode::kFailedPrecondition && e.code() != ErrorCode::kNotFound) throw;
+    }
+  }
+  for (const std::string& name : store_.AgeExpired(before, grace.count())) {
     if (IsStopping()) return;
     try {
       const std::string scene = store_.GetJob(name).scene;

@@ -28,7 +28,7 @@ struct MaintenanceTiming {
   std::chrono::hours keep_jobs{0};  // after their end, unless pinned; 0: for ever
   int64_t low_space_bytes = 0;      // free; below it no job is begun, until there is a tenth more
   int64_t scrub_bytes = int64_t{2} << 30;  // read and compared with their digests at each sweep
-  std::function<void()> on_leases = {};    // called whenever leases have been looked after
+  std::function<void()> on_life = {};      // called at each `reap` when the store could be read
 };
 
 // Blobs whose bytes are no longer those of their digest are set aside, so that an upload or another

@@ -5,7 +5,9 @@
 
 #include <fstream>
 #include <functional>
+#include <limits>
 
+#include "server/storage/collector.h"
 #include "server/storage/file_blob_store.h"
 #include "tests/support/service/job_store_fixture.h"
 
@@ -57,6 +59,24 @@ TEST_F(MaintenanceTest, WhatNothingNamesGoesAfterItsTimeByTheSteadyClock) {
   now_ += int64_t{25} * 3600 * 1000;
   RunUntil([&] { return ReasonThrown([&] { blobs_.Fetch(orphan.sha256); }) == "BLOB_MISSING"; });
   EXPECT_TRUE(fs::exists(blobs_.Fetch(named.sha256)));
+}
+
+TEST_F(MaintenanceTest, WhoeverOnlyLooksNotesNothing) {
+  blobs_.PutBytes("orphan");
+  const auto never = [] { return false; };
+  const auto due = [&](auto look) {
+    return look(*store_, ListBlobs(blobs_, never), milliseconds(10));
+  };
+  EXPECT_TRUE(due(DueBlobsSoFar).empty());
+  now_ += 10;
+  EXPECT_TRUE(due(DueBlobs).empty()) << "noted now, for the first time";
+  now_ += 10;
+  EXPECT_TRUE(due(DueBlobsSoFar).empty()) << "as of the last sweep";
+  EXPECT_EQ(due(DueBlobs).size(), 1u);
+  EXPECT_EQ(due(DueBlobsSoFar).size(), 1u);
+  const auto at_once = [] { return true; };
+  EXPECT_TRUE(RemoveDue(*store_, blobs_, due(DueBlobs), at_once).empty());
+  EXPECT_EQ(RemoveDue(*store_, blobs_, due(DueBlobs), never).size(), 1u);
 }
 
 TEST_F(MaintenanceTest, WhatIsTouchedBeginsItsTimeAnew) {
@@ -139,6 +159,33 @@ TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
   EXPECT_EQ(found, std::vector<std::string>{all[7].sha256});
   EXPECT_FALSE(blobs_.Touch(all[7]));
   EXPECT_EQ(scrubber.Scrub(ListBlobs(blobs_, go_on), 1000, [] { return true; }).bytes, 0);
+}
+
+class FullStore : public SqliteJobStore {
+ public:
+  using SqliteJobStore::SqliteJobStore;
+  int ReapExpired() override { throw Full(); }
+  std::vector<std::string> ExpireLeasesOf(const std::string&) override { throw Full(); }
+
+ private:
+  static Error Full() {
+    return ServiceError(ErrorCode::kResourceExhausted, "STORAGE_FULL", "full");
+  }
+};
+
+TEST_F(MaintenanceTest, AServerOnAFullDiskLivesAndStarts) {
+  store_->UpdateWorker({"gone", std::numeric_limits<int32_t>::max(), "", 0, 0});
+  StoreOptions options;
+  options.boot_id = boot_id_;
+  FullStore full(File(), StoreRole::kServer, TestClocks(), options);
+  EXPECT_NO_THROW(ExpireDeadWorkers(full)) << "leases run out by themselves";
+  std::atomic<int> lives{0};
+  MaintenanceTiming timing = Quick();
+  timing.on_life = [&] { ++lives; };
+  Maintenance chores(
+      full, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
+  for (int i = 0; i < 1000 && lives < 3; ++i) std::this_thread::sleep_for(milliseconds(5));
+  EXPECT_GE(lives, 3) << "systemd's watchdog would have ended a server that answers";
 }
 
 // A sweep that hangs keeps no lost job from going on.

@@ -277,7 +277,7 @@ void Serve(const ServeOptions& options) {
   // No sign of life while the store cannot be read: systemd's watchdog then starts us anew.
   chores.keep_jobs = std::chrono::hours(24) * options.keep_days;
   chores.low_space_bytes = options.low_space_mib << 20;
-  chores.on_leases = [] { NotifyServiceManager("WATCHDOG=1"); };
+  chores.on_life = [] { NotifyServiceManager("WATCHDOG=1"); };
   Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
   std::optional<Notifier> notifier;
   if (!options.notify_allow.empty()) notifier.emplace(store, clock, notify);

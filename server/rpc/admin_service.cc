@@ -35,14 +35,17 @@ void CollectNow(const RpcParts& parts,
                           grace,
                           kLeastGraceSeconds);
   }
-  const auto never = [] { return false; };
-  const std::vector<StoredBlob> due =
-      DueBlobs(parts.store, ListBlobs(parts.blobs, never), std::chrono::seconds(grace));
+  const auto stop = [&parts] { return parts.draining.load(); };
+  const std::vector<StoredBlob> blobs = ListBlobs(parts.blobs, stop);
+  RequireNotDraining(parts);
   std::vector<FileDigest> gone;
   if (request.dry_run()) {
-    for (const StoredBlob& blob : due) gone.push_back(blob.digest);
+    for (const StoredBlob& blob : DueBlobsSoFar(parts.store, blobs, std::chrono::seconds(grace))) {
+      gone.push_back(blob.digest);
+    }
   } else {
-    gone = RemoveDue(parts.store, parts.blobs, due);
+    const auto due = DueBlobs(parts.store, blobs, std::chrono::seconds(grace));
+    gone = RemoveDue(parts.store, parts.blobs, due, stop);
   }
   response->set_blobs(static_cast<int>(gone.size()));
   int64_t bytes = 0;

@@ -5,30 +5,55 @@
 
 namespace color3d {
 
+namespace {
+
+std::map<std::string, StoredBlob> Unnamed(JobStore& store, const std::vector<StoredBlob>& blobs) {
+  const std::set<std::string> named = store.ReferencedBlobs();
+  std::map<std::string, StoredBlob> unnamed;
+  for (const StoredBlob& blob : blobs) {
+    if (!named.contains(blob.digest.sha256)) unnamed[blob.digest.sha256] = blob;
+  }
+  return unnamed;
+}
+
+// Candidates that are still what they were.
+std::vector<StoredBlob> StillUnnamed(const std::map<std::string, StoredBlob>& unnamed,
+                                     const std::vector<BlobCandidate>& candidates) {
+  std::vector<StoredBlob> due;
+  for (const BlobCandidate& candidate : candidates) {
+    const auto blob = unnamed.find(candidate.sha256);
+    if (blob != unnamed.end() && blob->second.touched_ns == candidate.touched_ns) {
+      due.push_back(blob->second);
+    }
+  }
+  return due;
+}
+
+}  // namespace
+
 std::vector<StoredBlob> DueBlobs(JobStore& store,
                                  const std::vector<StoredBlob>& blobs,
                                  std::chrono::milliseconds grace) {
-  const std::set<std::string> named = store.ReferencedBlobs();
-  std::vector<BlobCandidate> unnamed;
-  std::map<std::string, int64_t> sizes;
-  for (const StoredBlob& blob : blobs) {
-    if (named.contains(blob.digest.sha256)) continue;
-    unnamed.push_back({blob.digest.sha256, blob.touched_ns});
-    sizes[blob.digest.sha256] = blob.digest.size_bytes;
-  }
-  std::vector<StoredBlob> due;
-  for (const BlobCandidate& candidate : store.AgeCandidates(unnamed, grace.count())) {
-    due.push_back({{candidate.sha256, sizes[candidate.sha256]}, candidate.touched_ns});
-  }
-  return due;
+  const std::map<std::string, StoredBlob> unnamed = Unnamed(store, blobs);
+  std::vector<BlobCandidate> told;
+  for (const auto& [sha256, blob] : unnamed) told.push_back({sha256, blob.touched_ns});
+  return StillUnnamed(unnamed, store.AgeCandidates(told, grace.count()));
+}
+
+std::vector<StoredBlob> DueBlobsSoFar(JobStore& store,
+                                      const std::vector<StoredBlob>& blobs,
+                                      std::chrono::milliseconds grace) {
+  return StillUnnamed(Unnamed(store, blobs), store.AgedCandidates(grace.count()));
 }
 
 // Whoever puts or looks for a blob touches it, before he names it.
 std::vector<FileDigest> RemoveDue(JobStore& store,
                                   BlobStore& blobs,
-                                  const std::vector<StoredBlob>& due) {
+                                  const std::vector<StoredBlob>& due,
+                                  const std::function<bool()>& stop) {
   std::vector<FileDigest> removed;
   for (const StoredBlob& blob : due) {
+    if (stop()) break;
     if (store.IsReferenced(blob.digest.sha256) || !blobs.RemoveIfUntouched(blob)) continue;
     store.ForgetBlob(blob.digest.sha256);
     removed.push_back(blob.digest);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <vector>
 
 #include "server/storage/blob_store.h"
@@ -15,9 +16,15 @@ std::vector<StoredBlob> DueBlobs(JobStore& store,
                                  const std::vector<StoredBlob>& blobs,
                                  std::chrono::milliseconds grace);
 
-// Those of `due` that were removed: still unnamed and untouched.
+// The same by what was noted before, without another note.
+std::vector<StoredBlob> DueBlobsSoFar(JobStore& store,
+                                      const std::vector<StoredBlob>& blobs,
+                                      std::chrono::milliseconds grace);
+
+// Those of `due` that were removed: still unnamed and untouched. `stop` is asked between them.
 std::vector<FileDigest> RemoveDue(JobStore& store,
                                   BlobStore& blobs,
-                                  const std::vector<StoredBlob>& due);
+                                  const std::vector<StoredBlob>& due,
+                                  const std::function<bool()>& stop);
 
 }  // namespace color3d

@@ -225,6 +225,8 @@ class JobStore {
   virtual std::vector<std::string> ExpireLeasesOf(const std::string& worker) = 0;
   // Whether somebody keeps all others from writing for as long as this looks, about a second.
   virtual bool IsHeld() = 0;
+  // Whether writes are refused because the disk is full.
+  virtual bool IsFull() = 0;
   virtual void UpdateWorker(const WorkerRecord& worker) = 0;
   virtual void RemoveWorker(const std::string& worker_id) = 0;
   virtual std::vector<WorkerRecord> ListWorkers() = 0;
@@ -252,10 +254,10 @@ class JobStore {
   // Those of the blobs that it may read.
   virtual std::set<std::string> HeldBlobs(const std::string& project,
                                           const std::vector<std::string>& sha256) = 0;
-  // The blob is gone: nobody holds it any more.
+  // The blob is gone: nobody holds it any more, unless a job or scene names it by now.
   virtual void ForgetBlob(const std::string& sha256) = 0;
 
-  // Notifications.
+  // Notifications. A pause is an hour at most.
   virtual std::vector<Notification> DueNotifications(int limit) = 0;
   // Delivered or given up.
   virtual void EndNotification(int64_t job_id) = 0;
@@ -277,9 +279,11 @@ class JobStore {
   // this time, are not pinned and are read by no unfinished job, and forgets those that are no
   // longer so. Returns the ones noted for `grace_ms` by the steady clock.
   virtual std::vector<std::string> AgeExpired(int64_t ended_before_ms, int64_t grace_ms) = 0;
-  // Active scenes of before this time of which no job is left.
-  virtual std::vector<std::string> ScenesWithoutJobs(int64_t committed_before_ms) = 0;
-  // Deletes events and request ids that ended before the given time.
+  // The same for scenes, also uploading ones, that were made and committed before this time and
+  // have no job.
+  virtual std::vector<std::string> AgeUnusedScenes(int64_t before_ms, int64_t grace_ms) = 0;
+  // Deletes events of finished jobs from before the given time, and request ids from before theirs,
+  // as it was told at a call a day ago by the steady clock, too.
   virtual void Compact(int64_t events_before_ms, int64_t requests_before_ms) = 0;
   // Digests of artifacts, scene files, checkpoints and of blobs that specs name.
   virtual std::set<std::string> ReferencedBlobs() = 0;
@@ -289,6 +293,8 @@ class JobStore {
   // for `grace_ms` by the steady clock since they were first told.
   virtual std::vector<BlobCandidate> AgeCandidates(const std::vector<BlobCandidate>& unnamed,
                                                    int64_t grace_ms) = 0;
+  // Those that it would return by what it has taken note of so far; writes nothing.
+  virtual std::vector<BlobCandidate> AgedCandidates(int64_t grace_ms) = 0;
   // Epoch of the job's present lease; 0 when it is not running or does not exist.
   virtual int64_t RunningEpoch(const std::string& job_name) = 0;
 };

@@ -106,10 +106,13 @@ TEST_F(ProjectStoreTest, ABlobIsForThoseWhoBroughtOrMadeIt) {
   a_.Delete(job.name, {});
   EXPECT_FALSE(a_.HoldsBlob(result));
   EXPECT_TRUE(a_.HoldsBlob(photo)) << "the scene names it";
+  store_->ForgetBlob(photo.sha256);
+  EXPECT_TRUE(a_.HoldsBlob(photo)) << "somebody has stored and named it again";
   a_.DeleteScene("scenes/house", {});
   EXPECT_EQ(a_.Usage().stored_bytes, 0);
-  b_.HoldBlob(photo);
-  store_->ForgetBlob(photo.sha256);
+  const FileDigest unnamed{Sha256Hex("unnamed"), 7};
+  b_.HoldBlob(unnamed);
+  store_->ForgetBlob(unnamed.sha256);
   EXPECT_EQ(b_.Usage().stored_bytes, 0);
 }
 

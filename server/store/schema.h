@@ -4,7 +4,7 @@
 
 namespace color3d {
 
-constexpr int kSchemaVersion = 4;
+constexpr int kSchemaVersion = 5;
 
 // Since version 4. A project holds the blobs that it uploaded and that its jobs left.
 #define COLOR3D_PROJECT_TABLES                                                                  \
@@ -53,7 +53,11 @@ constexpr const char* kMigrations[kSchemaVersion - 1] = {
     "pinned=0;" COLOR3D_PROJECT_TABLES
     "insert or ignore into blob_holding select '', sha256, size_bytes from artifact;"
     "insert or ignore into blob_holding select '', sha256, size_bytes from scene_file;"
-    "insert or ignore into blob_holding select '', sha256, 0 from job_blob;"};
+    "insert or ignore into blob_holding select '', sha256, 0 from job_blob;",
+    "create index request_id_age on request_id(at_ms);"
+    "alter table scene add column unused_age_ms integer not null default -1;"
+    "insert into meta values('requests_steady_ms', 0), ('requests_age_ms', 0), "
+    "('requests_noted_ms', 0), ('scenes_steady_ms', 0)"};
 
 constexpr char kSchema[] = R"sql(
 create table scene(
@@ -62,7 +66,8 @@ create table scene(
   active integer not null default 0, layout integer not null default 0,
   photo_count integer not null default 0,
   create_ms integer not null, commit_ms integer not null default 0,
-  key_color_job text not null default '', project text not null default '');
+  key_color_job text not null default '', project text not null default '',
+  unused_age_ms integer not null default -1);
 create index scene_project on scene(project, scene_id);
 create table scene_file(
   scene_id integer not null references scene on delete cascade,
@@ -147,12 +152,15 @@ create table request_id(
   method text not null, id text not null, body_sha256 text not null,
   resource text not null, at_ms integer not null,
   primary key(method, id)) without rowid;
+create index request_id_age on request_id(at_ms);
 create table worker(
   worker_id text primary key, pid integer not null, job text not null,
   memory_bytes integer not null, heartbeat_ms integer not null) without rowid;
 create table server(id integer primary key check(id=1), version text not null, boot_id text not null);
 create table meta(name text primary key, value integer not null) without rowid;
-insert into meta values('compacted_revision', 0), ('collected_steady_ms', 0);
+insert into meta values('compacted_revision', 0), ('collected_steady_ms', 0),
+  ('requests_steady_ms', 0), ('requests_age_ms', 0), ('requests_noted_ms', 0),
+  ('scenes_steady_ms', 0);
 )sql" COLOR3D_PROJECT_TABLES;
 
 }  // namespace color3d

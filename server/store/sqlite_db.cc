@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-std::atomic<int64_t> g_full_scan_steps{0};
+std::atomic<int64_t> g_steps{0};
 
 [[noreturn]] void ThrowSqlite(sqlite3* db, int code, const std::string& what) {
   const std::string detail = db != nullptr ? sqlite3_errmsg(db) : sqlite3_errstr(code);
@@ -50,7 +50,7 @@ SqliteStatement::SqliteStatement(sqlite3* db, std::string_view sql) : db_(db) {
 
 SqliteStatement::~SqliteStatement() {
   if (statement_ != nullptr) {
-    g_full_scan_steps += sqlite3_stmt_status(statement_, SQLITE_STMTSTATUS_FULLSCAN_STEP, 0);
+    g_steps += sqlite3_stmt_status(statement_, SQLITE_STMTSTATUS_VM_STEP, 0);
   }
   sqlite3_finalize(statement_);
 }
@@ -132,7 +132,7 @@ void SqliteDatabase::Exec(const char* sql) {
   if (code != SQLITE_OK) ThrowSqlite(db_, code, fmt::format("cannot run '{}'", sql));
 }
 
-int64_t SqliteDatabase::FullScanSteps() { return g_full_scan_steps; }
+int64_t SqliteDatabase::Steps() { return g_steps; }
 int64_t SqliteDatabase::LastInsertId() const { return sqlite3_last_insert_rowid(db_); }
 int64_t SqliteDatabase::Changes() const { return sqlite3_changes64(db_); }
 

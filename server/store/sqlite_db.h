@@ -74,8 +74,9 @@ class SqliteDatabase {
   sqlite3* handle() { return db_; }
   int64_t LastInsertId() const;
   int64_t Changes() const;
-  // Rows that all databases' statements have stepped over because there was no index, so far.
-  static int64_t FullScanSteps();
+  // Of SQLite's virtual machine, for all statements of all databases that have ended so far: what
+  // they cost, whatever the machine.
+  static int64_t Steps();
 
  private:
   sqlite3* db_ = nullptr;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "server/service_error.h"
+#include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/store/sqlite_rows.h"
@@ -40,6 +41,16 @@ void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
                        "server's own release",
                        options_.program_version,
                        server.Text(0));
+  }
+  // Builds of one release may differ in that, too.
+  SqliteStatement schema(db.handle(), "select version from schema_version");
+  if (schema.Step() && schema.Int(0) != kSchemaVersion) {
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "WORKER_VERSION",
+                       "this worker's job store has version {}, the server's version {}; start "
+                       "workers of the server's own build",
+                       kSchemaVersion,
+                       schema.Int(0));
   }
 }
 

@@ -1,9 +1,7 @@
-// Opening, reading, idempotency and housekeeping. The state machine is in sqlite_job_state.cc, what
-// workers call in sqlite_job_lease.cc, scenes and colorizers in sqlite_scene.cc.
+// Opening, reading and idempotency. The state machine is in sqlite_job_state.cc, what workers call
+// in sqlite_job_lease.cc, scenes and colorizers in sqlite_scene.cc, chores in sqlite_chores.cc.
 #include "server/store/sqlite_job_store.h"
 
-#include <algorithm>
-#include <thread>
 #include <utility>
 
 #include "server/service_error.h"
@@ -103,7 +101,9 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
   std::string tail = "where job_id < ?";
   if (!filter.parent.empty()) tail += " and parent=?";
   if (!filter.scene.empty()) tail += " and scene=?";
-  if (filter.project) tail += " and project=?";
+  // A parent or a scene has few jobs, a project many: its index is for those who ask for all.
+  const bool is_narrow = !filter.parent.empty() || !filter.scene.empty();
+  if (filter.project) tail += is_narrow ? " and +project=?" : " and project=?";
   SqliteStatement select(db.handle(), SelectJob(tail + " order by job_id desc limit ?"));
   select.Bind(before_id > 0 ? before_id : INT64_MAX);
   if (!filter.parent.empty()) select.Bind(filter.parent);
@@ -263,21 +263,6 @@ JobCounts SqliteJobStore::CountJobs() {
   return {select.Int(0), select.Int(1), select.Int(2), select.Int(3), select.Int(4)};
 }
 
-bool SqliteJobStore::IsHeld() {
-  SqliteDatabase probe(file_, SqliteAccess::kWrite);
-  probe.SetBusyTimeout(std::chrono::milliseconds(0));
-  for (int look = 0; look < 20; ++look) {
-    try {
-      SqliteTransaction transaction(probe);
-      return false;
-    } catch (const Error& e) {
-      if (e.code() != ErrorCode::kUnavailable) throw;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
-  return true;
-}
-
 void SqliteJobStore::UpdateWorker(const WorkerRecord& worker) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
@@ -314,87 +299,6 @@ std::vector<WorkerRecord> SqliteJobStore::ListWorkers() {
         {select.Text(0), select.Int(1), select.Text(2), select.Int(3), select.Int(4)});
   }
   return workers;
-}
-
-void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_ms) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
-  constexpr char kOld[] =
-      "from job_event where at_ms < ? and job_id in (select job_id from job where end_ms <> 0)";
-  SqliteStatement newest(
-      db.handle(), std::string("select coalesce(max(revision), 0) ") + kOld + " and progress=0");
-  newest.Bind(events_before_ms);
-  newest.Step();
-  db.Run("update meta set value=max(value, ?) where name='compacted_revision'", newest.Int(0));
-  db.Run(std::string("delete ") + kOld, events_before_ms);
-  db.Run("delete from request_id where at_ms < ?", requests_before_ms);
-  transaction.Commit();
-}
-
-namespace {
-constexpr char kReferences[] =
-    "select sha256 from artifact union select sha256 from scene_file "
-    "union select sha256 from job_blob "
-    "union select checkpoint_sha256 from job where checkpoint_sha256 <> ''";
-}  // namespace
-
-std::set<std::string> SqliteJobStore::ReferencedBlobs() {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(), kReferences);
-  std::set<std::string> digests;
-  while (select.Step()) digests.insert(select.Text(0));
-  return digests;
-}
-
-bool SqliteJobStore::IsReferenced(const std::string& sha256) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(
-      db.handle(),
-      "select exists(select 1 from artifact where sha256=?1) or "
-      "exists(select 1 from scene_file where sha256=?1) or "
-      "exists(select 1 from job_blob where sha256=?1) or "
-      "exists(select 1 from job where checkpoint_sha256=?1 and checkpoint_sha256 <> '')");
-  select.Bind(sha256);
-  select.Step();
-  return select.Int(0) != 0;
-}
-
-int64_t SqliteJobStore::ElapsedSinceLast(SqliteDatabase& db, const char* name) {
-  SqliteStatement last(db.handle(), "select value from meta where name=?");
-  last.Bind(name);
-  const int64_t before = last.Step() ? last.Int(0) : 0;
-  db.Run("update meta set value=max(?, 1) where name=?", SteadyNow(), name);
-  return before > 0 ? std::max<int64_t>(SteadyNow() - before, 0) : 0;
-}
-
-std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobCandidate>& unnamed,
-                                                         int64_t grace_ms) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
-  const int64_t elapsed = ElapsedSinceLast(db, "collected_steady_ms");
-  db.Exec("create temp table told(sha256 text primary key, touched_ns integer) without rowid");
-  for (const BlobCandidate& blob : unnamed) {
-    db.Run("insert or ignore into told values(?,?)", blob.sha256, blob.touched_ns);
-  }
-  db.Exec(
-      "delete from blob_candidate where not exists(select 1 from told where "
-      "told.sha256=blob_candidate.sha256 and told.touched_ns=blob_candidate.touched_ns)");
-  db.Run("update blob_candidate set age_ms=age_ms+?", elapsed);
-  db.Exec("insert or ignore into blob_candidate select sha256, touched_ns, 0 from told");
-  db.Exec("drop table told");
-  std::vector<BlobCandidate> due;
-  {
-    SqliteStatement select(db.handle(),
-                           "select sha256, touched_ns from blob_candidate where age_ms>=?");
-    select.Bind(grace_ms);
-    while (select.Step()) due.push_back({select.Text(0), select.Int(1)});
-  }
-  transaction.Commit();
-  return due;
 }
 
 int64_t SqliteJobStore::RunningEpoch(const std::string& job_name) {

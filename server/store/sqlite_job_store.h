@@ -85,6 +85,7 @@ class SqliteJobStore : public JobStore {
   int ReapExpired() override;
   std::vector<std::string> ExpireLeasesOf(const std::string& worker) override;
   bool IsHeld() override;
+  bool IsFull() override;
   void UpdateWorker(const WorkerRecord& worker) override;
   void RemoveWorker(const std::string& worker_id) override;
   std::vector<WorkerRecord> ListWorkers() override;
@@ -119,12 +120,13 @@ class SqliteJobStore : public JobStore {
   ColorizerRecord GetColorizer(const std::optional<std::string>& project,
                                const std::string& sha256) override;
   std::vector<std::string> AgeExpired(int64_t ended_before_ms, int64_t grace_ms) override;
-  std::vector<std::string> ScenesWithoutJobs(int64_t committed_before_ms) override;
+  std::vector<std::string> AgeUnusedScenes(int64_t before_ms, int64_t grace_ms) override;
   void Compact(int64_t events_before_ms, int64_t requests_before_ms) override;
   std::set<std::string> ReferencedBlobs() override;
   bool IsReferenced(const std::string& sha256) override;
   std::vector<BlobCandidate> AgeCandidates(const std::vector<BlobCandidate>& unnamed,
                                            int64_t grace_ms) override;
+  std::vector<BlobCandidate> AgedCandidates(int64_t grace_ms) override;
   int64_t RunningEpoch(const std::string& job_name) override;
 
  private:
@@ -141,6 +143,14 @@ class SqliteJobStore : public JobStore {
   // Idempotency: the resource of an earlier equal request. Throws REQUEST_ID_REUSED.
   std::optional<std::string> CheckRequest(SqliteDatabase& db, const RequestKey& request);
   void RecordRequest(SqliteDatabase& db, const RequestKey& request, const std::string& resource);
+
+  // Of the next events after this revision, deletes those of finished jobs from before this time.
+  // How far it came; nothing: they are all younger.
+  std::optional<int64_t> CompactEvents(int64_t after, int64_t before_ms);
+
+  // From before when request ids may go, as it was noted a day ago by the steady clock: a clock
+  // that jumps makes none old. 0: that day is not over; then takes note of `before_ms`.
+  int64_t NotedRequestAge(int64_t before_ms);
 
   // Throws WORKER_VERSION.
   void RequireServersVersion(SqliteDatabase& db) const;

@@ -105,6 +105,27 @@ TEST_F(SqliteJobStoreTest, CompactedRevisionsAreReported) {
   EXPECT_EQ(store_->NewestRevision(), newest);
 }
 
+TEST_F(SqliteJobStoreTest, RequestIdsOutliveAClockThatJumps) {
+  constexpr int64_t kDay = 24 * 3600 * 1000, kKept = 7 * kDay;
+  const RequestKey key{"CreateJob", "id", "body"};
+  CreateDiamond(key);
+  const auto sweep = [&](int64_t days) {  // once an hour
+    for (int64_t hour = 0; hour < days * 24; ++hour) {
+      now_ += kDay / 24;
+      wall_ += kDay / 24;
+      store_->Compact(0, wall_ - kKept);
+    }
+    return store_->FindRequest(key).has_value();
+  };
+  EXPECT_TRUE(sweep(2));
+  wall_ += 30 * kDay;
+  store_->Compact(0, wall_ - kKept);
+  EXPECT_TRUE(store_->FindRequest(key)) << "the clock may be set right";
+  wall_ -= 30 * kDay;
+  EXPECT_TRUE(sweep(4));
+  EXPECT_FALSE(sweep(3));
+}
+
 TEST_F(SqliteJobStoreTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "WRONG_STATE");

@@ -61,7 +61,12 @@ void SqliteJobStore::ForgetBlob(const std::string& sha256) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
-  db.Run("delete from blob_holding where sha256=?", sha256);
+  // Another may have stored and named the same bytes since.
+  db.Run(
+      "delete from blob_holding where sha256=?1 and not exists(select 1 from artifact where "
+      "sha256=?1) and not exists(select 1 from scene_file where sha256=?1) and not exists(select 1 "
+      "from job_blob where sha256=?1)",
+      sha256);
   transaction.Commit();
 }
 
@@ -166,15 +171,31 @@ std::vector<std::string> SqliteJobStore::AgeExpired(int64_t ended_before_ms, int
   return due;
 }
 
-std::vector<std::string> SqliteJobStore::ScenesWithoutJobs(int64_t committed_before_ms) {
-  const auto held = connections_.Read();
-  SqliteStatement select((*held).handle(),
-                         "select name from scene where active=1 and commit_ms<? and not exists("
-                         "select 1 from job where job.scene=scene.name) limit 1000");
-  select.Bind(committed_before_ms);
-  std::vector<std::string> names;
-  while (select.Step()) names.push_back(select.Text(0));
-  return names;
+std::vector<std::string> SqliteJobStore::AgeUnusedScenes(int64_t before_ms, int64_t grace_ms) {
+  constexpr char kUnused[] =
+      "(max(create_ms, commit_ms)<? and not exists(select 1 from job where job.scene=scene.name))";
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  db.Run("update scene set unused_age_ms=unused_age_ms+? where unused_age_ms>=0",
+         ElapsedSinceLast(db, "scenes_steady_ms"));
+  db.Run(std::string("update scene set unused_age_ms=-1 where unused_age_ms>=0 and not ") + kUnused,
+         before_ms);
+  db.Run(std::string("update scene set unused_age_ms=0 where unused_age_ms<0 and ") + kUnused,
+         before_ms);
+  std::vector<std::string> due;
+  {
+    SqliteStatement select(
+        db.handle(), "select name from scene where unused_age_ms>=? order by scene_id limit 1000");
+    select.Bind(grace_ms);
+    while (select.Step()) due.push_back(select.Text(0));
+  }
+  transaction.Commit();
+  return due;
+}
+
+namespace {
+constexpr int64_t kLongestPauseMs = 3'600'000;  // and some more; further away: the clock was set
 }
 
 std::vector<Notification> SqliteJobStore::DueNotifications(int limit) {
@@ -182,9 +203,9 @@ std::vector<Notification> SqliteJobStore::DueNotifications(int limit) {
   SqliteStatement select(
       (*held).handle(),
       "select n.job_id, job.name, n.url, n.tries, n.first_ms from notification n "
-      "join job on job.job_id=n.job_id where n.next_ms<=? order by n.next_ms "
+      "join job on job.job_id=n.job_id where n.next_ms<=? or n.next_ms>? order by n.next_ms "
       "limit ?");
-  select.Bind(Now(), limit);
+  select.Bind(Now(), Now() + kLongestPauseMs, limit);
   std::vector<Notification> due;
   while (select.Step()) {
     due.push_back({select.Int(0),

@@ -139,6 +139,23 @@ TEST_F(QueueTest, OldJobsGoInTwoPhases) {
             "INVALID_ARGUMENT");
 }
 
+TEST_F(QueueTest, ScenesWithoutJobsGoInTwoPhases) {
+  constexpr int64_t kGrace = 1000;
+  SceneRecord abandoned;
+  abandoned.name = "scenes/abandoned";  // never committed
+  store_->CreateScene(abandoned, {});
+  CreateSingle();  // of scenes/test
+  const auto unused = [&](int64_t before) { return store_->AgeUnusedScenes(before, kGrace); };
+  EXPECT_TRUE(unused(wall_ + (int64_t{1} << 40)).empty()) << "the clock jumped: noted only";
+  now_ += kGrace;
+  EXPECT_TRUE(unused(wall_).empty()) << "the clock was set right: forgotten";
+  now_ += kGrace;
+  wall_ += 10;
+  EXPECT_TRUE(unused(wall_).empty());
+  now_ += kGrace;
+  EXPECT_EQ(unused(wall_), std::vector<std::string>{abandoned.name});
+}
+
 TEST_F(QueueTest, WordOfAnEndIsOwedUntilItIsDelivered) {
   NewGraph graph;
   graph.scene = "scenes/test";
@@ -156,6 +173,10 @@ TEST_F(QueueTest, WordOfAnEndIsOwedUntilItIsDelivered) {
   EXPECT_TRUE(store_->DueNotifications(10).empty());
   wall_ += 500;
   EXPECT_EQ(store_->DueNotifications(10)[0].tries, 1);
+  store_->DelayNotification(due.job_id, 500);
+  wall_ -= int64_t{5} * 24 * 3600 * 1000;
+  EXPECT_EQ(store_->DueNotifications(10).size(), 1u) << "a clock that is set back stalls nothing";
+  wall_ += int64_t{5} * 24 * 3600 * 1000;
   store_->Retry(root.name, false, {}, kNoLimit);
   EXPECT_TRUE(store_->DueNotifications(10).empty()) << "it has not ended";
   Succeed(ClaimOne());

@@ -169,16 +169,19 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
 
 namespace {
 
-// Equal files made by several jobs (cached runs) are one colorizer: that of the oldest job.
-std::string SelectColorizer(const std::string& tail) {
-  static const std::string select = fmt::format(
-      "select min(j.job_id), j.name, j.scene, a.sha256, a.size_bytes, j.end_ms from artifact a "
-      "join job j on j.job_id=a.job_id where a.name='{}' and j.kind='{}' and "
-      "j.state='SUCCEEDED' ",
+// That the artifact is a colorizer of the project (?2, unless ?1) and the scene (?3, unless empty).
+std::string IsColorizer(const char* artifact, const char* job) {
+  return fmt::format(
+      "{0}.name='{2}' and {1}.kind='{3}' and {1}.state='SUCCEEDED' and (?1 or {1}.project=?2) and "
+      "(?3='' or {1}.scene=?3)",
+      artifact,
+      job,
       artifact::kColorizer,
       StageThatLeaves(artifact::kColorizer)->kind);
-  return select + tail;
 }
+
+constexpr char kColorizerColumns[] =
+    "select j.job_id, j.name, j.scene, a.sha256, a.size_bytes, j.end_ms ";
 
 ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
   return {row.Int(0), row.Text(1), row.Text(2), {row.Text(3), row.Int(4)}, row.Int(5)};
@@ -186,6 +189,7 @@ ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
 
 }  // namespace
 
+// Equal files made by several jobs (cached runs) are one colorizer: that of the oldest job.
 std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(
     const std::optional<std::string>& project,
     const std::string& scene,
@@ -193,11 +197,20 @@ std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(
     int limit) {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
+  // From what there is least of: the scene's jobs, or all colorizers, the newest first.
+  const std::string walk = scene.empty()
+                               ? "from artifact a cross join job j on j.job_id=a.job_id where "
+                               : "from job j cross join artifact a on a.job_id=j.job_id where "
+                                 "j.scene=?3 and ";
   SqliteStatement select(db.handle(),
-                         SelectColorizer("and (?1='' or j.scene=?1) and (?2 or j.project=?3) "
-                                         "group by a.sha256 having min(j.job_id) < ?4 "
-                                         "order by min(j.job_id) desc limit ?5"));
-  select.Bind(scene, !project, project.value_or(""), before_id > 0 ? before_id : INT64_MAX, limit);
+                         kColorizerColumns + walk + IsColorizer("a", "j") +
+                             " and j.job_id<?4 and not exists(select 1 from artifact older indexed "
+                             "by artifact_blob cross "
+                             "join job o on o.job_id=older.job_id where older.sha256=a.sha256 and "
+                             "older.job_id<a.job_id and " +
+                             IsColorizer("older", "o") + ") order by " +
+                             (scene.empty() ? "a" : "j") + ".job_id desc limit ?5");
+  select.Bind(!project, project.value_or(""), scene, before_id > 0 ? before_id : INT64_MAX, limit);
   std::vector<ColorizerRecord> colorizers;
   while (select.Step()) colorizers.push_back(ColorizerFromRow(select));
   return colorizers;
@@ -208,8 +221,11 @@ ColorizerRecord SqliteJobStore::GetColorizer(const std::optional<std::string>& p
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
   SqliteStatement select(
-      db.handle(), SelectColorizer("and a.sha256=? and (? or j.project=?) group by a.sha256"));
-  select.Bind(sha256, !project, project.value_or(""));
+      db.handle(),
+      kColorizerColumns + ("from artifact a indexed by artifact_blob cross join job j on "
+                           "j.job_id=a.job_id where a.sha256=?4 and " +
+                           IsColorizer("a", "j") + " order by a.job_id limit 1"));
+  select.Bind(!project, project.value_or(""), "", sha256);
   if (!select.Step()) {
     throw ServiceError(ErrorCode::kNotFound,
                        "COLORIZER_NOT_FOUND",

@@ -61,13 +61,23 @@ void MakeTables(SqliteDatabase& db) {
   transaction.Commit();
 }
 
+bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
+  SqliteStatement same(db.handle(), "select 1 from server where version=? and boot_id=?");
+  same.Bind(identity.program_version, identity.boot_id);
+  return same.Step();
+}
+
+// Writes nothing where nothing has changed: on a full disk the server still answers those who read.
 void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
+  if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);
   SqliteStatement before(db.handle(), "select 1 from server where boot_id=?");
   before.Bind(identity.boot_id);
   if (!before.Step()) {
     db.Exec("update job set lease_expires_ms=0 where state='RUNNING'");
-    db.Exec("update meta set value=0 where name in('collected_steady_ms', 'expiry_steady_ms')");
+    db.Exec(
+        "update meta set value=0 where name in('collected_steady_ms', "
+        "'expiry_steady_ms', 'requests_steady_ms', 'scenes_steady_ms')");
     db.Exec("update job set run_after_ms=0 where end_ms=0 and run_after_ms<>0");
   }
   db.Run(

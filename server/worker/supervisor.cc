@@ -181,11 +181,20 @@ bool Supervisor::IsStoreHeld() const {
   }
 }
 
+bool Supervisor::IsStoreFull() const {
+  try {
+    return store_.IsFull();
+  } catch (const Error& e) {
+    spdlog::warn("cannot look whether the store is full: {}", e.what());
+    return false;
+  }
+}
+
 // One that hangs outside of an attempt has no lease whose end would tell.
 void Supervisor::KillTheSilent() {
   const auto now = SteadyClock::now();
   if (now < next_listening_) return;
-  next_listening_ = now + kListening;
+  next_listening_ = now + std::min<SteadyClock::duration>(kListening, options_.max_silent / 4);
   std::map<std::string, int64_t> reports;
   try {
     for (const WorkerRecord& worker : store_.ListWorkers()) {
@@ -202,9 +211,10 @@ void Supervisor::KillTheSilent() {
       slot.report_ms = heard;
       slot.last_heard = now;
     } else if (now - slot.last_heard > options_.max_silent) {
+      slot.last_heard = now;
+      if (IsStoreFull()) continue;
       spdlog::error("{} (pid {}) gives no sign of life; killing it", slot.name, slot.pid);
       ::kill(slot.pid, SIGKILL);
-      slot.last_heard = now;
     }
   }
 }

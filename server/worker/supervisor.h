@@ -52,7 +52,8 @@ struct SupervisorOptions {
   // ... or for this long while nobody can write to the store, which it may have stopped in: before
   // the leases of all others run out with its own.
   std::chrono::milliseconds max_stopped_holding{10'000};
-  // A worker that runs but has not reported itself for so long is killed, too.
+  // A worker that runs but has not reported itself for so long is killed, too; not where no report
+  // can be written, for the disk is full.
   std::chrono::milliseconds max_silent{180'000};
 };
 
@@ -93,6 +94,7 @@ class Supervisor {
   void OnExit(Slot* slot, int status);
   void KillIfFrozen(Slot* slot);
   bool IsStoreHeld() const;
+  bool IsStoreFull() const;
   void KillTheSilent();
 
   const SupervisorOptions options_;

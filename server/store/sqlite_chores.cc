@@ -1,0 +1,191 @@
+// What the server's chores ask of the store: whether it takes writes, what is old, what is named.
+#include <algorithm>
+#include <thread>
+
+#include "core/base/error.h"
+#include "server/store/sqlite_db.h"
+#include "server/store/sqlite_job_store.h"
+
+namespace color3d {
+
+bool SqliteJobStore::IsHeld() {
+  SqliteDatabase probe(file_, SqliteAccess::kWrite);
+  probe.SetBusyTimeout(std::chrono::milliseconds(0));
+  for (int look = 0; look < 20; ++look) {
+    try {
+      SqliteTransaction transaction(probe);
+      return false;
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::kUnavailable) throw;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return true;
+}
+
+bool SqliteJobStore::IsFull() {
+  try {
+    const auto held = connections_.Write();
+    SqliteDatabase& db = *held;
+    SqliteTransaction transaction(db, /*durable=*/false);
+    db.Exec("insert into meta values('probe', 0) on conflict(name) do update set value=value+1");
+    transaction.Commit();
+    return false;
+  } catch (const Error& e) {
+    return e.code() == ErrorCode::kResourceExhausted;
+  }
+}
+
+namespace {
+constexpr int kCompactAtOnce = 200;
+}
+
+// In steps, so that nobody waits long for the right to write: along the events, from the oldest to
+// the first that are young.
+void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_ms) {
+  for (std::optional<int64_t> revision = 0; revision;) {
+    revision = CompactEvents(*revision, events_before_ms);
+  }
+  requests_before_ms = std::min(requests_before_ms, NotedRequestAge(requests_before_ms));
+  int64_t removed = kCompactAtOnce;
+  while (removed == kCompactAtOnce) {
+    const auto held = connections_.Write();
+    SqliteDatabase& db = *held;
+    SqliteTransaction transaction(db, /*durable=*/false);
+    removed = db.Run(
+        "delete from request_id where (method, id) in (select method, id from request_id where "
+        "at_ms<? order by at_ms limit ?)",
+        requests_before_ms,
+        kCompactAtOnce);
+    transaction.Commit();
+  }
+}
+
+int64_t SqliteJobStore::NotedRequestAge(int64_t before_ms) {
+  constexpr int64_t kDayMs = 24 * 3'600'000;
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db, /*durable=*/false);
+  db.Run("update meta set value=value+? where name='requests_age_ms'",
+         ElapsedSinceLast(db, "requests_steady_ms"));
+  SqliteStatement due(db.handle(),
+                      "select n.value from meta n, meta a where n.name='requests_noted_ms' and "
+                      "a.name='requests_age_ms' and a.value>=?");
+  due.Bind(kDayMs);
+  int64_t noted = 0;
+  if (due.Step()) {
+    noted = due.Int(0);
+    db.Run("update meta set value=? where name='requests_noted_ms'", before_ms);
+    db.Run("update meta set value=0 where name='requests_age_ms'");
+  }
+  transaction.Commit();
+  return noted;
+}
+
+std::optional<int64_t> SqliteJobStore::CompactEvents(int64_t after, int64_t before_ms) {
+  int64_t last = 0;
+  {
+    const auto held = connections_.Read();
+    SqliteStatement next(
+        (*held).handle(),
+        "select max(revision), max(old), max(old and ended) from (select "
+        "e.revision, e.at_ms<? as old, j.end_ms<>0 as ended from job_event e cross "
+        "join job j on j.job_id=e.job_id where e.revision>? order by e.revision "
+        "limit ?)");
+    next.Bind(before_ms, after, kCompactAtOnce);
+    next.Step();
+    if (next.Int(1) == 0) return std::nullopt;
+    last = next.Int(0);
+    if (next.Int(2) == 0) return last;
+  }
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db, /*durable=*/false);
+  constexpr char kOld[] =
+      " from job_event where revision>? and revision<=? and at_ms<? and "
+      "exists(select 1 from job where job.job_id=job_event.job_id and end_ms<>0)";
+  SqliteStatement newest(
+      db.handle(), std::string("select coalesce(max(revision), 0)") + kOld + " and progress=0");
+  newest.Bind(after, last, before_ms);
+  newest.Step();
+  db.Run("update meta set value=max(value, ?) where name='compacted_revision'", newest.Int(0));
+  db.Run(std::string("delete") + kOld, after, last, before_ms);
+  transaction.Commit();
+  return last;
+}
+
+namespace {
+constexpr char kReferences[] =
+    "select sha256 from artifact union select sha256 from scene_file "
+    "union select sha256 from job_blob "
+    "union select checkpoint_sha256 from job where checkpoint_sha256 <> ''";
+}  // namespace
+
+std::set<std::string> SqliteJobStore::ReferencedBlobs() {
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(db.handle(), kReferences);
+  std::set<std::string> digests;
+  while (select.Step()) digests.insert(select.Text(0));
+  return digests;
+}
+
+bool SqliteJobStore::IsReferenced(const std::string& sha256) {
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  SqliteStatement select(
+      db.handle(),
+      "select exists(select 1 from artifact where sha256=?1) or "
+      "exists(select 1 from scene_file where sha256=?1) or "
+      "exists(select 1 from job_blob where sha256=?1) or "
+      "exists(select 1 from job where checkpoint_sha256=?1 and checkpoint_sha256 <> '')");
+  select.Bind(sha256);
+  select.Step();
+  return select.Int(0) != 0;
+}
+
+int64_t SqliteJobStore::ElapsedSinceLast(SqliteDatabase& db, const char* name) {
+  SqliteStatement last(db.handle(), "select value from meta where name=?");
+  last.Bind(name);
+  const int64_t before = last.Step() ? last.Int(0) : 0;
+  db.Run("update meta set value=max(?, 1) where name=?", SteadyNow(), name);
+  return before > 0 ? std::max<int64_t>(SteadyNow() - before, 0) : 0;
+}
+
+namespace {
+std::vector<BlobCandidate> CandidatesOf(SqliteDatabase& db, int64_t grace_ms) {
+  SqliteStatement select(db.handle(),
+                         "select sha256, touched_ns from blob_candidate where age_ms>=?");
+  select.Bind(grace_ms);
+  std::vector<BlobCandidate> candidates;
+  while (select.Step()) candidates.push_back({select.Text(0), select.Int(1)});
+  return candidates;
+}
+}  // namespace
+
+std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobCandidate>& unnamed,
+                                                         int64_t grace_ms) {
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  SqliteTransaction transaction(db);
+  const int64_t elapsed = ElapsedSinceLast(db, "collected_steady_ms");
+  db.Exec("create temp table told(sha256 text primary key, touched_ns integer) without rowid");
+  for (const BlobCandidate& blob : unnamed) {
+    db.Run("insert or ignore into told values(?,?)", blob.sha256, blob.touched_ns);
+  }
+  db.Exec(
+      "delete from blob_candidate where not exists(select 1 from told where "
+      "told.sha256=blob_candidate.sha256 and told.touched_ns=blob_candidate.touched_ns)");
+  db.Run("update blob_candidate set age_ms=age_ms+?", elapsed);
+  db.Exec("insert or ignore into blob_candidate select sha256, touched_ns, 0 from told");
+  db.Exec("drop table told");
+  std::vector<BlobCandidate> due = CandidatesOf(db, grace_ms);
+  transaction.Commit();
+  return due;
+}
+
+std::vector<BlobCandidate> SqliteJobStore::AgedCandidates(int64_t grace_ms) {
+  return CandidatesOf(*connections_.Read(), grace_ms);
+}
+
+}  // namespace color3d
