@@ -104,11 +104,11 @@ public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights
 public core/grid edge_weights grid_solver
-public core/image box_mean codec draw fill_holes feature_matches guided_upsample local_features optical_flow plane_sampling reduced weighted_resize \
+public core/image box_mean codec draw fill_holes feature_matches flow_agreement guided_upsample local_features optical_flow plane_sampling reduced weighted_resize \
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
-public core/film anchor_frames film_carry moving_regions shots steady_tones
+public core/film anchor_frames film_carry moving_regions shots steady_colors steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan

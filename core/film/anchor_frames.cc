@@ -1,32 +1,18 @@
 #include "core/film/anchor_frames.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <map>
 
 #include "core/base/range_check.h"
+#include "core/film/frame_motion.h"
 #include "core/image/codec.h"
 #include "core/image/optical_flow.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kSidePx = 160;         // pictures that are compared
-constexpr double kFastShare = 0.03;  // of the pixels
-
-// What a tenth of the pixels exceeds, in longer sides.
-double MotionBetween(const Image& one, const Image& other) {
-  const Image flow = DenseFlow(one, other);
-  std::vector<float> lengths(flow.PlaneSize());
-  for (size_t i = 0; i < lengths.size(); ++i) {
-    lengths[i] = std::hypot(flow.Plane(0)[i], flow.Plane(1)[i]);
-  }
-  const auto fast = lengths.begin() + static_cast<std::ptrdiff_t>(
-                                          (1.0 - kFastShare) * static_cast<double>(lengths.size()));
-  std::nth_element(lengths.begin(), fast, lengths.end());
-  return *fast / std::max(one.width, one.height);
-}
+constexpr int kSidePx = 160;  // pictures that are compared
 
 // Of each frame of a shot, from the one before it.
 std::vector<double> MotionOf(const FilmFrames& frames,
@@ -44,7 +30,7 @@ std::vector<double> MotionOf(const FilmFrames& frames,
       pictures[i + 1] = FitWithin(*frames.luminance(shot[begin + i]), kSidePx);
     });
     pool.ForEach(size, [&](int64_t i, int) {
-      if (begin + i > 0) motion[begin + i] = MotionBetween(pictures[i], pictures[i + 1]);
+      if (begin + i > 0) motion[begin + i] = MotionOf(DenseFlow(pictures[i], pictures[i + 1]));
     });
     pictures[0] = std::move(pictures[size]);
   }

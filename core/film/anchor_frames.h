@@ -11,11 +11,10 @@
 namespace color3d {
 
 struct AnchorOptions {
-  // Of the frames around one anchor, from first to last: what 3 % of the pixels exceed,
-  // summed from frame to frame, in longer sides of the picture.
-  double most_motion = 0.1;  // 0..1; 0: each frame is an anchor
-  int most_frames = 12;      // 1..1000
-  void Validate() const;     // throws Error{kInvalidArgument}
+  // MotionOf each step, summed over the frames around one anchor, from first to last.
+  double most_motion = 0.07;  // 0..1; 0: each frame is an anchor
+  int most_frames = 12;       // 1..1000
+  void Validate() const;      // throws Error{kInvalidArgument}
 };
 
 // The middle frame of each run of frames of one shot, ascending; each other frame belongs to the

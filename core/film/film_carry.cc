@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/film/frame_motion.h"
 #include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
@@ -36,14 +37,9 @@ Image Moved(const Image& flow) {
   return place;
 }
 
-// One step further, from frame `now` to frame `next`.
-FilmTrack Step(const FilmTrack& track,
-               const Image& now,
-               const Image& next,
-               const CancellationToken& cancel) {
-  const Image there = DenseFlow(now, next);
-  cancel.ThrowIfCancelled();
-  FilmTrack further{SampledAt(track.in_key, Moved(DenseFlow(next, now))), track.in_frame};
+// One step further, along flow to the next frame and back.
+FilmTrack Step(const FilmTrack& track, const Image& there, const Image& back) {
+  FilmTrack further{SampledAt(track.in_key, Moved(back)), track.in_frame};
   const Image step = SampledAt(there, track.in_frame);
   for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
   return further;
@@ -147,6 +143,7 @@ void TakeWhereSurer(const Places& found, Places* followed) {
   }
 }
 
+constexpr double kMuchLost = 0.1;
 constexpr double kFollowedEnough = 0.9;  // mean confidence from which nothing is looked for
 
 double MeanOf(const Image& image) {
@@ -206,6 +203,103 @@ struct Walk {
   FilmWalk before;          // track null: it begins at the key frame
 };
 
+// Goes along a walk, one frame after the other.
+class Walker {
+ public:
+  Walker(const Walk& walk,
+         const FilmFrames& frames,
+         const FilmCarryOptions& options,
+         const CancellationToken& cancel)
+      : walk_(walk),
+        frames_(frames),
+        options_(options),
+        cancel_(cancel),
+        key_(frames.luminance(walk.key->frame)),
+        key_contrast_(LocalContrast(*key_)),
+        frame_(walk.key->frame),
+        luminance_(key_),
+        moved_(walk.before.moved),
+        wanted_(walk.before.wanted),
+        track_(walk.before.track) {
+    if (options.correct_after < 1.0) again_.emplace(*key_);
+    if (track_) {
+      frame_ = walk.before.frame;
+      luminance_ = frames.luminance(frame_);
+    } else {
+      const Image start = Identity(key_->width, key_->height);
+      wanted_ = MeanOf(walk.key->color.confidence) - kMuchLost;
+      track_ = std::make_shared<const FilmTrack>(FilmTrack{start, start});
+    }
+  }
+
+  CarriedColor GoTo(int frame) {
+    cancel_.ThrowIfCancelled();
+    const auto next = frames_.luminance(frame);
+    const Image contrast = LocalContrast(*next);
+    const auto flow = FlowTo(frame, *next);
+    const bool forward = walk_.direction > 0;
+    FilmTrack track =
+        forward ? Step(*track_, flow->forth, flow->back) : Step(*track_, flow->back, flow->forth);
+    const auto color = [&] {
+      return ColorOf(*walk_.key, key_contrast_, contrast, track, options_);
+    };
+    CarriedColor carried = color();
+    if (again_) {
+      moved_ += MotionOf(flow->back);
+      const bool in_turn = moved_ >= options_.correct_after;
+      if (in_turn || MeanOf(carried.confidence) < wanted_) {
+        Correct(*next, contrast, &track);
+        carried = color();
+      }
+      if (in_turn) {
+        moved_ = 0.0;
+        wanted_ = MeanOf(carried.confidence) - kMuchLost;
+      }
+    }
+    frame_ = frame;
+    luminance_ = next;
+    track_ = std::make_shared<const FilmTrack>(std::move(track));
+    return carried;
+  }
+
+  FilmWalk Where() const {
+    const bool ends = frame_ == walk_.frames.back();
+    return {walk_.key->frame, walk_.direction, frame_, moved_, wanted_, ends ? nullptr : track_};
+  }
+
+ private:
+  std::shared_ptr<const FlowPair> FlowTo(int frame, const Image& next) const {
+    const bool forward = walk_.direction > 0;
+    if (frames_.flow) return frames_.flow(forward ? frame_ : frame, forward ? frame : frame_);
+    const Image& earlier = forward ? *luminance_ : next;
+    const Image& later = forward ? next : *luminance_;
+    return std::make_shared<const FlowPair>(
+        FlowPair{DenseFlow(earlier, later), DenseFlow(later, earlier)});
+  }
+
+  void Correct(const Image& next, const Image& contrast, FilmTrack* track) const {
+    cancel_.ThrowIfCancelled();
+    Register(next, contrast, *key_, key_contrast_, &track->in_key);
+    cancel_.ThrowIfCancelled();
+    Register(*key_, key_contrast_, next, contrast, &track->in_frame);
+    cancel_.ThrowIfCancelled();
+    TakeFoundAgain(*again_, next, contrast, key_contrast_, options_, cancel_, track);
+  }
+
+  const Walk& walk_;
+  const FilmFrames& frames_;
+  const FilmCarryOptions& options_;
+  const CancellationToken& cancel_;
+  const std::shared_ptr<const Image> key_;
+  const Image key_contrast_;
+  std::optional<FoundAgain> again_;
+  int frame_;
+  std::shared_ptr<const Image> luminance_;  // of the frame
+  double moved_;
+  double wanted_;
+  std::shared_ptr<const FilmTrack> track_;
+};
+
 // Leaves out what is done.
 void TakeUp(const std::vector<FilmWalk>& walks, Walk* walk) {
   for (const FilmWalk& done : walks) {
@@ -262,6 +356,7 @@ void FilmCarryOptions::Validate() const {
   const RangeCheck check("film carry option");
   check("cycle_tolerance_px", cycle_tolerance_px, 0.1, 20);
   check("unlikeness", unlikeness, 0.05, 2);
+  check("correct_after", correct_after, 0, 1);
 }
 
 void CarryAlongFilm(const FilmFrames& frames,
@@ -287,36 +382,11 @@ void CarryAlongFilm(const FilmFrames& frames,
   const std::vector<Walk> walks = WalksOf(frames, keys, resume.walks);
   pool.ForEach(static_cast<int64_t>(walks.size()), [&](int64_t index, int) {
     const Walk& walk = walks[index];
-    const auto key = frames.luminance(walk.key->frame);
-    const Image key_contrast = LocalContrast(*key);
-    std::optional<FoundAgain> again;
-    if (options.find_again) again.emplace(*key);
-    auto now = key;
-    auto track = walk.before.track;
-    if (track) {
-      now = frames.luminance(walk.before.frame);
-    } else {
-      const Image start = Identity(key->width, key->height);
-      track = std::make_shared<const FilmTrack>(FilmTrack{start, start});
-    }
+    Walker walker(walk, frames, options, cancel);
     for (const int frame : walk.frames) {
-      cancel.ThrowIfCancelled();
-      const auto next = frames.luminance(frame);
-      const Image contrast = LocalContrast(*next);
-      FilmTrack further = Step(*track, *now, *next, cancel);
-      cancel.ThrowIfCancelled();
-      Register(*next, contrast, *key, key_contrast, &further.in_key);
-      cancel.ThrowIfCancelled();
-      Register(*key, key_contrast, *next, contrast, &further.in_frame);
-      if (again) TakeFoundAgain(*again, *next, contrast, key_contrast, options, cancel, &further);
-      track = std::make_shared<const FilmTrack>(std::move(further));
-      const CarriedColor color = ColorOf(*walk.key, key_contrast, contrast, *track, options);
-      now = next;
+      const CarriedColor color = walker.GoTo(frame);
       const std::lock_guard lock(handing_over);
-      if (resume.on_walk) {
-        const bool ends = frame == walk.frames.back();
-        resume.on_walk({walk.key->frame, walk.direction, frame, ends ? nullptr : track});
-      }
+      if (resume.on_walk) resume.on_walk(walker.Where());
       on_frame(frame, color);
     }
   });

@@ -26,16 +26,28 @@ struct FilmCarryOptions {
   // Mean difference of the local contrast of both places from which confidence falls, 0.05..2; to
   // 1/e at twice that.
   double unlikeness = 0.4;
-  // Whether local features look for what steps from frame to frame have lost.
-  bool find_again = true;
+  // Steps from frame to frame add up to errors. When so much has moved (MotionOf, summed) since
+  // that was done last, and while a tenth of the frame has been lost since, what they led to is
+  // registered against the key frame itself, and local features look for what they have lost.
+  // 0: at each frame; 1: never.
+  double correct_after = 0.05;
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const FilmCarryOptions&) const = default;
+};
+
+// Optical flow between two frames, px.
+struct FlowPair {
+  Image forth;  // from the earlier one to the later
+  Image back;
 };
 
 struct FilmFrames {
   std::vector<int> shot;  // of each frame; colours are carried within a shot only
   // L in 0..100, 1 channel, all of one size. Called from several threads at once.
   std::function<std::shared_ptr<const Image>(int frame)> luminance;
+  // Between a frame and the next one of its shot, where it is known already. May be empty. Called
+  // from several threads at once.
+  std::function<std::shared_ptr<const FlowPair>(int earlier, int later)> flow;
 };
 
 // How far the walk away from a key frame is.
@@ -43,6 +55,8 @@ struct FilmWalk {
   int key = 0;                             // frame
   int direction = 1;                       // 1 or -1
   int frame = 0;                           // the last one that was handed over
+  double moved = 0.0;                      // since it was corrected in its turn
+  double wanted = 0.0;                     // mean confidence below which it is corrected anyway
   std::shared_ptr<const FilmTrack> track;  // to it; null at the walk's end
 };
 

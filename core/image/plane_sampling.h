@@ -2,31 +2,50 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <cstddef>
 
 #include "core/base/image.h"
 
 namespace color3d {
 
+// The four pixels around a place of pictures of one size, which all their planes are read by.
 // Pixel centres at whole numbers; beyond the border the nearest pixel.
+class BilinearPlace {
+ public:
+  BilinearPlace(int width, int height, float x, float y) {
+    const float cx = std::clamp(x, 0.0f, static_cast<float>(width - 1));
+    const float cy = std::clamp(y, 0.0f, static_cast<float>(height - 1));
+    const int x0 = static_cast<int>(cx), y0 = static_cast<int>(cy);
+    const float fx = cx - static_cast<float>(x0), fy = cy - static_cast<float>(y0);
+    const size_t right = x0 + 1 < width ? 1 : 0;
+    const size_t below = y0 + 1 < height ? static_cast<size_t>(width) : 0;
+    const size_t first = static_cast<size_t>(y0) * width + x0;
+    pixel_ = {first, first + right, first + below, first + below + right};
+    weight_ = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
+  }
+
+  float Of(const float* plane) const {
+    return weight_[0] * plane[pixel_[0]] + weight_[1] * plane[pixel_[1]] +
+           weight_[2] * plane[pixel_[2]] + weight_[3] * plane[pixel_[3]];
+  }
+
+ private:
+  std::array<size_t, 4> pixel_;
+  std::array<float, 4> weight_;
+};
+
 inline float SampleBilinear(const Image& image, int channel, double x, double y) {
-  const double cx = std::clamp(x, 0.0, image.width - 1.0);
-  const double cy = std::clamp(y, 0.0, image.height - 1.0);
-  const int x0 = static_cast<int>(cx), y0 = static_cast<int>(cy);
-  const int x1 = std::min(x0 + 1, image.width - 1), y1 = std::min(y0 + 1, image.height - 1);
-  const auto fx = static_cast<float>(cx - x0), fy = static_cast<float>(cy - y0);
-  const float top = std::lerp(image.At(channel, y0, x0), image.At(channel, y0, x1), fx);
-  const float bottom = std::lerp(image.At(channel, y1, x0), image.At(channel, y1, x1), fx);
-  return std::lerp(top, bottom, fy);
+  return BilinearPlace(image.width, image.height, static_cast<float>(x), static_cast<float>(y))
+      .Of(image.Plane(channel));
 }
 
 // `image` at the places `place`, 2 channels of the result's size: x and y in px.
 inline Image SampledAt(const Image& image, const Image& place) {
   Image out(place.width, place.height, image.channels);
-  for (int c = 0; c < image.channels; ++c) {
-    for (size_t i = 0; i < place.PlaneSize(); ++i) {
-      out.Plane(c)[i] = SampleBilinear(image, c, place.Plane(0)[i], place.Plane(1)[i]);
-    }
+  for (size_t i = 0; i < place.PlaneSize(); ++i) {
+    const BilinearPlace at(image.width, image.height, place.Plane(0)[i], place.Plane(1)[i]);
+    for (int c = 0; c < image.channels; ++c) out.Plane(c)[i] = at.Of(image.Plane(c));
   }
   return out;
 }

@@ -9,6 +9,7 @@
 #include "core/base/evenly.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/image/flow_agreement.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
 
@@ -163,11 +164,8 @@ FollowedPixels FollowBack(const Image& luminance, const Image& luminance_before)
       followed.place.At(0, y, x) = static_cast<float>(u);
       followed.place.At(1, y, x) = static_cast<float>(v);
       if (too_small || u < 0.0 || v < 0.0 || u > width - 1.0 || v > height - 1.0) continue;
-      // Sundaram, Brox, Keutzer 2010, equation 5.
-      const double fx = SampleBilinear(forth, 0, u, v), fy = SampleBilinear(forth, 1, u, v);
-      const double gap = (bx + fx) * (bx + fx) + (by + fy) * (by + fy);
-      const double lengths = bx * bx + by * by + fx * fx + fy * fy;
-      followed.sure[static_cast<size_t>(y) * width + x] = gap < 0.01 * lengths + 0.5;
+      followed.sure[static_cast<size_t>(y) * width + x] =
+          FlowAgrees(bx, by, SampleBilinear(forth, 0, u, v), SampleBilinear(forth, 1, u, v));
     }
   }
   return followed;

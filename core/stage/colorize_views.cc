@@ -1,11 +1,11 @@
-#include <mutex>
 #include <utility>
 
-#include "core/image/codec.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
 #include "core/stage/film/color_frames.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/carry_facts.h"
+#include "core/stage/formats/views_checkpoint.h"
 #include "core/stage/sources/view_positions.h"
 #include "core/stage/stages.h"
 
@@ -38,28 +38,26 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
           number, images.WorkingCamera(number), luminance, images.Mask(number).get());
     });
   };
-  std::mutex outputs;
-  int64_t done = 0;
-  const auto deliver = [&](int number, const FusedColor& fused) {
-    const View& view = scene.views[number];
-    const std::string ab = EncodeAbPng(fused.ab);
-    const std::string provenance = EncodePng8(fused.provenance);
-    const std::lock_guard lock(outputs);
-    context.WriteOutput(ViewArtifact(artifact::kViewsAb, view, ".png"), ab);
-    context.WriteOutput(ViewArtifact(artifact::kProvenance, view, ".png"), provenance);
-    context.progress().OnProgress(++done, total, "colouring " + view.name);
-  };
+  ViewsCheckpoint done(scene, context);
   if (scene.IsFilm() || scene.IsDynamic()) {
-    return ColorFrames(scene, images, {sources, deliver}, context);
+    FrameColoring coloring;
+    coloring.sources = sources;
+    coloring.deliver = [&](int number, const FusedColor& color) { done.Add(number, color); };
+    coloring.was_done = [&](int number) { return done.WasDone(number); };
+    for (const std::string& name : ReadCarryFacts(context).key_views) {
+      coloring.key_views.insert(scene.FindView(name));
+    }
+    return ColorFrames(scene, images, coloring, context);
   }
   context.pool().ForEach(total, [&](int64_t index, int) {
     context.cancel().ThrowIfCancelled();
     const auto number = static_cast<int>(index);
+    if (done.WasDone(number)) return;
     const auto luminance = images.Luminance(number);
     const CarriedColor carried =
         ReadCarried(context, scene.views[index], luminance->width, luminance->height);
     ThreadPool one(1);
-    deliver(number, ColorOfView(*luminance, carried, sources(number), one, context.cancel()));
+    done.Add(number, ColorOfView(*luminance, carried, sources(number), one, context.cancel()));
   });
 }
 

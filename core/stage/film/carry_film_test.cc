@@ -27,21 +27,6 @@ class FrameCounter : public NullObserver {
   int64_t cancel_at = 0;
 };
 
-// Keeps every state that it is given, and dies at one.
-class Dying : public CheckpointStore {
- public:
-  std::optional<std::string> Load() override {
-    return states.empty() ? std::nullopt : std::optional(states.back());
-  }
-  bool WantsSave() override { return true; }
-  void Save(const std::string& state) override {
-    if (states.size() < dies_at || dies_at == 0) states.push_back(state);
-    if (states.size() == dies_at) throw Error(ErrorCode::kAborted, "the lease is lost");
-  }
-  std::vector<std::string> states;
-  size_t dies_at = 0;  // 0: never
-};
-
 class CarryFilmTest : public StageTest {
  protected:
   CarryFilmTest() {
@@ -111,7 +96,7 @@ TEST_F(CarryFilmTest, AnotherWorkerGoesOnAndGivesTheSame) {
   for (const int threads : {1, 2}) {
     threads_ = threads;
     for (const size_t dies_at : {1u, 4u, 9u}) {
-      Dying store;
+      DyingCheckpoints store;
       store.dies_at = dies_at;
       checkpoints_ = &store;
       EXPECT_THROW(Run(), Error);
@@ -128,8 +113,8 @@ TEST_F(CarryFilmTest, AnotherWorkerGoesOnAndGivesTheSame) {
 
 TEST_F(CarryFilmTest, ACheckpointOfAnotherFilmIsNotTakenUp) {
   const nlohmann::json facts = Run();
-  Dying store;
-  store.states = {"carry 2\nand then nonsense"};
+  DyingCheckpoints store;
+  store.states = {"carry 3\nand then nonsense"};
   checkpoints_ = &store;
   EXPECT_EQ(Run(), facts);
 }

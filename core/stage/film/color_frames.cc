@@ -1,197 +1,240 @@
 #include "core/stage/film/color_frames.h"
 
 #include <algorithm>
+#include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/film/anchor_frames.h"
 #include "core/film/film_carry.h"
-#include "core/image/fill_holes.h"
+#include "core/film/steady_colors.h"
+#include "core/image/optical_flow.h"
+#include "core/stage/film/between_anchors.h"
 #include "core/stage/formats/artifacts.h"
 
 namespace color3d {
 namespace {
 
-constexpr int64_t kSectionBytes = int64_t{64} << 20;  // of colours that wait for each other
-constexpr int kColorChannels = 3;                     // a, b and the share that is guessed
-constexpr float kFollowed = 0.5f;                     // confidence from which motion tells
-constexpr double kWorthAsking = 0.02;                 // share of a frame that is open
+constexpr int64_t kStretchBytes = int64_t{128} << 20;
+constexpr int64_t kBytesPerPixel = 17 * sizeof(float);  // of a frame: colours, flow, two followed
 
-// An anchor's delivered colours, of which all are sure.
-CarriedColor AsKey(const FusedColor& fused) {
-  Image color(fused.ab.width, fused.ab.height, kColorChannels);
-  std::copy(fused.ab.data.begin(), fused.ab.data.end(), color.data.begin());
-  for (size_t i = 0; i < color.PlaneSize(); ++i) {
-    const float guessed = fused.provenance.Plane(0)[i], inferred = fused.provenance.Plane(2)[i];
-    color.Plane(2)[i] = guessed / std::max(guessed + inferred, 1e-6f);
-  }
-  return {std::move(color), Image(fused.ab.width, fused.ab.height, 1, 1.0f)};
-}
-
-// 1 where the frame's own sources need not be asked.
-Image KnownOf(const CarriedColor& from_anchor, const Image& carried_surely) {
-  Image known = carried_surely;
-  for (size_t i = 0; i < known.data.size(); ++i) {
-    if (from_anchor.confidence.data[i] > kFollowed) known.data[i] = 1.0f;
-  }
-  return known;
-}
-
-double ShareOpen(const Image& known) {
-  const auto open = std::count(known.data.begin(), known.data.end(), 0.0f);
-  return static_cast<double>(open) / static_cast<double>(known.data.size());
-}
-
-// What the anchor tells of a frame stands for what its sources would.
-InferredColor AnswerOf(const CarriedColor& from_anchor,
-                       const Image& known,
-                       const Image& luminance,
-                       const ColorSources& sources) {
-  InferredColor answer;
-  if (ShareOpen(known) > kWorthAsking) {
-    answer = sources.infer(luminance, known);
-  } else {
-    answer = {Image(luminance.width, luminance.height, 2),
-              Image(luminance.width, luminance.height, 1)};
-    Image followed = from_anchor.confidence;
-    for (float& value : followed.data) value = value > kFollowed ? 1.0f : 0.0f;
-    std::copy_n(from_anchor.ab.data.begin(), answer.ab.data.size(), answer.ab.data.begin());
-    FillHoles(followed, &answer.ab);
-  }
-  for (size_t i = 0; i < luminance.PlaneSize(); ++i) {
-    if (from_anchor.confidence.data[i] <= kFollowed) continue;
-    for (int c = 0; c < 2; ++c) answer.ab.Plane(c)[i] = from_anchor.ab.Plane(c)[i];
-    if (!answer.distance.Empty()) answer.distance.data[i] = 0.0f;
-  }
-  return answer;
-}
-
-FusedColor ColorBetween(const Image& luminance,
-                        const CarriedColor& carried,
-                        const CarriedColor& from_anchor,
-                        const ColorSources& sources,
-                        const CancellationToken& cancel) {
-  ColorSources with_anchor = sources;
-  with_anchor.infer = [&](const Image& l, const Image& carried_surely) {
-    return AnswerOf(from_anchor, KnownOf(from_anchor, carried_surely), l, sources);
-  };
-  ThreadPool one(1);
-  FusedColor fused = ColorOfView(luminance, carried, with_anchor, one, cancel);
-  // What the anchor was given as a guess is one here, too.
-  for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
-    if (from_anchor.confidence.data[i] <= kFollowed) continue;
-    float& inferred = fused.provenance.Plane(2)[i];
-    const float guessed = inferred * std::clamp(from_anchor.ab.Plane(2)[i], 0.0f, 1.0f);
-    fused.provenance.Plane(0)[i] += guessed;
-    inferred -= guessed;
-  }
-  return fused;
-}
-
-// Some anchors, and the frames that belong to them.
-struct Section {
+// All frames of one shot, and its anchors among them: numbers of frames in order of time.
+struct Shot {
+  std::vector<int> frames;
   std::vector<int> anchors;
-  FilmFrames frames;
+
+  bool IsAnchor(int frame) const {
+    return std::binary_search(anchors.begin(), anchors.end(), frame);
+  }
+  // The last anchor up to a frame and the first behind it; -1 where there is none.
+  int AnchorUpTo(int frame) const {
+    const auto next = std::upper_bound(anchors.begin(), anchors.end(), frame);
+    return next == anchors.begin() ? -1 : *(next - 1);
+  }
+  int AnchorBehind(int frame) const {
+    const auto next = std::upper_bound(anchors.begin(), anchors.end(), frame);
+    return next == anchors.end() ? -1 : *next;
+  }
 };
 
-class FramesColorer {
+// A frame that has its colours, before they are steadied.
+struct Colored {
+  int frame = 0;
+  FusedColor color;
+  std::shared_ptr<const FlowPair> flow_from_last;
+};
+
+// Colours one shot, stretch by stretch: neighbouring frames, the last of which is an anchor or the
+// shot's end. What is told of a frame depends on its neighbours, not on where stretches end.
+class ShotColorer {
  public:
-  FramesColorer(const Scene& scene,
-                const ViewImages& images,
-                const FrameColoring& coloring,
-                StageContext& context)
-      : scene_(scene),
-        images_(images),
+  ShotColorer(const Shot& shot,
+              const FilmFrames& frames,
+              const std::vector<int>& view_of_frame,
+              const FrameColoring& coloring,
+              const Scene& scene,
+              StageContext& context)
+      : shot_(shot),
+        frames_(frames),
+        view_of_frame_(view_of_frame),
         coloring_(coloring),
-        context_(context),
-        order_(scene.ViewsInOrderOfTime()) {
-    for (const int view : order_) frames_.shot.push_back(scene.views[view].moment->shot);
-    frames_.luminance = [this](int frame) { return images_.Luminance(order_[frame]); };
-  }
+        scene_(scene),
+        context_(context) {}
 
   void Run() {
-    const std::vector<int> anchors = AnchorFrames(frames_, {}, context_.pool(), context_.cancel());
-    for (const Section& section : SectionsOf(anchors)) Color(section);
+    size_t begin = FirstToColor();
+    while (begin < shot_.frames.size()) {
+      const size_t end = EndOfStretch(begin);
+      Color({shot_.frames.begin() + static_cast<std::ptrdiff_t>(begin),
+             shot_.frames.begin() + static_cast<std::ptrdiff_t>(end)});
+      begin = end;
+      Deliver(end == shot_.frames.size());
+    }
   }
 
  private:
-  std::vector<Section> SectionsOf(const std::vector<int>& anchors) const {
-    const std::vector<int> owner = NearestKeyFrames(frames_.shot, anchors);
-    const Camera camera = images_.WorkingCamera(0);
-    const int64_t bytes = int64_t{camera.width} * camera.height * (kColorChannels + 1) * 4;
-    const auto at_once = std::max<int64_t>(
-        kSectionBytes / bytes, 2 * static_cast<int64_t>(context_.pool().thread_count()));
-    std::vector<Section> sections;
-    int64_t waiting = 0;
-    for (const int anchor : anchors) {
-      const auto owned = std::count(owner.begin(), owner.end(), anchor);
-      if (sections.empty() || waiting + owned > at_once) {
-        sections.emplace_back();
-        waiting = 0;
-      }
-      sections.back().anchors.push_back(anchor);
-      waiting += owned;
-    }
-    for (Section& section : sections) {
-      section.frames = frames_;
-      for (size_t i = 0; i < owner.size(); ++i) {
-        if (std::find(section.anchors.begin(), section.anchors.end(), owner[i]) ==
-            section.anchors.end()) {
-          section.frames.shot[i] = -1 - static_cast<int>(i);  // nobody colours it
-        }
-      }
-    }
-    return sections;
+  // An interrupted run goes on from the last anchor that reaches all that is left.
+  size_t FirstToColor() const {
+    const auto begin = shot_.frames.begin();
+    const auto open = std::find_if(begin, shot_.frames.end(), [&](int frame) {
+      return !coloring_.was_done(view_of_frame_[frame]);
+    });
+    if (open == shot_.frames.end()) return shot_.frames.size();
+    if (open - begin < steady_.reach) return 0;
+    const int anchor = shot_.AnchorUpTo(*(open - steady_.reach));
+    return anchor < 0 ? 0 : std::lower_bound(begin, open, anchor) - begin;
   }
 
-  void Color(const Section& section) {
-    std::vector<FilmKey> keys(section.anchors.size());
-    context_.pool().ForEach(static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
-      const int frame = section.anchors[i];
-      const FusedColor color = ColorOf(order_[frame], nullptr);
-      coloring_.deliver(order_[frame], color);
-      keys[i] = {frame, AsKey(color)};
+  size_t EndOfStretch(size_t begin) const {
+    const auto luminance = frames_.luminance(shot_.frames[begin]);
+    const auto at_once = static_cast<size_t>(
+        kStretchBytes / (kBytesPerPixel * static_cast<int64_t>(luminance->PlaneSize())));
+    size_t end = begin;
+    for (size_t i = begin; i < shot_.frames.size(); ++i) {
+      const bool may_end = shot_.IsAnchor(shot_.frames[i]) || i + 1 == shot_.frames.size();
+      if (!may_end) continue;
+      if (end > begin && i + 1 - begin > at_once) break;
+      end = i + 1;
+    }
+    return end;
+  }
+
+  void Color(const std::vector<int>& stretch) {
+    const auto index_of = [&](int frame) {
+      return std::lower_bound(stretch.begin(), stretch.end(), frame) - stretch.begin();
+    };
+    const auto count = static_cast<int64_t>(stretch.size());
+    ThreadPool& pool = context_.pool();
+    std::vector<Colored> colored(stretch.size());
+    pool.ForEach(count, [&](int64_t i, int) {
+      colored[i].frame = stretch[i];
+      colored[i].flow_from_last = FlowTo(stretch[i], i > 0 ? stretch[i - 1] : last_);
     });
-    std::vector<std::pair<int, CarriedColor>> between;
-    CarryAlongFilm(section.frames,
-                   keys,
-                   {.find_again = false},
-                   context_.pool(),
+    std::vector<FilmKey> keys;
+    if (last_anchor_) keys.push_back(std::move(*last_anchor_));
+    const size_t first_new = keys.size();
+    for (const int frame : stretch) {
+      if (shot_.IsAnchor(frame)) keys.push_back({frame, {}});
+    }
+    pool.ForEach(static_cast<int64_t>(keys.size() - first_new), [&](int64_t i, int) {
+      FilmKey& key = keys[first_new + i];
+      FusedColor& color = colored[index_of(key.frame)].color;
+      color = ColorOf(key.frame, nullptr);
+      key = AnchorAsKey(key.frame, color);
+    });
+    // Each anchor is followed to its neighbours on both sides.
+    std::vector<CarriedColor> before(stretch.size()), behind(stretch.size());
+    const auto flow = [&](int, int later) { return colored[index_of(later)].flow_from_last; };
+    pool.ForEach(2 * static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
+      const bool forward = i % 2 == 0;
+      FollowAnchor(keys[i / 2], stretch, forward, flow, [&](int frame, const CarriedColor& color) {
+        (forward ? before : behind)[index_of(frame)] = color;
+      });
+    });
+    pool.ForEach(count, [&](int64_t i, int) {
+      const int frame = stretch[i];
+      if (shot_.IsAnchor(frame)) return;
+      const int from = shot_.AnchorUpTo(frame), to = shot_.AnchorBehind(frame);
+      const double place =
+          from >= 0 && to >= 0 ? static_cast<double>(frame - from) / (to - from) : 0.0;
+      const CarriedColor of_anchors = OfBothAnchors(std::move(before[i]), behind[i], place);
+      colored[i].color = ColorOf(frame, &of_anchors);
+    });
+    if (!keys.empty()) last_anchor_ = std::move(keys.back());
+    last_ = stretch.back();
+    std::move(colored.begin(), colored.end(), std::back_inserter(colored_));
+  }
+
+  std::shared_ptr<const FlowPair> FlowTo(int frame, int last) const {
+    context_.cancel().ThrowIfCancelled();
+    if (last < 0) return nullptr;
+    const auto earlier = frames_.luminance(last), later = frames_.luminance(frame);
+    return std::make_shared<const FlowPair>(
+        FlowPair{DenseFlow(*earlier, *later), DenseFlow(*later, *earlier)});
+  }
+
+  // Into the frames of a stretch between an anchor and the next one in this direction.
+  void FollowAnchor(
+      const FilmKey& key,
+      const std::vector<int>& stretch,
+      bool forward,
+      const std::function<std::shared_ptr<const FlowPair>(int earlier, int later)>& flow,
+      const std::function<void(int frame, const CarriedColor& color)>& on_frame) const {
+    FilmFrames way = frames_;
+    way.flow = flow;
+    for (size_t i = 0; i < way.shot.size(); ++i) way.shot[i] = -1 - static_cast<int>(i);
+    way.shot[key.frame] = 0;
+    bool leads_on = false;
+    for (const int frame : stretch) {
+      if (shot_.IsAnchor(frame)) continue;
+      const int owner = forward ? shot_.AnchorUpTo(frame) : shot_.AnchorBehind(frame);
+      if (owner != key.frame) continue;
+      way.shot[frame] = 0;
+      leads_on = true;
+    }
+    if (!leads_on) return;
+    ThreadPool one(1);
+    CarryAlongFilm(way,
+                   {key},
+                   {.correct_after = 1.0},
+                   one,
                    context_.cancel(),
                    [&](int frame, const CarriedColor& color) {
-                     const auto& anchors = section.anchors;
-                     if (std::find(anchors.begin(), anchors.end(), frame) == anchors.end()) {
-                       between.emplace_back(frame, color);
-                     }
+                     if (frame != key.frame) on_frame(frame, color);
                    });
-    keys.clear();
-    context_.pool().ForEach(static_cast<int64_t>(between.size()), [&](int64_t i, int) {
-      auto& [frame, from_anchor] = between[i];
-      coloring_.deliver(order_[frame], ColorOf(order_[frame], &from_anchor));
-    });
   }
 
-  // `from_anchor`: null of an anchor.
-  FusedColor ColorOf(int view, const CarriedColor* from_anchor) const {
+  // `of_anchors`: null of an anchor.
+  FusedColor ColorOf(int frame, const CarriedColor* of_anchors) const {
     context_.cancel().ThrowIfCancelled();
-    const auto luminance = images_.Luminance(view);
+    const int view = view_of_frame_[frame];
+    const auto luminance = frames_.luminance(frame);
     const CarriedColor carried =
         ReadCarried(context_, scene_.views[view], luminance->width, luminance->height);
     const ColorSources sources = coloring_.sources(view);
-    if (from_anchor != nullptr) {
-      return ColorBetween(*luminance, carried, *from_anchor, sources, context_.cancel());
+    if (of_anchors != nullptr) {
+      return ColorBetweenAnchors(*luminance, carried, *of_anchors, sources, context_.cancel());
     }
     ThreadPool one(1);
     return ColorOfView(*luminance, carried, sources, one, context_.cancel());
   }
 
-  const Scene& scene_;
-  const ViewImages& images_;
+  // All frames whose neighbours are known; these are kept as long as others need them.
+  void Deliver(bool is_end) {
+    const auto reach = static_cast<size_t>(steady_.reach);
+    const size_t end =
+        is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
+    std::vector<FrameInMotion> neighbors;
+    for (const Colored& one : colored_) neighbors.push_back({&one.color.ab, one.flow_from_last});
+    context_.pool().ForEach(static_cast<int64_t>(end - delivered_), [&](int64_t i, int) {
+      context_.cancel().ThrowIfCancelled();
+      const size_t index = delivered_ + static_cast<size_t>(i);
+      const int view = view_of_frame_[colored_[index].frame];
+      if (coloring_.was_done(view)) return;
+      FusedColor color = colored_[index].color;
+      if (!coloring_.key_views.contains(view)) {
+        color.ab = SteadyColors(neighbors, static_cast<int>(index), steady_);
+      }
+      coloring_.deliver(view, color);
+    });
+    const size_t done_with = end - std::min(end, reach);
+    colored_.erase(colored_.begin(), colored_.begin() + static_cast<std::ptrdiff_t>(done_with));
+    delivered_ = end - done_with;
+  }
+
+  const Shot& shot_;
+  const FilmFrames& frames_;
+  const std::vector<int>& view_of_frame_;
   const FrameColoring& coloring_;
+  const Scene& scene_;
   StageContext& context_;
-  const std::vector<int> order_;
-  FilmFrames frames_;
+  const SteadyColorsOptions steady_;
+  int last_ = -1;                       // frame of the last stretch
+  std::optional<FilmKey> last_anchor_;  // of the last stretch
+  std::vector<Colored> colored_;        // frames one after the other
+  size_t delivered_ = 0;                // of those
 };
 
 }  // namespace
@@ -200,7 +243,20 @@ void ColorFrames(const Scene& scene,
                  const ViewImages& images,
                  const FrameColoring& coloring,
                  StageContext& context) {
-  FramesColorer(scene, images, coloring, context).Run();
+  const std::vector<int> order = scene.ViewsInOrderOfTime();
+  FilmFrames frames;
+  for (const int view : order) frames.shot.push_back(scene.views[view].moment->shot);
+  frames.luminance = [&](int frame) { return images.Luminance(order[frame]); };
+  std::map<int, Shot> shots;
+  for (size_t i = 0; i < order.size(); ++i) {
+    shots[frames.shot[i]].frames.push_back(static_cast<int>(i));
+  }
+  for (const int anchor : AnchorFrames(frames, {}, context.pool(), context.cancel())) {
+    shots[frames.shot[anchor]].anchors.push_back(anchor);
+  }
+  for (const auto& [number, shot] : shots) {
+    ShotColorer(shot, frames, order, coloring, scene, context).Run();
+  }
 }
 
 }  // namespace color3d

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <set>
 
 #include "core/carry/view_color.h"
 #include "core/scene/view_images.h"
@@ -13,14 +14,19 @@ namespace color3d {
 struct FrameColoring {
   // What a view's colour comes from beside what was carried into it. Thread-safe.
   std::function<ColorSources(int view)> sources;
-  // Takes each view's colour once, in any order. Thread-safe.
+  // Takes each view's colour once, in any order, but those that were done. Thread-safe.
   std::function<void(int view, const FusedColor& color)> deliver;
+  // Views that an interrupted run has delivered. Thread-safe.
+  std::function<bool(int view)> was_done;
+  // Views whose colours are somebody's own and stay as they are.
+  std::set<int> key_views;
 };
 
 // Anchors are coloured by their sources (core/film/anchor_frames.h). A frame between them has what
-// was carried into it, as they have; where that leaves it open, the colours of the nearest anchor,
-// followed by motion; and where motion does not tell, its own sources are asked. Memory does not
-// grow with the number of frames.
+// was carried into it, as they have; where that leaves it open, the colours of the anchors before
+// and behind it, followed by motion; and where motion does not tell, its own sources are asked. In
+// the end all are steadied along motion (core/film/steady_colors.h). Memory does not grow with the
+// number of frames; what comes of an interrupted run is the same to the bit.
 void ColorFrames(const Scene& scene,
                  const ViewImages& images,
                  const FrameColoring& coloring,

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <set>
 
+#include "core/base/error.h"
 #include "core/base/random.h"
 #include "core/image/codec.h"
 #include "tests/support/stages/stage_fixture.h"
@@ -60,36 +62,60 @@ class ColorFramesTest : public StageTest {
     std::map<int, FusedColor> delivered;
     asked_.clear();
     FrameColoring coloring;
+    coloring.key_views = key_views_;
+    coloring.was_done = [this](int view) { return done_.contains(view); };
     coloring.sources = [&](int view) {
       return ColorSources{
           [this, &mutex, view](const Image& l, const Image&) {
             const std::lock_guard lock(mutex);
             asked_.push_back(view);
-            return InferredColor{TrueAb(view), Image(l.width, l.height, 1, distance_)};
+            return InferredColor{Told(view), Image(l.width, l.height, 1, distance_)};
           },
           [view](const Image&) { return TrueAb(view); },
           {}};
     };
     coloring.deliver = [&](int view, const FusedColor& color) {
       const std::lock_guard lock(mutex);
+      if (delivered.size() == dies_after_) throw Error(ErrorCode::kAborted, "killed");
       EXPECT_TRUE(delivered.emplace(view, color).second) << view;
     };
-    ColorFrames(scene_, images, coloring, context);
-    EXPECT_EQ(delivered.size(), scene_.views.size());
+    try {
+      ColorFrames(scene_, images, coloring, context);
+      EXPECT_EQ(delivered.size() + done_.size(), scene_.views.size());
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::kAborted);
+      EXPECT_EQ(delivered.size(), dies_after_);
+    }
     return delivered;
+  }
+
+  // What the sources say of a frame.
+  Image Told(int view) const {
+    Image ab = TrueAb(view);
+    if (flicker_) {
+      for (float& value : ab.data) value += view % 2 == 0 ? 8.0f : -8.0f;
+    }
+    return ab;
   }
 
   Scene scene_;
   std::vector<int> asked_;
   float distance_ = 0.0f;  // of what is asked, as features go
+  bool flicker_ = false;
+  std::set<int> key_views_;
+  std::set<int> done_;
+  size_t dies_after_ = 1000;  // frames
 };
 
+// A texture that moves as TrueAb does.
+float Panned(int frame, int x, int y) {
+  const double u = x + kPanPx * frame;
+  return static_cast<float>(0.5 + 0.15 * std::sin(0.31 * u + 0.1 * y) +
+                            0.15 * std::sin(0.23 * y - 0.17 * u));
+}
+
 TEST_F(ColorFramesTest, FramesBetweenTakeTheColoursOfAnchors) {
-  AddFrames([](int frame, int x, int y) {
-    const double u = x + kPanPx * frame;
-    return static_cast<float>(0.5 + 0.15 * std::sin(0.31 * u + 0.1 * y) +
-                              0.15 * std::sin(0.23 * y - 0.17 * u));
-  });
+  AddFrames(Panned);
   const std::map<int, FusedColor> colors = Run(2);
   EXPECT_LT(asked_.size(), static_cast<size_t>(kFrames));
   for (const auto& [view, color] : colors) {
@@ -115,6 +141,43 @@ TEST_F(ColorFramesTest, WhatStandsStillIsAskedOnceARun) {
   for (const auto& [view, color] : colors) {
     EXPECT_NEAR(color.provenance.At(0, 30, 50), 0.6, 0.05) << "what is guessed stays so: " << view;
     EXPECT_NEAR(color.provenance.At(2, 30, 50), 0.4, 0.05) << view;
+  }
+}
+
+TEST_F(ColorFramesTest, WhatFlickersIsSteadied) {
+  AddFrames(Panned);
+  flicker_ = true;
+  key_views_ = {12};
+  const std::map<int, FusedColor> colors = Run(2);
+  ASSERT_GT(asked_.size(), 2u);
+  double jump = 0.0;
+  for (int view = 1; view < kFrames; ++view) {
+    if (view == 12 || view == 13) continue;  // a key frame is nobody else's to change
+    jump = std::max(
+        jump,
+        std::abs(double{colors.at(view).ab.At(1, 30, 50)} - colors.at(view - 1).ab.At(1, 30, 50)));
+  }
+  EXPECT_LT(jump, 4.0) << "of 16";
+}
+
+TEST_F(ColorFramesTest, AnotherWorkerGoesOnAndGivesTheSame) {
+  AddFrames(Panned);
+  flicker_ = true;
+  const std::map<int, FusedColor> whole = Run(2);
+  for (const size_t dies_after : {1u, 9u, 20u, 29u}) {
+    done_.clear();
+    dies_after_ = dies_after;
+    std::map<int, FusedColor> colors = Run(2);
+    for (const auto& [view, color] : colors) done_.insert(view);
+    dies_after_ = 1000;
+    const size_t asked_before = asked_.size();
+    colors.merge(Run(1));
+    EXPECT_LE(asked_.size(), asked_before) << "not all of it is done again";
+    ASSERT_EQ(colors.size(), whole.size());
+    for (const auto& [view, color] : whole) {
+      EXPECT_EQ(colors.at(view).ab.data, color.ab.data) << view << ", died after " << dies_after;
+      EXPECT_EQ(colors.at(view).provenance.data, color.provenance.data) << view;
+    }
   }
 }
 

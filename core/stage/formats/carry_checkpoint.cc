@@ -1,10 +1,6 @@
 #include "core/stage/formats/carry_checkpoint.h"
 
-#include <fmt/format.h>
-
-#include <cstdint>
 #include <cstring>
-#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "core/catalogue/stages.h"
@@ -16,43 +12,12 @@ using nlohmann::json;
 
 namespace {
 
-// A checkpoint: these bytes, then records: length (uint64) and CBOR of
+// A checkpoint: these bytes, then records:
 //   {"view": name, "coverage": 0..1, "png": bytes}       a view that is done
-//   {"key": name, "direction": 1 or -1, "frame": name, "width": px, "height": px,
-//    "in_key": bytes, "in_frame": bytes}                 a walk of a film; neither at its end
-constexpr std::string_view kMagic = "carry 2\n";
-
-void Append(std::ostream& out, const json& record) {
-  std::string bytes;
-  json::to_cbor(record, bytes);
-  const uint64_t length = bytes.size();
-  out.write(reinterpret_cast<const char*>(&length), sizeof(length));
-  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-}
-
-// Throws json::exception or Error{kDataLoss}.
-void ForEachRecord(const std::filesystem::path& file,
-                   const std::function<void(const json&)>& on_record) {
-  const Error damaged(ErrorCode::kDataLoss, "it ends too soon");
-  std::ifstream in(file, std::ios::binary);
-  uint64_t left = std::filesystem::file_size(file);
-  std::string bytes(kMagic.size(), '\0');
-  if (!in.read(bytes.data(), static_cast<std::streamsize>(bytes.size())) || bytes != kMagic) {
-    throw Error(ErrorCode::kDataLoss, "it is none of this version");
-  }
-  left -= bytes.size();
-  while (left > 0) {
-    uint64_t length = 0;
-    if (left < sizeof(length)) throw damaged;
-    in.read(reinterpret_cast<char*>(&length), sizeof(length));
-    left -= sizeof(length);
-    if (length > left) throw damaged;
-    bytes.resize(length);
-    if (!in.read(bytes.data(), static_cast<std::streamsize>(length))) throw damaged;
-    left -= length;
-    on_record(json::from_cbor(bytes));
-  }
-}
+//   {"key": name, "direction": 1 or -1, "frame": name, "moved": longer sides,
+//    "wanted": 0..1, "width": px, "height": px, "in_key": bytes, "in_frame": bytes}
+//                                                        a walk of a film; no maps at its end
+constexpr char kMagic[] = "carry 3\n";
 
 json::binary_t BytesOf(const Image& map) {
   std::vector<uint8_t> bytes(map.data.size() * sizeof(float));
@@ -73,7 +38,9 @@ Image MapFrom(const json& record, const char* name) {
 json RecordOf(const FilmWalk& walk, const Scene& scene) {
   json record{{"key", scene.views[walk.key].name},
               {"direction", walk.direction},
-              {"frame", scene.views[walk.frame].name}};
+              {"frame", scene.views[walk.frame].name},
+              {"moved", walk.moved},
+              {"wanted", walk.wanted}};
   if (walk.track) {
     record["width"] = walk.track->in_key.width;
     record["height"] = walk.track->in_key.height;
@@ -88,6 +55,8 @@ FilmWalk WalkFrom(const json& record, const Scene& scene) {
   walk.key = scene.FindView(record.at("key").get<std::string>());
   walk.direction = record.at("direction");
   walk.frame = scene.FindView(record.at("frame").get<std::string>());
+  walk.moved = record.at("moved");
+  walk.wanted = record.at("wanted");
   if (record.contains("in_key")) {
     walk.track = std::make_shared<const FilmTrack>(
         FilmTrack{MapFrom(record, "in_key"), MapFrom(record, "in_frame")});
@@ -112,27 +81,9 @@ CarryCheckpoint::CarryCheckpoint(const Scene& scene, StageContext& context)
       context_(context),
       was_done_(scene.views.size(), 0),
       coverage_(scene.views.size(), 0.0),
-      file_(FileOf("carried"), std::ios::binary | std::ios::trunc) {
-  file_ << kMagic;
-  const std::filesystem::path before = FileOf("before");
-  try {
-    if (context.checkpoints().LoadTo(before)) TakeUp(before);
-  } catch (const Error& e) {
-    if (e.code() != ErrorCode::kDataLoss && e.code() != ErrorCode::kNotFound) throw;
-    context.progress().OnWarning(fmt::format(
-        "{} starts afresh: its checkpoint is damaged ({})", kind::kCarryColor, e.what()));
-  }
-  std::filesystem::remove(before);
-}
-
-// All of it or nothing.
-void CarryCheckpoint::TakeUp(const std::filesystem::path& file) {
-  try {
-    ForEachRecord(file, [&](const json& record) { CheckRecord(record, scene_); });
-  } catch (const json::exception& e) {
-    throw Error(ErrorCode::kDataLoss, "{}", e.what());
-  }
-  ForEachRecord(file, [&](const json& record) { TakeUp(record); });
+      records_(kind::kCarryColor, kMagic, context) {
+  records_.TakeUp([&](const json& record) { CheckRecord(record, scene_); },
+                  [&](const json& record) { TakeUp(record); });
 }
 
 void CarryCheckpoint::TakeUp(const json& record) {
@@ -151,10 +102,9 @@ void CarryCheckpoint::Keep(size_t view, double coverage, const std::string& png)
   context_.WriteOutput(ViewArtifact(artifact::kCarried, scene_.views[view], ".png"), png);
   coverage_[view] = coverage;
   ++done_;
-  Append(file_,
-         {{"view", scene_.views[view].name},
-          {"coverage", coverage},
-          {"png", json::binary(std::vector<uint8_t>(png.begin(), png.end()))}});
+  records_.Append({{"view", scene_.views[view].name},
+                   {"coverage", coverage},
+                   {"png", json::binary(std::vector<uint8_t>(png.begin(), png.end()))}});
 }
 
 void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
@@ -164,7 +114,11 @@ void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
   context_.progress().OnProgress(done_,
                                  static_cast<int64_t>(scene_.views.size()),
                                  "carrying colour into " + scene_.views[index].name);
-  if (context_.checkpoints().WantsSave()) Save();
+  records_.SaveWhenDue([&] {
+    std::vector<json> walks;
+    for (const auto& [place, walk] : walks_) walks.push_back(RecordOf(walk, scene_));
+    return walks;
+  });
 }
 
 std::vector<FilmWalk> CarryCheckpoint::Walks() const {
@@ -177,27 +131,6 @@ std::vector<FilmWalk> CarryCheckpoint::Walks() const {
 void CarryCheckpoint::SetWalk(const FilmWalk& walk) {
   const std::lock_guard lock(mutex_);
   walks_[{walk.key, walk.direction}] = walk;
-}
-
-void CarryCheckpoint::Save() {
-  const std::filesystem::path file = FileOf("save");
-  file_.flush();
-  std::filesystem::copy_file(
-      FileOf("carried"), file, std::filesystem::copy_options::overwrite_existing);
-  {
-    std::ofstream out(file, std::ios::binary | std::ios::app);
-    for (const auto& [place, walk] : walks_) Append(out, RecordOf(walk, scene_));
-    if (!file_ || !out.flush()) {
-      throw Error(ErrorCode::kResourceExhausted,
-                  "cannot write the checkpoint {}; is the disk full?",
-                  file.string());
-    }
-  }
-  context_.checkpoints().SaveFile(file);
-}
-
-std::filesystem::path CarryCheckpoint::FileOf(const char* name) const {
-  return context_.scratch_folder() / fmt::format("carry_checkpoint.{}", name);
 }
 
 }  // namespace color3d

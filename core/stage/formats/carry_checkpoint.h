@@ -3,8 +3,6 @@
 // with their number. Thread-safe but for the constructor.
 #pragma once
 
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
@@ -14,6 +12,7 @@
 
 #include "core/film/film_carry.h"
 #include "core/scene/scene.h"
+#include "core/stage/formats/record_checkpoint.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -36,11 +35,8 @@ class CarryCheckpoint {
   void SetWalk(const FilmWalk& walk);
 
  private:
-  void TakeUp(const std::filesystem::path& file);
   void TakeUp(const nlohmann::json& record);
   void Keep(size_t view, double coverage, const std::string& png);
-  void Save();
-  std::filesystem::path FileOf(const char* name) const;
 
   const Scene& scene_;
   StageContext& context_;
@@ -48,8 +44,8 @@ class CarryCheckpoint {
   mutable std::mutex mutex_;
   std::vector<double> coverage_;
   int64_t done_ = 0;
-  std::ofstream file_;                             // the views that are done
   std::map<std::pair<int, int>, FilmWalk> walks_;  // by key frame and direction
+  RecordCheckpoint records_;
 };
 
 }  // namespace color3d

@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/image/codec.h"
 #include "core/splat/model/gaussian_model.h"
@@ -17,6 +20,21 @@ class Warnings : public NullObserver {
  public:
   void OnWarning(const std::string& message) override { text += message + "\n"; }
   std::string text;
+};
+
+// Keeps every state that it is given, and dies at one.
+class DyingCheckpoints : public CheckpointStore {
+ public:
+  std::optional<std::string> Load() override {
+    return states.empty() ? std::nullopt : std::optional(states.back());
+  }
+  bool WantsSave() override { return true; }
+  void Save(const std::string& state) override {
+    if (states.size() < dies_at || dies_at == 0) states.push_back(state);
+    if (states.size() == dies_at) throw Error(ErrorCode::kAborted, "the lease is lost");
+  }
+  std::vector<std::string> states;
+  size_t dies_at = 0;  // 0: never
 };
 
 class StageTest : public ::testing::Test {

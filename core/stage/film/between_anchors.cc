@@ -1,0 +1,108 @@
+#include "core/stage/film/between_anchors.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/image/fill_holes.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kColorChannels = 3;      // a, b and the share that is guessed
+constexpr float kFollowed = 0.5f;      // confidence from which motion tells
+constexpr double kWorthAsking = 0.05;  // share of a frame that is open
+
+// 1 where the frame's own sources need not be asked.
+Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
+  Image known = carried_surely;
+  for (size_t i = 0; i < known.data.size(); ++i) {
+    if (of_anchors.confidence.data[i] > kFollowed) known.data[i] = 1.0f;
+  }
+  return known;
+}
+
+double ShareOpen(const Image& known) {
+  const auto open = std::count(known.data.begin(), known.data.end(), 0.0f);
+  return static_cast<double>(open) / static_cast<double>(known.data.size());
+}
+
+// What the anchors tell of a frame stands for what its sources would.
+InferredColor AnswerOf(const CarriedColor& of_anchors,
+                       const Image& known,
+                       const Image& luminance,
+                       const ColorSources& sources) {
+  InferredColor answer;
+  if (ShareOpen(known) > kWorthAsking) {
+    answer = sources.infer(luminance, known);
+  } else {
+    answer = {Image(luminance.width, luminance.height, 2),
+              Image(luminance.width, luminance.height, 1)};
+    Image followed = of_anchors.confidence;
+    for (float& value : followed.data) value = value > kFollowed ? 1.0f : 0.0f;
+    std::copy_n(of_anchors.ab.data.begin(), answer.ab.data.size(), answer.ab.data.begin());
+    FillHoles(followed, &answer.ab);
+  }
+  for (size_t i = 0; i < luminance.PlaneSize(); ++i) {
+    if (of_anchors.confidence.data[i] <= kFollowed) continue;
+    for (int c = 0; c < 2; ++c) answer.ab.Plane(c)[i] = of_anchors.ab.Plane(c)[i];
+    if (!answer.distance.Empty()) answer.distance.data[i] = 0.0f;
+  }
+  return answer;
+}
+
+}  // namespace
+
+FilmKey AnchorAsKey(int frame, const FusedColor& color) {
+  const int width = color.ab.width, height = color.ab.height;
+  Image channels(width, height, kColorChannels);
+  std::copy(color.ab.data.begin(), color.ab.data.end(), channels.data.begin());
+  for (size_t i = 0; i < channels.PlaneSize(); ++i) {
+    const float guessed = color.provenance.Plane(0)[i], inferred = color.provenance.Plane(2)[i];
+    channels.Plane(2)[i] = guessed / std::max(guessed + inferred, 1e-6f);
+  }
+  return {frame, {std::move(channels), Image(width, height, 1, 1.0f)}};
+}
+
+CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, double place) {
+  if (before.ab.Empty()) return behind;
+  if (behind.ab.Empty()) return before;
+  const auto share_behind = static_cast<float>(place);
+  for (size_t i = 0; i < before.confidence.data.size(); ++i) {
+    float& confidence = before.confidence.data[i];
+    const float other = behind.confidence.data[i];
+    float weight = confidence > kFollowed ? confidence * (1.0f - share_behind) : 0.0f;
+    float other_weight = other > kFollowed ? other * share_behind : 0.0f;
+    confidence = std::max(confidence, other);
+    const float sum = weight + other_weight;
+    if (sum == 0.0f) continue;
+    for (int c = 0; c < before.ab.channels; ++c) {
+      float& value = before.ab.Plane(c)[i];
+      value = (weight * value + other_weight * behind.ab.Plane(c)[i]) / sum;
+    }
+  }
+  return before;
+}
+
+FusedColor ColorBetweenAnchors(const Image& luminance,
+                               const CarriedColor& carried,
+                               const CarriedColor& of_anchors,
+                               const ColorSources& sources,
+                               const CancellationToken& cancel) {
+  ColorSources with_anchors = sources;
+  with_anchors.infer = [&](const Image& l, const Image& carried_surely) {
+    return AnswerOf(of_anchors, KnownOf(of_anchors, carried_surely), l, sources);
+  };
+  ThreadPool one(1);
+  FusedColor fused = ColorOfView(luminance, carried, with_anchors, one, cancel);
+  // What an anchor was given as a guess is one here, too.
+  for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
+    if (of_anchors.confidence.data[i] <= kFollowed) continue;
+    float& inferred = fused.provenance.Plane(2)[i];
+    const float guessed = inferred * std::clamp(of_anchors.ab.Plane(2)[i], 0.0f, 1.0f);
+    fused.provenance.Plane(0)[i] += guessed;
+    inferred -= guessed;
+  }
+  return fused;
+}
+
+}  // namespace color3d

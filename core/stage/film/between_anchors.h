@@ -1,0 +1,28 @@
+// The colour of a film's frames between two anchors (core/film/anchor_frames.h). Stateless.
+#pragma once
+
+#include "core/base/cancellation.h"
+#include "core/base/image.h"
+#include "core/carry/view_color.h"
+#include "core/film/film_carry.h"
+
+namespace color3d {
+
+// An anchor's delivered colours as colours to be followed, all of them sure; a third channel has
+// the share that is guessed of what is not seen.
+FilmKey AnchorAsKey(int frame, const FusedColor& color);
+
+// What a frame has of the anchors before and behind it (either may be empty), of which the nearer
+// weighs more. `place`: 0..1 of the way from the one before to the one behind.
+CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, double place);
+
+// The colour of a frame: what was carried into it, as in all views; what `of_anchors` tells where
+// that is followed surely in place of what the frame's own sources would say, which are asked
+// where neither tells, if that is much.
+FusedColor ColorBetweenAnchors(const Image& luminance,
+                               const CarriedColor& carried,
+                               const CarriedColor& of_anchors,
+                               const ColorSources& sources,
+                               const CancellationToken& cancel);
+
+}  // namespace color3d

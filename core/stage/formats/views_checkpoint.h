@@ -1,0 +1,40 @@
+// The views that colorize_views has coloured: its outputs, kept in checkpoints so that a killed
+// worker's successor does not colour them again. Thread-safe but for the constructor.
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "core/carry/view_color.h"
+#include "core/scene/scene.h"
+#include "core/stage/formats/record_checkpoint.h"
+#include "core/stage/stage.h"
+
+namespace color3d {
+
+class ViewsCheckpoint {
+ public:
+  // Takes up the checkpoint, if there is one, and writes the outputs of its views. The references
+  // must outlive the object.
+  ViewsCheckpoint(const Scene& scene, StageContext& context);
+
+  // The checkpoint has it: nothing is left to do for this view.
+  bool WasDone(int view) const { return was_done_[static_cast<size_t>(view)] != 0; }
+  // Writes the outputs, reports progress, saves a checkpoint when it is time.
+  void Add(int view, const FusedColor& color);
+
+ private:
+  void Keep(int view, const std::string& ab, const std::string& provenance);
+
+  const Scene& scene_;
+  StageContext& context_;
+  std::vector<char> was_done_;
+  std::mutex mutex_;
+  int64_t done_ = 0;
+  RecordCheckpoint records_;
+};
+
+}  // namespace color3d
