@@ -41,6 +41,11 @@ ClientMetric Value(MetricType type, double value, const Labels& labels = {}) {
   return metric;
 }
 
+// Claims no jobs.
+bool IsForLivePictures(const WorkerRecord& worker) {
+  return worker.worker_id.starts_with("inference-");
+}
+
 // Read when somebody asks.
 class Sampled : public prometheus::Collectable {
  public:
@@ -128,15 +133,16 @@ class Sampled : public prometheus::Collectable {
     held.metric.push_back(
         Value(MetricType::Gauge, holds.contains(Hold::kStorage), {{"reason", "storage"}}));
     families->push_back(std::move(held));
-    int idle = 0, busy = 0;
+    int idle = 0, busy = 0, live = 0;
     double silent = 0.0;
     for (const WorkerRecord& worker : store_.ListWorkers()) {
-      ++(worker.job.empty() ? idle : busy);
+      ++(IsForLivePictures(worker) ? live : worker.job.empty() ? idle : busy);
       silent = std::max(silent, static_cast<double>(now - worker.heartbeat_ms) / 1000.0);
     }
     MetricFamily workers{"color3d_workers", "Worker processes.", MetricType::Gauge, {}};
     workers.metric.push_back(Value(MetricType::Gauge, idle, {{"state", "idle"}}));
     workers.metric.push_back(Value(MetricType::Gauge, busy, {{"state", "busy"}}));
+    workers.metric.push_back(Value(MetricType::Gauge, live, {{"state", "live"}}));
     families->push_back(std::move(workers));
     Add(families,
         "color3d_worker_silence_seconds",

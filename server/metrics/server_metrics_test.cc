@@ -59,6 +59,7 @@ TEST_F(ServerMetricsTest, TellsOfQueueCallsAndEnds) {
   CreateDiamond();
   store_->SetHold(Hold::kPaused, true);
   store_->UpdateWorker({"w", 1, "", 0, 0});
+  store_->UpdateWorker({"inference-2", 2, "", 0, 0});
   metrics_.CountCall("/color3d.v1.JobService/GetJob", "OK", 0.003);
   metrics_.CountCall("/color3d.v1.JobService/GetJob", "NOT_FOUND", 0.2);
   sample_.blobs_damaged = 7;
@@ -71,6 +72,7 @@ TEST_F(ServerMetricsTest, TellsOfQueueCallsAndEnds) {
     EXPECT_EQ(ValueOf(text, "color3d_jobs_ended_total{kind=\"single\",state=\"FAILED\"}"), 1);
     EXPECT_EQ(ValueOf(text, "color3d_queue_held{reason=\"paused\"}"), 1);
     EXPECT_EQ(ValueOf(text, "color3d_workers{state=\"idle\"}"), 1);
+    EXPECT_EQ(ValueOf(text, "color3d_workers{state=\"live\"}"), 1) << "it claims no jobs";
     EXPECT_EQ(ValueOf(text, "color3d_blobs_damaged_total"), 7);
     EXPECT_EQ(ValueOf(text, "color3d_build_info{version=\"1.2.3\"}"), 1);
     EXPECT_EQ(ValueOf(text,
