@@ -26,6 +26,8 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target) {
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 300);
   // A picture that kills the worker must not be sent to the next one by itself.
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
+  // Each worker has a connection of its own.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
 }
 
@@ -66,7 +68,7 @@ InferenceClient::InferenceClient(InferenceLink link) : link_(std::move(link)) {
 }
 
 void InferenceClient::WarmUp() const {
-  if (stub_ && link_.demand) link_.demand();
+  if (available() && link_.demand) link_.demand();
 }
 
 void InferenceClient::Start(const std::shared_ptr<Call>& call,
@@ -105,23 +107,34 @@ void InferenceClient::Send(const Order& order) {
   Call& call = *order.call;
   call.context.set_deadline(std::min(limit, order.deadline));
   call.context.set_wait_for_ready(true);
-  stub_->async()->ColorizeImage(&call.context,
-                                &call.request,
-                                &call.response,
-                                [this, order, our_limit](const grpc::Status& status) {
-                                  const PoisonWatch::End end = EndOf(status);
-                                  const LivePicture picture =
-                                      end == PoisonWatch::End::kWorkerDied
-                                          ? DigestOfMessage(order.call->request)
-                                          : order.picture;
-                                  {
-                                    std::lock_guard lock(mutex_);
-                                    watch_.OnEnd(picture, end);
-                                  }
-                                  Pump();
-                                  // The last: this object may be gone afterwards.
-                                  order.done(Explained(status, our_limit));
-                                });
+  std::shared_ptr<Stub> stub;
+  {
+    std::lock_guard lock(mutex_);
+    stub = stub_;
+  }
+  stub->async()->ColorizeImage(&call.context,
+                               &call.request,
+                               &call.response,
+                               [this, order, stub, our_limit](const grpc::Status& status) {
+                                 OnEnd(order, stub, status);
+                                 Pump();
+                                 // The last: this object may be gone afterwards.
+                                 order.done(Explained(status, our_limit));
+                               });
+}
+
+void InferenceClient::OnEnd(const Order& order,
+                            const std::shared_ptr<Stub>& stub,
+                            const grpc::Status& status) {
+  const PoisonWatch::End end = EndOf(status);
+  const bool died = end == PoisonWatch::End::kWorkerDied;
+  const LivePicture picture = died ? DigestOfMessage(order.call->request) : order.picture;
+  std::lock_guard lock(mutex_);
+  watch_.OnEnd(picture, end);
+  // What is sent next must not end with the dead worker's connection, and be taken for its killer.
+  if (died && stub == stub_) {
+    stub_ = internal::v1::InferenceService::NewStub(MakeChannel(link_.target));
+  }
 }
 
 }  // namespace color3d

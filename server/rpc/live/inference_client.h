@@ -40,7 +40,7 @@ class InferenceClient {
 
   explicit InferenceClient(InferenceLink link);
 
-  bool available() const { return stub_ != nullptr; }
+  bool available() const { return !link_.target.empty(); }
   // Calls the worker to life ahead of the first picture.
   void WarmUp() const;
   // Keeps the worker from being drained while what this returns lives.
@@ -64,10 +64,12 @@ class InferenceClient {
   // Sends what may be sent now.
   void Pump();
   void Send(const Order& order);
+  using Stub = internal::v1::InferenceService::Stub;
+  void OnEnd(const Order& order, const std::shared_ptr<Stub>& stub, const grpc::Status& status);
 
   InferenceLink link_;
-  std::unique_ptr<internal::v1::InferenceService::Stub> stub_;
   std::mutex mutex_;
+  std::shared_ptr<Stub> stub_;  // to the present worker; null: there is none
   PoisonWatch watch_;
   std::deque<Order> waiting_;
 };
