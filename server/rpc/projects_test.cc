@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <thread>
+#include <utility>
 
 #include "tests/support/service/rpc_fixture.h"
 
@@ -25,6 +26,7 @@ class ProjectsTest : public RpcTest {
     options.limits.project_max_unfinished_jobs = 20;
     options.limits.project_max_streams = 2;
     options.job_logs = scratch_.path();
+    options.inference.target = "unix:" + (scratch_.path() / "nobody").string();
     guarded_ = std::make_unique<RpcServer>(options, store_, blobs_, uploads_, SystemClock());
     attic_ = Open(attic);
     cellar_ = Open(cellar);
@@ -138,6 +140,67 @@ TEST_F(ProjectsTest, WhatOneHasIsNotThereForTheOther) {
   EXPECT_EQ(other.Download(other.Upload("key")), "key") << "whoever shows the bytes has them";
 }
 
+// Jobs, scenes and files of others in what a request names, not in what it asks for.
+TEST_F(ProjectsTest, WhatOneHasCannotBeNamedByTheOther) {
+  const std::string scene = attic_->MakeScene().name(), own = cellar_->MakeScene().name();
+  v1::JobSpec spec;
+  spec.set_scene(scene);
+  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = attic_->Upload("key");
+  const v1::Job job = attic_->Create(spec);
+  Work();
+  v1::Job key_color;
+  for (const v1::Job& child : attic_->Children(job.name())) {
+    if (child.kind() == "colorize_key_view") key_color = child;
+  }
+  v1::ListColorizersResponse colorizers;
+  Call(*attic_->colorizers,
+       &v1::ColorizerService::Stub::ListColorizers,
+       v1::ListColorizersRequest(),
+       &colorizers);
+  ASSERT_EQ(colorizers.colorizers_size(), 1);
+
+  const auto create = [&](const v1::JobSpec& wanted) {
+    v1::CreateJobRequest request;
+    *request.mutable_spec() = wanted;
+    return Call(*cellar_->jobs, &v1::JobService::Stub::CreateJob, request);
+  };
+  v1::JobSpec inputs = ScriptedSpec(own, "a");
+  inputs.add_inputs(job.name());
+  EXPECT_EQ(create(inputs).error_code(), StatusCode::NOT_FOUND);
+  v1::JobSpec digests = spec;
+  digests.set_scene(own);
+  EXPECT_EQ(ReasonOfStatus(create(digests)), "BLOB_MISSING");
+  for (const bool of_scene : {true, false}) {
+    v1::JobSpec routes;
+    auto* route = routes.mutable_personalize_scenes()->add_routes();
+    route->set_scene(of_scene ? scene : own);
+    route->set_key_color_job(key_color.name());
+    EXPECT_EQ(create(routes).error_code(), StatusCode::NOT_FOUND) << of_scene;
+  }
+
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
+  const auto stream = cellar_->colorizers->ColorizeImages(&context);
+  std::vector<v1::ColorizeImagesRequest> pictures(4);
+  pictures[0].set_scene(scene);
+  pictures[1].set_colorizer(colorizers.colorizers(0).name());
+  *pictures[2].mutable_example() = DigestOf("key");
+  *pictures[3].mutable_image_digest() = DigestOf("key");
+  *pictures[3].mutable_example() = cellar_->Upload("an example");
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    if (i != 3) pictures[i].set_image("picture");
+    pictures[i].set_request_id(std::to_string(i));
+    stream->Write(pictures[i]);
+    v1::ColorizeImagesResponse answer;
+    ASSERT_TRUE(stream->Read(&answer)) << i;
+    EXPECT_EQ(answer.request_id(), std::to_string(i));
+    EXPECT_EQ(answer.error().code(), static_cast<int>(StatusCode::NOT_FOUND))
+        << i << ": " << answer.error().message();
+  }
+  stream->WritesDone();
+  EXPECT_TRUE(stream->Finish().ok());
+}
+
 TEST_F(ProjectsTest, QuotasSayWhatIsFullAndWhenToTryAgain) {
   attic_->Upload(std::string(3000, 'a'));
   grpc::ClientContext context;
@@ -240,6 +303,30 @@ TEST_F(ProjectsTest, StreamsOfAProjectAreCounted) {
   EXPECT_EQ(ReasonOfStatus(refused->Finish()), "QUOTA_EXCEEDED");
   for (int i = 0; i < 2; ++i) contexts[i].TryCancel();
   Work();
+}
+
+TEST_F(ProjectsTest, LiveStreamsOfAProjectAreCounted) {
+  std::deque<grpc::ClientContext> contexts;
+  v1::ColorizeImagesResponse response;
+  // Whether the stream is open: a picture that is none gets an answer.
+  const auto open = [&](TestClient& client) {
+    grpc::ClientContext& context = contexts.emplace_back();
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
+    auto stream = client.colorizers->ColorizeImages(&context);
+    stream->Write(v1::ColorizeImagesRequest());
+    return std::pair(stream->Read(&response), std::move(stream));
+  };
+  const auto first = open(*attic_), second = open(*attic_), third = open(*attic_);
+  EXPECT_TRUE(first.first);
+  EXPECT_TRUE(second.first);
+  EXPECT_FALSE(third.first);
+  EXPECT_EQ(ReasonOfStatus(third.second->Finish()), "QUOTA_EXCEEDED");
+  const auto others = open(*cellar_);
+  EXPECT_TRUE(others.first);
+  for (const auto* stream : {&first, &second, &others}) {
+    stream->second->WritesDone();
+    EXPECT_TRUE(stream->second->Finish().ok());
+  }
 }
 
 // Of whoever may not write nothing is read; he hears so before he has sent a byte.
