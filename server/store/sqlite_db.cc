@@ -108,6 +108,8 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
     if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot open " + path.string());
     sqlite3_extended_result_codes(db_, 1);
     SetBusyTimeout(std::chrono::seconds(10));
+    // Files for large statements would lie where a worker that is locked in may not write.
+    Exec("pragma temp_store=MEMORY");
     if (writes) {
       Exec("pragma journal_mode=WAL");
       Exec("pragma synchronous=FULL");

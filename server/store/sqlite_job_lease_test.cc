@@ -1,4 +1,6 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <mutex>
@@ -192,6 +194,42 @@ TEST_F(SqliteJobLeaseTest, StageCacheFindsSucceededJobsByKey) {
   store_->Publish(LeaseOf(job), publication);
   EXPECT_EQ(store_->FindStage("key").value().artifacts.size(), 1u);
   EXPECT_FALSE(store_->FindStage(""));
+}
+
+// No file can be opened while one is there.
+class NoFurtherFiles {
+ public:
+  NoFurtherFiles() {
+    ::getrlimit(RLIMIT_NOFILE, &before_);
+    const int next = ::dup(0);
+    ::close(next);
+    rlimit none = before_;
+    none.rlim_cur = static_cast<rlim_t>(next);
+    ::setrlimit(RLIMIT_NOFILE, &none);
+  }
+  ~NoFurtherFiles() { ::setrlimit(RLIMIT_NOFILE, &before_); }
+  NoFurtherFiles(const NoFurtherFiles&) = delete;
+  NoFurtherFiles& operator=(const NoFurtherFiles&) = delete;
+
+ private:
+  rlimit before_ = {};
+};
+
+// A worker that is locked in may not write where SQLite would put them.
+TEST_F(SqliteJobLeaseTest, TheResultsOfALongFilmNeedNoFileBesideTheStore) {
+  CreateSingle();
+  const JobRecord job = ClaimOne();
+  Publication publication;
+  for (int i = 0; i < 3000; ++i) {
+    const std::string name = "views_ab/" + std::to_string(i);
+    publication.artifacts.push_back({name, {Sha256Hex(name), 1}, "image/png"});
+  }
+  store_->Heartbeat(LeaseOf(job), {}, {}, kLease);
+  {
+    const NoFurtherFiles none;
+    EXPECT_NO_THROW(store_->Publish(LeaseOf(job), publication));
+  }
+  EXPECT_EQ(store_->GetJob(job.name).artifacts.size(), publication.artifacts.size());
 }
 
 TEST_F(SqliteJobLeaseTest, DeadWorkersLoseTheirLeasesAtOnce) {
