@@ -3,6 +3,7 @@
 # same packages). Run as root or as a user with sudo; does nothing when all is there.
 #   deploy/install-deps.sh           what deploy/demo.sh needs
 #   deploy/install-deps.sh --tests   what tests/run.sh needs, too
+#   deploy/install-deps.sh --fuzz    what tests/run.sh -L fuzz needs, too
 set -euo pipefail
 
 packages=(
@@ -19,7 +20,8 @@ case "${1:-}" in
   "") ;;
   --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus
     python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
-  *) echo "install-deps: unknown option $1; there is --tests" >&2; exit 2 ;;
+  --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;
+  *) echo "install-deps: unknown option $1; there are --tests and --fuzz" >&2; exit 2 ;;
 esac
 
 if ! command -v apt-get >/dev/null 2>&1; then

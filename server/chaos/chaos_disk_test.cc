@@ -1,5 +1,6 @@
 // The disk of the data folder fills up while jobs run, and is given space again. The folder is a
-// small file system of its own, which needs root or user namespaces; label "chaos".
+// small file system of its own, which needs root or user namespaces. COLOR3D_CHAOS_JOBS (8); label
+// "chaos".
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -22,7 +23,6 @@ using testing::ScriptedSpec;
 using testing::SleepMs;
 using testing::TestClient;
 
-constexpr int kJobs = 8;
 constexpr char kScript[] = "steps=30,ms=100";
 constexpr char kDiskSize[] = "size=16m";
 
@@ -83,6 +83,7 @@ class ChaosDiskTest : public ::testing::Test {
   ScratchFolder scratch_;
   const fs::path disk_ = scratch_.path() / "data";
   const fs::path filler_ = disk_ / "filler";
+  const int jobs_ = static_cast<int>(testing::FromEnvironment("COLOR3D_CHAOS_JOBS", 8));
   bool is_mounted_ = false;
 };
 
@@ -160,7 +161,7 @@ ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib,
   const std::string undisturbed = ResultOf(client, first);
 
   std::vector<std::string> names;
-  for (int i = 0; i < kJobs; ++i) names.push_back(submit());
+  for (int i = 0; i < jobs_; ++i) names.push_back(submit());
   SleepMs(1000);
   for (int i = 0; i < 60; ++i) {
     Fill(free_bytes);  // what is freed meanwhile is taken at once
@@ -189,7 +190,7 @@ ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib,
   for (const auto& entry : fs::recursive_directory_iterator(disk_ / "blobs")) {
     EXPECT_NE(entry.path().extension(), ".part") << "a half-written blob was left";
   }
-  std::cout << kJobs << " jobs: " << outcome.failed << " failed with STORAGE_FULL and succeeded "
+  std::cout << jobs_ << " jobs: " << outcome.failed << " failed with STORAGE_FULL and succeeded "
             << "when they were retried with space; " << outcome.lost_attempts << " attempts lost; "
             << outcome.refused << " of 6 submissions refused\n";
   return outcome;

@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <string_view>
 
 #include "server/service_error.h"
 
@@ -12,14 +11,18 @@ namespace {
 
 constexpr std::string_view kScheme = "Bearer ";
 
-std::string_view TokenOf(const grpc::CallbackServerContext& context) {
+std::string_view AuthorizationOf(const grpc::CallbackServerContext& context) {
   const auto entry = context.client_metadata().find("authorization");
   if (entry == context.client_metadata().end()) return {};
-  const std::string_view value(entry->second.data(), entry->second.size());
-  return value.starts_with(kScheme) ? value.substr(kScheme.size()) : std::string_view();
+  return {entry->second.data(), entry->second.size()};
 }
 
 }  // namespace
+
+std::string_view TokenOf(std::string_view authorization) {
+  return authorization.starts_with(kScheme) ? authorization.substr(kScheme.size())
+                                            : std::string_view();
+}
 
 // Once a second at most: refusals must not fill the disk.
 void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContext& context) const {
@@ -33,7 +36,7 @@ void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContex
 
 Caller Access::Require(Role role, const grpc::CallbackServerContext& context) const {
   if (!tokens_) return {};
-  const std::string_view token = TokenOf(context);
+  const std::string_view token = TokenOf(AuthorizationOf(context));
   if (token.empty()) {
     LogRefusal("it brings no token", context);
     throw ServiceError(ErrorCode::kFailedPrecondition,

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "server/access/tokens.h"
 
@@ -23,6 +24,9 @@ struct Caller {
 inline const char* NameOf(const Caller& caller) {
   return caller.name.empty() ? "somebody" : caller.name.c_str();
 }
+
+// What follows "Bearer " in the metadata "authorization"; empty for anything else.
+std::string_view TokenOf(std::string_view authorization);
 
 class Access {
  public:

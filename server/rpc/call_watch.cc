@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
-#include <cstring>
 #include <map>
 
 #include "server/store/job.h"
@@ -22,7 +21,7 @@ bool IsLowHex(std::string_view text) {
 
 bool IsSaneId(std::string_view id) {
   return !id.empty() && id.size() <= 64 && std::ranges::all_of(id, [](unsigned char c) {
-    return std::isalnum(c) != 0 || std::strchr("-_.", c) != nullptr;
+    return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
   });
 }
 
@@ -53,8 +52,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
       return entry == metadata.end() ? std::string()
                                      : std::string(entry->second.data(), entry->second.size());
     };
-    request_id_ = find("x-request-id");
-    if (!IsSaneId(request_id_)) request_id_ = NewId();
+    request_id_ = RequestIdOf(find("x-request-id"));
     trace_ = TraceIdOf(find("traceparent"));
   }
 
@@ -135,6 +133,10 @@ std::string TraceIdOf(std::string_view traceparent) {
     return "";
   }
   return std::string(trace);
+}
+
+std::string RequestIdOf(std::string_view header) {
+  return IsSaneId(header) ? std::string(header) : NewId();
 }
 
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(

@@ -23,8 +23,11 @@ const char* StatusName(grpc::StatusCode code);
 // all zeros. https://www.w3.org/TR/trace-context/
 std::string TraceIdOf(std::string_view traceparent);
 
-// Trailers of each call carry "x-request-id": the client's own of that name when it is 1 to 64
-// letters, digits, '-', '_' or '.', else a fresh one.
+// The client's own "x-request-id" when it is 1 to 64 letters, digits, '-', '_' or '.', else a fresh
+// one.
+std::string RequestIdOf(std::string_view header);
+
+// Trailers of each call carry "x-request-id", as RequestIdOf.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
     CallObserver observer);
 

@@ -10,6 +10,7 @@
 #include "core/base/files.h"
 #include "core/scene/formats/colmap_model.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/support/memory_folder.h"
 
 namespace color3d {
 namespace {
@@ -76,7 +77,7 @@ std::vector<std::string> FuzzSeeds() {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace color3d;
   if (size < kHead) return 0;
-  static const ScratchFolder folder;
+  static const ScratchFolder folder(MemoryFolder());
   const bool binary = (data[0] & 1) != 0;
   std::string_view rest(reinterpret_cast<const char*>(data) + kHead, size - kHead);
   for (size_t f = 0; f < kFiles.size(); ++f) {

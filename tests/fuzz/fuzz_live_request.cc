@@ -21,8 +21,8 @@ struct Fixture {
   FileBlobStore blobs{scratch.path() / "blobs", {0}};
   UploadStore uploads{scratch.path() / "uploads", blobs, 1 << 20};
   SqliteJobStore store{scratch.path() / "jobs.db", StoreRole::kServer, SystemClocks()};
-  Executor quick{1}, slow{1};
-  StreamLimits streams{{"watches", 1, 0}, {"downloads", 1, 0}, {"uploads", 1, 0}};
+  Executor quick{1}, slow{1}, bulk{1};
+  StreamLimits streams{{"watches", 1, 0}, {"downloads", 1, 0}, {"uploads", 1, 0}, {"live", 1, 0}};
   CallMemory memory{1 << 20};
   Access access{nullptr};
   FileDigests digests;
@@ -34,6 +34,7 @@ struct Fixture {
                  uploads,
                  quick,
                  slow,
+                 bulk,
                  streams,
                  memory,
                  access,

@@ -1,7 +1,9 @@
-// Fuzz target: transforms.json, as the server looks at it and as a worker reads it.
+// Fuzz target: transforms.json, as the server looks at it, as a worker reads it, and as cameras to
+// render from.
 #include <cmath>
 #include <string_view>
 
+#include "core/scene/formats/camera_file.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "server/rpc/transforms_outline.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -10,6 +12,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace color3d;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const TransformsOutline outline = OutlineOfTransforms(text);
+  ReadOrRefuse([&] {
+    const Camera absent{640, 480, 500.0, 500.0, 320.0, 240.0};
+    for (const FileCamera& camera : ReadCameraFile(text, "cameras.json", Scene(), absent, 100)) {
+      if (!camera.cam_from_world.Center().allFinite()) std::abort();
+      if (camera.camera.width < 1 || camera.camera.height < 1) std::abort();
+    }
+  });
   return ReadOrRefuse([&] {
     const nlohmann::json root = ParseFrames(text, "transforms.json");
     // What a worker accepts, the server has not refused.

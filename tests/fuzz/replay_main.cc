@@ -1,8 +1,11 @@
-// Runs a fuzz target without libFuzzer: on its seeds, on every prefix of them, and on seeded
-// mutations. The same inputs on every run. With a folder as argument it writes the seeds there
-// instead, for libFuzzer to start from; with files as arguments it replays those.
+// Runs a fuzz target without libFuzzer: on its seeds, on every prefix of them, on a corpus, and on
+// seeded mutations. The same inputs on every run.
+//   NAME_replay CORPUS          the folder's files are seeds, too
+//   NAME_replay FILE...         only these
+//   NAME_replay --write FOLDER  writes the seeds there, for libFuzzer to start from
 #include <fmt/core.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <string>
 
@@ -71,16 +74,40 @@ void Mutate(const std::vector<std::string>& seeds, Random& random, std::string& 
   }
 }
 
-void Replay(const std::vector<std::string>& seeds) {
+void Replay(const std::vector<std::string>& seeds, const std::vector<std::string>& corpus) {
   for (const std::string& seed : seeds) {
     for (size_t size = 0; size <= seed.size(); ++size) RunOne(seed.substr(0, size));
   }
+  std::vector<std::string> all = seeds;
+  for (const std::string& input : corpus) {
+    RunOne(input);
+    all.push_back(input);
+  }
   Random random(/*seed=*/4);
   for (int i = 0; i < kMutations; ++i) {
-    std::string input = seeds[random.NextBelow(static_cast<uint32_t>(seeds.size()))];
+    std::string input = all[random.NextBelow(static_cast<uint32_t>(all.size()))];
     const uint32_t count = 1 + random.NextBelow(4);
-    for (uint32_t j = 0; j < count; ++j) Mutate(seeds, random, input);
+    for (uint32_t j = 0; j < count; ++j) Mutate(all, random, input);
     RunOne(input);
+  }
+}
+
+int ReplayCorpus(const std::filesystem::path& folder) {
+  std::vector<std::string> corpus;
+  for (const std::string& file : ListFiles(folder)) corpus.push_back(ReadFile(folder / file));
+  if (corpus.empty()) {
+    std::fprintf(stderr, "%s holds no inputs\n", folder.c_str());
+    return 1;
+  }
+  Replay(FuzzSeeds(), corpus);
+  return 0;
+}
+
+void WriteSeeds(const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  const std::vector<std::string> seeds = FuzzSeeds();
+  for (size_t i = 0; i < seeds.size(); ++i) {
+    WriteFileAtomic(folder / fmt::format("seed{}", i), seeds[i]);
   }
 }
 
@@ -88,17 +115,18 @@ void Replay(const std::vector<std::string>& seeds) {
 }  // namespace color3d
 
 int main(int argc, char** argv) {
-  const std::vector<std::string> seeds = color3d::FuzzSeeds();
-  if (argc < 2) color3d::Replay(seeds);
-  for (int i = 1; i < argc; ++i) {
-    const std::filesystem::path path = argv[i];
-    if (!std::filesystem::is_directory(path)) {
-      color3d::RunOne(color3d::ReadFile(path));
-      continue;
-    }
-    for (size_t j = 0; j < seeds.size(); ++j) {
-      color3d::WriteFileAtomic(path / fmt::format("seed{}", j), seeds[j]);
-    }
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  if (arguments.size() == 2 && arguments[0] == "--write") {
+    color3d::WriteSeeds(arguments[1]);
+    return 0;
   }
+  if (arguments.size() == 1 && std::filesystem::is_directory(arguments[0])) {
+    return color3d::ReplayCorpus(arguments[0]);
+  }
+  if (arguments.empty()) {
+    std::fprintf(stderr, "say a corpus, files, or --write FOLDER\n");
+    return 2;
+  }
+  for (const std::string& file : arguments) color3d::RunOne(color3d::ReadFile(file));
   return 0;
 }

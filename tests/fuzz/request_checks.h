@@ -3,8 +3,10 @@
 
 #include <google/protobuf/stubs/logging.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <initializer_list>
 #include <utility>
 
 #include "server/rpc/error_mapping.h"
@@ -12,12 +14,15 @@
 
 namespace color3d {
 
-// What clients are told is of one line, whatever they had sent, and blames the request.
+// What clients are told is of one line, whatever they had sent, and blames the request: with
+// INVALID_ARGUMENT, NOT_FOUND, or one of `others`.
 template <class Reader>
-int AnswerOrRefuse(Reader&& reader) {
+int AnswerOrRefuse(Reader&& reader, std::initializer_list<grpc::StatusCode> others = {}) {
   const grpc::Status status = Guard(std::forward<Reader>(reader));
-  const bool good = status.ok() || status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ||
-                    status.error_code() == grpc::StatusCode::NOT_FOUND;
+  const grpc::StatusCode code = status.error_code();
+  const bool good = status.ok() || code == grpc::StatusCode::INVALID_ARGUMENT ||
+                    code == grpc::StatusCode::NOT_FOUND ||
+                    std::ranges::find(others, code) != others.end();
   if (!good || status.error_message().find('\n') != std::string::npos) {
     std::fprintf(stderr, "not a refusal: %s\n", status.error_message().c_str());
     std::abort();
