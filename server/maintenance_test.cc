@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -59,6 +60,29 @@ TEST_F(MaintenanceTest, WhatNothingNamesGoesAfterItsTimeByTheSteadyClock) {
   now_ += int64_t{25} * 3600 * 1000;
   RunUntil([&] { return ReasonThrown([&] { blobs_.Fetch(orphan.sha256); }) == "BLOB_MISSING"; });
   EXPECT_TRUE(fs::exists(blobs_.Fetch(named.sha256)));
+}
+
+// The disk does not list its blobs when it is asked first.
+class BlobsOfABusyDisk : public FileBlobStore {
+ public:
+  explicit BlobsOfABusyDisk(const fs::path& folder) : FileBlobStore(folder, {0}) {}
+  void ForEach(const std::function<bool(const StoredBlob&)>& visit) const override {
+    if (++sweeps == 1) throw Error(ErrorCode::kUnavailable, "the disk does not answer");
+    FileBlobStore::ForEach(visit);
+  }
+  mutable std::atomic<int> sweeps{0};
+};
+
+TEST_F(MaintenanceTest, ASweepThatFailedIsTriedAgainSoonAndOneThatDidNotIsNot) {
+  BlobsOfABusyDisk blobs(paths_.Blobs());
+  MaintenanceTiming timing = Quick();
+  timing.sweep = std::chrono::hours(1);
+  const Maintenance chores(
+      *store_, blobs, uploads_, paths_, [this] { return wall_.load(); }, timing);
+  for (int i = 0; i < 1000 && blobs.sweeps < 2; ++i) std::this_thread::sleep_for(milliseconds(5));
+  std::this_thread::sleep_for(milliseconds(50));
+  EXPECT_EQ(blobs.sweeps, 2);
+  EXPECT_EQ(chores.counts().sweeps_failed, 1);
 }
 
 TEST_F(MaintenanceTest, WhoeverOnlyLooksNotesNothing) {
