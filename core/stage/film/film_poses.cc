@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -117,14 +118,11 @@ Scene DynamicScene(Scene placed, const Scene& film) {
 
 void WarnOfDropped(const Scene& film, const Scene& placed, StageContext& context) {
   constexpr size_t kNamed = 5;
+  std::set<std::string> has_place;
+  for (const View& view : placed.views) has_place.insert(view.name);
   std::vector<std::string> dropped;
-  size_t next = 0;
   for (const View& view : film.views) {
-    if (next < placed.views.size() && placed.views[next].name == view.name) {
-      ++next;
-    } else {
-      dropped.push_back(view.name);
-    }
+    if (!has_place.contains(view.name)) dropped.push_back(view.name);
   }
   if (dropped.empty()) return;
   std::string names;

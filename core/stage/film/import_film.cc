@@ -10,6 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/name_order.h"
 #include "core/base/range_check.h"
 #include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
@@ -229,7 +230,7 @@ void ImportPictures(const FilmOptions& options,
   for (const std::string& file : ListFiles(folder)) {
     if (HasImageExtension(file)) files.push_back(file);
   }
-  std::sort(files.begin(), files.end());
+  std::sort(files.begin(), files.end(), ComesBefore);
   std::vector<double> times;
   const double rate = options.frames_per_second.value_or(kFramesPerSecond);
   for (size_t i = 0; i < files.size(); ++i) times.push_back(static_cast<double>(i) / rate);

@@ -117,6 +117,16 @@ TEST_F(ImportFilmTest, PicturesInFramesAreAFilm) {
   EXPECT_THAT(Complaint(), HasSubstr("n7.png"));
 }
 
+TEST_F(ImportFilmTest, PicturesWhoseNumbersHaveNoZerosComeInTheirOrder) {
+  for (int i = 1; i <= 12; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
+  const Scene scene = Import();
+  ASSERT_EQ(scene.views.size(), 12u);
+  for (int i = 0; i < 12; ++i) {
+    EXPECT_EQ(scene.views[i].name, "n" + std::to_string(i + 1) + ".png");
+    EXPECT_NEAR(scene.views[i].moment->time_s, i / 25.0, 1e-12);
+  }
+}
+
 TEST_F(ImportFilmTest, PicturesHaveTheRateThatIsGiven) {
   for (int i = 0; i < 5; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
   EXPECT_NEAR(Import({.frames_per_second = 16}).views[4].moment->time_s, 0.25, 1e-12);

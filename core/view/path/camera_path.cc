@@ -1,13 +1,12 @@
 #include "core/view/path/camera_path.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <string_view>
 
 #include "core/base/error.h"
+#include "core/base/name_order.h"
 #include "core/view/path/turn.h"
 #include "core/view/stand.h"
 
@@ -20,33 +19,6 @@ using Eigen::Vector3d;
 constexpr double kRamp = 0.12;       // share of a way on which its speed grows, and falls again
 constexpr double kLeastGap = 1e-3;   // of what the curve counts, where cameras are the same
 constexpr double kLeastWay = 1e-12;  // between two steps, so that the way always grows
-
-// Follows the digits at `*at`, without leading zeros.
-std::string_view NumberAt(std::string_view text, size_t* at) {
-  while (*at < text.size() && text[*at] == '0') ++*at;
-  const size_t begin = *at;
-  while (*at < text.size() && std::isdigit(static_cast<unsigned char>(text[*at]))) ++*at;
-  return text.substr(begin, *at - begin);
-}
-
-bool ComesBefore(std::string_view a, std::string_view b) {
-  const auto digit = [](std::string_view text, size_t at) {
-    return std::isdigit(static_cast<unsigned char>(text[at])) != 0;
-  };
-  size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (digit(a, i) && digit(b, j)) {
-      const std::string_view x = NumberAt(a, &i), y = NumberAt(b, &j);
-      if (x.size() != y.size()) return x.size() < y.size();
-      if (x != y) return x < y;
-    } else {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i, ++j;
-    }
-  }
-  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
-  return a < b;
-}
 
 double AngleBetween(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {
   return 2.0 * std::acos(std::clamp(std::abs(a.normalized().dot(b.normalized())), 0.0, 1.0));
