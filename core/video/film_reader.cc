@@ -136,7 +136,9 @@ class FilmReader::Impl {
     std::map<int64_t, bool> shown;  // by stamp: does decoding begin here?
     int64_t last_duration = 0, without_stamp = 0;
     while (av_read_frame(container_.get(), packet.get()) >= 0) {
-      if (packet->stream_index == stream_->index && packet->size > 0) {
+      // What an edit list cuts off is decoded for what follows it, and never shown.
+      const bool is_shown = (packet->flags & AV_PKT_FLAG_DISCARD) == 0;
+      if (packet->stream_index == stream_->index && packet->size > 0 && is_shown) {
         int64_t stamp = packet->pts;
         if (stamp == AV_NOPTS_VALUE) stamp = packet->dts;
         if (stamp == AV_NOPTS_VALUE) {

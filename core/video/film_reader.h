@@ -36,7 +36,7 @@ class FilmReader {
 
   const FilmFacts& facts() const;
   // When each frame is shown: s from the first one, strictly ascending, never empty. Frames that
-  // the file gives one time count once.
+  // the file gives one time count once, those that its edit list cuts off do not.
   const std::vector<double>& times() const;
 
   // sRGB in 0..1, 3 channels, facts().width x facts().height. The frame after the last one read

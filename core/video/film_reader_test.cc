@@ -144,6 +144,40 @@ TEST_F(FilmReaderTest, APhoneThatWasTurnedGivesUprightFrames) {
   }
 }
 
+uint32_t BigEndian(const std::string& bytes, size_t at) {
+  uint32_t value = 0;
+  for (int k = 0; k < 4; ++k) value = value << 8 | static_cast<uint8_t>(bytes[at + k]);
+  return value;
+}
+
+// As a phone trims: the track's edit list (ISO 14496-12, 8.6.6) begins later, the pictures stay.
+void TrimBegin(const fs::path& file, double seconds) {
+  std::string bytes = ReadFile(file);
+  const size_t media = bytes.find("mdhd"), edits = bytes.find("elst");
+  ASSERT_NE(media, std::string::npos);
+  ASSERT_NE(edits, std::string::npos);
+  ASSERT_EQ(BigEndian(bytes, edits + 8), 1u);  // one edit
+  const size_t media_time = edits + 16;
+  const uint32_t begin = BigEndian(bytes, media_time) +
+                         static_cast<uint32_t>(std::lround(seconds * BigEndian(bytes, media + 16)));
+  for (int k = 0; k < 4; ++k) bytes[media_time + k] = static_cast<char>(begin >> (24 - 8 * k));
+  WriteFileAtomic(file, bytes);
+}
+
+TEST_F(FilmReaderTest, WhatAPhoneHasTrimmedIsNoFrame) {
+  constexpr int kFrames = 80, kTrimmed = 30;
+  const fs::path file = Film(kFrames);
+  TrimBegin(file, kTrimmed / 25.0);
+  FilmReader film(file);
+  ASSERT_EQ(film.times().size(), static_cast<size_t>(kFrames - kTrimmed));
+  EXPECT_NEAR(film.facts().first_s, 0.0, 1e-6);
+  EXPECT_NEAR(film.times()[1], 0.04, 1e-6);
+  for (const int frame : {0, 1, 25, kFrames - kTrimmed - 1, 3}) {
+    const float level = 0.2f + 0.6f * static_cast<float>(kTrimmed + frame) / kFrames;
+    EXPECT_NEAR(MeanGreen(film.Read(frame), 56, 88, 8, 56), level, 0.02) << frame;
+  }
+}
+
 TEST_F(FilmReaderTest, ADamagedPartCostsItsOwnFramesOnly) {
   constexpr int kFrames = 150;  // key frames every 2 s: 0, 50, 100
   const fs::path file = Film(kFrames);
