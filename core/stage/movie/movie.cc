@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/base/files.h"
+#include "core/base/median.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/formats/camera_file.h"
@@ -160,7 +163,11 @@ double RateOf(const RenderOptions& options,
   const bool own = !options.frames && !options.time_s && frames.size() > 1 && scene.IsDynamic() &&
                    options.path != RenderOptions::Path::kCameras && IsOneByOne(options, scene);
   if (!own) return options.frames_per_second;
-  const double step = std::abs(frames[1].time_s - frames[0].time_s);
+  std::vector<double> steps;
+  for (size_t i = 1; i < frames.size(); ++i) {
+    steps.push_back(std::abs(frames[i].time_s - frames[i - 1].time_s));
+  }
+  const double step = Median(std::move(steps));  // some frames may have found no place
   // Times may also count from 0 to 1 for the whole.
   const bool seconds = frames.size() > 2 && scene.Times().back() > 1.0;
   return seconds && step > 0.0 ? std::clamp(1.0 / step, 1.0, 120.0) : options.frames_per_second;

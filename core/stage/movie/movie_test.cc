@@ -100,6 +100,20 @@ TEST_F(MovieTest, TheFirstFrameOfTheOriginalPathIsTheFirstPhotosView) {
   EXPECT_LT(PsnrDb(first, last), 40.0);
 }
 
+TEST_F(MovieTest, AFrameWithoutAPlaceDoesNotSlowTheMovieDown) {
+  scene_.views.push_back(scene_.views[0]);
+  scene_.views.push_back(scene_.views[1]);
+  const double times[] = {0.0, 0.5, 0.75, 1.0, 1.25};  // the second found no place
+  for (int i = 0; i < 5; ++i) {
+    scene_.views[i].name = "f" + std::to_string(i) + ".png";
+    scene_.views[i].moment = Moment{times[i], 0};
+  }
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  const ReadMovie movie = DecodeMovie(Render({.path = Path::kPhotos}) / "scene.mp4");
+  EXPECT_EQ(movie.frames.size(), 5u);
+  EXPECT_NEAR(movie.seconds, 1.25, 0.01);
+}
+
 TEST_F(MovieTest, CamerasOfAFileAreTakenOneByOneOrSmoothly) {
   const std::string frames = FrameAt(0.0) + "," + FrameAt(-0.1) + "," + FrameAt(-0.2);
   RenderOptions options{.path = Path::kCameras, .pictures = true, .cameras = CameraFile(frames)};
