@@ -4,15 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "core/base/error.h"
+#include "core/base/median.h"
 
 namespace color3d {
 namespace {
 
-constexpr double kSameTime = 1e-6;  // share of all time
+constexpr double kSameTime = 1e-6;    // share of all time
+constexpr double kSameTick = 0.25;    // share of a step of the cameras' clock
+constexpr double kToldOffset = 0.05;  // likewise: farther apart it is no matter of rounding
 
 // Relative to images/.
 std::string Folder(std::string file) {
@@ -69,6 +74,86 @@ bool SomeShareATime(std::vector<double> times) {
   return std::adjacent_find(times.begin(), times.end()) != times.end();
 }
 
+// Frames of each camera, in order of time.
+using FramesByCamera = std::map<std::string, std::vector<size_t>>;
+
+FramesByCamera ByCamera(const std::vector<std::string>& camera, const std::vector<double>& times) {
+  FramesByCamera frames;
+  for (size_t i = 0; i < times.size(); ++i) frames[camera[i]].push_back(i);
+  for (auto& [name, own] : frames) {
+    std::stable_sort(
+        own.begin(), own.end(), [&](size_t a, size_t b) { return times[a] < times[b]; });
+  }
+  return frames;
+}
+
+double MedianStep(const FramesByCamera& cameras, const std::vector<double>& times) {
+  std::vector<double> steps;
+  for (const auto& [name, own] : cameras) {
+    for (size_t i = 1; i < own.size(); ++i) steps.push_back(times[own[i]] - times[own[i - 1]]);
+  }
+  return steps.empty() ? 0.0 : Median(std::move(steps));
+}
+
+// The tick of each frame of one clock that all cameras follow to a quarter of a step; empty where
+// they follow none. Rounded times drift against any one step, so that steps are counted.
+std::vector<int64_t> TicksOf(const FramesByCamera& cameras, const std::vector<double>& times) {
+  constexpr double kMaxSteps = 1e6;  // missing between two frames
+  const double step = MedianStep(cameras, times);
+  if (!(step > 0.0)) return {};
+  std::vector<int64_t> ticks(times.size());
+  int64_t most = 0;
+  double seconds = 0.0;  // that the most ticks of one camera take
+  for (const auto& [name, own] : cameras) {
+    for (size_t i = 1; i < own.size(); ++i) {
+      const double steps = (times[own[i]] - times[own[i - 1]]) / step;
+      if (steps < 0.5 || steps > kMaxSteps) return {};
+      ticks[own[i]] = ticks[own[i - 1]] + std::llround(steps);
+    }
+    if (ticks[own.back()] <= most) continue;
+    most = ticks[own.back()];
+    seconds = times[own.back()] - times[own.front()];
+  }
+  if (most == 0) return {};
+  const double tick_s = seconds / static_cast<double>(most);
+  for (const auto& [name, own] : cameras) {
+    const int64_t first = std::llround(times[own.front()] / tick_s);
+    for (const size_t i : own) {
+      ticks[i] += first;
+      if (std::abs(times[i] - static_cast<double>(ticks[i]) * tick_s) > kSameTick * tick_s) {
+        return {};
+      }
+    }
+  }
+  return ticks;
+}
+
+// Makes times of one tick of a rig's clock the earliest of them; a note where that is more than
+// what containers round.
+std::string ShareMoments(const std::vector<std::string>& camera, std::vector<double>* times) {
+  const FramesByCamera cameras = ByCamera(camera, *times);
+  if (cameras.size() < 2) return "";
+  const std::vector<int64_t> ticks = TicksOf(cameras, *times);
+  if (ticks.empty()) return "";
+  std::map<int64_t, double> earliest;
+  for (size_t i = 0; i < ticks.size(); ++i) {
+    double& time = earliest.try_emplace(ticks[i], (*times)[i]).first->second;
+    time = std::min(time, (*times)[i]);
+  }
+  const double told = kToldOffset * MedianStep(cameras, *times);
+  double moved = 0.0;
+  for (size_t i = 0; i < ticks.size(); ++i) {
+    const double time = earliest.at(ticks[i]);
+    moved = std::max(moved, (*times)[i] - time);
+    (*times)[i] = time;
+  }
+  if (moved <= told) return "";
+  return fmt::format(
+      "the cameras' clocks differ by up to {:.3g} s: frames less than that apart are taken for one "
+      "moment",
+      moved);
+}
+
 }  // namespace
 
 FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
@@ -79,7 +164,7 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
   }
   const bool named =
       AllOrNone(frames, "camera", [](const FrameTime& f) { return !f.camera.empty(); });
-  const std::vector<double> times = ShiftedTimes(frames);
+  std::vector<double> times = ShiftedTimes(frames);
   if (*std::max_element(times.begin(), times.end()) == 0.0) {
     result.note = fmt::format("all {} frames were taken at one time: a scene that stands still",
                               frames.size());
@@ -96,6 +181,7 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
     shot = static_cast<int>(result.cameras.size());
     result.cameras.push_back(name);
   }
+  result.note = ShareMoments(camera, &times);
   std::map<std::pair<int, double>, size_t> taken;
   for (size_t i = 0; i < frames.size(); ++i) {
     result.moments[i] = Moment{times[i], shots[camera[i]]};

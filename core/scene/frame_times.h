@@ -25,10 +25,12 @@ struct FrameMoments {
 
 // Times are kept, but for their beginning: the earliest becomes 0, and those that differ by less
 // than a millionth of all are one. Frames whose camera is not told: where several share a time,
-// each folder is a camera; else all are one camera's. No moments (and a note) where all times are
-// the same: nothing can move. Throws Error{kInvalidArgument} that names the frames: some have a
-// time and others none, some tell their camera and others do not, two of one camera at one time,
-// times too far apart for a number.
+// each folder is a camera; else all are one camera's. Where several cameras follow one clock to a
+// quarter of its step (the median of theirs), each tick has one time, that of its earliest frame,
+// and a note says so where more than rounding keeps them apart. No moments (and a note) where all
+// times are the same: nothing can move. Throws Error{kInvalidArgument} that names the frames: some
+// have a time and others none, some tell their camera and others do not, two of one camera at one
+// time, times too far apart for a number.
 FrameMoments MomentsOf(const std::vector<FrameTime>& frames);
 
 }  // namespace color3d

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "tests/support/scenes/test_scenes.h"
 
@@ -59,6 +62,51 @@ TEST(FrameTimes, WhatRoundingKeepsApartIsOneTime) {
                                     Frame("a/2.png", 0.4)});
   EXPECT_EQ(m.moments[0]->time_s, m.moments[1]->time_s);
   EXPECT_EQ(m.moments[4]->time_s, 0.4);
+}
+
+// Frames at 29.97 a second as a container with so many ticks a second says when they are.
+std::vector<FrameTime> Rounded(const std::string& camera, int ticks, double offset_s, int count) {
+  std::vector<FrameTime> frames;
+  for (int i = 0; i < count; ++i) {
+    const double time = i * 1001 / 30000.0 + offset_s;
+    frames.push_back(Frame(camera + std::to_string(i), std::round(time * ticks) / ticks, camera));
+  }
+  return frames;
+}
+
+TEST(FrameTimes, CamerasWhoseContainersRoundShareTheirMoments) {
+  constexpr int kCount = 900;  // rounded steps of 1/600 s drift by 15 ticks
+  std::vector<FrameTime> frames = Rounded("a", 600, 0.0, kCount);
+  for (const FrameTime& frame : Rounded("b", 90000, 0.0, kCount)) frames.push_back(frame);
+  const FrameMoments m = MomentsOf(frames);
+  for (int i = 0; i < kCount; ++i) {
+    ASSERT_EQ(m.moments[i]->time_s, m.moments[kCount + i]->time_s) << i;
+    ASSERT_NEAR(m.moments[i]->time_s, i * 1001 / 30000.0, 1.0 / 600) << i;
+  }
+  EXPECT_EQ(m.note, "");
+}
+
+TEST(FrameTimes, CamerasThatBeganAFifthOfAStepApartShareTheirMomentsAndItIsSaid) {
+  std::vector<FrameTime> frames = Rounded("a", 90000, 0.0, 40);
+  for (const FrameTime& frame : Rounded("b", 90000, 0.0067, 40)) frames.push_back(frame);
+  const FrameMoments m = MomentsOf(frames);
+  for (int i = 0; i < 40; ++i) EXPECT_EQ(m.moments[i]->time_s, m.moments[40 + i]->time_s) << i;
+  EXPECT_THAT(m.note, HasSubstr("clocks differ by up to 0.0067"));
+}
+
+TEST(FrameTimes, CamerasHalfAStepApartOrOfOtherRatesKeepTheirTimes) {
+  std::vector<FrameTime> halves = Rounded("a", 90000, 0.0, 40);
+  for (const FrameTime& frame : Rounded("b", 90000, 0.0167, 40)) halves.push_back(frame);
+  const FrameMoments m = MomentsOf(halves);
+  EXPECT_NEAR(m.moments[40]->time_s, 0.0167, 1e-4);
+  EXPECT_EQ(m.note, "");
+  const FrameMoments rates = MomentsOf({Frame("a0", 0.0, "a"),
+                                        Frame("a1", 0.1, "a"),
+                                        Frame("a2", 0.2, "a"),
+                                        Frame("b0", 0.0, "b"),
+                                        Frame("b1", 0.06, "b"),
+                                        Frame("b2", 0.12, "b")});
+  EXPECT_EQ(rates.moments[4]->time_s, 0.06);
 }
 
 TEST(FrameTimes, OneTimeIsAStillScene) {
