@@ -278,6 +278,12 @@ void ImportFilm(const std::string& film,
                 const ImportOptions& import,
                 StageContext& context) {
   options.Validate();
+  if (!import.hold_out_camera.empty()) {
+    throw InvalidArgument(
+        "hold_out_camera is '{}', but a film is of one camera; leave it out, or hold out every "
+        "eighth frame",
+        import.hold_out_camera);
+  }
   if (film == kFramesFolder) return ImportPictures(options, import, context);
   ImportVideo(film, options, import, context);
 }

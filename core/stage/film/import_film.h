@@ -38,7 +38,8 @@ std::string FindFilm(const std::filesystem::path& scene_folder);
 // decoded are left out; those, and blank and torn ones, are named in a warning. Throws
 // Error{kInvalidArgument}: no film that can be read, nothing between the times that are asked for,
 // one frame, more than kMaxFilmFrames (with the stride and the length that would do), frames of
-// different sizes or of names that differ in their endings only, a rate for a video file.
+// different sizes or of names that differ in their endings only, a rate for a video file, a camera
+// to hold out.
 void ImportFilm(const std::string& film,
                 const FilmOptions& options,
                 const ImportOptions& import,

@@ -10,6 +10,7 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "core/video/mp4_writer.h"
+#include "tests/support/scenes/test_scenes.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
@@ -135,6 +136,16 @@ TEST_F(ImportFilmTest, PicturesHaveTheRateThatIsGiven) {
   fs::remove_all(scratch_.path() / "frames");
   WriteVideo(4, 4);
   EXPECT_THAT(Complaint({.frames_per_second = 16}), HasSubstr("film.mp4 has times of its own"));
+}
+
+TEST_F(ImportFilmTest, ACameraToHoldOutIsRefusedInsteadOfLosingThePoses) {
+  WriteVideo(4, 4);
+  for (const FilmPoses poses : {FilmPoses::kOff, FilmPoses::kAuto}) {
+    ImportOptions options;
+    options.hold_out_camera = "cam01";
+    EXPECT_THAT(Refusal([&] { Import({.poses = poses}, options); }),
+                HasSubstr("hold_out_camera is 'cam01', but a film is of one camera"));
+  }
 }
 
 TEST_F(ImportFilmTest, FramesOfOneStemAreRefused) {
