@@ -34,6 +34,14 @@ v1::Job WithModel(v1::Job job) {
                 job.name());
   }
   if (ModelOf(job) != nullptr) return job;
+  if (job.kind() == kind::kColorizeScene) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} coloured a film without poses: no camera can move through it. Its coloured "
+                "frames are {} in its results; for a scene to move through, colour the film with "
+                "--film --poses, where one moving camera took it",
+                job.name(),
+                artifact::kMovie);
+  }
   throw Error(ErrorCode::kFailedPrecondition,
               "{} is a {} job and has no {} to look at; name a {} job",
               job.name(),

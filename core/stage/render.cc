@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/error.h"
 #include "core/base/evenly.h"
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
@@ -31,6 +32,16 @@ bool HasColors(const StageContext& context, const Scene& scene) {
          context.HasInput(ViewAbArtifact(context, scene.views.front()));
 }
 
+// Frames without poses were coloured, not reconstructed: there is nothing to move through.
+void RefuseWayThroughFilm(const RenderOptions& options) {
+  if (options.path == RenderOptions::Path::kViews && !options.time_s) return;
+  throw InvalidArgument(
+      "this film has no poses, so no camera can move through it; its coloured frames are {} of the "
+      "job that coloured it. For a scene to move through, colour the film with poses "
+      "(film_poses: auto), where one moving camera took it",
+      artifact::kMovie);
+}
+
 }  // namespace
 
 void RenderOptions::Validate() const {
@@ -53,6 +64,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   if (IsColoredAsFilm(context, scene)) {
+    RefuseWayThroughFilm(options);
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);
   }
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));

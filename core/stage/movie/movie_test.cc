@@ -161,6 +161,18 @@ TEST_F(MovieTest, WhatCannotBeRenderedIsNamed) {
   EXPECT_THAT(Complaint({}), HasSubstr("no Gaussians"));
 }
 
+TEST_F(MovieTest, AFilmWithoutPosesIsNoPlaceToMoveThrough) {
+  for (int i = 0; i < 3; ++i) {
+    scene_.views[i].cam_from_world = Pose{};
+    scene_.views[i].moment = Moment{0.1 * i, 0};
+  }
+  ASSERT_TRUE(scene_.IsFilm());
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  for (const Path path : {Path::kOrbit, Path::kPhotos, Path::kStill}) {
+    EXPECT_THAT(Complaint({.path = path}), HasSubstr("this film has no poses"));
+  }
+}
+
 TEST_F(MovieTest, ACancelledMovieLeavesNothing) {
   cancel_.Cancel();
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 2}), HasSubstr("cancelled"));
