@@ -8,6 +8,7 @@
 #include "core/image/codec.h"
 #include "core/splat/import/splat_scene.h"
 #include "core/splat/raster/render.h"
+#include "core/stage/film/film_frames.h"
 #include "core/stage/film/import_posed_films.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/import_output.h"
@@ -79,6 +80,7 @@ void RunImportScene(const ImportOptions& options,
   if (!film.empty()) {
     return ImportFilm(film, film_options, options, context);
   }
+  WarnOfUnusedOptions(film_options, NoFilm::kPhotos, context);
   const std::string splat = FindSplat(context.scene_folder());
   if (!splat.empty()) return ImportSplatScene(splat, options, splat_views, context);
   const ImportResult result =

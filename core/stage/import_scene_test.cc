@@ -50,5 +50,14 @@ TEST_F(StageTest, PhotosWinOverASplatBesideThem) {
   }
 }
 
+TEST_F(StageTest, OptionsOfFilmsAreToldToBeOfNoUseForPhotosAndSplats) {
+  WriteFileAtomic(scratch_.path() / "scene.ply", SplatPly(BallOnGround(800, 0.0f, 1)));
+  StageContext context = MakeContext();
+  RunImportScene({}, context, {.views = 8, .side_px = 96}, {.stride = 2, .deflicker = true});
+  EXPECT_NE(observer_.text.find("film_stride, film_deflicker are left aside: the scene is no film"),
+            std::string::npos)
+      << observer_.text;
+}
+
 }  // namespace
 }  // namespace color3d

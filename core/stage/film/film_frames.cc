@@ -1,6 +1,7 @@
 #include "core/stage/film/film_frames.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -30,6 +31,31 @@ std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOpti
         times.back());
   }
   return wanted;
+}
+
+void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext& context) {
+  const FilmOptions usual;
+  std::vector<std::string> unused;
+  const auto add = [&](bool given, const char* name) {
+    if (given) unused.emplace_back(name);
+  };
+  if (scene == NoFilm::kPhotos) {
+    add(options.stride != usual.stride, "film_stride");
+    add(options.begin_s != usual.begin_s, "film_begin_s");
+    add(options.end_s != usual.end_s, "film_end_s");
+  }
+  add(options.frames_per_second != usual.frames_per_second, "film_frames_per_second");
+  add(options.deflicker != usual.deflicker, "film_deflicker");
+  add(options.poses != usual.poses, "film_poses");
+  if (unused.empty()) return;
+  context.progress().OnWarning(fmt::format(
+      "{} {} left aside: {}",
+      fmt::join(unused, ", "),
+      unused.size() == 1 ? "is" : "are",
+      scene == NoFilm::kPosedFilms
+          ? "films whose poses are given have times and places of their own, and are taken as "
+            "exposed"
+          : "the scene is no film"));
 }
 
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {

@@ -14,6 +14,12 @@ namespace color3d {
 // Error{kInvalidArgument} when there is none.
 std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options);
 
+// What a scene is that is not a film of one camera without poses.
+enum class NoFilm { kPosedFilms, kPhotos };
+
+// Warns of the options that were given and are of no use for it; nothing for none.
+void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext& context);
+
 // Throws Error{kInvalidArgument}, with the stride and the length that would do, for more than
 // kMaxFilmFrames. `seconds`: from the first to the last of them.
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options);

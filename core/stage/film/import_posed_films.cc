@@ -131,6 +131,7 @@ bool ImportPosedFilms(const ImportOptions& options,
                       StageContext& context) {
   const std::vector<Footage> all = AllFootage(film, context);
   if (all.empty()) return false;
+  WarnOfUnusedOptions(film, NoFilm::kPosedFilms, context);
   size_t longest = 0;
   for (const Footage& footage : all) longest = std::max(longest, footage.frames.size());
   PosedFilmImport import(context);

@@ -14,6 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr int kWidth = 96, kHeight = 64;
 
@@ -116,6 +117,16 @@ TEST_F(ImportPosedFilmsTest, OddRatesAreTold) {
   WritePoses(2);
   Import();
   EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times"));
+}
+
+TEST_F(ImportPosedFilmsTest, OptionsOfNoUseAreTold) {
+  for (int camera = 0; camera < 2; ++camera) WriteFilm(camera, 4);
+  WritePoses(2);
+  Import({.stride = 2});
+  EXPECT_THAT(observer_.text, Not(HasSubstr("left aside")));
+  Import({.frames_per_second = 16, .deflicker = true, .poses = FilmPoses::kAuto});
+  EXPECT_THAT(observer_.text,
+              HasSubstr("film_frames_per_second, film_deflicker, film_poses are left aside"));
 }
 
 TEST_F(ImportPosedFilmsTest, FilmsThatAreNoneAreRefusedByName) {
