@@ -12,7 +12,7 @@ namespace color3d {
 
 struct AnchorOptions {
   // MotionOf each step, summed over the frames around one anchor, from first to last.
-  double most_motion = 0.07;  // 0..1; 0: each frame is an anchor
+  double most_motion = 0.1;  // 0..1; 0: each frame is an anchor
   int most_frames = 12;       // 1..1000
   void Validate() const;      // throws Error{kInvalidArgument}
 };

@@ -10,6 +10,11 @@
 #include "core/stage/stages.h"
 
 namespace color3d {
+namespace {
+
+constexpr int64_t kFramesCacheBytes = int64_t{32} << 20;  // neighbours are read several times
+
+}  // namespace
 
 ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position) {
@@ -30,7 +35,9 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
   const ViewPositions positions(scene, context);
-  const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
+  const bool are_frames = scene.IsFilm() || scene.IsDynamic();
+  const ViewImages images(
+      scene, context.scene_folder(), max_side_px, are_frames ? kFramesCacheBytes : 0);
   const auto total = static_cast<int64_t>(scene.views.size());
   const auto sources = [&](int number) {
     return SourcesOf(*colorizer, [&, number](const Image& luminance) {
@@ -39,7 +46,7 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     });
   };
   ViewsCheckpoint done(scene, context);
-  if (scene.IsFilm() || scene.IsDynamic()) {
+  if (are_frames) {
     FrameColoring coloring;
     coloring.sources = sources;
     coloring.deliver = [&](int number, const FusedColor& color) { done.Add(number, color); };

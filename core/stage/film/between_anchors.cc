@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "core/image/fill_holes.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kColorChannels = 3;      // a, b and the share that is guessed
-constexpr float kFollowed = 0.5f;      // confidence from which motion tells
-constexpr double kWorthAsking = 0.05;  // share of a frame that is open
+constexpr int kColorChannels = 3;  // a, b and the share that is guessed
+constexpr float kFollowed = 0.5f;  // confidence from which motion tells
 
 // 1 where the frame's own sources need not be asked.
 Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
@@ -21,7 +21,7 @@ Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
   return known;
 }
 
-double ShareOpen(const Image& known) {
+double ShareUnknown(const Image& known) {
   const auto open = std::count(known.data.begin(), known.data.end(), 0.0f);
   return static_cast<double>(open) / static_cast<double>(known.data.size());
 }
@@ -32,7 +32,7 @@ InferredColor AnswerOf(const CarriedColor& of_anchors,
                        const Image& luminance,
                        const ColorSources& sources) {
   InferredColor answer;
-  if (ShareOpen(known) > kWorthAsking) {
+  if (ShareUnknown(known) > kWorthAsking) {
     answer = sources.infer(luminance, known);
   } else {
     answer = {Image(luminance.width, luminance.height, 2),
@@ -81,6 +81,25 @@ CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, doub
     }
   }
   return before;
+}
+
+double ShareOpen(const CarriedColor& carried, const CarriedColor& of_anchors) {
+  const std::vector<float>& one = carried.confidence.data;
+  const std::vector<float>& other = of_anchors.confidence.data;
+  size_t open = 0;
+  for (size_t i = 0; i < one.size(); ++i) open += one[i] <= kFollowed && other[i] <= kFollowed;
+  return static_cast<double>(open) / static_cast<double>(one.size());
+}
+
+void FillOpen(const CarriedColor& others, CarriedColor* of_anchors) {
+  for (size_t i = 0; i < others.confidence.data.size(); ++i) {
+    float& confidence = of_anchors->confidence.data[i];
+    if (confidence > kFollowed || others.confidence.data[i] <= kFollowed) continue;
+    confidence = others.confidence.data[i];
+    for (int c = 0; c < others.ab.channels; ++c) {
+      of_anchors->ab.Plane(c)[i] = others.ab.Plane(c)[i];
+    }
+  }
 }
 
 FusedColor ColorBetweenAnchors(const Image& luminance,

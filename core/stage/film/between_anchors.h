@@ -16,9 +16,16 @@ FilmKey AnchorAsKey(int frame, const FusedColor& color);
 // weighs more. `place`: 0..1 of the way from the one before to the one behind.
 CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, double place);
 
+// Share of a frame from which its own sources are worth asking.
+inline constexpr double kWorthAsking = 0.02;
+// Share of a frame that neither what was carried into it nor the anchors tell surely.
+double ShareOpen(const CarriedColor& carried, const CarriedColor& of_anchors);
+// Takes `others` where `of_anchors` tells nothing surely.
+void FillOpen(const CarriedColor& others, CarriedColor* of_anchors);
+
 // The colour of a frame: what was carried into it, as in all views; what `of_anchors` tells where
 // that is followed surely in place of what the frame's own sources would say, which are asked
-// where neither tells, if that is much.
+// where neither tells, if that is more than kWorthAsking.
 FusedColor ColorBetweenAnchors(const Image& luminance,
                                const CarriedColor& carried,
                                const CarriedColor& of_anchors,

@@ -1,6 +1,7 @@
 #include "core/stage/film/color_frames.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -46,6 +47,14 @@ struct Colored {
   std::shared_ptr<const FlowPair> flow_from_last;
 };
 
+// Neighbouring frames between two anchors: indices within a stretch.
+struct Gap {
+  size_t begin = 0;
+  size_t end = 0;
+};
+
+using Flow = std::function<std::shared_ptr<const FlowPair>(int earlier, int later)>;
+
 // Colours one shot, stretch by stretch: neighbouring frames, the last of which is an anchor or the
 // shot's end. What is told of a frame depends on its neighbours, not on where stretches end.
 class ShotColorer {
@@ -55,12 +64,14 @@ class ShotColorer {
               const std::vector<int>& view_of_frame,
               const FrameColoring& coloring,
               const Scene& scene,
+              const ViewImages& images,
               StageContext& context)
       : shot_(shot),
         frames_(frames),
         view_of_frame_(view_of_frame),
         coloring_(coloring),
         scene_(scene),
+        images_(images),
         context_(context) {}
 
   void Run() {
@@ -124,23 +135,34 @@ class ShotColorer {
       color = ColorOf(key.frame, nullptr);
       key = AnchorAsKey(key.frame, color);
     });
-    // Each anchor is followed to its neighbours on both sides.
     std::vector<CarriedColor> before(stretch.size()), behind(stretch.size());
-    const auto flow = [&](int, int later) { return colored[index_of(later)].flow_from_last; };
+    const Flow flow = [&](int, int later) { return colored[index_of(later)].flow_from_last; };
     pool.ForEach(2 * static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
+      const FilmKey& key = keys[i / 2];
       const bool forward = i % 2 == 0;
-      FollowAnchor(keys[i / 2], stretch, forward, flow, [&](int frame, const CarriedColor& color) {
+      std::vector<int> way;
+      for (const int frame : stretch) {
+        if (shot_.IsAnchor(frame)) continue;
+        const int owner = forward ? shot_.AnchorUpTo(frame) : shot_.AnchorBehind(frame);
+        if (owner == key.frame) way.push_back(frame);
+      }
+      FollowInto(key, way, flow, [&](int frame, const CarriedColor& color) {
         (forward ? before : behind)[index_of(frame)] = color;
       });
     });
+    std::vector<CarriedColor> of_anchors(stretch.size());
     pool.ForEach(count, [&](int64_t i, int) {
-      const int frame = stretch[i];
-      if (shot_.IsAnchor(frame)) return;
-      const int from = shot_.AnchorUpTo(frame), to = shot_.AnchorBehind(frame);
+      const int from = shot_.AnchorUpTo(stretch[i]), to = shot_.AnchorBehind(stretch[i]);
       const double place =
-          from >= 0 && to >= 0 ? static_cast<double>(frame - from) / (to - from) : 0.0;
-      const CarriedColor of_anchors = OfBothAnchors(std::move(before[i]), behind[i], place);
-      colored[i].color = ColorOf(frame, &of_anchors);
+          from >= 0 && to >= 0 ? static_cast<double>(stretch[i] - from) / (to - from) : 0.0;
+      of_anchors[i] = OfBothAnchors(std::move(before[i]), behind[i], place);
+    });
+    const std::vector<Gap> gaps = GapsOf(stretch);
+    pool.ForEach(static_cast<int64_t>(gaps.size()), [&](int64_t i, int) {
+      AskWhereOpen(gaps[i], stretch, flow, &of_anchors, &colored);
+    });
+    pool.ForEach(count, [&](int64_t i, int) {
+      if (colored[i].color.ab.Empty()) colored[i].color = ColorOf(stretch[i], &of_anchors[i]);
     });
     if (!keys.empty()) last_anchor_ = std::move(keys.back());
     last_ = stretch.back();
@@ -155,28 +177,19 @@ class ShotColorer {
         FlowPair{DenseFlow(*earlier, *later), DenseFlow(*later, *earlier)});
   }
 
-  // Into the frames of a stretch between an anchor and the next one in this direction.
-  void FollowAnchor(
-      const FilmKey& key,
-      const std::vector<int>& stretch,
-      bool forward,
-      const std::function<std::shared_ptr<const FlowPair>(int earlier, int later)>& flow,
-      const std::function<void(int frame, const CarriedColor& color)>& on_frame) const {
-    FilmFrames way = frames_;
-    way.flow = flow;
-    for (size_t i = 0; i < way.shot.size(); ++i) way.shot[i] = -1 - static_cast<int>(i);
-    way.shot[key.frame] = 0;
-    bool leads_on = false;
-    for (const int frame : stretch) {
-      if (shot_.IsAnchor(frame)) continue;
-      const int owner = forward ? shot_.AnchorUpTo(frame) : shot_.AnchorBehind(frame);
-      if (owner != key.frame) continue;
-      way.shot[frame] = 0;
-      leads_on = true;
-    }
-    if (!leads_on) return;
+  // The colours of a frame in those of `way`, which lie around it without a gap, step by step.
+  void FollowInto(const FilmKey& key,
+                  const std::vector<int>& way,
+                  const Flow& flow,
+                  const std::function<void(int frame, const CarriedColor& color)>& on_frame) const {
+    if (way.empty()) return;
+    FilmFrames frames = frames_;
+    frames.flow = flow;
+    for (size_t i = 0; i < frames.shot.size(); ++i) frames.shot[i] = -1 - static_cast<int>(i);
+    frames.shot[key.frame] = 0;
+    for (const int frame : way) frames.shot[frame] = 0;
     ThreadPool one(1);
-    CarryAlongFilm(way,
+    CarryAlongFilm(frames,
                    {key},
                    {.correct_after = 1.0},
                    one,
@@ -186,13 +199,63 @@ class ShotColorer {
                    });
   }
 
+  std::vector<Gap> GapsOf(const std::vector<int>& stretch) const {
+    std::vector<Gap> gaps;
+    for (size_t i = 0; i < stretch.size(); ++i) {
+      if (shot_.IsAnchor(stretch[i])) continue;
+      if (i > 0 && !gaps.empty() && gaps.back().end == i) {
+        gaps.back().end = i + 1;
+      } else {
+        gaps.push_back({i, i + 1});
+      }
+    }
+    return gaps;
+  }
+
+  // Frames of a gap that motion leaves open ask their own sources, the most open one first; what
+  // they are told fills what is open in the others, too.
+  void AskWhereOpen(const Gap& gap,
+                    const std::vector<int>& stretch,
+                    const Flow& flow,
+                    std::vector<CarriedColor>* of_anchors,
+                    std::vector<Colored>* colored) const {
+    const std::vector<int> frames(stretch.begin() + static_cast<std::ptrdiff_t>(gap.begin),
+                                  stretch.begin() + static_cast<std::ptrdiff_t>(gap.end));
+    std::vector<double> open(frames.size());
+    const auto measure = [&](size_t i) {
+      open[i] = ShareOpen(CarriedInto(frames[i]), (*of_anchors)[gap.begin + i]);
+    };
+    for (size_t i = 0; i < frames.size(); ++i) measure(i);
+    for (size_t left = frames.size(); left > 0; --left) {
+      const auto most = std::max_element(open.begin(), open.end()) - open.begin();
+      if (open[most] <= kWorthAsking) return;
+      open[most] = 0.0;
+      Colored& asked = (*colored)[gap.begin + most];
+      asked.color = ColorOf(asked.frame, &(*of_anchors)[gap.begin + most]);
+      FollowInto(AnchorAsKey(asked.frame, asked.color),
+                 frames,
+                 flow,
+                 [&](int frame, const CarriedColor& color) {
+                   const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
+                   if (open[i] == 0.0) return;
+                   FillOpen(color, &(*of_anchors)[gap.begin + i]);
+                   measure(i);
+                 });
+    }
+  }
+
+  CarriedColor CarriedInto(int frame) const {
+    const int view = view_of_frame_[frame];
+    const Camera camera = images_.WorkingCamera(view);
+    return ReadCarried(context_, scene_.views[view], camera.width, camera.height);
+  }
+
   // `of_anchors`: null of an anchor.
   FusedColor ColorOf(int frame, const CarriedColor* of_anchors) const {
     context_.cancel().ThrowIfCancelled();
     const int view = view_of_frame_[frame];
     const auto luminance = frames_.luminance(frame);
-    const CarriedColor carried =
-        ReadCarried(context_, scene_.views[view], luminance->width, luminance->height);
+    const CarriedColor carried = CarriedInto(frame);
     const ColorSources sources = coloring_.sources(view);
     if (of_anchors != nullptr) {
       return ColorBetweenAnchors(*luminance, carried, *of_anchors, sources, context_.cancel());
@@ -229,6 +292,7 @@ class ShotColorer {
   const std::vector<int>& view_of_frame_;
   const FrameColoring& coloring_;
   const Scene& scene_;
+  const ViewImages& images_;
   StageContext& context_;
   const SteadyColorsOptions steady_;
   int last_ = -1;                       // frame of the last stretch
@@ -255,7 +319,7 @@ void ColorFrames(const Scene& scene,
     shots[frames.shot[anchor]].anchors.push_back(anchor);
   }
   for (const auto& [number, shot] : shots) {
-    ShotColorer(shot, frames, order, coloring, scene, context).Run();
+    ShotColorer(shot, frames, order, coloring, scene, images, context).Run();
   }
 }
 
