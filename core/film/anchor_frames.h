@@ -13,8 +13,8 @@ namespace color3d {
 struct AnchorOptions {
   // MotionOf each step, summed over the frames around one anchor, from first to last.
   double most_motion = 0.1;  // 0..1; 0: each frame is an anchor
-  int most_frames = 12;       // 1..1000
-  void Validate() const;      // throws Error{kInvalidArgument}
+  int most_frames = 12;      // 1..1000
+  void Validate() const;     // throws Error{kInvalidArgument}
 };
 
 // The middle frame of each run of frames of one shot, ascending; each other frame belongs to the
