@@ -73,8 +73,10 @@ TEST(CameraFileTest, WhatIsWrongIsNamed) {
               HasSubstr("frame 1: transform_matrix"));
   EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1e999,0,0,5]") + "]}"), HasSubstr("path.json"));
   EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[2,0,0,5]") + "]}"), HasSubstr("not a rotation"));
-  EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1,0,0,1e300]") + "]}"),
+  EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1,0,0,1e12]") + "]}"),
               HasSubstr("from the scene"));
+  EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1,0,0,1e300]") + "]}"),
+              HasSubstr("too far away"));
   EXPECT_THAT(Complaint("{\"h\":0,\"frames\":[" + Frame() + "]}"), HasSubstr("600 x 0 px"));
   EXPECT_THAT(Complaint("{\"w\":\"wide\",\"frames\":[" + Frame() + "]}"),
               HasSubstr("w must be a finite number"));
