@@ -344,7 +344,7 @@ TEST_F(FusionTest, AnEdgeOfLuminanceKeepsColoursApart) {
 }
 
 TEST_F(FusionTest, StrangePlacesTakeTheFadedGuessAndSharesSumToOne) {
-  Image distance(32, 24, 1), guess(32, 24, 2, 50.0f);
+  Image distance(32, 24, 1), guess(32, 24, 2, 10.0f);
   for (int y = 0; y < 24; ++y) {
     for (int x = 0; x < 32; ++x) {
       distance.At(0, y, x) = x < 16 ? 0.0f : 100.0f;
@@ -353,13 +353,23 @@ TEST_F(FusionTest, StrangePlacesTakeTheFadedGuessAndSharesSumToOne) {
   }
   const FusedColor fused = Fuse(distance, guess);
   EXPECT_NEAR(fused.ab.At(0, 12, 4), -20.0, 1.0);
-  EXPECT_NEAR(fused.ab.At(0, 12, 28), 0.4 * -20.0 + 0.6 * 0.7 * 50.0, 2.0);
+  EXPECT_NEAR(fused.ab.At(0, 12, 28), 0.4 * -20.0 + 0.6 * 0.7 * 10.0, 1.0);
   for (size_t i = 0; i < luminance_.PlaneSize(); ++i) {
     const double sum =
         fused.provenance.Plane(0)[i] + fused.provenance.Plane(1)[i] + fused.provenance.Plane(2)[i];
     ASSERT_NEAR(sum, 1.0, 1e-5);
   }
   EXPECT_NEAR(fused.provenance.At(0, 12, 28), 0.6, 1e-5);
+}
+
+TEST_F(FusionTest, AColourfulGuessDecidesWhereThingsAreStrangeAndNowhereElse) {
+  const Image guess(32, 24, 2, -30.0f);
+  inferred_ = Image(32, 24, 2, 8.0f);
+  const FusedColor strange = Fuse(Image(32, 24, 1, 3.2f), guess);
+  EXPECT_NEAR(strange.ab.At(0, 12, 12), -30.0, 0.5);
+  EXPECT_NEAR(strange.provenance.At(0, 12, 12), 1.0, 1e-5);
+  const FusedColor known = Fuse(Image(32, 24, 1, 1.0f), guess);
+  EXPECT_NEAR(known.ab.At(0, 12, 12), 8.0, 0.5);
 }
 
 TEST_F(FusionTest, MisfittingPicturesAreRefused) {

@@ -37,6 +37,20 @@ double SmoothStep(double x, double begin, double end) {
   return t * t * (3.0 - 2.0 * t);
 }
 
+struct GuessShare {
+  double share = 0.0;   // of the prior
+  double colour = 0.0;  // of the guess that is added for it
+};
+
+GuessShare ShareOfGuess(double distance, double chroma, const FusionOptions& options) {
+  const double faded =
+      options.max_guessed * SmoothStep(distance, options.guess_begins, options.guess_ends);
+  const double bold =
+      SmoothStep(distance, options.bold_distance_begins, options.bold_distance_ends) *
+      SmoothStep(chroma, options.bold_chroma_begins, options.bold_chroma_ends);
+  return {std::max(faded, bold), std::max(options.guess_chroma * faded, bold)};
+}
+
 }  // namespace
 
 void FusionOptions::Validate() const {
@@ -48,6 +62,10 @@ void FusionOptions::Validate() const {
   check("guess_ends", guess_ends, guess_begins + 1e-6, 2e6);
   check("max_guessed", max_guessed, 0, 1);
   check("guess_chroma", guess_chroma, 0, 1);
+  check("bold_distance_begins", bold_distance_begins, 0, 1e6);
+  check("bold_distance_ends", bold_distance_ends, bold_distance_begins + 1e-6, 2e6);
+  check("bold_chroma_begins", bold_chroma_begins, 0, 200);
+  check("bold_chroma_ends", bold_chroma_ends, bold_chroma_begins + 1e-6, 400);
 }
 
 FusedColor FuseColors(const Image& luminance,
@@ -72,10 +90,12 @@ FusedColor FuseColors(const Image& luminance,
   for (size_t i = 0; i < pixels; ++i) {
     const double confidence = carried.confidence.data[i];
     const double seen = confidence > options.min_confidence ? confidence * confidence : 0.0;
-    const double guess = distance.Empty() ? 0.0
-                                          : options.max_guessed * SmoothStep(distance.data[i],
-                                                                             options.guess_begins,
-                                                                             options.guess_ends);
+    const double guess_a = guessed.Empty() ? 0.0 : guessed.Plane(0)[i];
+    const double guess_b = guessed.Empty() ? 0.0 : guessed.Plane(1)[i];
+    const GuessShare guess =
+        distance.Empty()
+            ? GuessShare{}
+            : ShareOfGuess(distance.data[i], std::hypot(guess_a, guess_b), options);
     const double strangeness =
         distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMaxStrange);
     const double pull =
@@ -83,16 +103,16 @@ FusedColor FuseColors(const Image& luminance,
     const double total = seen + pull;
     const double scale = options.relative_chroma.Scale(luminance.data[i]);
     for (int c = 0; c < 2; ++c) {
-      const double guess_ab = guessed.Empty() ? 0.0 : options.guess_chroma * guessed.Plane(c)[i];
-      const double prior = (1.0 - guess) * inferred.Plane(c)[i] + guess * guess_ab;
+      const double prior = (1.0 - guess.share) * inferred.Plane(c)[i] +
+                           guess.colour * (c == 0 ? guess_a : guess_b);
       target[c * pixels + i] =
           static_cast<float>((seen * carried.ab.Plane(c)[i] + pull * prior) / (total * scale));
     }
     system.data[static_cast<int64_t>(i)] = static_cast<float>(total);
     const double share_seen = seen / total;
-    out.provenance.Plane(0)[i] = static_cast<float>((1.0 - share_seen) * guess);
+    out.provenance.Plane(0)[i] = static_cast<float>((1.0 - share_seen) * guess.share);
     out.provenance.Plane(1)[i] = static_cast<float>(share_seen);
-    out.provenance.Plane(2)[i] = static_cast<float>((1.0 - share_seen) * (1.0 - guess));
+    out.provenance.Plane(2)[i] = static_cast<float>((1.0 - share_seen) * (1.0 - guess.share));
   }
   GridSolveOptions solve;
   solve.tolerance = kTolerance;

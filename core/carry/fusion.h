@@ -27,6 +27,12 @@ struct FusionOptions {
   double guess_ends = 7.0;
   double max_guessed = 0.6;   // that full share, 0..1
   double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
+  // A colourful guess (sky, leaves) is seldom made without reason: between these feature distances
+  // and chromas (Lab units) it comes to decide alone, unfaded.
+  double bold_distance_begins = 1.5;
+  double bold_distance_ends = 3.0;
+  double bold_chroma_begins = 15.0;
+  double bold_chroma_ends = 25.0;
   // What spreads over the picture is chroma relative to luminance.
   RelativeChroma relative_chroma;
   void Validate() const;

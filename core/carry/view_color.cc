@@ -1,5 +1,7 @@
 #include "core/carry/view_color.h"
 
+#include <algorithm>
+
 namespace color3d {
 namespace {
 
@@ -9,7 +11,7 @@ constexpr double kWorthGuessing = 0.02;  // share of a view's pixels
 bool WantsGuess(const CarriedColor& carried, const Image& distance, const FusionOptions& options) {
   size_t strange = 0;
   for (size_t i = 0; i < distance.data.size(); ++i) {
-    strange += distance.data[i] > options.guess_begins &&
+    strange += distance.data[i] > std::min(options.guess_begins, options.bold_distance_begins) &&
                        carried.confidence.data[i] <= options.min_confidence
                    ? 1
                    : 0;

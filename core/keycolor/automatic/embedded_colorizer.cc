@@ -150,7 +150,9 @@ class EmbeddedColorizer : public AutomaticColorizer {
 }  // namespace
 
 std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::Embedded() {
-  return FromPretrained(EmbeddedWeights(""));
+  static const std::shared_ptr<const AutomaticColorizer> embedded =
+      FromPretrained(EmbeddedWeights(""));
+  return embedded;
 }
 
 std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromPretrained(
