@@ -93,9 +93,8 @@ FusedColor FuseColors(const Image& luminance,
     const double guess_a = guessed.Empty() ? 0.0 : guessed.Plane(0)[i];
     const double guess_b = guessed.Empty() ? 0.0 : guessed.Plane(1)[i];
     const GuessShare guess =
-        distance.Empty()
-            ? GuessShare{}
-            : ShareOfGuess(distance.data[i], std::hypot(guess_a, guess_b), options);
+        distance.Empty() ? GuessShare{}
+                         : ShareOfGuess(distance.data[i], std::hypot(guess_a, guess_b), options);
     const double strangeness =
         distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMaxStrange);
     const double pull =
@@ -103,8 +102,8 @@ FusedColor FuseColors(const Image& luminance,
     const double total = seen + pull;
     const double scale = options.relative_chroma.Scale(luminance.data[i]);
     for (int c = 0; c < 2; ++c) {
-      const double prior = (1.0 - guess.share) * inferred.Plane(c)[i] +
-                           guess.colour * (c == 0 ? guess_a : guess_b);
+      const double prior =
+          (1.0 - guess.share) * inferred.Plane(c)[i] + guess.colour * (c == 0 ? guess_a : guess_b);
       target[c * pixels + i] =
           static_cast<float>((seen * carried.ab.Plane(c)[i] + pull * prior) / (total * scale));
     }
