@@ -200,7 +200,13 @@ struct Walk {
   const FilmKey* key = nullptr;
   int direction = 1;
   std::vector<int> frames;  // in the order of the walk
+  size_t nearest = 0;       // of them: those that no key frame is nearer to, which come first
   FilmWalk before;          // track null: it begins at the key frame
+
+  void Drop(size_t count) {
+    frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(count));
+    nearest -= std::min(nearest, count);
+  }
 };
 
 // Goes along a walk, one frame after the other.
@@ -307,25 +313,29 @@ void TakeUp(const std::vector<FilmWalk>& walks, Walk* walk) {
     const auto last = std::find(walk->frames.begin(), walk->frames.end(), done.frame);
     if (last == walk->frames.end()) return;  // of other keys
     if (!done.track && last + 1 != walk->frames.end()) return;
-    walk->frames.erase(walk->frames.begin(), last + 1);
+    walk->Drop(static_cast<size_t>(last - walk->frames.begin()) + 1);
     walk->before = done;
   }
 }
 
 std::vector<Walk> WalksOf(const FilmFrames& frames,
                           const std::vector<FilmKey>& keys,
+                          bool with_second,
                           const std::vector<FilmWalk>& done) {
   const int count = static_cast<int>(frames.shot.size());
   std::vector<int> key_frames;
   for (const FilmKey& key : keys) key_frames.push_back(key.frame);
-  const std::vector<int> nearest = NearestKeyFrames(frames.shot, key_frames);
+  const std::vector<NearKeyFrames> near = NearestKeyFrames(frames, key_frames);
   std::vector<Walk> walks;
   for (const FilmKey& key : keys) {
     for (const int direction : {1, -1}) {
-      Walk walk{&key, direction, {}, {}};
+      Walk walk{&key, direction, {}, 0, {}};
       for (int i = key.frame + direction; i >= 0 && i < count; i += direction) {
         // Frames with faults lie between those of a shot.
-        if (nearest[i] == key.frame) walk.frames.push_back(i);
+        const bool is_nearest = near[i].nearest == key.frame;
+        if (!is_nearest && !(with_second && near[i].second == key.frame)) continue;
+        walk.frames.push_back(i);
+        if (is_nearest) walk.nearest = walk.frames.size();
       }
       TakeUp(done, &walk);
       if (!walk.frames.empty()) walks.push_back(std::move(walk));
@@ -340,16 +350,27 @@ std::vector<Walk> WalksOf(const FilmFrames& frames,
 
 }  // namespace
 
-std::vector<int> NearestKeyFrames(const std::vector<int>& shot, const std::vector<int>& keys) {
-  std::vector<int> nearest(shot.size(), -1);
-  for (size_t i = 0; i < shot.size(); ++i) {
-    const int frame = static_cast<int>(i);
+std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames,
+                                            const std::vector<int>& keys) {
+  constexpr double kSameTime = 1e-6;  // times are not exact
+  const auto distance = [&](int a, int b) {
+    return frames.time_s.empty() ? std::abs(a - b) : std::abs(frames.time_s[a] - frames.time_s[b]);
+  };
+  const auto nearest_but = [&](int except, int frame) {
+    int nearest = -1;
     for (const int key : keys) {
-      if (shot[key] != shot[i]) continue;
-      if (nearest[i] < 0 || std::abs(key - frame) < std::abs(nearest[i] - frame)) nearest[i] = key;
+      if (key == except || frames.shot[key] != frames.shot[frame]) continue;
+      if (nearest < 0 || distance(key, frame) < distance(nearest, frame) - kSameTime) nearest = key;
     }
+    return nearest;
+  };
+  std::vector<NearKeyFrames> near(frames.shot.size());
+  for (size_t i = 0; i < near.size(); ++i) {
+    const int frame = static_cast<int>(i);
+    near[i].nearest = nearest_but(-1, frame);
+    near[i].second = nearest_but(near[i].nearest, frame);
   }
-  return nearest;
+  return near;
 }
 
 void FilmCarryOptions::Validate() const {
@@ -364,8 +385,9 @@ void CarryAlongFilm(const FilmFrames& frames,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const std::function<void(int frame, const CarriedColor& color)>& on_frame,
-                    const FilmResume& resume) {
+                    const OnCarriedFrame& on_frame,
+                    const FilmResume& resume,
+                    const OnCarriedFrame& on_second) {
   options.Validate();
   for (size_t i = 0; i < keys.size(); ++i) {
     if (keys[i].frame < 0 || keys[i].frame >= static_cast<int>(frames.shot.size())) {
@@ -377,19 +399,25 @@ void CarryAlongFilm(const FilmFrames& frames,
       }
     }
   }
-  std::mutex handing_over;
   for (const FilmKey& key : keys) on_frame(key.frame, key.color);
-  const std::vector<Walk> walks = WalksOf(frames, keys, resume.walks);
-  pool.ForEach(static_cast<int64_t>(walks.size()), [&](int64_t index, int) {
-    const Walk& walk = walks[index];
-    Walker walker(walk, frames, options, cancel);
-    for (const int frame : walk.frames) {
+  std::mutex handing_over;
+  const auto go = [&](size_t count, const OnCarriedFrame& to, Walk* walk) {
+    if (count == 0) return;
+    Walker walker(*walk, frames, options, cancel);
+    for (size_t i = 0; i < count; ++i) {
+      const int frame = walk->frames[i];
       const CarriedColor color = walker.GoTo(frame);
       const std::lock_guard lock(handing_over);
       if (resume.on_walk) resume.on_walk(walker.Where());
-      on_frame(frame, color);
+      to(frame, color);
     }
-  });
+    walk->before = walker.Where();
+    walk->Drop(count);
+  };
+  std::vector<Walk> walks = WalksOf(frames, keys, on_second != nullptr, resume.walks);
+  const auto count = static_cast<int64_t>(walks.size());
+  pool.ForEach(count, [&](int64_t i, int) { go(walks[i].nearest, on_frame, &walks[i]); });
+  pool.ForEach(count, [&](int64_t i, int) { go(walks[i].frames.size(), on_second, &walks[i]); });
 }
 
 }  // namespace color3d

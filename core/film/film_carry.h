@@ -48,6 +48,8 @@ struct FilmFrames {
   // Between a frame and the next one of its shot, where it is known already. May be empty. Called
   // from several threads at once.
   std::function<std::shared_ptr<const FlowPair>(int earlier, int later)> flow;
+  // When each frame is shown, ascending within a shot; empty: one after the other.
+  std::vector<double> time_s = {};
 };
 
 // How far the walk away from a key frame is.
@@ -67,21 +69,29 @@ struct FilmResume {
   std::function<void(const FilmWalk& walk)> on_walk;
 };
 
-// Of each frame the nearest of `keys` (frames; of two as near the one given first) in its shot; -1
-// where that has none.
-std::vector<int> NearestKeyFrames(const std::vector<int>& shot, const std::vector<int>& keys);
+// The key frames of a frame's shot that are nearest to it in time; -1 where there is none.
+struct NearKeyFrames {
+  int nearest = -1;
+  int second = -1;
+};
+// Of each frame, among `keys` (frames; of two as near the one given first).
+std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames, const std::vector<int>& keys);
+
+using OnCarriedFrame = std::function<void(int frame, const CarriedColor& color)>;
 
 // Colours every frame of the shots that have a key frame from the nearest of them, and hands it to
 // `on_frame` in any order, from several threads, one after the other. Frames of other shots are not
-// handed over. Memory does not grow with the number of frames. What comes of resumed walks is the
-// same to the bit; key frames are handed over again. Throws Error{kInvalidArgument} for keys that
-// are no frames or are given twice, kCancelled.
+// handed over. When all are there, `on_second`, unless it is empty, is handed what the second
+// nearest key frame gives those of shots with two or more. Memory does not grow with the number of
+// frames. What comes of resumed walks is the same to the bit; key frames are handed over again.
+// Throws Error{kInvalidArgument} for keys that are no frames or are given twice, kCancelled.
 void CarryAlongFilm(const FilmFrames& frames,
                     const std::vector<FilmKey>& keys,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const std::function<void(int frame, const CarriedColor& color)>& on_frame,
-                    const FilmResume& resume = {});
+                    const OnCarriedFrame& on_frame,
+                    const FilmResume& resume = {},
+                    const OnCarriedFrame& on_second = {});
 
 }  // namespace color3d

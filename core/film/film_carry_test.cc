@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <utility>
 
 #include "core/base/error.h"
 
@@ -146,6 +147,73 @@ TEST(FilmCarry, ALaterKeyFrameChangesOnlyTheFramesNearerToIt) {
   Image opposite = scenery.Ab(13);
   for (float& v : opposite.data) v = -v;
   EXPECT_LT(ErrorOf(after.at(13), opposite).weighted, 1.5);
+}
+
+TEST(FilmCarry, TheNearestIsTheNearestInTime) {
+  FilmFrames frames{{0, 0, 0, 0, 0, 1, 0}, {}};
+  const auto owners = [&] {
+    std::vector<int> nearest, second;
+    for (const NearKeyFrames& near : NearestKeyFrames(frames, {6, 0, 2})) {
+      nearest.push_back(near.nearest);
+      second.push_back(near.second);
+    }
+    return std::pair(nearest, second);
+  };
+  EXPECT_EQ(owners().first, (std::vector<int>{0, 0, 2, 2, 6, -1, 6}));
+  EXPECT_EQ(owners().second, (std::vector<int>{2, 2, 0, 6, 2, -1, 2})) << "6 was given first";
+  frames.time_s = {0.0, 0.4, 0.5, 0.6, 0.7, 0.8, 2.4};  // most of it stands still
+  EXPECT_EQ(owners().first, (std::vector<int>{0, 2, 2, 2, 2, -1, 6}));
+  EXPECT_EQ(owners().second, (std::vector<int>{2, 0, 0, 0, 0, -1, 2}));
+}
+
+// What the camera shows of the left end at first and of the right end at last is in one key frame
+// each.
+TEST(FilmCarry, TheSecondKeyFrameIsHandedOverWhenTheNearestIsThere) {
+  const Scenery scenery{.pan_px = 5.0};
+  const std::vector<FilmKey> keys = {KeyOf(scenery, 2), KeyOf(scenery, 9)};
+  const FilmFrames frames{std::vector<int>(12, 0), [&](int frame) {
+                            return std::make_shared<const Image>(scenery.Luminance(frame));
+                          }};
+  ThreadPool pool(2);
+  CancellationToken cancel;
+  std::map<int, CarriedColor> first, second;
+  std::map<std::pair<int, int>, FilmWalk> walks;
+  const auto carry = [&](int killed_after) {
+    FilmResume resume{{}, [&](const FilmWalk& walk) { walks[{walk.key, walk.direction}] = walk; }};
+    for (const auto& [place, walk] : walks) resume.walks.push_back(walk);
+    CarryAlongFilm(
+        frames,
+        keys,
+        {},
+        pool,
+        cancel,
+        [&](int frame, const CarriedColor& color) { first[frame] = color; },
+        resume,
+        [&](int frame, const CarriedColor& color) {
+          EXPECT_EQ(first.size(), 12u);
+          EXPECT_TRUE(second.emplace(frame, color).second) << frame;
+          if (static_cast<int>(second.size()) == killed_after) {
+            throw Error(ErrorCode::kAborted, "killed");
+          }
+        });
+  };
+  carry(0);
+  ASSERT_EQ(second.size(), 12u);
+  const auto at_right_end = [&](const std::map<int, CarriedColor>& colors, int frame) {
+    return colors.at(frame).confidence.At(0, kHeight / 2, kWidth - 8);
+  };
+  EXPECT_LT(at_right_end(first, 5), 0.1f);
+  EXPECT_GT(at_right_end(second, 5), 0.5f);
+  EXPECT_LT(ErrorOf(second.at(5), scenery.Ab(5)).weighted, 1.5);
+  const auto whole = std::exchange(second, {});
+  walks.clear();
+  EXPECT_THROW(carry(5), Error);
+  carry(0);
+  ASSERT_EQ(second.size(), 12u);
+  for (const auto& [frame, color] : whole) {
+    EXPECT_EQ(second.at(frame).ab.data, color.ab.data) << frame;
+    EXPECT_EQ(second.at(frame).confidence.data, color.confidence.data) << frame;
+  }
 }
 
 TEST(FilmCarry, WhatCannotBeFollowedIsNotClaimed) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "core/base/range_check.h"
 #include "core/carry/carry_views.h"
@@ -11,6 +12,7 @@
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
+#include "core/stage/film/between_anchors.h"
 #include "core/stage/film/frames_in_color.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/carry_checkpoint.h"
@@ -149,7 +151,7 @@ CarriedColor CarriedToFrame(const FilmFrames& frames,
                             const FilmCarryOptions& options,
                             StageContext& context) {
   CarriedColor color;
-  const int nearest = NearestKeyFrames(frames.shot, ViewsOf(keys, &FilmKey::frame))[frame];
+  const int nearest = NearestKeyFrames(frames, ViewsOf(keys, &FilmKey::frame))[frame].nearest;
   if (nearest < 0) return color;
   // Only the frames between are walked along.
   FilmFrames between = frames;
@@ -176,7 +178,10 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
   constexpr int64_t kCacheBytes = int64_t{8} << 20;  // each frame is read once, in order
   const ViewImages images(scene, context.scene_folder(), options.max_side_px, kCacheBytes);
   FilmFrames frames;
-  for (const View& view : scene.views) frames.shot.push_back(view.moment->shot);
+  for (const View& view : scene.views) {
+    frames.shot.push_back(view.moment->shot);
+    frames.time_s.push_back(view.time_s());
+  }
   frames.luminance = [&](int frame) { return images.Luminance(frame); };
   const Camera camera = images.WorkingCamera(0);
   std::vector<FilmKey> keys(1);
@@ -191,17 +196,18 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
     keys.push_back(std::move(key));
   }
   CarryCheckpoint done(scene, context);
-  CarryAlongFilm(frames,
-                 keys,
-                 options.film,
-                 context.pool(),
-                 context.cancel(),
-                 [&](int frame, const CarriedColor& color) {
-                   if (done.WasDone(frame)) return;
-                   done.Add(
-                       frame, Coverage(color, kCovered), EncodeAbPng(color.ab, color.confidence));
-                 },
-                 {done.Walks(), [&](const FilmWalk& walk) { done.SetWalk(walk); }});
+  const FilmResume resume{done.Walks(), [&](const FilmWalk& walk) { done.SetWalk(walk); }};
+  const auto add = [&](int frame, const CarriedColor& color) {
+    if (done.WasDone(frame)) return;
+    done.Add(frame, Coverage(color, kCovered), EncodeAbPng(color.ab, color.confidence));
+  };
+  const auto fill = [&](int frame, const CarriedColor& second) {
+    AbMap map = DecodeAbPng(done.Png(frame), artifact::kCarried);
+    CarriedColor color{std::move(map.ab), std::move(map.confidence)};
+    if (FillOpen(second, &color) == 0) return;
+    done.Replace(frame, Coverage(color, kCovered), EncodeAbPng(color.ab, color.confidence));
+  };
+  CarryAlongFilm(frames, keys, options.film, context.pool(), context.cancel(), add, resume, fill);
   Conclude(scene, ViewsOf(keys, &FilmKey::frame), done.coverage(), context);
 }
 

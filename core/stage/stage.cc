@@ -97,6 +97,14 @@ void StageContext::WriteOutput(const std::string& name, std::string_view bytes) 
   outputs_.push_back(name);
 }
 
+std::string StageContext::ReadOutput(const std::string& name) const {
+  return ReadFile(setup_.output_folder / name);
+}
+
+void StageContext::RewriteOutput(const std::string& name, std::string_view bytes) {
+  WriteFileAtomic(PlaceFor(name), bytes);
+}
+
 void StageContext::TakeOutput(const std::string& name, const std::filesystem::path& file) {
   PublishFile(file, PlaceFor(name));
   outputs_.push_back(name);

@@ -77,7 +77,10 @@ class StageContext {
 
   // Writes an artifact, atomically.
   void WriteOutput(const std::string& name, std::string_view bytes);
-  // The same for a finished file in the scratch folder, which is moved.
+  // What was written under that name, and other bytes in its place.
+  std::string ReadOutput(const std::string& name) const;
+  void RewriteOutput(const std::string& name, std::string_view bytes);
+  // As WriteOutput for a finished file in the scratch folder, which is moved.
   void TakeOutput(const std::string& name, const std::filesystem::path& file);
   // An input that this stage publishes again under its name.
   void PassOn(const std::string& name);

@@ -91,15 +91,16 @@ double ShareOpen(const CarriedColor& carried, const CarriedColor& of_anchors) {
   return static_cast<double>(open) / static_cast<double>(one.size());
 }
 
-void FillOpen(const CarriedColor& others, CarriedColor* of_anchors) {
+size_t FillOpen(const CarriedColor& others, CarriedColor* color) {
+  size_t filled = 0;
   for (size_t i = 0; i < others.confidence.data.size(); ++i) {
-    float& confidence = of_anchors->confidence.data[i];
+    float& confidence = color->confidence.data[i];
     if (confidence > kFollowed || others.confidence.data[i] <= kFollowed) continue;
     confidence = others.confidence.data[i];
-    for (int c = 0; c < others.ab.channels; ++c) {
-      of_anchors->ab.Plane(c)[i] = others.ab.Plane(c)[i];
-    }
+    for (int c = 0; c < others.ab.channels; ++c) color->ab.Plane(c)[i] = others.ab.Plane(c)[i];
+    ++filled;
   }
+  return filled;
 }
 
 FusedColor ColorBetweenAnchors(const Image& luminance,

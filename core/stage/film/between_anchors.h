@@ -20,8 +20,8 @@ CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, doub
 inline constexpr double kWorthAsking = 0.02;
 // Share of a frame that neither what was carried into it nor the anchors tell surely.
 double ShareOpen(const CarriedColor& carried, const CarriedColor& of_anchors);
-// Takes `others` where `of_anchors` tells nothing surely.
-void FillOpen(const CarriedColor& others, CarriedColor* of_anchors);
+// Takes `others` where they tell surely and `color` does not; how many pixels these are.
+size_t FillOpen(const CarriedColor& others, CarriedColor* color);
 
 // The colour of a frame: what was carried into it, as in all views; what `of_anchors` tells where
 // that is followed surely in place of what the frame's own sources would say, which are asked

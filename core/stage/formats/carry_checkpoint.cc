@@ -13,7 +13,7 @@ using nlohmann::json;
 namespace {
 
 // A checkpoint: these bytes, then records:
-//   {"view": name, "coverage": 0..1, "png": bytes}       a view that is done
+//   {"view": name, "coverage": 0..1, "png": bytes}       a view that is done; the last one counts
 //   {"key": name, "direction": 1 or -1, "frame": name, "moved": longer sides,
 //    "wanted": 0..1, "width": px, "height": px, "in_key": bytes, "in_frame": bytes}
 //                                                        a walk of a film; no maps at its end
@@ -80,6 +80,7 @@ CarryCheckpoint::CarryCheckpoint(const Scene& scene, StageContext& context)
     : scene_(scene),
       context_(context),
       was_done_(scene.views.size(), 0),
+      is_done_(scene.views.size(), 0),
       coverage_(scene.views.size(), 0.0),
       records_(kind::kCarryColor, kMagic, context) {
   records_.TakeUp([&](const json& record) { CheckRecord(record, scene_); },
@@ -99,9 +100,15 @@ void CarryCheckpoint::TakeUp(const json& record) {
 }
 
 void CarryCheckpoint::Keep(size_t view, double coverage, const std::string& png) {
-  context_.WriteOutput(ViewArtifact(artifact::kCarried, scene_.views[view], ".png"), png);
+  const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view], ".png");
+  if (is_done_[view] != 0) {
+    context_.RewriteOutput(name, png);
+  } else {
+    context_.WriteOutput(name, png);
+    is_done_[view] = 1;
+    ++done_;
+  }
   coverage_[view] = coverage;
-  ++done_;
   records_.Append({{"view", scene_.views[view].name},
                    {"coverage", coverage},
                    {"png", json::binary(std::vector<uint8_t>(png.begin(), png.end()))}});
@@ -114,6 +121,20 @@ void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
   context_.progress().OnProgress(done_,
                                  static_cast<int64_t>(scene_.views.size()),
                                  "carrying colour into " + scene_.views[index].name);
+  SaveWhenDue();
+}
+
+std::string CarryCheckpoint::Png(int view) const {
+  return context_.ReadOutput(ViewArtifact(artifact::kCarried, scene_.views[view], ".png"));
+}
+
+void CarryCheckpoint::Replace(int view, double coverage, const std::string& png) {
+  const std::lock_guard lock(mutex_);
+  Keep(static_cast<size_t>(view), coverage, png);
+  SaveWhenDue();
+}
+
+void CarryCheckpoint::SaveWhenDue() {
   records_.SaveWhenDue([&] {
     std::vector<json> walks;
     for (const auto& [place, walk] : walks_) walks.push_back(RecordOf(walk, scene_));

@@ -27,6 +27,10 @@ class CarryCheckpoint {
   bool WasDone(int view) const { return was_done_[static_cast<size_t>(view)] != 0; }
   // Writes the output, reports progress, saves a checkpoint when it is time. `coverage`: 0..1.
   void Add(int view, double coverage, const std::string& png);
+  // The output of a view that was added.
+  std::string Png(int view) const;
+  // Writes another one in its place, saves a checkpoint when it is time.
+  void Replace(int view, double coverage, const std::string& png);
   // By view; once all are there.
   const std::vector<double>& coverage() const { return coverage_; }
 
@@ -37,10 +41,12 @@ class CarryCheckpoint {
  private:
   void TakeUp(const nlohmann::json& record);
   void Keep(size_t view, double coverage, const std::string& png);
+  void SaveWhenDue();
 
   const Scene& scene_;
   StageContext& context_;
   std::vector<char> was_done_;
+  std::vector<char> is_done_;
   mutable std::mutex mutex_;
   std::vector<double> coverage_;
   int64_t done_ = 0;
