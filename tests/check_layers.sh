@@ -108,7 +108,7 @@ public core/image box_mean codec draw fill_holes feature_matches flow_agreement 
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
-public core/film anchor_frames film_carry moving_regions shots steady_colors steady_tones
+public core/film anchor_frames film_carry moving_regions returning_shots shots steady_colors steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan

@@ -373,6 +373,19 @@ std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames,
   return near;
 }
 
+CarriedColor CarryFoundAgain(const FilmKey& key,
+                             const Image& key_luminance,
+                             const Image& frame,
+                             const FilmCarryOptions& options,
+                             const CancellationToken& cancel) {
+  constexpr float kNowhere = -1e4f;
+  const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(key_luminance);
+  const Image nowhere(frame.width, frame.height, 2, kNowhere);
+  FilmTrack track{nowhere, nowhere};
+  TakeFoundAgain(FoundAgain(key_luminance), frame, contrast, key_contrast, options, cancel, &track);
+  return ColorOf(key, key_contrast, contrast, track, options);
+}
+
 void FilmCarryOptions::Validate() const {
   const RangeCheck check("film carry option");
   check("cycle_tolerance_px", cycle_tolerance_px, 0.1, 20);

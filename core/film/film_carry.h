@@ -77,6 +77,15 @@ struct NearKeyFrames {
 // Of each frame, among `keys` (frames; of two as near the one given first).
 std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames, const std::vector<int>& keys);
 
+// What a frame that nothing leads to from a key frame, as behind a cut, shows of it as far as local
+// features find that; confidence 0 elsewhere. `key_luminance`, `frame`: as FilmFrames' luminance.
+// Throws Error{kCancelled}.
+CarriedColor CarryFoundAgain(const FilmKey& key,
+                             const Image& key_luminance,
+                             const Image& frame,
+                             const FilmCarryOptions& options,
+                             const CancellationToken& cancel);
+
 using OnCarriedFrame = std::function<void(int frame, const CarriedColor& color)>;
 
 // Colours every frame of the shots that have a key frame from the nearest of them, and hands it to

@@ -8,6 +8,7 @@
 #include "core/carry/carry_views.h"
 #include "core/color/lab.h"
 #include "core/film/film_carry.h"
+#include "core/film/returning_shots.h"
 #include "core/image/codec.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
@@ -207,8 +208,17 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
     if (FillOpen(second, &color) == 0) return;
     done.Replace(frame, Coverage(color, kCovered), EncodeAbPng(color.ab, color.confidence));
   };
-  CarryAlongFilm(frames, keys, options.film, context.pool(), context.cancel(), add, resume, fill);
-  Conclude(scene, ViewsOf(keys, &FilmKey::frame), done.coverage(), context);
+  const auto carry = [&](const std::vector<FilmKey>& from) {
+    CarryAlongFilm(frames, from, options.film, context.pool(), context.cancel(), add, resume, fill);
+  };
+  carry(keys);
+  const std::vector<int> key_views = ViewsOf(keys, &FilmKey::frame);
+  for (const int middle : MiddlesWithoutKey(frames.shot, key_views)) {
+    const auto key =
+        KeyOfReturningShot(frames, middle, keys, options.film, context.pool(), context.cancel());
+    if (key) carry({*key});
+  }
+  Conclude(scene, key_views, done.coverage(), context);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/random.h"
 #include "core/color/lab.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
@@ -129,6 +130,75 @@ TEST_F(CarryFilmTest, CancelStopsBeforeTheNextFrame) {
     EXPECT_EQ(e.code(), ErrorCode::kCancelled);
   }
   EXPECT_EQ(frames_.steps.back(), 3);
+}
+
+// There, elsewhere, and back again.
+class ReturningShotTest : public StageTest {
+ protected:
+  static constexpr int kSideX = 176, kSideY = 132;
+
+  ReturningShotTest() {
+    for (int i = 0; i < kFrames; ++i) {
+      const int shot = i / 4;
+      View view;
+      view.name = view.image_file = "f" + std::to_string(100 + i) + ".png";
+      view.camera =
+          view.captured_camera = {kSideX, kSideY, 100.0, 100.0, kSideX / 2.0, kSideY / 2.0};
+      view.moment = Moment{0.04 * i, shot};
+      WriteFileAtomic(scratch_.path() / view.image_file,
+                      EncodePng8(Noise(shot == 1 ? 2 : 1, 2 * i)));
+      scene_.views.push_back(view);
+    }
+    AddInput(artifact::kScene, SceneToJson(scene_));
+    AddInput(artifact::kKeyView, R"({"view": "f101.png"})");
+    AddInput(artifact::kKeyColor, EncodeAbPng(Image(kSideX, kSideY, 2, 30.0f)));
+  }
+  // Part of a picture of smooth noise, 0.2 to 0.8.
+  static Image Noise(uint64_t seed, int from) {
+    constexpr int kGrainPx = 4;
+    Random random(seed);
+    Image coarse(kSideX / kGrainPx + 10, kSideY / kGrainPx, 1);
+    for (float& value : coarse.data) value = static_cast<float>(0.2 + 0.6 * random.NextUniform());
+    const Image fine = Resize(coarse, coarse.width * kGrainPx, kSideY);
+    Image part(kSideX, kSideY, 1);
+    for (int y = 0; y < kSideY; ++y) {
+      for (int x = 0; x < kSideX; ++x) part.At(0, y, x) = fine.At(0, y, x + from);
+    }
+    return part;
+  }
+  std::string Run() {
+    StageContext context = MakeContext();
+    RunCarryColor({}, context);
+    return ReadFile(scratch_.path() / "out" / artifact::kCarryFacts);
+  }
+  std::filesystem::path Carried(int frame) {
+    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[frame], ".png");
+  }
+  Scene scene_;
+};
+
+TEST_F(ReturningShotTest, TakesTheColorsOfTheShotThatItReturnsTo) {
+  const std::string facts = Run();
+  EXPECT_EQ(nlohmann::json::parse(facts).at("key_views"), nlohmann::json({"f101.png"}));
+  std::vector<std::string> files;
+  for (int i = 0; i < kFrames; ++i) {
+    ASSERT_EQ(std::filesystem::exists(Carried(i)), i < 4 || i >= 8) << i;
+    if (i < 8) continue;
+    files.push_back(ReadFile(Carried(i)));
+    const AbMap map = DecodeAbPng(files.back(), "carried");
+    EXPECT_GT(map.confidence.At(0, kSideY / 2, kSideX / 2), 0.5f) << i;
+    EXPECT_NEAR(map.ab.At(0, kSideY / 2, kSideX / 2), 30.0f, 0.1f) << i;
+    EXPECT_LT(map.confidence.At(0, kSideY / 2, kSideX - 2), 0.5f) << "not in the key frame: " << i;
+  }
+  DyingCheckpoints store;
+  store.dies_at = 7;
+  checkpoints_ = &store;
+  std::filesystem::remove_all(scratch_.path() / "out");
+  EXPECT_THROW(Run(), Error);
+  store.dies_at = 0;
+  std::filesystem::remove_all(scratch_.path() / "out");
+  EXPECT_EQ(Run(), facts);
+  for (int i = 8; i < kFrames; ++i) EXPECT_EQ(ReadFile(Carried(i)), files[i - 8]) << i;
 }
 
 }  // namespace
