@@ -17,6 +17,7 @@ constexpr int kMaxShiftPx = 5;           // of the thumbnails: a fast pan
 constexpr double kCutUnlikeness = 0.55;
 constexpr double kCutOverUsual = 2.5;
 constexpr int kUsualFrames = 6;  // to either side
+constexpr int kMostAlien = 2;    // torn frames side by side
 
 Image Normalised(const Image& image) {
   const TonesOfPicture tones(image);
@@ -100,14 +101,17 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   const auto is_cut = [&](int k) {
     return steps[k] > kCutUnlikeness && steps[k] > kCutOverUsual * Usual(steps, k);
   };
-  // Two cuts, one after the other, to and from a frame whose neighbours are alike.
+  // A cut to, and one from, a frame or few whose neighbours are alike.
+  const int count_of_steps = static_cast<int>(steps.size());
   std::vector<bool> cut(steps.size(), false);
-  for (int k = 0; k < static_cast<int>(steps.size()); ++k) cut[k] = is_cut(k);
-  for (int k = 0; k + 1 < static_cast<int>(steps.size()); ++k) {
-    if (!cut[k] || !cut[k + 1]) continue;
-    if (UnlikenessOf(normalised[k], normalised[k + 2]) > kCutUnlikeness) continue;
-    result.fault[kept[k + 1]] = FrameFault::kAlien;
-    cut[k] = cut[k + 1] = false;
+  for (int k = 0; k < count_of_steps; ++k) cut[k] = is_cut(k);
+  for (int k = 0; k < count_of_steps; ++k) {
+    for (int aliens = 1; cut[k] && aliens <= kMostAlien && k + aliens < count_of_steps; ++aliens) {
+      if (!cut[k + aliens]) continue;
+      if (UnlikenessOf(normalised[k], normalised[k + aliens + 1]) > kCutUnlikeness) continue;
+      for (int i = 1; i <= aliens; ++i) result.fault[kept[k + i]] = FrameFault::kAlien;
+      std::fill_n(cut.begin() + k, aliens + 1, false);
+    }
   }
   // Frames with faults get the numbers behind.
   int shot = 0;

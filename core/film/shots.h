@@ -13,7 +13,7 @@ inline constexpr int kShotThumbnailPx = 64;  // longer side of the small picture
 enum class FrameFault {
   kNone,
   kBlank,  // black, white or of one grey all over
-  kAlien,  // unlike the frames before and after, which are alike: torn, or a flash
+  kAlien,  // it, or it and the next, unlike the frames around, which are alike: torn, or a flash
 };
 
 struct FilmShots {

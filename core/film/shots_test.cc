@@ -65,6 +65,30 @@ TEST(Shots, FaultsDoNotCutWhatGoesOn) {
   EXPECT_EQ(shots.shot[8], 3);
 }
 
+TEST(Shots, TwoTornFramesSideBySideDoNotCutEither) {
+  for (const int second : {9, 10}) {  // torn alike, or each in its own way
+    std::vector<Image> frames;
+    for (int i = 0; i < 14; ++i) frames.push_back(Place(1, i));
+    frames[5] = Place(9, 0);
+    frames[6] = Place(second, 1);
+    const FilmShots shots = FindShots(frames);
+    EXPECT_EQ(shots.fault[5], FrameFault::kAlien) << second;
+    EXPECT_EQ(shots.fault[6], FrameFault::kAlien) << second;
+    EXPECT_EQ(shots.count, 3) << second;
+    for (const int i : {0, 4, 7, 13}) EXPECT_EQ(shots.shot[i], 0) << second;
+  }
+}
+
+TEST(Shots, AShortShotElsewhereIsAShot) {
+  std::vector<Image> frames;
+  for (int i = 0; i < 8; ++i) frames.push_back(Place(1, i));
+  for (int i = 0; i < 2; ++i) frames.push_back(Place(9, i));
+  for (int i = 0; i < 8; ++i) frames.push_back(Place(3, i));
+  const FilmShots shots = FindShots(frames);
+  EXPECT_EQ(shots.count, 3);
+  EXPECT_THAT(shots.fault, testing::Each(FrameFault::kNone));
+}
+
 TEST(Shots, FewFramesAndBadOnes) {
   EXPECT_EQ(FindShots({}).count, 0);
   EXPECT_EQ(FindShots({Place(1, 0)}).count, 1);
