@@ -7,6 +7,7 @@
 #include "client/lib/names.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/name_order.h"
 #include "core/base/utf8.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
@@ -346,8 +347,10 @@ void TakeAsFrames(PhotoFolder* folder) {
                             photo.file.filename().string());
     }
   }
-  const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
-  std::sort(folder->photos.begin(), folder->photos.end(), by_path);
+  const auto as_counted = [](const LocalFile& x, const LocalFile& y) {
+    return ComesBefore(x.path, y.path);
+  };
+  std::sort(folder->photos.begin(), folder->photos.end(), as_counted);
 }
 
 namespace {

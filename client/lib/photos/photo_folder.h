@@ -41,8 +41,8 @@ struct PhotoFolder {
 // that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root);
 
-// The photos as frames of a film, in the order of their names; poses are of no use then. Throws
-// Error{kInvalidArgument} when there are none, or two of one name.
+// The photos as frames of a film, in the order of their names (numbers count as numbers); poses are
+// of no use then. Throws Error{kInvalidArgument} when there are none, or two of one name.
 void TakeAsFrames(PhotoFolder* folder);
 
 // The photo whose file stem is that of `file` ("x/0007_coloured.png" has the stem "0007_coloured"),

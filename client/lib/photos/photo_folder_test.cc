@@ -107,6 +107,11 @@ TEST_F(PhotoFolderTest, AFilmStandsForPhotosAndPhotosForAFilm) {
   TakeAsFrames(&folder);
   EXPECT_THAT(Paths(folder.photos), ElementsAre("frames/a.jpg", "frames/b.jpg"));
   EXPECT_EQ(PhotoOfSameStem(folder, "b.png"), "b.jpg");
+  for (const char* name : {"images/c10.jpg", "images/c2.jpg"}) Write(name);
+  folder = CollectPhotos(root());
+  TakeAsFrames(&folder);
+  EXPECT_THAT(Paths(folder.photos),
+              ElementsAre("frames/a.jpg", "frames/b.jpg", "frames/c2.jpg", "frames/c10.jpg"));
   Write("images/more/a.jpg");
   PhotoFolder two = CollectPhotos(root());
   EXPECT_THROW(TakeAsFrames(&two), Error);
