@@ -1,9 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
+#include "tests/support/formats/splat4d_reader.h"
 #include "tests/support/formats/viewer_files.h"
 #include "tests/support/stages/stage_fixture.h"
 
@@ -55,6 +58,68 @@ TEST_F(StageTest, ExportWritesItsFilesInTheWorldsFrameAndSaysWhatTheyLose) {
   EXPECT_EQ(others.outputs(), (std::vector<std::string>{"scene.spz", "scene.glb", "export.json"}));
   EXPECT_EQ(ReadSpz(ReadFile(scratch_.path() / "out/scene.spz")).size(), 9u);
   EXPECT_EQ(ReadGlb(ReadFile(scratch_.path() / "out/scene.glb")).position, from_ply.position);
+}
+
+// The ball is the Gaussian that is not as far as the wall.
+double BallX(const std::vector<double>& position) {
+  return position[2] < position[5] ? position[0] : position[3];
+}
+
+class ExportInTime : public StageTest {
+ protected:
+  void SetUp() override {
+    Scene scene = RampScene(scratch_.path(), 48, 32);
+    for (int i = 0; i < 3; ++i) scene.views[i].moment = Moment{static_cast<double>(i), 0};
+    AddInput(artifact::kScene, SceneToJson(scene));
+    AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
+    AddInput(artifact::kModel, SerializeGaussians(BallBeforeWall(0.0, 2.0)));
+  }
+};
+
+TEST_F(ExportInTime, EveryMomentIsAPly) {
+  StageContext context = MakeContext();
+  RunExport({.sog = false, .splat4d = false, .moments = 5}, context);
+  for (int i = 0; i < 5; ++i) {
+    const auto file = scratch_.path() / ("out/moments/0000" + std::to_string(i + 1) + ".ply");
+    const ViewerGaussians at = ReadPly(ReadFile(file));
+    ASSERT_EQ(at.size(), 2u);
+    EXPECT_NEAR(BallX({at.position.begin(), at.position.end()}), -0.4 + 0.2 * i, 1e-5) << i;
+  }
+  EXPECT_EQ(std::count_if(context.outputs().begin(),
+                          context.outputs().end(),
+                          [](const std::string& name) { return name.starts_with("moments/"); }),
+            5);
+  // scene.ply is the key view's moment, the middle one; so is a single moment.
+  const ViewerGaussians key = ReadPly(ReadFile(scratch_.path() / "out/scene.ply"));
+  EXPECT_NEAR(BallX({key.position.begin(), key.position.end()}), 0.0, 1e-5);
+  StageContext one = MakeContext();
+  RunExport({.sog = false, .splat4d = false, .moments = 1}, one);
+  const ViewerGaussians middle = ReadPly(ReadFile(scratch_.path() / "out/moments/00001.ply"));
+  EXPECT_NEAR(BallX({middle.position.begin(), middle.position.end()}), 0.0, 1e-5);
+}
+
+TEST_F(ExportInTime, PlayersGetAFrameForEachTime) {
+  StageContext context = MakeContext();
+  RunExport({.sog = false}, context);
+  const Splat4dFile file = ReadSplat4d(ReadFile(scratch_.path() / "out/scene.splat4d"));
+  ASSERT_EQ(file.frames.size(), 3u);
+  EXPECT_EQ(file.moving, 1u);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(BallX(file.frames[i].position), -0.4 + 0.4 * i, 2.0 * file.position_bound) << i;
+  }
+  StageContext without = MakeContext();
+  RunExport({.sog = false, .splat4d = false}, without);
+  EXPECT_EQ(std::count(without.outputs().begin(), without.outputs().end(), "scene.splat4d"), 0);
+}
+
+TEST_F(ExportInTime, WhereNothingMovesThereAreNoMoments) {
+  AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
+  StageContext context = MakeContext();
+  RunExport({.sog = false, .moments = 3}, context);
+  EXPECT_NE(observer_.text.find("there are no moments to export"), std::string::npos);
+  for (const std::string& name : context.outputs()) {
+    EXPECT_FALSE(name.starts_with("moments/") || name == "scene.splat4d") << name;
+  }
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ class StageTest : public ::testing::Test {
                         cancel_);
   }
   void AddInput(const std::string& name, const std::string& bytes) {
-    const auto path = scratch_.path() / ("in" + std::to_string(inputs_.size()));
+    const auto path = scratch_.path() / ("in" + std::to_string(added_++));
     WriteFileAtomic(path, bytes);
     inputs_[name] = path;
   }
@@ -67,6 +67,7 @@ class StageTest : public ::testing::Test {
   int64_t memory_bytes_ = 0;
   std::map<std::string, std::filesystem::path> models_;
   RemoteColorizerFactory remote_;
+  int added_ = 0;  // inputs, those that were replaced too
 };
 
 // Three photos of a ramp, with made-up poses, as an imported scene.
@@ -90,6 +91,33 @@ inline Scene RampScene(const std::filesystem::path& folder, int width, int heigh
     scene.views.push_back(view);
   }
   return scene;
+}
+
+// A dark wall, and before it a bright ball that goes from x = -0.4 at begin_s to x = 0.4 at end_s,
+// at the depth kBallDepth.
+inline constexpr float kBallDepth = 1.5f;
+inline GaussianModel BallBeforeWall(double begin_s, double end_s) {
+  GaussianModel model;
+  model.channels = 3;
+  const auto add = [&model](float depth, float log_scale, float sh_l) {
+    model.position.insert(model.position.end(), {0.0f, 0.0f, depth});
+    model.log_scale.insert(model.log_scale.end(), 3, log_scale);
+    model.rotation.insert(model.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
+    model.opacity_logit.push_back(6.0f);
+    model.sh_l.push_back(sh_l);
+    model.sh_a.push_back(0.1f);
+    model.sh_b.push_back(0.1f);
+  };
+  add(6.0f, 1.5f, -1.0f);
+  add(kBallDepth, -2.5f, 1.5f);
+  model.motion.begin_s = begin_s;
+  model.motion.end_s = end_s;
+  model.motion.velocity = {0.4f, 0.0f, 0.0f};
+  model.motion.acceleration = {0.0f, 0.0f, 0.0f};
+  model.motion.spin = {0.0f, 0.0f, 0.0f, 0.0f};
+  model.motion.center = {0.0f};
+  model.motion.log_width = {5.0f};
+  return model;
 }
 
 // A few Gaussians in front of RampScene's cameras.
