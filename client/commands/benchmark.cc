@@ -114,7 +114,8 @@ const BenchmarkView* FindView(const std::vector<BenchmarkView>& views, const std
 // What carry_color would say, but not before the geometry has been made.
 void CheckMoreKeys(const ColorizeOptions& options, const Selection& selection) {
   for (const std::string& text : options.more_keys) {
-    const std::string wanted = ParseMoreKey(text).view;
+    const MoreKey key = ParseMoreKey(text);
+    const std::string& wanted = key.view;
     const BenchmarkView* view = FindView(selection.views, wanted);
     if (view == nullptr) continue;
     if (view->held_out) {
@@ -123,7 +124,7 @@ void CheckMoreKeys(const ColorizeOptions& options, const Selection& selection) {
           wanted,
           view->name);
     }
-    if (selection.IsKey(view->name)) {
+    if (!key.HasRange() && selection.IsKey(view->name)) {
       throw InvalidArgument(
           "--more-key {}: the view {} is the key view already; name each once", wanted, view->name);
     }

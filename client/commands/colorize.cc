@@ -43,8 +43,14 @@ class Colorize {
     for (const std::string& text : options_.more_keys) {
       const MoreKey key = ParseMoreKey(text);
       RequirePhoto(folder_, key.view);
-      if (fs::path(key.view).replace_extension() ==
-          fs::path(options_.key_view).replace_extension()) {
+      if (key.HasRange() && ((!options_.film && !folder_.film) || options_.poses)) {
+        throw InvalidArgument(
+            "--more-key {}: a range of time is for films without poses; leave {} out",
+            key.view,
+            options_.poses ? "it or --poses" : "it");
+      }
+      if (!key.HasRange() && fs::path(key.view).replace_extension() ==
+                                 fs::path(options_.key_view).replace_extension()) {
         throw InvalidArgument("--more-key {}: it is the key view already", key.view);
       }
     }

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <map>
+#include <string_view>
+#include <system_error>
 
 #include "client/options/option_fields.h"
 #include "client/options/preset_file.h"
@@ -135,16 +138,61 @@ void ColorizeOptions::Check() const {
   }
 }
 
+namespace {
+
+// "10-14.5", "10-" or "-14.5"; false for other text.
+bool ParseRange(std::string_view text, MoreKey* key) {
+  const auto seconds = [](std::string_view number, std::optional<double>* to) {
+    if (number.empty()) return true;
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(
+        number.data(), number.data() + number.size(), value, std::chars_format::fixed);
+    *to = value;
+    return error == std::errc() && end == number.data() + number.size();
+  };
+  const size_t dash = text.find('-');
+  return dash != std::string_view::npos && seconds(text.substr(0, dash), &key->begin_s) &&
+         seconds(text.substr(dash + 1), &key->end_s) && key->HasRange();
+}
+
+// Takes the range of time off the end of `value`, where it has one. A file may be called
+// "a@2x.png".
+void TakeRange(std::string* value, MoreKey* key) {
+  const size_t at = value->rfind('@');
+  if (at == std::string::npos) return;
+  const std::string range = value->substr(at + 1);
+  if (range.find_first_not_of("0123456789.-") != std::string::npos) return;
+  if (!ParseRange(range, key)) {
+    throw InvalidArgument(
+        "--more-key {}: '{}' is no range of time; write seconds of the film, BEGIN-END, e.g. "
+        "@10-14.5, or @10- for up to its end",
+        key->view,
+        "@" + range);
+  }
+  if (key->begin_s && key->end_s && *key->end_s < *key->begin_s) {
+    throw InvalidArgument("--more-key {}: the range of time ends at {} s, before it begins at {} s",
+                          key->view,
+                          *key->end_s,
+                          *key->begin_s);
+  }
+  value->resize(at);
+}
+
+}  // namespace
+
 MoreKey ParseMoreKey(const std::string& text) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
     throw InvalidArgument(
         "--more-key wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
-        "VIEW=POINTS.json, VIEW=auto); '{}' is not of that form",
+        "VIEW=POINTS.json, VIEW=auto), of a film also VIEW=COLOURED.png@BEGIN-END, in seconds; "
+        "'{}' "
+        "is not of that form",
         text);
   }
-  const std::string value = text.substr(equals + 1);
+  std::string value = text.substr(equals + 1);
   MoreKey key{text.substr(0, equals), {}};
+  TakeRange(&value, &key);
   if (value == "auto") {
     key.color.automatic = true;
   } else if (fs::path(value).extension() == ".json") {
@@ -168,6 +216,8 @@ void AddMoreKeys(Connection& connection,
     v1::FurtherKeyView* further = spec->mutable_carry_color()->add_further_key_views();
     further->set_view(key.view);
     *further->mutable_color() = UploadKeyColor(connection, key.color);
+    if (key.begin_s) further->set_begin_s(*key.begin_s);
+    if (key.end_s) further->set_end_s(*key.end_s);
   }
 }
 
@@ -204,7 +254,8 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
                  o->more_keys,
                  "VIEW=COLOURED.png: a further key view, for what the first one does not show; its "
                  "colours never replace those of the key views before it. In a film it colours the "
-                 "frames that are nearer to it. May be repeated");
+                 "frames that are nearer to it; VIEW=COLOURED.png@10-14.5: from second 10 to 14.5, "
+                 "before all others, and no frame outside. May be repeated");
   app.add_option("--preset",
                  o->preset,
                  fmt::format("How much time quality is worth: {}; or a file of your own (`color3d "

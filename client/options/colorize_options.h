@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,7 @@ struct ColorizeOptions {
   std::string out;
   KeyColorFlags color;
   std::string masks;                   // folder; empty: none
-  std::vector<std::string> more_keys;  // "VIEW=COLOURED_PICTURE", in order of importance
+  std::vector<std::string> more_keys;  // as ParseMoreKey takes them, in order of importance
   std::string key_view;                // view name or stem; empty: selected
   std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";  // of the server's, or a file of the user's own
@@ -45,9 +46,13 @@ struct ColorizeOptions {
 struct MoreKey {
   std::string view;
   KeyColorFlags color;
+  // Of a film: the range of time that it counts in alone, seconds; either end may be open.
+  std::optional<double> begin_s = {};
+  std::optional<double> end_s = {};
+  bool HasRange() const { return begin_s || end_s; }
 };
-// "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto". Throws Error{kInvalidArgument} for other
-// text, and what checking the file throws.
+// "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto", and "@BEGIN-END" behind it or not. Throws
+// Error{kInvalidArgument} for other text, and what checking the file throws.
 MoreKey ParseMoreKey(const std::string& text);
 
 // Uploads the pictures of the further key views and names them in the spec.

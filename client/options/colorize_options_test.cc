@@ -156,6 +156,26 @@ TEST_F(ColorizeOptionsTest, APresetIsANameOrAFile) {
               AllOf(HasSubstr("fast, best, paper"), HasSubstr("no such file")));
 }
 
+TEST_F(ColorizeOptionsTest, AFurtherKeyViewMayHaveARangeOfTime) {
+  const MoreKey range = ParseMoreKey("f000012=auto@10-14.5");
+  EXPECT_EQ(range.view, "f000012");
+  EXPECT_TRUE(range.color.automatic);
+  EXPECT_EQ(range.begin_s, 10.0);
+  EXPECT_EQ(range.end_s, 14.5);
+  EXPECT_EQ(ParseMoreKey("a=auto@0.25-").begin_s, 0.25);
+  EXPECT_FALSE(ParseMoreKey("a=auto@0.25-").end_s);
+  EXPECT_FALSE(ParseMoreKey("a=auto@-3").begin_s);
+  EXPECT_FALSE(ParseMoreKey("a=auto").HasRange());
+  EXPECT_THAT(Complaint({"--more-key=a=auto@5-2"}),
+              HasSubstr("ends at 2 s, before it begins at 5"));
+  for (const char* text : {"@10", "@-", "@", "@1-2-3", "@1.2.3-4"}) {
+    EXPECT_THAT(Complaint({std::string("--more-key=a=auto") + text}),
+                HasSubstr("is no range of time; write seconds of the film, BEGIN-END"))
+        << text;
+  }
+  EXPECT_THAT(Complaint({"--more-key=a=painted@2x.png"}), HasSubstr("painted@2x.png"));
+}
+
 TEST_F(ColorizeOptionsTest, WhatIsWrongInAPresetFileIsToldWithItsLine) {
   EXPECT_THAT(Complaint({"--preset", File("max_side_px: 300\npersonalize {\n  iteration: 3\n}\n")}),
               AllOf(HasSubstr("mine.textproto, line 3: there is no field 'iteration'"),

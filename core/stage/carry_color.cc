@@ -6,7 +6,6 @@
 
 #include "core/base/range_check.h"
 #include "core/carry/carry_views.h"
-#include "core/color/lab.h"
 #include "core/film/film_carry.h"
 #include "core/film/returning_shots.h"
 #include "core/image/codec.h"
@@ -18,7 +17,7 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/carry_facts.h"
-#include "core/stage/sources/key_color_sources.h"
+#include "core/stage/sources/further_colors.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -28,30 +27,14 @@ constexpr float kCovered = 0.25f;        // confidence from which a pixel counts
 constexpr double kSmallCoverage = 0.01;  // below, the user is told
 constexpr size_t kMaxFurtherKeyViews = 16;
 
-// The user's colours of a further key view, undistorted and reduced.
-CarriedColor ColorOfFurther(const FurtherKeyView& further,
-                            int view,
-                            const Scene& scene,
-                            const ViewImages& images,
-                            StageContext& context) {
-  KeyPhoto photo;
-  photo.srgb = ReadImage(context.scene_folder() / scene.views[view].image_file);
-  photo.luminance = LuminanceFromSrgb(photo.srgb);
-  const KeyColorResult result = SolveKeyColor(further.color, photo, context);
-  CarriedColor color;
-  color.ab = images.Undistort(view, result.ab);
-  color.confidence = result.confidence.Empty() ? Image(color.ab.width, color.ab.height, 1, 1.0f)
-                                               : images.Undistort(view, result.confidence);
-  ClearMasked(images.Mask(view).get(), &color.confidence);
-  return color;
-}
-
 // `taken`: the key views before it.
 int FurtherView(const FurtherKeyView& further, const std::vector<int>& taken, const Scene& scene) {
-  const int view = scene.FindView(further.view);
-  if (scene.views[view].held_out) {
-    throw InvalidArgument("the view {} is held out for evaluation and cannot be a key view",
-                          scene.views[view].name);
+  const int view = ViewOfFurther(further, scene);
+  if (further.HasRange()) {
+    throw InvalidArgument(
+        "the key view {} has a range of time; such key views are corrections of the coloured film, "
+        "not carried with the others",
+        scene.views[view].name);
   }
   if (std::find(taken.begin(), taken.end(), view) != taken.end()) {
     throw InvalidArgument("the view {} is a key view already; name each once",

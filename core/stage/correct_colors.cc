@@ -14,6 +14,7 @@
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/recolor/recolor_ranges.h"
 #include "core/stage/sources/given_colors.h"
 #include "core/stage/sources/view_positions.h"
 #include "core/stage/stages.h"
@@ -227,6 +228,10 @@ void RunCorrectColors(const CorrectColorsOptions& options,
                       StageContext& context,
                       const std::string& encoder) {
   options.Validate();
+  const auto has_range = [](const FurtherKeyView& correction) { return correction.HasRange(); };
+  if (std::any_of(options.corrections.begin(), options.corrections.end(), has_range)) {
+    return RecolorRanges(options.corrections, ReadScene(context), encoder, context);
+  }
   const ColoredViews views(context);
   const Scene& scene = views.scene();
   const std::vector<Painted> painted = ReadCorrections(options.corrections, views, context);

@@ -73,10 +73,16 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
 
 // A key view beside the first one. Of its colours only those are taken that the key views before it
 // have not given already; so they never contradict. In a film it colours the frames of its shot
-// that are nearer to it, and has what is not painted from the key views before it.
+// that are nearer to it and what is open in others, and has what is not painted from the key views
+// before it.
 struct FurtherKeyView {
   std::string view;  // name or unique file stem
   ColorizeKeyViewOptions color;
+  // Of a correction of a film: the frames of its shot that it counts in, seconds of the film, both
+  // ends included; nothing: from the beginning, to the end.
+  std::optional<double> begin_s = {};
+  std::optional<double> end_s = {};
+  bool HasRange() const { return begin_s || end_s; }
   bool operator==(const FurtherKeyView&) const = default;
 };
 
@@ -125,7 +131,8 @@ ColorSources SourcesOf(const Colorizer& colorizer,
 
 struct CorrectColorsOptions {
   // Parts of photos in the colours that they should have, later ones over earlier ones, at most 64:
-  // strokes, points or a picture (sources/given_colors.h). No held-out views.
+  // strokes, points or a picture (sources/given_colors.h). No held-out views. Of a film: key frames
+  // with a range of time (recolor/time_ranges.h), from any source.
   std::vector<FurtherKeyView> corrections;
   int proposals = 3;  // how many further places are named, 0..16
   void Validate() const;

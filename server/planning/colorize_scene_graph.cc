@@ -155,11 +155,25 @@ std::string WhyNotForFilm(const std::string& kind, const ColorizeSceneSpec& scen
   return "";
 }
 
-void CheckFilm(const ColorizeSceneSpec& given) {
-  if (given.has_correct_colors() && !given.correct_colors().corrections().empty()) {
-    throw InvalidArgument(
-        "corrections are for places that are reconstructed; colour further frames of the film as "
-        "key views instead (carry_color.further_key_views)");
+// `scene`: with its preset.
+void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
+  const bool has_poses =
+      facts.is_film && scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO;
+  for (const v1::FurtherKeyView& correction : scene.correct_colors().corrections()) {
+    const bool has_range = correction.has_begin_s() || correction.has_end_s();
+    if (facts.is_film && !has_range) {
+      throw InvalidArgument(
+          "corrections are for places that are reconstructed; colour further frames of the film as "
+          "key views instead (carry_color.further_key_views), or give them the range of time that "
+          "they count in (begin_s, end_s)");
+    }
+    if (has_range && (!facts.is_film || has_poses)) {
+      throw InvalidArgument(
+          "the key view {} has a range of time (begin_s, end_s), which is for films without poses; "
+          "leave the range out{}",
+          correction.view(),
+          has_poses ? ", or import_scene.film_poses" : "");
+    }
   }
 }
 
@@ -178,7 +192,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
         kind::kSelectKeyView);
   }
   if (submitted.inputs_size() > 0) CheckGiven(builder->given(), given);
-  if (facts.is_film) CheckFilm(given);
+  CheckCorrections(scene, facts);
   for (const Stage& stage : StageCatalogue()) {
     const std::string kind = stage.kind;
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
@@ -186,7 +200,8 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     TakeSceneOptions(scene, &spec);
     std::string skip_reason;
     if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);
-    if (kind == kind::kCorrectColors && !given.has_correct_colors()) {
+    if (kind == kind::kCorrectColors && !given.has_correct_colors() &&
+        scene.correct_colors().corrections().empty()) {
       skip_reason = "nothing is to be corrected";
     }
     if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);

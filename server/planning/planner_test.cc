@@ -128,6 +128,52 @@ TEST(Planner, AFilmIsColoredNotReconstructed) {
   EXPECT_THROW(refused(), Error);
 }
 
+TEST(Planner, AKeyFrameWithARangeOfTimeCorrectsTheColoredFilm) {
+  const SceneFacts film{.photos = 0, .is_film = true};
+  v1::JobSpec spec = SceneSpec();
+  v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
+  scene->set_preset(v1::PRESET_PAPER);  // carries no colour
+  const NewGraph without = PlanJob(spec, {}, film);
+  v1::FurtherKeyView* key = scene->mutable_carry_color()->add_further_key_views();
+  key->set_view("a");
+  *key->mutable_color() = scene->key_color();
+  key->set_begin_s(10.0);
+  key->set_end_s(14.5);
+  const NewGraph with = PlanJob(spec, {}, film);
+  const v1::JobSpec correct = SpecOf(with, "correct_colors");
+  ASSERT_EQ(correct.correct_colors().corrections_size(), 1);
+  EXPECT_EQ(correct.correct_colors().corrections(0).end_s(), 14.5);
+  EXPECT_EQ(with.jobs[IndexOf(with, "correct_colors")].skip_reason, "");
+  EXPECT_THAT(InputKinds(with, "render"), Contains("correct_colors"));
+  for (const char* kind : {"carry_color", "personalize", "colorize_views"}) {
+    const NewJob &one = without.jobs[IndexOf(without, kind)],
+                 &other = with.jobs[IndexOf(with, kind)];
+    EXPECT_EQ(one.spec, other.spec) << kind;
+    EXPECT_EQ(one.skip_reason, other.skip_reason) << kind;
+  }
+
+  const auto complaint = [&](const SceneFacts& facts) {
+    try {
+      PlanJob(spec, {}, facts);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_THAT(complaint(kTwentyPhotos), HasSubstr("a has a range of time"));
+  scene->mutable_import_scene()->set_film_poses(v1::ImportSceneSpec::FILM_POSES_AUTO);
+  EXPECT_THAT(complaint(film), HasSubstr("or import_scene.film_poses"));
+  scene->clear_import_scene();
+  key->set_begin_s(15.0);
+  EXPECT_THAT(complaint(film),
+              HasSubstr("carry_color.further_key_views[0].end_s is 14.5, before begin_s, 15"));
+  key->clear_begin_s();
+  v1::JobSpec alone;
+  alone.set_scene("scenes/test");
+  *alone.mutable_carry_color() = scene->carry_color();
+  EXPECT_THAT(PlanError(alone).message, HasSubstr("belongs to correct_colors"));
+}
+
 TEST(Planner, KeyViewMakesTheSelectionManual) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_key_view("a.jpg");

@@ -2,6 +2,7 @@
 
 #include <google/protobuf/text_format.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -58,6 +59,19 @@ void MergeOver(const Message& given, Message* base) {
   base->MergeFrom(*rest);
 }
 
+bool HasRange(const v1::FurtherKeyView& key) { return key.has_begin_s() || key.has_end_s(); }
+
+// Key views that count in a range of time correct the coloured film: nothing before is made anew.
+void TakeRangesAsCorrections(v1::ColorizeSceneSpec* spec) {
+  auto* further = spec->mutable_carry_color()->mutable_further_key_views();
+  if (std::none_of(further->begin(), further->end(), HasRange)) return;
+  v1::CorrectColorsSpec* corrections = spec->mutable_correct_colors();
+  for (const v1::FurtherKeyView& key : *further) {
+    if (HasRange(key)) *corrections->add_corrections() = key;
+  }
+  further->erase(std::remove_if(further->begin(), further->end(), HasRange), further->end());
+}
+
 }  // namespace
 
 const std::vector<Preset>& Presets() {
@@ -76,6 +90,7 @@ const v1::ColorizeSceneSpec& OptionsOf(v1::Preset preset) {
 v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
   v1::ColorizeSceneSpec merged = OptionsOf(given.preset());
   MergeOver(given, &merged);
+  TakeRangesAsCorrections(&merged);
   // A preset that carries no colour does so where further key views need it.
   if (!merged.carry_color().further_key_views().empty()) {
     merged.mutable_carry_color()->clear_skip();

@@ -210,15 +210,31 @@ void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
   }
 }
 
-void CheckCarryColor(const v1::CarryColorSpec& spec, const std::string& path) {
-  const int count = spec.further_key_views_size();
-  if (count > 0 && spec.skip()) {
-    Reject(path + ".skip", " is set, but further_key_views need the stage; leave one of them out");
-  }
-  for (int i = 0; i < count; ++i) {
+bool HasRange(const v1::FurtherKeyView& key) { return key.has_begin_s() || key.has_end_s(); }
+
+void CheckRange(const v1::FurtherKeyView& key, const std::string& entry) {
+  if (!key.has_begin_s() || !key.has_end_s() || key.end_s() >= key.begin_s()) return;
+  Reject(entry + ".end_s",
+         fmt::format(" is {}, before begin_s, {}; swap them", key.end_s(), key.begin_s()));
+}
+
+// `of_whole_scene`: the job corrects colours, too.
+void CheckCarryColor(const v1::CarryColorSpec& spec, bool of_whole_scene, const std::string& path) {
+  for (int i = 0; i < spec.further_key_views_size(); ++i) {
+    const v1::FurtherKeyView& key = spec.further_key_views(i);
     const std::string entry = fmt::format("{}.further_key_views[{}]", path, i);
-    if (spec.further_key_views(i).view().empty()) Reject(entry + ".view", " is empty; name a view");
-    CheckKeyColor(spec.further_key_views(i).color(), entry + ".color");
+    if (key.view().empty()) Reject(entry + ".view", " is empty; name a view");
+    CheckKeyColor(key.color(), entry + ".color");
+    CheckRange(key, entry);
+    if (HasRange(key) && !of_whole_scene) {
+      Reject(entry,
+             fmt::format(" has a range of time: it corrects a coloured film and belongs to {}",
+                         kind::kCorrectColors));
+    }
+    if (!HasRange(key) && spec.skip()) {
+      Reject(path + ".skip",
+             " is set, but further_key_views need the stage; leave one of them out");
+    }
   }
 }
 
@@ -227,6 +243,11 @@ void CheckCorrections(const v1::CorrectColorsSpec& spec, const std::string& path
     const std::string entry = fmt::format("{}.corrections[{}]", path, i);
     const v1::FurtherKeyView& correction = spec.corrections(i);
     if (correction.view().empty()) Reject(entry + ".view", " is empty; name a view");
+    CheckRange(correction, entry);
+    if (HasRange(correction)) {
+      CheckKeyColor(correction.color(), entry + ".color");
+      continue;
+    }
     CheckKeyColorExtras(correction.color(), entry + ".color");
     switch (correction.color().source_case()) {
       case v1::KeyColorSource::kImage:
@@ -280,7 +301,7 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
     CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
   }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
-  CheckCarryColor(spec.carry_color(), kind::kCarryColor);
+  CheckCarryColor(spec.carry_color(), /*of_whole_scene=*/true, kind::kCarryColor);
   CheckCorrections(spec.correct_colors(), kind::kCorrectColors);
   CheckRender(spec.render(), /*of_whole_scene=*/true, kind::kRender);
   CheckTruth(spec.truth(), "truth");
@@ -311,7 +332,9 @@ void CheckSpec(const v1::JobSpec& spec) {
   if (spec.has_colorize_key_view()) {
     CheckKeyColor(spec.colorize_key_view().source(), kind + ".source");
   }
-  if (spec.has_carry_color()) CheckCarryColor(spec.carry_color(), kind);
+  if (spec.has_carry_color()) {
+    CheckCarryColor(spec.carry_color(), /*of_whole_scene=*/false, kind);
+  }
   if (spec.has_correct_colors()) CheckCorrections(spec.correct_colors(), kind);
   if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), kind);
   if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());

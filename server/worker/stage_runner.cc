@@ -92,10 +92,17 @@ ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, Blob
   return options;
 }
 
+FurtherKeyView FurtherFrom(const v1::FurtherKeyView& spec, BlobSource& blobs) {
+  FurtherKeyView further{spec.view(), SourceOptionsFrom(spec.color(), blobs)};
+  if (spec.has_begin_s()) further.begin_s = spec.begin_s();
+  if (spec.has_end_s()) further.end_s = spec.end_s();
+  return further;
+}
+
 CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs) {
   CarryColorOptions options = CarryOptionsFrom(spec);
   for (const v1::FurtherKeyView& further : spec.further_key_views()) {
-    options.further.push_back({further.view(), SourceOptionsFrom(further.color(), blobs)});
+    options.further.push_back(FurtherFrom(further, blobs));
   }
   return options;
 }
@@ -103,8 +110,7 @@ CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs
 CorrectColorsOptions CorrectOptions(const v1::CorrectColorsSpec& spec, BlobSource& blobs) {
   CorrectColorsOptions options = CorrectOptionsFrom(spec);
   for (const v1::FurtherKeyView& correction : spec.corrections()) {
-    options.corrections.push_back(
-        {correction.view(), SourceOptionsFrom(correction.color(), blobs)});
+    options.corrections.push_back(FurtherFrom(correction, blobs));
   }
   return options;
 }

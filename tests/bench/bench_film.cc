@@ -1,6 +1,7 @@
 // color3d-bench film: what each step of colouring a film is worth, against its true colours, and
 // how steady it is: no colour, each frame by the automatic colourizer, flow alone, and the
 // personalized colorizer after several lengths of training.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -30,6 +31,8 @@ struct FilmArguments {
   std::string frames_folder;
   std::string out_folder;
   std::string key_view;
+  std::string recolor_view;  // in its true colours; the key view has false ones then
+  std::vector<double> recolor_s = {0.0, 1e6};  // where
   std::vector<int> iterations = {0, 20, 50, 100, 200};
   int max_side_px = 500;
   int threads = 2;
@@ -60,6 +63,7 @@ class FilmBench {
       const Scene scene = ReadScene(context);
       ColorizeKeyViewOptions options;
       options.file = context.scene_folder() / scene.views[ReadKeyView(context, scene)].image_file;
+      if (!args_.recolor_view.empty()) options.file = InFalseColors(options.file, context);
       RunColorizeKeyView(options, context);
     });
     pipeline_.Run(kind::kCarryColor, [&](StageContext& context) {
@@ -74,6 +78,7 @@ class FilmBench {
       if (row.at("colors") == "carried alone") row["seconds"] = carried_after;
     }
     for (const int iterations : args_.iterations) rows.push_back(Personalized(iterations));
+    if (!args_.recolor_view.empty()) rows.push_back(Recolored());
     return rows;
   }
 
@@ -191,6 +196,50 @@ class FilmBench {
             {"seconds_colorize_views", colored - trained}};
   }
 
+  // a and b of each pixel change places.
+  static fs::path InFalseColors(const fs::path& picture, const StageContext& context) {
+    Image lab = LabFromSrgb(ReadImage(picture));
+    std::swap_ranges(lab.Plane(1), lab.Plane(2), lab.Plane(2));
+    const fs::path file = context.scratch_folder() / "false_colors.png";
+    WriteFileAtomic(file, EncodePng16(SrgbFromLab(lab)));
+    return file;
+  }
+
+  // Mean chroma errors of the held-out frames within the range, before and after.
+  ordered_json Recolored() {
+    const double before = Seconds();
+    const auto errors = [&] {
+      double inside = 0.0;
+      int count = 0;
+      pipeline_.Run("scores of a range", [&](StageContext& context) {
+        const Scene scene = ReadScene(context);
+        const ViewImages images(scene, context.scene_folder(), kConsistencySidePx, 0);
+        for (const int view : scene.HeldOutViews()) {
+          const double time_s = scene.views[view].time_s();
+          if (time_s < args_.recolor_s[0] || time_s > args_.recolor_s[1]) continue;
+          const auto l = images.Luminance(view);
+          inside +=
+              ChromaError(images.Srgb(view),
+                          JoinLab(*l, ReadViewAb(context, scene.views[view], l->width, l->height)));
+          ++count;
+        }
+      });
+      return inside / std::max(count, 1);
+    };
+    const double was = errors();
+    pipeline_.Run(kind::kCorrectColors, [&](StageContext& context) {
+      const Scene scene = ReadScene(context);
+      FurtherKeyView key{args_.recolor_view, {}, args_.recolor_s[0], args_.recolor_s[1]};
+      key.color.file = context.scene_folder() / scene.views[scene.FindView(key.view)].image_file;
+      RunCorrectColors({.corrections = {key}, .proposals = 0}, context);
+    });
+    const double seconds = Seconds() - before;
+    return {{"colors", "recolored"},
+            {"delta_e00_chroma_before", was},
+            {"delta_e00_chroma", errors()},
+            {"seconds", seconds}};
+  }
+
   const FilmArguments& args_;
   LocalPipeline pipeline_;
 };
@@ -219,6 +268,11 @@ void AddFilmCommand(CLI::App& app) {
       ->check(CLI::ExistingDirectory);
   command->add_option("--out", args->out_folder, "for what the stages leave")->required();
   command->add_option("--key-view", args->key_view, "frame whose true colours are given");
+  command->add_option(
+      "--recolor-view",
+      args->recolor_view,
+      "frame that recolours a range in its true colours; --key-view has false ones");
+  command->add_option("--recolor-range", args->recolor_s, "its range, two times in s")->expected(2);
   command->add_option("--iterations", args->iterations, "of personalization; several")
       ->check(CLI::Range(0, 100000));
   command->add_option("--max-side", args->max_side_px, "px")->check(CLI::Range(64, 4096));

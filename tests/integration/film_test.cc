@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
@@ -133,6 +134,97 @@ TEST_F(FilmTest, AVideoIsColoredFromOnePaintedFrame) {
     const int x = 40 + 5 * frame;
     EXPECT_GT(image.At(2, 70, x), image.At(0, 70, x) + 0.15f) << frame;
   }
+}
+
+// Only the left half is painted, where the thing walks; the rest is open.
+TEST_F(FilmTest, APartlyPaintedFrameColorsWhatItPaints) {
+  WriteFrames();
+  const Image truth = FrameOf(6);
+  Image painted(kWidth, kHeight, 4);
+  std::copy(truth.data.begin(), truth.data.end(), painted.data.begin());
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth / 2; ++x) painted.At(3, y, x) = 1.0f;
+  }
+  WriteFileAtomic(Path("half.png"), EncodePng8(painted));
+  const ProcessResult result = Colorize(
+      Path("frames"), {"--film", "--key-view", "n106", "--key-color", Path("half.png").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  FilmReader movie(Path("out") / "scene.mp4");
+  for (const int frame : {0, 6, 13}) {
+    const Image image = movie.Read(frame);
+    const int x = 40 + 5 * frame;
+    EXPECT_GT(image.At(2, 70, x), image.At(0, 70, x) + 0.15f) << frame;
+    // The wall of the painted half, as far as it moves on to here.
+    const int wall = 39 - 3 * frame / 2;
+    const Image truth_here = FrameOf(frame);
+    EXPECT_NEAR(image.At(0, 20, wall) - image.At(1, 20, wall),
+                truth_here.At(0, 20, wall) - truth_here.At(1, 20, wall),
+                0.08)
+        << frame;
+  }
+}
+
+TEST_F(FilmTest, ARangeOfTimeIsRecoloredAndNothingElseIsMadeAnew) {
+  WriteFrames();
+  WriteFileAtomic(Path("painted.png"), EncodePng8(FrameOf(8)));
+  Image red = FrameOf(12);
+  std::swap_ranges(red.Plane(0), red.Plane(1), red.Plane(2));  // what is blue becomes red
+  WriteFileAtomic(Path("red.png"), EncodePng8(red));
+  const std::vector<std::string> film = {
+      "--film", "--key-view", "n108", "--key-color", Path("painted.png").string()};
+  const auto with = [&](const std::string& range) {
+    std::vector<std::string> arguments = film;
+    arguments.insert(arguments.end(), {"--more-key", "n112=" + Path("red.png").string() + range});
+    return Colorize(Path("frames"), arguments);
+  };
+  const ProcessResult before = Colorize(Path("frames"), film);
+  ASSERT_EQ(before.exit_code, 0) << before.err;
+  // Colours and their sources of all frames, before any is recoloured.
+  const auto colored = [&] {
+    std::map<std::string, std::string> digests;
+    const v1::Job job = NewestJob("colorize_views");
+    for (const v1::Artifact& artifact : job.artifacts()) {
+      digests[artifact.name()] = artifact.digest().sha256();
+    }
+    return digests;
+  };
+  const auto colored_before = colored();
+  EXPECT_EQ(colored_before.size(), 2u * kFrames);
+  const ProcessResult after = with("@0.4-0.56");
+  ASSERT_EQ(after.exit_code, 0) << after.out << after.err;
+  EXPECT_EQ(colored(), colored_before);
+  const v1::Job recolored = NewestJob("correct_colors");
+  int frames = 0;
+  for (const v1::Artifact& artifact : recolored.artifacts()) {
+    if (artifact.name().find("corrected_ab/") == std::string::npos) continue;
+    ++frames;
+    EXPECT_THAT(artifact.name(), testing::ContainsRegex("n11[0-4].png"));
+  }
+  EXPECT_EQ(frames, 5);
+  EXPECT_THAT(ReadFile(Path("out") / "report.html"), HasSubstr("n112.png=COLOURED_1.png@0.4-0.56"));
+  FilmReader movie(Path("out") / "scene.mp4");
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const Image image = movie.Read(frame);
+    const int x = 40 + 5 * frame;
+    const float bluer = image.At(2, 70, x) - image.At(0, 70, x);
+    if (frame >= 10 && frame <= 14) {
+      EXPECT_LT(bluer, -0.1f) << frame;
+    } else {
+      EXPECT_GT(bluer, 0.1f) << frame;
+    }
+  }
+  const std::pair<const char*, const char*> refused[] = {
+      {"@0.5-0.4", "before it begins"},
+      {"@0.5-0.6", "n112.png is shown at 0.480 s, outside of its range"},
+      {"@0.4-7", "reaches out of the film, which is coloured from 0.000 s to 0.680 s"}};
+  for (const auto& [range, complaint] : refused) {
+    const ProcessResult result = with(range);
+    EXPECT_NE(result.exit_code, 0);
+    EXPECT_THAT(result.err, HasSubstr(complaint));
+  }
+  std::vector<std::string> as_photos = film;
+  as_photos[0] = "--more-key=n112=auto@0.4-0.56";
+  EXPECT_THAT(Colorize(Path("frames"), as_photos).err, HasSubstr("is for films without poses"));
 }
 
 TEST_F(FilmTest, TheSelectionTakesFramesOfAFilm) {

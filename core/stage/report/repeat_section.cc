@@ -34,6 +34,24 @@ std::string ColorFlags(bool has_truth, const StageContext& context) {
   return source == "automatic" ? " --auto" : "";
 }
 
+// Those of the key views that recolour ranges of a film; `number`: of the first one's picture.
+std::string RangeFlags(size_t number, const StageContext& context) {
+  if (!context.HasInput(artifact::kCorrections)) return "";
+  const auto facts = ReadJson(context, artifact::kCorrections);
+  const auto seconds = [](const auto& range, const char* name) {
+    return range.contains(name) ? fmt::format("{}", range.at(name).template get<double>()) : "";
+  };
+  std::string flags;
+  for (const auto& range : facts.value("recolored", nlohmann::ordered_json::array())) {
+    flags += " --more-key " + ShellWord(fmt::format("{}=COLOURED_{}.png@{}-{}",
+                                                    range.at("view").get<std::string>(),
+                                                    number++,
+                                                    seconds(range, "begin_s"),
+                                                    seconds(range, "end_s")));
+  }
+  return flags;
+}
+
 }  // namespace
 
 void AddHowToRepeat(const std::vector<std::string>& keys,
@@ -49,6 +67,7 @@ void AddHowToRepeat(const std::vector<std::string>& keys,
     for (size_t i = 1; i < keys.size(); ++i) {
       command += " --more-key " + ShellWord(keys[i] + "=COLOURED_" + std::to_string(i) + ".png");
     }
+    command += RangeFlags(keys.size(), context);
     data->repeat.push_back(command);
   } else if (has_truth && keys.size() > 1) {
     data->repeat.push_back(

@@ -1,0 +1,353 @@
+#include "core/stage/recolor/recolor_ranges.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/colorizer/corrector.h"
+#include "core/film/film_carry.h"
+#include "core/film/steady_colors.h"
+#include "core/image/codec.h"
+#include "core/image/optical_flow.h"
+#include "core/scene/view_images.h"
+#include "core/stage/film/between_anchors.h"
+#include "core/stage/formats/artifacts.h"
+#include "core/stage/recolor/time_ranges.h"
+#include "core/stage/sources/further_colors.h"
+
+namespace color3d {
+namespace {
+
+constexpr size_t kAtOnce = 16;                      // frames
+constexpr int64_t kCacheBytes = int64_t{32} << 20;  // neighbours are read several times
+
+// What the coloured film is read from, and who knows its colours.
+struct ColoredFilm {
+  const Scene& scene;
+  const ViewImages& images;
+  const Colorizer& colorizer;
+  int key;  // the first key view
+  StageContext& context;
+
+  // In its present colours.
+  PlacedPicture Picture(int view) const {
+    PlacedPicture picture{*images.Luminance(view), {}, {}, {}};
+    const Image& size = picture.luminance;
+    picture.ab = ReadTargetAb(context, scene.views[view], view == key, size.width, size.height);
+    return picture;
+  }
+};
+
+void MixIn(const CarriedColor& color, Image* ab) {
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < color.confidence.data.size(); ++i) {
+      float& value = ab->Plane(c)[i];
+      value += color.confidence.data[i] * (color.ab.Plane(c)[i] - value);
+    }
+  }
+}
+
+// The colours of a key frame as channels to be carried: a, b and how far they are painted. Where
+// they are not, the frame has the colours that it had, and is known to.
+CarriedColor PaintedOver(Image ab, const CarriedColor& color) {
+  MixIn(color, &ab);
+  CarriedColor key{Image(ab.width, ab.height, 3), Image(ab.width, ab.height, 1, 1.0f)};
+  std::copy(ab.data.begin(), ab.data.end(), key.ab.data.begin());
+  std::copy_n(color.confidence.data.begin(), ab.PlaneSize(), key.ab.Plane(2));
+  return key;
+}
+
+// What is told of a frame of a range before it is fused.
+struct Told {
+  Image before;          // its colours as they were
+  Image changed;         // as what is like it was changed
+  Image change_share;    // how far that is known; may be empty
+  Image provenance;      // as it was; may be empty
+  CarriedColor painted;  // followed from key frames: see PaintedOver
+};
+
+// What is surely followed is as it was painted or left. Elsewhere what the film shows of other key
+// frames stays, as changed. `is_old`: 1 where the colours are not those of key frames of the range.
+CarriedColor KnownOf(const Told& told, Image* is_old) {
+  constexpr float kSure = 0.5f;
+  const int width = told.before.width, height = told.before.height;
+  CarriedColor known{Image(width, height, 2), Image(width, height, 1)};
+  *is_old = Image(width, height, 1);
+  for (size_t i = 0; i < known.ab.PlaneSize(); ++i) {
+    const float followed = told.painted.confidence.data[i];
+    const float painted = followed * std::clamp(told.painted.ab.Plane(2)[i], 0.0f, 1.0f);
+    const float left = followed - painted;
+    const float seen = told.provenance.Empty() ? 0.0f : told.provenance.Plane(1)[i];
+    const Image* from = &told.painted.ab;
+    known.confidence.data[i] = painted;
+    if (left > kSure) {
+      from = &told.before;
+      known.confidence.data[i] = left;
+    } else if (painted <= kSure && seen > kSure) {
+      from = &told.changed;
+      known.confidence.data[i] = seen;
+    }
+    is_old->data[i] = from == &told.painted.ab ? 0.0f : 1.0f;
+    for (int c = 0; c < 2; ++c) known.ab.Plane(c)[i] = from->Plane(c)[i];
+  }
+  return known;
+}
+
+// What does not come from key frames of the range comes from where it came, changed or not.
+void TakeShares(const Told& told, const Image& is_old, Image* provenance) {
+  for (size_t i = 0; i < provenance->PlaneSize(); ++i) {
+    const float seen = is_old.data[i] > 0.0f ? 0.0f : provenance->Plane(1)[i];
+    const float change = told.change_share.Empty() ? 0.0f : told.change_share.data[i];
+    for (int c = 0; c < 3; ++c) {
+      const float was =
+          told.provenance.Empty() ? (c == 2 ? 1.0f : 0.0f) : told.provenance.Plane(c)[i];
+      const float is = c == 2 ? was + change * (1.0f - was) : was * (1.0f - change);
+      provenance->Plane(c)[i] = (c == 1 ? seen : 0.0f) + (1.0f - seen) * is;
+    }
+  }
+}
+
+// Colours one range.
+class RangeColorer {
+ public:
+  RangeColorer(const RecoloredRange& range, const ColoredFilm& film, std::filesystem::path folder)
+      : range_(range), film_(film), folder_(std::move(folder)) {
+    std::filesystem::create_directories(folder_);
+  }
+
+  // `deliver` takes each frame of the range once, from several threads.
+  void Run(const std::function<void(int view, const FusedColor& color)>& deliver) {
+    ReadKeys();
+    Carry();
+    for (size_t begin = 0; begin < range_.views.size(); begin += kAtOnce) {
+      const size_t end = std::min(range_.views.size(), begin + kAtOnce);
+      Color(end - begin);
+      Deliver(end == range_.views.size(), deliver);
+    }
+  }
+
+ private:
+  struct Recolored {
+    FusedColor color;
+    std::shared_ptr<const FlowPair> flow_from_last;
+  };
+
+  void ReadKeys() {
+    std::vector<Correction> corrections;
+    for (const RecoloredRange::Key& key : range_.keys) {
+      CarriedColor color =
+          ColorOfFurther(*key.given, key.view, film_.scene, film_.images, film_.context);
+      const std::vector<float>& painted = color.confidence.data;
+      if (std::none_of(painted.begin(), painted.end(), [](float p) { return p > 0.0f; })) {
+        throw InvalidArgument("nothing is painted on the key view {} that would recolour its range",
+                              film_.scene.views[key.view].name);
+      }
+      PlacedPicture picture = film_.Picture(key.view);
+      const auto frame = std::find(range_.views.begin(), range_.views.end(), key.view);
+      keys_.push_back(
+          {static_cast<int>(frame - range_.views.begin()), PaintedOver(picture.ab, color)});
+      // What was left unpainted is as it should be, too.
+      Image wanted = picture.ab;
+      MixIn(color, &wanted);
+      Image sure(wanted.width, wanted.height, 1, 1.0f);
+      corrections.push_back({std::move(picture), std::move(wanted), std::move(sure)});
+    }
+    try {
+      corrector_ = film_.colorizer.Correct(corrections);
+    } catch (const Error& e) {
+      // Without feature neighbours nothing is known of what is alike.
+      if (e.code() != ErrorCode::kFailedPrecondition) throw;
+    }
+  }
+
+  void Carry() const {
+    FilmFrames frames;
+    frames.shot.resize(range_.views.size());
+    frames.luminance = [&](int frame) { return film_.images.Luminance(range_.views[frame]); };
+    for (const int view : range_.views) {
+      frames.time_s.push_back(film_.scene.views[view].time_s());
+    }
+    const auto keep = [&](int frame, const CarriedColor& color) {
+      Image ab(color.ab.width, color.ab.height, 2), painted(color.ab.width, color.ab.height, 1);
+      std::copy_n(color.ab.data.begin(), ab.data.size(), ab.data.begin());
+      std::copy_n(color.ab.Plane(2), painted.data.size(), painted.data.begin());
+      WriteFileAtomic(FileOf(frame, "colors"), EncodeAbPng(ab, color.confidence));
+      WriteFileAtomic(FileOf(frame, "painted"), EncodePng8(painted));
+    };
+    CarryAlongFilm(frames,
+                   keys_,
+                   {},
+                   film_.context.pool(),
+                   film_.context.cancel(),
+                   keep,
+                   {},
+                   [&](int frame, const CarriedColor& second) {
+                     CarriedColor color = CarriedInto(frame);
+                     if (FillOpen(second, &color) > 0) keep(frame, color);
+                   });
+  }
+
+  std::filesystem::path FileOf(int frame, const char* what) const {
+    return folder_ / fmt::format("{}_{}.png", what, frame);
+  }
+
+  CarriedColor CarriedInto(int frame) const {
+    const AbMap map = DecodeAbPng(ReadFile(FileOf(frame, "colors")), "colors");
+    const Image painted = DecodeImage(ReadFile(FileOf(frame, "painted")), "painted");
+    CarriedColor color{Image(map.ab.width, map.ab.height, 3), map.confidence};
+    std::copy(map.ab.data.begin(), map.ab.data.end(), color.ab.data.begin());
+    std::copy_n(painted.data.begin(), map.ab.PlaneSize(), color.ab.Plane(2));
+    return color;
+  }
+
+  const FilmKey* KeyAt(int frame) const {
+    const auto key = std::find_if(
+        keys_.begin(), keys_.end(), [&](const FilmKey& k) { return k.frame == frame; });
+    return key == keys_.end() ? nullptr : &*key;
+  }
+
+  // The next frames, behind those that are coloured.
+  void Color(size_t count) {
+    const size_t begin = first_ + colored_.size();
+    const size_t place = colored_.size();
+    colored_.resize(place + count);
+    film_.context.pool().ForEach(static_cast<int64_t>(count), [&](int64_t i, int) {
+      film_.context.cancel().ThrowIfCancelled();
+      const int frame = static_cast<int>(begin) + static_cast<int>(i);
+      Recolored& colored = colored_[place + static_cast<size_t>(i)];
+      colored.color = ColorOf(frame);
+      if (frame == 0) return;
+      const auto earlier = film_.images.Luminance(range_.views[frame - 1]);
+      const auto later = film_.images.Luminance(range_.views[frame]);
+      colored.flow_from_last = std::make_shared<const FlowPair>(
+          FlowPair{DenseFlow(*earlier, *later), DenseFlow(*later, *earlier)});
+    });
+  }
+
+  FusedColor ColorOf(int frame) const {
+    const int view = range_.views[frame];
+    const PlacedPicture picture = film_.Picture(view);
+    const Image& luminance = picture.luminance;
+    Told told{
+        picture.ab,
+        picture.ab,
+        {},
+        ReadProvenance(film_.context, film_.scene.views[view], luminance.width, luminance.height),
+        CarriedInto(frame)};
+    if (corrector_) {
+      CorrectedColor corrected = corrector_->Predict(picture, 0);
+      for (size_t i = 0; i < told.changed.data.size(); ++i) {
+        told.changed.data[i] += corrected.change.data[i];
+      }
+      told.change_share = std::move(corrected.share);
+    }
+    Image is_old;
+    const CarriedColor known = KnownOf(told, &is_old);
+    const ColorSources sources{[&](const Image&, const Image&) {
+                                 return InferredColor{told.changed, {}};
+                               },
+                               {},
+                               film_.colorizer.relative_chroma()};
+    ThreadPool one(1);
+    FusedColor color = ColorOfView(luminance, known, sources, one, film_.context.cancel());
+    TakeShares(told, is_old, &color.provenance);
+    if (const FilmKey* key = KeyAt(frame)) {
+      std::copy_n(key->color.ab.data.begin(), color.ab.data.size(), color.ab.data.begin());
+    }
+    return color;
+  }
+
+  // All frames whose neighbours are known; these are kept as long as others need them.
+  void Deliver(bool is_end, const std::function<void(int view, const FusedColor& color)>& deliver) {
+    const auto reach = static_cast<size_t>(steady_.reach);
+    const size_t end =
+        is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
+    std::vector<FrameInMotion> neighbors;
+    for (const Recolored& one : colored_) neighbors.push_back({&one.color.ab, one.flow_from_last});
+    film_.context.pool().ForEach(static_cast<int64_t>(end - delivered_), [&](int64_t i, int) {
+      film_.context.cancel().ThrowIfCancelled();
+      const int index = static_cast<int>(delivered_) + static_cast<int>(i);
+      const int frame = static_cast<int>(first_) + index;
+      FusedColor color = colored_[index].color;
+      if (KeyAt(frame) == nullptr) color.ab = SteadyColors(neighbors, index, steady_);
+      deliver(range_.views[frame], color);
+    });
+    const size_t done_with = end - std::min(end, reach);
+    colored_.erase(colored_.begin(), colored_.begin() + static_cast<std::ptrdiff_t>(done_with));
+    first_ += done_with;
+    delivered_ = end - done_with;
+  }
+
+  const RecoloredRange& range_;
+  const ColoredFilm& film_;
+  const std::filesystem::path folder_;
+  std::vector<FilmKey> keys_;  // frames: places in range_.views
+  std::unique_ptr<const Corrector> corrector_;
+  const SteadyColorsOptions steady_;
+  std::vector<Recolored> colored_;  // frames one after the other
+  size_t first_ = 0;                // of them
+  size_t delivered_ = 0;            // of them
+};
+
+nlohmann::ordered_json FactsOf(const std::vector<RecoloredRange>& ranges, const Scene& scene) {
+  auto recolored = nlohmann::ordered_json::array();
+  for (const RecoloredRange& range : ranges) {
+    for (const RecoloredRange::Key& key : range.keys) {
+      nlohmann::ordered_json one{{"view", scene.views[key.view].name},
+                                 {"first", scene.views[range.views.front()].name},
+                                 {"last", scene.views[range.views.back()].name}};
+      if (key.given->begin_s) one["begin_s"] = *key.given->begin_s;
+      if (key.given->end_s) one["end_s"] = *key.given->end_s;
+      recolored.push_back(std::move(one));
+    }
+  }
+  return recolored;
+}
+
+}  // namespace
+
+void RecolorRanges(const std::vector<FurtherKeyView>& keys,
+                   const Scene& scene,
+                   const std::string& encoder,
+                   StageContext& context) {
+  const std::vector<RecoloredRange> ranges = RangesOf(keys, scene);
+  // Frames are coloured side by side, each on one thread.
+  const auto colorizer = LoadColorizer(
+      context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
+  const int key = ReadKeyView(context, scene);
+  const ViewImages images(
+      scene, context.scene_folder(), ColoredSide(context, scene.views[key]), kCacheBytes);
+  const ColoredFilm film{scene, images, *colorizer, key, context};
+  int64_t total = 0, done = 0;
+  for (const RecoloredRange& range : ranges) total += static_cast<int64_t>(range.views.size());
+  std::mutex outputs;
+  for (size_t i = 0; i < ranges.size(); ++i) {
+    RangeColorer(ranges[i], film, context.scratch_folder() / fmt::format("range_{}", i))
+        .Run([&](int index, const FusedColor& color) {
+          const View& view = scene.views[index];
+          const std::string ab = EncodeAbPng(color.ab);
+          const std::string provenance = EncodePng8(color.provenance);
+          const std::lock_guard lock(outputs);
+          context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view, ".png"), ab);
+          context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view, ".png"),
+                              provenance);
+          context.progress().OnProgress(++done, total, "recolouring " + view.name);
+        });
+  }
+  nlohmann::ordered_json facts;
+  facts["corrections"] = keys.size();
+  facts["share_changed"] = static_cast<double>(total) / static_cast<double>(scene.views.size());
+  facts["proposals"] = nlohmann::ordered_json::array();
+  facts["recolored"] = FactsOf(ranges, scene);
+  context.WriteOutput(artifact::kCorrections, facts.dump(2));
+}
+
+}  // namespace color3d

@@ -1,0 +1,36 @@
+#include "core/stage/sources/further_colors.h"
+
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/scene/masks/photo_masks.h"
+#include "core/stage/sources/key_color_sources.h"
+
+namespace color3d {
+
+int ViewOfFurther(const FurtherKeyView& further, const Scene& scene) {
+  const int view = scene.FindView(further.view);
+  if (scene.views[view].held_out) {
+    throw InvalidArgument("the view {} is held out for evaluation and cannot be a key view",
+                          scene.views[view].name);
+  }
+  return view;
+}
+
+CarriedColor ColorOfFurther(const FurtherKeyView& further,
+                            int view,
+                            const Scene& scene,
+                            const ViewImages& images,
+                            StageContext& context) {
+  KeyPhoto photo;
+  photo.srgb = ReadImage(context.scene_folder() / scene.views[view].image_file);
+  photo.luminance = LuminanceFromSrgb(photo.srgb);
+  const KeyColorResult result = SolveKeyColor(further.color, photo, context);
+  CarriedColor color;
+  color.ab = images.Undistort(view, result.ab);
+  color.confidence = result.confidence.Empty() ? Image(color.ab.width, color.ab.height, 1, 1.0f)
+                                               : images.Undistort(view, result.confidence);
+  ClearMasked(images.Mask(view).get(), &color.confidence);
+  return color;
+}
+
+}  // namespace color3d
