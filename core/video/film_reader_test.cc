@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -11,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/video/mp4_writer.h"
+#include "tests/support/formats/interlaced_film.h"
 #include "tests/support/formats/movie_reader.h"
 
 namespace color3d {
@@ -93,6 +95,39 @@ TEST_F(FilmReaderTest, FramesComeAsTheyWereInAnyOrder) {
   }
   EXPECT_THROW(film.Read(130), Error);
   EXPECT_THROW(film.Read(-1), Error);
+}
+
+// A bar walks to the right; the even lines of each frame show it at one moment, the odd ones half a
+// frame later.
+double BarAt(double frame) { return 10.0 + 6.0 * frame; }
+
+double MiddleOfBar(const Image& image, int y) {
+  double sum = 0.0, weighted = 0.0;
+  for (int x = 0; x < image.width; ++x) {
+    const double light = std::max(0.0f, image.At(1, y, x) - 0.3f);
+    sum += light;
+    weighted += x * light;
+  }
+  return weighted / sum;
+}
+
+TEST_F(FilmReaderTest, OfInterlacedFilmOneFieldOfEachFrameIsTaken) {
+  constexpr int kFrames = 10;
+  const fs::path file = folder_.path() / "fields.mov";
+  WriteInterlacedFilm(file, kWidth, kHeight, kFrames, [](int frame, int field, int x) {
+    return std::abs(x - BarAt(frame + 0.5 * field)) < 8.0 ? 0.9 : 0.02;
+  });
+  FilmReader film(file);
+  EXPECT_TRUE(film.facts().interlaced);
+  ASSERT_EQ(film.times().size(), static_cast<size_t>(kFrames));
+  EXPECT_EQ(film.facts().height, kHeight);
+  for (const int frame : {0, 4, 9, 3}) {
+    const Image image = film.Read(frame);
+    ASSERT_EQ(image.height, kHeight);
+    for (int y = 4; y < kHeight - 4; ++y) {
+      EXPECT_NEAR(MiddleOfBar(image, y), BarAt(frame), 1.0) << "frame " << frame << " line " << y;
+    }
+  }
 }
 
 TEST_F(FilmReaderTest, OneFrameIsAFilm) {

@@ -10,6 +10,7 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "core/video/mp4_writer.h"
+#include "tests/support/formats/interlaced_film.h"
 #include "tests/support/scenes/test_scenes.h"
 #include "tests/support/stages/stage_fixture.h"
 
@@ -88,6 +89,18 @@ TEST_F(ImportFilmTest, FramesOfAVideoAreViewsWithTheirMoments) {
   for (size_t i = 0; i < frame.PlaneSize(); ++i) error += std::abs(frame.data[i] - truth.data[i]);
   EXPECT_LT(error / static_cast<double>(frame.PlaneSize()), 0.02);
   EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(ImportFilmTest, InterlacedFilmsAreTakenByTheFieldAndToldSo) {
+  WriteInterlacedFilm(scratch_.path() / "tape.mov", kWidth, kHeight, 6, [](int, int field, int x) {
+    return 0.3 + 0.1 * field + 0.3 * std::sin(0.2 * x);
+  });
+  const Scene scene = Import();
+  ASSERT_EQ(scene.views.size(), 6u);
+  EXPECT_THAT(observer_.text, HasSubstr("the film is interlaced: one field of each frame"));
+  const Image frame = ReadImage(scratch_.path() / "out" / scene.views[3].image_file);
+  ASSERT_EQ(frame.height, kHeight);
+  EXPECT_NEAR(frame.At(0, 20, 30), frame.At(0, 21, 30), 0.02) << "no line of the other field";
 }
 
 TEST_F(ImportFilmTest, PartsStridesAndCuts) {
