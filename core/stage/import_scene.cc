@@ -80,11 +80,15 @@ void RunImportScene(const ImportOptions& options,
   if (!film.empty()) {
     return ImportFilm(film, film_options, options, context);
   }
-  WarnOfUnusedOptions(film_options, NoFilm::kPhotos, context);
   const std::string splat = FindSplat(context.scene_folder());
-  if (!splat.empty()) return ImportSplatScene(splat, options, splat_views, context);
+  if (!splat.empty()) {
+    WarnOfUnusedOptions(film_options, NoFilm::kPhotos, context);
+    return ImportSplatScene(splat, options, splat_views, context);
+  }
   const ImportResult result =
       ImportScene(context.scene_folder(), context.scratch_folder(), options, context.control());
+  const NoFilm what = result.scene.IsDynamic() ? NoFilm::kTimedPictures : NoFilm::kPhotos;
+  WarnOfUnusedOptions(film_options, what, context);
   WriteImported(result, context);
 }
 

@@ -59,5 +59,23 @@ TEST_F(StageTest, OptionsOfFilmsAreToldToBeOfNoUseForPhotosAndSplats) {
       << observer_.text;
 }
 
+TEST_F(StageTest, PicturesWithTimesAreNotCalledNoFilm) {
+  std::string frames;
+  for (const View& view : RampScene(scratch_.path(), 48, 32).views) {
+    const double x = -view.cam_from_world.translation.x();
+    frames += (frames.empty() ? "" : ",") + std::string("{\"file_path\":\"") + view.image_file +
+              "\",\"time\":" + std::to_string(-10.0 * x) + ",\"transform_matrix\":[[1,0,0," +
+              std::to_string(x) + "],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}";
+  }
+  WriteFileAtomic(scratch_.path() / "transforms.json", "{\"fl_x\":50,\"frames\":[" + frames + "]}");
+  StageContext context = MakeContext();
+  RunImportScene({}, context, {}, {.stride = 2, .frames_per_second = 16});
+  EXPECT_NE(
+      observer_.text.find("film_stride, film_frames_per_second are left aside: pictures whose "
+                          "times and poses are given are all taken"),
+      std::string::npos)
+      << observer_.text;
+}
+
 }  // namespace
 }  // namespace color3d

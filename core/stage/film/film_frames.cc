@@ -16,6 +16,19 @@ namespace {
 
 constexpr size_t kNamed = 5;  // frames in a warning
 
+const char* WhyUnused(NoFilm scene) {
+  switch (scene) {
+    case NoFilm::kPosedFilms:
+      return "films whose poses are given have times and places of their own, and are taken as "
+             "exposed";
+    case NoFilm::kTimedPictures:
+      return "pictures whose times and poses are given are all taken, as exposed";
+    case NoFilm::kPhotos:
+      break;
+  }
+  return "the scene is no film";
+}
+
 }  // namespace
 
 std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options) {
@@ -39,7 +52,7 @@ void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext&
   const auto add = [&](bool given, const char* name) {
     if (given) unused.emplace_back(name);
   };
-  if (scene == NoFilm::kPhotos) {
+  if (scene != NoFilm::kPosedFilms) {
     add(options.stride != usual.stride, "film_stride");
     add(options.begin_s != usual.begin_s, "film_begin_s");
     add(options.end_s != usual.end_s, "film_end_s");
@@ -48,14 +61,10 @@ void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext&
   add(options.deflicker != usual.deflicker, "film_deflicker");
   add(options.poses != usual.poses, "film_poses");
   if (unused.empty()) return;
-  context.progress().OnWarning(fmt::format(
-      "{} {} left aside: {}",
-      fmt::join(unused, ", "),
-      unused.size() == 1 ? "is" : "are",
-      scene == NoFilm::kPosedFilms
-          ? "films whose poses are given have times and places of their own, and are taken as "
-            "exposed"
-          : "the scene is no film"));
+  context.progress().OnWarning(fmt::format("{} {} left aside: {}",
+                                           fmt::join(unused, ", "),
+                                           unused.size() == 1 ? "is" : "are",
+                                           WhyUnused(scene)));
 }
 
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {

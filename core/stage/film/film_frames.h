@@ -15,7 +15,7 @@ namespace color3d {
 std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options);
 
 // What a scene is that is not a film of one camera without poses.
-enum class NoFilm { kPosedFilms, kPhotos };
+enum class NoFilm { kPosedFilms, kTimedPictures, kPhotos };
 
 // Warns of the options that were given and are of no use for it; nothing for none.
 void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext& context);
