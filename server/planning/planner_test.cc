@@ -321,8 +321,6 @@ TEST(Planner, AugmentationOptionsAreChecked) {
 TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
-  spec.mutable_reconstruct_dynamic();
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dynamic"));
   spec.mutable_reconstruct_dense();
   EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dense"));
 }
