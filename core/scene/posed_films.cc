@@ -46,6 +46,7 @@ PosedFilm ReadFilm(const FrameFields& own,
     throw InvalidArgument("{}: there is no film {}", fields.place(), film.file);
   }
   film.camera = own.TextOr("camera", fs::path(film.file).stem().string());
+  film.time_offset_s = own.NumberOr("time_offset", 0.0);
   const auto [width, height] = size(film.file);
   ReadFrameCamera(fields, width, height, &film.view);
   FitToFilm({width, height}, &film);

@@ -70,8 +70,12 @@ TEST_F(PosedFilms, ATransformsJsonNamesThem) {
   EXPECT_NEAR(films[0].view.captured_camera.fx, 30.0, 1e-9);  // of the film's own size
   EXPECT_EQ(films[0].view.captured_camera.width, 48);
   EXPECT_LT((films[0].view.cam_from_world.Center() - Eigen::Vector3d(1.5, 0, 4)).norm(), 1e-12);
+  EXPECT_EQ(films[0].time_offset_s, 0.0);
   EXPECT_EQ(films[1].camera, "left");
   EXPECT_EQ(films[1].file, "films/b.mp4");
+  EXPECT_EQ(
+      Read(Frame("a.mp4", "\"time_offset\":-1.5,") + "," + Frame("films/b.mp4"))[0].time_offset_s,
+      -1.5);
 }
 
 TEST_F(PosedFilms, WrongTransformsAreRefusedByName) {

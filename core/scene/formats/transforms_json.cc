@@ -40,7 +40,9 @@ bool ReadFrame(const FrameFields& fields, const fs::path& scene_folder, View* vi
 FrameTime ReadTime(const json& frame, const std::string& place, const std::string& file) {
   const FrameFields own(frame, frame, place);
   FrameTime time{place, file, own.Number("time"), ""};
-  if (time.time) time.camera = own.TextOr("camera", "");
+  if (!time.time) return time;
+  time.camera = own.TextOr("camera", "");
+  *time.time += own.NumberOr("time_offset", 0.0);
   return time;
 }
 

@@ -144,6 +144,9 @@ TEST_F(TransformsFile, FramesHaveTimes) {
   Scene scene = Read(TimedJson("\"time\":0.75,", "\"time\":0.25,"));
   EXPECT_EQ(scene.views[0].moment, (Moment{0.5, 0}));
   EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));
+  scene = Read(TimedJson("\"time\":0.5,\"time_offset\":0.25,", "\"time\":1,\"time_offset\":-1,"));
+  EXPECT_NEAR(scene.views[0].moment->time_s, 0.75, 1e-12);
+  EXPECT_EQ(scene.views[1].moment->time_s, 0.0);
   scene = Read(TimedJson("\"time\":2,\"camera\":\"r\",", "\"time\":1,\"camera\":\"l\","));
   EXPECT_EQ(scene.views[0].moment, (Moment{1.0, 1}));
   EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "core/base/error.h"
@@ -84,11 +86,8 @@ class PosedFilmImport {
     FrameMoments moments = MomentsOf(times_);
     for (size_t i = 0; i < views_.size(); ++i) views_[i].moment = moments.moments[i];
     result.cameras = std::move(moments.cameras);
-    if (moments.note.empty()) {
-      WarnOfOddTimes(views_, longest, context_);
-    } else {
-      result.warnings.push_back(std::move(moments.note));
-    }
+    if (!moments.note.empty()) result.warnings.push_back(std::move(moments.note));
+    if (views_[0].moment) WarnOfOddTimes(views_, longest, context_);
     result.layout = SceneLayout::kPosedFilms;
     result.photos_found = count_;
     std::sort(
@@ -113,7 +112,8 @@ class PosedFilmImport {
       damaged_.push_back(view.name);
       return;
     }
-    times_.push_back({view.name, film.file, reader->times()[frame], film.camera});
+    const double time_s = reader->times()[frame] + film.time_offset_s;
+    times_.push_back({view.name, film.file, time_s, film.camera});
     views_.push_back(std::move(view));
   }
 
@@ -133,11 +133,15 @@ bool ImportPosedFilms(const ImportOptions& options,
   if (all.empty()) return false;
   WarnOfUnusedOptions(film, NoFilm::kPosedFilms, context);
   size_t longest = 0;
-  for (const Footage& footage : all) longest = std::max(longest, footage.frames.size());
+  std::map<std::string, std::string> films;
+  for (const Footage& footage : all) {
+    longest = std::max(longest, footage.frames.size());
+    films[footage.film.camera] = footage.film.file;
+  }
   PosedFilmImport import(context);
   import.Read(all);
   const ImportResult result = import.Finish(options, longest);
-  WriteImported(result, context);
+  WriteImported(result, context, films);
   return true;
 }
 

@@ -42,6 +42,16 @@ class ImportPosedFilmsTest : public StageTest {
     WriteFileAtomic(scratch_.path() / "poses_bounds.npy",
                     NpyOf({static_cast<size_t>(cameras), 17}, rows));
   }
+  // The first two films; `of_second`: fields of its frame.
+  void WriteTransforms(const std::string& of_second) {
+    const auto frame = [](const std::string& file, const std::string& more, double x) {
+      return "{\"file_path\":\"" + file + "\"," + more + "\"transform_matrix\":[[1,0,0," +
+             std::to_string(x) + "],[0,1,0,0],[0,0,1,4],[0,0,0,1]]}";
+    };
+    WriteFileAtomic(scratch_.path() / "transforms.json",
+                    "{\"fl_x\":90,\"frames\":[" + frame("cam00.mp4", "", 0.0) + "," +
+                        frame("cam01.mp4", of_second, 0.5) + "]}");
+  }
   Scene Import(const FilmOptions& film = {}, const ImportOptions& options = {}) {
     fs::remove_all(scratch_.path() / "out");
     observer_.text.clear();
@@ -117,6 +127,36 @@ TEST_F(ImportPosedFilmsTest, OddRatesAreTold) {
   WritePoses(2);
   Import();
   EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times"));
+}
+
+TEST_F(ImportPosedFilmsTest, ClocksThatAreOffAreSetByTheirOffset) {
+  WriteFilm(0, 8);
+  WriteFilm(1, 8);
+  WriteTransforms("\"time_offset\":-0.25,");
+  Scene scene = Import();  // cam01 began 2.5 frames before the other
+  EXPECT_NEAR(scene.views[0].time_s(), 0.25, 1e-6);
+  EXPECT_EQ(scene.views[8].name, "cam01/f000000.png");
+  EXPECT_NEAR(scene.views[8].time_s(), 0.0, 1e-6);
+  EXPECT_NEAR(scene.views[15].time_s(), 0.7, 1e-6);
+  EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times"));
+  const auto facts = ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json"));
+  ASSERT_EQ(facts.cameras.size(), 2u);
+  EXPECT_EQ(facts.cameras[1].name, "cam01");
+  EXPECT_EQ(facts.cameras[1].film, "cam01.mp4");
+  WriteTransforms("\"time_offset\":0.3,");
+  scene = Import();
+  EXPECT_EQ(scene.views[8].time_s(), scene.views[3].time_s());
+  WriteTransforms("\"time_offset\":\"late\",");
+  EXPECT_THAT(Complaint(), HasSubstr("frame 1: time_offset must be a finite number"));
+}
+
+TEST_F(ImportPosedFilmsTest, OddTimesAreToldBesideWhatIsSaidOfTheClock) {
+  WriteFilm(0, 8);
+  WriteFilm(1, 8);
+  WriteTransforms("\"time_offset\":0.72,");
+  Import();  // one frame of each is of one moment, nearly
+  EXPECT_THAT(observer_.text, HasSubstr("clocks differ by up to 0.02 s"));
+  EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times (15 times, 8 frames"));
 }
 
 TEST_F(ImportPosedFilmsTest, OptionsOfNoUseAreTold) {

@@ -48,6 +48,9 @@ std::string ImportFactsToJson(const ImportFacts& f) {
                     {"path_unevenness", f.film->path_unevenness},
                     {"motion_energy", f.film->motion_energy}};
   }
+  for (const FilmingCamera& camera : f.cameras) {
+    json["cameras"].push_back({{"name", camera.name}, {"film", camera.film}});
+  }
   return json.dump(1) + "\n";
 }
 
@@ -71,6 +74,9 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
                 .background_px = film.at("background_px"),
                 .path_unevenness = film.at("path_unevenness"),
                 .motion_energy = film.at("motion_energy")};
+    }
+    for (const auto& camera : value.value("cameras", nlohmann::json::array())) {
+      f.cameras.push_back({.name = camera.at("name"), .film = camera.at("film")});
     }
     return f;
   } catch (const nlohmann::json::exception& e) {

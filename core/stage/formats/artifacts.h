@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/base/image.h"
 #include "core/carry/carry.h"
@@ -35,6 +36,11 @@ struct FilmFindings {
   double motion_energy = -1.0;  // share of the picture that moves on its own, 0..1; < 0: not known
 };
 
+struct FilmingCamera {
+  std::string name;  // as the files tell it, else its folder or its film's name
+  std::string film;  // relative to the scene's folder; empty: its frames came as pictures
+};
+
 // What the import stage found out, for the plan and the report.
 struct ImportFacts {
   std::string
@@ -47,6 +53,7 @@ struct ImportFacts {
   int photos_registered = 0;
   int masked_views = 0;  // of which parts are masked out
   std::optional<FilmFindings> film;
+  std::vector<FilmingCamera> cameras;  // by Moment::shot, of a scene that several filmed
 };
 std::string ImportFactsToJson(const ImportFacts& facts);
 ImportFacts ImportFactsFromJson(std::string_view json);

@@ -24,7 +24,9 @@ const char* LayoutName(SceneLayout layout) {
 
 }  // namespace
 
-void WriteImported(const ImportResult& result, StageContext& context) {
+void WriteImported(const ImportResult& result,
+                   StageContext& context,
+                   const std::map<std::string, std::string>& films) {
   CheckStemsAreUnique(result.scene);
   for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
   ImportFacts facts;
@@ -36,6 +38,11 @@ void WriteImported(const ImportResult& result, StageContext& context) {
   facts.photos_found = result.photos_found;
   facts.photos_registered = result.photos_registered;
   facts.masked_views = result.masked_views;
+  for (const std::string& camera : result.cameras) {
+    if (result.cameras.size() < 2) break;
+    const auto film = films.find(camera);
+    facts.cameras.push_back({camera, film != films.end() ? film->second : ""});
+  }
   context.progress().OnError(
       result.photos_found, "photos_without_pose", result.photos_found - result.photos_registered);
   context.WriteOutput(artifact::kScene, SceneToJson(result.scene));
