@@ -51,6 +51,7 @@ std::vector<FileCamera> ReadCameraFile(std::string_view text,
     FileCamera camera;
     camera.camera = CameraOf(fields, absent);
     camera.cam_from_world = ReadTransform(fields);
+    camera.time_s = FrameFields(frames[i], frames[i], place).Number("time");
     // world = scale * scene + offset, for points as for the camera's centre.
     const Eigen::Vector3d center =
         (camera.cam_from_world.Center() - scene.world_offset) / scene.world_from_scene_scale;

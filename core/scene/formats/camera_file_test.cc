@@ -62,6 +62,15 @@ TEST(CameraFileTest, WhatTheFileSaysOfThePictureCountsForAllOrForOne) {
   EXPECT_DOUBLE_EQ(sized[0].camera.cx, 50.0);
 }
 
+TEST(CameraFileTest, AFrameMayHaveATime) {
+  const auto cameras =
+      Read("{\"time\":9,\"frames\":[" + Frame() + "," + Frame("[1,0,0,6]", "\"time\":0.5,") + "]}");
+  EXPECT_FALSE(cameras[0].time_s) << "no file says that of all its frames";
+  EXPECT_EQ(cameras[1].time_s, 0.5);
+  EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1,0,0,5]", "\"time\":\"now\",") + "]}"),
+              HasSubstr("frame 0: time must be a finite number"));
+}
+
 TEST(CameraFileTest, WhatIsWrongIsNamed) {
   EXPECT_THAT(Complaint("{\"frames\": ["), HasSubstr("path.json is not JSON"));
   EXPECT_THAT(Complaint(""), HasSubstr("not JSON"));

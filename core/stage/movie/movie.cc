@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "core/base/files.h"
-#include "core/base/median.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/formats/camera_file.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/movie/film_clock.h"
 #include "core/stage/sources/focus.h"
 #include "core/video/mp4_writer.h"
 #include "core/view/path/camera_path.h"
@@ -33,16 +33,49 @@ int HomeView(const Scene& scene, const StageContext& context) {
   return ViewsInOrder(scene)[scene.views.size() / 2];
 }
 
-std::vector<PathCamera> CamerasOfFile(const RenderOptions& options,
-                                      const Scene& scene,
-                                      const Camera& home) {
-  const std::string text = ReadFile(options.cameras, kMaxFileBytes);
+// A way of the camera, before it is known how many frames it takes.
+struct Stations {
   std::vector<PathCamera> cameras;
-  for (const FileCamera& camera :
-       ReadCameraFile(text, "the file of cameras", scene, home, kMaxMovieFrames)) {
-    cameras.push_back({camera.camera, camera.cam_from_world});
+  bool have_times = false;  // of the scene
+};
+
+// The moments that a file of cameras tells; refused where it tells those of some.
+bool TakeTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations* stations) {
+  if (!scene.IsDynamic()) return false;
+  const bool has_times = file[0].time_s.has_value();
+  const double last_s = scene.Times().back();
+  for (size_t i = 0; i < file.size(); ++i) {
+    if (file[i].time_s.has_value() != has_times) {
+      throw InvalidArgument(
+          "the file of cameras: frame {} has {} time, unlike those before it; give a time to every "
+          "frame, or to none",
+          i,
+          has_times ? "no" : "a");
+    }
+    if (!has_times) continue;
+    const double time_s = *file[i].time_s;
+    if (time_s < 0.0 || time_s > last_s) {
+      throw InvalidArgument(
+          "the file of cameras: frame {} is at {:g} s, but the scene lasts from 0 to {:g} s",
+          i,
+          time_s,
+          last_s);
+    }
+    stations->cameras[i].time_s = time_s;
   }
-  return cameras;
+  return has_times;
+}
+
+Stations CamerasOfFile(const RenderOptions& options, const Scene& scene, const Camera& home) {
+  const std::string text = ReadFile(options.cameras, kMaxFileBytes);
+  const std::vector<FileCamera> file =
+      ReadCameraFile(text, "the file of cameras", scene, home, kMaxMovieFrames);
+  Stations stations;
+  for (const FileCamera& camera : file) {
+    stations.cameras.push_back({camera.camera, camera.cam_from_world});
+  }
+  stations.have_times = TakeTimes(file, scene, &stations);
+  return stations;
 }
 
 std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene& scene, int home) {
@@ -66,18 +99,6 @@ std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
   return cameras;
 }
 
-// The moment that each frame shows, where the frames are not those of the film: all of the scene's
-// time, and back where the path comes back.
-void SetTimes(const RenderOptions& options, const Scene& scene, std::vector<PathCamera>* frames) {
-  const std::vector<double> times = scene.Times();
-  const double last = std::max<double>(1.0, static_cast<double>(frames->size()) - 1.0);
-  for (size_t i = 0; i < frames->size(); ++i) {
-    double share = static_cast<double>(i) / last;
-    if (options.bounce) share = 1.0 - std::abs(2.0 * share - 1.0);
-    (*frames)[i].time_s = times.front() + share * (times.back() - times.front());
-  }
-}
-
 // Whether a movie without a wanted length shows every camera of its path once.
 bool IsOneByOne(const RenderOptions& options, const Scene& scene) {
   using Path = RenderOptions::Path;
@@ -92,85 +113,165 @@ std::vector<PathCamera> OneByOne(std::vector<PathCamera> cameras, bool bounce) {
   return cameras;
 }
 
-// The frames' cameras, all of one size, with their times where they have their own.
-std::vector<PathCamera> CamerasOf(const RenderOptions& options,
-                                  const Scene& scene,
-                                  const GaussianModel& model,
-                                  StageContext& context) {
-  using Path = RenderOptions::Path;
-  const int home = HomeView(scene, context);
-  const View& view = scene.views[home];
-  const Camera small = view.camera.FitWithin(kFocusSidePx);
-  const Eigen::Vector3d focus =
-      FocusOf(view,
-              small,
-              RenderView(model, small, view.cam_from_world, context.pool(), 0.0f, view.time_s())
-                  .median_depth);
-  std::vector<PathCamera> stations;
-  if (options.path == Path::kCameras) stations = CamerasOfFile(options, scene, view.camera);
-  if (options.path == Path::kPhotos) stations = CamerasOfViews(options, scene, home);
-  if (options.path == Path::kStill) stations = StillCamera(scene, home);
+// The moment that each frame shows, where nobody tells: all of the scene's time, and back where the
+// path comes back.
+void SpreadTimes(bool bounce, const Scene& scene, std::vector<PathCamera>* frames) {
+  const std::vector<double> times = scene.Times();
+  const double last = std::max<double>(1.0, static_cast<double>(frames->size()) - 1.0);
+  for (size_t i = 0; i < frames->size(); ++i) {
+    double share = static_cast<double>(i) / last;
+    if (bounce) share = 1.0 - std::abs(2.0 * share - 1.0);
+    (*frames)[i].time_s = times.front() + share * (times.back() - times.front());
+  }
+}
 
-  Camera picture = options.path == Path::kCameras ? stations[0].camera : view.camera;
+// The moment at a share of a smooth path: between its stations' as far as the camera is.
+double TimeOnPath(const SmoothPath& path, const std::vector<PathCamera>& stations, double share) {
+  size_t next = 1;
+  while (next + 1 < stations.size() && path.KnotAt(next) < share) ++next;
+  if (next >= stations.size()) return stations[0].time_s;
+  const double begin = path.KnotAt(next - 1), end = path.KnotAt(next);
+  const double part = std::clamp((share - begin) / std::max(1e-12, end - begin), 0.0, 1.0);
+  return std::lerp(stations[next - 1].time_s, stations[next].time_s, part);
+}
+
+Eigen::Vector3d FocusOfView(const View& view, const GaussianModel& model, ThreadPool& pool) {
+  const Camera small = view.camera.FitWithin(kFocusSidePx);
+  return FocusOf(
+      view,
+      small,
+      RenderView(model, small, view.cam_from_world, pool, 0.0f, view.time_s()).median_depth);
+}
+
+// Of the size of all frames.
+Camera PictureOf(const RenderOptions& options, const Stations& stations, const View& home) {
+  Camera picture =
+      options.path == RenderOptions::Path::kCameras ? stations.cameras[0].camera : home.camera;
   picture = picture.FitWithin(options.max_side_px);
   picture.width -= picture.width % 2;  // as movies need it
   picture.height -= picture.height % 2;
-  if (std::min(picture.width, picture.height) < kLeastSidePx) {
-    throw InvalidArgument(
-        "frames of {} x {} px are too small; their shorter side must be at least "
-        "{} px: ask for a larger max_side_px or for cameras of another shape",
-        picture.width,
-        picture.height,
-        kLeastSidePx);
-  }
-  for (PathCamera& station : stations) {
-    station.camera = CoverPicture(station.camera, picture.width, picture.height);
-  }
-  if (!options.frames && IsOneByOne(options, scene)) return OneByOne(stations, options.bounce);
+  if (std::min(picture.width, picture.height) >= kLeastSidePx) return picture;
+  throw InvalidArgument(
+      "frames of {} x {} px are too small; their shorter side must be at least "
+      "{} px: ask for a larger max_side_px or for cameras of another shape",
+      picture.width,
+      picture.height,
+      kLeastSidePx);
+}
 
-  const bool turns = options.path == Path::kOrbit;
-  const std::vector<double> shares =
-      FrameShares(options.frames.value_or(kDefaultMovieFrames), options.bounce, turns);
-  if (turns) {
-    std::vector<PathCamera> frames = TurnFrames(scene, home, focus, shares);
-    for (PathCamera& frame : frames) {
-      frame.camera = CoverPicture(frame.camera, picture.width, picture.height);
-    }
-    return frames;
+Stations StationsOf(const RenderOptions& options, const Scene& scene, int home) {
+  using Path = RenderOptions::Path;
+  switch (options.path) {
+    case Path::kCameras:
+      return CamerasOfFile(options, scene, scene.views[home].camera);
+    case Path::kPhotos:
+      return {CamerasOfViews(options, scene, home), scene.IsDynamic()};
+    case Path::kStill:
+      return {StillCamera(scene, home), true};
+    default:
+      return {};
   }
-  const SmoothPath path(stations, (focus - view.cam_from_world.Center()).norm());
+}
+
+// On a way that is gone smoothly; with moments where `file_tells` them.
+std::vector<PathCamera> SmoothFrames(const RenderOptions& options,
+                                     const Stations& stations,
+                                     double unit,
+                                     bool file_tells) {
+  const SmoothPath path(stations.cameras, unit);
   std::vector<PathCamera> frames;
-  for (const double share : shares) frames.push_back(path.At(share));
+  for (const double share :
+       FrameShares(options.frames.value_or(kDefaultMovieFrames), options.bounce, false)) {
+    frames.push_back(path.At(share));
+    if (file_tells) frames.back().time_s = TimeOnPath(path, stations.cameras, share);
+  }
   return frames;
 }
 
+std::vector<PathCamera> Turning(const RenderOptions& options,
+                                const Scene& scene,
+                                int home,
+                                const Eigen::Vector3d& focus,
+                                const Camera& picture) {
+  const std::vector<double> shares =
+      FrameShares(options.frames.value_or(kDefaultMovieFrames), options.bounce, true);
+  std::vector<PathCamera> frames = TurnFrames(scene, home, focus, shares);
+  for (PathCamera& frame : frames) {
+    frame.camera = CoverPicture(frame.camera, picture.width, picture.height);
+  }
+  return frames;
+}
+
+// The frames' cameras, all of one size, each at its moment.
 std::vector<PathCamera> FramesOf(const RenderOptions& options,
                                  const Scene& scene,
+                                 int home,
                                  const GaussianModel& model,
                                  StageContext& context) {
-  std::vector<PathCamera> frames = CamerasOf(options, scene, model, context);
-  const bool own_times = !options.frames && options.path != RenderOptions::Path::kCameras &&
-                         IsOneByOne(options, scene);
-  if (!own_times && scene.IsDynamic()) SetTimes(options, scene, &frames);
+  const View& view = scene.views[home];
+  Stations stations = StationsOf(options, scene, home);
+  const Camera picture = PictureOf(options, stations, view);
+  for (PathCamera& station : stations.cameras) {
+    station.camera = CoverPicture(station.camera, picture.width, picture.height);
+  }
+  const bool one_by_one = !options.frames && IsOneByOne(options, scene);
+  const bool file_tells = stations.have_times && options.path == RenderOptions::Path::kCameras;
+  std::vector<PathCamera> frames;
+  if (one_by_one) {
+    frames = OneByOne(stations.cameras, options.bounce);
+  } else {
+    const Eigen::Vector3d focus = FocusOfView(view, model, context.pool());
+    const double unit = (focus - view.cam_from_world.Center()).norm();
+    frames = options.path == RenderOptions::Path::kOrbit
+                 ? Turning(options, scene, home, focus, picture)
+                 : SmoothFrames(options, stations, unit, file_tells);
+  }
+  const bool told = file_tells || (one_by_one && stations.have_times);
+  if (!told && scene.IsDynamic()) SpreadTimes(options.bounce, scene, &frames);
   for (PathCamera& frame : frames) frame.time_s = options.time_s.value_or(frame.time_s);
   return frames;
 }
 
-// Frames of the scene's own moments go at its own rate.
-double RateOf(const RenderOptions& options,
-              const Scene& scene,
-              const std::vector<PathCamera>& frames) {
+// Of frames that are the scene's own moments; nothing where frames follow each other evenly.
+std::optional<FilmClock> OwnClock(const RenderOptions& options,
+                                  const Scene& scene,
+                                  const std::vector<PathCamera>& frames,
+                                  const StageContext& context) {
   const bool own = !options.frames && !options.time_s && frames.size() > 1 && scene.IsDynamic() &&
                    options.path != RenderOptions::Path::kCameras && IsOneByOne(options, scene);
-  if (!own) return options.frames_per_second;
-  std::vector<double> steps;
-  for (size_t i = 1; i < frames.size(); ++i) {
-    steps.push_back(std::abs(frames[i].time_s - frames[i - 1].time_s));
+  if (!own || !TimesAreSeconds(scene, FindImportFacts(context))) return std::nullopt;
+  std::vector<double> times;
+  for (const PathCamera& frame : frames) times.push_back(frame.time_s);
+  return ClockOf(times);
+}
+
+Mp4Options MovieOf(const RenderOptions& options,
+                   const Scene& scene,
+                   int home,
+                   const std::vector<PathCamera>& frames,
+                   const std::optional<FilmClock>& clock,
+                   StageContext& context) {
+  Mp4Options movie{.width = frames[0].camera.width,
+                   .height = frames[0].camera.height,
+                   .frames_per_second = options.frames_per_second,
+                   .threads = context.pool().thread_count()};
+  if (!clock) return movie;
+  movie.frames_per_second = clock->frames_per_second;
+  movie.ticks_per_second = clock->ticks_per_second;
+  // Views that are named need not follow each other as they were filmed.
+  if (options.views.empty() && !options.bounce) {
+    movie.sound = SoundFrom(scene, home, frames[0].time_s, *clock, context);
   }
-  const double step = Median(std::move(steps));  // some frames may have found no place
-  // Times may also count from 0 to 1 for the whole.
-  const bool seconds = frames.size() > 2 && scene.Times().back() > 1.0;
-  return seconds && step > 0.0 ? std::clamp(1.0 / step, 1.0, 120.0) : options.frames_per_second;
+  return movie;
+}
+
+void WarnOf(const Mp4Writer& movie, StageContext& context) {
+  if (movie.encoder() == "mpeg4") {
+    context.progress().OnWarning(
+        "this machine's libavcodec has no H.264 encoder (libx264): the movie is MPEG-4 part 2, "
+        "which browsers do not show");
+  }
+  if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
 }
 
 }  // namespace
@@ -184,7 +285,8 @@ void RenderMovie(const RenderOptions& options,
         "this scene has no times: a camera that stands still, or a moment, is of use for a scene "
         "that moves");
   }
-  const std::vector<PathCamera> frames = FramesOf(options, scene, model, context);
+  const int home = HomeView(scene, context);
+  const std::vector<PathCamera> frames = FramesOf(options, scene, home, model, context);
   if (options.pictures && frames.size() > kMaxMoviePictures) {
     throw InvalidArgument(
         "{} frames are too many to keep as pictures; at most {} are: ask for "
@@ -193,18 +295,11 @@ void RenderMovie(const RenderOptions& options,
         kMaxMoviePictures);
   }
   const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
+  const std::optional<FilmClock> clock = OwnClock(options, scene, frames, context);
   std::optional<Mp4Writer> movie;
   if (options.video) {
-    movie.emplace(file,
-                  Mp4Options{.width = frames[0].camera.width,
-                             .height = frames[0].camera.height,
-                             .frames_per_second = RateOf(options, scene, frames),
-                             .threads = context.pool().thread_count()});
-    if (movie->encoder() == "mpeg4") {
-      context.progress().OnWarning(
-          "this machine's libavcodec has no H.264 encoder (libx264): the movie is MPEG-4 part 2, "
-          "which browsers do not show");
-    }
+    movie.emplace(file, MovieOf(options, scene, home, frames, clock, context));
+    WarnOf(*movie, context);
   }
   const int64_t count = static_cast<int64_t>(frames.size());
   for (int64_t i = 0; i < count; ++i) {
@@ -213,7 +308,11 @@ void RenderMovie(const RenderOptions& options,
     const Image srgb = SrgbFromLab(
         RenderView(model, frame.camera, frame.cam_from_world, context.pool(), 0.0f, frame.time_s)
             .lab);
-    if (movie) movie->Add(srgb, context.pool());
+    if (movie && clock) {
+      movie->AddAt(clock->time_s[i], clock->seconds[i], srgb, context.pool());
+    } else if (movie) {
+      movie->Add(srgb, context.pool());
+    }
     if (options.pictures) {
       context.WriteOutput(fmt::format("{}{:05}.png", artifact::kFrames, i + 1), EncodePng8(srgb));
     }

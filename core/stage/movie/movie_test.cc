@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
+#include "core/splat/motion/motion.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "tests/support/formats/movie_reader.h"
@@ -45,8 +46,34 @@ class MovieTest : public EvaluatedSceneTest {
            "],[0,-1,0,0],[0,0,-1,0],[0,0,0,1]]}";
   }
 
+  // The scene's views at these times, of one camera, and what moves in it.
+  void MakeMoving(const std::vector<double>& times) {
+    for (size_t i = 0; i < times.size(); ++i) scene_.views[i].moment = Moment{times[i], 0};
+    AddInput(artifact::kScene, SceneToJson(scene_));
+    AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
+    AddInput(artifact::kModel, SerializeGaussians(BallBeforeWall(times.front(), times.back())));
+  }
+
   std::vector<std::string> outputs_;
 };
+
+// The column of the bright ball, px.
+double BallColumn(const Image& image) {
+  double sum = 0.0, weighted = 0.0;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const double light = std::max(0.0, image.At(1, y, x) - 0.5);
+      sum += light;
+      weighted += light * (x + 0.5);
+    }
+  }
+  return weighted / sum;
+}
+
+// Where a camera of RampScene at that x sees it.
+double ColumnOf(double ball_x, double camera_x = 0.0) {
+  return 24.0 + 50.0 * (ball_x - camera_x) / kBallDepth;
+}
 
 // Mean over the pixels of the root of the mean squared difference in sRGB, as a peak ratio.
 double PsnrDb(const Image& a, const Image& b) {
@@ -100,7 +127,7 @@ TEST_F(MovieTest, TheFirstFrameOfTheOriginalPathIsTheFirstPhotosView) {
   EXPECT_LT(PsnrDb(first, last), 40.0);
 }
 
-TEST_F(MovieTest, AFrameWithoutAPlaceDoesNotSlowTheMovieDown) {
+TEST_F(MovieTest, AFrameWithoutAPlaceLeavesAGap) {
   scene_.views.push_back(scene_.views[0]);
   scene_.views.push_back(scene_.views[1]);
   const double times[] = {0.0, 0.5, 0.75, 1.0, 1.25};  // the second found no place
@@ -110,8 +137,83 @@ TEST_F(MovieTest, AFrameWithoutAPlaceDoesNotSlowTheMovieDown) {
   }
   AddInput(artifact::kScene, SceneToJson(scene_));
   const ReadMovie movie = DecodeMovie(Render({.path = Path::kPhotos}) / "scene.mp4");
-  EXPECT_EQ(movie.frames.size(), 5u);
-  EXPECT_NEAR(movie.seconds, 1.25, 0.01);
+  ASSERT_EQ(movie.times.size(), 5u);
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(movie.times[i], times[i], 1e-4) << i;
+  EXPECT_NEAR(movie.seconds, 1.5, 0.01);
+}
+
+TEST_F(MovieTest, AStillCameraSeesAllMomentsAtTheirOwnTimes) {
+  MakeMoving({0.0, 1.0, 2.5});
+  const auto out = Render({.path = Path::kStill, .pictures = true});
+  const ReadMovie movie = DecodeMovie(out / "scene.mp4");
+  ASSERT_EQ(movie.times.size(), 3u);
+  EXPECT_NEAR(movie.times[1], 1.0, 1e-4);
+  EXPECT_NEAR(movie.times[2], 2.5, 1e-4);
+  const double ball_x[] = {-0.4, -0.08, 0.4};
+  for (int i = 0; i < 3; ++i) {  // p1 stands at x = -0.1
+    const Image frame = ReadImage(out / ("frames/0000" + std::to_string(i + 1) + ".png"));
+    EXPECT_NEAR(BallColumn(frame), ColumnOf(ball_x[i], -0.1), 0.6) << i;
+  }
+}
+
+TEST_F(MovieTest, ThereAndBackKeepsTheFilmsPace) {
+  MakeMoving({0.0, 0.5, 1.5});
+  const ReadMovie movie =
+      DecodeMovie(Render({.path = Path::kPhotos, .bounce = true}) / "scene.mp4");
+  ASSERT_EQ(movie.times.size(), 4u);
+  EXPECT_NEAR(movie.times[1], 0.5, 1e-4);
+  EXPECT_NEAR(movie.times[2], 1.5, 1e-4);
+}
+
+TEST_F(MovieTest, TimeStandsStillOnAnOrbit) {
+  MakeMoving({0.0, 1.0, 2.5});
+  const RenderOptions options{
+      .path = Path::kOrbit, .frames = 4, .video = false, .pictures = true, .time_s = 1.0};
+  const auto bytes = [&](const RenderOptions& asked) {
+    const auto out = Render(asked);
+    std::vector<std::string> files;
+    for (const std::string& name : outputs_) files.push_back(ReadFile(out / name));
+    return files;
+  };
+  const std::vector<std::string> frozen = bytes(options);
+  ASSERT_EQ(frozen.size(), 4u);
+  EXPECT_NE(frozen[0], frozen[1]) << "the camera turns";
+  RenderOptions later = options;
+  later.time_s = 2.5;
+  EXPECT_NE(bytes(later)[1], frozen[1]);
+  // The same as the scene of that moment, of which nothing moves.
+  ThreadPool pool(1);
+  AddInput(artifact::kModel, SerializeGaussians(ModelAt(BallBeforeWall(0.0, 2.5), 1.0, pool)));
+  EXPECT_EQ(bytes(options), frozen);
+}
+
+TEST_F(MovieTest, CamerasOfAFileMayHaveTimesOfTheirOwn) {
+  MakeMoving({0.0, 1.0, 2.0});
+  const auto at = [](double time_s) {
+    return "{\"time\":" + std::to_string(time_s) +
+           ",\"transform_matrix\":[[1,0,0,0],[0,-1,0,0],[0,0,-1,0],[0,0,0,1]]}";
+  };
+  RenderOptions options{.path = Path::kCameras,
+                        .pictures = true,
+                        .cameras = CameraFile(at(2.0) + "," + at(0.0) + "," + at(1.0))};
+  auto out = Render(options);
+  const double ball_x[] = {0.4, -0.4, 0.0};
+  for (int i = 0; i < 3; ++i) {
+    const Image frame = ReadImage(out / ("frames/0000" + std::to_string(i + 1) + ".png"));
+    EXPECT_NEAR(BallColumn(frame), ColumnOf(ball_x[i]), 0.6) << i;
+  }
+  options.frames = 3;  // on a smooth way, from the first of two to the other
+  options.cameras = CameraFile(at(0.0) + "," + at(2.0));
+  out = Render(options);
+  for (int i = 0; i < 3; ++i) {
+    const Image frame = ReadImage(out / ("frames/0000" + std::to_string(i + 1) + ".png"));
+    EXPECT_NEAR(BallColumn(frame), ColumnOf(-0.4 + 0.4 * i), 0.6) << i;
+  }
+  options.cameras = CameraFile(at(0.0) + "," + FrameAt(0.0));
+  EXPECT_THAT(Complaint(options), HasSubstr("frame 1 has no time, unlike those before it"));
+  options.cameras = CameraFile(at(0.0) + "," + at(2.5));
+  EXPECT_THAT(Complaint(options),
+              HasSubstr("frame 1 is at 2.5 s, but the scene lasts from 0 to 2"));
 }
 
 TEST_F(MovieTest, CamerasOfAFileAreTakenOneByOneOrSmoothly) {
