@@ -26,6 +26,10 @@ namespace {
 constexpr float kCovered = 0.25f;        // confidence from which a pixel counts as covered
 constexpr double kSmallCoverage = 0.01;  // below, the user is told
 constexpr size_t kMaxFurtherKeyViews = 16;
+// Of decoded pictures, each of two sizes: neighbours in space are read again and again; of a scene
+// that moves these are the few of one moment.
+constexpr int64_t kPhotosCacheBytes = int64_t{1} << 30;
+constexpr int64_t kFramesCacheBytes = int64_t{64} << 20;
 
 // `taken`: the key views before it.
 int FurtherView(const FurtherKeyView& further, const std::vector<int>& taken, const Scene& scene) {
@@ -226,8 +230,9 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   if (IsColoredAsFilm(context, scene)) return CarryByMotion(options, scene, context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  const ViewImages images(scene, context.scene_folder(), options.max_side_px);
-  const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px);
+  const int64_t cache_bytes = scene.IsDynamic() ? kFramesCacheBytes : kPhotosCacheBytes;
+  const ViewImages images(scene, context.scene_folder(), options.max_side_px, cache_bytes);
+  const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px, cache_bytes);
   const SurfaceRenderer render = [&](int index, const Camera& camera) {
     ThreadPool one(1);
     const View& view = scene.views[index];
@@ -241,9 +246,10 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   std::optional<FramesInColor> frames;
   if (scene.IsDynamic()) frames.emplace(scene, images, keys, options.film, context);
   CarryCheckpoint done(scene, context);
-  context.pool().ForEach(static_cast<int64_t>(scene.views.size()), [&](int64_t index, int) {
+  const std::vector<int> order = scene.ViewsInOrderOfTime();  // those of one moment share frames
+  context.pool().ForEach(static_cast<int64_t>(order.size()), [&](int64_t index, int) {
     context.cancel().ThrowIfCancelled();
-    const int view = static_cast<int>(index);
+    const int view = order[index];
     if (done.WasDone(view)) return;
     const auto key = std::find_if(
         keys.begin(), keys.end(), [&](const ColoredKeyView& k) { return k.view == view; });

@@ -32,6 +32,7 @@ MemoryPlan PlanMemory(const GeometryOptions& options,
   demand.max_side_px = max_side_px;
   demand.max_gaussians = options.max_gaussians;
   demand.sh_degree = options.sh_degree;
+  demand.moves = scene.IsDynamic();
   return PlanGeometryMemory(demand, budget_bytes);
 }
 
@@ -94,7 +95,8 @@ void RunReconstructGeometry(const GeometryOptions& options,
       options.recipe == GeometryOptions::Recipe::kPaper
           ? unmasked
           : WithDensePoints(unmasked, images, planned.max_gaussians, context.control());
-  const GeometryProblem problem = GeometryProblemOf(start, images);
+  GeometryProblem problem = GeometryProblemOf(start, images);
+  problem.picture_cache_bytes = memory.target_cache_bytes;
   const GaussianModel model = TrainGeometry(problem, planned, context.control());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));
   context.WriteOutput(artifact::kMemoryPlan, MemoryPlanToJson(memory));

@@ -1,6 +1,3 @@
-#include <map>
-#include <mutex>
-
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
@@ -17,28 +14,23 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     context.WriteOutput(artifact::kModel, SerializeGaussians(geometry));
     return;
   }
-  const ViewImages images(scene, context.scene_folder(), ColoredSide(context, scene.views[key]));
-  std::map<int, std::shared_ptr<const ChromaTarget>> cache;
-  std::mutex mutex;
+  const ViewImages images(scene, context.scene_folder(), ColoredSide(context, scene.views[key]), 0);
   const ChromaTargetSource targets = [&](int view) {
-    std::lock_guard lock(mutex);
-    auto& target = cache[view];
-    if (!target) {
-      const Camera camera = images.WorkingCamera(view);
-      auto made = std::make_shared<ChromaTarget>();
-      made->ab = ReadTargetAb(context, scene.views[view], view == key, camera.width, camera.height);
-      made->confidence =
-          ReadViewConfidence(context, scene.views[view], camera.width, camera.height);
-      if (made->confidence.Empty() && view == key) {
-        made->confidence = Image(camera.width, camera.height, 1, 1.0f);
-      }
-      if (const auto mask = images.Mask(view)) made->weight = *mask;
-      target = std::move(made);
+    const Camera camera = images.WorkingCamera(view);
+    auto target = std::make_shared<ChromaTarget>();
+    target->ab = ReadTargetAb(context, scene.views[view], view == key, camera.width, camera.height);
+    target->confidence =
+        ReadViewConfidence(context, scene.views[view], camera.width, camera.height);
+    if (target->confidence.Empty() && view == key) {
+      target->confidence = Image(camera.width, camera.height, 1, 1.0f);
     }
+    if (const auto mask = images.Mask(view)) target->weight = *mask;
     return target;
   };
-  GaussianModel model =
-      FitChroma(geometry, ChromaProblemOf(scene, images, targets), options, context.control());
+  GaussianModel model = FitChroma(geometry,
+                                  ChromaProblemOf(scene, images, targets),
+                                  scene.IsDynamic() ? ForManyFrames(options) : options,
+                                  context.control());
   AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }

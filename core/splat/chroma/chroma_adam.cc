@@ -26,11 +26,13 @@ class ChromaTrainer {
  public:
   ChromaTrainer(const ChromaFitting& fitting,
                 const std::vector<int>& colored,
+                ChromaTargets& targets,
                 ChromaParameters& parameters)
       : fitting_(fitting),
         options_(fitting.options),
         run_(fitting.run),
         colored_(colored),
+        targets_(targets),
         parameters_(parameters),
         in_time_(fitting.geometry, fitting.run.pool) {
     state_.parameters = parameters.block;
@@ -115,9 +117,10 @@ class ChromaTrainer {
   bool Step() {
     const PosedCamera& view = fitting_.problem.training[static_cast<size_t>(
         colored_[state_.order.Next(static_cast<int>(colored_.size()), state_.random)])];
-    ChromaPlanes target;
-    if (!LoadChromaPlanes(fitting_.problem, view, &target)) return true;
-    for (float& value : target.ab.data) value += kNeutralChroma;
+    const std::shared_ptr<const ChromaPlanes> target = targets_.Get(view);
+    if (target == nullptr) return true;
+    target_ab_ = target->ab;
+    for (float& value : target_ab_.data) value += kNeutralChroma;
     const RasterCamera camera = MakeRasterCamera(view.camera, view.cam_from_world);
     const float background[2] = {kNeutralChroma, kNeutralChroma};
     const ColorSpec& color = parameters_.color;
@@ -129,7 +132,7 @@ class ChromaTrainer {
     weights.l1 = 1.0f - weights.ssim;
     weights.edge = 0.0f;
     const LossValue loss =
-        loss_.Evaluate(pipeline_.color(), target.ab, &target.weight, weights, pool, d_color_);
+        loss_.Evaluate(pipeline_.color(), target_ab_, &target->weight, weights, pool, d_color_);
     if (!std::isfinite(loss.total)) return false;
     pipeline_.Backward(now, color, camera, d_color_, GradientScope::kColorOnly, pool, gradient_);
     if (!AdamStep(gradient_,
@@ -167,11 +170,13 @@ class ChromaTrainer {
   const ChromaOptions& options_;
   const RunControl& run_;
   const std::vector<int>& colored_;
+  ChromaTargets& targets_;
   ChromaParameters& parameters_;
   GeometryInTime in_time_;
   TrainingState state_;
   SplatPipeline pipeline_;
   ImageLoss loss_;
+  PlaneBuffer target_ab_;
   PlaneBuffer d_color_;
   ParameterBlock gradient_;
   double last_progress_ = 0.0;
@@ -182,8 +187,9 @@ class ChromaTrainer {
 
 void TrainChromaWithAdam(const ChromaFitting& fitting,
                          const std::vector<int>& colored,
+                         ChromaTargets& targets,
                          ChromaParameters& parameters) {
-  ChromaTrainer(fitting, colored, parameters).Train();
+  ChromaTrainer(fitting, colored, targets, parameters).Train();
 }
 
 }  // namespace color3d

@@ -5,13 +5,15 @@
 #include <vector>
 
 #include "core/splat/chroma/chroma_fitting.h"
+#include "core/splat/chroma/chroma_targets.h"
 
 namespace color3d {
 
 // Improves `parameters` in place; `colored` are the positions in fitting.problem.training that have
-// colours.
+// colours; `targets` gives them.
 void TrainChromaWithAdam(const ChromaFitting& fitting,
                          const std::vector<int>& colored,
+                         ChromaTargets& targets,
                          ChromaParameters& parameters);
 
 }  // namespace color3d

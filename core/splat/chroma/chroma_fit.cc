@@ -33,8 +33,9 @@ GaussianModel FitChroma(const GaussianModel& geometry,
   const bool solve =
       options.solver == ChromaOptions::Solver::kConjugateGradients && options.iterations > 0;
   GeometryInTime in_time(geometry, run.pool);
+  ChromaTargets targets(problem, options.target_budget_bytes);
   ChromaSystem system(
-      parameters.block, parameters.color, in_time, options.memory_budget_bytes, run.pool);
+      parameters.block, parameters.color, in_time, targets, options.memory_budget_bytes, run.pool);
   std::vector<int> colored;  // positions in problem.training
   bool all_confident = true;
   for (size_t k = 0; k < problem.training.size(); ++k) {
@@ -44,12 +45,7 @@ GaussianModel FitChroma(const GaussianModel& geometry,
     if (!LoadChromaPlanes(problem, view, &planes)) continue;
     colored.push_back(static_cast<int>(k));
     all_confident = all_confident && planes.has_confidence;
-    system.AddView(MakeRasterCamera(view.camera, view.cam_from_world),
-                   view.time_s,
-                   planes.ab,
-                   planes.weight,
-                   planes.confidence,
-                   solve);
+    if (!system.AddView(view, planes, solve)) targets.Offer(view, std::move(planes));
     run.progress.OnProgress(static_cast<int64_t>(k), 0, "chroma: reading the coloured views");
   }
   const std::vector<char> seen = SetClosedForm(system, run.pool, parameters);
@@ -59,7 +55,7 @@ GaussianModel FitChroma(const GaussianModel& geometry,
     if (solve) {
       SolveChroma(fitting, seen, system, parameters);
     } else {
-      TrainChromaWithAdam(fitting, colored, parameters);
+      TrainChromaWithAdam(fitting, colored, targets, parameters);
     }
     FillUnseen(seen, run.pool, parameters);
   }

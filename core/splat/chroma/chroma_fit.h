@@ -25,7 +25,8 @@ struct ChromaTarget {
   Image weight;
   Image confidence;
 };
-// May return null for a view that has no colours.
+// May return null for a view that has no colours. The same each time that it is asked for a view,
+// which may be often, by several threads at once.
 using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
 
 struct ChromaProblem {

@@ -1,5 +1,7 @@
 #include "core/splat/chroma/chroma_options.h"
 
+#include <algorithm>
+
 #include "core/base/range_check.h"
 
 namespace color3d {
@@ -18,7 +20,16 @@ void ChromaOptions::Validate() const {
   check("tikhonov", tikhonov, 1e-6, 1e6);
   check("tikhonov_rest", tikhonov_rest, 1.0, 1e6);
   check("memory_budget_bytes", static_cast<double>(memory_budget_bytes), 0.0, 1e15);
+  check("target_budget_bytes", static_cast<double>(target_budget_bytes), 0.0, 1e15);
   adjustment.Validate();
+}
+
+ChromaOptions ForManyFrames(ChromaOptions options) {
+  constexpr int64_t kMemoryBytes = int64_t{384} << 20;
+  constexpr int64_t kTargetBytes = int64_t{96} << 20;
+  options.memory_budget_bytes = std::min(options.memory_budget_bytes, kMemoryBytes);
+  options.target_budget_bytes = std::min(options.target_budget_bytes, kTargetBytes);
+  return options;
 }
 
 }  // namespace color3d

@@ -31,12 +31,19 @@ struct ChromaOptions {
   // coefficients above degree 0, times tikhonov_rest, 1..1e6.
   double tikhonov = 0.01;
   double tikhonov_rest = 10.0;
-  int64_t memory_budget_bytes = int64_t{2} << 30;  // of kept blending weights, 0..1e15
+  // Of blending weights that are kept with their view's targets, and of targets of the other views,
+  // each 0..1e15. What is not kept is made and read again.
+  int64_t memory_budget_bytes = int64_t{2} << 30;
+  int64_t target_budget_bytes = int64_t{512} << 20;
 
   ChromaAdjustment adjustment;  // of what was solved
 
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const ChromaOptions&) const = default;
 };
+
+// With small budgets, so that a scene of 400 frames takes no more memory than one of 100. The
+// result is the same.
+ChromaOptions ForManyFrames(ChromaOptions options);
 
 }  // namespace color3d

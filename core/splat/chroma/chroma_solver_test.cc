@@ -5,11 +5,14 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/chroma/chroma_parameters.h"
+#include "core/splat/chroma/chroma_system.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/raster/raster_camera.h"
 #include "tests/reference/splat.h"
@@ -137,8 +140,54 @@ TEST(FitChromaTest, ViewsBeyondTheMemoryBudgetGiveTheSameBytes) {
   options.chroma_sh_degree = 1;
   const GaussianModel kept = Fit(geometry, problem, options);
   EXPECT_EQ(Fit(geometry, problem, options).sh_a, kept.sh_a);
-  options.memory_budget_bytes = 0;
-  EXPECT_EQ(Fit(geometry, problem, options).sh_a, kept.sh_a);
+  for (const int64_t targets : {int64_t{0}, int64_t{1} << 20}) {
+    for (const int64_t budget : {int64_t{0}, int64_t{150'000}}) {  // none, or some of the views
+      options.memory_budget_bytes = budget;
+      options.target_budget_bytes = targets;
+      EXPECT_EQ(Fit(geometry, problem, options).sh_a, kept.sh_a);
+    }
+  }
+}
+
+// However many views there are, what is kept of them is within the budgets; the rest is asked for
+// again, by each pass.
+TEST(FitChromaTest, WhatIsKeptDoesNotGrowWithTheNumberOfViews) {
+  const GaussianModel geometry = RandomGaussians(60, 4);
+  constexpr int64_t kBudget = 150'000, kTargetBudget = 40'000;
+  for (const int views : {12, 48}) {
+    ChromaProblem problem = RandomProblem(views, 6);
+    std::atomic<int> asked = 0;
+    problem.targets = [&, source = problem.targets](int view) {
+      ++asked;
+      return source(view);
+    };
+    ThreadPool pool(2);
+    const ChromaParameters parameters = ChromaParameters::From(geometry, 0);
+    GeometryInTime in_time(geometry, pool);
+    ChromaTargets targets(problem, kTargetBudget);
+    ChromaSystem system(parameters.block, parameters.color, in_time, targets, kBudget, pool);
+    int kept = 0;
+    for (const PosedCamera& view : problem.training) {
+      ChromaPlanes planes;
+      ASSERT_TRUE(LoadChromaPlanes(problem, view, &planes));
+      if (system.AddView(view, planes, true)) {
+        ++kept;
+      } else {
+        targets.Offer(view, std::move(planes));
+      }
+    }
+    EXPECT_GT(kept, 1);
+    EXPECT_LE(system.kept_bytes(), kBudget);
+    EXPECT_GT(system.kept_bytes(), kBudget / 2);
+    EXPECT_LE(targets.kept_bytes(), kTargetBudget);
+    EXPECT_GT(targets.kept_bytes(), kTargetBudget / 2);
+    EXPECT_EQ(asked, views);
+    ChromaVector x(2 * static_cast<size_t>(system.count()), 0.1);
+    system.Sweep({}, 1.0, 1.0, std::vector<char>(system.count(), 1), CancellationToken(), x);
+    EXPECT_GT(asked, views);
+    EXPECT_LT(asked, 2 * views);
+    EXPECT_LE(targets.kept_bytes(), kTargetBudget);
+  }
 }
 
 class LastSave : public CheckpointStore {

@@ -1,87 +1,66 @@
 #include "core/splat/chroma/chroma_system.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
+#include <utility>
 
 #include "core/splat/model/spherical_harmonics.h"
 
 namespace color3d {
-namespace {
-
-constexpr int kTileFloats = 2 * kTilePixels;  // of a tile's picture
-
-// Copies a tile's targets and weights; pixels outside, and those of weight 0, get zeros. `sure`
-// gets weights in its first channel, weights times confidence in its second.
-void LoadTile(const PlaneBuffer& ab,
-              const PlaneBuffer& weight,
-              const PlaneBuffer& confidence,
-              int x0,
-              int y0,
-              float* target,
-              float* mask,
-              float* sure) {
-  for (int b = 0; b < kTileBlocks; ++b) {
-    for (int lane = 0; lane < kBlockPixels; ++lane) {
-      const int x = x0 + PixelX(b, lane), y = y0 + PixelY(b, lane);
-      const bool inside = x < ab.width && y < ab.height;
-      const float w = inside ? weight.Row(0, y)[x] : 0.0f;
-      float* t = target + 2 * kBlockPixels * b + lane;
-      t[0] = w > 0.0f ? ab.Row(0, y)[x] : 0.0f;
-      t[kBlockPixels] = w > 0.0f ? ab.Row(1, y)[x] : 0.0f;
-      mask[kBlockPixels * b + lane] = w > 0.0f ? w : 0.0f;
-      float* s = sure + 2 * kBlockPixels * b + lane;
-      s[0] = w > 0.0f ? w : 0.0f;
-      s[kBlockPixels] = w > 0.0f ? w * confidence.Row(0, y)[x] : 0.0f;
-    }
-  }
-}
-
-// D of a tile from the residuals target - picture, which become `picture`. Returns the sums of
-// weight * |residual| and of the weights.
-std::array<float, 2> WeighTile(
-    const RobustWeights& robust, const float* target, const float* mask, float* picture, float* d) {
-  const float scale = static_cast<float>(robust.scale), floor = static_cast<float>(robust.floor);
-  float l1 = 0.0f, area = 0.0f;
-  for (int b = 0; b < 2 * kTileBlocks; ++b) {
-    const float* m = mask + b / 2 * kBlockPixels;
-    for (int lane = 0; lane < kBlockPixels; ++lane) {
-      const int i = b * kBlockPixels + lane;
-      const float r = target[i] - picture[i];
-      l1 += m[lane] * std::abs(r);
-      area += m[lane];
-      d[i] = robust.on ? m[lane] * scale / std::max(std::abs(r), floor) : m[lane];
-      picture[i] = r;
-    }
-  }
-  return {l1, area};
-}
-
-}  // namespace
 
 // Targets and D are [tile][block][channel][16], pixel weights [tile][block][16].
 struct ChromaSystem::View {
+  PosedCamera posed;
   RasterCamera camera;
-  double time_s = 0.0;
   int tiles = 0;
-  bool kept = false;
-  std::vector<TileWeights> weights;  // per tile, when kept
+  bool kept = false;                 // all below
+  std::vector<TileWeights> weights;  // per tile
   AlignedFloats target, mask, d;
 
+  void Allocate() {
+    weights.resize(tiles);
+    target.resize(static_cast<size_t>(tiles) * kTileFloats);
+    mask.resize(static_cast<size_t>(tiles) * kTilePixels);
+    d.assign(target.size(), 0.0f);
+  }
+  void Release() {
+    kept = false;
+    weights = std::vector<TileWeights>();  // {} would keep the memory
+    target = AlignedFloats();
+    mask = AlignedFloats();
+    d = AlignedFloats();
+  }
+  // That are held, used or not.
+  int64_t Bytes() const {
+    auto bytes =
+        static_cast<int64_t>(sizeof(float) * (target.capacity() + mask.capacity() + d.capacity()));
+    for (const TileWeights& w : weights) bytes += w.Bytes();
+    return bytes;
+  }
   float* Target(int tile) { return target.data() + static_cast<size_t>(tile) * kTileFloats; }
   float* Mask(int tile) { return mask.data() + static_cast<size_t>(tile) * kTilePixels; }
   float* D(int tile) { return d.data() + static_cast<size_t>(tile) * kTileFloats; }
 };
 
+struct ChromaSystem::Tile {
+  const TileWeights& weights;
+  const float* target;
+  const float* mask;
+  float* d;
+};
+
 ChromaSystem::ChromaSystem(const ParameterBlock& parameters,
                            const ColorSpec& color,
                            GeometryInTime& in_time,
+                           ChromaTargets& targets,
                            int64_t budget_bytes,
                            ThreadPool& pool)
     : parameters_(parameters),
       color_(color),
       in_time_(in_time),
+      targets_(targets),
       at_(&parameters),
       coefficients_(color.channel[0].coefficients),
       budget_bytes_(budget_bytes),
@@ -104,46 +83,37 @@ void ChromaSystem::BinView(const RasterCamera& camera) {
   binner_.Bin(splats_, camera.width, camera.height, pool_, lists_);
 }
 
-void ChromaSystem::AddView(const RasterCamera& camera,
-                           double time_s,
-                           const PlaneBuffer& ab,
-                           const PlaneBuffer& weight,
-                           const PlaneBuffer& confidence,
-                           bool keep) {
+bool ChromaSystem::AddView(const PosedCamera& posed, const ChromaPlanes& planes, bool solve) {
   auto view = std::make_unique<View>();
-  view->camera = camera;
-  view->time_s = time_s;
-  Enter(time_s);
+  view->posed = posed;
+  view->camera = MakeRasterCamera(posed.camera, posed.cam_from_world);
+  const RasterCamera& camera = view->camera;
+  Enter(posed.time_s);
   BinView(camera);
   view->tiles = lists_.tile_count();
-  view->target.resize(static_cast<size_t>(view->tiles) * kTileFloats);
-  view->mask.resize(static_cast<size_t>(view->tiles) * kTilePixels);
-  view->kept = keep && kept_bytes_ < budget_bytes_;
-  if (view->kept) view->weights.resize(view->tiles);
+  view->kept = solve && !is_full_;
+  if (view->kept) view->Allocate();
   ResetSums(sums_);
   ResetSums(right_);
   const int threads = pool_.thread_count();
   pool_.ForRanges(threads, [&](int64_t thread, int64_t, int) {
     TileWeights w;
+    alignas(64) float target[kTileFloats], mask[kTilePixels];
     alignas(64) float picture[kTileFloats], sure[kTileFloats];
     for (int tile = static_cast<int>(thread); tile < view->tiles; tile += threads) {
-      const float* target = view->Target(tile);
-      const float* mask = view->Mask(tile);
-      LoadTile(ab,
-               weight,
-               confidence,
-               tile % lists_.tiles_x * kTileSide,
-               tile / lists_.tiles_x * kTileSide,
-               view->Target(tile),
-               view->Mask(tile),
-               sure);
+      const int x0 = tile % lists_.tiles_x * kTileSide, y0 = tile / lists_.tiles_x * kTileSide;
+      LoadTile(planes, x0, y0, target, mask);
+      LoadConfidence(planes.confidence, x0, y0, mask, sure);
       BuildTileWeights(splats_, lists_, tile, camera.width, camera.height, w);
       for (int i = 0; i < kTileFloats; ++i) {
         picture[i] = mask[i / (2 * kBlockPixels) * kBlockPixels + i % kBlockPixels] * target[i];
       }
       TileAdjoint(w, picture, sums_[thread].data());
       TileAdjoint(w, sure, right_[thread].data());
-      if (view->kept) view->weights[tile] = w;
+      if (!view->kept) continue;
+      view->weights[tile] = w;
+      std::copy_n(target, kTileFloats, view->Target(tile));
+      std::copy_n(mask, kTilePixels, view->Mask(tile));
     }
   });
   for (int64_t i = 0; i < count(); ++i) {
@@ -154,24 +124,66 @@ void ChromaSystem::AddView(const RasterCamera& camera,
       target_sum_[2 * i + 1] += sums_[t][2 * i + 1];
     }
   }
-  if (!keep) return;
-  for (const TileWeights& w : view->weights) kept_bytes_ += w.Bytes();
-  view->d.assign(view->target.size(), 0.0f);
-  views_.push_back(std::move(view));
+  return solve && Keep(std::move(view));
 }
 
-// visit(tile, thread, weights) for every tile; a thread's tiles are always the same.
+bool ChromaSystem::Keep(std::unique_ptr<View> view) {
+  const bool fits = view->kept && kept_bytes() + view->Bytes() <= budget_bytes_;
+  if (!fits) {
+    is_full_ = true;
+    view->Release();
+  }
+  views_.push_back(std::move(view));
+  return fits;
+}
+
+int64_t ChromaSystem::kept_bytes() const {
+  int64_t bytes = 0;
+  for (const auto& view : views_) bytes += view->Bytes();
+  return bytes;
+}
+
+// visit(view, planes) for every view, one after the other, the k-th of them order(k). `planes`: the
+// targets of one that is not kept; some views' are read at once.
+template <class Order, class Visitor>
+void ChromaSystem::ForViews(const CancellationToken& cancel,
+                            const Order& order,
+                            const Visitor& visit) {
+  const size_t n = views_.size(), at_once = static_cast<size_t>(pool_.thread_count());
+  std::vector<std::shared_ptr<const ChromaPlanes>> planes(at_once);
+  for (size_t begin = 0; begin < n; begin += at_once) {
+    const size_t size = std::min(at_once, n - begin);
+    pool_.ForEach(static_cast<int64_t>(size), [&](int64_t i, int) {
+      const View& view = *views_[order(begin + static_cast<size_t>(i))];
+      planes[i] = view.kept ? nullptr : targets_.Get(view.posed);
+    });
+    for (size_t i = 0; i < size; ++i) {
+      cancel.ThrowIfCancelled();
+      View& view = *views_[order(begin + i)];
+      Enter(view.posed.time_s);
+      visit(view, planes[i].get());
+    }
+  }
+}
+
+// visit(thread, tile) for every tile; a thread's tiles are always the same.
 template <class Visitor>
-void ChromaSystem::ForTiles(View& view, const Visitor& visit) {
+void ChromaSystem::ForTiles(View& view, const ChromaPlanes* planes, const Visitor& visit) {
   if (!view.kept) BinView(view.camera);
   const int threads = pool_.thread_count();
   pool_.ForRanges(threads, [&](int64_t thread, int64_t, int) {
     TileWeights made;
-    for (int tile = static_cast<int>(thread); tile < view.tiles; tile += threads) {
-      if (!view.kept) {
-        BuildTileWeights(splats_, lists_, tile, view.camera.width, view.camera.height, made);
+    alignas(64) float target[kTileFloats], mask[kTilePixels], d[kTileFloats];
+    for (int i = static_cast<int>(thread); i < view.tiles; i += threads) {
+      if (view.kept) {
+        visit(static_cast<int>(thread),
+              Tile{view.weights[i], view.Target(i), view.Mask(i), view.D(i)});
+        continue;
       }
-      visit(tile, static_cast<int>(thread), view.kept ? view.weights[tile] : made);
+      LoadTile(
+          *planes, i % lists_.tiles_x * kTileSide, i / lists_.tiles_x * kTileSide, target, mask);
+      BuildTileWeights(splats_, lists_, i, view.camera.width, view.camera.height, made);
+      visit(static_cast<int>(thread), Tile{made, target, mask, d});
     }
   });
 }
@@ -186,8 +198,10 @@ void ChromaSystem::Basis(const RasterCamera& camera, int64_t i, float* basis) co
   EvaluateSh(coefficients_, d[0] * inverse, d[1] * inverse, d[2] * inverse, basis);
 }
 
-void ChromaSystem::SetValues(const RasterCamera& camera, const ChromaVector& x) {
-  value_.resize(2 * static_cast<size_t>(count()));
+void ChromaSystem::SetValues(const RasterCamera& camera,
+                             const ChromaVector& x,
+                             AlignedFloats& value) {
+  value.resize(2 * static_cast<size_t>(count()));
   pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
     float basis[kMaxShCoefficients];
     if (coefficients_ == 1) EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
@@ -198,8 +212,8 @@ void ChromaSystem::SetValues(const RasterCamera& camera, const ChromaVector& x) 
         a += basis[k] * x[(i * coefficients_ + k) * 2];
         b += basis[k] * x[(i * coefficients_ + k) * 2 + 1];
       }
-      value_[2 * i] = static_cast<float>(a);
-      value_[2 * i + 1] = static_cast<float>(b);
+      value[2 * i] = static_cast<float>(a);
+      value[2 * i + 1] = static_cast<float>(b);
     }
   });
 }
@@ -310,24 +324,21 @@ double ChromaSystem::Sweep(const RobustWeights& robust,
   const size_t n = views_.size();
   size_t stride = std::max<size_t>(1, static_cast<size_t>(0.618 * static_cast<double>(n)));
   while (std::gcd(stride, n) > 1) ++stride;
-  for (size_t k = 0; k < n; ++k) {
-    cancel.ThrowIfCancelled();
-    View& view = *views_[k * stride % n];
-    Enter(view.time_s);
-    SetValues(view.camera, x);
-    ForTiles(view, [&](int tile, int thread, const TileWeights& weights) {
+  const auto order = [&](size_t k) { return k * stride % n; };
+  ForViews(cancel, order, [&](View& view, const ChromaPlanes* planes) {
+    SetValues(view.camera, x, value_);
+    ForTiles(view, planes, [&](int thread, const Tile& tile) {
       alignas(64) float picture[kTileFloats];
-      float* d = view.D(tile);
-      TileForward(weights, value_.data(), picture);
-      const auto [l1, area] = WeighTile(robust, view.Target(tile), view.Mask(tile), picture, d);
-      for (int i = 0; i < kTileFloats; ++i) picture[i] *= d[i];
+      TileForward(tile.weights, value_.data(), picture);
+      const auto [l1, area] = WeighTile(robust, tile.target, tile.mask, picture, tile.d);
+      for (int i = 0; i < kTileFloats; ++i) picture[i] *= tile.d[i];
       pixel_sums_[thread].l1 += l1;
       pixel_sums_[thread].weight += area;
-      TileAdjoint(weights, picture, sums_[thread].data());
-      TileAdjoint(weights, d, right_[thread].data());
+      TileAdjoint(tile.weights, picture, sums_[thread].data());
+      TileAdjoint(tile.weights, tile.d, right_[thread].data());
     });
     Step(view.camera, relaxation, rest_weight, seen, x);
-  }
+  });
   return SumOfThreads().Mean();
 }
 
@@ -335,36 +346,34 @@ void ChromaSystem::Reweight(const ChromaVector& x,
                             const RobustWeights& robust,
                             const CancellationToken& cancel,
                             Residuals& out) {
+  robust_ = robust;
+  weighed_at_ = x;
   out.gradient.assign(x.size(), 0.0);
   out.right.assign(x.size(), 0.0);
   out.blocks.assign(static_cast<size_t>(count()) * 2 * coefficients_ * coefficients_, 0.0);
   ResetSums(sums_);
   ResetSums(squares_);
   ResetSums(right_);
-  for (const auto& view : views_) {
-    cancel.ThrowIfCancelled();
-    Enter(view->time_s);
-    SetValues(view->camera, x);
-    ForTiles(*view, [&](int tile, int thread, const TileWeights& weights) {
+  ForViews(cancel, std::identity(), [&](View& view, const ChromaPlanes* planes) {
+    SetValues(view.camera, x, value_);
+    ForTiles(view, planes, [&](int thread, const Tile& tile) {
       alignas(64) float picture[kTileFloats], right[kTileFloats];
-      const float* target = view->Target(tile);
-      float* d = view->D(tile);
-      TileForward(weights, value_.data(), picture);
-      const auto [l1, area] = WeighTile(robust, target, view->Mask(tile), picture, d);
+      TileForward(tile.weights, value_.data(), picture);
+      const auto [l1, area] = WeighTile(robust, tile.target, tile.mask, picture, tile.d);
       for (int i = 0; i < kTileFloats; ++i) {
-        picture[i] *= d[i];
-        right[i] = d[i] * target[i];
+        picture[i] *= tile.d[i];
+        right[i] = tile.d[i] * tile.target[i];
       }
       pixel_sums_[thread].l1 += l1;
       pixel_sums_[thread].weight += area;
-      TileAdjoint(weights, picture, sums_[thread].data());
-      TileAdjoint(weights, right, right_[thread].data());
-      TileSquares(weights, d, squares_[thread].data());
+      TileAdjoint(tile.weights, picture, sums_[thread].data());
+      TileAdjoint(tile.weights, right, right_[thread].data());
+      TileSquares(tile.weights, tile.d, squares_[thread].data());
     });
-    AddSums(view->camera, sums_, out.gradient);
-    AddSums(view->camera, right_, out.right);
-    AddBlocks(view->camera, out.blocks);
-  }
+    AddSums(view.camera, sums_, out.gradient);
+    AddSums(view.camera, right_, out.right);
+    AddBlocks(view.camera, out.blocks);
+  });
   out.mean_l1 = SumOfThreads().Mean();
 }
 
@@ -373,21 +382,27 @@ void ChromaSystem::Multiply(const ChromaVector& x,
                             ChromaVector& y) {
   y.assign(x.size(), 0.0);
   ResetSums(sums_);
-  for (size_t k = 0; k < views_.size(); ++k) {
-    View& view = *views_[k];
-    cancel.ThrowIfCancelled();
-    Enter(view.time_s);
-    // Values of degree 0 are the same for all views.
-    if (k == 0 || coefficients_ > 1) SetValues(view.camera, x);
-    ForTiles(view, [&](int tile, int thread, const TileWeights& weights) {
+  // Values of degree 0 are the same for all views.
+  bool has_values = false, has_weighed_values = false;
+  ForViews(cancel, std::identity(), [&](View& view, const ChromaPlanes* planes) {
+    if (!has_values) SetValues(view.camera, x, value_);
+    has_values = coefficients_ == 1;
+    if (!view.kept && !has_weighed_values) {
+      SetValues(view.camera, weighed_at_, weighed_value_);
+      has_weighed_values = coefficients_ == 1;
+    }
+    ForTiles(view, planes, [&](int thread, const Tile& tile) {
       alignas(64) float picture[kTileFloats];
-      const float* d = view.D(tile);
-      TileForward(weights, value_.data(), picture);
-      for (int i = 0; i < kTileFloats; ++i) picture[i] *= d[i];
-      TileAdjoint(weights, picture, sums_[thread].data());
+      if (!view.kept) {
+        TileForward(tile.weights, weighed_value_.data(), picture);
+        WeighTile(robust_, tile.target, tile.mask, picture, tile.d);
+      }
+      TileForward(tile.weights, value_.data(), picture);
+      for (int i = 0; i < kTileFloats; ++i) picture[i] *= tile.d[i];
+      TileAdjoint(tile.weights, picture, sums_[thread].data());
     });
     AddSums(view.camera, sums_, y);
-  }
+  });
 }
 
 }  // namespace color3d

@@ -1,8 +1,9 @@
 // The linear system of chroma on fixed geometry. A picture's chroma, measured from neutral, is
 // W c: blending weights times spherical harmonics (the background is neutral, so it drops out).
 // Weighted least squares asks for W^T D W c = W^T D t with the target t and pixel weights D. The
-// products are matrix-free over the views; blending weights are kept (chroma_weights.h) as far as a
-// byte budget reaches and made again from the splats for the other views.
+// products are matrix-free over the views; blending weights (chroma_weights.h), targets and D are
+// kept as far as a byte budget reaches. For the other views they are made again each time from the
+// splats, the targets, and the coefficients of the last reweighting: the same to the bit.
 // Internal to the splat module. Not thread-safe; uses the pool's threads. Deterministic for a
 // thread count.
 #pragma once
@@ -13,7 +14,7 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/parallel.h"
-#include "core/splat/chroma/chroma_weights.h"
+#include "core/splat/chroma/chroma_tile.h"
 #include "core/splat/model/parameter_block.h"
 #include "core/splat/motion/geometry_in_time.h"
 #include "core/splat/raster/binning.h"
@@ -24,38 +25,26 @@ namespace color3d {
 // Coefficient k of channel c (0: a', 1: b') of Gaussian i at [(i * coefficients + k) * 2 + c].
 using ChromaVector = std::vector<double>;
 
-// D = weight / max(|residual|, floor) * scale for least absolute residuals by reweighting (Holland
-// & Welsch 1977), or the plain weight. All in units of a' and b'.
-struct RobustWeights {
-  bool on = true;
-  double scale = 4.0 / 255.0;
-  double floor =
-      0.25 / 255.0;  // below it |residual| becomes quadratic: half a step of 8-bit chroma
-};
-
 class ChromaSystem {
  public:
   // `parameters` holds the geometry and has the rows of `color` (two channels of 1 or 4
-  // coefficients); `in_time` takes them to a view's moment. All must outlive this object.
+  // coefficients); `in_time` takes them to a view's moment; `targets` gives those of views that are
+  // beyond the budget. All must outlive this object.
   ChromaSystem(const ParameterBlock& parameters,
                const ColorSpec& color,
                GeometryInTime& in_time,
+               ChromaTargets& targets,
                int64_t budget_bytes,
                ThreadPool& pool);
   ~ChromaSystem();
 
-  // `ab`: 2 channels, target chroma from neutral; `weight`, `confidence`: 1 channel, 0..1. With
-  // `keep` false only the sums below are taken.
-  void AddView(const RasterCamera& camera,
-               double time_s,
-               const PlaneBuffer& ab,
-               const PlaneBuffer& weight,
-               const PlaneBuffer& confidence,
-               bool keep);
+  // `planes`: what `targets` gives for the view, with its confidence. With `solve` false only the
+  // sums below are taken. Whether the view is within the budget.
+  bool AddView(const PosedCamera& view, const ChromaPlanes& planes, bool solve);
 
   int64_t count() const { return parameters_.count(); }
   int coefficients() const { return coefficients_; }
-  int64_t kept_bytes() const { return kept_bytes_; }
+  int64_t kept_bytes() const;  // of all views, at most the budget
   // Over all views and pixels: sum of weight w, [i], and of weight w t, [2 i + c].
   const std::vector<double>& seen_weight() const { return seen_weight_; }
   const std::vector<double>& target_sum() const { return target_sum_; }
@@ -91,6 +80,7 @@ class ChromaSystem {
 
  private:
   struct View;
+  struct Tile;
   using Sums = std::vector<AlignedFloats>;  // per thread, two numbers per Gaussian
   struct PixelSums {
     double l1 = 0.0;
@@ -98,12 +88,15 @@ class ChromaSystem {
     double Mean() const { return weight > 0.0 ? l1 / weight : 0.0; }
   };
 
+  bool Keep(std::unique_ptr<View> view);
+  template <class Order, class Visitor>
+  void ForViews(const CancellationToken& cancel, const Order& order, const Visitor& visit);
   template <class Visitor>
-  void ForTiles(View& view, const Visitor& visit);
+  void ForTiles(View& view, const ChromaPlanes* planes, const Visitor& visit);
   void BinView(const RasterCamera& camera);
   void Enter(double time_s) { at_ = &in_time_.At(parameters_, time_s); }
   void Basis(const RasterCamera& camera, int64_t i, float* basis) const;
-  void SetValues(const RasterCamera& camera, const ChromaVector& x);
+  void SetValues(const RasterCamera& camera, const ChromaVector& x, AlignedFloats& value);
   PixelSums SumOfThreads();
   void AddSums(const RasterCamera& camera, Sums& sums, ChromaVector& y);
   void AddBlocks(const RasterCamera& camera, std::vector<double>& blocks);
@@ -117,18 +110,21 @@ class ChromaSystem {
   const ParameterBlock& parameters_;
   ColorSpec color_;
   GeometryInTime& in_time_;
+  ChromaTargets& targets_;
   const ParameterBlock* at_;  // parameters_ at the moment of the view at hand
   int coefficients_;
   int64_t budget_bytes_;
-  int64_t kept_bytes_ = 0;
+  bool is_full_ = false;  // a view did not fit
   ThreadPool& pool_;
   std::vector<std::unique_ptr<View>> views_;
   std::vector<double> seen_weight_, target_sum_, confidence_sum_;
+  RobustWeights robust_;     // of the last reweighting
+  ChromaVector weighed_at_;  // where it was
   // Work space.
   SplatBuffer splats_;
   TileBinner binner_;
   TileLists lists_;
-  AlignedFloats value_;  // two per Gaussian, of the view at hand
+  AlignedFloats value_, weighed_value_;  // two per Gaussian, of the view at hand
   Sums sums_, squares_, right_;
   std::vector<PixelSums> pixel_sums_;  // per thread
 };

@@ -77,4 +77,33 @@ bool LoadChromaPlanes(const ChromaProblem& problem, const PosedCamera& view, Chr
   return true;
 }
 
+std::shared_ptr<const ChromaPlanes> ChromaTargets::Get(const PosedCamera& view) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto found = kept_.find(view.view);
+    if (found != kept_.end()) return found->second;
+  }
+  auto planes = std::make_shared<ChromaPlanes>();
+  if (!LoadChromaPlanes(problem_, view, planes.get())) return nullptr;
+  planes->confidence = {};
+  return planes;
+}
+
+void ChromaTargets::Offer(const PosedCamera& view, ChromaPlanes planes) {
+  planes.confidence = {};
+  const auto bytes =
+      static_cast<int64_t>((planes.ab.data.size() + planes.weight.data.size()) * sizeof(float));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (kept_bytes_ + bytes > budget_bytes_) return;
+  if (!kept_.emplace(view.view, std::make_shared<const ChromaPlanes>(std::move(planes))).second) {
+    return;
+  }
+  kept_bytes_ += bytes;
+}
+
+int64_t ChromaTargets::kept_bytes() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return kept_bytes_;
+}
+
 }  // namespace color3d

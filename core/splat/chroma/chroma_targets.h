@@ -1,8 +1,11 @@
 // Target chroma of the training views in the kernels' form, checked at the door. Internal to the
-// splat module. Not thread-safe.
+// splat module.
 #pragma once
 
-#include <vector>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
 
 #include "core/simd/plane_buffer.h"
 #include "core/splat/chroma/chroma_fit.h"
@@ -19,5 +22,28 @@ struct ChromaPlanes {
 // Reads the target of one view. False when it has none. Throws Error{kInvalidArgument} for another
 // size, chroma that is not finite and weights that are not in 0..1, with the view and the pixel.
 bool LoadChromaPlanes(const ChromaProblem& problem, const PosedCamera& view, ChromaPlanes* planes);
+
+// Targets that are asked for again and again: kept within a byte budget, first come first kept, and
+// read again where they are not, so that memory does not grow with the number of views. Thread-safe
+// as far as the problem's source is.
+class ChromaTargets {
+ public:
+  // `problem` must outlive this object.
+  ChromaTargets(const ChromaProblem& problem, int64_t budget_bytes)
+      : problem_(problem), budget_bytes_(budget_bytes) {}
+
+  // Without their confidence. Null when the view has no colours. Throws as LoadChromaPlanes.
+  std::shared_ptr<const ChromaPlanes> Get(const PosedCamera& view);
+  // What has just been read of a view: kept as far as the budget reaches.
+  void Offer(const PosedCamera& view, ChromaPlanes planes);
+  int64_t kept_bytes() const;
+
+ private:
+  const ChromaProblem& problem_;
+  const int64_t budget_bytes_;
+  mutable std::mutex mutex_;  // guards all below
+  int64_t kept_bytes_ = 0;
+  std::map<int, std::shared_ptr<const ChromaPlanes>> kept_;  // by view
+};
 
 }  // namespace color3d

@@ -1,6 +1,7 @@
 // What geometry is trained on: cameras, pictures and the first Gaussians.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "core/scene/scene.h"
@@ -21,6 +22,9 @@ struct GeometryProblem {
   // degree.
   GaussianModel initial;
   double extent = 1.0;  // of the scene, world units
+  // Of pictures that are kept in the kernels' form, and a quarter of it of masks; the others are
+  // asked for again.
+  int64_t picture_cache_bytes = int64_t{512} << 20;
 };
 
 enum class TrainingColors { kLuminance, kSrgb };

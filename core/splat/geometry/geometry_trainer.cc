@@ -23,8 +23,6 @@
 namespace color3d {
 namespace {
 
-constexpr int64_t kTargetBudgetBytes = int64_t{512} << 20;
-constexpr int64_t kMaskBudgetBytes = int64_t{128} << 20;
 constexpr double kErrorReports = 100.0;
 constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
@@ -47,8 +45,8 @@ class GeometryTrainer {
         targets_(problem.colors ? problem.colors : problem.luminance,
                  channels_,
                  problem.colors ? 1.0f : 0.01f,
-                 kTargetBudgetBytes),
-        masks_(problem.mask, 1, 1.0f, kMaskBudgetBytes, ResizeMask) {
+                 problem.picture_cache_bytes),
+        masks_(problem.mask, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask) {
     state_.parameters = FirstParameters(
         problem.initial, channels_, ShCoefficients(options.sh_degree), options.max_gaussians);
     const int rows = state_.parameters.rows();

@@ -1,10 +1,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
+#include <set>
 
 #include "core/splat/geometry/motion_survey.h"
 #include "core/splat/geometry/mover_seeds.h"
+#include "core/splat/geometry/moving_part.h"
 #include "core/splat/motion/motion.h"
 
 namespace color3d {
@@ -149,6 +153,81 @@ TEST(MoverSeedsTest, OneCameraPutsThemBeforeTheWall) {
     EXPECT_GT(seeds.block.Row(2)[i], 0.5);
     EXPECT_TRUE(std::isfinite(seeds.block.Row(kLogScaleRow)[i]));
   }
+}
+
+std::vector<PosedCamera> PosedRig(int cameras, int times) {
+  std::vector<PosedCamera> views;
+  for (int camera = 0; camera < cameras; ++camera) {
+    for (int t = 0; t < times; ++t) views.push_back(CameraAt(0.1 * camera, camera, t));
+  }
+  return views;
+}
+
+TEST(BlocksOfTimeTest, AreBoundedAndTearNoMomentApart) {
+  struct Case {
+    int cameras, times;
+    size_t blocks, largest;
+  };
+  for (const Case& c : {Case{1, 100, 1, 100},
+                        Case{1, 400, 4, 100},
+                        Case{4, 100, 4, 100},
+                        Case{1, 12'800, 100, 128},
+                        Case{20, 50, 2, 500},  // 24 times tell what stands still
+                        Case{30, 12, 1, 360}}) {
+    const auto blocks = BlocksOfTime(PosedRig(c.cameras, c.times));
+    EXPECT_EQ(blocks.size(), c.blocks);
+    size_t views = 0, largest = 0;
+    double begin_s = 0.0;
+    for (const std::vector<PosedCamera>& block : blocks) {
+      views += block.size();
+      largest = std::max(largest, block.size());
+      double end_s = 0.0;
+      for (const PosedCamera& view : block) {
+        EXPECT_GE(view.time_s, begin_s);
+        end_s = std::max(end_s, view.time_s);
+      }
+      begin_s = end_s + 1.0;
+    }
+    EXPECT_EQ(views, static_cast<size_t>(c.cameras * c.times));
+    EXPECT_EQ(largest, c.largest);
+  }
+}
+
+// A long film is surveyed block by block: what moves is seeded in all of them.
+TEST(FindMovingPartTest, ALongFilmHasMoversAtAllTimes) {
+  constexpr int kFrames = 300, kMost = 3000;
+  GeometryProblem problem;
+  for (int t = 0; t < kFrames; ++t) {
+    problem.training.push_back(CameraAt(0.0, 0, 4.0 * t / (kFrames - 1)));
+    problem.training.back().view = t;
+  }
+  ParameterBlock wall(kColorRow + 1, 1);  // one large Gaussian
+  wall.Row(kPositionRow + 2)[0] = static_cast<float>(kWall);
+  for (int k = 0; k < 3; ++k) wall.Row(kLogScaleRow + k)[0] = k == 2 ? -3.0f : 3.0f;
+  wall.Row(kRotationRow)[0] = 1.0f;
+  wall.Row(kOpacityRow)[0] = 5.0f;
+  ColorSpec color;
+  color.channel[0] = {kColorRow, 1, 0.5f, true};
+  const LevelTarget target = [](const PosedCamera& posed, int) {
+    return std::make_shared<const PlaneBuffer>(
+        PlanesFromImage(ViewAt(0.0, 0, posed.time_s, true).luminance, 0.0f, 1.0f));
+  };
+  GeometryOptions options;
+  options.sh_degree = 0;
+  options.max_gaussians = kMost;
+  ThreadPool pool(2);
+  const FoundMovers found =
+      FindMovingPart(problem, TimeSpanOf(problem), wall, color, target, options, pool);
+  EXPECT_GT(found.moving_share, 0.02);
+  const ParameterBlock& movers = found.moving.parameters;
+  EXPECT_LE(movers.count(), kMost);
+  EXPECT_GT(movers.count(), kMost / 20);
+  std::set<int> tenths;
+  for (int64_t i = 0; i < movers.count(); ++i) {
+    const float t = movers.Row(wall.rows() + kCenterRow)[i];
+    tenths.insert(std::min(9, static_cast<int>(5.0f * (t + 1.0f))));
+  }
+  EXPECT_EQ(tenths.size(), 10u);
 }
 
 TEST(MoverSeedsTest, NothingMovesNothingIsSeeded) {

@@ -41,15 +41,16 @@ void TakeMasked(const Image& mask, const Image& luminance, Image& drawn) {
   }
 }
 
-// The training views as they are and as `still` draws them.
+// These training views as they are and as `still` draws them.
 std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
+                                        const std::vector<PosedCamera>& training,
                                         const ParameterBlock& still,
                                         const ColorSpec& color,
                                         const LevelTarget& target,
                                         ThreadPool& pool) {
   std::vector<SurveyedView> views;
   SplatPipeline pipeline;
-  for (const PosedCamera& posed : problem.training) {
+  for (const PosedCamera& posed : training) {
     int level = 0;
     while (std::max(posed.camera.width, posed.camera.height) >> level > kSurveySidePx) ++level;
     const std::shared_ptr<const PlaneBuffer> picture = target(posed, level);
@@ -70,6 +71,18 @@ std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
     views.push_back(std::move(view));
   }
   return views;
+}
+
+void Append(const ParameterBlock& more, ParameterBlock* all) {
+  if (all->count() == 0) {
+    *all = more;
+    return;
+  }
+  const int64_t first = all->count();
+  all->Resize(first + more.count());
+  for (int row = 0; row < all->rows(); ++row) {
+    std::copy_n(more.Row(row), more.count(), all->Row(row) + first);
+  }
 }
 
 DensifyStatistics Part(const DensifyStatistics& all, int64_t begin, int64_t end) {
@@ -96,6 +109,20 @@ TimeSpan TimeSpanOf(const GeometryProblem& problem) {
   return {*times.begin(), *times.rbegin(), static_cast<int>(times.size())};
 }
 
+std::vector<std::vector<PosedCamera>> BlocksOfTime(const std::vector<PosedCamera>& views) {
+  std::set<double> all;
+  for (const PosedCamera& view : views) all.insert(view.time_s);
+  const std::vector<double> times(all.begin(), all.end());
+  const size_t wanted = std::max<size_t>(1, (views.size() + kViewsAtOnce - 1) / kViewsAtOnce);
+  const size_t count = std::clamp<size_t>(times.size() / kFewestTimesAtOnce, 1, wanted);
+  std::vector<std::vector<PosedCamera>> blocks(count);
+  for (const PosedCamera& view : views) {
+    const auto time = std::lower_bound(times.begin(), times.end(), view.time_s) - times.begin();
+    blocks[static_cast<size_t>(time) * count / times.size()].push_back(view);
+  }
+  return blocks;
+}
+
 FoundMovers FindMovingPart(const GeometryProblem& problem,
                            const TimeSpan& times,
                            const ParameterBlock& still,
@@ -103,21 +130,28 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
                            const LevelTarget& target,
                            const GeometryOptions& options,
                            ThreadPool& pool) {
-  std::vector<SurveyedView> views = SurveyedViews(problem, still, color, target, pool);
-  FoundMovers found;
-  found.moving_share = SurveyMotion(pool, views).moving_share;
-  if (found.moving_share < kStillShare) return found;
-  std::vector<float> unit_time;
-  for (const PosedCamera& view : problem.training) unit_time.push_back(times.UnitTime(view.time_s));
   MoverSeedOptions seeds;
   seeds.rows = still.rows();
   seeds.channels = color.channels;
   seeds.coefficients = ShCoefficients(options.sh_degree);
-  seeds.most = static_cast<int64_t>(kMoverShare * static_cast<double>(options.max_gaussians));
   seeds.width = TuningOf(options).seed_width;
   seeds.interval = times.Interval();
+  FoundMovers found;
   ParameterBlock& parameters = found.moving.parameters;
-  parameters = SeedMovers(views, unit_time, seeds, pool);
+  for (const std::vector<PosedCamera>& block : BlocksOfTime(problem.training)) {
+    std::vector<SurveyedView> views = SurveyedViews(problem, block, still, color, target, pool);
+    const double share =
+        static_cast<double>(block.size()) / static_cast<double>(problem.training.size());
+    found.moving_share += share * SurveyMotion(pool, views).moving_share;
+    seeds.most = static_cast<int64_t>(share * kMoverShare * options.max_gaussians);
+    std::vector<float> unit_time;
+    for (const PosedCamera& view : block) unit_time.push_back(times.UnitTime(view.time_s));
+    Append(SeedMovers(views, unit_time, seeds, pool), &parameters);
+  }
+  if (found.moving_share < kStillShare) {
+    parameters = {};
+    return found;
+  }
   const ParameterBlock zero(parameters.rows(), parameters.count());
   found.moving.moments = {zero, zero};
   return found;

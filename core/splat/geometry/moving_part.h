@@ -3,6 +3,7 @@
 // Deterministic whatever the thread count.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -36,6 +37,14 @@ struct TimeSpan {
   float UnitTime(double time_s) const;
 };
 TimeSpan TimeSpanOf(const GeometryProblem& problem);
+
+// Motion is looked for in blocks of time, so that memory does not grow with the scene's length:
+// some blocks of about as many times each where there are more views than these, but not fewer
+// times than tell what stands still.
+inline constexpr size_t kViewsAtOnce = 128;
+inline constexpr size_t kFewestTimesAtOnce = 24;
+// Each view once, in the given order; those of one time are in one block.
+std::vector<std::vector<PosedCamera>> BlocksOfTime(const std::vector<PosedCamera>& views);
 
 // The picture of a view at a level.
 using LevelTarget =

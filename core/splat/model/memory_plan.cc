@@ -17,8 +17,12 @@ constexpr int64_t kPairsPerTile = 400;
 constexpr int64_t kTilePx = 256;
 constexpr int64_t kWorkBytesPerPixel = 80;   // pictures, gradients and filtered moments of the loss
 constexpr int64_t kPhotoBytesPerPixel = 36;  // decoded (3 x 16 bit), as float, turned, undistorted
-constexpr int64_t kTargetCacheBytes = 512 * kMiB;  // of the trainer
+// At most, of the trainer's pictures and of decoded ones.
+constexpr int64_t kTargetCacheBytes = 512 * kMiB;
 constexpr int64_t kImageCacheBytes = 1024 * kMiB;
+constexpr int64_t kFrameTargetCacheBytes = 128 * kMiB;  // of a scene that moves
+constexpr int64_t kFrameCacheBytes = 32 * kMiB;
+constexpr int64_t kSurveyBytes = 80 * kMiB;  // of what moves
 constexpr int kSmallestSidePx = 64;
 constexpr double kSideStep = 0.85;
 constexpr int64_t kFewestGaussians = 1000;
@@ -48,12 +52,16 @@ int64_t PhotoBytes(const MemoryDemand& demand) {
   return most;
 }
 
+int64_t TargetCacheBytes(const MemoryDemand& demand) {
+  return demand.moves ? kFrameTargetCacheBytes : kTargetCacheBytes;
+}
+
 // All but the Gaussians.
 int64_t FixedBytes(const MemoryDemand& demand, int side) {
   const PixelCounts px = WorkingPixels(demand, side);
   // The trainer keeps pictures at two sizes (4 + 1 bytes a pixel) within its own budget.
   return kProgramBytes + PhotoBytes(demand) + kWorkBytesPerPixel * px.largest +
-         std::min(kTargetCacheBytes, 5 * px.all) +
+         std::min(TargetCacheBytes(demand), 5 * px.all) + (demand.moves ? kSurveyBytes : 0) +
          kBytesPerPair * kPairsPerTile * (px.largest / kTilePx + 1);
 }
 
@@ -110,7 +118,8 @@ MemoryPlan PlanGeometryMemory(const MemoryDemand& demand, int64_t budget_bytes) 
     break;
   }
   const int64_t least = GeometryBytes(demand, plan.max_side_px, plan.max_gaussians);
-  plan.image_cache_bytes = std::min({kImageCacheBytes,
+  plan.target_cache_bytes = TargetCacheBytes(demand);
+  plan.image_cache_bytes = std::min({demand.moves ? kFrameCacheBytes : kImageCacheBytes,
                                      4 * WorkingPixels(demand, plan.max_side_px).all,
                                      std::max<int64_t>(0, budget_bytes - least)});
   plan.estimated_bytes = least + plan.image_cache_bytes;

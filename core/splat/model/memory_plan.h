@@ -25,13 +25,15 @@ struct MemoryDemand {
   int max_side_px = 0;      // wanted working size
   int max_gaussians = 0;    // wanted cap
   int sh_degree = 0;        // of luminance, 0..3
+  bool moves = false;       // the views are frames, maybe many: caches stay small
 };
 
 struct MemoryPlan {
   int max_side_px = 0;
   int max_gaussians = 0;
-  int64_t image_cache_bytes = 0;  // for ViewImages
-  int64_t estimated_bytes = 0;    // peak, of all of it
+  int64_t image_cache_bytes = 0;   // for ViewImages
+  int64_t target_cache_bytes = 0;  // for GeometryProblem::picture_cache_bytes
+  int64_t estimated_bytes = 0;     // peak, of all of it
   int64_t budget_bytes = 0;
   std::string note;  // what was reduced and why; empty when nothing was
 };

@@ -31,6 +31,19 @@ TEST(MemoryPlan, PlentyChangesNothing) {
   EXPECT_EQ(BytesPerGaussian(3), 1316);
 }
 
+TEST(MemoryPlan, MoreFramesOfASceneThatMovesTakeNoMoreMemory) {
+  MemoryDemand demand = DemandOf(1600, 1200, 100);
+  const int64_t of_photos = PlanGeometryMemory(demand, 8192 * kMiB).estimated_bytes;
+  demand.moves = true;
+  const MemoryPlan plan = PlanGeometryMemory(demand, 8192 * kMiB);
+  EXPECT_LT(plan.estimated_bytes, of_photos);
+  EXPECT_GT(plan.target_cache_bytes, 0);
+  demand.views.resize(4000, demand.views.front());
+  const MemoryPlan longer = PlanGeometryMemory(demand, 8192 * kMiB);
+  EXPECT_EQ(longer.estimated_bytes, plan.estimated_bytes);
+  EXPECT_EQ(longer.target_cache_bytes, plan.target_cache_bytes);
+}
+
 TEST(MemoryPlan, LessMemoryGivesUpCachesThenGaussiansThenPixels) {
   const MemoryDemand demand = DemandOf(1600, 1200, 50);
   const int64_t wanted = GeometryBytes(demand, 800, 150'000);

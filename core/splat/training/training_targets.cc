@@ -35,6 +35,10 @@ void CheckFinite(const Image& image, int view) {
   }
 }
 
+int64_t BytesOf(const PlaneBuffer& planes) {
+  return static_cast<int64_t>(planes.data.size() * sizeof(float));
+}
+
 }  // namespace
 
 int SizeAtLevel(int size_px, int level) {
@@ -64,12 +68,23 @@ std::shared_ptr<const PlaneBuffer> TrainingTargets::Get(const PosedCamera& view,
   };
   auto planes = std::make_shared<const PlaneBuffer>(
       PlanesFromImage(level == 0 ? *image : reduced(), 0.0f, scale_));
-  const int64_t bytes = static_cast<int64_t>(planes->data.size() * sizeof(float));
-  if (used_bytes_ + bytes <= budget_bytes_) {
-    used_bytes_ += bytes;
-    kept_[{view.view, level}] = planes;
-  }
+  Keep(view.view, level, planes);
   return planes;
+}
+
+void TrainingTargets::Keep(int view, int level, const std::shared_ptr<const PlaneBuffer>& planes) {
+  const int64_t bytes = BytesOf(*planes);
+  for (auto other = kept_.begin(); other != kept_.end() && kept_bytes_ + bytes > budget_bytes_;) {
+    if (other->first.second == level) {
+      ++other;
+      continue;
+    }
+    kept_bytes_ -= BytesOf(*other->second);
+    other = kept_.erase(other);
+  }
+  if (kept_bytes_ + bytes > budget_bytes_) return;
+  kept_bytes_ += bytes;
+  kept_[{view, level}] = planes;
 }
 
 }  // namespace color3d

@@ -1,5 +1,6 @@
-// Pictures to train on, in the kernels' form, kept in memory within a budget. Internal to the splat
-// module. Not thread-safe.
+// Pictures to train on, in the kernels' form, kept in memory within a budget: first come first
+// kept, which is as good as any other choice where the order of asking is random; those of other
+// levels than the one that is asked for make room. Internal to the splat module. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -42,14 +43,17 @@ class TrainingTargets {
   // Picture of a view at a level; null when the source has none. Throws Error{kInvalidArgument}
   // when the picture does not have the camera's size.
   std::shared_ptr<const PlaneBuffer> Get(const PosedCamera& view, int level);
+  int64_t kept_bytes() const { return kept_bytes_; }  // at most the budget
 
  private:
+  void Keep(int view, int level, const std::shared_ptr<const PlaneBuffer>& planes);
+
   const PictureSource& source_;
   int channels_;
   float scale_;
   int64_t budget_bytes_;
   Reduce reduce_;
-  int64_t used_bytes_ = 0;
+  int64_t kept_bytes_ = 0;
   std::map<std::pair<int, int>, std::shared_ptr<const PlaneBuffer>> kept_;
 };
 
