@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/evenly.h"
 #include "core/base/range_check.h"
 #include "core/color/difference.h"
 
@@ -92,11 +93,8 @@ void CheckPicture(const ColoredPicture& p) {
       p.lab.channels);
 }
 
-void AddPairs(int views, int gap, bool long_gap, int most, std::vector<ViewPair>* pairs) {
-  const int64_t there_are = views - gap;
-  const int64_t wanted = std::min<int64_t>(there_are, most);
-  for (int64_t k = 0; k < wanted; ++k) {
-    const int first = static_cast<int>(k * there_are / wanted);
+void AddPairs(int begin, int views, int gap, bool long_gap, std::vector<ViewPair>* pairs) {
+  for (int first = begin; first + gap < begin + views; ++first) {
     pairs->push_back({first, first + gap, long_gap});
   }
 }
@@ -172,11 +170,19 @@ PairDifference CompareMatches(const ColoredPicture& from,
   return {sum.matches, sum.absolute_rgb / count, sum.squared_rgb / count, sum.delta_e00 / count};
 }
 
-std::vector<ViewPair> ConsistencyPairs(int views, int most) {
-  std::vector<ViewPair> pairs;
-  const int long_gap = std::min(kLongGap, views - 1);
-  if (views > kShortGap) AddPairs(views, kShortGap, false, most, &pairs);
-  if (long_gap > kShortGap) AddPairs(views, long_gap, true, most, &pairs);
+std::vector<ViewPair> ConsistencyPairs(const std::vector<int>& groups, int most) {
+  std::vector<ViewPair> short_pairs, long_pairs;
+  int begin = 0;
+  for (const int views : groups) {
+    const int long_gap = std::min(kLongGap, views - 1);
+    AddPairs(begin, views, kShortGap, false, &short_pairs);
+    if (long_gap > kShortGap) AddPairs(begin, views, long_gap, true, &long_pairs);
+    begin += views;
+  }
+  std::vector<ViewPair> pairs = EvenlyOf(short_pairs, static_cast<size_t>(most));
+  for (const ViewPair& pair : EvenlyOf(long_pairs, static_cast<size_t>(most))) {
+    pairs.push_back(pair);
+  }
   std::sort(pairs.begin(), pairs.end(), [](const ViewPair& x, const ViewPair& y) {
     return x.first != y.first ? x.first < y.first : x.second < y.second;
   });

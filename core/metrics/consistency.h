@@ -61,7 +61,6 @@ PairDifference CompareMatches(const ColoredPicture& from,
                               const ColoredPicture& to,
                               const std::vector<PixelMatch>& matches);
 
-// Views are numbered in order of their names.
 struct ViewPair {
   int first = 0;
   int second = 0;
@@ -69,9 +68,11 @@ struct ViewPair {
 };
 inline constexpr int kShortGap = 1;
 inline constexpr int kLongGap = 7;
-// All (i, i + 1) and (i, i + 7), at most `most` of each, evenly spread; by `first`, then `second`.
-// With fewer than 8 views the long gap is that of the first and the last view (none below 3).
-std::vector<ViewPair> ConsistencyPairs(int views, int most);
+// `groups`: how many views each has, which are numbered on from group to group; two of one group
+// are compared. All (i, i + 1) and (i, i + 7), at most `most` of each over all groups, evenly
+// spread; by `first`, then `second`. In a group of fewer than 8 views the long gap is that of the
+// first and the last view (none below 3).
+std::vector<ViewPair> ConsistencyPairs(const std::vector<int>& groups, int most);
 
 struct Consistency {
   int pairs = 0;          // that have matches

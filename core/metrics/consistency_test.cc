@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <tuple>
 
 #include "core/base/error.h"
 #include "core/color/difference.h"
@@ -139,20 +140,31 @@ TEST(CompareMatches, AKnownOffsetIsTheMatchingError) {
 }
 
 TEST(ConsistencyPairs, AreTheShortAndTheLongGapWhateverTheNumberOfViews) {
-  EXPECT_TRUE(ConsistencyPairs(0, 24).empty());
-  EXPECT_TRUE(ConsistencyPairs(1, 24).empty());
-  const auto two = ConsistencyPairs(2, 24);
+  EXPECT_TRUE(ConsistencyPairs({}, 24).empty());
+  EXPECT_TRUE(ConsistencyPairs({1}, 24).empty());
+  const auto two = ConsistencyPairs({2}, 24);
   ASSERT_EQ(two.size(), 1u);
   EXPECT_FALSE(two[0].long_gap);
-  EXPECT_EQ(ConsistencyPairs(5, 24).size(), 5u);  // 4 short ones, first and last
-  EXPECT_EQ(ConsistencyPairs(20, 24).size(), 19u + 13u);
-  const auto many = ConsistencyPairs(1000, 24);
+  EXPECT_EQ(ConsistencyPairs({5}, 24).size(), 5u);  // 4 short ones, first and last
+  EXPECT_EQ(ConsistencyPairs({20}, 24).size(), 19u + 13u);
+  const auto many = ConsistencyPairs({1000}, 24);
   EXPECT_EQ(many.size(), 48u);
   for (size_t i = 0; i < many.size(); ++i) {
     EXPECT_EQ(many[i].second - many[i].first, many[i].long_gap ? 7 : 1);
     EXPECT_LT(many[i].second, 1000);
     EXPECT_GE(many[i].first, many[i == 0 ? 0 : i - 1].first);
   }
+}
+
+TEST(ConsistencyPairs, AreOfOneGroup) {
+  // Views 0..3 are of one moment, 4 of another, 5..6 of a third.
+  const auto pairs = ConsistencyPairs({4, 1, 2}, 24);
+  std::vector<std::tuple<int, int, bool>> found;
+  for (const ViewPair& pair : pairs) found.emplace_back(pair.first, pair.second, pair.long_gap);
+  EXPECT_EQ(found,
+            (std::vector<std::tuple<int, int, bool>>{
+                {0, 1, false}, {0, 3, true}, {1, 2, false}, {2, 3, false}, {5, 6, false}}));
+  EXPECT_EQ(ConsistencyPairs(std::vector<int>(100, 4), 24).size(), 48u);
 }
 
 TEST(ConsistencyMeter, WeighsMatchesForMeAndPairsForTc) {

@@ -37,7 +37,7 @@ class Scorer {
   }
 
   SceneConsistency Score() {
-    const auto pairs = ConsistencyPairs(source_.views, kMaxPairs);
+    const auto pairs = ConsistencyPairs(source_.groups, kMaxPairs);
     with_truth_ = std::all_of(pairs.begin(), pairs.end(), [&](const ViewPair& pair) {
       return source_.has_truth(pair.first) && source_.has_truth(pair.second);
     });

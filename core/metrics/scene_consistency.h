@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "core/base/cancellation.h"
 #include "core/base/parallel.h"
@@ -21,7 +22,9 @@ struct ConsistencySource {
     Image lab;  // 3 channels
   };
 
-  int views = 0;  // in order of their names
+  // Which views are compared (ConsistencyPairs): how many there are of each group, numbered on from
+  // group to group.
+  std::vector<int> groups;
   // The coloured model as a view sees it. Called for one view at a time: it may use the pool.
   std::function<Rendered(int view)> render;
   // The photo with the colours that were predicted for it, 3 channels of Lab. Called from several
@@ -38,7 +41,7 @@ struct SceneConsistency {
   std::optional<Consistency> truth;  // the true colours: what the photos themselves leave
 };
 
-// Over ConsistencyPairs of all views, training and held-out ones alike; matches come from the
+// Over ConsistencyPairs of all groups, training and held-out ones alike; matches come from the
 // model's own depth. The truth is scored when every view of the pairs has one. Throws
 // Error{kCancelled} and what the source throws.
 SceneConsistency MeasureConsistency(const ConsistencySource& source,

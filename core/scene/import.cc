@@ -12,6 +12,7 @@
 #include "core/scene/formats/colmap_model.h"
 #include "core/scene/formats/nerfies.h"
 #include "core/scene/formats/scene_readers.h"
+#include "core/scene/held_out.h"
 #include "core/scene/lens.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/normalise.h"
@@ -227,6 +228,7 @@ void ImportOptions::Validate() const {
   check("sfm_max_image_side_px", sfm_max_image_side_px, 256, 4096);
   check("sfm_max_features", sfm_max_features, 512, 16384);
   check("sfm_neighbors", sfm_neighbors, 2, 100);
+  check("hold_out_block", hold_out_block, 0.0, 0.5);
   check("sfm_timeout", sfm_timeout.count(), 1, 7 * 24 * 3600);
 }
 
@@ -309,6 +311,7 @@ void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
   AddRandomPointsWhenEmpty(result);
   if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result->warnings);
   if (!options.hold_out_camera.empty()) HoldOutCamera(options.hold_out_camera, result);
+  if (options.hold_out_block > 0.0) HoldOutBlock(options.hold_out_block, &scene);
   if (scene.TrainingViews().size() < kMinTrainingViews) {
     throw InvalidArgument("only {} view is left to learn from when the others are held out",
                           scene.TrainingViews().size());

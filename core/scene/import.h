@@ -24,6 +24,8 @@ struct ImportOptions {
   // Of a dynamic scene of several cameras: all views of this one, by its name or folder. Empty:
   // none.
   std::string hold_out_camera;
+  // Of views with times: this share of the moments as one block, in the middle (held_out.h). 0: no.
+  double hold_out_block = 0.0;  // 0..0.5
   // Structure-from-motion (only when the input has no poses).
   int sfm_max_image_side_px = 1600;  // 256..4096
   int sfm_max_features = 4096;       // 512..16384, per photo

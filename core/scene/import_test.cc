@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/scene_writers.h"
@@ -147,6 +148,23 @@ TEST_F(Import, AWholeCameraIsHeldOut) {
   }
   options_.hold_out_camera = "cam09";
   EXPECT_THAT(Said(), HasSubstr("no camera 'cam09'; the scene has cam00, cam01, cam02"));
+}
+
+TEST_F(Import, ABlockOfTimeIsHeldOutBesideCamerasAndMoments) {
+  RigScene(20, folder_.path());
+  options_.hold_out_every_eighth = true;
+  options_.hold_out_camera = "cam01";
+  options_.hold_out_block = 0.2;
+  for (const View& view : Run().scene.views) {
+    const auto step = std::lround(10.0 * view.time_s());
+    EXPECT_EQ(view.held_out,
+              view.name.starts_with("cam1/") || step % 8 == 4 || (step >= 8 && step < 12))
+        << view.name;
+  }
+  options_.hold_out_block = 0.6;
+  EXPECT_THAT(Said(), HasSubstr("hold_out_block is 0.6; it must be 0 to 0.5"));
+  options_.hold_out_block = 0.05;
+  EXPECT_THAT(Said(), HasSubstr("less than two of them"));
 }
 
 TEST_F(Import, TimesWithoutPosesAreAFilm) {

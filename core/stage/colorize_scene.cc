@@ -32,6 +32,17 @@ ReportPicture Picture(const StageContext& context, const std::string& name, std:
   return {std::move(caption), EncodeJpeg(FitWithin(image, kReportSidePx), 88)};
 }
 
+// The means by how views are held out, where that is more than one way.
+void AddByHeldOut(const ordered_json& scores, ordered_json* metrics) {
+  if (!scores.contains("held_out") || scores.at("held_out").size() < 2) return;
+  for (const auto& [how, means] : scores.at("held_out").items()) {
+    for (const char* name :
+         {"views", "psnr_rgb", "psnr_l", "delta_e00_chroma", "delta_e00_chroma_2d"}) {
+      if (means.contains(name)) (*metrics)[fmt::format("{}_{}", name, how)] = means.at(name);
+    }
+  }
+}
+
 // Keys in the order in which people read them.
 ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                             const std::vector<std::string>& keys,
@@ -40,7 +51,8 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                             StageContext& context) {
   ordered_json metrics = ordered_json::object();
   if (context.HasInput(artifact::kScores)) {
-    const auto mean = ReadJson(context, artifact::kScores).at("mean");
+    const auto scores = ReadJson(context, artifact::kScores);
+    const auto& mean = scores.at("mean");
     for (const char* name : {"psnr_rgb",
                              "ssim_rgb",
                              "psnr_l",
@@ -57,6 +69,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                              "colorfulness_ratio_bound"}) {
       if (mean.contains(name)) metrics[name] = mean.at(name);
     }
+    AddByHeldOut(scores, &metrics);
   }
   metrics["key_views"] = keys;
   if (next) {

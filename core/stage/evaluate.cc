@@ -2,7 +2,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "core/color/difference.h"
 #include "core/color/lab.h"
@@ -10,6 +12,7 @@
 #include "core/image/codec.h"
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/view_scores.h"
+#include "core/scene/held_out.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
@@ -81,8 +84,19 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   NoCheckpoints none;
   return FitChroma(geometry,
                    ChromaProblemOf(scene, images, targets),
-                   options,
+                   scene.IsDynamic() ? ForManyFrames(options) : options,
                    {context.pool(), none, progress, context.cancel()});
+}
+
+// In order of time: cameras of one moment, since between moments things move. Of photos, and where
+// one camera took all, neighbours of all.
+std::vector<int> GroupsToCompare(const Scene& scene) {
+  std::map<double, int> moments;
+  for (const View& view : scene.views) ++moments[view.time_s()];
+  std::vector<int> groups;
+  for (const auto& [time_s, views] : moments) groups.push_back(views);
+  if (groups.size() < scene.views.size()) return groups;
+  return {static_cast<int>(scene.views.size())};
 }
 
 SceneConsistency CompareViews(const Scene& scene,
@@ -91,8 +105,10 @@ SceneConsistency CompareViews(const Scene& scene,
                               StageContext& context) {
   const ViewImages images(scene, context.scene_folder(), kConsistencySidePx, 0);
   ConsistencySource source;
-  source.views = static_cast<int>(scene.views.size());
-  source.render = [&](int view) {
+  source.groups = GroupsToCompare(scene);
+  const std::vector<int> order = scene.ViewsInOrderOfTime();
+  source.render = [&](int number) {
+    const int view = order[number];
     const Pose& pose = scene.views[view].cam_from_world;
     const Camera camera = images.WorkingCamera(view);
     RenderedView rendered =
@@ -101,13 +117,16 @@ SceneConsistency CompareViews(const Scene& scene,
     return ConsistencySource::Rendered{{camera, pose, std::move(rendered.depth)},
                                        std::move(rendered.lab)};
   };
-  source.colored_lab = [&](int view) {
+  source.colored_lab = [&](int number) {
+    const int view = order[number];
     const auto luminance = images.Luminance(view);
     return JoinLab(*luminance,
                    ReadViewAb(context, scene.views[view], luminance->width, luminance->height));
   };
-  source.has_truth = [&](int view) { return truth.contains(view); };
-  source.true_srgb = [&](int view) { return images.Undistort(view, ReadImage(truth.at(view))); };
+  source.has_truth = [&](int number) { return truth.contains(order[number]); };
+  source.true_srgb = [&](int number) {
+    return images.Undistort(order[number], ReadImage(truth.at(order[number])));
+  };
   return MeasureConsistency(source, context.pool(), context.cancel());
 }
 
@@ -119,7 +138,7 @@ class HeldOutScores {
                 const std::optional<GaussianModel>& model,
                 const std::optional<GaussianModel>& bound,
                 StageContext& context)
-      : scene_(scene), model_(model), bound_(bound), context_(context) {}
+      : scene_(scene), how_(HowHeldOut(scene)), model_(model), bound_(bound), context_(context) {}
 
   void Add(int index, const std::filesystem::path& truth) {
     const View& view = scene_.views[index];
@@ -149,11 +168,12 @@ class HeldOutScores {
           true_srgb, ab, DecodeImage(context_.ReadInput(provenance), provenance), mask.get());
     }
     ordered_json entry{{"view", view.name}};
-    for (const auto& [name, value] : scores) {
-      entry[name] = value;
-      sum_[name] += value;
-    }
+    const std::string how = NameOf(how_[index]);
+    if (!how.empty()) entry["held_out"] = how;
+    for (const auto& [name, value] : scores) entry[name] = value;
     views_.push_back(std::move(entry));
+    all_.Add(scores);
+    if (!how.empty()) by_how_[how].Add(scores);
     const Image colored = SrgbFromLab(JoinLab(LuminanceOfLab(LabFromSrgb(true_srgb)),
                                               Resize(ab, true_srgb.width, true_srgb.height)));
     context_.WriteOutput(ViewArtifact(artifact::kTruths, view, ".jpg"), EncodeJpeg(true_srgb));
@@ -161,9 +181,32 @@ class HeldOutScores {
   }
 
   // Empty when nothing was added.
-  Scores Mean() const {
+  Scores Mean() const { return MeanOf(all_); }
+  // By how the views are held out; empty for photos.
+  ordered_json MeanByHow() const {
+    ordered_json json = ordered_json::object();
+    for (const auto& [how, sum] : by_how_) {
+      json[how] = {{"views", sum.views}};
+      for (const auto& [name, value] : MeanOf(sum)) json[how][name] = value;
+    }
+    return json;
+  }
+  const ordered_json& views() const { return views_; }
+  const SourceErrors& sources() const { return sources_; }
+
+ private:
+  struct Sum {
+    int views = 0;
+    Scores scores;
+    void Add(const Scores& more) {
+      ++views;
+      for (const auto& [name, value] : more) scores[name] += value;
+    }
+  };
+
+  Scores MeanOf(const Sum& sum) const {
     Scores mean;
-    for (const auto& [name, value] : sum_) mean[name] = value / static_cast<double>(views_.size());
+    for (const auto& [name, value] : sum.scores) mean[name] = value / sum.views;
     const double truth = mean.contains("colorfulness_truth") ? mean["colorfulness_truth"] : 0.0;
     if (truth > 0.0) {
       mean["colorfulness_ratio"] = mean["colorfulness"] / truth;
@@ -172,20 +215,19 @@ class HeldOutScores {
     }
     return mean;
   }
-  const ordered_json& views() const { return views_; }
-  const SourceErrors& sources() const { return sources_; }
 
- private:
   Image Rendered(const GaussianModel& model, const Camera& camera, const View& view) {
     return RenderView(model, camera, view.cam_from_world, context_.pool(), 0.0f, view.time_s()).lab;
   }
 
   const Scene& scene_;
+  const std::vector<HeldOutAs> how_;  // by view
   const std::optional<GaussianModel>& model_;
   const std::optional<GaussianModel>& bound_;
   StageContext& context_;
   ordered_json views_ = ordered_json::array();
-  Scores sum_;
+  Sum all_;
+  std::map<std::string, Sum> by_how_;
   SourceErrors sources_;
 };
 
@@ -246,6 +288,9 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const Scores mean = scores.Mean();
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
   ordered_json json{{"mean", mean}, {"views", scores.views()}};
+  if (ordered_json by_how = scores.MeanByHow(); !by_how.empty()) {
+    json["held_out"] = std::move(by_how);
+  }
   json["consistency"] = JsonOf(consistency);
   if (ordered_json temporal = TemporalScores(scene, model, all, context); !temporal.empty()) {
     json["temporal"] = std::move(temporal);

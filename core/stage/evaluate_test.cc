@@ -51,6 +51,24 @@ TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
   EXPECT_THROW(Evaluated(options), Error);
 }
 
+TEST_F(EvaluateTest, OfASceneThatMovesCamerasOfOneMomentAreComparedAndGapsAreTold) {
+  scene_.views[0].moment = Moment{0.0, 1};  // its camera is held out
+  scene_.views[1].moment = Moment{0.0, 0};
+  scene_.views[2].moment = Moment{0.5, 0};
+  ASSERT_TRUE(scene_.IsDynamic());
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  EvaluateOptions options;
+  options.truth = {TruthOf("p0.png")};
+  const json scores = Evaluated(options);
+  EXPECT_EQ(scores.at("consistency").at("colored_views").at("pairs"), 1);  // p0 and p1
+  EXPECT_LT(scores.at("consistency").at("colored_views").at("me_de00"), 5.0) << "p2 is redder";
+  EXPECT_EQ(scores.at("views")[0].at("held_out"), "camera");
+  EXPECT_EQ(scores.at("held_out").size(), 1u);
+  const json& camera = scores.at("held_out").at("camera");
+  EXPECT_EQ(camera.at("views"), 1);
+  EXPECT_EQ(camera.at("delta_e00_chroma"), scores.at("mean").at("delta_e00_chroma"));
+}
+
 TEST_F(EvaluateTest, ErrorsAreToldBySource) {
   AddProvenance("p0.png", Halves({0.0f, 1.0f, 0.0f}, {1.0f, 0.0f, 0.0f}));
   EvaluateOptions options;

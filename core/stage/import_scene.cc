@@ -6,6 +6,7 @@
 #include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/scene/held_out.h"
 #include "core/splat/import/splat_scene.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/film/film_frames.h"
@@ -49,6 +50,7 @@ void ImportSplatScene(const std::string& file,
                                  context.control());
   Scene& scene = splat.scene;
   if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &splat.warnings);
+  if (options.hold_out_block > 0.0) HoldOutBlock(options.hold_out_block, &scene);
   for (const std::string& warning : splat.warnings) context.progress().OnWarning(warning);
   const auto count = static_cast<int64_t>(scene.views.size());
   for (int64_t i = 0; i < count; ++i) {

@@ -20,6 +20,7 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec) {
   ImportOptions options;
   options.hold_out_every_eighth = spec.hold_out_every_eighth();
   options.hold_out_camera = spec.hold_out_camera();
+  options.hold_out_block = spec.hold_out_block();
   if (spec.has_sfm_max_image_side_px())
     options.sfm_max_image_side_px = spec.sfm_max_image_side_px();
   if (spec.sfm_pairs() == v1::ImportSceneSpec::SFM_PAIRS_EXHAUSTIVE) {

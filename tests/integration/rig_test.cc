@@ -84,6 +84,29 @@ TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
   }
 }
 
+TEST_F(RigTest, ScoresAreToldByHowViewsAreHeldOut) {
+  WriteFilms();  // and the pictures
+  const ProcessResult result = Colorize("pictures",
+                                        {"--benchmark",
+                                         "--key-view",
+                                         "cam01/0006",
+                                         "--set",
+                                         "import_scene.hold_out_camera=cam02",
+                                         "--set",
+                                         "import_scene.hold_out_block=0.25"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
+  EXPECT_EQ(metrics.at("views_camera"), 9);
+  EXPECT_EQ(metrics.at("views_block"), 4);  // the fourth and the fifth moment of two cameras
+  EXPECT_FALSE(metrics.contains("views_moment")) << "the eighth moment is one of the block";
+  const double all = metrics.at("delta_e00_chroma"), camera = metrics.at("delta_e00_chroma_camera"),
+               block = metrics.at("delta_e00_chroma_block");
+  EXPECT_NEAR(all, (9 * camera + 4 * block) / 13, 1e-6);
+  EXPECT_THAT(result.out, HasSubstr("of a camera held out"));
+  EXPECT_THAT(result.out, HasSubstr("of a block of time"));
+  EXPECT_THAT(ReadFile(Path("out") / "report.html"), HasSubstr("delta_e00_chroma_block"));
+}
+
 TEST_F(RigTest, WhatDoesNotFitIsNamed) {
   WriteFilms();
   fs::remove(Path("rig/cam01.mp4"));

@@ -95,6 +95,7 @@ ImportResult Place(const fs::path& frames_root,
                    ImportOptions options,
                    StageContext& context) {
   options.hold_out_every_eighth = false;  // whoever imports the film does that
+  options.hold_out_block = 0.0;
   std::vector<SequenceFrame> frames;
   for (const int view : shot) {
     const fs::path mask = files.StillFile(view);

@@ -17,6 +17,7 @@
 #include "core/film/shots.h"
 #include "core/film/steady_tones.h"
 #include "core/image/codec.h"
+#include "core/scene/held_out.h"
 #include "core/scene/import.h"
 #include "core/stage/film/film_frames.h"
 #include "core/stage/film/film_poses.h"
@@ -194,6 +195,7 @@ void ImportFrames(const FrameStream& stream,
   }
   std::vector<std::string> warnings;
   if (import.hold_out_every_eighth) HoldOutEveryEighth(&scene, &warnings);
+  if (import.hold_out_block > 0.0) HoldOutBlock(import.hold_out_block, &scene);
   for (const std::string& warning : warnings) context.progress().OnWarning(warning);
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
   context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));

@@ -112,6 +112,13 @@ TEST_F(ImportPosedFilmsTest, StridesPartsAndHeldOutCameras) {
   EXPECT_THAT(Complaint({}, options), HasSubstr("the scene has cam00, cam01, cam02"));
 }
 
+TEST_F(ImportPosedFilmsTest, TooManyFramesOfAllCamerasAreRefusedWithNumbers) {
+  for (int camera = 0; camera < 2; ++camera) WriteFilm(camera, 1510);
+  WritePoses(2);
+  EXPECT_THAT(Complaint({}), HasSubstr("3020 frames"));
+  EXPECT_THAT(Complaint({}), HasSubstr("take every 2th (film_stride)"));
+}
+
 TEST_F(ImportPosedFilmsTest, OneTimeIsAStillScene) {
   for (int camera = 0; camera < 3; ++camera) WriteFilm(camera, 4);
   WritePoses(3);
