@@ -1,6 +1,7 @@
 #include "core/stage/film/between_anchors.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -11,6 +12,8 @@ namespace {
 
 constexpr int kColorChannels = 3;  // a, b and the share that is guessed
 constexpr float kFollowed = 0.5f;  // confidence from which motion tells
+const float kJustFollowed = std::nextafter(kFollowed, 1.0f);
+constexpr float kAnswerFollowed = 0.2f;  // and from which an answer goes along with it
 
 // 1 where the frame's own sources need not be asked.
 Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
@@ -101,6 +104,14 @@ size_t FillOpen(const CarriedColor& others, CarriedColor* color) {
     ++filled;
   }
   return filled;
+}
+
+void TakeAnswer(const CarriedColor& answer, CarriedColor* color) {
+  CarriedColor followed = answer;
+  for (float& confidence : followed.confidence.data) {
+    if (confidence > kAnswerFollowed) confidence = std::max(confidence, kJustFollowed);
+  }
+  FillOpen(followed, color);
 }
 
 FusedColor ColorBetweenAnchors(const Image& luminance,

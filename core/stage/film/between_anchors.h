@@ -22,6 +22,9 @@ inline constexpr double kWorthAsking = 0.02;
 double ShareOpen(const CarriedColor& carried, const CarriedColor& of_anchors);
 // Takes `others` where they tell surely and `color` does not; how many pixels these are.
 size_t FillOpen(const CarriedColor& others, CarriedColor* color);
+// Takes what a neighbouring frame was told by its sources where `color` tells nothing surely: an
+// answer goes on less sure ways than what was seen does, to be asked anew would not be surer.
+void TakeAnswer(const CarriedColor& answer, CarriedColor* color);
 
 // The colour of a frame: what was carried into it, as in all views; what `of_anchors` tells where
 // that is followed surely in place of what the frame's own sources would say, which are asked

@@ -238,7 +238,7 @@ class ShotColorer {
                  [&](int frame, const CarriedColor& color) {
                    const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
                    if (open[i] == 0.0) return;
-                   FillOpen(color, &(*of_anchors)[gap.begin + i]);
+                   TakeAnswer(color, &(*of_anchors)[gap.begin + i]);
                    measure(i);
                  });
     }
