@@ -25,6 +25,17 @@ const v1::Artifact* ModelOf(const v1::Job& job) {
   return found != job.artifacts().end() ? &*found : nullptr;
 }
 
+[[noreturn]] void RefuseFilm(const std::string& results) {
+  throw Error(
+      ErrorCode::kFailedPrecondition,
+      "{}: a film was coloured without poses, and no camera can move through it. Its "
+      "coloured frames are {} among the results (as pictures: colour it once more, with "
+      "--png; what is done is not done again); for a scene to move through, colour the film "
+      "with --film --poses, where one moving camera took it",
+      results,
+      artifact::kMovie);
+}
+
 v1::Job WithModel(v1::Job job) {
   if (job.state() != v1::Job::STATE_SUCCEEDED) {
     throw Error(ErrorCode::kFailedPrecondition,
@@ -34,14 +45,7 @@ v1::Job WithModel(v1::Job job) {
                 job.name());
   }
   if (ModelOf(job) != nullptr) return job;
-  if (job.kind() == kind::kColorizeScene) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "{} coloured a film without poses: no camera can move through it. Its coloured "
-                "frames are {} in its results; for a scene to move through, colour the film with "
-                "--film --poses, where one moving camera took it",
-                job.name(),
-                artifact::kMovie);
-  }
+  if (job.kind() == kind::kColorizeScene) RefuseFilm(job.name());
   throw Error(ErrorCode::kFailedPrecondition,
               "{} is a {} job and has no {} to look at; name a {} job",
               job.name(),
@@ -60,6 +64,10 @@ fs::path ModelFileIn(const fs::path& folder) {
   }
   const fs::path model = folder / artifact::kModel;
   if (fs::is_regular_file(model, none)) return model;
+  if (fs::is_regular_file(folder / artifact::kReport, none) &&
+      fs::is_regular_file(folder / artifact::kMovie, none)) {
+    RefuseFilm(folder.string());
+  }
   throw Error(ErrorCode::kFailedPrecondition,
               "{} has no {}: it holds no finished results of `color3d colorize`; when the job is "
               "done, fetch them with `color3d artifact download jobs/ID -o {}`",
