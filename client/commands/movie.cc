@@ -243,11 +243,13 @@ void AddMovieCommands(CLI::App& app, Context& context) {
   CLI::App* render = app.add_subcommand("render", "A movie along a path, or pictures of views");
   AddCommonOptions(render, rendering.get());
   rendering->out = "render";
-  render->add_option("--path",
-                     rendering->path,
-                     "orbit, original (through the photos' cameras; of a scene that moves, as the "
-                     "key view's camera took it), still (that camera stands still while time runs) "
-                     "or a file of cameras (transforms.json); none: pictures of views");
+  render->add_option(
+      "--path",
+      rendering->path,
+      "orbit, original (through the photos' cameras; of a scene that moves, as the "
+      "key view's camera took it), still (that camera stands still while time runs) "
+      "or a file of cameras (transforms.json, of a scene that moves perhaps with the `time` "
+      "of each frame); none: pictures of views");
   render->add_option("--views",
                      rendering->views,
                      "Photos: whose views to render, or to pass on the original path");

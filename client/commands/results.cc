@@ -162,6 +162,8 @@ std::string Summary(const fs::path& out) {
   const bool has_film = fs::exists(out / artifact::kFilm, none);
   const std::pair<const char*, const char*> files[] = {
       {"coloured film", artifact::kFilm},
+      {"of every camera", artifact::kFilms},
+      {"coloured frames", artifact::kFilmFrames},
       {has_film ? "rendered movie" : "coloured film", artifact::kMovie},
       {"coloured scene", artifact::kPly},
       {"report", artifact::kReport},

@@ -58,6 +58,11 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
       "--augment-files",
       [o] { o->settings.push_back("generate_augmentations.files=true"); },
       "The colorizer learns from the coloured pictures in PHOTOS/augment/, too");
+  app.add_flag_callback(
+      "--png",
+      [o] { o->settings.push_back("render.pictures=true"); },
+      "Of a film, and of cameras that filmed a scene: every frame in colour as a picture, too, at "
+      "its full size and under its name (OUT/film_frames/)");
   app.add_option_function<std::vector<std::string>>(
          "--set",
          [o](const std::vector<std::string>& settings) {

@@ -72,6 +72,11 @@ TEST_F(ColorizeOptionsTest, FlagsAndSettingsReachTheirFields) {
   EXPECT_TRUE(spec.select_key_view().exclude_self());
 }
 
+TEST_F(ColorizeOptionsTest, FramesAreKeptAsPicturesOnRequest) {
+  EXPECT_TRUE(Spec({"--png"}).render().pictures());
+  EXPECT_FALSE(Spec({}).render().pictures());
+}
+
 TEST_F(ColorizeOptionsTest, PicturesInAugmentCountWhenTheyAreAskedFor) {
   EXPECT_FALSE(Spec({"--augment=4"}).generate_augmentations().files());
   const v1::ColorizeSceneSpec spec = Spec({"--augment-files"});

@@ -51,7 +51,12 @@ inline constexpr char kMoments[] = "moments/";       // "00001.ply" and so on, o
 inline constexpr char kExportScores[] = "export.json";  // what they lose against our renders
 inline constexpr char kRenders[] = "renders/";          // view's stem + ".png"
 inline constexpr char kMovie[] = "scene.mp4";
-inline constexpr char kFilm[] = "film.mp4";   // the frames of a scene that moves, in colour
+// Of a scene that moves: what the key view's camera filmed, in colour; and of several cameras each,
+// by its name + ".mp4".
+inline constexpr char kFilm[] = "film.mp4";
+inline constexpr char kFilms[] = "films/";
+inline constexpr char kFilmFrames[] =
+    "film_frames/";                           // view's stem + ".png": its frames, in colour
 inline constexpr char kFrames[] = "frames/";  // "00001.png" and so on, of the movie
 inline constexpr char kScores[] = "scores.json";
 inline constexpr char kTruths[] = "truths/";            // view's stem + ".jpg"

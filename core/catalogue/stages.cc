@@ -70,9 +70,10 @@ const std::vector<Stage>& StageCatalogue() {
        .results = {kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments, kViewPage}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
-       .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb},  // of films and what moves
-       .leaves = {kRenders, kMovie, kFilm, kFrames},
-       .results = {kRenders, kMovie, kFilm}},
+       // of films and what moves
+       .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb, kImportFacts},
+       .leaves = {kRenders, kMovie, kFilm, kFilms, kFilmFrames, kFrames},
+       .results = {kRenders, kMovie, kFilm, kFilms, kFilmFrames}},
       {.kind = kind::kEvaluate,
        .needs = {kScene, kViewsAb, kModel},
        .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance},

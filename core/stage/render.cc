@@ -77,11 +77,15 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     RenderOptions movie = options;
     movie.views.clear();
     movie.path = RenderOptions::Path::kPhotos;
+    movie.pictures = false;  // those of the cameras' own films are asked for
     RenderMovie(movie, scene, model, context);
-    if (HasColors(context, scene)) {
-      WriteColoredFilm(
-          scene, scene.FramesOfShotOf(ReadKeyView(context, scene)), artifact::kFilm, context);
-    }
+  }
+  if (scene.IsDynamic()) {  // whether something moves in it or not
+    if (HasColors(context, scene)) WriteFilmsOfCameras(scene, options.pictures, context);
+  } else if (options.pictures) {
+    context.progress().OnWarning(
+        "pictures is left aside: it is for the frames of films and of cameras that filmed a scene, "
+        "and these are photos");
   }
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();

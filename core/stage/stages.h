@@ -186,13 +186,16 @@ struct RenderOptions {
   int max_views = 12;     // 1..1000, for the empty list
   int max_side_px = 500;  // 64..4096
   Path path = Path::kViews;
-  // The rest is of movies. 1..kMaxMovieFrames; nothing: kDefaultMovieFrames, of a file of cameras
-  // one for each, of a scene that moves with kPhotos and kStill one for each moment.
+  // The rest is of movies, but for `pictures`. 1..kMaxMovieFrames; nothing: kDefaultMovieFrames, of
+  // a file of cameras one for each, of a scene that moves with kPhotos and kStill one for each
+  // moment.
   std::optional<int> frames;
   double frames_per_second = 30.0;  // 1..120
   bool video = true;                // kMovie is made
-  bool pictures = false;            // kFrames are kept, at most kMaxMoviePictures
-  bool bounce = false;              // there and back again
+  // kFrames are kept, at most kMaxMoviePictures; with kViews, of a film and of what cameras filmed,
+  // kFilmFrames.
+  bool pictures = false;
+  bool bounce = false;  // there and back again
   // Of a scene that moves: it stands still at this time, seconds; nothing: time runs.
   std::optional<double> time_s;
   std::filesystem::path cameras;  // for kCameras: scene/formats/camera_file.h

@@ -74,7 +74,7 @@ class FilmTest : public ServiceTest {
 TEST_F(FilmTest, FramesComeBackInColor) {
   WriteFrames();
   const ProcessResult result =
-      Colorize(Path("frames"), {"--film", "--benchmark", "--key-view", "n109"});
+      Colorize(Path("frames"), {"--film", "--benchmark", "--key-view", "n109", "--png"});
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_THAT(result.err, HasSubstr("coloured, not reconstructed"));
   const auto metrics = nlohmann::json::parse(ReadFile(Path("out") / "metrics.json"));
@@ -85,8 +85,18 @@ TEST_F(FilmTest, FramesComeBackInColor) {
   FilmReader movie(Path("out") / "scene.mp4");
   EXPECT_EQ(movie.times().size(), static_cast<size_t>(kFrames));
   EXPECT_EQ(movie.facts().width, kWidth);
+  for (int i = 0; i < kFrames; ++i) {
+    const std::string name = "n" + std::to_string(100 + i) + ".png";
+    const Image picture = ReadImage(Path("out") / "film_frames" / name);
+    EXPECT_EQ(picture.width, kWidth);
+    EXPECT_EQ(picture.channels, 3) << name;
+  }
+  EXPECT_THAT(result.out, HasSubstr("film_frames/"));
   EXPECT_TRUE(fs::exists(Path("out") / "report.html"));
   EXPECT_FALSE(fs::exists(Path("out") / "scene.ply"));
+  const ProcessResult turned = Client({"turntable", Path("out").string()});
+  EXPECT_EQ(turned.exit_code, 2);
+  EXPECT_THAT(turned.err, HasSubstr("coloured without poses, and no camera can move through it"));
 }
 
 TEST_F(FilmTest, PosesAreLookedForOnRequestOnly) {

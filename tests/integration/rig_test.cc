@@ -64,6 +64,7 @@ TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
                                          "--key-color",
                                          Path("painted.png").string(),
                                          "--hold-out",
+                                         "--png",
                                          "--set",
                                          "import_scene.hold_out_camera=cam02"});
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
@@ -82,6 +83,26 @@ TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
   for (const char* movie : {"film.mp4", "scene.mp4"}) {
     EXPECT_EQ(FilmReader(Path("out") / movie).times().size(), 9u) << movie;
   }
+  // And the frames of every camera, as a film and as pictures.
+  EXPECT_THAT(result.out, HasSubstr("films/"));
+  for (const std::string camera : {"cam00", "cam01", "cam02"}) {
+    const FilmReader film(Path("out") / "films" / (camera + ".mp4"));
+    EXPECT_EQ(film.times().size(), 9u) << camera;
+    EXPECT_EQ(film.facts().width, 128) << camera;
+    EXPECT_EQ(ReadImage(Path("out") / "film_frames" / camera / "f000008.png").width, 128);
+  }
+}
+
+TEST_F(RigTest, OptionsOfFilmsThatARigHasNoUseForAreTold) {
+  WriteFilms();
+  const ProcessResult films = Colorize("rig", {"--deflicker"});
+  EXPECT_EQ(films.exit_code, 0) << films.err;
+  EXPECT_THAT(films.err, HasSubstr("film_deflicker is left aside: films whose poses are given"));
+  const ProcessResult pictures =
+      Colorize("pictures", {"--set", "import_scene.film_frames_per_second=16"});
+  EXPECT_EQ(pictures.exit_code, 0) << pictures.err;
+  EXPECT_THAT(pictures.err,
+              HasSubstr("film_frames_per_second is left aside: pictures whose times and poses"));
 }
 
 TEST_F(RigTest, ScoresAreToldByHowViewsAreHeldOut) {

@@ -1,73 +1,24 @@
 #include "core/stage/film/colored_frames.h"
 
 #include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <map>
 #include <numeric>
 #include <optional>
+#include <set>
+#include <string>
+#include <utility>
 
-#include "core/base/files.h"
-#include "core/base/median.h"
-#include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/formats/artifacts.h"
-#include "core/video/film_reader.h"
+#include "core/stage/movie/film_clock.h"
 #include "core/video/mp4_writer.h"
-#include "core/video/ticks.h"
 
 namespace color3d {
+namespace fs = std::filesystem;
 namespace {
-
-// When the movie shows each frame, and how long it does.
-struct FrameTimes {
-  int ticks_per_second = 0;
-  std::vector<double> time_s;     // from the first one's
-  std::vector<double> seconds;    // to the next one
-  double frames_per_second = 25;  // as is usual
-};
-
-// Gaps that frames of no use have left stay gaps, so that what is heard fits what is seen.
-FrameTimes TimesOf(const Scene& scene, const std::vector<int>& frames) {
-  const auto time_s = [&](size_t i) { return scene.views[frames[i]].time_s(); };
-  std::vector<double> steps;
-  for (size_t i = 1; i < frames.size(); ++i) {
-    const double step = time_s(i) - time_s(i - 1);
-    if (step > 0.0) steps.push_back(step);
-  }
-  FrameTimes times;
-  const double usual = steps.empty() ? 1.0 / times.frames_per_second : Median(std::move(steps));
-  times.frames_per_second = std::clamp(1.0 / usual, 1.0, 120.0);
-  for (size_t i = 0; i < frames.size(); ++i) {
-    const double step = i > 0 ? time_s(i) - time_s(i - 1) : 0.0;
-    // Another camera's film begins again.
-    times.time_s.push_back(i == 0 ? 0.0 : times.time_s.back() + (step > 0.0 ? step : usual));
-  }
-  times.ticks_per_second = TicksPerSecond(times.time_s);
-  for (size_t i = 1; i < times.time_s.size(); ++i) {
-    // Broken films give two frames nearly one time.
-    const double least = times.time_s[i - 1] + 1.0 / times.ticks_per_second;
-    times.time_s[i] = std::max(times.time_s[i], least);
-    times.seconds.push_back(times.time_s[i] - times.time_s[i - 1]);
-  }
-  times.seconds.push_back(usual);
-  return times;
-}
-
-// None for frames that came as pictures, or from several cameras.
-std::optional<SoundPart> SoundOf(const Scene& scene,
-                                 const std::vector<int>& frames,
-                                 const FrameTimes& times,
-                                 const StageContext& context) {
-  std::vector<std::string> films;
-  for (const std::string& file : ListFiles(context.scene_folder())) {
-    if (HasFilmExtension(file) && !IsAugmentFile(file)) films.push_back(file);
-  }
-  if (films.size() != 1) return std::nullopt;
-  const std::filesystem::path film = context.scene_folder() / films[0];
-  const FilmFacts facts = FilmReader(film).facts();
-  if (!facts.has_sound) return std::nullopt;
-  const double begin_s = facts.first_s + scene.views[frames.front()].time_s();
-  return SoundPart{film, begin_s, begin_s + times.time_s.back() + times.seconds.back()};
-}
 
 // Movies have even sides.
 Image EvenSides(const Image& image) {
@@ -80,6 +31,54 @@ Image EvenSides(const Image& image) {
     }
   }
   return out;
+}
+
+constexpr double kUsualRate = 25.0;  // frames a second, where times are no seconds
+
+FilmClock ClockOfFilm(const Scene& scene,
+                      const std::vector<int>& frames,
+                      const StageContext& context) {
+  const bool seconds = TimesAreSeconds(scene, FindImportFacts(context));
+  std::vector<double> times;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    times.push_back(seconds ? scene.views[frames[i]].time_s()
+                            : static_cast<double>(i) / kUsualRate);
+  }
+  return ClockOf(times);
+}
+
+// A file name that tells the camera, unlike those that are taken.
+std::string FileNameOf(const std::string& camera, std::set<std::string>* taken) {
+  std::string name = camera.empty() ? "camera" : camera;
+  for (char& c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80 && std::isalnum(byte) == 0 && c != '-' && c != '.') c = '_';
+  }
+  if (name[0] == '.') name[0] = '_';
+  std::string unlike = name;
+  for (int i = 2; !taken->insert(unlike).second; ++i) unlike = name + "_" + std::to_string(i);
+  return unlike;
+}
+
+// The views of each shot, in order of time.
+std::map<int, std::vector<int>> FramesByShot(const Scene& scene) {
+  std::map<int, std::vector<int>> frames;
+  for (const int view : scene.ViewsInOrderOfTime()) {
+    frames[scene.views[view].moment->shot].push_back(view);
+  }
+  return frames;
+}
+
+// The file in the scratch folder under one name or more.
+void LeaveAs(const std::vector<std::string>& artifacts,
+             const fs::path& file,
+             StageContext& context) {
+  for (size_t i = 1; i < artifacts.size(); ++i) {
+    const fs::path copy = file.string() + ".copy";
+    fs::copy_file(file, copy);
+    context.TakeOutput(artifacts[i], copy);
+  }
+  context.TakeOutput(artifacts[0], file);
 }
 
 }  // namespace
@@ -95,26 +94,29 @@ Image ColoredFrame(const View& view,
 }
 
 void WriteColoredFilm(const Scene& scene,
-                      const std::vector<int>& frames,
-                      const char* artifact,
+                      const ColoredFilm& film,
                       StageContext& context,
                       const std::function<void(int view, const Image& srgb)>& written) {
+  const std::vector<int>& frames = film.frames;
   const ViewImages images(scene, context.scene_folder(), /*max_side_px=*/0, 0);
   const Camera camera = images.WorkingCamera(frames.front());
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
-  const std::filesystem::path file = context.scratch_folder() / artifact;
-  const FrameTimes times = TimesOf(scene, frames);
-  Mp4Writer movie(file,
-                  {.width = camera.width - camera.width % 2,
-                   .height = camera.height - camera.height % 2,
-                   .frames_per_second = times.frames_per_second,
-                   .ticks_per_second = times.ticks_per_second,
-                   .threads = context.pool().thread_count(),
-                   .sound = SoundOf(scene, frames, times, context)});
+  const fs::path file = context.scratch_folder() / "colored_film.mp4";
+  const FilmClock clock = ClockOfFilm(scene, frames, context);
+  Mp4Writer movie(
+      file,
+      {.width = camera.width - camera.width % 2,
+       .height = camera.height - camera.height % 2,
+       .frames_per_second = clock.frames_per_second,
+       .ticks_per_second = clock.ticks_per_second,
+       .threads = context.pool().thread_count(),
+       .sound =
+           SoundFrom(scene, frames.front(), scene.views[frames.front()].time_s(), clock, context)});
   if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
   const auto count = static_cast<int>(frames.size());
   const int batch = context.pool().thread_count();
   std::vector<Image> pictures(batch);
+  std::vector<std::string> files(batch);
   for (int begin = 0; begin < count; begin += batch) {
     context.cancel().ThrowIfCancelled();
     const int size = std::min(batch, count - begin);
@@ -122,26 +124,49 @@ void WriteColoredFilm(const Scene& scene,
       const int view = frames[begin + i];
       pictures[i] =
           SrgbFromLab(ColoredFrame(scene.views[view], view, view == key, images, context));
+      if (film.pictures) files[i] = EncodePng8(pictures[i]);
     });
     for (int i = 0; i < size; ++i) {
       const int frame = begin + i;
+      const View& view = scene.views[frames[frame]];
       movie.AddAt(
-          times.time_s[frame], times.seconds[frame], EvenSides(pictures[i]), context.pool());
+          clock.time_s[frame], clock.seconds[frame], EvenSides(pictures[i]), context.pool());
+      if (film.pictures) {
+        context.WriteOutput(ViewArtifact(artifact::kFilmFrames, view, ".png"), files[i]);
+      }
       if (written) written(frames[frame], pictures[i]);
     }
-    context.progress().OnProgress(begin + size, count, "writing frames");
+    context.progress().OnProgress(begin + size, count, "writing frames of " + film.artifacts[0]);
   }
   movie.Finish();
-  context.TakeOutput(artifact, file);
+  LeaveAs(film.artifacts, file, context);
+}
+
+void WriteFilmsOfCameras(const Scene& scene, bool pictures, StageContext& context) {
+  const int key = ReadKeyView(context, scene);
+  const std::optional<ImportFacts> facts = FindImportFacts(context);
+  if (!facts || facts->cameras.size() < 2) {
+    return WriteColoredFilm(
+        scene, {scene.FramesOfShotOf(key), {artifact::kFilm}, pictures}, context);
+  }
+  std::set<std::string> taken;
+  for (auto& [shot, frames] : FramesByShot(scene)) {
+    const std::string camera = facts->cameras.at(static_cast<size_t>(shot)).name;
+    ColoredFilm film{std::move(frames), {}, pictures};
+    film.artifacts.push_back(artifact::kFilms + FileNameOf(camera, &taken) + ".mp4");
+    if (shot == scene.views[key].moment->shot) film.artifacts.emplace_back(artifact::kFilm);
+    WriteColoredFilm(scene, film, context);
+  }
 }
 
 void RenderFilm(const RenderOptions& options,
                 const Scene& scene,
                 const std::vector<int>& views,
                 StageContext& context) {
-  std::vector<int> frames(scene.views.size());
-  std::iota(frames.begin(), frames.end(), 0);
-  WriteColoredFilm(scene, frames, artifact::kMovie, context, [&](int view, const Image& srgb) {
+  ColoredFilm film{{}, {artifact::kMovie}, options.pictures};
+  film.frames.resize(scene.views.size());
+  std::iota(film.frames.begin(), film.frames.end(), 0);
+  WriteColoredFilm(scene, film, context, [&](int view, const Image& srgb) {
     if (std::find(views.begin(), views.end(), view) == views.end()) return;
     context.WriteOutput(ViewArtifact(artifact::kRenders, scene.views[view], ".png"),
                         EncodePng8(FitWithin(srgb, options.max_side_px)));

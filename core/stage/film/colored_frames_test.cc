@@ -8,6 +8,7 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
+#include "tests/support/formats/movie_reader.h"
 #include "tests/support/formats/sound_film.h"
 #include "tests/support/stages/stage_fixture.h"
 
@@ -76,6 +77,29 @@ class ColoredFramesTest : public StageTest {
     RunRender({.max_views = 2}, context);
     return scratch_.path() / "out/scene.mp4";
   }
+  // Two frames, 0.5 s apart, of each of two cameras whose poses are known, in colours of one kind.
+  void MakeRig() {
+    for (const char* camera : {"left", "right"}) {
+      for (int i = 0; i < 2; ++i) {
+        View view;
+        view.name = std::string(camera) + "/f00000" + std::to_string(i) + ".png";
+        view.image_file = artifact::kGivenViews + view.name;
+        view.camera = view.captured_camera = {kWidth, kHeight, 60.0, 60.0, 32.0, 24.0};
+        view.cam_from_world.translation = {camera[0] == 'l' ? 0.0 : 0.1, 0.0, 0.0};
+        view.moment = Moment{0.5 * i, camera[0] == 'l' ? 0 : 1};
+        fs::create_directories((scratch_.path() / view.image_file).parent_path());
+        WriteFileAtomic(scratch_.path() / view.image_file, EncodePng8(FrameOf(i)));
+        AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"),
+                 EncodeAbPng(Image(kWidth, kHeight, 2, 20.0f)));
+        scene_.views.push_back(view);
+      }
+    }
+    AddInput(artifact::kScene, SceneToJson(scene_));
+    AddInput(artifact::kKeyView, R"({"view": "right/f000001.png"})");
+    AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 20.0f)));
+    AddInput(artifact::kModel, SerializeGaussians(BallBeforeWall(0.0, 0.5)));
+  }
+
   Scene scene_;
 };
 
@@ -118,6 +142,94 @@ TEST_F(ColoredFramesTest, APartOfEverySecondFrameStaysInStep) {
   const HeardSound sound = HearFilm(movie);
   EXPECT_EQ(sound.codec, "aac");
   EXPECT_NEAR(OnsetOf(sound), 2.0 - begin, 0.01);
+}
+
+TEST_F(ColoredFramesTest, EveryFrameIsAPictureOfItsOwnSizeWhereThatIsAskedFor) {
+  const std::vector<double> times = {0.0, 0.1, 0.2, 0.3, 0.4};
+  WriteFilm(times, "aac");
+  Colored({.stride = 2});
+  EXPECT_FALSE(fs::exists(scratch_.path() / "out/film_frames")) << "only on request";
+  fs::remove_all(scratch_.path() / "out");
+  StageContext context = MakeContext();
+  RunRender({.max_views = 2, .pictures = true}, context);
+  const ReadMovie movie = DecodeMovie(scratch_.path() / "out/scene.mp4");
+  ASSERT_GE(scene_.views.size(), 2u);
+  ASSERT_EQ(movie.frames.size(), scene_.views.size());
+  for (size_t i = 0; i < scene_.views.size(); ++i) {
+    const std::string name = "film_frames/f00000" + std::to_string(2 * i) + ".png";
+    EXPECT_THAT(context.outputs(), testing::Contains(name));
+    const Image picture = ReadImage(scratch_.path() / "out" / name);
+    ASSERT_EQ(picture.width, kWidth);
+    ASSERT_EQ(picture.height, kHeight);
+    double error = 0.0;
+    for (size_t k = 0; k < picture.data.size(); ++k) {
+      error += std::abs(picture.data[k] - movie.frames[i].data[k]);
+    }
+    EXPECT_LT(error / static_cast<double>(picture.data.size()), 0.01) << name;
+  }
+}
+
+TEST_F(ColoredFramesTest, EveryCameraOfARigHasAFilmOfItsOwn) {
+  MakeRig();
+  WriteFilm({0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}, "aac");
+  ImportFacts facts;
+  facts.layout = "posed_films";
+  facts.cameras = {{"in the/left", ""}, {"in the_left", "film.mov"}};
+  AddInput(artifact::kImportFacts, ImportFactsToJson(facts));
+  StageContext context = MakeContext();
+  RunRender({.pictures = true}, context);
+  const fs::path out = scratch_.path() / "out";
+  for (const char* name : {"films/in_the_left.mp4", "films/in_the_left_2.mp4", "scene.mp4"}) {
+    FilmReader film(out / name);
+    ASSERT_EQ(film.times().size(), 2u) << name;
+    EXPECT_NEAR(film.times()[1], 0.5, 1e-6) << name;
+  }
+  EXPECT_EQ(ReadFile(out / "film.mp4"), ReadFile(out / "films/in_the_left_2.mp4"));
+  EXPECT_NE(ReadFile(out / "film.mp4"), ReadFile(out / "films/in_the_left.mp4"));
+  EXPECT_EQ(HearFilm(out / "films/in_the_left.mp4").codec, "");
+  EXPECT_EQ(HearFilm(out / "film.mp4").codec, "aac");
+  EXPECT_EQ(HearFilm(out / "scene.mp4").codec, "aac") << "as that camera saw it";
+  for (const View& view : scene_.views) {
+    EXPECT_EQ(ReadImage(out / ("film_frames/" + view.name)).width, kWidth) << view.name;
+  }
+  EXPECT_FALSE(fs::exists(out / "frames"));
+}
+
+TEST_F(ColoredFramesTest, AFilmOfWhatStandsStillIsAColoredFilm) {
+  MakeRig();
+  AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
+  StageContext context = MakeContext();
+  RunRender({}, context);
+  EXPECT_EQ(FilmReader(scratch_.path() / "out/film.mp4").times().size(), 2u);
+  EXPECT_FALSE(fs::exists(scratch_.path() / "out/scene.mp4"));
+}
+
+TEST_F(ColoredFramesTest, ARenderedPathThatKeepsTheFilmsTimesIsHeard) {
+  const std::vector<double> times = UnevenTimes();
+  WriteFilm(times, "aac");
+  Colored({.begin_s = 1.0});
+  for (size_t i = 0; i < scene_.views.size(); ++i) {
+    scene_.views[i].cam_from_world.translation.x() = 0.01 * static_cast<double>(i);
+  }
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  AddInput(artifact::kKeyView, R"({"view": ")" + scene_.views[3].name + "\"}");
+  const double begin_s = scene_.views.front().time_s(), end_s = scene_.views.back().time_s();
+  AddInput(artifact::kModel, SerializeGaussians(BallBeforeWall(begin_s, end_s)));
+  for (const auto path : {RenderOptions::Path::kPhotos, RenderOptions::Path::kStill}) {
+    fs::remove_all(scratch_.path() / "out");
+    StageContext context = MakeContext();
+    RunRender({.path = path}, context);
+    FilmReader film(scratch_.path() / "out/scene.mp4");
+    ASSERT_EQ(film.times().size(), scene_.views.size());
+    for (size_t i = 0; i < film.times().size(); ++i) {
+      EXPECT_NEAR(film.times()[i], scene_.views[i].time_s() - begin_s, 1e-6) << i;
+    }
+    EXPECT_NEAR(OnsetOf(HearFilm(scratch_.path() / "out/scene.mp4")), 2.0 - begin_s, 0.01);
+  }
+  fs::remove_all(scratch_.path() / "out");
+  StageContext back = MakeContext();
+  RunRender({.path = RenderOptions::Path::kStill, .bounce = true}, back);
+  EXPECT_EQ(HearFilm(scratch_.path() / "out/scene.mp4").codec, "");
 }
 
 TEST_F(ColoredFramesTest, SoundThatIsLeftOutIsNamed) {

@@ -275,6 +275,11 @@ TEST_F(MovieTest, AFilmWithoutPosesIsNoPlaceToMoveThrough) {
   }
 }
 
+TEST_F(MovieTest, PicturesOfFramesAreToldToBeOfNoUseWhereNothingWasFilmed) {
+  Render({.pictures = true});
+  EXPECT_THAT(observer_.text, HasSubstr("pictures is left aside"));
+}
+
 TEST_F(MovieTest, ACancelledMovieLeavesNothing) {
   cancel_.Cancel();
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 2}), HasSubstr("cancelled"));
