@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <map>
+#include <memory>
 #include <utility>
 
 #include "core/base/evenly.h"
@@ -23,14 +25,28 @@ struct SweptView {
   Image depth;               // empty when no other view shows the same
 };
 
-SweptView Reduced(const Scene& scene, int view, const ViewImages& images, int side_px) {
+// The mask of a view with what moves on its own; empty: all counts.
+Image MaskOf(int view, const ViewImages& images, const StillRegions& still, const Camera& size) {
+  Image both;
+  for (const auto& mask : {images.Mask(view), still ? still(view) : nullptr}) {
+    if (mask == nullptr) continue;
+    Image reduced = ResizeMask(*mask, size.width, size.height);
+    if (!both.Empty()) ClearMasked(&both, &reduced);
+    both = std::move(reduced);
+  }
+  return both;
+}
+
+SweptView Reduced(const Scene& scene,
+                  int view,
+                  const ViewImages& images,
+                  const StillRegions& still,
+                  int side_px) {
   SweptView swept;
   swept.camera = images.WorkingCamera(view).FitWithin(side_px);
   swept.pose = scene.views[view].cam_from_world;
   swept.luminance = Resize(*images.Luminance(view), swept.camera.width, swept.camera.height);
-  if (const auto mask = images.Mask(view)) {
-    swept.mask = ResizeMask(*mask, swept.camera.width, swept.camera.height);
-  }
+  swept.mask = MaskOf(view, images, still, swept.camera);
   return swept;
 }
 
@@ -103,25 +119,65 @@ std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
   return points;
 }
 
+// The training views of each moment, in the order of time.
+std::vector<std::vector<int>> Moments(const Scene& scene) {
+  std::map<double, std::vector<int>> moments;
+  for (const int view : scene.TrainingViews()) moments[scene.views[view].time_s()].push_back(view);
+  std::vector<std::vector<int>> in_order;
+  for (auto& [time, views] : moments) in_order.push_back(std::move(views));
+  return in_order;
+}
+
+struct SweepPlan {
+  std::vector<int> views;                    // ascending
+  std::vector<std::vector<int>> candidates;  // by view of the scene: what it may be compared with
+};
+
+// Whole moments, evenly spread over time; of a single moment, or where none has two views, views.
+SweepPlan PlanSweeps(const Scene& scene, size_t most) {
+  std::vector<std::vector<int>> moments = Moments(scene);
+  SweepPlan plan;
+  plan.candidates.resize(scene.views.size());
+  const size_t views = scene.TrainingViews().size();
+  if (moments.size() == 1 || moments.size() == views) {
+    plan.views = EvenlyOf(scene.TrainingViews(), most);
+    for (const int view : plan.views) plan.candidates[view] = plan.views;
+    return plan;
+  }
+  const size_t few = std::max<size_t>(1, most * moments.size() / std::max<size_t>(1, views));
+  moments = EvenlyOf(std::move(moments), few);
+  for (std::vector<int>& moment : moments) {
+    moment = EvenlyOf(std::move(moment), most);
+    plan.views.insert(plan.views.end(), moment.begin(), moment.end());
+  }
+  std::sort(plan.views.begin(), plan.views.end());
+  for (const std::vector<int>& moment : moments) {
+    for (const int view : moment) plan.candidates[view] = moment.size() > 1 ? moment : plan.views;
+  }
+  return plan;
+}
+
 }  // namespace
 
 std::vector<SparsePoint> DensePoints(const Scene& scene,
                                      const ViewImages& images,
                                      const DensePointsOptions& options,
-                                     const RunControl& run) {
+                                     const RunControl& run,
+                                     const StillRegions& still) {
   const std::vector<std::vector<Eigen::Vector3d>> tracked = TrackedPoints(scene);
-  const std::vector<int> training = EvenlyOf(scene.TrainingViews(), options.max_views);
+  const SweepPlan plan = PlanSweeps(scene, options.max_views);
   std::vector<SweptView> swept(scene.views.size());
   const auto for_each_view = [&](const std::function<void(int view)>& work) {
-    run.pool.ForEach(static_cast<int64_t>(training.size()), [&](int64_t k, int) {
+    run.pool.ForEach(static_cast<int64_t>(plan.views.size()), [&](int64_t k, int) {
       run.cancel.ThrowIfCancelled();
-      work(training[k]);
+      work(plan.views[k]);
     });
   };
   for_each_view(
-      [&](int view) { swept[view] = Reduced(scene, view, images, options.depth_side_px); });
-  for_each_view(
-      [&](int view) { Sweep(scene, view, training, tracked[view], options, run.cancel, swept); });
+      [&](int view) { swept[view] = Reduced(scene, view, images, still, options.depth_side_px); });
+  for_each_view([&](int view) {
+    Sweep(scene, view, plan.candidates[view], tracked[view], options, run.cancel, swept);
+  });
   std::vector<std::vector<SparsePoint>> by_view(scene.views.size());
   for_each_view([&](int view) { by_view[view] = PointsOf(swept, view, options); });
   std::vector<SparsePoint> all;

@@ -3,6 +3,8 @@
 // alone. Pure function but for the pool's threads.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "core/base/run_control.h"
@@ -13,7 +15,7 @@
 namespace color3d {
 
 struct DensePointsOptions {
-  int max_views = 32;       // evenly spaced ones of the training views
+  int max_views = 32;       // evenly spaced ones of the training views, of whole moments
   int depth_sources = 4;    // views that each view is compared with, 1..16
   int depth_side_px = 200;  // at which depth is measured
   PlaneSweepOptions sweep;
@@ -24,10 +26,15 @@ struct DensePointsOptions {
 
 // Points carry the views that agree, ascending; none is one that an earlier view gave already.
 // Held-out views are not looked at. No points where no view is known to observe any of the scene's
-// own. Throws Error{kCancelled}.
+// own. Where a moment has several training views, they are compared with each other alone: at
+// other moments things may be elsewhere. `still` (empty, or null for a view: not known): 1 channel
+// of the view's working size, 0 where something moves on its own, which counts as masked. Called
+// from several threads at once. Throws Error{kCancelled}.
+using StillRegions = std::function<std::shared_ptr<const Image>(int view)>;
 std::vector<SparsePoint> DensePoints(const Scene& scene,
                                      const ViewImages& images,
                                      const DensePointsOptions& options,
-                                     const RunControl& run);
+                                     const RunControl& run,
+                                     const StillRegions& still = {});
 
 }  // namespace color3d

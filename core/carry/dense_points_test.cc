@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <numeric>
+#include <set>
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
@@ -98,6 +101,69 @@ TEST_F(DensePointsTest, MaskedPartsOfPhotosHaveAndConfirmNone) {
       ASSERT_GT(at.x(), kWidth / 2 - 1.5) << view;
     }
   }
+}
+
+TEST_F(DensePointsTest, WhatMovesOnItsOwnHasNone) {
+  const auto right = std::make_shared<const Image>([] {
+    Image still(kWidth, kHeight, 1);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = kWidth / 2; x < kWidth; ++x) still.At(0, y, x) = 1.0f;
+    }
+    return still;
+  }());
+  QuietRun run(2);
+  const ViewImages images(scene_, scratch_.path(), kWidth);
+  const std::vector<SparsePoint> points =
+      DensePoints(scene_,
+                  images,
+                  {.depth_side_px = kWidth, .max_points = 1'000'000},
+                  run.control(),
+                  [&](int view) { return view == 1 ? nullptr : right; });
+  EXPECT_GT(points.size(), 0.2 * kWidth * kHeight);
+  for (const SparsePoint& point : points) {
+    for (const int view : point.views) {
+      const Eigen::Vector2d at = scene_.views[view].camera.Project(
+          scene_.views[view].cam_from_world.Apply(point.position));
+      ASSERT_TRUE(view == 1 || at.x() > kWidth / 2 - 1.5) << view;
+    }
+  }
+}
+
+// The same cameras at four moments; the wall has another picture at each.
+TEST_F(DensePointsTest, MomentsOfSeveralCamerasAreTakenWholeAndNeverMixed) {
+  Scene rig = scene_;
+  for (int moment = 1; moment < 4; ++moment) {
+    for (int i = 0; i < 6; ++i) rig.views.push_back(scene_.views[i]);
+  }
+  for (int v = 0; v < 24; ++v) {
+    rig.views[v].moment = Moment{0.1 * (v / 6), v % 6};
+    rig.views[v].held_out = false;
+  }
+  for (SparsePoint& point : rig.points) {
+    point.views.resize(24);
+    std::iota(point.views.begin(), point.views.end(), 0);
+  }
+  QuietRun run(2);
+  const ViewImages images(rig, scratch_.path(), kWidth);
+  const std::vector<SparsePoint> points =
+      DensePoints(rig,
+                  images,
+                  {.max_views = 14, .depth_side_px = kWidth, .max_points = 1'000'000},
+                  run.control());
+  std::set<int> seen;
+  for (const SparsePoint& point : points) {
+    for (const int view : point.views) {
+      ASSERT_EQ(view / 6, point.views.front() / 6);
+      seen.insert(view);
+    }
+  }
+  EXPECT_EQ(seen, (std::set<int>{0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17}));
+}
+
+TEST_F(DensePointsTest, OneCameraThatMovesIsComparedOverTime) {
+  for (int v = 0; v < 6; ++v) scene_.views[v].moment = Moment{0.1 * v, 0};
+  EXPECT_GT(Points(2, {.depth_side_px = kWidth, .max_points = 1'000'000}).size(),
+            0.8 * kWidth * kHeight);
 }
 
 TEST_F(DensePointsTest, AreThinnedEvenlyAndTheSameForEveryThreadCount) {
