@@ -208,6 +208,11 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
   Conclude(scene, key_views, done.coverage(), context);
 }
 
+// Frames of a place where nothing moves are photos of it.
+void ForgetTimes(Scene& scene) {
+  for (View& view : scene.views) view.moment.reset();
+}
+
 }  // namespace
 
 void CarryColorOptions::Validate() const {
@@ -227,10 +232,11 @@ void CarryColorOptions::Validate() const {
 
 void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   options.Validate();
-  const Scene scene = ReadScene(context);
+  Scene scene = ReadScene(context);
   if (IsColoredAsFilm(context, scene)) return CarryByMotion(options, scene, context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
   const int64_t cache_bytes = scene.IsDynamic() ? kFramesCacheBytes : kPhotosCacheBytes;
+  if (geometry.motion.size() == 0) ForgetTimes(scene);
   const ViewImages images(scene, context.scene_folder(), options.max_side_px, cache_bytes);
   const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px, cache_bytes);
   const SurfaceRenderer render = [&](int index, const Camera& camera) {

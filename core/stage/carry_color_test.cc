@@ -121,6 +121,16 @@ TEST_F(CarryStageTest, EveryViewGetsWhatTheKeyViewShowsOfIt) {
   EXPECT_EQ(observer_.text, "");
 }
 
+TEST_F(CarryStageTest, AFilmOfWhatStandsStillIsCarriedAsPhotosAre) {
+  Run();
+  std::vector<Image> of_photos;
+  for (int i = 0; i < 5; ++i) of_photos.push_back(Carried(i).ab);
+  for (int i = 0; i < 5; ++i) scene_.views[i].moment = Moment{0.1 * i, 0};
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  Run();
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(Carried(i).ab.data, of_photos[i].data) << i;
+}
+
 TEST_F(CarryStageTest, NothingIsCarriedFromOrToWhatIsMaskedOut) {
   Image mask(kWidth, kHeight, 1, 1.0f);
   for (int y = 0; y < kHeight; ++y) {
