@@ -24,7 +24,7 @@ const std::vector<Stage>& StageCatalogue() {
        .brings_prerequisites = true},
       {.kind = kind::kReconstructGeometry,
        .needs = {kScene},
-       .reads = {kGivenGeometry},  // in place of training
+       .reads = {kGivenGeometry, kMovingRegions},  // the former in place of training
        .leaves = {kGeometry, kMemoryPlan},
        .brings_prerequisites = true,
        .resumes = true,

@@ -1,9 +1,12 @@
 #include <iterator>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/carry/dense_points.h"
+#include "core/image/codec.h"
 #include "core/scene/masks/masked_points.h"
+#include "core/scene/masks/still_regions.h"
 #include "core/scene/view_images.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_cap.h"
@@ -44,13 +47,27 @@ Scene WithoutMaskedPoints(Scene scene, const ViewImages& images) {
 // `scene` with points of the surfaces that several photos agree on.
 Scene WithDensePoints(Scene scene,
                       const ViewImages& images,
+                      const PictureSource& still,
                       int max_gaussians,
                       const RunControl& run) {
   DensePointsOptions options;
   options.max_points = static_cast<int>(kDenseShare * max_gaussians);
-  std::vector<SparsePoint> points = DensePoints(scene, images, options, run);
+  std::vector<SparsePoint> points = DensePoints(scene, images, options, run, still);
   std::move(points.begin(), points.end(), std::back_inserter(scene.points));
   return scene;
+}
+
+// What the import saw of each view to stand still; empty where it did not look.
+PictureSource StillRegionsOf(const Scene& scene,
+                             const ViewImages& images,
+                             const StageContext& context) {
+  if (context.InputsBelow(artifact::kMovingRegions).empty()) return {};
+  return [&](int view) -> std::shared_ptr<const Image> {
+    const std::string name = ViewArtifact(artifact::kMovingRegions, scene.views[view], ".png");
+    if (!context.HasInput(name)) return nullptr;
+    return std::make_shared<const Image>(
+        StillRegion(images, scene, view, DecodeImage(context.ReadInput(name), name)));
+  };
 }
 
 std::string MemoryPlanToJson(const MemoryPlan& plan) {
@@ -91,11 +108,13 @@ void RunReconstructGeometry(const GeometryOptions& options,
   const ViewImages images(
       scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
   const Scene unmasked = WithoutMaskedPoints(scene, images);
+  const PictureSource still = StillRegionsOf(scene, images, context);
   const Scene start =
       options.recipe == GeometryOptions::Recipe::kPaper
           ? unmasked
-          : WithDensePoints(unmasked, images, planned.max_gaussians, context.control());
+          : WithDensePoints(unmasked, images, still, planned.max_gaussians, context.control());
   GeometryProblem problem = GeometryProblemOf(start, images);
+  problem.still = still;
   problem.picture_cache_bytes = memory.target_cache_bytes;
   const GaussianModel model = TrainGeometry(problem, planned, context.control());
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));

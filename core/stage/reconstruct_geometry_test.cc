@@ -37,5 +37,32 @@ TEST_F(StageTest, PosesWithoutPointsReconstructAndLittleMemoryIsPlannedFor) {
   EXPECT_THROW(RunReconstructGeometry(options, 64, none), Error);
 }
 
+// What an import saw to move is nothing to learn from at first.
+TEST_F(StageTest, WhatWasSeenToMoveReachesTheTraining) {
+  Scene scene = RampScene(scratch_.path(), 48, 32);
+  for (size_t v = 0; v < scene.views.size(); ++v) {
+    scene.views[v].moment = Moment{0.1 * static_cast<double>(v), 0};
+  }
+  SparsePoint point;
+  point.position = scene.views[0].cam_from_world.WorldFromCamera({0.0, 0.0, 2.0});
+  point.views = {0, 1, 2};
+  scene.points = {point};
+  AddInput(artifact::kScene, SceneToJson(scene));
+  GeometryOptions options;
+  options.iterations = 20;
+  const auto trained = [&] {
+    StageContext context = MakeContext();
+    RunReconstructGeometry(options, 64, context);
+    return ReadFile(scratch_.path() / "out/geometry.c3g");
+  };
+  const std::string without = trained();
+  EXPECT_EQ(trained(), without);
+  for (const View& view : scene.views) {
+    AddInput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
+             EncodePng8(Image(12, 8, 1, 1.0f)));
+  }
+  EXPECT_NE(trained(), without);
+}
+
 }  // namespace
 }  // namespace color3d

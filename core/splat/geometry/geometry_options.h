@@ -38,9 +38,10 @@ struct GeometryTuning {
   double wanted_iterations = 800;
   // Of pictures for which what belongs to their own moment is left out, so that what belongs to the
   // moments before and after learns to move there.
-  double moment_drop_rate = 0.5;
+  double moment_drop_rate = 0.2;
   double least_width = 0.9;  // of a window in time, of the interval between moments
   double seed_width = 1.0;   // the first
+  int mover_sh_degree = 0;   // of what moves: few views see it, each from a direction of its own
   double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
 
   bool operator==(const GeometryTuning&) const = default;
@@ -75,6 +76,7 @@ void VisitFields(Tuning& tuning, Visit&& visit) {
   visit("moment_drop_rate", tuning.moment_drop_rate);
   visit("least_width", tuning.least_width);
   visit("seed_width", tuning.seed_width);
+  visit("mover_sh_degree", tuning.mover_sh_degree);
   visit("last_rate", tuning.last_rate);
 }
 

@@ -18,6 +18,8 @@ struct GeometryProblem {
   PictureSource luminance;  // 1 channel, L in 0..100
   PictureSource colors;     // 3 channels, sRGB 0..1; when set, trained on in place of luminance
   PictureSource mask;  // 1 channel, 1 where a pixel counts, else 0; may be empty or give null: all
+  // As `mask`: 0 where something was seen to move on its own; may be empty or give null: not known.
+  PictureSource still;
   // 1 or 3 channels of any degree; its spherical harmonics are cut or extended to the options'
   // degree.
   GaussianModel initial;

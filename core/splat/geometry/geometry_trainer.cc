@@ -46,7 +46,8 @@ class GeometryTrainer {
                  channels_,
                  problem.colors ? 1.0f : 0.01f,
                  problem.picture_cache_bytes),
-        masks_(problem.mask, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask) {
+        masks_(problem.mask, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask),
+        still_(problem.still, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask) {
     state_.parameters = FirstParameters(
         problem.initial, channels_, ShCoefficients(options.sh_degree), options.max_gaussians);
     const int rows = state_.parameters.rows();
@@ -174,7 +175,7 @@ class GeometryTrainer {
     const bool exposed = !state_.exposures.empty();
     if (exposed) Expose(state_.exposures[drawn], pipeline_.color(), run_.pool, exposed_);
     const LossValue loss =
-        Compare(exposed ? exposed_ : pipeline_.color(), target, MaskOf(view, level), weights);
+        Compare(exposed ? exposed_ : pipeline_.color(), target, LearntFrom(view, level), weights);
     if (!std::isfinite(loss.total)) return false;
     if (exposed) {
       FitExposure(pipeline_.color(),
@@ -201,6 +202,17 @@ class GeometryTrainer {
   // Null: all of the view counts.
   std::shared_ptr<const PlaneBuffer> MaskOf(const PosedCamera& view, int level) {
     return problem_.mask ? masks_.Get(view, level) : nullptr;
+  }
+
+  // The same in training: until motion has been looked for, what moves is nothing to learn from.
+  std::shared_ptr<const PlaneBuffer> LearntFrom(const PosedCamera& view, int level) {
+    const std::shared_ptr<const PlaneBuffer> mask = MaskOf(view, level);
+    if (!problem_.still || !MayMove() || fraction_ >= kSurveyAt) return mask;
+    const std::shared_ptr<const PlaneBuffer> still = still_.Get(view, level);
+    if (mask == nullptr || still == nullptr) return mask == nullptr ? still : mask;
+    auto both = std::make_shared<PlaneBuffer>(*mask);
+    for (size_t i = 0; i < both->data.size(); ++i) both->data[i] *= still->data[i];
+    return both;
   }
 
   // Loss and d_color_. What is masked out is taken to be as drawn, which costs nothing, not even in
@@ -240,10 +252,10 @@ class GeometryTrainer {
                         run_.pool,
                         gradient_,
                         moving_gradient_);
-      const std::vector<float> motion = schedule_.MotionRates(fraction_, times_.Interval());
-      std::vector<float> all = rates;
-      all.insert(all.end(), motion.begin(), motion.end());
-      finite = UpdatePart(moving_gradient_, std::move(all), moving.parameters, moving.moments);
+      finite = UpdatePart(moving_gradient_,
+                          schedule_.MoverRates(fraction_, channels_, times_.Interval()),
+                          moving.parameters,
+                          moving.moments);
       LimitWindows(static_cast<float>(std::log(schedule_.tuning().least_width * times_.Interval())),
                    state_.parameters.rows(),
                    moving.parameters);
@@ -359,9 +371,8 @@ class GeometryTrainer {
       point.psnr_db += each * quality.psnr_db;
       point.ssim += each * quality.ssim;
       point.l1 += each * quality.l1;
-      if (&views == &problem_.held_out && fraction_ >= 1.0 && trace_ != nullptr &&
-          trace_->on_held_out_picture) {
-        trace_->on_held_out_picture(view.view, ImageFromPlanes(drawn));
+      if (fraction_ >= 1.0 && trace_ != nullptr && trace_->on_picture) {
+        trace_->on_picture(view.view, ImageFromPlanes(drawn));
       }
     }
     clock_.Enter(Phase::kOther);
@@ -392,6 +403,7 @@ class GeometryTrainer {
   const int channels_;
   TrainingTargets targets_;
   TrainingTargets masks_;
+  TrainingTargets still_;
   GeometryState state_;
   int64_t initial_count_ = 0;     // Gaussians
   double fraction_ = 0.0;         // of the schedule that is done

@@ -28,8 +28,9 @@ struct HeldOutPoint {
 
 // What training leaves for whoever measures it.
 struct TrainingTrace {
-  // Called at the end for each held-out view, in order: the model's picture, clamped to 0..1.
-  std::function<void(int view, const Image& drawn)> on_held_out_picture;
+  // Called at the end for each held-out view, in order, and then for each training view where
+  // `score_training` asks for them: the model's picture, clamped to 0..1.
+  std::function<void(int view, const Image& drawn)> on_picture;
   double seconds = 0.0;  // of training in this attempt, held-out evaluation not counted
   int64_t iterations = 0;
   int64_t gaussians = 0;

@@ -275,7 +275,7 @@ TEST(TrainOnColorsTest, LearnsAViewItNeverSawInRgb) {
   TrainingTrace trace;
   int pictures = 0;
   double error = 0.0;
-  trace.on_held_out_picture = [&](int view, const Image& drawn) {
+  trace.on_picture = [&](int view, const Image& drawn) {
     ++pictures;
     EXPECT_EQ(view, 3);
     const Image truth = SrgbFromLab(s.lab[view]);

@@ -73,6 +73,19 @@ Image MaskOf(const Image& residual, double threshold) {
   return mask;
 }
 
+// What was seen to move before anything was drawn.
+void AddSeenMoving(SurveyedView& view) {
+  for (size_t i = 0; i < view.still.data.size(); ++i) {
+    if (view.still.data[i] == 0.0f) view.moving.data[i] = 1.0f;
+  }
+}
+
+double Sum(const Image& image) {
+  double sum = 0.0;
+  for (const float v : image.data) sum += v;
+  return sum;
+}
+
 }  // namespace
 
 MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
@@ -90,14 +103,18 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
     if (frames.size() >= kFewestFrames) RemoveStanding(frames, pool, residuals);
   }
   survey.threshold = std::max(kLeastResidual, kDeviations * DeviationOf(residuals));
-  double moving = 0.0, pixels = 0.0;
+  double residual = 0.0, moving = 0.0, pixels = 0.0;
   for (size_t i = 0; i < views.size(); ++i) {
     views[i].moving = one_time ? Image(residuals[i].width, residuals[i].height, 1)
                                : MaskOf(residuals[i], survey.threshold);
-    for (const float m : views[i].moving.data) moving += m;
+    residual += Sum(views[i].moving);
+    if (!one_time) AddSeenMoving(views[i]);
+    moving += Sum(views[i].moving);
     pixels += static_cast<double>(views[i].moving.data.size());
   }
-  survey.moving_share = pixels > 0.0 ? moving / pixels : 0.0;
+  if (pixels == 0.0) return survey;
+  survey.residual_share = residual / pixels;
+  survey.moving_share = moving / pixels;
   return survey;
 }
 

@@ -17,6 +17,7 @@ struct SurveyedView {
   Image luminance;    // 1 channel, 0..1
   Image drawn;        // 1 channel, 0..1: by what stands still
   Image depth;        // 1 channel, world units; 0: nothing is there
+  Image still;        // 1 channel: 0 where something was seen to move on its own; empty: not known
   Image moving;       // 1 channel, 0 or 1; set by SurveyMotion
 };
 
@@ -24,14 +25,15 @@ struct SurveyedView {
 inline constexpr int kSurveySidePx = 192;
 
 struct MotionSurvey {
-  double moving_share = 0.0;  // motion energy: of all pixels, those that move
-  double threshold = 0.0;     // of |residual| over 5x5 px, 0..1
+  double moving_share = 0.0;    // motion energy: of all pixels, those that move
+  double residual_share = 0.0;  // of all pixels, those whose residual says so
+  double threshold = 0.0;       // of |residual| over 5x5 px, 0..1
 };
 
 // Sets `moving` of every view: where the mean residual over 5x5 px is beyond five deviations of the
 // scene's (and 0.03). From the residuals of a camera that does not move the median over time is
-// taken away first: that is what stands still and is drawn badly. Specks are none. With one time
-// for all views nothing moves.
+// taken away first: that is what stands still and is drawn badly. Specks are none. What `still`
+// leaves out moves, too. With one time for all views nothing moves.
 MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views);
 
 }  // namespace color3d

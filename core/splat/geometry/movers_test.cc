@@ -104,6 +104,20 @@ TEST(MotionSurveyTest, WhatIsAlwaysDrawnBadlyDoesNotMove) {
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
+TEST(MotionSurveyTest, WhatWasSeenToMoveMovesHoweverItIsDrawn) {
+  ThreadPool pool(2);
+  std::vector<SurveyedView> views = Rig(4, false);
+  for (SurveyedView& view : views) {
+    view.still = Image(kSide, kSide, 1, 1.0f);
+    for (int i = 0; i < 9 * kSide; ++i) view.still.data[i] = 0.0f;
+  }
+  const MotionSurvey survey = SurveyMotion(pool, views);
+  EXPECT_EQ(survey.residual_share, 0.0);
+  EXPECT_NEAR(survey.moving_share, 9.0 / kSide, 1e-9);
+  EXPECT_EQ(views[2].moving.data[9 * kSide - 1], 1.0f);
+  EXPECT_EQ(views[2].moving.data[9 * kSide], 0.0f);
+}
+
 struct Seeded {
   ParameterBlock block;
   int rows = kColorRow + 1;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "core/scene/masks/photo_masks.h"
 #include "core/splat/geometry/motion_survey.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/model/spherical_harmonics.h"
@@ -68,6 +69,10 @@ std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
     view.depth = MeanImage(pipeline.median_depth(), 1);
     const std::shared_ptr<const Image> mask = problem.mask ? problem.mask(posed.view) : nullptr;
     if (mask != nullptr) TakeMasked(*mask, view.luminance, view.drawn);
+    const std::shared_ptr<const Image> seen = problem.still ? problem.still(posed.view) : nullptr;
+    if (seen != nullptr) {
+      view.still = ResizeMask(*seen, view.luminance.width, view.luminance.height);
+    }
     views.push_back(std::move(view));
   }
   return views;
@@ -137,18 +142,21 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
   seeds.width = TuningOf(options).seed_width;
   seeds.interval = times.Interval();
   FoundMovers found;
+  double residual_share = 0.0;
   ParameterBlock& parameters = found.moving.parameters;
   for (const std::vector<PosedCamera>& block : BlocksOfTime(problem.training)) {
     std::vector<SurveyedView> views = SurveyedViews(problem, block, still, color, target, pool);
     const double share =
         static_cast<double>(block.size()) / static_cast<double>(problem.training.size());
-    found.moving_share += share * SurveyMotion(pool, views).moving_share;
+    const MotionSurvey survey = SurveyMotion(pool, views);
+    found.moving_share += share * survey.moving_share;
+    residual_share += share * survey.residual_share;
     seeds.most = static_cast<int64_t>(share * kMoverShare * options.max_gaussians);
     std::vector<float> unit_time;
     for (const PosedCamera& view : block) unit_time.push_back(times.UnitTime(view.time_s));
     Append(SeedMovers(views, unit_time, seeds, pool), &parameters);
   }
-  if (found.moving_share < kStillShare) {
+  if (residual_share < kStillShare) {
     parameters = {};
     return found;
   }

@@ -83,11 +83,20 @@ std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels
   return rates;
 }
 
-std::vector<float> TrainingSchedule::MotionRates(double fraction, double interval) const {
-  std::vector<float> rates(kMotionRows, 0.0f);
+std::vector<float> TrainingSchedule::MoverRates(double fraction,
+                                                int channels,
+                                                double interval) const {
+  std::vector<float> rates = LearningRates(fraction, channels);
+  const int coefficients = ShCoefficients(options_.sh_degree);
+  const int kept = std::min(coefficients, ShCoefficients(tuning_.mover_sh_degree));
+  for (int c = 0; c < channels; ++c) {
+    std::fill_n(rates.begin() + kColorRow + c * coefficients + kept, coefficients - kept, 0.0f);
+  }
+  const auto first = static_cast<int>(rates.size());
+  rates.resize(first + kMotionRows, 0.0f);
   const double scale = options_.learning_rate_scale;
   const auto set = [&](int row, int count, double rate) {
-    std::fill_n(rates.begin() + row, count, static_cast<float>(rate));
+    std::fill_n(rates.begin() + first + row, count, static_cast<float>(rate));
   };
   // What a step changes one time step away is what a step of the position changes.
   set(kVelocityRow, 3, scale * PositionRate(fraction) / interval);

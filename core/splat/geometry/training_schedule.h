@@ -28,8 +28,9 @@ class TrainingSchedule {
   double DropRate(double fraction, int views) const;
   // One per parameter row, for `channels` colour channels of degree options.sh_degree.
   std::vector<float> LearningRates(double fraction, int channels) const;
-  // One per row of motion (motion/motion.h); `interval` between time steps in units of t.
-  std::vector<float> MotionRates(double fraction, double interval) const;
+  // The same for what moves, followed by one per row of motion (motion/motion.h); `interval`
+  // between time steps in units of t.
+  std::vector<float> MoverRates(double fraction, int channels, double interval) const;
   // What belongs to a nearer moment than this, in units of t, is left out of this iteration's
   // picture: half of the interval at random, as the iteration's number says, or 0.
   float HiddenTime(int64_t iteration, double interval) const;

@@ -12,9 +12,11 @@
 #include "core/image/codec.h"
 #include "core/metrics/quality.h"
 #include "core/report/curves.h"
+#include "core/scene/masks/still_regions.h"
 #include "core/simd/instruction_set.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_cap.h"
+#include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "server/planning/presets.h"
 #include "tests/bench/commands.h"
@@ -34,6 +36,7 @@ struct ReconstructArguments {
   TrainingColors colors = TrainingColors::kSrgb;
   std::string imported_file;  // scene.json of an earlier import
   std::string geometry_file;  // gets the model
+  std::string moving_folder;  // what moves on its own in each view, as an import leaves it
   int score_side_px = 500;    // beside the size trained on
   std::string set_aside;      // "K/N"
   bool capped = false;        // as the service caps
@@ -206,6 +209,45 @@ class ReducedScore {
   double sum_ssim_ = 0.0;
 };
 
+// What the import saw of each view to stand still; empty where no folder is given.
+PictureSource StillRegionsOf(const std::string& folder,
+                             const Scene& scene,
+                             const ViewImages& images) {
+  if (folder.empty()) return {};
+  return [&, folder = std::filesystem::path(folder)](int view) -> std::shared_ptr<const Image> {
+    const auto file = folder / ViewArtifact("", scene.views[view], ".png");
+    if (!std::filesystem::exists(file)) return nullptr;
+    return std::make_shared<const Image>(StillRegion(images, scene, view, ReadImage(file)));
+  };
+}
+
+// dB of what moves and of what stands still, over all pictures.
+class ScoreByMotion {
+ public:
+  void Add(const Image& truth, const Image& drawn, const Image& still) {
+    for (int c = 0; c < truth.channels; ++c) {
+      for (size_t i = 0; i < still.data.size(); ++i) {
+        const double d = double{truth.Plane(c)[i]} - drawn.Plane(c)[i];
+        const int part = still.data[i] > 0.0f ? 1 : 0;
+        squares_[part] += d * d;
+        values_[part] += 1.0;
+      }
+    }
+  }
+  nlohmann::ordered_json ToJson() const {
+    const auto db = [&](int part) {
+      return -10.0 * std::log10(squares_[part] / std::max(1.0, values_[part]));
+    };
+    return {{"moving_db", db(0)},
+            {"still_db", db(1)},
+            {"moving_share", values_[0] / std::max(1.0, values_[0] + values_[1])}};
+  }
+
+ private:
+  double squares_[2] = {};
+  double values_[2] = {};
+};
+
 void RunReconstruct(ReconstructArguments args) {
   NullObserver silent;
   NoCheckpoints none;
@@ -221,27 +263,34 @@ void RunReconstruct(ReconstructArguments args) {
   }
   const ViewImages images(scene, args.scene_folder, args.max_side_px);
   for (const int view : scene.TrainingViews()) images.Luminance(view);  // not in the times
+  const PictureSource still = StillRegionsOf(args.moving_folder, scene, images);
   const auto begin = std::chrono::steady_clock::now();
   if (args.dense > 0.0) {
     args.dense_points.max_points = static_cast<int>(args.dense * args.geometry.max_gaussians);
     const std::vector<SparsePoint> points =
-        DensePoints(scene, images, args.dense_points, {pool, none, silent, cancel});
+        DensePoints(scene, images, args.dense_points, {pool, none, silent, cancel}, still);
     scene.points.insert(scene.points.end(), points.begin(), points.end());
   }
   const double dense_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   GeometryProblem problem = GeometryProblemOf(scene, images, args.colors);
+  problem.still = still;
   CurveRecorder recorder("reconstruct_geometry", silent, none);
   TrainingTrace trace;
   trace.score_training = true;
   ReducedScore reduced(args.score_side_px);
   if (!args.pictures_folder.empty()) std::filesystem::create_directories(args.pictures_folder);
-  trace.on_held_out_picture = [&](int view, const Image& drawn) {
+  ScoreByMotion by_motion[2];
+  trace.on_picture = [&](int view, const Image& drawn) {
     const Image truth = Truth(images, view, args.colors);
-    reduced.Add(truth, drawn);
+    const bool held_out = scene.views[view].held_out;
+    if (still) {
+      if (const auto region = still(view)) by_motion[held_out ? 1 : 0].Add(truth, drawn, *region);
+    }
+    if (held_out) reduced.Add(truth, drawn);
     if (args.pictures_folder.empty()) return;
-    const auto file =
-        std::filesystem::path(args.pictures_folder) / (scene.views[view].name + ".png");
+    const auto file = std::filesystem::path(args.pictures_folder) /
+                      (held_out ? "held_out" : "training") / (scene.views[view].name + ".png");
     std::filesystem::create_directories(file.parent_path());
     WriteFileAtomic(file, EncodePng8(SideBySide(truth, drawn)));
   };
@@ -251,6 +300,10 @@ void RunReconstruct(ReconstructArguments args) {
   nlohmann::ordered_json result = ToJson(args, trace);
   result["dense_seconds"] = dense_seconds;
   result["reduced"] = reduced.ToJson();
+  if (still) {
+    result["training"].update(by_motion[0].ToJson());
+    result["reduced"].update(by_motion[1].ToJson());
+  }
   for (const CurvePoint& p : recorder.points()) {
     if (p.error_name == "restored_non_finite") result["restored_at"].push_back(p.iteration);
     if (p.error_name == "moving_share") result["moving_share"] = p.value;
@@ -275,6 +328,9 @@ void AddReconstructCommand(CLI::App& app) {
       ->trigger_on_parse();
   command->add_option("--threads", args->threads);
   command->add_option("--imported", args->imported_file, "scene.json of an earlier import");
+  command->add_option("--moving",
+                      args->moving_folder,
+                      "what moves on its own, as the import of a film with poses leaves it");
   command->add_option("--geometry", args->geometry_file, "gets the model");
   command->add_option(
       "--score-side", args->score_side_px, "px; scores at this size, too, of reduced pictures");
@@ -310,7 +366,8 @@ void AddReconstructCommand(CLI::App& app) {
   command->add_option("--ssim-weight", args->geometry.ssim_weight);
   command->add_option("--seed", args->geometry.seed);
   command->add_option("--set", args->settings, "name=value of the schedule (GeometryTuning)");
-  command->add_option("--pictures", args->pictures_folder, "held-out views: truth, drawn");
+  command->add_option(
+      "--pictures", args->pictures_folder, "held-out and training views: truth, drawn");
   command->add_option("--json", args->json_file, "default: standard output");
   command->callback([args, iterations] {
     if (args->geometry.time_limit_seconds > 0.0 && iterations->count() == 0) {
