@@ -18,6 +18,7 @@ constexpr double kLeastResidual = 0.03;
 constexpr size_t kMedianFrames = 31;  // at most, evenly over time
 constexpr size_t kFewestFrames = 5;   // that say what stands still
 constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
+constexpr double kConfirmed = 0.1;    // of what was seen to move, by residuals, at least
 constexpr size_t kNoiseStep = 7;      // every so many pixels tell the scene's deviation
 
 using Stand = std::tuple<double, double, double, double, double, double, double, int, int>;
@@ -80,6 +81,19 @@ void AddSeenMoving(SurveyedView& view) {
   }
 }
 
+// Whether what was seen to move is drawn badly by what stands still: what is not, stands still.
+bool SeenIsConfirmed(const std::vector<SurveyedView>& views) {
+  double seen = 0.0, confirmed = 0.0;
+  for (const SurveyedView& view : views) {
+    for (size_t i = 0; i < view.still.data.size(); ++i) {
+      if (view.still.data[i] > 0.0f) continue;
+      seen += 1.0;
+      confirmed += view.moving.data[i];
+    }
+  }
+  return confirmed > kConfirmed * seen;
+}
+
 double Sum(const Image& image) {
   double sum = 0.0;
   for (const float v : image.data) sum += v;
@@ -108,9 +122,12 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
     views[i].moving = one_time ? Image(residuals[i].width, residuals[i].height, 1)
                                : MaskOf(residuals[i], survey.threshold);
     residual += Sum(views[i].moving);
-    if (!one_time) AddSeenMoving(views[i]);
-    moving += Sum(views[i].moving);
-    pixels += static_cast<double>(views[i].moving.data.size());
+  }
+  const bool seen = !one_time && SeenIsConfirmed(views);
+  for (SurveyedView& view : views) {
+    if (seen) AddSeenMoving(view);
+    moving += Sum(view.moving);
+    pixels += static_cast<double>(view.moving.data.size());
   }
   if (pixels == 0.0) return survey;
   survey.residual_share = residual / pixels;

@@ -33,7 +33,8 @@ struct MotionSurvey {
 // Sets `moving` of every view: where the mean residual over 5x5 px is beyond five deviations of the
 // scene's (and 0.03). From the residuals of a camera that does not move the median over time is
 // taken away first: that is what stands still and is drawn badly. Specks are none. What `still`
-// leaves out moves, too. With one time for all views nothing moves.
+// leaves out moves, too, where at least a tenth of all of it has such residuals. With one time for
+// all views nothing moves.
 MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views);
 
 }  // namespace color3d

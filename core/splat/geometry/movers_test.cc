@@ -104,18 +104,29 @@ TEST(MotionSurveyTest, WhatIsAlwaysDrawnBadlyDoesNotMove) {
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
-TEST(MotionSurveyTest, WhatWasSeenToMoveMovesHoweverItIsDrawn) {
-  ThreadPool pool(2);
-  std::vector<SurveyedView> views = Rig(4, false);
+// Rows first to end - 1 were seen to move.
+std::vector<SurveyedView> WithSeen(std::vector<SurveyedView> views, int first, int end) {
   for (SurveyedView& view : views) {
     view.still = Image(kSide, kSide, 1, 1.0f);
-    for (int i = 0; i < 9 * kSide; ++i) view.still.data[i] = 0.0f;
+    std::fill_n(view.still.data.begin() + first * kSide, (end - first) * kSide, 0.0f);
   }
-  const MotionSurvey survey = SurveyMotion(pool, views);
-  EXPECT_EQ(survey.residual_share, 0.0);
-  EXPECT_NEAR(survey.moving_share, 9.0 / kSide, 1e-9);
-  EXPECT_EQ(views[2].moving.data[9 * kSide - 1], 1.0f);
-  EXPECT_EQ(views[2].moving.data[9 * kSide], 0.0f);
+  return views;
+}
+
+TEST(MotionSurveyTest, WhatWasSeenToMoveMovesAlsoWhereItIsDrawnWell) {
+  ThreadPool pool(2);
+  std::vector<SurveyedView> without = Rig(4, true);
+  std::vector<SurveyedView> views = WithSeen(without, 30, 48);  // with the ball's upper half
+  const MotionSurvey alone = SurveyMotion(pool, without), both = SurveyMotion(pool, views);
+  EXPECT_EQ(both.residual_share, alone.moving_share);
+  EXPECT_NEAR(both.moving_share, 18.0 / kSide + 0.5 * alone.moving_share, 0.01);
+  EXPECT_EQ(views[2].moving.At(0, 30, 0), 1.0f);
+}
+
+TEST(MotionSurveyTest, WhatWasSeenToMoveAndIsAllDrawnWellStandsStill) {
+  ThreadPool pool(2);
+  std::vector<SurveyedView> views = WithSeen(Rig(4, false), 0, 9);
+  EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
 struct Seeded {
