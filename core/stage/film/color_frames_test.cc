@@ -71,7 +71,7 @@ class ColorFramesTest : public StageTest {
             asked_.push_back(view);
             return InferredColor{Told(view), Image(l.width, l.height, 1, distance_)};
           },
-          [view](const Image&) { return TrueAb(view); },
+          [](const Image& l) { return Image(l.width, l.height, 2, 5.0f); },
           {}};
     };
     coloring.deliver = [&](int view, const FusedColor& color) {
