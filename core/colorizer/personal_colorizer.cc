@@ -15,6 +15,7 @@
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
+#include "core/image/fill_holes.h"
 #include "core/image/guided_upsample.h"
 #include "core/weights/byte_source.h"
 
@@ -71,13 +72,13 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
   if (!parts_.neighbors) return {decoded, {}};
   if (model.config().HasAdapters()) taps = parts_.encoder->Taps(parts_.encoder->Input(luminance));
   const NeighborColors found = parts_.neighbors->Lookup(taps, luminance, wanted, position);
+  Image cells = ImageFromTensor(found.ab);
+  if (wanted.defined()) FillHoles(ImageFromTensor(wanted.to(torch::kFloat32).unsqueeze(0)), &cells);
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
   const Image coarse_luminance = ImageFromTensor(guide);
-  const torch::Tensor near =
-      TensorFromImage(FromRelative(parts_.relative_chroma,
-                                   coarse_luminance,
-                                   UpsampleGuided(ImageFromTensor(found.ab), coarse_luminance)));
+  const torch::Tensor near = TensorFromImage(FromRelative(
+      parts_.relative_chroma, coarse_luminance, UpsampleGuided(cells, coarse_luminance)));
   if (!decode) return {near, found.distance};
   return {torch::lerp(near, decoded, DecoderShare(found.variance, decoded)), found.distance};
 }
@@ -142,7 +143,7 @@ torch::Tensor PersonalColorizer::WantedCells(const Image& known, const Image& sm
   for (float& value : unknown.data) value = value > 0.999f ? 0.0f : 1.0f;
   const torch::Tensor cells =
       torch::max_pool2d(Padded(unknown), {kCellPx, kCellPx}, {kCellPx, kCellPx});
-  constexpr int kMarginCells = 5;  // guided upsampling averages twice over windows of 5 cells
+  constexpr int kMarginCells = 1;  // as far as one cell reaches when answers are enlarged
   return torch::max_pool2d(cells,
                            {2 * kMarginCells + 1, 2 * kMarginCells + 1},
                            {1, 1},

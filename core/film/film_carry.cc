@@ -110,16 +110,17 @@ Image ConfidenceOf(const Image& place,
   const Image unlike = Unlike(contrast, SampledAt(other_contrast, place));
   const Image returned = SampledAt(back, place);
   const int width = contrast.width, height = contrast.height;
+  const double inverse_square_tolerance =
+      1.0 / (options.cycle_tolerance_px * options.cycle_tolerance_px);
   Image confidence(width, height, 1);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       if (!Inside(place.At(0, y, x), place.At(1, y, x), width, height)) continue;
-      const double cycle = std::hypot(returned.At(0, y, x) - static_cast<float>(x),
-                                      returned.At(1, y, x) - static_cast<float>(y)) /
-                           options.cycle_tolerance_px;
-      const double closed = 1.0 / (1.0 + cycle * cycle);
-      const double like =
-          std::exp(-std::max(0.0, unlike.At(0, y, x) - options.unlikeness) / options.unlikeness);
+      const double dx = returned.At(0, y, x) - static_cast<float>(x);
+      const double dy = returned.At(1, y, x) - static_cast<float>(y);
+      const double closed = 1.0 / (1.0 + (dx * dx + dy * dy) * inverse_square_tolerance);
+      const double excess = unlike.At(0, y, x) - options.unlikeness;
+      const double like = excess > 0.0 ? std::exp(-excess / options.unlikeness) : 1.0;
       confidence.At(0, y, x) = static_cast<float>(closed * closed * like);
     }
   }

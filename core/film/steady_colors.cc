@@ -1,16 +1,13 @@
 #include "core/film/steady_colors.h"
 
+#include <vector>
+
 #include "core/base/range_check.h"
 #include "core/image/flow_agreement.h"
 #include "core/image/plane_sampling.h"
 
 namespace color3d {
 namespace {
-
-struct Place {
-  float x = 0.0f;
-  float y = 0.0f;
-};
 
 struct WeightedColor {
   float a = 0.0f;
@@ -24,39 +21,57 @@ struct WeightedColor {
   }
 };
 
-// Takes a place of one frame to where it lies in the next; false where flow does not surely tell.
-bool Follow(const Image& there, const Image& back, Place* place) {
-  const int width = there.width, height = there.height;
-  const BilinearPlace from(width, height, place->x, place->y);
-  const float x = from.Of(there.Plane(0)), y = from.Of(there.Plane(1));
-  *place = {place->x + x, place->y + y};
-  if (place->x < 0.0f || place->x > static_cast<float>(width - 1) || place->y < 0.0f ||
-      place->y > static_cast<float>(height - 1)) {
-    return false;
-  }
-  const BilinearPlace to(width, height, place->x, place->y);
-  return FlowAgrees(x, y, to.Of(back.Plane(0)), to.Of(back.Plane(1)));
-}
+// A place of a frame, and what to read its planes with.
+struct Place {
+  Place(const Image& frame, float at_x, float at_y)
+      : x(at_x), y(at_y), pixels(frame.width, frame.height, at_x, at_y) {}
 
-// What the frames behind `index` (direction 1) or before it (-1) show where `place` goes.
+  // Goes on to where it lies in the next frame; false where flow does not surely tell. The flow back
+  // is that of the nearest pixel.
+  bool Follow(const Image& there, const Image& back) {
+    const float dx = pixels.Of(there.Plane(0)), dy = pixels.Of(there.Plane(1));
+    const float next_x = x + dx, next_y = y + dy;
+    if (next_x < 0.0f || next_x > static_cast<float>(there.width - 1) || next_y < 0.0f ||
+        next_y > static_cast<float>(there.height - 1)) {
+      return false;
+    }
+    const int nearest =
+        static_cast<int>(next_y + 0.5f) * there.width + static_cast<int>(next_x + 0.5f);
+    if (!FlowAgrees(dx, dy, back.Plane(0)[nearest], back.Plane(1)[nearest])) return false;
+    *this = Place(there, next_x, next_y);
+    return true;
+  }
+
+  float x, y;
+  BilinearPlace pixels;
+};
+
+// To a row of frame `index`: what the frames behind it (direction 1) or before it (-1) show where
+// its pixels go. Frame by frame, so that few planes are read at a time.
 void AddFollowed(const std::vector<FrameInMotion>& frames,
                  int index,
                  int direction,
-                 Place place,
+                 int row,
                  const SteadyColorsOptions& options,
-                 WeightedColor* color) {
+                 std::vector<WeightedColor>* colors) {
+  const Image& here = *frames[index].ab;
+  std::vector<Place> places;
+  std::vector<int> followed;  // of the row's pixels
+  for (int x = 0; x < here.width; ++x) {
+    places.emplace_back(here, static_cast<float>(x), static_cast<float>(row));
+    followed.push_back(x);
+  }
   float share = 1.0f;
-  for (int step = 1; step <= options.reach; ++step) {
+  for (int step = 1; step <= options.reach && !followed.empty(); ++step) {
     const int now = index + direction * step;
     if (now < 0 || now >= static_cast<int>(frames.size())) return;
     const FlowPair* flow = frames[direction > 0 ? now : now + 1].flow_from_last.get();
     if (flow == nullptr) return;
-    const bool followed = direction > 0 ? Follow(flow->forth, flow->back, &place)
-                                        : Follow(flow->back, flow->forth, &place);
-    if (!followed) return;
+    const Image& there = direction > 0 ? flow->forth : flow->back;
+    const Image& back = direction > 0 ? flow->back : flow->forth;
+    std::erase_if(followed, [&](int x) { return !places[x].Follow(there, back); });
     share *= static_cast<float>(options.persistence);
-    const Image& ab = *frames[now].ab;
-    color->Add(ab, BilinearPlace(ab.width, ab.height, place.x, place.y), share);
+    for (const int x : followed) (*colors)[x].Add(*frames[now].ab, places[x].pixels, share);
   }
 }
 
@@ -73,15 +88,17 @@ Image SteadyColors(const std::vector<FrameInMotion>& frames,
                    const SteadyColorsOptions& options) {
   options.Validate();
   Image steady = *frames[index].ab;
+  std::vector<WeightedColor> colors(steady.width);
   for (int y = 0; y < steady.height; ++y) {
     for (int x = 0; x < steady.width; ++x) {
-      const Place place{static_cast<float>(x), static_cast<float>(y)};
-      WeightedColor color{steady.At(0, y, x), steady.At(1, y, x), 1.0f};
-      for (const int direction : {-1, 1}) {
-        AddFollowed(frames, index, direction, place, options, &color);
-      }
-      steady.At(0, y, x) = color.a / color.weight;
-      steady.At(1, y, x) = color.b / color.weight;
+      colors[x] = {steady.At(0, y, x), steady.At(1, y, x), 1.0f};
+    }
+    for (const int direction : {-1, 1}) {
+      AddFollowed(frames, index, direction, y, options, &colors);
+    }
+    for (int x = 0; x < steady.width; ++x) {
+      steady.At(0, y, x) = colors[x].a / colors[x].weight;
+      steady.At(1, y, x) = colors[x].b / colors[x].weight;
     }
   }
   return steady;

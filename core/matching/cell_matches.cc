@@ -19,9 +19,10 @@ constexpr float kNegligible = 8.0f;     // exp(-8) of the best match's weight
 constexpr int64_t kStep = 16;  // entries that are skipped together
 
 float Smallest(const float* values, int64_t count) {
-  float smallest = values[0];
-  for (int64_t i = 1; i < count; ++i) smallest = values[i] < smallest ? values[i] : smallest;
-  return smallest;
+  if (count == kStep) {
+    return Eigen::Map<const Eigen::Array<float, kStep, 1>>(values).minCoeff();  // in vectors
+  }
+  return *std::min_element(values, values + count);
 }
 
 // |x - y|^2 without |x|^2, which is the same for all y.
@@ -66,13 +67,16 @@ class Vote {
         bins_(bins.count) {}
 
   void Clear() {
-    std::fill(bins_.begin(), bins_.end(), Bin{});
+    for (const int32_t number : used_) bins_[number] = {};
+    used_.clear();
     squares_ = 0.0;
   }
   void Add(int64_t row, float closeness) {
     const double w = weights_[row] * closeness;
+    if (!(w > 0.0)) return;
     const double a = colors_[2 * row], b = colors_[2 * row + 1];
     Bin& bin = bins_[bin_of_[row]];
+    if (bin.weight == 0.0) used_.push_back(bin_of_[row]);
     bin.weight += w;
     bin.a += w * a;
     bin.b += w * b;
@@ -81,8 +85,8 @@ class Vote {
   void Store(int median_steps, float* ab, float* variance) {
     double sum = 0.0, a = 0.0, b = 0.0;
     filled_.clear();
-    for (const Bin& bin : bins_) {
-      if (!(bin.weight > 0.0)) continue;
+    for (const int32_t number : used_) {
+      const Bin& bin = bins_[number];
       sum += bin.weight;
       a += bin.a;
       b += bin.b;
@@ -121,7 +125,8 @@ class Vote {
   const float* colors_;
   const float* weights_;
   const int32_t* bin_of_;
-  std::vector<Bin> bins_;    // sums
+  std::vector<Bin> bins_;      // sums
+  std::vector<int32_t> used_;  // of bins_
   std::vector<Bin> filled_;  // means
   double squares_ = 0.0;
 };

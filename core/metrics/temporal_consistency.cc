@@ -129,7 +129,7 @@ ColorHistogram HistogramOf(const Image& srgb) {
     std::array<int64_t, 256> count = {};
     const float* plane = srgb.Plane(c);
     for (size_t i = 0; i < srgb.PlaneSize(); ++i) {
-      ++count[static_cast<size_t>(std::lround(255.0f * std::clamp(plane[i], 0.0f, 1.0f)))];
+      ++count[static_cast<size_t>(255.0f * std::clamp(plane[i], 0.0f, 1.0f) + 0.5f)];
     }
     for (size_t v = 0; v < count.size(); ++v) {
       histogram[c][v] = static_cast<float>(share * static_cast<double>(count[v]));
@@ -159,13 +159,17 @@ FollowedPixels FollowBack(const Image& luminance, const Image& luminance_before)
   const bool too_small = std::min(width, height) < kSmallestSide;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const double bx = back.At(0, y, x), by = back.At(1, y, x);
-      const double u = x + bx, v = y + by;
-      followed.place.At(0, y, x) = static_cast<float>(u);
-      followed.place.At(1, y, x) = static_cast<float>(v);
-      if (too_small || u < 0.0 || v < 0.0 || u > width - 1.0 || v > height - 1.0) continue;
+      const float bx = back.At(0, y, x), by = back.At(1, y, x);
+      const float u = static_cast<float>(x) + bx, v = static_cast<float>(y) + by;
+      followed.place.At(0, y, x) = u;
+      followed.place.At(1, y, x) = v;
+      if (too_small || u < 0.0f || v < 0.0f || u > static_cast<float>(width - 1) ||
+          v > static_cast<float>(height - 1)) {
+        continue;
+      }
+      const BilinearPlace at(width, height, u, v);
       followed.sure[static_cast<size_t>(y) * width + x] =
-          FlowAgrees(bx, by, SampleBilinear(forth, 0, u, v), SampleBilinear(forth, 1, u, v));
+          FlowAgrees(bx, by, at.Of(forth.Plane(0)), at.Of(forth.Plane(1)));
     }
   }
   return followed;
@@ -189,11 +193,11 @@ void ChromaAlongMotion::Add(const Image& ab,
   all_pixels += static_cast<int64_t>(place.PlaneSize());
   for (size_t i = 0; i < place.PlaneSize(); ++i) {
     if (!followed.sure[i]) continue;
-    const double u = place.Plane(0)[i], v = place.Plane(1)[i];
+    const BilinearPlace before(place.width, place.height, place.Plane(0)[i], place.Plane(1)[i]);
     const double a = ab.Plane(0)[i], b = ab.Plane(1)[i];
-    difference +=
-        std::hypot(a - SampleBilinear(ab_before, 0, u, v), b - SampleBilinear(ab_before, 1, u, v));
-    chroma += std::hypot(a, b);
+    const double da = a - before.Of(ab_before.Plane(0)), db = b - before.Of(ab_before.Plane(1));
+    difference += std::sqrt(da * da + db * db);
+    chroma += std::sqrt(a * a + b * b);
     ++pixels;
   }
 }

@@ -24,19 +24,14 @@ Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
   return known;
 }
 
-double ShareUnknown(const Image& known) {
-  const auto open = std::count(known.data.begin(), known.data.end(), 0.0f);
-  return static_cast<double>(open) / static_cast<double>(known.data.size());
-}
-
 // What the anchors tell of a frame stands for what its sources would.
 InferredColor AnswerOf(const CarriedColor& of_anchors,
-                       const Image& known,
+                       const Image& carried_surely,
                        const Image& luminance,
                        const ColorSources& sources) {
   InferredColor answer;
-  if (ShareUnknown(known) > kWorthAsking) {
-    answer = sources.infer(luminance, known);
+  if (ShareOpen(carried_surely, of_anchors) > kWorthAsking) {
+    answer = sources.infer(luminance, KnownOf(of_anchors, carried_surely));
   } else {
     answer = {Image(luminance.width, luminance.height, 2),
               Image(luminance.width, luminance.height, 1)};
@@ -86,8 +81,8 @@ CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, doub
   return before;
 }
 
-double ShareOpen(const CarriedColor& carried, const CarriedColor& of_anchors) {
-  const std::vector<float>& one = carried.confidence.data;
+double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors) {
+  const std::vector<float>& one = carried_confidence.data;
   const std::vector<float>& other = of_anchors.confidence.data;
   size_t open = 0;
   for (size_t i = 0; i < one.size(); ++i) open += one[i] <= kFollowed && other[i] <= kFollowed;
@@ -121,7 +116,7 @@ FusedColor ColorBetweenAnchors(const Image& luminance,
                                const CancellationToken& cancel) {
   ColorSources with_anchors = sources;
   with_anchors.infer = [&](const Image& l, const Image& carried_surely) {
-    return AnswerOf(of_anchors, KnownOf(of_anchors, carried_surely), l, sources);
+    return AnswerOf(of_anchors, carried_surely, l, sources);
   };
   ThreadPool one(1);
   FusedColor fused = ColorOfView(luminance, carried, with_anchors, one, cancel);

@@ -19,7 +19,7 @@ CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, doub
 // Share of a frame from which its own sources are worth asking.
 inline constexpr double kWorthAsking = 0.02;
 // Share of a frame that neither what was carried into it nor the anchors tell surely.
-double ShareOpen(const CarriedColor& carried, const CarriedColor& of_anchors);
+double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors);
 // Takes `others` where they tell surely and `color` does not; how many pixels these are.
 size_t FillOpen(const CarriedColor& others, CarriedColor* color);
 // Takes what a neighbouring frame was told by its sources where `color` tells nothing surely: an

@@ -4,7 +4,9 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -46,6 +48,14 @@ struct Colored {
   FusedColor color;
   std::shared_ptr<const FlowPair> flow_from_last;
 };
+
+constexpr double kWorthGuessing = 0.02;  // share of an anchor
+
+double ShareGuessed(const FusedColor& color) {
+  const float* guessed = color.provenance.Plane(0);
+  const auto pixels = static_cast<std::ptrdiff_t>(color.provenance.PlaneSize());
+  return std::accumulate(guessed, guessed + pixels, 0.0) / static_cast<double>(pixels);
+}
 
 // Neighbouring frames between two anchors: indices within a stretch.
 struct Gap {
@@ -135,6 +145,11 @@ class ShotColorer {
       color = ColorOf(key.frame, nullptr);
       key = AnchorAsKey(key.frame, color);
     });
+    for (const Colored& one : colored) {
+      if (!one.color.ab.Empty() && ShareGuessed(one.color) > kWorthGuessing) {
+        guessed_.insert(one.frame);
+      }
+    }
     std::vector<CarriedColor> before(stretch.size()), behind(stretch.size());
     const Flow flow = [&](int, int later) { return colored[index_of(later)].flow_from_last; };
     pool.ForEach(2 * static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
@@ -157,7 +172,11 @@ class ShotColorer {
           from >= 0 && to >= 0 ? static_cast<double>(stretch[i] - from) / (to - from) : 0.0;
       of_anchors[i] = OfBothAnchors(std::move(before[i]), behind[i], place);
     });
-    const std::vector<Gap> gaps = GapsOf(stretch);
+    std::vector<Gap> gaps = GapsOf(stretch);
+    // The longest first, so that threads end together.
+    std::stable_sort(gaps.begin(), gaps.end(), [](const Gap& x, const Gap& y) {
+      return x.end - x.begin > y.end - y.begin;
+    });
     pool.ForEach(static_cast<int64_t>(gaps.size()), [&](int64_t i, int) {
       AskWhereOpen(gaps[i], stretch, flow, &of_anchors, &colored);
     });
@@ -221,11 +240,15 @@ class ShotColorer {
                     std::vector<Colored>* colored) const {
     const std::vector<int> frames(stretch.begin() + static_cast<std::ptrdiff_t>(gap.begin),
                                   stretch.begin() + static_cast<std::ptrdiff_t>(gap.end));
+    std::vector<Image> carried;  // confidences
     std::vector<double> open(frames.size());
     const auto measure = [&](size_t i) {
-      open[i] = ShareOpen(CarriedInto(frames[i]), (*of_anchors)[gap.begin + i]);
+      open[i] = ShareOpen(carried[i], (*of_anchors)[gap.begin + i]);
     };
-    for (size_t i = 0; i < frames.size(); ++i) measure(i);
+    for (size_t i = 0; i < frames.size(); ++i) {
+      carried.push_back(std::move(CarriedInto(frames[i]).confidence));
+      measure(i);
+    }
     for (size_t left = frames.size(); left > 0; --left) {
       const auto most = std::max_element(open.begin(), open.end()) - open.begin();
       if (open[most] <= kWorthAsking) return;
@@ -250,14 +273,19 @@ class ShotColorer {
     return ReadCarried(context_, scene_.views[view], camera.width, camera.height);
   }
 
-  // `of_anchors`: null of an anchor.
+  // `of_anchors`: null of an anchor. Where both anchors around a frame have no use for a guess, none
+  // is made.
   FusedColor ColorOf(int frame, const CarriedColor* of_anchors) const {
     context_.cancel().ThrowIfCancelled();
     const int view = view_of_frame_[frame];
     const auto luminance = frames_.luminance(frame);
     const CarriedColor carried = CarriedInto(frame);
-    const ColorSources sources = coloring_.sources(view);
+    ColorSources sources = coloring_.sources(view);
     if (of_anchors != nullptr) {
+      if (!guessed_.contains(shot_.AnchorUpTo(frame)) &&
+          !guessed_.contains(shot_.AnchorBehind(frame))) {
+        sources.guess = [](const Image&) { return Image(); };
+      }
       return ColorBetweenAnchors(*luminance, carried, *of_anchors, sources, context_.cancel());
     }
     ThreadPool one(1);
@@ -295,6 +323,7 @@ class ShotColorer {
   const ViewImages& images_;
   StageContext& context_;
   const SteadyColorsOptions steady_;
+  std::set<int> guessed_;               // anchors that a guess was of use to
   int last_ = -1;                       // frame of the last stretch
   std::optional<FilmKey> last_anchor_;  // of the last stretch
   std::vector<Colored> colored_;        // frames one after the other
