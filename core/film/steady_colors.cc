@@ -26,8 +26,8 @@ struct Place {
   Place(const Image& frame, float at_x, float at_y)
       : x(at_x), y(at_y), pixels(frame.width, frame.height, at_x, at_y) {}
 
-  // Goes on to where it lies in the next frame; false where flow does not surely tell. The flow back
-  // is that of the nearest pixel.
+  // Goes on to where it lies in the next frame; false where flow does not surely tell. The flow
+  // back is that of the nearest pixel.
   bool Follow(const Image& there, const Image& back) {
     const float dx = pixels.Of(there.Plane(0)), dy = pixels.Of(there.Plane(1));
     const float next_x = x + dx, next_y = y + dy;

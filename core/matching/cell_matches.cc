@@ -127,7 +127,7 @@ class Vote {
   const int32_t* bin_of_;
   std::vector<Bin> bins_;      // sums
   std::vector<int32_t> used_;  // of bins_
-  std::vector<Bin> filled_;  // means
+  std::vector<Bin> filled_;    // means
   double squares_ = 0.0;
 };
 

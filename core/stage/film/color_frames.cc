@@ -273,8 +273,8 @@ class ShotColorer {
     return ReadCarried(context_, scene_.views[view], camera.width, camera.height);
   }
 
-  // `of_anchors`: null of an anchor. Where both anchors around a frame have no use for a guess, none
-  // is made.
+  // `of_anchors`: null of an anchor. Where both anchors around a frame have no use for a guess,
+  // none is made.
   FusedColor ColorOf(int frame, const CarriedColor* of_anchors) const {
     context_.cancel().ThrowIfCancelled();
     const int view = view_of_frame_[frame];

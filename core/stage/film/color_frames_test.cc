@@ -61,6 +61,7 @@ class ColorFramesTest : public StageTest {
     std::mutex mutex;
     std::map<int, FusedColor> delivered;
     asked_.clear();
+    guesses_ = 0;
     FrameColoring coloring;
     coloring.key_views = key_views_;
     coloring.was_done = [this](int view) { return done_.contains(view); };
@@ -71,7 +72,11 @@ class ColorFramesTest : public StageTest {
             asked_.push_back(view);
             return InferredColor{Told(view), Image(l.width, l.height, 1, distance_)};
           },
-          [](const Image& l) { return Image(l.width, l.height, 2, 5.0f); },
+          [this, &mutex](const Image& l) {
+            const std::lock_guard lock(mutex);
+            ++guesses_;
+            return Image(l.width, l.height, 2, 5.0f);
+          },
           {}};
     };
     coloring.deliver = [&](int view, const FusedColor& color) {
@@ -100,6 +105,7 @@ class ColorFramesTest : public StageTest {
 
   Scene scene_;
   std::vector<int> asked_;
+  size_t guesses_ = 0;
   float distance_ = 0.0f;  // of what is asked, as features go
   bool flicker_ = false;
   std::set<int> key_views_;
@@ -142,6 +148,19 @@ TEST_F(ColorFramesTest, WhatStandsStillIsAskedOnceARun) {
     EXPECT_NEAR(color.provenance.At(0, 30, 50), 0.6, 0.05) << "what is guessed stays so: " << view;
     EXPECT_NEAR(color.provenance.At(2, 30, 50), 0.4, 0.05) << view;
   }
+}
+
+TEST_F(ColorFramesTest, GuessesAreMadeWhereTheAnchorsAroundHaveUseForOne) {
+  AddFrames(Panned);
+  distance_ = 7.0f;  // so strange that guesses count
+  Run(2);
+  EXPECT_EQ(guesses_, asked_.size());
+  const size_t asked = asked_.size();
+  distance_ = 2.0f;  // strange, but a pale guess does not count
+  Run(2);
+  EXPECT_EQ(asked_.size(), asked);
+  EXPECT_GT(guesses_, 0u) << "anchors";
+  EXPECT_LT(guesses_, asked);
 }
 
 TEST_F(ColorFramesTest, WhatFlickersIsSteadied) {
