@@ -19,7 +19,11 @@ constexpr size_t kMedianFrames = 31;  // at most, evenly over time
 constexpr size_t kFewestFrames = 5;   // that say what stands still
 constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
 constexpr double kConfirmed = 0.1;    // of what was seen to move, by residuals, at least
-constexpr size_t kNoiseStep = 7;      // every so many pixels tell the scene's deviation
+// Shares of the pixels that a still scene stays below: with a median over time or regions that were
+// seen to move, and with neither, where what is drawn badly looks like what moves.
+constexpr double kStillShare = 0.002;
+constexpr double kStillShareAlone = 0.005;
+constexpr size_t kNoiseStep = 7;  // every so many pixels tell the scene's deviation
 
 using Stand = std::tuple<double, double, double, double, double, double, double, int, int>;
 
@@ -113,8 +117,11 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
                [&](int64_t i, int) { residuals[i] = ResidualOf(views[i]); });
   std::map<Stand, std::vector<size_t>> stands;
   for (size_t i = 0; i < views.size(); ++i) stands[StandOf(views[i].posed)].push_back(i);
+  bool has_median = false;
   for (const auto& [stand, frames] : stands) {
-    if (frames.size() >= kFewestFrames) RemoveStanding(frames, pool, residuals);
+    if (frames.size() < kFewestFrames) continue;
+    has_median = true;
+    RemoveStanding(frames, pool, residuals);
   }
   survey.threshold = std::max(kLeastResidual, kDeviations * DeviationOf(residuals));
   double residual = 0.0, moving = 0.0, pixels = 0.0;
@@ -124,6 +131,7 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
     residual += Sum(views[i].moving);
   }
   const bool seen = !one_time && SeenIsConfirmed(views);
+  survey.least_share = has_median || seen ? kStillShare : kStillShareAlone;
   for (SurveyedView& view : views) {
     if (seen) AddSeenMoving(view);
     moving += Sum(view.moving);

@@ -28,13 +28,15 @@ struct MotionSurvey {
   double moving_share = 0.0;    // motion energy: of all pixels, those that move
   double residual_share = 0.0;  // of all pixels, those whose residual says so
   double threshold = 0.0;       // of |residual| over 5x5 px, 0..1
+  double least_share = 0.0;     // a smaller residual_share is what still scenes have, too
 };
 
 // Sets `moving` of every view: where the mean residual over 5x5 px is beyond five deviations of the
 // scene's (and 0.03). From the residuals of a camera that does not move the median over time is
-// taken away first: that is what stands still and is drawn badly. Specks are none. What `still`
-// leaves out moves, too, where at least a tenth of all of it has such residuals. With one time for
-// all views nothing moves.
+// taken away first: that is what stands still and is drawn badly; where no camera stands still and
+// nothing that was seen beforehand is confirmed, more is asked (`least_share`). Specks are none.
+// What `still` leaves out moves, too, where at least a tenth of all of it has such residuals. With
+// one time for all views nothing moves.
 MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views);
 
 }  // namespace color3d

@@ -129,6 +129,18 @@ TEST(MotionSurveyTest, WhatWasSeenToMoveAndIsAllDrawnWellStandsStill) {
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
+// One camera that moves has no median over time: what it draws badly looks like what moves.
+TEST(MotionSurveyTest, ACameraThatMovesMustShowMoreMotionUnlessItWasSeenBefore) {
+  ThreadPool pool(2);
+  std::vector<SurveyedView> moving;
+  for (int t = 0; t < 6; ++t) moving.push_back(ViewAt(0.1 * t, 0, t, true));
+  std::vector<SurveyedView> seen = WithSeen(moving, 30, 48), standing = Rig(6, true);
+  const double alone = SurveyMotion(pool, moving).least_share;
+  EXPECT_EQ(alone, 0.005);
+  EXPECT_EQ(SurveyMotion(pool, seen).least_share, 0.002);
+  EXPECT_EQ(SurveyMotion(pool, standing).least_share, 0.002);
+}
+
 struct Seeded {
   ParameterBlock block;
   int rows = kColorRow + 1;

@@ -14,8 +14,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kMoverShare = 0.4;    // of the most Gaussians that there may be
-constexpr double kStillShare = 0.002;  // of the pixels: less moves in pictures of a still scene
+constexpr double kMoverShare = 0.4;  // of the most Gaussians that there may be
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
 // The mean over the channels.
@@ -142,7 +141,7 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
   seeds.width = TuningOf(options).seed_width;
   seeds.interval = times.Interval();
   FoundMovers found;
-  double residual_share = 0.0;
+  double residual_share = 0.0, least_share = 0.0;
   ParameterBlock& parameters = found.moving.parameters;
   for (const std::vector<PosedCamera>& block : BlocksOfTime(problem.training)) {
     std::vector<SurveyedView> views = SurveyedViews(problem, block, still, color, target, pool);
@@ -151,12 +150,13 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
     const MotionSurvey survey = SurveyMotion(pool, views);
     found.moving_share += share * survey.moving_share;
     residual_share += share * survey.residual_share;
+    least_share += share * survey.least_share;
     seeds.most = static_cast<int64_t>(share * kMoverShare * options.max_gaussians);
     std::vector<float> unit_time;
     for (const PosedCamera& view : block) unit_time.push_back(times.UnitTime(view.time_s));
     Append(SeedMovers(views, unit_time, seeds, pool), &parameters);
   }
-  if (residual_share < kStillShare) {
+  if (residual_share < least_share) {
     parameters = {};
     return found;
   }
