@@ -41,4 +41,7 @@ inline bool IsMaskFile(std::string_view path) { return path.starts_with("masks/"
 inline constexpr std::string_view kFramesFolder = "frames/";
 inline bool IsFrameFile(std::string_view path) { return path.starts_with(kFramesFolder); }
 
+// In the scene's folder: when the photos of a COLMAP model were taken.
+inline constexpr std::string_view kTimesFile = "times.txt";
+
 }  // namespace color3d

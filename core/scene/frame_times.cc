@@ -196,7 +196,9 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
         frames[i].file,
         named ? " (" + camera[i] + ")" : "",
         *frames[i].time,
-        named ? "" : ", or give every frame the name of its \"camera\", or each camera a folder");
+        named
+            ? ""
+            : ", or give each camera a folder (in transforms.json also: each frame a \"camera\")");
   }
   return result;
 }

@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/catalogue/scene_files.h"
 #include "core/scene/formats/colmap_model.h"
 #include "core/scene/formats/nerfies.h"
 #include "core/scene/formats/scene_readers.h"
@@ -168,6 +169,17 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
       "{} photos have no pose and were left out: {}", unposed.size(), FirstNames(unposed, 5)));
 }
 
+void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
+  std::error_code error;
+  if (!fs::is_regular_file(scene_folder / kTimesFile, error)) return;
+  result->warnings.push_back(
+      fmt::format("{} is not read: it goes with a COLMAP model{}",
+                  kTimesFile,
+                  result->layout == SceneLayout::kPhotos
+                      ? "; give one, or colour the frames of one moving camera with --film --poses"
+                      : "; transforms.json and metadata.json have times of their own"));
+}
+
 // Of a scene that may move, what all cameras took at every eighth moment from the fifth on: each
 // has moments before and after it.
 void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
@@ -246,7 +258,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   const fs::path colmap_folder = FindColmapFolder(scene_folder);
   if (!colmap_folder.empty()) {
     result.layout = SceneLayout::kColmap;
-    result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings);
+    result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings, &result.cameras);
     WarnOfUnposedPhotos(scene_folder, &result);
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else if (IsNerfiesFolder(scene_folder)) {
@@ -263,6 +275,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }
+  if (result.layout != SceneLayout::kColmap) WarnOfUnreadTimes(scene_folder, &result);
   FinishPosedScene(options, &result);
   return result;
 }

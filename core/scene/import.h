@@ -63,16 +63,16 @@ struct ImportResult {
 };
 
 // `scene_folder` holds photos (directly or in images/), or a COLMAP model (sparse/0, sparse or the
-// folder itself; text or binary) with images/, or transforms.json with the photos that it names, or
-// what Nerfies and HyperNeRF have (metadata.json, camera/, rgb/). With poses of several kinds,
-// COLMAP's wins. `scratch_folder` receives structure-from-motion's
-// files and sfm.log. Throws Error: an empty folder, one photo, unreadable photos, a model whose
-// images are missing, masks that fit no photo (photo_masks.h), non-finite numbers, photos that do
-// not overlap (how many registered and why it may have failed), points that all lie behind their
-// cameras or absurdly far away. Scenes far from the origin are recentred, very small and very large
-// ones rescaled (normalise.h); points with fewer than 2 observations are dropped; poses without
-// points get 20 000 seeded random ones. Warns of cameras whose intrinsics do not fit their
-// observations. Keeps no checkpoints.
+// folder itself; text or binary) with images/ and perhaps times.txt, or transforms.json with the
+// photos that it names, or what Nerfies and HyperNeRF have (metadata.json, camera/, rgb/). With
+// poses of several kinds, COLMAP's wins; a times.txt without a COLMAP model is warned of.
+// `scratch_folder` receives structure-from-motion's files and sfm.log. Throws Error: an empty
+// folder, one photo, unreadable photos, a model whose images are missing, masks that fit no photo
+// (photo_masks.h), non-finite numbers, photos that do not overlap (how many registered and why it
+// may have failed), points that all lie behind their cameras or absurdly far away. Scenes far from
+// the origin are recentred, very small and very large ones rescaled (normalise.h); points with
+// fewer than 2 observations are dropped; poses without points get 20 000 seeded random ones. Warns
+// of cameras whose intrinsics do not fit their observations. Keeps no checkpoints.
 ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const std::filesystem::path& scratch_folder,
                          const ImportOptions& options,

@@ -150,6 +150,38 @@ TEST_F(Import, AWholeCameraIsHeldOut) {
   EXPECT_THAT(Said(), HasSubstr("no camera 'cam09'; the scene has cam00, cam01, cam02"));
 }
 
+TEST_F(Import, AColmapModelWithTimesMovesAsAnyOther) {
+  const Scene rig = RigScene(14, folder_.path());
+  WriteColmapText(rig, folder_.path() / "sparse/0");
+  EXPECT_FALSE(Run().scene.IsDynamic());
+  std::string times;
+  for (const View& view : rig.views) {
+    times += std::to_string(7.0 + view.time_s()) + " " + view.name + "\n";
+  }
+  WriteFileAtomic(folder_.path() / "times.txt", times);
+  options_.hold_out_every_eighth = true;
+  options_.hold_out_camera = "cam1";
+  const ImportResult result = Run();
+  EXPECT_EQ(result.layout, SceneLayout::kColmap);
+  EXPECT_TRUE(result.scene.IsDynamic());
+  EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam0", "cam1", "cam2"}));
+  EXPECT_TRUE(result.warnings.empty());
+  ASSERT_EQ(result.scene.views.size(), 42u);
+  for (const View& view : result.scene.views) {
+    const auto step = std::lround(10.0 * view.time_s());
+    EXPECT_EQ(view.name,
+              "cam" + std::to_string(view.moment->shot) + "/" + std::to_string(step + 10) + ".png");
+    EXPECT_EQ(view.held_out, step % 8 == 4 || view.moment->shot == 1) << view.name;
+  }
+}
+
+TEST_F(Import, TimesWithoutAColmapModelAreNotRead) {
+  RigScene(3, folder_.path());
+  WriteFileAtomic(folder_.path() / "times.txt", "not read");
+  EXPECT_THAT(Run().warnings,
+              testing::Contains(HasSubstr("times.txt is not read: it goes with a COLMAP model")));
+}
+
 TEST_F(Import, ABlockOfTimeIsHeldOutBesideCamerasAndMoments) {
   RigScene(20, folder_.path());
   options_.hold_out_every_eighth = true;

@@ -148,10 +148,10 @@ TEST_F(ImportedScene, NumbersThatAreNotFiniteAreNamedByTheirPlace) {
     return Refusal([&] { Import(); });
   };
   EXPECT_THAT(said("cameras.txt", "PINHOLE 48 32 50", "PINHOLE 48 32 nan"),
-              HasSubstr("cameras.txt line 2: camera 1 has a parameter that is not finite"));
+              HasSubstr("cameras.txt: line 2: camera 1 has a parameter that is not finite"));
   const std::string pose = "\n2 ";
-  EXPECT_THAT(said("images.txt", pose.c_str(), "\n2 nan "), HasSubstr("images.txt line"));
-  EXPECT_THAT(said("points3D.txt", "\n3 ", "\n3 nan "), HasSubstr("points3D.txt line"));
+  EXPECT_THAT(said("images.txt", pose.c_str(), "\n2 nan "), HasSubstr("images.txt: line"));
+  EXPECT_THAT(said("points3D.txt", "\n3 ", "\n3 nan "), HasSubstr("points3D.txt: line"));
   Write(scene);
   std::string images = ReadFile(folder_.path() / "images.txt");
   const size_t line = images.find("0001.png\n") + 9;

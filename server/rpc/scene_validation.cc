@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int64_t kMaxTransformsBytes = int64_t{64} << 20;  // 10,000 photos need about 10
+constexpr int64_t kMaxTimesBytes = int64_t{16} << 20;       // with the longest names about 10
 
 // Reads it all. Mapped, what a disk does not give would be a signal that ends the server.
 bool IsReadable(int fd, size_t size) {
@@ -94,12 +95,6 @@ bool IsWholeModel(const std::set<std::string>& names) {
 void CheckTransforms(const std::string& path,
                      std::string_view bytes,
                      std::vector<FieldViolation>* violations) {
-  if (static_cast<int64_t>(bytes.size()) > kMaxTransformsBytes) {
-    violations->push_back(
-        {path,
-         fmt::format("has {} bytes; at most {} are allowed", bytes.size(), kMaxTransformsBytes)});
-    return;
-  }
   const TransformsOutline outline = OutlineOfTransforms(bytes);
   if (!outline.is_object) {
     violations->push_back({path, "is not a JSON object"});
@@ -161,6 +156,13 @@ void CheckFile(const SceneFileRecord& file,
   if (is_augmentation && !is_photo) {
     violations->push_back(
         {file.path, "is no picture (JPEG, PNG or TIFF); remove it from augment/"});
+    return;
+  }
+  const int64_t max_bytes = is_transforms ? kMaxTransformsBytes : kMaxTimesBytes;
+  if ((is_transforms || file.path == kTimesFile) && file.digest.size_bytes > max_bytes) {
+    violations->push_back(
+        {file.path,
+         fmt::format("has {} bytes; at most {} are allowed", file.digest.size_bytes, max_bytes)});
     return;
   }
   if (!is_photo && !is_transforms) return;

@@ -110,6 +110,35 @@ TEST_F(SceneValidationTest, LayoutsAreRecognised) {
               HasSubstr("transforms.json"));
 }
 
+TEST_F(SceneValidationTest, TimesGoWithAColmapModel) {
+  v1::Scene scene;
+  ASSERT_TRUE(Commit({{"images/a.png", TinyPng()},
+                      {"images/b.png", TinyPng()},
+                      {"sparse/0/cameras.bin", "1"},
+                      {"sparse/0/images.bin", "2"},
+                      {"sparse/0/points3D.bin", "3"},
+                      {"times.txt", "0 a.png\n1 b.png\n"}},
+                     &scene)
+                  .ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_COLMAP);
+  EXPECT_EQ(scene.photo_count(), 2);
+}
+
+TEST_F(SceneValidationTest, TimesHaveALimit) {
+  const ProjectStore store(store_, "");
+  const FileDigest blob = blobs_.PutBytes(std::string((16 << 20) + 1, '#'));
+  store.HoldBlob(blob);
+  SceneRecord scene;
+  scene.name = "scenes/test";
+  scene.files = {{"times.txt", blob}};
+  try {
+    CheckScene(scene, blobs_, store, {});
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("times.txt has 16777217 bytes; at most 16777216 are allowed"));
+  }
+}
+
 TEST_F(SceneValidationTest, MasksAreNoPhotos) {
   v1::Scene scene;
   std::vector<std::pair<std::string, std::string>> files = {

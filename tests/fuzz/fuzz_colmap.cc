@@ -1,8 +1,9 @@
-// Fuzz target: COLMAP's models. The first byte says text or binary, the next ones where the files
-// cameras, images and points3D end.
+// Fuzz target: COLMAP's models, and the times of their photos. The first byte says text, binary or
+// times.txt, the next ones where a model's files cameras, images and points3D end.
 #include <unistd.h>
 
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string_view>
@@ -18,11 +19,12 @@ namespace fs = std::filesystem;
 
 constexpr std::array<const char*, 3> kFiles = {"cameras", "images", "points3D"};
 constexpr size_t kHead = 5;
+constexpr char kBinary = 1, kTimes = 2;  // else text
 
 size_t Number(const uint8_t* bytes) { return bytes[0] | bytes[1] << 8; }
 
 std::string Input(bool binary, const std::array<std::string, 3>& files) {
-  std::string input(1, binary ? 1 : 0);
+  std::string input(1, binary ? kBinary : '\0');
   for (int f = 0; f < 2; ++f) {
     input += static_cast<char>(files[f].size() & 255u);
     input += static_cast<char>(files[f].size() >> 8u);
@@ -36,6 +38,19 @@ std::string Binary(const Values&... values) {
   std::string bytes;
   (bytes.append(reinterpret_cast<const char*>(&values), sizeof(values)), ...);
   return bytes;
+}
+
+std::string Times(const std::string& text) { return std::string(1, kTimes) + "...." + text; }
+
+int ReadTimes(const fs::path& file, std::string_view text) {
+  std::ofstream(file, std::ios::binary) << text;
+  return ReadOrRefuse([&] {
+    std::vector<FrameTime> times;
+    for (const auto& [name, time] : LoadColmapTimes(file)) times.push_back(time);
+    for (const std::optional<Moment>& moment : MomentsOf(times).moments) {
+      if (moment && !std::isfinite(moment->time_s)) std::abort();
+    }
+  });
 }
 
 }  // namespace
@@ -69,7 +84,11 @@ std::vector<std::string> FuzzSeeds() {
                                     uint64_t{1},
                                     uint32_t{1},
                                     uint32_t{0});
-  return {Input(false, text), Input(true, {cameras, images, points}), Input(true, {"", "", ""})};
+  return {Input(false, text),
+          Input(true, {cameras, images, points}),
+          Input(true, {"", "", ""}),
+          Times("# comment\n\n0 l/a b.jpg\r\n0 r/a.jpg\n+0.04 l/c.jpg\n"),
+          Times("-1e308 a\n1e308 b\nnan c\n")};
 }
 
 }  // namespace color3d
@@ -78,8 +97,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace color3d;
   if (size < kHead) return 0;
   static const ScratchFolder folder(MemoryFolder());
-  const bool binary = (data[0] & 1) != 0;
+  const bool binary = (data[0] & kBinary) != 0;
   std::string_view rest(reinterpret_cast<const char*>(data) + kHead, size - kHead);
+  if ((data[0] & kTimes) != 0) return ReadTimes(folder.path() / "times.txt", rest);
   for (size_t f = 0; f < kFiles.size(); ++f) {
     const size_t length = f < 2 ? std::min(Number(data + 1 + 2 * f), rest.size()) : rest.size();
     const fs::path file = folder.path() / (std::string(kFiles[f]) + (binary ? ".bin" : ".txt"));

@@ -177,6 +177,17 @@ void CollectModel(const fs::path& root, PhotoFolder* result) {
   if (IsFile(root / kTransforms)) {
     result->model_files.push_back({kTransforms, root / kTransforms});
   }
+  if (!IsFile(root / kTimesFile)) return;
+  const std::string times(kTimesFile);
+  if (!model.empty()) {
+    result->model_files.push_back({times, root / times});
+  } else {
+    result->notes.push_back(
+        times + " is not read: it goes with a COLMAP model" +
+        (result->model_files.empty()
+             ? "; give one, or colour the frames of one moving camera with --film --poses"
+             : "; transforms.json and metadata.json have times of their own"));
+  }
 }
 
 // All files, so that one of the wrong kind is refused by name instead of being passed over.

@@ -17,7 +17,7 @@ struct LocalFile {
 struct PhotoFolder {
   std::filesystem::path root;
   std::vector<LocalFile> photos;         // sorted by path
-  std::vector<LocalFile> model_files;    // of a COLMAP model or transforms.json, sorted by path
+  std::vector<LocalFile> model_files;    // tell poses and times, sorted by path
   std::vector<LocalFile> augment_files;  // pictures in colour for the colorizer, sorted by path
   std::vector<LocalFile> mask_files;     // of photos, see mask_files.h
   std::optional<LocalFile> splat;        // in place of photos: views are drawn from it
@@ -32,13 +32,13 @@ struct PhotoFolder {
 
 // Photos (.jpg .jpeg .png .tif .tiff) are taken from images/, at any depth, when there is one with
 // photos; else from `root` itself and from the subfolders that transforms.json names. Also taken: a
-// COLMAP model in sparse/0, sparse or `root`, transforms.json, and everything in augment/ (any
-// depth). Of a folder of Nerfies or HyperNeRF: metadata.json, camera/, points.npy and the pictures
-// of one size, rgb/2x/, else 1x, 4x, 8x. Nothing else, but for a splat (.ply .sog .spz) or a film
-// (.mp4 .mov ...): `root` itself, or the only one in a folder without photos; or several films
-// beside a transforms.json that names them, or beside a poses_bounds.npy. Throws Error: no such
-// folder, another file instead of a folder, no photos, one photo, more than 10,000 files, names
-// that are not safe or not UTF-8.
+// COLMAP model in sparse/0, sparse or `root` with the times.txt in `root`, transforms.json, and
+// everything in augment/ (any depth). Of a folder of Nerfies or HyperNeRF: metadata.json, camera/,
+// points.npy and the pictures of one size, rgb/2x/, else 1x, 4x, 8x. Nothing else, but for a splat
+// (.ply .sog .spz) or a film (.mp4 .mov ...): `root` itself, or the only one in a folder without
+// photos; or several films beside a transforms.json that names them, or beside a poses_bounds.npy.
+// Throws Error: no such folder, another file instead of a folder, no photos, one photo, more than
+// 10,000 files, names that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root);
 
 // The photos as frames of a film, in the order of their names (numbers count as numbers); poses are

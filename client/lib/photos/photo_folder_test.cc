@@ -135,6 +135,28 @@ TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {
   EXPECT_EQ(CollectPhotos(root()).model_files.size(), 4u);
 }
 
+TEST_F(PhotoFolderTest, TimesGoWithAColmapModel) {
+  for (const char* name : {"images/a.jpg", "images/b.jpg", "times.txt"}) Write(name);
+  PhotoFolder folder = CollectPhotos(root());
+  EXPECT_THAT(folder.model_files, IsEmpty());
+  EXPECT_THAT(folder.notes, ElementsAre(HasSubstr("give one, or colour the frames")));
+  Write("transforms.json", R"({"frames": []})");
+  folder = CollectPhotos(root());
+  EXPECT_THAT(Paths(folder.model_files), ElementsAre("transforms.json"));
+  EXPECT_THAT(folder.notes, ElementsAre(HasSubstr("have times of their own")));
+  for (const char* stem : {"cameras", "images", "points3D"}) {
+    Write(std::string("sparse/0/") + stem + ".bin");
+  }
+  folder = CollectPhotos(root());
+  EXPECT_THAT(Paths(folder.model_files),
+              ElementsAre("sparse/0/cameras.bin",
+                          "sparse/0/images.bin",
+                          "sparse/0/points3D.bin",
+                          "times.txt",
+                          "transforms.json"));
+  EXPECT_THAT(folder.notes, IsEmpty());
+}
+
 TEST_F(PhotoFolderTest, TransformsNamesItsSubfolders) {
   for (const char* name : {"train/a.png", "train/b.png", "other/c.png"}) Write(name);
   Write("transforms.json", R"({"frames": [{"file_path": "./train/a"}, {"file_path": "../x/y"}]})");

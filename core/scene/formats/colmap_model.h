@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/scene/camera.h"
+#include "core/scene/frame_times.h"
 
 namespace color3d {
 
@@ -68,5 +69,11 @@ void CheckColmapPoint(const ColmapPoint& point, const std::string& place);
 
 ColmapModel LoadColmapBinary(const std::filesystem::path& folder);
 ColmapModel LoadColmapText(const std::filesystem::path& folder);
+
+// What COLMAP does not keep: when its photos were taken. A text file as COLMAP's are, with a line
+// "SECONDS NAME" for each photo; the name, as the model has it, may hold blanks. By name. Throws
+// Error{kInvalidArgument} naming file and line: no finite number, no name, a name that is there
+// twice or holds control characters.
+std::map<std::string, FrameTime> LoadColmapTimes(const std::filesystem::path& file);
 
 }  // namespace color3d

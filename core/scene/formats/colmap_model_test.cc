@@ -163,6 +163,74 @@ TEST(Colmap, TextWithCommentsBlanksAndWindowsLineEnds) {
   EXPECT_TRUE(read.points.empty());
 }
 
+// Photos 0001.png, 0002.png and "l/a b.png" with times as a file tells them.
+class ColmapTimes : public testing::Test {
+ protected:
+  ColmapTimes() {
+    Scene scene = ArcScene(3);
+    scene.views[2].name = "l/a b.png";
+    scene.views[2].image_file = "images/l/a b.png";
+    WritePhotos(scene, folder_.path());
+    WriteColmapText(scene, folder_.path() / "sparse/0");
+  }
+  Scene Read(const std::string& times) {
+    warnings_.clear();
+    WriteFileAtomic(folder_.path() / "times.txt", times);
+    return ReadColmapModel(folder_.path() / "sparse/0", folder_.path(), &warnings_, &cameras_);
+  }
+  std::string Said(const std::string& times) {
+    return Refusal([&] { Read(times); });
+  }
+  ScratchFolder folder_;
+  std::vector<std::string> warnings_, cameras_;
+};
+
+TEST_F(ColmapTimes, ViewsHaveTheMomentsOfTheirLines) {
+  const Scene scene =
+      Read("# SECONDS NAME\r\n\r\n2.5 l/a b.png \r\n  +2e0\t0001.png\n3 unplaced.png\n4 0002.png");
+  EXPECT_EQ(scene.views[0].moment, (Moment{0.0, 0}));
+  EXPECT_EQ(scene.views[1].moment, (Moment{2.0, 0}));
+  EXPECT_EQ(scene.views[2].moment, (Moment{0.5, 0}));
+  EXPECT_EQ(cameras_.size(), 1u);
+  EXPECT_TRUE(warnings_.empty());
+}
+
+TEST_F(ColmapTimes, FoldersAreCamerasWherePhotosShareATime) {
+  const Scene scene = Read("1 0001.png\n2 0002.png\n1 l/a b.png\n");
+  EXPECT_EQ(cameras_, (std::vector<std::string>{"", "l"}));
+  EXPECT_EQ(scene.views[2].moment, (Moment{0.0, 1}));
+  EXPECT_THAT(
+      Said("1 0001.png\n1 0002.png\n2 l/a b.png\n"),
+      HasSubstr("times.txt: line 1 (0001.png) and times.txt: line 2 (0002.png) are of one "
+                "camera and one time (1); remove one of them, or give each camera a folder"));
+}
+
+TEST_F(ColmapTimes, EveryPhotoHasOneOrNone) {
+  EXPECT_THAT(
+      Said("1 0001.png\n2 0003.png\n"),
+      HasSubstr("times.txt has no time for 2 of the COLMAP model's 3 photos (0002.png, l/a "
+                "b.png), but 0001.png has one; give it to every photo, or remove the file"));
+  for (const char* other : {"1 images/0001.png\n", "# nothing\n"}) {
+    EXPECT_FALSE(Read(other).views[0].moment) << other;
+    ASSERT_EQ(warnings_.size(), 1u);
+    EXPECT_THAT(warnings_[0], HasSubstr("names no photo as the COLMAP model does (0001.png, "));
+    EXPECT_TRUE(cameras_.empty());
+  }
+}
+
+TEST_F(ColmapTimes, BadLinesAreRefusedByNumber) {
+  EXPECT_EQ(Said("#\n\n0001.png 1\n"),
+            "times.txt: line 3: \"0001.png\" is not a number of seconds; a line is SECONDS NAME");
+  EXPECT_THAT(Said("0,5 0001.png\n"), HasSubstr("line 1: \"0,5\" is not a number of seconds"));
+  EXPECT_EQ(Said("1 0001.png\n2 \r\n"), "times.txt: line 2 names no photo; a line is SECONDS NAME");
+  EXPECT_EQ(Said("nan 0001.png\n"),
+            "times.txt: line 1: the time of 0001.png is nan; it must be finite");
+  EXPECT_EQ(Said("1 0001.png\n2 0002.png\n3 0001.png\n"),
+            "times.txt: line 3: 0001.png has a time already (times.txt: line 1); remove one of the "
+            "two lines");
+  EXPECT_THAT(Said("1 a\x01.png\n"), HasSubstr("times.txt: line 1: the name of an image holds"));
+}
+
 TEST(Colmap, EveryCameraModel) {
   struct Case {
     const char* model;
@@ -281,7 +349,7 @@ TEST(Colmap, NonFiniteNumbersAreNamed) {
   WriteColmapText(ArcScene(2), text.path());
   WriteFileAtomic(text.path() / "points3D.txt", "5 0 nan 0 1 2 3 0.5\n");
   EXPECT_EQ(Refusal([&] { LoadColmapModel(text.path()); }),
-            "points3D.txt line 1: point 5 has a NaN coordinate");
+            "points3D.txt: line 1: point 5 has a NaN coordinate");
   WriteFileAtomic(text.path() / "points3D.txt", "5 0 1e999 0 1 2 3 0.5\n");
   EXPECT_THAT(Refusal([&] { LoadColmapModel(text.path()); }),
               HasSubstr("\"1e999\" is not a number"));

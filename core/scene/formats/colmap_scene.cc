@@ -1,10 +1,15 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/catalogue/scene_files.h"
 #include "core/scene/formats/colmap_model.h"
 #include "core/scene/formats/scene_readers.h"
+#include "core/scene/frame_times.h"
 #include "core/scene/photos.h"
 #include "core/scene/reprojection.h"
 
@@ -12,25 +17,66 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-void ThrowMissing(const std::vector<std::string>& missing, size_t total, const fs::path& folder) {
-  std::string names;
-  for (size_t i = 0; i < std::min<size_t>(missing.size(), 3); ++i) {
-    names += (i == 0 ? "" : ", ") + missing[i];
+std::string FirstThree(const std::vector<std::string>& names) {
+  std::string text;
+  for (size_t i = 0; i < std::min<size_t>(names.size(), 3); ++i) {
+    text += (i == 0 ? "" : ", ") + names[i];
   }
+  return text + (names.size() > 3 ? ", ..." : "");
+}
+
+void ThrowMissing(const std::vector<std::string>& missing, size_t total, const fs::path& folder) {
   throw InvalidArgument(
-      "{} of the {} photos that the COLMAP model names are not in {} ({}{}); put them there",
+      "{} of the {} photos that the COLMAP model names are not in {} ({}); put them there",
       missing.size(),
       total,
       (folder / "images").string(),
-      names,
-      missing.size() > 3 ? ", ..." : "");
+      FirstThree(missing));
+}
+
+// The views' moments, where a file tells times.
+FrameMoments ReadMoments(const fs::path& scene_folder, const std::vector<View>& views) {
+  FrameMoments none;
+  none.moments.resize(views.size());
+  std::error_code error;
+  if (!fs::is_regular_file(scene_folder / kTimesFile, error)) return none;
+  const std::map<std::string, FrameTime> times = LoadColmapTimes(scene_folder / kTimesFile);
+  std::vector<FrameTime> frames;
+  std::vector<std::string> without;
+  for (const View& view : views) {
+    const auto time = times.find(view.name);
+    if (time != times.end()) {
+      frames.push_back(time->second);
+    } else {
+      without.push_back(view.name);
+    }
+  }
+  if (frames.empty()) {
+    none.note = fmt::format(
+        "{} names no photo as the COLMAP model does ({}): the scene is taken to stand still",
+        kTimesFile,
+        FirstThree(without));
+    return none;
+  }
+  if (!without.empty()) {
+    throw InvalidArgument(
+        "{} has no time for {} of the COLMAP model's {} photos ({}), but {} has one; give it to "
+        "every photo, or remove the file",
+        kTimesFile,
+        without.size(),
+        views.size(),
+        FirstThree(without),
+        frames[0].file);
+  }
+  return MomentsOf(frames);
 }
 
 }  // namespace
 
 Scene ReadColmapModel(const fs::path& model_folder,
                       const fs::path& scene_folder,
-                      std::vector<std::string>* warnings) {
+                      std::vector<std::string>* warnings,
+                      std::vector<std::string>* cameras) {
   const ColmapModel model = LoadColmapModel(model_folder);
   const std::vector<CameraReprojection> reprojection = MeasureReprojection(model);
   if (warnings != nullptr) {
@@ -75,6 +121,10 @@ Scene ReadColmapModel(const fs::path& model_folder,
     scene.views.push_back(std::move(view));
   }
   if (!missing.empty()) ThrowMissing(missing, order.size(), scene_folder);
+  FrameMoments moments = ReadMoments(scene_folder, scene.views);
+  for (size_t i = 0; i < scene.views.size(); ++i) scene.views[i].moment = moments.moments[i];
+  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
+  if (cameras != nullptr) *cameras = std::move(moments.cameras);
 
   scene.points.reserve(model.points.size());
   for (const ColmapPoint& from : model.points) {

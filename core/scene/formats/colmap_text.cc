@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
@@ -36,7 +37,7 @@ class Lines {
     }
     return false;
   }
-  std::string Place() const { return fmt::format("{} line {}", name_, number_); }
+  std::string Place() const { return fmt::format("{}: line {}", name_, number_); }
   bool AtEndOfLine() const { return line_.empty(); }
 
   std::string_view Word() {
@@ -48,16 +49,16 @@ class Lines {
     return word;
   }
   // Independent of the locale. Accepts "nan" and "inf", which the caller's checks refuse by name.
+  // `wanted` says in the error what the word is not.
   template <typename T>
-  T Number() {
+  T Number(const char* wanted = "a number that fits here") {
     std::string_view word = Word();
     const std::string_view shown = word;
     if (word.size() > 1 && word[0] == '+') word.remove_prefix(1);
     T value{};
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (error != std::errc() || end != word.data() + word.size()) {
-      throw InvalidArgument(
-          "{}: \"{}\" is not a number that fits here", Place(), shown.substr(0, 40));
+      throw InvalidArgument("{}: \"{}\" is not {}", Place(), shown.substr(0, 40), wanted);
     }
     return value;
   }
@@ -157,6 +158,31 @@ ColmapModel LoadColmapText(const fs::path& folder) {
   return {ReadCameras(folder / "cameras.txt"),
           ReadImages(folder / "images.txt"),
           ReadPoints(folder / "points3D.txt")};
+}
+
+std::map<std::string, FrameTime> LoadColmapTimes(const fs::path& file) {
+  Lines lines(file);
+  std::map<std::string, FrameTime> times;
+  while (lines.NextRecord()) {
+    const std::string place = lines.Place();
+    const double time = lines.Number<double>("a number of seconds; a line is SECONDS NAME");
+    const std::string name = lines.Rest();
+    if (name.empty()) {
+      throw InvalidArgument("{} names no photo; a line is SECONDS NAME", place);
+    }
+    CheckColmapName(name, place);
+    if (!std::isfinite(time)) {
+      throw InvalidArgument("{}: the time of {} is {:g}; it must be finite", place, name, time);
+    }
+    const auto [other, fresh] = times.emplace(name, FrameTime{place, name, time, ""});
+    if (!fresh) {
+      throw InvalidArgument("{}: {} has a time already ({}); remove one of the two lines",
+                            place,
+                            name,
+                            other->second.place);
+    }
+  }
+  return times;
 }
 
 }  // namespace color3d
