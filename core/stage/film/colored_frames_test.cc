@@ -195,6 +195,19 @@ TEST_F(ColoredFramesTest, EveryCameraOfARigHasAFilmOfItsOwn) {
   EXPECT_FALSE(fs::exists(out / "frames"));
 }
 
+TEST_F(ColoredFramesTest, HalfASecondOfAColmapModelWithTimesIsNoWhole) {
+  MakeRig();
+  ImportFacts facts;
+  facts.layout = "colmap";
+  facts.cameras = {{"left", ""}, {"right", ""}};
+  AddInput(artifact::kImportFacts, ImportFactsToJson(facts));
+  StageContext context = MakeContext();
+  RunRender({}, context);
+  FilmReader film(scratch_.path() / "out/film.mp4");
+  ASSERT_EQ(film.times().size(), 2u);
+  EXPECT_NEAR(film.times()[1], 0.5, 1e-6);
+}
+
 TEST_F(ColoredFramesTest, AFilmOfWhatStandsStillIsAColoredFilm) {
   MakeRig();
   AddInput(artifact::kModel, SerializeGaussians(SmallModel()));

@@ -73,7 +73,9 @@ std::optional<ImportFacts> FindImportFacts(const StageContext& context) {
 }
 
 bool TimesAreSeconds(const Scene& scene, const std::optional<ImportFacts>& facts) {
-  if (facts && (facts->layout == "film" || facts->layout == "posed_films")) return true;
+  for (const char* layout : {"film", "posed_films", "colmap"}) {
+    if (facts && facts->layout == layout) return true;
+  }
   return scene.IsFilm() || scene.Times().back() > kLongestWhole;
 }
 

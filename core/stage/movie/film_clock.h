@@ -27,7 +27,8 @@ FilmClock ClockOf(const std::vector<double>& times_s);
 // Nothing where the import has left no facts, as in tests.
 std::optional<ImportFacts> FindImportFacts(const StageContext& context);
 
-// Whether the scene's times are seconds: they may also count from 0 to 1 for the whole.
+// Whether the scene's times are seconds, as those of films and of times.txt are: others may also
+// count from 0 to 1 for the whole.
 bool TimesAreSeconds(const Scene& scene, const std::optional<ImportFacts>& facts);
 
 // What is heard in the film that `view` is a frame of, from this time of the scene on, as long as
