@@ -155,7 +155,7 @@ std::string WhyNotForFilm(const std::string& kind, const ColorizeSceneSpec& scen
   return "";
 }
 
-// `scene`: with its preset.
+// `scene`: as BuildColorizeSceneGraph takes it.
 void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const bool has_poses =
       facts.is_film && scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO;
@@ -172,7 +172,7 @@ void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
           "the key view {} has a range of time (begin_s, end_s), which is for films without poses; "
           "leave the range out{}",
           correction.view(),
-          has_poses ? ", or import_scene.film_poses" : "");
+          has_poses ? ", or import the film without import_scene.film_poses" : "");
     }
   }
 }

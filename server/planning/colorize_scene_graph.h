@@ -17,8 +17,8 @@ inline int SamplesOf(const v1::GenerateAugmentationsSpec& spec) {
 }
 
 // Adds all jobs to the builder, which fills in the options of each stage from `scene`: what was
-// submitted, over its preset. Throws Error for inputs that the submitted options contradict, or
-// that lack a job which they read.
+// submitted, over its preset, with the options of the import that is given, if one is. Throws Error
+// for inputs that the submitted options contradict, or that lack a job which they read.
 void BuildColorizeSceneGraph(const v1::JobSpec& submitted,
                              const v1::ColorizeSceneSpec& scene,
                              const SceneFacts& facts,

@@ -44,6 +44,17 @@ void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
           : "");
 }
 
+// What was submitted over its preset. A given import has settled what a new one would be asked for:
+// a film's poses, its part and its stride.
+v1::ColorizeSceneSpec SceneOf(const v1::JobSpec& submitted, const std::vector<JobRecord>& inputs) {
+  v1::ColorizeSceneSpec scene = WithPreset(submitted.colorize_scene());
+  for (const JobRecord& input : inputs) {
+    if (!submitted.has_colorize_scene() || input.kind != kind::kImportScene) continue;
+    *scene.mutable_import_scene() = ParseSpec(input.spec, input.name).import_scene();
+  }
+  return scene;
+}
+
 }  // namespace
 
 NewGraph PlanJob(const v1::JobSpec& spec,
@@ -53,7 +64,7 @@ NewGraph PlanJob(const v1::JobSpec& spec,
   if (spec.has_personalize_scenes()) {
     throw Error(ErrorCode::kInternal, "{} is planned by PlanPersonalizeScenes", KindOf(spec));
   }
-  const v1::ColorizeSceneSpec scene = WithPreset(spec.colorize_scene());
+  const v1::ColorizeSceneSpec scene = SceneOf(spec, inputs);
   std::optional<TimeBudget> time_budget;
   if (scene.time_budget_seconds() > 0.0) {
     time_budget = DivideTimeBudget(scene.time_budget_seconds(), facts);

@@ -128,6 +128,40 @@ TEST(Planner, AFilmIsColoredNotReconstructed) {
   EXPECT_THROW(refused(), Error);
 }
 
+// As `color3d key accept` leaves it for `colorize --scene`.
+JobRecord GivenImport(const v1::ImportSceneSpec& options) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  *spec.mutable_import_scene() = options;
+  JobRecord import;
+  import.name = "jobs/i";
+  import.kind = kind::kImportScene;
+  import.scene = spec.scene();
+  import.spec = spec.SerializeAsString();
+  import.state = JobState::kSucceeded;
+  return import;
+}
+
+TEST(Planner, AGivenImportSaysWhetherPosesOfAFilmWereAskedFor) {
+  const SceneFacts film{.photos = 0, .is_film = true};
+  v1::JobSpec spec = SceneSpec();
+  v1::ImportSceneSpec options;
+  const NewGraph colored = PlanJob(spec, {GivenImport(options)}, film);
+  options.set_film_poses(v1::ImportSceneSpec::FILM_POSES_AUTO);
+  const NewGraph with_poses = PlanJob(spec, {GivenImport(options)}, film);
+  for (const char* kind : {"reconstruct_geometry", "solve_chroma", "export"}) {
+    EXPECT_THAT(colored.jobs[IndexOf(colored, kind)].skip_reason, HasSubstr("film")) << kind;
+    EXPECT_EQ(with_poses.jobs[IndexOf(with_poses, kind)].skip_reason, "") << kind;
+  }
+  v1::FurtherKeyView* key =
+      spec.mutable_colorize_scene()->mutable_carry_color()->add_further_key_views();
+  key->set_view("a");
+  *key->mutable_color() = spec.colorize_scene().key_color();
+  key->set_begin_s(1.0);
+  EXPECT_NO_THROW(PlanJob(spec, {GivenImport({})}, film));
+  EXPECT_THROW(PlanJob(spec, {GivenImport(options)}, film), Error) << "a range of time";
+}
+
 TEST(Planner, AKeyFrameWithARangeOfTimeCorrectsTheColoredFilm) {
   const SceneFacts film{.photos = 0, .is_film = true};
   v1::JobSpec spec = SceneSpec();
@@ -162,7 +196,7 @@ TEST(Planner, AKeyFrameWithARangeOfTimeCorrectsTheColoredFilm) {
   };
   EXPECT_THAT(complaint(kTwentyPhotos), HasSubstr("a has a range of time"));
   scene->mutable_import_scene()->set_film_poses(v1::ImportSceneSpec::FILM_POSES_AUTO);
-  EXPECT_THAT(complaint(film), HasSubstr("or import_scene.film_poses"));
+  EXPECT_THAT(complaint(film), HasSubstr("or import the film without import_scene.film_poses"));
   scene->clear_import_scene();
   key->set_begin_s(15.0);
   EXPECT_THAT(complaint(film),
