@@ -103,11 +103,10 @@ class Colorize {
   }
 
   v1::JobSpec AcceptedSpec(const std::string& scene) {
-    if (!options_.key_view.empty() || options_.hold_out || options_.deflicker) {
+    if (!options_.key_view.empty() || options_.hold_out || options_.deflicker || options_.poses) {
       throw InvalidArgument(
-          "--key-view, --hold-out and --deflicker were settled when the key view was selected "
-          "(`color3d key "
-          "select`); leave them out");
+          "--key-view, --hold-out, --deflicker and --poses were settled when the key view was "
+          "selected (`color3d key select`); leave them out, or select anew with them");
     }
     const KeyState state = ReadKeyState(*connection_, scene);
     if (!state.accepted) {

@@ -14,9 +14,11 @@
 #include "client/commands/scene_target.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
+#include "client/options/colorize_options.h"
 #include "client/options/key_color_flags.h"
 #include "core/base/error.h"
 #include "core/catalogue/artifacts.h"
+#include "core/catalogue/stages.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -30,10 +32,9 @@ struct KeyOptions {
   std::string encoder;   // weights by name in the server's configuration
   std::string features;  // CLIP weights, likewise
   std::string job;
-  int count = 1;  // key views that are chosen together
-  bool hold_out = false;
+  int count = 1;           // key views that are chosen together
   bool film = false;       // the target is a folder of a film's frames
-  bool deflicker = false;  // of the film
+  ColorizeOptions import;  // what its import is asked for, and no more
   KeyColorFlags color;
 };
 
@@ -59,19 +60,27 @@ class Key {
     spec.set_scene(scene);
     return spec;
   }
+  bool AsksForImport() const {
+    return ImportSpec(options_.import, "").import_scene().ByteSizeLong() > 0;
+  }
   // Submits the selection that the options ask for, with the import that it needs.
   v1::Job SubmitSelection(const std::string& scene);
   v1::Job Follow(const std::vector<std::string>& jobs) {
     return FollowToSuccess(connection_, context_, jobs, options_.out, display_);
   }
-  // A submitted job at its end, what it chose, and the files that it left in options_.out.
+  // A submitted job at its end, what it chose, and the files that it left in options_.out. What an
+  // import that was asked for has to say belongs to its selection.
   struct Fetched {
     v1::Job job;
     KeyViewChoice choice;
     std::vector<std::string> files;
   };
   Fetched Fetch(const v1::Job& submitted) {
-    const v1::Job job = Follow({submitted.name()});
+    std::vector<std::string> jobs = {submitted.name()};
+    if (submitted.kind() == kind::kSelectKeyView) {
+      jobs.insert(jobs.begin(), submitted.spec().inputs().begin(), submitted.spec().inputs().end());
+    }
+    const v1::Job job = Follow(jobs);
     return {job,
             ReadChoice(connection_, job),
             DownloadResults(connection_, context_, job, options_.out, display_)};
@@ -106,20 +115,24 @@ v1::Job Key::SubmitSelection(const std::string& scene) {
   if (options_.count > 1) select->set_count(options_.count);
   select->set_encoder(options_.encoder);
   select->set_features(options_.features);
-  if (options_.hold_out || options_.deflicker) {
-    v1::JobSpec import = Spec(scene);
-    if (options_.hold_out) import.mutable_import_scene()->set_hold_out_every_eighth(true);
-    if (options_.deflicker) import.mutable_import_scene()->set_film_deflicker(true);
-    spec.add_inputs(SubmitJob(connection_, import).name());
+  if (AsksForImport()) {  // else the server's own will do
+    spec.add_inputs(SubmitJob(connection_, ImportSpec(options_.import, scene)).name());
   }
   return SubmitJob(connection_, spec);
 }
 
 std::string Key::HowToColor(const std::string& scene) const {
+  std::vector<std::string> again = {"key", "select", scene, "--view", "NAME"};
+  if (options_.import.hold_out) again.emplace_back("--hold-out");
+  if (options_.import.deflicker) again.emplace_back("--deflicker");
+  if (options_.import.poses) again.emplace_back("--poses");
+  for (const std::string& setting : options_.import.settings) {
+    again.insert(again.end(), {"--set", setting});
+  }
   return "Colour it, for instance\n" + Command({"key", "color", scene, "--auto"}) +
          Command({"key", "color", scene, "--image", "COLOURED.png"}) +
          Command({"key", "color", scene, "--hints", "STROKES.png"}) + "or take another view\n" +
-         Command({"key", "select", scene, "--view", "NAME"});
+         Command(again);
 }
 
 ExitCode Key::Select() {
@@ -160,7 +173,7 @@ ExitCode Key::Select() {
 }
 
 std::vector<std::string> Key::SelectionFor(const std::string& scene) {
-  if (!options_.view.empty() || options_.hold_out || options_.deflicker) {
+  if (!options_.view.empty() || AsksForImport()) {
     const v1::Job select = SubmitSelection(scene);
     return WithItsInputs(connection_, select);
   }
@@ -284,8 +297,7 @@ void AddTarget(CLI::App* command, KeyOptions* options) {
 
 void AddView(CLI::App* command, KeyOptions* options) {
   command->add_option("--view", options->view, "Take this photo (its name) as the key view");
-  command->add_flag("--hold-out", options->hold_out, "Hold out every eighth view");
-  command->add_flag("--deflicker", options->deflicker, "Of a film: take out flicker of exposure");
+  DeclareImportOptions(*command, &options->import);
   command->add_option("-o,--out", options->out, "Folder for the pictures")->capture_default_str();
 }
 

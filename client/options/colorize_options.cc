@@ -11,6 +11,7 @@
 #include "client/options/option_fields.h"
 #include "client/options/preset_file.h"
 #include "core/base/error.h"
+#include "core/catalogue/stages.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -72,6 +73,27 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
          "STAGE` names its options. May be repeated")
       ->allow_extra_args(false)
       ->check(Complaint);
+}
+
+// What the import of the photos is asked for.
+void DeclareImportFlags(CLI::App& app, ColorizeOptions* o) {
+  app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
+  app.add_flag("--deflicker",
+               o->deflicker,
+               "Take flicker of exposure out of a film; the coloured frames get steady luminance");
+  app.add_flag("--poses",
+               o->poses,
+               "Of a film by one moving camera: find the frames' poses by what stands still");
+}
+
+std::string ComplaintOfImport(const std::string& setting) {
+  if (!setting.starts_with(kind::kImportScene)) {
+    return "'" + setting +
+           "' is no option of the import (import_scene.OPTION=VALUE); other stages have theirs "
+           "from "
+           "`color3d colorize`";
+  }
+  return Complaint(setting);
 }
 
 constexpr size_t kMaxMoreKeys = 16;
@@ -287,19 +309,23 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
   app.add_flag(
       "--film", o->film, "The photos are frames of a film: coloured one by one, not reconstructed");
-  app.add_flag("--deflicker",
-               o->deflicker,
-               "Take flicker of exposure out of a film; the coloured frames get steady luminance");
-  app.add_flag("--poses",
-               o->poses,
-               "Of a film by one moving camera: find the frames' poses by what stands still");
+  DeclareImportFlags(app, o);
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_option("--notify",
                  o->notify,
                  "Address that is told when the job has ended; the server's operator allows which");
-  app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
   app.add_option("--seed", o->seed, "Same seed, same machine: same result");
   DeclareOptionFlags(app, o);
+}
+
+void DeclareImportOptions(CLI::App& app, ColorizeOptions* o) {
+  DeclareImportFlags(app, o);
+  app.add_option("--set",
+                 o->settings,
+                 "import_scene.OPTION=VALUE: any option of the import, e.g. "
+                 "import_scene.film_stride=2; `--set import_scene` names them. May be repeated")
+      ->allow_extra_args(false)
+      ->check(ComplaintOfImport);
 }
 
 v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene) {

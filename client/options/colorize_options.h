@@ -66,6 +66,8 @@ bool WantsAugmentFiles(const ColorizeOptions& options);
 void RequireAugmentFiles(const ColorizeOptions& options, const PhotoFolder& folder);
 
 void DeclareOptions(CLI::App& app, ColorizeOptions* options);
+// Those that ImportSpec reads, for commands that come before the scene is coloured.
+void DeclareImportOptions(CLI::App& app, ColorizeOptions* options);
 
 // A spec with scene and seed, and no stage yet.
 v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene);

@@ -125,6 +125,29 @@ TEST_F(ColorizeOptionsTest, PosesOfAFilmAreAskedForByFlag) {
   }
 }
 
+TEST_F(ColorizeOptionsTest, ASelectionAsksForPosesPartAndStrideOfAFilm) {
+  const auto import = [](std::vector<std::string> arguments) {
+    ColorizeOptions options;
+    CLI::App app;
+    DeclareImportOptions(app, &options);
+    std::reverse(arguments.begin(), arguments.end());
+    app.parse(arguments);
+    return ImportSpec(options, "scenes/s").import_scene();
+  };
+  EXPECT_EQ(import({}).ByteSizeLong(), 0u) << "the server's own will do";
+  const v1::ImportSceneSpec spec = import({"--poses",
+                                           "--deflicker",
+                                           "--set=import_scene.film_stride=3",
+                                           "--set",
+                                           "import_scene.film_begin_s=1.5"});
+  EXPECT_EQ(spec.film_poses(), v1::ImportSceneSpec::FILM_POSES_AUTO);
+  EXPECT_TRUE(spec.film_deflicker());
+  EXPECT_EQ(spec.film_stride(), 3);
+  EXPECT_EQ(spec.film_begin_s(), 1.5);
+  EXPECT_THROW(import({"--set=personalize.iterations=7"}), CLI::ValidationError);
+  EXPECT_THROW(import({"--set=import_scene.film_stride=0"}), CLI::ValidationError);
+}
+
 TEST_F(ColorizeOptionsTest, AnUnknownOptionIsToldWithTheNearest) {
   EXPECT_THAT(Complaint({"--set=personalise.iterations=3"}),
               HasSubstr("did you mean personalize.iterations?"));

@@ -57,6 +57,17 @@ class FilmTest : public ServiceTest {
       WriteFileAtomic(Path("frames") / ("n" + number + ".png"), EncodePng8(FrameOf(i)));
     }
   }
+  // Before it, a thing moves.
+  void WriteFramesOfAStillCamera() {
+    fs::create_directories(Path("frames"));
+    const Camera camera{320, 240, 330.0, 330.0, 160.0, 120.0};
+    for (int i = 0; i < 6; ++i) {
+      const Image gray = RenderCorner(camera,
+                                      LookAt({0.5, -0.1, -1.3}, {0.1, 0.4, 1.6}),
+                                      MovingBoard{{0.3 - 0.025 * i, 0.3 - 0.02 * i, 0.9}});
+      WriteFileAtomic(Path("frames") / ("n" + std::to_string(i) + ".png"), EncodePng8(gray));
+    }
+  }
   fs::path WriteVideo() {
     ThreadPool pool(1);
     Mp4Writer writer(Path("walk.mp4"),
@@ -100,14 +111,7 @@ TEST_F(FilmTest, FramesComeBackInColor) {
 }
 
 TEST_F(FilmTest, PosesAreLookedForOnRequestOnly) {
-  fs::create_directories(Path("frames"));
-  const Camera camera{320, 240, 330.0, 330.0, 160.0, 120.0};
-  for (int i = 0; i < 6; ++i) {
-    const Image gray = RenderCorner(camera,
-                                    LookAt({0.5, -0.1, -1.3}, {0.1, 0.4, 1.6}),
-                                    MovingBoard{{0.3 - 0.025 * i, 0.3 - 0.02 * i, 0.9}});
-    WriteFileAtomic(Path("frames") / ("n" + std::to_string(i) + ".png"), EncodePng8(gray));
-  }
+  WriteFramesOfAStillCamera();
   const ProcessResult refused = Colorize(Path("frames"), {"--poses"});
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("--poses is for films"));
@@ -117,6 +121,35 @@ TEST_F(FilmTest, PosesAreLookedForOnRequestOnly) {
   const ProcessResult off = Colorize(Path("frames"), {"--film"});
   EXPECT_EQ(off.exit_code, 0) << off.err;
   EXPECT_EQ(off.err.find("poses:"), std::string::npos);
+}
+
+TEST_F(FilmTest, PosesThatTheSelectionAskedForAreAskedForWhenItsKeyViewIsAccepted) {
+  WriteFramesOfAStillCamera();
+  const std::string key = Path("key").string();
+  const ProcessResult select = Client({"key",
+                                       "select",
+                                       Path("frames").string(),
+                                       "--film",
+                                       "--poses",
+                                       "--set",
+                                       "import_scene.film_frames_per_second=16",
+                                       "-o",
+                                       key});
+  ASSERT_EQ(select.exit_code, 0) << select.out << select.err;
+  EXPECT_THAT(select.err, HasSubstr("the film stays without poses: the camera stands still"));
+  EXPECT_THAT(select.out, HasSubstr("--poses --set import_scene.film_frames_per_second=16"));
+  const std::string scene = NewestJob("select_key_view").spec().scene();
+  ASSERT_EQ(Client({"key", "color", scene, "--auto", "-o", key}).exit_code, 0);
+  ASSERT_EQ(Client({"key", "accept", scene}).exit_code, 0);
+  const std::vector<std::string> colorize = {
+      "colorize", "--scene", scene, "-o", Path("out").string()};
+  const ProcessResult again = Client(colorize + std::vector<std::string>{"--poses"});
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, HasSubstr("--poses were settled when the key view was selected"));
+  const ProcessResult result = Client(colorize + QuickOptions());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, testing::Not(HasSubstr("frames of a film without poses")));
+  EXPECT_NEAR(FilmReader(Path("out") / "scene.mp4").times().at(1), 1 / 16.0, 1e-3);
 }
 
 TEST_F(FilmTest, AVideoIsColoredFromOnePaintedFrame) {
