@@ -67,7 +67,7 @@ NewGraph PlanJob(const v1::JobSpec& spec,
   const v1::ColorizeSceneSpec scene = SceneOf(spec, inputs);
   std::optional<TimeBudget> time_budget;
   if (scene.time_budget_seconds() > 0.0) {
-    time_budget = DivideTimeBudget(scene.time_budget_seconds(), facts);
+    time_budget = DivideTimeBudget(scene.time_budget_seconds(), facts, scene.import_scene());
   }
   GraphBuilder builder(spec, inputs, [&](v1::JobSpec* stage) {
     FillStage(scene, stage);

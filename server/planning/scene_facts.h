@@ -7,7 +7,7 @@ namespace color3d {
 inline constexpr int kSplatViews = 24;
 
 struct SceneFacts {
-  int photos = 0;
+  int photos = 0;  // of a film its pictures; 0 for video files, whose frames nobody has counted
   bool has_poses = false;
   int augment_files = 0;
   bool is_film = false;   // frames without poses: coloured, not reconstructed

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "core/catalogue/stages.h"
 #include "proto/option_text.h"
@@ -15,6 +16,9 @@ namespace {
 // Measured at 500 px on two cores (tests/bench/RESULTS.md "Scenes end to end").
 constexpr double kBaseSeconds = 6.0;
 constexpr double kSecondsPerPhoto = 1.7;  // carries into and colours one view, renders, evaluates
+// Of a film, most of whose colours go along with motion: carrying 0.1, colouring 0.3, movie and
+// figures 0.1.
+constexpr double kSecondsPerFrame = 0.5;
 constexpr double kPosesSecondsPerPhoto = 0.6;  // structure-from-motion
 constexpr double kMinScheduledSeconds = 15.0;  // below this the pictures are not worth having
 
@@ -23,33 +27,75 @@ constexpr double kGeometryShare = 0.25;
 constexpr double kPersonalizeShare = 0.70;
 constexpr double kChromaShare = 0.05;
 
-}  // namespace
+constexpr double kFramesPerSecond = 25.0;  // of pictures, unless their import is told
 
-double FixedSeconds(const SceneFacts& facts) {
-  const double per_photo = kSecondsPerPhoto + (facts.has_poses ? 0.0 : kPosesSecondsPerPhoto);
-  return kBaseSeconds + per_photo * facts.photos;
+bool FindsPoses(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  return facts.is_film ? import.film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO
+                       : !facts.has_poses;
 }
 
-TimeBudget DivideTimeBudget(double seconds, const SceneFacts& facts) {
-  const double fixed = FixedSeconds(facts);
-  const double rest = seconds - fixed;
+// Those of video files are not counted before the import.
+bool ViewsAreKnown(const SceneFacts& facts) { return facts.photos > 0; }
+
+// Of a film those of its pictures that the import will take.
+int ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  if (!facts.is_film) return facts.photos;
+  const double rate =
+      import.has_film_frames_per_second() ? import.film_frames_per_second() : kFramesPerSecond;
+  const auto first_from = [&](double time_s) {
+    return static_cast<int>(std::clamp(std::ceil(time_s * rate), 0.0, 1.0 * facts.photos));
+  };
+  const int end = import.has_film_end_s() ? first_from(import.film_end_s()) : facts.photos;
+  const int inside = std::max(0, end - first_from(import.film_begin_s()));
+  const int stride = std::max(1, import.film_stride());
+  return (inside + stride - 1) / stride;
+}
+
+std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  const double fixed = FixedSeconds(facts, import);
+  const std::string what =
+      !ViewsAreKnown(facts)
+          ? "a film takes, without its frames,"
+          : fmt::format("{} {} take", ViewsOf(facts, import), facts.is_film ? "frames" : "photos");
+  const char* fewer = !ViewsAreKnown(facts) ? ""
+                      : facts.is_film ? ", or fewer frames (film_stride, film_begin_s, film_end_s)"
+                                      : ", or fewer photos";
+  return fmt::format(
+      "time_budget_seconds is {:.0f}, but {} about {:.0f} s in stages that cannot be shortened{}; "
+      "give at least {:.0f} s{}",
+      std::ceil(seconds),
+      what,
+      std::ceil(fixed),
+      ViewsAreKnown(facts) && FindsPoses(facts, import) ? " (finding their poses among them)" : "",
+      std::ceil(fixed + kMinScheduledSeconds),
+      fewer);
+}
+
+}  // namespace
+
+double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  const double per_view = (facts.is_film ? kSecondsPerFrame : kSecondsPerPhoto) +
+                          (FindsPoses(facts, import) ? kPosesSecondsPerPhoto : 0.0);
+  return kBaseSeconds + per_view * ViewsOf(facts, import);
+}
+
+TimeBudget DivideTimeBudget(double seconds,
+                            const SceneFacts& facts,
+                            const v1::ImportSceneSpec& import) {
+  const double rest = seconds - FixedSeconds(facts, import);
   if (rest < kMinScheduledSeconds) {
-    throw ServiceError(
-        ErrorCode::kInvalidArgument,
-        "BAD_OPTION",
-        fmt::format(
-            "time_budget_seconds is {:.0f}, but {} photos take about {:.0f} s in stages that "
-            "cannot be shortened{}; give at least {:.0f} s, or fewer photos",
-            std::ceil(seconds),
-            facts.photos,
-            std::ceil(fixed),
-            facts.has_poses ? "" : " (finding their poses among them)",
-            std::ceil(fixed + kMinScheduledSeconds)),
-        {{fmt::format("spec.{}.time_budget_seconds", kind::kColorizeScene),
-          "too short for this scene"}});
+    throw ServiceError(ErrorCode::kInvalidArgument,
+                       "BAD_OPTION",
+                       TooShort(seconds, facts, import),
+                       {{fmt::format("spec.{}.time_budget_seconds", kind::kColorizeScene),
+                         "too short for this scene"}});
   }
   if (facts.is_splat) {  // its geometry is there
     return {0.0, (kGeometryShare + kPersonalizeShare) * rest, kChromaShare * rest};
+  }
+  if (facts.is_film && !FindsPoses(facts, import)) {  // nothing is reconstructed
+    // What geometry and chroma would have is for frames that are not counted.
+    return {0.0, ViewsAreKnown(facts) ? rest : kPersonalizeShare * rest, 0.0};
   }
   return {kGeometryShare * rest, kPersonalizeShare * rest, kChromaShare * rest};
 }

@@ -14,12 +14,15 @@ struct TimeBudget {
 };
 
 // Seconds that the stages without a schedule take on two cores: poses, colouring every view,
-// export, renders, report.
-double FixedSeconds(const SceneFacts& facts);
+// export, renders, report. Without the frames of video files, which are not counted before they are
+// imported. `import`: which frames of a film are taken, and whether their poses are looked for.
+double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import = {});
 
 // Throws ServiceError{kInvalidArgument, BAD_OPTION} naming the least that works when `seconds`
 // leave nothing for the rest.
-TimeBudget DivideTimeBudget(double seconds, const SceneFacts& facts);
+TimeBudget DivideTimeBudget(double seconds,
+                            const SceneFacts& facts,
+                            const v1::ImportSceneSpec& import);
 
 // Writes a stage's share into its options, at most what they take as a time limit, unless they
 // have one of their own.

@@ -36,6 +36,74 @@ TEST(Planner, ASplatsGeometryTakesNoTime) {
   EXPECT_NEAR(personalize + chroma + FixedSeconds(splat), 90.0, 1e-6);
 }
 
+double PersonalizeSeconds(const v1::JobSpec& spec, const SceneFacts& facts) {
+  return SpecOf(PlanJob(spec, {}, facts), "personalize").personalize().time_limit_seconds();
+}
+
+TEST(Planner, AFilmsBudgetGoesToPersonalizationWhereNothingIsReconstructed) {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(120);
+  const SceneFacts film = {.photos = 65, .is_film = true};
+  EXPECT_NEAR(FixedSeconds(film), 39.0, 1.0);
+  EXPECT_NEAR(PersonalizeSeconds(spec, film) + FixedSeconds(film), 120.0, 1e-6);
+  v1::ImportSceneSpec* import = spec.mutable_colorize_scene()->mutable_import_scene();
+  import->set_film_poses(v1::ImportSceneSpec::FILM_POSES_AUTO);
+  const NewGraph graph = PlanJob(spec, {}, film);
+  const double geometry =
+      SpecOf(graph, "reconstruct_geometry").reconstruct_geometry().time_limit_seconds();
+  EXPECT_GT(FixedSeconds(film, *import), FixedSeconds(film) + 30.0);
+  EXPECT_NEAR(geometry, 0.25 * (120.0 - FixedSeconds(film, *import)), 1e-6);
+}
+
+TEST(Planner, FramesOfAFilmThatAreNotTakenTakeNoTime) {
+  const SceneFacts film = {.photos = 3000, .is_film = true};
+  const auto same_as = [&](int frames, const v1::ImportSceneSpec& import) {
+    EXPECT_NEAR(
+        FixedSeconds(film, import), FixedSeconds({.photos = frames, .is_film = true}), 1e-6);
+  };
+  v1::ImportSceneSpec import;
+  import.set_film_stride(7);
+  same_as(429, import);
+  import.set_film_begin_s(10.0);  // of pictures that are shown at 25 a second
+  import.set_film_end_s(20.0);
+  same_as(36, import);
+  import.set_film_frames_per_second(16);
+  same_as(23, import);
+  import.set_film_begin_s(1e6);
+  import.clear_film_end_s();
+  same_as(0, import);
+}
+
+TEST(Planner, AFilmWhoseFramesNobodyHasCountedIsBoundedAndNotRefused) {
+  const SceneFacts video = {.photos = 0, .is_film = true};
+  const SceneFacts rig = {.photos = 0, .has_poses = true};
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(30);
+  for (const SceneFacts& facts : {video, rig}) {
+    const double seconds = PersonalizeSeconds(spec, facts);
+    EXPECT_GT(seconds, 10.0);
+    EXPECT_LT(seconds, 20.0) << "some is left for the frames";
+  }
+}
+
+TEST(Planner, AFilmsRefusalSpeaksOfItsFrames) {
+  const auto complaint = [](double seconds, const SceneFacts& facts) {
+    v1::JobSpec spec = SceneSpec();
+    spec.mutable_colorize_scene()->set_time_budget_seconds(seconds);
+    try {
+      PlanJob(spec, {}, facts);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_THAT(complaint(40, {.photos = 65, .is_film = true}),
+              HasSubstr("65 frames take about 39 s in stages that cannot be shortened; give at "
+                        "least 54 s, or fewer frames (film_stride"));
+  EXPECT_THAT(complaint(12, {.photos = 0, .is_film = true}),
+              HasSubstr("a film takes, without its frames, about 6 s"));
+}
+
 TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(604'800);
