@@ -128,13 +128,16 @@ std::vector<int64_t> TicksOf(const FramesByCamera& cameras, const std::vector<do
   return ticks;
 }
 
-// Makes times of one tick of a rig's clock the earliest of them; a note where that is more than
-// what containers round.
-std::string ShareMoments(const std::vector<std::string>& camera, std::vector<double>* times) {
+// Makes times of one tick of a rig's clock the earliest of them, where there is such a clock; a
+// note where that is more than what containers round.
+void ShareMoments(const std::vector<std::string>& camera,
+                  std::vector<double>* times,
+                  FrameMoments* result) {
   const FramesByCamera cameras = ByCamera(camera, *times);
-  if (cameras.size() < 2) return "";
+  if (cameras.size() < 2) return;
   const std::vector<int64_t> ticks = TicksOf(cameras, *times);
-  if (ticks.empty()) return "";
+  result->one_clock = !ticks.empty();
+  if (ticks.empty()) return;
   std::map<int64_t, double> earliest;
   for (size_t i = 0; i < ticks.size(); ++i) {
     double& time = earliest.try_emplace(ticks[i], (*times)[i]).first->second;
@@ -147,8 +150,8 @@ std::string ShareMoments(const std::vector<std::string>& camera, std::vector<dou
     moved = std::max(moved, (*times)[i] - time);
     (*times)[i] = time;
   }
-  if (moved <= told) return "";
-  return fmt::format(
+  if (moved <= told) return;
+  result->note = fmt::format(
       "the cameras' clocks differ by up to {:.3g} s: frames less than that apart are taken for one "
       "moment",
       moved);
@@ -181,7 +184,7 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
     shot = static_cast<int>(result.cameras.size());
     result.cameras.push_back(name);
   }
-  result.note = ShareMoments(camera, &times);
+  ShareMoments(camera, &times, &result);
   std::map<std::pair<int, double>, size_t> taken;
   for (size_t i = 0; i < frames.size(); ++i) {
     result.moments[i] = Moment{times[i], shots[camera[i]]};

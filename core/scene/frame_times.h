@@ -20,7 +20,8 @@ struct FrameMoments {
   std::vector<std::optional<Moment>> moments;  // one for each frame
   // Names by Moment::shot: as told, else folders relative to images/. Empty without moments.
   std::vector<std::string> cameras;
-  std::string note;  // what the user should know; may be empty
+  std::string note;        // what the user should know; may be empty
+  bool one_clock = false;  // several cameras follow one, to a quarter of its step
 };
 
 // Times are kept, but for their beginning: the earliest becomes 0, and those that differ by less

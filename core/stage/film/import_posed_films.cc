@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -22,30 +23,101 @@ namespace {
 
 struct Footage {
   PosedFilm film;
-  std::vector<int> frames;
+  std::vector<double> times;  // of all its frames, s since the first of all films
+  std::vector<int> frames;    // that are asked for, in their order
 };
 
-std::vector<Footage> AllFootage(const FilmOptions& options, StageContext& context) {
+// The films with the times of their frames on the clock that they share.
+std::vector<Footage> FilmsInTime(StageContext& context) {
   const auto size_of = [&](const std::string& file) {
     context.cancel().ThrowIfCancelled();
     const FilmReader reader(context.scene_folder() / file);
     return std::pair(reader.facts().width, reader.facts().height);
   };
   std::vector<Footage> all;
-  size_t frames = 0;
-  double seconds = 0.0;
+  double begin_s = std::numeric_limits<double>::infinity();
   for (PosedFilm& film : ReadPosedFilms(context.scene_folder(), size_of)) {
     context.cancel().ThrowIfCancelled();
-    const FilmReader reader(context.scene_folder() / film.file);
-    all.push_back({std::move(film), {}});
-    try {
-      all.back().frames = FramesAskedFor(reader.times(), options);
-    } catch (const Error& e) {
-      throw Error(e.code(), "{}: {}", all.back().film.file, e.what());
+    Footage footage{std::move(film), {}, {}};
+    footage.times = FilmReader(context.scene_folder() / footage.film.file).times();
+    for (double& time_s : footage.times) time_s += footage.film.time_offset_s;
+    begin_s = std::min(begin_s, footage.times.front());
+    all.push_back(std::move(footage));
+  }
+  for (Footage& footage : all) {
+    for (double& time_s : footage.times) time_s -= begin_s;
+  }
+  return all;
+}
+
+// Whether a moment lies in the part that is asked for; `margin_s` farther to either side counts.
+bool IsInside(double time_s, const FilmOptions& options, double margin_s) {
+  return time_s >= options.begin_s - margin_s &&
+         (!options.end_s || time_s < *options.end_s + margin_s);
+}
+
+// Gives frames of one moment one time, of those that may be asked for. Whether the films follow one
+// clock, so that they have such moments.
+bool ShareMoments(const FilmOptions& options, std::vector<Footage>* all, StageContext& context) {
+  constexpr double kMarginS = 1.0;  // more than a moment is long; hours may lie before and behind
+  std::vector<FrameTime> frames;
+  std::vector<double*> times;
+  for (Footage& footage : *all) {
+    for (double& time_s : footage.times) {
+      if (!IsInside(time_s, options, kMarginS)) continue;
+      frames.push_back({footage.film.file, footage.film.file, time_s, footage.film.camera});
+      times.push_back(&time_s);
     }
-    const std::vector<int>& asked = all.back().frames;
-    frames += asked.size();
-    seconds = std::max(seconds, reader.times()[asked.back()] - reader.times()[asked.front()]);
+  }
+  const FrameMoments moments = MomentsOf(frames);
+  if (moments.cameras.empty()) return true;  // none, or all of one time
+  if (!moments.note.empty()) context.progress().OnWarning(moments.note);
+  double begin_s = std::numeric_limits<double>::infinity();
+  for (const FrameTime& frame : frames) begin_s = std::min(begin_s, *frame.time);
+  for (size_t i = 0; i < times.size(); ++i) *times[i] = begin_s + moments.moments[i]->time_s;
+  return moments.one_clock;
+}
+
+// Every so many moments of the part that is asked for, the same of all films. Those that follow no
+// clock together have none: each counts its own frames.
+void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageContext& context) {
+  constexpr double kRoundedS = 1e-6;  // what adding an offset may take from a time
+  const bool one_clock = ShareMoments(options, all, context);
+  std::map<double, int> moments;  // of that part, and which each is
+  for (const Footage& footage : *all) {
+    for (const double time_s : footage.times) {
+      if (IsInside(time_s + kRoundedS, options, 0.0)) moments[time_s] = 0;
+    }
+  }
+  int count = 0;
+  for (auto& [time_s, number] : moments) number = count++;
+  for (Footage& footage : *all) {
+    int own = 0;
+    for (size_t i = 0; i < footage.times.size(); ++i) {
+      const auto moment = moments.find(footage.times[i]);
+      if (moment == moments.end()) continue;
+      const int number = one_clock ? moment->second : own++;
+      if (number % options.stride == 0) footage.frames.push_back(static_cast<int>(i));
+    }
+    if (!footage.frames.empty()) continue;
+    throw InvalidArgument(
+        "{}: the film has no frame of the moments that are asked for (film_begin_s, film_end_s, "
+        "film_stride); it runs from {:.2f} to {:.2f} s of the time that all films share",
+        footage.film.file,
+        footage.times.front(),
+        footage.times.back());
+  }
+}
+
+std::vector<Footage> AllFootage(const FilmOptions& options, StageContext& context) {
+  std::vector<Footage> all = FilmsInTime(context);
+  ChooseFrames(options, &all, context);
+  size_t frames = 0;
+  double seconds = 0.0;
+  for (const Footage& footage : all) {
+    frames += footage.frames.size();
+    seconds = std::max(
+        seconds, footage.times[footage.frames.back()] - footage.times[footage.frames.front()]);
   }
   CheckFrameCount(frames, seconds, options);
   return all;
@@ -75,7 +147,7 @@ class PosedFilmImport {
         context_.progress().OnWarning(footage.film.file +
                                       " is interlaced: one field of each frame is taken");
       }
-      for (const int frame : footage.frames) ReadFrame(footage.film, frame, &reader);
+      for (const int frame : footage.frames) ReadFrame(footage, frame, &reader);
     }
     WarnOfFrames(damaged_, "cannot be decoded and are left out", context_);
     if (views_.empty()) throw InvalidArgument("none of the {} frames can be decoded", count_);
@@ -98,7 +170,8 @@ class PosedFilmImport {
   }
 
  private:
-  void ReadFrame(const PosedFilm& film, int frame, FilmReader* reader) {
+  void ReadFrame(const Footage& footage, int frame, FilmReader* reader) {
+    const PosedFilm& film = footage.film;
     context_.cancel().ThrowIfCancelled();
     context_.progress().OnProgress(done_++, count_, "reading frames");
     View view = film.view;
@@ -112,8 +185,7 @@ class PosedFilmImport {
       damaged_.push_back(view.name);
       return;
     }
-    const double time_s = reader->times()[frame] + film.time_offset_s;
-    times_.push_back({view.name, film.file, time_s, film.camera});
+    times_.push_back({view.name, film.file, footage.times[frame], film.camera});
     views_.push_back(std::move(view));
   }
 

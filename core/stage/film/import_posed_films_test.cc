@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
@@ -29,6 +31,22 @@ class ImportPosedFilmsTest : public StageTest {
         {.width = kWidth, .height = kHeight, .frames_per_second = frames_per_second, .threads = 1});
     for (int i = 0; i < frames; ++i) {
       writer.Add(Image(kWidth, kHeight, 3, static_cast<float>(Gray(camera, i))), pool);
+    }
+    writer.Finish();
+  }
+  // Shown at multiples of 0.1 s, but for one that was dropped.
+  void WriteFilmWithout(int camera, int frames, int dropped) {
+    ThreadPool pool(1);
+    Mp4Writer writer(scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
+                     {.width = kWidth,
+                      .height = kHeight,
+                      .frames_per_second = 10,
+                      .ticks_per_second = 1000,
+                      .threads = 1});
+    for (int i = 0; i < frames; ++i) {
+      if (i == dropped) continue;
+      writer.AddAt(
+          0.1 * i, 0.1, Image(kWidth, kHeight, 3, static_cast<float>(Gray(camera, i))), pool);
     }
     writer.Finish();
   }
@@ -107,7 +125,8 @@ TEST_F(ImportPosedFilmsTest, StridesPartsAndHeldOutCameras) {
   for (const View& view : scene.views) {
     EXPECT_EQ(view.held_out, view.name.starts_with("cam02/")) << view.name;
   }
-  EXPECT_THAT(Complaint({.begin_s = 9.0}), HasSubstr("cam00.mp4: the film has no frame between"));
+  EXPECT_THAT(Complaint({.begin_s = 9.0}),
+              HasSubstr("cam00.mp4: the film has no frame of the moments that are asked for"));
   options.hold_out_camera = "cam09";
   EXPECT_THAT(Complaint({}, options), HasSubstr("the scene has cam00, cam01, cam02"));
 }
@@ -155,6 +174,60 @@ TEST_F(ImportPosedFilmsTest, ClocksThatAreOffAreSetByTheirOffset) {
   EXPECT_EQ(scene.views[8].time_s(), scene.views[3].time_s());
   WriteTransforms("\"time_offset\":\"late\",");
   EXPECT_THAT(Complaint(), HasSubstr("frame 1: time_offset must be a finite number"));
+}
+
+// Which frames of each camera are taken, by their time.
+using FramesAt = std::map<std::string, std::map<double, std::string>>;
+FramesAt FramesOf(const Scene& scene) {
+  FramesAt frames;
+  for (const View& view : scene.views) {
+    frames[view.name.substr(0, 5)][std::round(1000.0 * view.time_s()) / 1000.0] =
+        view.name.substr(6, 7);
+  }
+  return frames;
+}
+
+TEST_F(ImportPosedFilmsTest, AStrideTakesTheSameMomentsOfCamerasThatBeganApart) {
+  WriteFilm(0, 8);
+  WriteFilm(1, 8);
+  WriteTransforms("\"time_offset\":0.1,");  // one frame
+  EXPECT_EQ(
+      FramesOf(Import({.stride = 2})),
+      (FramesAt{
+          {"cam00", {{0.0, "f000000"}, {0.2, "f000002"}, {0.4, "f000004"}, {0.6, "f000006"}}},
+          {"cam01", {{0.2, "f000001"}, {0.4, "f000003"}, {0.6, "f000005"}, {0.8, "f000007"}}}}));
+}
+
+TEST_F(ImportPosedFilmsTest, AStrideTakesTheSameMomentsWhereOneCameraDroppedAFrame) {
+  WriteFilm(0, 8);
+  WriteFilmWithout(1, 8, 3);
+  WriteTransforms("");
+  EXPECT_EQ(
+      FramesOf(Import({.stride = 2})),
+      (FramesAt{
+          {"cam00", {{0.0, "f000000"}, {0.2, "f000002"}, {0.4, "f000004"}, {0.6, "f000006"}}},
+          {"cam01", {{0.0, "f000000"}, {0.2, "f000002"}, {0.4, "f000003"}, {0.6, "f000005"}}}}));
+}
+
+TEST_F(ImportPosedFilmsTest, APartIsTheSameOfCamerasThatBeganApart) {
+  WriteFilm(0, 9);
+  WriteFilm(1, 9);
+  WriteTransforms("\"time_offset\":0.3,");
+  EXPECT_EQ(FramesOf(Import({.begin_s = 0.5, .end_s = 0.7})),
+            (FramesAt{{"cam00", {{0.0, "f000005"}, {0.1, "f000006"}}},
+                      {"cam01", {{0.0, "f000002"}, {0.1, "f000003"}}}}));
+  EXPECT_THAT(Complaint({.end_s = 0.25}),
+              HasSubstr("cam01.mp4: the film has no frame of the moments that are asked for "
+                        "(film_begin_s, film_end_s, film_stride); it runs from 0.30 to 1.10 s"));
+}
+
+TEST_F(ImportPosedFilmsTest, CamerasThatShareNoMomentsCountTheirOwnFrames) {
+  WriteFilm(0, 8);
+  WriteFilm(1, 8);
+  WriteTransforms("\"time_offset\":0.05,");  // always between two frames of the other
+  const FramesAt frames = FramesOf(Import({.stride = 2}));
+  EXPECT_EQ(frames.at("cam00").size(), 4u);
+  EXPECT_EQ(frames.at("cam01").size(), 4u);
 }
 
 TEST_F(ImportPosedFilmsTest, OddTimesAreToldBesideWhatIsSaidOfTheClock) {
