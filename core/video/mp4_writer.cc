@@ -150,8 +150,8 @@ class Mp4Writer::Impl {
 
   void CheckOptions() const {
     const RangeCheck check("movie option");
-    check("width", options_.width, 16, 8192);
-    check("height", options_.height, 16, 8192);
+    check("width", options_.width, kMinMovieSidePx, kMaxMovieSidePx);
+    check("height", options_.height, kMinMovieSidePx, kMaxMovieSidePx);
     check("frames_per_second", options_.frames_per_second, 1, 120);
     check("ticks_per_second", options_.ticks_per_second, 0, 65535);
     check("threads", options_.threads, 1, 1024);

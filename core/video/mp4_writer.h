@@ -22,8 +22,11 @@ struct SoundPart {
   bool operator==(const SoundPart&) const = default;
 };
 
+// Of a movie's sides.
+inline constexpr int kMinMovieSidePx = 16, kMaxMovieSidePx = 8192;
+
 struct Mp4Options {
-  int width = 0;  // px, even, 16..8192
+  int width = 0;  // px, even, kMinMovieSidePx..kMaxMovieSidePx
   int height = 0;
   double frames_per_second = 30.0;  // 1..120
   // 1..65535: pictures have times of their own (AddAt), which are rounded to so many ticks a second

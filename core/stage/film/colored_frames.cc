@@ -12,6 +12,7 @@
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/stage/film/film_frames.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/movie/film_clock.h"
 #include "core/video/mp4_writer.h"
@@ -20,9 +21,10 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Movies have even sides.
-Image EvenSides(const Image& image) {
-  const int width = image.width - image.width % 2, height = image.height - image.height % 2;
+// Of the size that MovieSize says.
+Image MovieFrame(const Image& picture) {
+  Image image = FitWithin(picture, kMaxMovieSidePx);
+  const auto [width, height] = MovieSize(picture.width, picture.height);
   if (width == image.width && height == image.height) return image;
   Image out(width, height, image.channels);
   for (int c = 0; c < image.channels; ++c) {
@@ -100,13 +102,14 @@ void WriteColoredFilm(const Scene& scene,
   const std::vector<int>& frames = film.frames;
   const ViewImages images(scene, context.scene_folder(), /*max_side_px=*/0, 0);
   const Camera camera = images.WorkingCamera(frames.front());
+  const auto [width, height] = MovieSize(camera.width, camera.height);
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
   const fs::path file = context.scratch_folder() / "colored_film.mp4";
   const FilmClock clock = ClockOfFilm(scene, frames, context);
   Mp4Writer movie(
       file,
-      {.width = camera.width - camera.width % 2,
-       .height = camera.height - camera.height % 2,
+      {.width = width,
+       .height = height,
        .frames_per_second = clock.frames_per_second,
        .ticks_per_second = clock.ticks_per_second,
        .threads = context.pool().thread_count(),
@@ -130,7 +133,7 @@ void WriteColoredFilm(const Scene& scene,
       const int frame = begin + i;
       const View& view = scene.views[frames[frame]];
       movie.AddAt(
-          clock.time_s[frame], clock.seconds[frame], EvenSides(pictures[i]), context.pool());
+          clock.time_s[frame], clock.seconds[frame], MovieFrame(pictures[i]), context.pool());
       if (film.pictures) {
         context.WriteOutput(ViewArtifact(artifact::kFilmFrames, view, ".png"), files[i]);
       }

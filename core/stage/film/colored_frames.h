@@ -25,9 +25,9 @@ struct ColoredFilm {
   bool pictures = false;  // every frame as a picture of its own size, too: artifact::kFilmFrames
 };
 
-// Leaves a movie of these frames in colour, at the film's own times and size, with its sound where
-// it came as a video file. `written`, which may be empty, is told each of them, in sRGB. Throws
-// Error{kCancelled} and what Mp4Writer throws.
+// Leaves a movie of these frames in colour, at the film's own times and size (within what movies
+// take), with its sound where it came as a video file. `written`, which may be empty, is told each
+// of them, in sRGB. Throws Error{kCancelled} and what Mp4Writer throws.
 void WriteColoredFilm(const Scene& scene,
                       const ColoredFilm& film,
                       StageContext& context,

@@ -169,6 +169,34 @@ TEST_F(ColoredFramesTest, EveryFrameIsAPictureOfItsOwnSizeWhereThatIsAskedFor) {
   }
 }
 
+TEST_F(ColoredFramesTest, WideScansKeepTheirSizeAsPicturesAndFitIntoTheMovie) {
+  constexpr int kWide = 8210, kTall = 31;
+  fs::create_directories(scratch_.path() / "frames");
+  for (int i = 0; i < 2; ++i) {
+    WriteFileAtomic(scratch_.path() / "frames" / ("n" + std::to_string(i) + ".png"),
+                    EncodePng8(Image(kWide, kTall, 3, 0.3f + 0.2f * i)));
+  }
+  {
+    StageContext context = MakeContext();
+    RunImportScene({}, context);
+  }
+  scene_ = SceneFromJson(ReadFile(scratch_.path() / "out/scene.json"));
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  for (const View& view : scene_.views) {
+    AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"),
+             EncodeAbPng(Image(kWide, kTall, 2, 20.0f)));
+  }
+  StageContext context = MakeContext();
+  RunRender({.max_views = 2, .pictures = true}, context);
+  const FilmReader movie(scratch_.path() / "out/scene.mp4");
+  EXPECT_EQ(movie.times().size(), 2u);
+  EXPECT_EQ(movie.facts().width, 8192);
+  EXPECT_EQ(movie.facts().height, 30);
+  const Image picture = ReadImage(scratch_.path() / "out/film_frames/n1.png");
+  EXPECT_EQ(picture.width, kWide);
+  EXPECT_EQ(picture.height, kTall);
+}
+
 TEST_F(ColoredFramesTest, EveryCameraOfARigHasAFilmOfItsOwn) {
   MakeRig();
   WriteFilm({0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}, "aac");

@@ -10,6 +10,8 @@
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/scene/camera.h"
+#include "core/video/mp4_writer.h"
 
 namespace color3d {
 namespace {
@@ -78,6 +80,26 @@ void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) 
       kMaxFilmFrames,
       (frames * options.stride + kMaxFilmFrames - 1) / kMaxFilmFrames,
       std::floor(seconds * kMaxFilmFrames / static_cast<double>(frames)));
+}
+
+std::pair<int, int> MovieSize(int width, int height) {
+  const Camera movie = Camera{width, height}.FitWithin(kMaxMovieSidePx);
+  return {movie.width - movie.width % 2, movie.height - movie.height % 2};
+}
+
+void CheckMovieSize(const std::string& frames, int width, int height) {
+  const auto [movie_width, movie_height] = MovieSize(width, height);
+  if (std::min(movie_width, movie_height) >= kMinMovieSidePx) return;
+  throw InvalidArgument(
+      "{} has {} x {} px, which makes a movie of {} x {} px; the shorter side of a movie must be "
+      "at "
+      "least {} px: give larger frames, or frames of another shape",
+      frames,
+      width,
+      height,
+      movie_width,
+      movie_height,
+      kMinMovieSidePx);
 }
 
 std::string EncodeGrayFrame(Image luminance) {

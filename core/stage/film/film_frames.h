@@ -1,8 +1,9 @@
-// What the ways to import films share: which frames are asked for, how they are kept and named. For
-// this folder only.
+// What the ways to import films share: which frames are asked for, how they are kept and named, and
+// how large their movie is. For this folder only.
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/image.h"
@@ -23,6 +24,13 @@ void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext&
 // Throws Error{kInvalidArgument}, with the stride and the length that would do, for more than
 // kMaxFilmFrames. `seconds`: from the first to the last of them.
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options);
+
+// Width and height of the movie of frames of that size: as they are, but even and no larger than
+// movies may be.
+std::pair<int, int> MovieSize(int width, int height);
+// Throws Error{kInvalidArgument} that names `frames` where these are too small to be shown in the
+// end.
+void CheckMovieSize(const std::string& frames, int width, int height);
 
 // Luminance (Lab L) as an 8-bit grey picture.
 std::string EncodeGrayFrame(Image luminance);

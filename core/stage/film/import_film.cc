@@ -123,6 +123,7 @@ ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& cont
       continue;
     }
     View view = ViewOf(stream, i, luminance, stream.is_video || deflicker);
+    if (views.empty()) CheckMovieSize(view.name, view.camera.width, view.camera.height);
     if (!views.empty() && (view.camera.width != views[0].camera.width ||
                            view.camera.height != views[0].camera.height)) {
       throw InvalidArgument("{} has {} x {} px, but {} has {} x {} px: frames of a film are alike",

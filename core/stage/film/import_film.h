@@ -37,9 +37,9 @@ std::string FindFilm(const std::filesystem::path& scene_folder);
 // held out and, for poses, what is said of structure-from-motion count. Frames that cannot be
 // decoded are left out; those, and blank and torn ones, are named in a warning. Throws
 // Error{kInvalidArgument}: no film that can be read, nothing between the times that are asked for,
-// one frame, more than kMaxFilmFrames (with the stride and the length that would do), frames of
-// different sizes or of names that differ in their endings only, a rate for a video file, a camera
-// to hold out.
+// one frame, more than kMaxFilmFrames (with the stride and the length that would do), frames that
+// are too small for a movie, of different sizes or of names that differ in their endings only, a
+// rate for a video file, a camera to hold out.
 void ImportFilm(const std::string& film,
                 const FilmOptions& options,
                 const ImportOptions& import,

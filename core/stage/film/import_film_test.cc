@@ -173,6 +173,20 @@ TEST_F(ImportFilmTest, OneFrameIsNoFilm) {
   EXPECT_THAT(Complaint(), HasSubstr("one frame is no film"));
 }
 
+TEST_F(ImportFilmTest, FramesThatAreTooSmallForAMovieAreRefusedAtOnce) {
+  for (int i = 0; i < 2; ++i) {
+    WriteFrame("n" + std::to_string(i) + ".png", Image(96, 15, 3, 0.3f + 0.1f * i));
+  }
+  EXPECT_THAT(
+      Complaint(),
+      HasSubstr("n0.png has 96 x 15 px, which makes a movie of 96 x 14 px; the shorter side "
+                "of a movie must be at least 16 px: give larger frames"));
+  for (int i = 0; i < 2; ++i) {
+    WriteFrame("n" + std::to_string(i) + ".png", Image(96, 17, 3, 0.3f + 0.1f * i));
+  }
+  EXPECT_EQ(Complaint(), "");
+}
+
 TEST_F(ImportFilmTest, FourHoursAreRefusedWithNumbers) {
   ThreadPool pool(1);
   Mp4Writer writer(scratch_.path() / "film.mp4",

@@ -31,8 +31,9 @@ struct Footage {
 std::vector<Footage> FilmsInTime(StageContext& context) {
   const auto size_of = [&](const std::string& file) {
     context.cancel().ThrowIfCancelled();
-    const FilmReader reader(context.scene_folder() / file);
-    return std::pair(reader.facts().width, reader.facts().height);
+    const FilmFacts facts = FilmReader(context.scene_folder() / file).facts();
+    CheckMovieSize(file, facts.width, facts.height);
+    return std::pair(facts.width, facts.height);
   };
   std::vector<Footage> all;
   double begin_s = std::numeric_limits<double>::infinity();
