@@ -30,7 +30,7 @@ class Colorize {
   ExitCode Run() {
     options_.Check();
     if (!options_.scene.empty()) return RunStored();
-    folder_ = CollectPhotos(options_.photos);
+    folder_ = CollectPhotos(options_.photos, options_.film);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
     if (options_.film) TakeAsFrames(&folder_);
     if (options_.poses && !options_.film && !folder_.film) {

@@ -41,7 +41,7 @@ ExitCode RunCreate(const Context& context,
                    const std::string& photos,
                    const std::string& masks,
                    bool film) {
-  PhotoFolder folder = CollectPhotos(photos);
+  PhotoFolder folder = CollectPhotos(photos, film);
   if (film && !masks.empty()) {
     throw InvalidArgument("--masks is for photos of a place; --film takes frames as they are");
   }

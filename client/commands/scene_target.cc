@@ -48,7 +48,7 @@ std::string ResolveScene(Connection& connection,
         "`color3d scene list` shows them)",
         text);
   }
-  PhotoFolder folder = CollectPhotos(text);
+  PhotoFolder folder = CollectPhotos(text, film);
   if (film) TakeAsFrames(&folder);
   for (const std::string& note : folder.notes) PrintNote(context, note);
   return UploadFolder(connection, context, folder, display);

@@ -240,7 +240,7 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
   return LocalFile{found[0], root / found[0]};
 }
 
-void CheckCounts(const PhotoFolder& folder) {
+void CheckCounts(const PhotoFolder& folder, bool as_frames) {
   const std::string root = folder.root.string();
   if (folder.splat || folder.film || !folder.posed_films.empty()) return;
   if (folder.photos.empty()) {
@@ -249,6 +249,12 @@ void CheckCounts(const PhotoFolder& folder) {
         "{} contains no photographs (JPEG, PNG or TIFF){}",
         root,
         sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?");
+  }
+  if (folder.photos.size() == 1 && as_frames) {
+    throw InvalidArgument(
+        "{} contains one picture ({}), and one frame is no film; give the folder of all its frames",
+        root,
+        folder.photos[0].path);
   }
   if (folder.photos.size() == 1) {
     throw InvalidArgument("{} contains one photograph ({}); at least 3 that overlap are needed",
@@ -294,7 +300,7 @@ std::string PhotoFolder::Name() const {
   return fs::absolute(splat ? splat->file : film ? film->file : root).filename().string();
 }
 
-PhotoFolder CollectPhotos(const fs::path& root) {
+PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   PhotoFolder result;
   const std::string file = root.filename().string();
   if (IsFile(root) && (HasSplatExtension(file) || HasFilmExtension(file))) {
@@ -326,7 +332,7 @@ PhotoFolder CollectPhotos(const fs::path& root) {
   std::sort(result.photos.begin(), result.photos.end(), by_path);
   std::sort(result.model_files.begin(), result.model_files.end(), by_path);
   std::sort(result.augment_files.begin(), result.augment_files.end(), by_path);
-  CheckCounts(result);
+  CheckCounts(result, as_frames);
   CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
   if (result.model_files.empty() && IsFolder(parent / "sparse")) {

@@ -37,9 +37,10 @@ struct PhotoFolder {
 // points.npy and the pictures of one size, rgb/2x/, else 1x, 4x, 8x. Nothing else, but for a splat
 // (.ply .sog .spz) or a film (.mp4 .mov ...): `root` itself, or the only one in a folder without
 // photos; or several films beside a transforms.json that names them, or beside a poses_bounds.npy.
-// Throws Error: no such folder, another file instead of a folder, no photos, one photo, more than
-// 10,000 files, names that are not safe or not UTF-8.
-PhotoFolder CollectPhotos(const std::filesystem::path& root);
+// `as_frames`: TakeAsFrames follows, and what is wrong is told of frames. Throws Error: no such
+// folder, another file instead of a folder, no photos, one photo, more than 10,000 files, names
+// that are not safe or not UTF-8.
+PhotoFolder CollectPhotos(const std::filesystem::path& root, bool as_frames = false);
 
 // The photos as frames of a film, in the order of their names (numbers count as numbers); poses are
 // of no use then. Throws Error{kInvalidArgument} when there are none, or two of one name.

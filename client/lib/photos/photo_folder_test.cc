@@ -27,9 +27,9 @@ class PhotoFolderTest : public ::testing::Test {
     for (const LocalFile& file : files) paths.push_back(file.path);
     return paths;
   }
-  std::string ErrorOf(const fs::path& path) {
+  std::string ErrorOf(const fs::path& path, bool as_frames = false) {
     try {
-      CollectPhotos(path);
+      CollectPhotos(path, as_frames);
     } catch (const Error& e) {
       return e.what();
     }
@@ -236,6 +236,12 @@ TEST_F(PhotoFolderTest, ErrorsNameTheFolder) {
   EXPECT_EQ(ErrorOf(root()), "");
   Write("transforms.json", "{");
   EXPECT_THAT(ErrorOf(root()), HasSubstr("is not JSON"));
+}
+
+TEST_F(PhotoFolderTest, OnePictureIsNoFilm) {
+  Write("one.jpg");
+  EXPECT_THAT(ErrorOf(root(), /*as_frames=*/true),
+              HasSubstr("contains one picture (one.jpg), and one frame is no film"));
 }
 
 TEST_F(PhotoFolderTest, RefusesNamesThatAreNotText) {

@@ -50,7 +50,9 @@ std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& opt
   std::vector<int> wanted = FramesAskedFor(times, options);
   CheckFrameCount(wanted.size(), times[wanted.back()] - times[wanted.front()], options);
   if (wanted.size() == 1) {
-    throw InvalidArgument("one frame is no film; colour it as a photo, by `color3d key color`");
+    throw InvalidArgument(
+        "one frame is no film; give one of two frames at least, or take more of its own "
+        "(film_stride, film_begin_s, film_end_s)");
   }
   return wanted;
 }
