@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -39,6 +40,17 @@ struct Stations {
   bool have_times = false;  // of the scene
 };
 
+// A time of the scene, which ends at `last_s`. As its end counts what that is rounded to where it
+// is told.
+double TimeInScene(double time_s, double last_s, const std::string& what) {
+  constexpr double kRounded = 1e-5;
+  if (time_s < 0.0 || time_s > (1.0 + kRounded) * last_s) {
+    throw InvalidArgument(
+        "{} is at {:g} s, but the scene lasts from 0 to {:g} s", what, time_s, last_s);
+  }
+  return std::min(time_s, last_s);
+}
+
 // The moments that a file of cameras tells; refused where it tells those of some.
 bool TakeTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations* stations) {
   if (!scene.IsDynamic()) return false;
@@ -53,15 +65,8 @@ bool TakeTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations
           has_times ? "no" : "a");
     }
     if (!has_times) continue;
-    const double time_s = *file[i].time_s;
-    if (time_s < 0.0 || time_s > last_s) {
-      throw InvalidArgument(
-          "the file of cameras: frame {} is at {:g} s, but the scene lasts from 0 to {:g} s",
-          i,
-          time_s,
-          last_s);
-    }
-    stations->cameras[i].time_s = time_s;
+    stations->cameras[i].time_s =
+        TimeInScene(*file[i].time_s, last_s, fmt::format("the file of cameras: frame {}", i));
   }
   return has_times;
 }
@@ -228,7 +233,10 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   }
   const bool told = file_tells || (one_by_one && stations.have_times);
   if (!told && scene.IsDynamic()) SpreadTimes(options.bounce, scene, &frames);
-  for (PathCamera& frame : frames) frame.time_s = options.time_s.value_or(frame.time_s);
+  if (!options.time_s) return frames;
+  const double time_s =
+      TimeInScene(*options.time_s, scene.Times().back(), "the moment that is asked for (time_s)");
+  for (PathCamera& frame : frames) frame.time_s = time_s;
   return frames;
 }
 

@@ -8,8 +8,9 @@
 namespace color3d {
 
 // Leaves artifact::kMovie, artifact::kFrames or both, as `options` say, which name a path. Throws
-// Error: kInvalidArgument for a file of cameras that is none and for pictures that are too small
-// for a movie; kFailedPrecondition when this machine encodes no movie.
+// Error: kInvalidArgument for a file of cameras that is none, times that the scene does not have
+// and pictures that are too small for a movie; kFailedPrecondition when this machine encodes no
+// movie.
 void RenderMovie(const RenderOptions& options,
                  const Scene& scene,
                  const GaussianModel& model,

@@ -187,6 +187,15 @@ TEST_F(MovieTest, TimeStandsStillOnAnOrbit) {
   EXPECT_EQ(bytes(options), frozen);
 }
 
+TEST_F(MovieTest, AMomentBehindTheScenesEndIsRefused) {
+  MakeMoving({0.0, 1.0, 89.0 / 30.0});
+  RenderOptions options{.path = Path::kOrbit, .frames = 2, .time_s = 3.0};
+  EXPECT_THAT(Complaint(options),
+              HasSubstr("(time_s) is at 3 s, but the scene lasts from 0 to 2.96667 s"));
+  options.time_s = 2.96667;  // as it is told
+  EXPECT_EQ(Complaint(options), "none");
+}
+
 TEST_F(MovieTest, CamerasOfAFileMayHaveTimesOfTheirOwn) {
   MakeMoving({0.0, 1.0, 2.0});
   const auto at = [](double time_s) {
