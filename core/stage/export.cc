@@ -146,7 +146,7 @@ void RunExport(const ExportOptions& options, StageContext& context) {
     const ExportedFile file =
         WriteWithHarmonics(options, model, rgb.harmonics, frame, with_confidence, context);
     if (context.HasInput(artifact::kKeyView)) {
-      WriteViewPage(scene, ReadKeyView(context, scene), model, file, context);
+      WriteViewPage(scene, shown, model, in_time.motion.size() > 0, file, context);
     }
   }
   if (options.splat) {

@@ -43,21 +43,27 @@ void TakeScene(const GaussianModel& model,
   for (size_t i = 0; i < order.size(); ++i) page->confidence[i] = model.confidence[order[i]];
 }
 
-std::vector<ViewPagePhoto> PhotosOf(const Scene& scene, int key_view, StageContext& context) {
-  const size_t count = scene.views.size();
-  std::vector<ViewPagePhoto> photos(count);
-  std::vector<int> pictured = {key_view};
+// Of a scene that moves those of the key view's moment: the page shows it as it was then.
+std::vector<ViewPagePhoto> PhotosOf(const Scene& scene,
+                                    int key_view,
+                                    bool moves,
+                                    StageContext& context) {
+  std::vector<ViewPagePhoto> photos;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (moves && scene.views[i].time_s() != scene.views[key_view].time_s()) continue;
+    photos.push_back({static_cast<int>(i), {}});
+  }
+  const size_t count = photos.size();
+  std::vector<size_t> pictured;
   for (size_t i = 0; i < count; ++i) {
-    photos[i].view = static_cast<int>(i);
     const size_t evenly = i * kMaxPictures / count, next = (i + 1) * kMaxPictures / count;
-    if ((count <= kMaxPictures || next > evenly) && photos[i].view != key_view) {
-      pictured.push_back(photos[i].view);
-    }
+    if (count <= kMaxPictures || next > evenly || photos[i].view == key_view) pictured.push_back(i);
   }
   const ViewImages images(scene, context.scene_folder(), kPhotoPx, 0);
   context.pool().ForEach(static_cast<int64_t>(pictured.size()), [&](int64_t i, int) {
     context.cancel().ThrowIfCancelled();
-    photos[pictured[i]].jpeg = EncodeJpeg(images.Srgb(pictured[i]), kPhotoQuality);
+    ViewPagePhoto& photo = photos[pictured[i]];
+    photo.jpeg = EncodeJpeg(images.Srgb(photo.view), kPhotoQuality);
   });
   return photos;
 }
@@ -67,6 +73,7 @@ std::vector<ViewPagePhoto> PhotosOf(const Scene& scene, int key_view, StageConte
 bool WriteViewPage(const Scene& scene,
                    int key_view,
                    const GaussianModel& model,
+                   bool moves,
                    const ExportedFile& file,
                    StageContext& context) {
   if (file.name.empty()) return false;
@@ -85,7 +92,7 @@ bool WriteViewPage(const Scene& scene,
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);
-  page.photos = PhotosOf(scene, key_view, context);
+  page.photos = PhotosOf(scene, key_view, moves, context);
   context.WriteOutput(artifact::kViewPage, RenderViewPage(scene, page));
   return true;
 }

@@ -14,12 +14,14 @@ struct ExportedFile {
   std::string bytes;
 };
 
-// Leaves artifact::kViewPage with that file of the model in it; it opens at the key view. False,
-// and nothing is left, without a file or without a viewer in this build, which is told as a
+// Leaves artifact::kViewPage with that file of the model in it; it opens at the key view. `moves`:
+// the model is one of the key view's moment, so that only the photos of that moment are there.
+// False, and nothing is left, without a file or without a viewer in this build, which is told as a
 // warning. Throws Error{kCancelled} and what reading the photos throws.
 bool WriteViewPage(const Scene& scene,
                    int key_view,
                    const GaussianModel& model,
+                   bool moves,
                    const ExportedFile& file,
                    StageContext& context);
 

@@ -15,9 +15,9 @@ TEST_F(StageTest, ThePageIsMadeFromTheExportedSceneAndTheModel) {
   GaussianModel model = SmallModel();
   model.confidence.assign(model.size(), 0.5f);
   StageContext context = MakeContext();
-  EXPECT_FALSE(WriteViewPage(scene, 1, model, {}, context));
+  EXPECT_FALSE(WriteViewPage(scene, 1, model, false, {}, context));
   const ExportedFile ply{artifact::kPly, "the bytes of the exported file"};
-  EXPECT_EQ(WriteViewPage(scene, 1, model, ply, context), HasViewer());
+  EXPECT_EQ(WriteViewPage(scene, 1, model, false, ply, context), HasViewer());
   if (!HasViewer()) {
     EXPECT_NE(observer_.text.find("npm"), std::string::npos) << observer_.text;
     return;
@@ -27,11 +27,29 @@ TEST_F(StageTest, ThePageIsMadeFromTheExportedSceneAndTheModel) {
   EXPECT_NE(html.find(Base64(Gzip("the bytes of the exported file"))), std::string::npos);
   StageContext compressed = MakeContext();
   const ExportedFile sog{artifact::kSog, "the bytes of the smaller file"};
-  ASSERT_TRUE(WriteViewPage(scene, 1, model, sog, compressed));
+  ASSERT_TRUE(WriteViewPage(scene, 1, model, false, sog, compressed));
   EXPECT_NE(ReadFile(scratch_.path() / "out/view.html").find(Base64("the bytes of the smaller")),
             std::string::npos);
   for (const View& view : scene.views) {
     EXPECT_NE(html.find("\"name\":\"" + view.name), std::string::npos) << view.name;
+  }
+}
+
+TEST_F(StageTest, ThePageOfASceneThatMovesHasThePhotosOfItsMoment) {
+  if (!HasViewer())
+    GTEST_SKIP() << "skipped, because the viewer was left out of this build (no npm)";
+  Scene scene = RampScene(scratch_.path(), 48, 32);
+  for (int i = 0; i < 3; ++i) scene.views[i].moment = Moment{i < 2 ? 0.0 : 0.5, i % 2};
+  StageContext context = MakeContext();
+  const ExportedFile ply{artifact::kPly, "the bytes of the exported file"};
+  for (const bool moves : {true, false}) {
+    ASSERT_TRUE(WriteViewPage(scene, 1, SmallModel(), moves, ply, context));
+    const std::string html = ReadFile(scratch_.path() / "out/view.html");
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(html.find("\"name\":\"" + scene.views[i].name) != std::string::npos,
+                !moves || i < 2)
+          << moves << i;
+    }
   }
 }
 
