@@ -117,26 +117,6 @@ void WarnIfOffTheGeometry(const Painted& painted, const std::string& name, Stage
       "reaches other views by looks alone");
 }
 
-// What was not given must not leak into the edges of what was.
-Image UndistortGiven(const ViewImages& images,
-                     int view,
-                     const GivenColors& given,
-                     const Image& undistorted) {
-  Image weighted = given.ab;
-  for (int c = 0; c < 2; ++c) {
-    for (size_t i = 0; i < given.given.data.size(); ++i) {
-      weighted.Plane(c)[i] *= given.given.data[i];
-    }
-  }
-  Image ab = images.Undistort(view, weighted);
-  for (int c = 0; c < 2; ++c) {
-    for (size_t i = 0; i < undistorted.data.size(); ++i) {
-      if (undistorted.data[i] > 0.0f) ab.Plane(c)[i] /= undistorted.data[i];
-    }
-  }
-  return ab;
-}
-
 Painted ReadCorrection(const FurtherKeyView& wanted,
                        const ColoredViews& views,
                        StageContext& context) {
@@ -151,8 +131,9 @@ Painted ReadCorrection(const FurtherKeyView& wanted,
                                             ReadImage(context.scene_folder() / view.image_file),
                                             correction.picture.ab,
                                             context);
-  correction.painted = views.images().Undistort(index, given.given);
-  correction.ab = UndistortGiven(views.images(), index, given, correction.painted);
+  CarriedColor undistorted = UndistortGiven(given.ab, given.given, index, views.images());
+  correction.ab = std::move(undistorted.ab);
+  correction.painted = std::move(undistorted.confidence);
   if (const auto mask = views.images().Mask(index)) {
     ClearMasked(mask.get(), &correction.painted);
     if (Mean(correction.painted) == 0.0) {

@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "core/color/lab.h"
+#include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/further_colors.h"
 #include "core/stage/stages.h"
 #include "tests/support/stages/stage_fixture.h"
 
@@ -124,6 +126,21 @@ TEST_F(LaterKeyFrameTest, WhatIsNotPaintedKeepsItsColor) {
   EXPECT_LT(painted / count, 2.0);
   EXPECT_LT(kept / count, 2.0);
   EXPECT_GT(sure, 0.7 * was_sure);
+}
+
+// Of a reduced column, two thirds are painted.
+TEST_F(LaterKeyFrameTest, TheBorderOfWhatIsPaintedIsNoPaler) {
+  constexpr int kSide = 64, kBorder = 28;
+  const ViewImages images(scene_, scratch_.path(), kSide);
+  StageContext context = MakeContext();
+  const CarriedColor color = ColorOfFurther(Painted(12, 0, 43), 12, scene_, images, context);
+  const int y = color.ab.height / 2;
+  EXPECT_NEAR(color.confidence.At(0, y, kBorder - 1), 1.0, 1e-4);
+  EXPECT_NEAR(color.confidence.At(0, y, kBorder), 2.0 / 3.0, 0.02);
+  EXPECT_EQ(color.confidence.At(0, y, kBorder + 1), 0.0f);
+  for (const int x : {kBorder - 1, kBorder, kBorder + 1}) {
+    EXPECT_NEAR(color.ab.At(0, y, x), -25.0f, 0.5f) << "also between pixels: " << x;
+  }
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/image/fill_holes.h"
 #include "core/scene/masks/photo_masks.h"
+#include "core/stage/sources/given_colors.h"
 #include "core/stage/sources/key_color_sources.h"
 
 namespace color3d {
@@ -26,9 +28,14 @@ CarriedColor ColorOfFurther(const FurtherKeyView& further,
   photo.luminance = LuminanceFromSrgb(photo.srgb);
   const KeyColorResult result = SolveKeyColor(further.color, photo, context);
   CarriedColor color;
-  color.ab = images.Undistort(view, result.ab);
-  color.confidence = result.confidence.Empty() ? Image(color.ab.width, color.ab.height, 1, 1.0f)
-                                               : images.Undistort(view, result.confidence);
+  if (result.confidence.Empty()) {
+    color.ab = images.Undistort(view, result.ab);
+    color.confidence = Image(color.ab.width, color.ab.height, 1, 1.0f);
+  } else {
+    color = UndistortGiven(result.ab, result.confidence, view, images);
+    // Colours are carried from between pixels, too.
+    FillHoles(color.confidence, &color.ab);
+  }
   ClearMasked(images.Mask(view).get(), &color.confidence);
   return color;
 }

@@ -134,4 +134,22 @@ GivenColors ReadGivenColors(const ColorizeKeyViewOptions& options,
   return colors;
 }
 
+CarriedColor UndistortGiven(const Image& ab,
+                            const Image& given,
+                            int view,
+                            const ViewImages& images) {
+  Image weighted = ab;
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < given.data.size(); ++i) weighted.Plane(c)[i] *= given.data[i];
+  }
+  CarriedColor color{images.Undistort(view, weighted), images.Undistort(view, given)};
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < color.confidence.data.size(); ++i) {
+      const float share = color.confidence.data[i];
+      if (share > 0.0f) color.ab.Plane(c)[i] /= share;
+    }
+  }
+  return color;
+}
+
 }  // namespace color3d

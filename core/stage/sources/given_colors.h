@@ -2,6 +2,8 @@
 #pragma once
 
 #include "core/base/image.h"
+#include "core/carry/carry.h"
+#include "core/scene/view_images.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -24,5 +26,13 @@ GivenColors ReadGivenColors(const ColorizeKeyViewOptions& options,
                             const Image& srgb,
                             const Image& current_ab,
                             StageContext& context);
+
+// Colours of the photo of `view` (2 channels, size as captured) that somebody gave as far as
+// `given` (1 channel, 0..1) says, on the grid of `images`: what was not given does not leak into
+// the edges of what was.
+CarriedColor UndistortGiven(const Image& ab,
+                            const Image& given,
+                            int view,
+                            const ViewImages& images);
 
 }  // namespace color3d
