@@ -18,7 +18,8 @@ struct SteadyColorsOptions {
 
 struct FrameInMotion {
   const Image* ab = nullptr;  // 2 channels, Lab units
-  // Flow between the frame before it and this one; null where a shot begins.
+  // Flow between the frame before it and this one; null where that one has no say, nor those before
+  // it: where a shot begins, or the frames that another key frame colours.
   std::shared_ptr<const FlowPair> flow_from_last;
 };
 

@@ -52,7 +52,7 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     coloring.deliver = [&](int number, const FusedColor& color) { done.Add(number, color); };
     coloring.was_done = [&](int number) { return done.WasDone(number); };
     for (const std::string& name : ReadCarryFacts(context).key_views) {
-      coloring.key_views.insert(scene.FindView(name));
+      coloring.key_views.push_back(scene.FindView(name));
     }
     return ColorFrames(scene, images, coloring, context);
   }

@@ -71,6 +71,7 @@ class ShotColorer {
  public:
   ShotColorer(const Shot& shot,
               const FilmFrames& frames,
+              const std::vector<NearKeyFrames>& near,
               const std::vector<int>& view_of_frame,
               const FrameColoring& coloring,
               const Scene& scene,
@@ -78,6 +79,7 @@ class ShotColorer {
               StageContext& context)
       : shot_(shot),
         frames_(frames),
+        near_(near),
         view_of_frame_(view_of_frame),
         coloring_(coloring),
         scene_(scene),
@@ -297,15 +299,22 @@ class ShotColorer {
     const auto reach = static_cast<size_t>(steady_.reach);
     const size_t end =
         is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
+    // Beside a frame that another key frame is nearest to, colours may be others: no mean of both.
     std::vector<FrameInMotion> neighbors;
-    for (const Colored& one : colored_) neighbors.push_back({&one.color.ab, one.flow_from_last});
+    int last_nearest = -1;
+    for (const Colored& one : colored_) {
+      const int nearest = near_[one.frame].nearest;
+      neighbors.push_back({&one.color.ab, nearest == last_nearest ? one.flow_from_last : nullptr});
+      last_nearest = nearest;
+    }
     context_.pool().ForEach(static_cast<int64_t>(end - delivered_), [&](int64_t i, int) {
       context_.cancel().ThrowIfCancelled();
       const size_t index = delivered_ + static_cast<size_t>(i);
-      const int view = view_of_frame_[colored_[index].frame];
+      const int frame = colored_[index].frame;
+      const int view = view_of_frame_[frame];
       if (coloring_.was_done(view)) return;
       FusedColor color = colored_[index].color;
-      if (!coloring_.key_views.contains(view)) {
+      if (near_[frame].nearest != frame) {
         color.ab = SteadyColors(neighbors, static_cast<int>(index), steady_);
       }
       coloring_.deliver(view, color);
@@ -317,6 +326,7 @@ class ShotColorer {
 
   const Shot& shot_;
   const FilmFrames& frames_;
+  const std::vector<NearKeyFrames>& near_;  // of each frame
   const std::vector<int>& view_of_frame_;
   const FrameColoring& coloring_;
   const Scene& scene_;
@@ -338,7 +348,10 @@ void ColorFrames(const Scene& scene,
                  StageContext& context) {
   const std::vector<int> order = scene.ViewsInOrderOfTime();
   FilmFrames frames;
-  for (const int view : order) frames.shot.push_back(scene.views[view].moment->shot);
+  for (const int view : order) {
+    frames.shot.push_back(scene.views[view].moment->shot);
+    frames.time_s.push_back(scene.views[view].time_s());
+  }
   frames.luminance = [&](int frame) { return images.Luminance(order[frame]); };
   std::map<int, Shot> shots;
   for (size_t i = 0; i < order.size(); ++i) {
@@ -347,8 +360,14 @@ void ColorFrames(const Scene& scene,
   for (const int anchor : AnchorFrames(frames, {}, context.pool(), context.cancel())) {
     shots[frames.shot[anchor]].anchors.push_back(anchor);
   }
+  std::vector<int> key_frames;
+  for (const int view : coloring.key_views) {
+    key_frames.push_back(
+        static_cast<int>(std::find(order.begin(), order.end(), view) - order.begin()));
+  }
+  const std::vector<NearKeyFrames> near = NearestKeyFrames(frames, key_frames);
   for (const auto& [number, shot] : shots) {
-    ShotColorer(shot, frames, order, coloring, scene, images, context).Run();
+    ShotColorer(shot, frames, near, order, coloring, scene, images, context).Run();
   }
 }
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <functional>
-#include <set>
+#include <vector>
 
 #include "core/carry/view_color.h"
 #include "core/scene/view_images.h"
@@ -18,15 +18,17 @@ struct FrameColoring {
   std::function<void(int view, const FusedColor& color)> deliver;
   // Views that an interrupted run has delivered. Thread-safe.
   std::function<bool(int view)> was_done;
-  // Views whose colours are somebody's own and stay as they are.
-  std::set<int> key_views;
+  // Views whose colours are somebody's own and stay as they are, in the order in which they were
+  // given.
+  std::vector<int> key_views;
 };
 
 // Anchors are coloured by their sources (core/film/anchor_frames.h). A frame between them has what
 // was carried into it, as they have; where that leaves it open, the colours of the anchors before
 // and behind it, followed by motion; and where motion does not tell, its own sources are asked. In
-// the end all are steadied along motion (core/film/steady_colors.h). Memory does not grow with the
-// number of frames; what comes of an interrupted run is the same to the bit.
+// the end all are steadied along motion (core/film/steady_colors.h), each with those that it shares
+// its nearest key frame with. Memory does not grow with the number of frames; what comes of an
+// interrupted run is the same to the bit.
 void ColorFrames(const Scene& scene,
                  const ViewImages& images,
                  const FrameColoring& coloring,

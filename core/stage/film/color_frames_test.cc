@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/random.h"
 #include "core/image/codec.h"
+#include "core/stage/formats/artifacts.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
@@ -51,6 +52,7 @@ class ColorFramesTest : public StageTest {
   // The colours that are delivered, by view.
   std::map<int, FusedColor> Run(int threads) {
     StageContext context({.scene_folder = scratch_.path(),
+                          .inputs = inputs_,
                           .output_folder = scratch_.path() / "out",
                           .scratch_folder = scratch_.path(),
                           .threads = threads},
@@ -108,7 +110,7 @@ class ColorFramesTest : public StageTest {
   size_t guesses_ = 0;
   float distance_ = 0.0f;  // of what is asked, as features go
   bool flicker_ = false;
-  std::set<int> key_views_;
+  std::vector<int> key_views_;
   std::set<int> done_;
   size_t dies_after_ = 1000;  // frames
 };
@@ -177,6 +179,20 @@ TEST_F(ColorFramesTest, WhatFlickersIsSteadied) {
         std::abs(double{colors.at(view).ab.At(1, 30, 50)} - colors.at(view - 1).ab.At(1, 30, 50)));
   }
   EXPECT_LT(jump, 4.0) << "of 16";
+}
+
+TEST_F(ColorFramesTest, WhatTwoKeyFramesContradictEachOtherInIsNotAveraged) {
+  constexpr int kFirst = 24, kSecond = 8, kSwitch = 16;  // as near to both
+  AddFrames(Panned);
+  key_views_ = {kFirst, kSecond};
+  for (int i = 0; i < kFrames; ++i) {
+    AddInput(ViewArtifact(artifact::kCarried, scene_.views[i], ".png"),
+             EncodeAbPng(Image(kWidth, kHeight, 2, i < kSwitch ? -30.0f : 30.0f)));
+  }
+  for (const auto& [view, color] : Run(2)) {
+    const float expected = view < kSwitch ? -30.0f : 30.0f;
+    for (const float value : color.ab.data) ASSERT_NEAR(value, expected, 0.5f) << view;
+  }
 }
 
 TEST_F(ColorFramesTest, AnotherWorkerGoesOnAndGivesTheSame) {

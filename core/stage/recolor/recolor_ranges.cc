@@ -168,13 +168,16 @@ class RangeColorer {
     }
   }
 
-  void Carry() const {
+  void Carry() {
     FilmFrames frames;
     frames.shot.resize(range_.views.size());
     frames.luminance = [&](int frame) { return film_.images.Luminance(range_.views[frame]); };
     for (const int view : range_.views) {
       frames.time_s.push_back(film_.scene.views[view].time_s());
     }
+    std::vector<int> key_frames;
+    for (const FilmKey& key : keys_) key_frames.push_back(key.frame);
+    near_ = NearestKeyFrames(frames, key_frames);
     const auto keep = [&](int frame, const CarriedColor& color) {
       Image ab(color.ab.width, color.ab.height, 2), painted(color.ab.width, color.ab.height, 1);
       std::copy_n(color.ab.data.begin(), ab.data.size(), ab.data.begin());
@@ -270,8 +273,13 @@ class RangeColorer {
     const auto reach = static_cast<size_t>(steady_.reach);
     const size_t end =
         is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
+    // Beside a frame that another key frame is nearest to, colours may be others: no mean of both.
     std::vector<FrameInMotion> neighbors;
-    for (const Recolored& one : colored_) neighbors.push_back({&one.color.ab, one.flow_from_last});
+    for (size_t i = 0; i < colored_.size(); ++i) {
+      const size_t frame = first_ + i;
+      const bool alike = frame > 0 && near_[frame].nearest == near_[frame - 1].nearest;
+      neighbors.push_back({&colored_[i].color.ab, alike ? colored_[i].flow_from_last : nullptr});
+    }
     film_.context.pool().ForEach(static_cast<int64_t>(end - delivered_), [&](int64_t i, int) {
       film_.context.cancel().ThrowIfCancelled();
       const int index = static_cast<int>(delivered_) + static_cast<int>(i);
@@ -289,7 +297,8 @@ class RangeColorer {
   const RecoloredRange& range_;
   const ColoredFilm& film_;
   const std::filesystem::path folder_;
-  std::vector<FilmKey> keys_;  // frames: places in range_.views
+  std::vector<FilmKey> keys_;        // frames: places in range_.views
+  std::vector<NearKeyFrames> near_;  // of each of them
   std::unique_ptr<const Corrector> corrector_;
   const SteadyColorsOptions steady_;
   std::vector<Recolored> colored_;  // frames one after the other
