@@ -14,6 +14,7 @@ namespace {
 constexpr double kSecondsPerSfmPair = 0.1;
 constexpr double kSecondsPerRemapMegapixel = 0.01;
 constexpr double kSecondsPerFeatureMegapixel = 0.5;
+constexpr double kFullyDynamic = 0.5;  // motion energy
 
 double SfmSeconds(const PlanFacts& f) {
   // Planned pairs: about six a photo, or all of a small set.
@@ -29,13 +30,31 @@ PlanStep Step(
 std::string WhyTime(const PlanFacts& f) {
   if (f.is_film) return "nothing is reconstructed of a film";
   if (!f.is_dynamic) return "all photos show one moment";
-  return fmt::format("the views show {} moments, seen by {} camera{}",
-                     f.time_steps,
-                     f.cameras,
-                     f.cameras == 1 ? "" : "s");
+  std::string why = fmt::format("the views show {} moments, seen by {} camera{}",
+                                f.time_steps,
+                                f.cameras,
+                                f.cameras == 1 ? "" : "s");
+  if (!f.motion) return why;
+  const std::string found = ClassOf(*f.motion);
+  if (!f.motion->moves) return why + "; " + found + ": nothing moves in their geometry";
+  if (!f.motion->share) return why + "; something moves in their geometry";
+  return why + fmt::format("; {}: {:.1f} % of the pixels move", found, 100.0 * *f.motion->share);
+}
+
+PlanStep TimeStep(const PlanFacts& f) {
+  const bool needed = f.is_dynamic && !f.is_film && (!f.motion || f.motion->moves);
+  PlanStep step = Step("deformation_over_time", needed, WhyTime(f), 0.0);
+  step.motion = f.motion;
+  return step;
 }
 
 }  // namespace
+
+std::string ClassOf(const SceneMotion& motion) {
+  if (!motion.moves) return "static";
+  if (!motion.share) return "";
+  return *motion.share < kFullyDynamic ? "partly dynamic" : "fully dynamic";
+}
 
 std::vector<PlanStep> PlanScene(const PlanFacts& f) {
   const double megapixels = f.views * f.megapixels_per_view;
@@ -90,7 +109,7 @@ std::vector<PlanStep> PlanScene(const PlanFacts& f) {
                       false,
                       "chroma is low-frequency in angle: degree 0 suffices unless asked for",
                       0.0));
-  plan.push_back(Step("deformation_over_time", f.is_dynamic, WhyTime(f), 0.0));
+  plan.push_back(TimeStep(f));
   plan.push_back(
       Step("evaluation",
            true,
@@ -109,6 +128,8 @@ std::string PlanToJson(const std::vector<PlanStep>& steps) {
                                  {"reason", s.reason},
                                  {"estimated_seconds", s.estimated_seconds}};
     if (s.measured_seconds >= 0.0) entry["measured_seconds"] = s.measured_seconds;
+    if (s.motion && !ClassOf(*s.motion).empty()) entry["motion"] = ClassOf(*s.motion);
+    if (s.motion && s.motion->share) entry["moving_share"] = *s.motion->share;
     array.push_back(std::move(entry));
   }
   return array.dump(1) + "\n";

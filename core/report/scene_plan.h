@@ -2,10 +2,20 @@
 // before work starts, completed with measured seconds afterwards.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace color3d {
+
+// What the geometry of a scene with times and poses has found.
+struct SceneMotion {
+  bool moves = false;           // else it was reconstructed as one that stands still
+  std::optional<double> share;  // the motion energy: of all pixels, those that move, 0..1
+};
+// "static", "partly dynamic" or, where half of the pixels move, "fully dynamic"; empty where
+// something moves and nobody has measured how much.
+std::string ClassOf(const SceneMotion& motion);
 
 struct PlanStep {
   std::string step;  // e.g. "structure_from_motion"
@@ -17,6 +27,7 @@ struct PlanStep {
   // Kind of the stage whose time the step takes; empty when it is only a part of one. Not in the
   // file.
   std::string stage = {};
+  std::optional<SceneMotion> motion = {};  // that `needed` goes by
 };
 
 // What the plan depends on.
@@ -24,11 +35,12 @@ struct PlanFacts {
   bool has_poses = false;
   bool has_distortion = false;
   bool has_sparse_points = true;
-  bool geometry_given = false;  // the scene is a splat
-  bool is_film = false;         // frames without poses: nothing is reconstructed
-  bool is_dynamic = false;      // several times with poses
-  int time_steps = 0;           // of a dynamic scene
-  int cameras = 0;              // of a dynamic scene
+  bool geometry_given = false;             // the scene is a splat
+  bool is_film = false;                    // frames without poses: nothing is reconstructed
+  bool is_dynamic = false;                 // several times with poses
+  int time_steps = 0;                      // of a dynamic scene
+  int cameras = 0;                         // of a dynamic scene
+  std::optional<SceneMotion> motion = {};  // of a dynamic scene, once there is geometry
   bool has_truth = false;
   bool key_view_given = false;
   int views = 0;

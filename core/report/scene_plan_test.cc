@@ -41,6 +41,33 @@ TEST(ScenePlan, TellsOfTime) {
   const PlanStep step = told({.is_dynamic = true, .time_steps = 25, .cameras = 4});
   EXPECT_TRUE(step.needed);
   EXPECT_EQ(step.reason, "the views show 25 moments, seen by 4 cameras");
+  EXPECT_FALSE(told({.is_film = true, .is_dynamic = true}).needed);
+}
+
+TEST(ScenePlan, TellsWhatTheGeometryHasDecided) {
+  const auto told = [](const SceneMotion& motion) {
+    for (auto& step : nlohmann::json::parse(PlanToJson(
+             PlanScene({.is_dynamic = true, .time_steps = 9, .cameras = 1, .motion = motion})))) {
+      if (step.at("step") == "deformation_over_time") return step;
+    }
+    return nlohmann::json();
+  };
+  const auto still = told({false, 0.001});
+  EXPECT_EQ(still.at("needed"), false);
+  EXPECT_EQ(still.at("motion"), "static");
+  EXPECT_EQ(still.at("moving_share"), 0.001);
+  EXPECT_EQ(still.at("reason"),
+            "the views show 9 moments, seen by 1 camera; static: nothing moves in their geometry");
+  const auto partly = told({true, 0.031});
+  EXPECT_EQ(partly.at("needed"), true);
+  EXPECT_EQ(partly.at("motion"), "partly dynamic");
+  EXPECT_EQ(partly.at("reason"),
+            "the views show 9 moments, seen by 1 camera; partly dynamic: 3.1 % of the pixels move");
+  EXPECT_EQ(told({true, 0.5}).at("motion"), "fully dynamic");
+  const auto unmeasured = told({true, {}});
+  EXPECT_EQ(unmeasured.at("needed"), true);
+  EXPECT_FALSE(unmeasured.contains("motion"));
+  EXPECT_FALSE(unmeasured.contains("moving_share"));
 }
 
 }  // namespace

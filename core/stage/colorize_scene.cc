@@ -48,6 +48,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                             const std::vector<std::string>& keys,
                             const std::optional<NextKeyViewFacts>& next,
                             const ColorFacts& colors,
+                            const std::optional<SceneMotion>& motion,
                             StageContext& context) {
   ordered_json metrics = ordered_json::object();
   if (context.HasInput(artifact::kScores)) {
@@ -90,6 +91,8 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
     const size_t count = ParseGaussians(context.ReadInput(artifact::kModel)).size();
     if (count > 0) metrics["gaussians"] = count;
   }
+  if (motion && !ClassOf(*motion).empty()) metrics["motion"] = ClassOf(*motion);
+  if (motion && motion->share) metrics["moving_share"] = *motion->share;
   double total = 0.0;
   int64_t peak = 0;
   for (const StageSummary& s : stages) {
@@ -111,6 +114,22 @@ std::vector<CurvePoint> CollectCurves(const StageContext& context) {
     curves.insert(curves.end(), points.begin(), points.end());
   }
   return curves;
+}
+
+// Nothing of photos, nor before there is geometry.
+std::optional<SceneMotion> MotionOf(const Scene& scene,
+                                    const std::vector<CurvePoint>& curves,
+                                    const StageContext& context) {
+  const char* name = context.HasInput(artifact::kModel) ? artifact::kModel : artifact::kGeometry;
+  if (!scene.IsDynamic() || !context.HasInput(name)) return std::nullopt;
+  SceneMotion motion;
+  motion.moves = ParseGaussians(context.ReadInput(name)).motion.size() > 0;
+  for (const CurvePoint& point : curves) {
+    if (point.stage == kind::kReconstructGeometry && point.error_name == "moving_share") {
+      motion.share = point.value;
+    }
+  }
+  return motion;
 }
 
 double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kind) {
@@ -145,6 +164,7 @@ void AddTime(const Scene& scene, PlanFacts* facts) {
 
 std::vector<PlanStep> CollectPlan(const Scene& scene,
                                   const std::vector<StageSummary>& stages,
+                                  const std::optional<SceneMotion>& motion,
                                   bool has_truth,
                                   const StageContext& context) {
   if (!context.HasInput(artifact::kImportFacts)) return {};  // nobody knows what was planned
@@ -152,6 +172,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   PlanFacts plan_facts;
   plan_facts.is_film = IsColoredAsFilm(context, scene);
   AddTime(scene, &plan_facts);
+  plan_facts.motion = motion;
   plan_facts.has_poses = !facts.ran_structure_from_motion;
   plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
@@ -265,14 +286,15 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   if (keys.empty() && key) keys = {scene.views[*key].name};
   const auto next = keys.empty() ? std::nullopt : AdviseNextKeyView(scene, keys, context);
   const ColorFacts colors(scene, context, next);
-  const ordered_json metrics = CollectMetrics(stages, keys, next, colors, context);
+  const std::vector<CurvePoint> curves = CollectCurves(context);
+  const std::optional<SceneMotion> motion = MotionOf(scene, curves, context);
+  const ordered_json metrics = CollectMetrics(stages, keys, next, colors, motion, context);
 
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
   data.summary = Summary(scene, IsColoredAsFilm(context, scene), metrics, keys);
   if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
   data.key_view = ReportOfKeyView(KeyPictures(key ? scene.views[*key].name : "", context), context);
-  const std::vector<CurvePoint> curves = CollectCurves(context);
   std::vector<CurvePoint> personalization;
   std::partition_copy(curves.begin(),
                       curves.end(),
@@ -285,7 +307,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   for (const auto& [name, value] : metrics.items()) {
     if (value.is_number()) data.metrics.emplace_back(name, value.get<double>());
   }
-  data.plan = CollectPlan(scene, stages, metrics.contains("delta_e00"), context);
+  data.plan = CollectPlan(scene, stages, motion, metrics.contains("delta_e00"), context);
   for (const StageSummary& s : stages) {
     if (s.state == "SUCCEEDED") data.stages.push_back({s.kind, s.seconds});
     for (const std::string& w : s.warnings) data.warnings.push_back(s.kind + ": " + w);

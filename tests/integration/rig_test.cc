@@ -72,11 +72,16 @@ TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
   bool told = false;
   for (const json& step : json::parse(ReadFile(Path("out") / "plan.json"))) {
     if (step["step"] != "deformation_over_time") continue;
-    told = step["reason"] == "the views show 9 moments, seen by 3 cameras" && step["needed"];
+    EXPECT_THAT(step["reason"].get<std::string>(),
+                HasSubstr("the views show 9 moments, seen by 3 cameras; partly dynamic: "));
+    told = step["needed"] && step.value("motion", "") == "partly dynamic" &&
+           step.value("moving_share", 0.0) > 0.0;
   }
   EXPECT_TRUE(told) << ReadFile(Path("out") / "plan.json");
   const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
   EXPECT_GT(metrics.at("gaussians"), 1000);
+  EXPECT_EQ(metrics.at("motion"), "partly dynamic");
+  EXPECT_GT(metrics.at("moving_share"), 0.0);
   EXPECT_TRUE(fs::exists(Path("out") / "scene.ply"));
   // The key view's camera: its own frames in colour, and the scene as it saw it.
   EXPECT_THAT(result.out, HasSubstr("film.mp4"));

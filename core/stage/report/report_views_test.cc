@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "core/image/codec.h"
+#include "core/report/curves.h"
 #include "core/stage/report/source_overlay.h"
 #include "tests/support/stages/evaluated_scene.h"
 
@@ -38,6 +41,31 @@ TEST_F(ReportViewsTest, AReportOfHalfFinishedWorkShowsWhatThereIs) {
   EXPECT_THAT(html, testing::HasSubstr("solve chroma"));
   EXPECT_THAT(html, testing::Not(testing::HasSubstr("Key view</h2>")));
   EXPECT_THAT(html, testing::Not(testing::HasSubstr("view.html")));
+}
+
+TEST_F(ReportViewsTest, PlanAndMetricsTellWhetherAPosedFilmMoves) {
+  for (int i = 0; i < 3; ++i) scene_.views[i].moment = Moment{0.5 * i, 0};
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = "film"}));
+  AddInput(std::string(artifact::kCurves) + "reconstruct_geometry.csv",
+           CurvesToCsv({{"reconstruct_geometry", 1.0, 100, "moving_share", 0.03}}));
+  for (const bool moves : {false, true}) {
+    AddInput(artifact::kModel, SerializeGaussians(moves ? BallBeforeWall(0.0, 1.0) : SmallModel()));
+    std::filesystem::remove_all(scratch_.path() / "out");
+    StageContext context = MakeContext();
+    RunReport({}, context);
+    const auto read = [&](const char* name) {
+      return nlohmann::json::parse(ReadFile(scratch_.path() / "out" / name));
+    };
+    const char* motion = moves ? "partly dynamic" : "static";
+    EXPECT_EQ(read(artifact::kMetrics).at("motion"), motion);
+    EXPECT_EQ(read(artifact::kMetrics).at("moving_share"), 0.03);
+    for (const auto& step : read(artifact::kPlan)) {
+      if (step.at("step") != "deformation_over_time") continue;
+      EXPECT_EQ(step.at("needed"), moves);
+      EXPECT_EQ(step.at("motion"), motion);
+    }
+  }
 }
 
 TEST(SourceOverlay, TellsSourcesApartByLightnessAndPatternNotByHueAlone) {
