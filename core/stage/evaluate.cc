@@ -84,7 +84,7 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   NoCheckpoints none;
   return FitChroma(geometry,
                    ChromaProblemOf(scene, images, targets),
-                   scene.IsDynamic() ? ForManyFrames(options) : options,
+                   geometry.motion.size() > 0 ? ForManyFrames(options) : options,
                    {context.pool(), none, progress, context.cancel()});
 }
 

@@ -29,7 +29,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   };
   GaussianModel model = FitChroma(geometry,
                                   ChromaProblemOf(scene, images, targets),
-                                  scene.IsDynamic() ? ForManyFrames(options) : options,
+                                  geometry.motion.size() > 0 ? ForManyFrames(options) : options,
                                   context.control());
   AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));

@@ -16,6 +16,9 @@ class ViewPositions {
   // Without geometry among the inputs nothing is known.
   ViewPositions(const Scene& scene, const StageContext& context);
 
+  // Whether the geometry says that nothing moves: frames of a place are photos of it.
+  bool NothingMoves() const { return geometry_ && geometry_->motion.size() == 0; }
+
   // PictureFacts::position, of the size of `luminance`, the view's as `camera` takes it. Known
   // where the geometry is rendered as the view shows it: elsewhere, and where `mask` (of that size;
   // null: nowhere) is 0, the view shows something else. Empty without geometry.
