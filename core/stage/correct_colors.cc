@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <map>
+#include <functional>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -172,10 +172,35 @@ void CountAsSeen(const Image& share, Image* provenance) {
   }
 }
 
-// The places worth a stroke as JSON, and their views as pictures to paint on.
+// A view as the corrections change it.
+struct CorrectedView {
+  CorrectedColor answer;
+  Image ab;  // 2 channels, Lab units
+};
+
+CorrectedView CorrectView(int number,
+                          const PlacedPicture& picture,
+                          const std::vector<Painted>& painted,
+                          const Corrector& corrector,
+                          int samples) {
+  CorrectedView corrected{corrector.Predict(picture, samples), picture.ab};
+  auto& [answer, ab] = corrected;
+  for (size_t i = 0; i < ab.data.size(); ++i) ab.data[i] += answer.change.data[i];
+  for (const Painted& one : painted) {
+    if (one.view != number) continue;
+    MixIn(one.correction.ab, one.correction.painted, &ab);
+    for (size_t i = 0; i < answer.share.data.size(); ++i) {
+      float& share = answer.share.data[i];
+      share = std::max(share, one.correction.painted.data[i]);
+    }
+  }
+  return corrected;
+}
+
+// The places worth a stroke as JSON, and their views, which have `colors`, as pictures to paint on.
 nlohmann::ordered_json WriteProposals(const std::vector<ProposedPlace>& proposed,
                                       const std::vector<int>& view_of_sample,
-                                      const std::map<int, Image>& colors,
+                                      const std::function<Image(int view)>& colors,
                                       const ColoredViews& views,
                                       StageContext& context) {
   auto places = nlohmann::ordered_json::array();
@@ -190,7 +215,7 @@ nlohmann::ordered_json WriteProposals(const std::vector<ProposedPlace>& proposed
                       {"gain", place.gain}});
     if (!painted.insert(index).second) continue;
     context.WriteOutput(ViewArtifact(artifact::kPaint, view, ".png"),
-                        EncodePng8(PaintablePhoto(photo, colors.at(index))));
+                        EncodePng8(PaintablePhoto(photo, colors(index))));
   }
   return places;
 }
@@ -225,8 +250,7 @@ void RunCorrectColors(const CorrectColorsOptions& options,
   const auto corrector = colorizer->Correct(corrections);
   const auto total = static_cast<int64_t>(scene.views.size());
   const int samples = static_cast<int>(kPlacesOfAllViews / scene.TrainingViews().size() + 1);
-  std::vector<CorrectedColor> answers(total);
-  std::map<int, Image> colors;  // of views that may be proposed, as they are now
+  std::vector<PlaceSample> samples_of(total);
   std::mutex outputs;
   int64_t done = 0;
   double changed = 0.0;
@@ -235,18 +259,8 @@ void RunCorrectColors(const CorrectColorsOptions& options,
     const auto number = static_cast<int>(index);
     const View& view = scene.views[index];
     const PlacedPicture picture = views.Picture(number);
-    CorrectedColor& answer = answers[index];
-    answer = corrector->Predict(picture, view.held_out ? 0 : samples);
-    Image ab = picture.ab;
-    for (size_t i = 0; i < ab.data.size(); ++i) ab.data[i] += answer.change.data[i];
-    for (const Painted& one : painted) {
-      if (one.view != number) continue;
-      MixIn(one.correction.ab, one.correction.painted, &ab);
-      for (size_t i = 0; i < answer.share.data.size(); ++i) {
-        float& share = answer.share.data[i];
-        share = std::max(share, one.correction.painted.data[i]);
-      }
-    }
+    auto [answer, ab] =
+        CorrectView(number, picture, painted, *corrector, view.held_out ? 0 : samples);
     Image provenance = views.Provenance(number, picture.luminance);
     if (!provenance.Empty()) CountAsSeen(answer.share, &provenance);
     const std::string ab_png = EncodeAbPng(ab);
@@ -260,13 +274,16 @@ void RunCorrectColors(const CorrectColorsOptions& options,
                             provenance_png);
       }
     }
-    answer.change = answer.share = Image();
-    if (options.proposals > 0 && !view.held_out) colors[number] = std::move(ab);
+    samples_of[index] = std::move(answer.sample);
     context.progress().OnProgress(++done, total, "correcting " + view.name);
   });
   const std::vector<int> training = scene.TrainingViews();
   std::vector<PlaceSample> places;
-  for (const int view : training) places.push_back(std::move(answers[view].sample));
+  for (const int view : training) places.push_back(std::move(samples_of[view]));
+  // Few are proposed: theirs are made again, so that memory does not grow with the number of views.
+  const auto colors = [&](int view) {
+    return CorrectView(view, views.Picture(view), painted, *corrector, 0).ab;
+  };
   nlohmann::ordered_json facts;
   facts["corrections"] = painted.size();
   facts["share_changed"] = changed / static_cast<double>(total);

@@ -184,6 +184,29 @@ TEST_F(RecolorRangesTest, ACorrectionWithoutARangeAmongThemIsRefused) {
   }
 }
 
+// Those of views that are proposed are made again, not kept of all.
+TEST_F(RecolorRangesTest, PicturesToPaintOnHaveTheColorsOfTheCorrectedFilm) {
+  FurtherKeyView correction = Painted(9, 0.0, 0.0, -25.0f, 0, kWidth / 2);
+  correction.begin_s = correction.end_s = std::nullopt;
+  Run([&](StageContext& context) {
+    RunCorrectColors({.corrections = {correction}, .proposals = 3}, context);
+  });
+  const std::vector<Image> after = Film();
+  const StageContext context = MakeContext();
+  const auto places = ReadJson(context, artifact::kCorrections).at("proposals");
+  ASSERT_FALSE(places.empty());
+  for (const auto& place : places) {
+    const int index = scene_.FindView(place.at("view").get<std::string>());
+    const std::string name = ViewArtifact(artifact::kPaint, scene_.views[index], ".png");
+    const Image painted = LabFromSrgb(DecodeImage(context.ReadInput(name), name));
+    double error = 0.0;
+    for (size_t i = 0; i < after[index].data.size(); ++i) {
+      error += std::abs(painted.Plane(1)[i] - after[index].data[i]);
+    }
+    EXPECT_LT(error / static_cast<double>(after[index].data.size()), 1.0) << name;
+  }
+}
+
 std::string Complaint(const std::vector<FurtherKeyView>& keys, const Scene& scene) {
   try {
     RangesOf(keys, scene);
