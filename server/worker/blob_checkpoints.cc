@@ -15,7 +15,7 @@ BlobCheckpoints::BlobCheckpoints(JobStore& store,
       blobs_(blobs),
       lease_{job.id, job.lease_epoch},
       tag_(AttemptTag(job)),
-      interval_(interval),
+      pace_(interval, std::chrono::steady_clock::now()),
       newest_(job.checkpoint) {}
 
 std::optional<std::filesystem::path> BlobCheckpoints::Newest() {
@@ -43,9 +43,7 @@ bool BlobCheckpoints::LoadTo(const std::filesystem::path& file) {
   return newest.has_value();
 }
 
-bool BlobCheckpoints::WantsSave() {
-  return std::chrono::steady_clock::now() - last_save_ >= interval_;
-}
+bool BlobCheckpoints::WantsSave() { return pace_.IsDue(std::chrono::steady_clock::now()); }
 
 void BlobCheckpoints::Save(const std::string& state) { Name(blobs_.PutBytes(state)); }
 
@@ -54,7 +52,7 @@ void BlobCheckpoints::SaveFile(const std::filesystem::path& file) { Name(blobs_.
 void BlobCheckpoints::Name(const FileDigest& digest) {
   const std::optional<FileDigest> before = store_.SetCheckpoint(lease_, digest);
   newest_ = digest;
-  last_save_ = std::chrono::steady_clock::now();
+  pace_.OnSaved(std::chrono::steady_clock::now());
   if (before && before->sha256 != digest.sha256 && !store_.IsReferenced(before->sha256)) {
     blobs_.Remove(before->sha256);
   }

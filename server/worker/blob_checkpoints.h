@@ -10,6 +10,7 @@
 #include "core/base/progress.h"
 #include "server/storage/blob_store.h"
 #include "server/store/job_store.h"
+#include "server/worker/checkpoint_pace.h"
 
 namespace color3d {
 
@@ -36,9 +37,8 @@ class BlobCheckpoints : public CheckpointStore {
   BlobStore& blobs_;
   const Lease lease_;
   const std::string tag_;  // of log lines
-  const std::chrono::milliseconds interval_;
+  CheckpointPace pace_;
   std::optional<FileDigest> newest_;
-  std::chrono::steady_clock::time_point last_save_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace color3d
