@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <mutex>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -51,9 +52,9 @@ Image Texture(const Image& luminance) {
   return BoxMean(gradient, 3);
 }
 
-Flow SureFlow(const Image& from, const Image& to) {
-  Flow flow{DenseFlow(from, to), std::vector<char>(from.PlaneSize(), 0), {}, Texture(from)};
-  const Image back = DenseFlow(to, from);
+// Of `from`, whose pixels go `there`; those of the other frame go `back`.
+Flow SureFlow(const Image& from, const Image& there, const Image& back) {
+  Flow flow{there, std::vector<char>(from.PlaneSize(), 0), {}, Texture(from)};
   for (int y = 0; y < from.height; ++y) {
     for (int x = 0; x < from.width; ++x) {
       const float u = flow.there.At(0, y, x), v = flow.there.At(1, y, x);
@@ -161,12 +162,41 @@ double MedianTexture(const Flow& flow) {
   return Median(std::move(texture));
 }
 
-// Counts over the neighbours of one frame.
+PairResidual Compare(const Image& from, const Image& there, const Image& back) {
+  PairResidual result;
+  result.excess = Image(from.width, from.height, 1, -1.0f);
+  const Flow flow = SureFlow(from, there, back);
+  if (flow.sample.size() < kLeastSamples) return result;
+  result.background_px = MedianLength(flow);
+  const std::optional<Account> account =
+      result.background_px < kStillPx ? Account::Still() : Explain(flow);
+  if (!account) return result;
+  result.motion = account->motion();
+  const double noise_px = kNoiseFactor * Median(ResidualsOf(*account, flow));
+  const double texture = MedianTexture(flow);
+  for (int y = 0; y < from.height; ++y) {
+    for (int x = 0; x < from.width; ++x) {
+      const size_t at = static_cast<size_t>(y) * from.width + x;
+      if (!flow.sure[at]) continue;
+      const double residual =
+          account->Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
+      // The error of flow goes with the inverse of the gradient.
+      const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
+      result.excess.data[at] =
+          static_cast<float>(residual / std::max(kLeastMotionPx, noise_px * std::max(1.0, plain)));
+    }
+  }
+  return result;
+}
+
+// Counts over the neighbours of one frame, per pixel; empty before the first one.
 struct Votes {
-  std::vector<int> moving, all;
+  std::vector<uint8_t> moving, all;
 };
 
 void Add(const PairResidual& pair, Votes* votes) {
+  votes->moving.resize(pair.excess.data.size());
+  votes->all.resize(pair.excess.data.size());
   for (size_t i = 0; i < votes->all.size(); ++i) {
     const float excess = pair.excess.data[i];
     if (excess < 0.0f) continue;
@@ -212,13 +242,23 @@ Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
   return image;
 }
 
-std::vector<int> NeighborsOf(int frame, int count) {
-  std::vector<int> neighbors;
+int NeighborCount(int frame, int count) {
+  int neighbors = 0;
   for (const int distance : kDistances) {
-    if (frame >= distance) neighbors.push_back(frame - distance);
-    if (frame + distance < count) neighbors.push_back(frame + distance);
+    neighbors += (frame >= distance ? 1 : 0) + (frame + distance < count ? 1 : 0);
   }
   return neighbors;
+}
+
+// The frames from `begin` to `end`, each with its neighbours behind it.
+std::vector<std::pair<int, int>> PairsFrom(int begin, int end, int count) {
+  std::vector<std::pair<int, int>> pairs;
+  for (int frame = begin; frame < end; ++frame) {
+    for (const int distance : kDistances) {
+      if (frame + distance < count) pairs.emplace_back(frame, frame + distance);
+    }
+  }
+  return pairs;
 }
 
 // Of frames spread over the shot: each with the next one and with all of its like.
@@ -239,30 +279,7 @@ std::vector<std::pair<int, int>> TellingPairs(int count) {
 }  // namespace
 
 PairResidual CompareFrames(const Image& from, const Image& to) {
-  PairResidual result;
-  result.excess = Image(from.width, from.height, 1, -1.0f);
-  const Flow flow = SureFlow(from, to);
-  if (flow.sample.size() < kLeastSamples) return result;
-  result.background_px = MedianLength(flow);
-  const std::optional<Account> account =
-      result.background_px < kStillPx ? Account::Still() : Explain(flow);
-  if (!account) return result;
-  result.motion = account->motion();
-  const double noise_px = kNoiseFactor * Median(ResidualsOf(*account, flow));
-  const double texture = MedianTexture(flow);
-  for (int y = 0; y < from.height; ++y) {
-    for (int x = 0; x < from.width; ++x) {
-      const size_t at = static_cast<size_t>(y) * from.width + x;
-      if (!flow.sure[at]) continue;
-      const double residual =
-          account->Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
-      // The error of flow goes with the inverse of the gradient.
-      const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
-      result.excess.data[at] =
-          static_cast<float>(residual / std::max(kLeastMotionPx, noise_px * std::max(1.0, plain)));
-    }
-  }
-  return result;
+  return Compare(from, DenseFlow(from, to), DenseFlow(to, from));
 }
 
 ShotMotion MotionOfCamera(const ShotFrames& frames,
@@ -272,8 +289,8 @@ ShotMotion MotionOfCamera(const ShotFrames& frames,
   std::vector<double> shift(pairs.size(), -1.0);
   pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
-    const Flow flow =
-        SureFlow(*frames.luminance(pairs[i].first), *frames.luminance(pairs[i].second));
+    const auto from = frames.luminance(pairs[i].first), to = frames.luminance(pairs[i].second);
+    const Flow flow = SureFlow(*from, DenseFlow(*from, *to), DenseFlow(*to, *from));
     if (flow.sample.size() >= kLeastSamples) shift[i] = MedianLength(flow);
   });
   std::erase_if(shift, [](double px) { return px < 0.0; });
@@ -289,27 +306,42 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
                              ThreadPool& pool,
                              const CancellationToken& cancel,
                              const std::function<void(int frame, const Image& moving)>& on_frame) {
+  constexpr int kAtOnce = 16;  // frames: what is told of more is not held
   ShotMotion motion = MotionOfCamera(frames, pool, cancel);
-  std::mutex handing_over;
+  std::mutex adding, handing_over;
+  std::vector<Votes> votes(frames.count);
   std::vector<double> share(frames.count, 0.0);
-  pool.ForEach(frames.count, [&](int64_t index, int) {
-    const int frame = static_cast<int>(index);
-    const auto picture = frames.luminance(frame);
-    const std::vector<int> neighbors = NeighborsOf(frame, frames.count);
-    Votes votes{std::vector<int>(picture->PlaneSize(), 0),
-                std::vector<int>(picture->PlaneSize(), 0)};
-    for (const int neighbor : neighbors) {
+  for (int begin = 0; begin < frames.count; begin += kAtOnce) {
+    const int end = std::min(begin + kAtOnce, frames.count);
+    const std::vector<std::pair<int, int>> pairs = PairsFrom(begin, end, frames.count);
+    // One pair of flows tells of both frames.
+    pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
       cancel.ThrowIfCancelled();
-      Add(CompareFrames(*picture, *frames.luminance(neighbor)), &votes);
-    }
-    const int least = std::min<int>(2, static_cast<int>(neighbors.size()));
-    const Image moving = RegionsOf(votes, std::max(1, least), picture->width, picture->height);
-    double sum = 0.0;
-    for (const float v : moving.data) sum += v;
-    share[frame] = sum / static_cast<double>(moving.data.size());
-    const std::lock_guard lock(handing_over);
-    on_frame(frame, moving);
-  });
+      const auto [earlier, later] = pairs[i];
+      const auto before = frames.luminance(earlier), behind = frames.luminance(later);
+      const Image forth = DenseFlow(*before, *behind), back = DenseFlow(*behind, *before);
+      const PairResidual of_earlier = Compare(*before, forth, back);
+      const PairResidual of_later = Compare(*behind, back, forth);
+      const std::lock_guard lock(adding);
+      Add(of_earlier, &votes[earlier]);
+      Add(of_later, &votes[later]);
+    });
+    // All that there is to be told of these has been.
+    pool.ForEach(end - begin, [&](int64_t i, int) {
+      const int frame = begin + static_cast<int>(i);
+      const auto picture = frames.luminance(frame);
+      Votes told = std::exchange(votes[frame], {});
+      told.moving.resize(picture->PlaneSize());
+      told.all.resize(picture->PlaneSize());
+      const int least = std::clamp(NeighborCount(frame, frames.count), 1, 2);
+      const Image moving = RegionsOf(told, least, picture->width, picture->height);
+      double sum = 0.0;
+      for (const float v : moving.data) sum += v;
+      share[frame] = sum / static_cast<double>(moving.data.size());
+      const std::lock_guard lock(handing_over);
+      on_frame(frame, moving);
+    });
+  }
   double sum = 0.0;
   for (const double s : share) sum += s;
   motion.moving_share = frames.count > 0 ? sum / frames.count : 0.0;

@@ -55,20 +55,20 @@ struct Found {
   std::map<int, Image> moving;
 };
 
-Found Find(const Film& film) {
+Found Find(const Film& film, int first = 0, int count = kFrames, int threads = 2) {
   std::vector<std::shared_ptr<const Image>> pictures;
-  for (int i = 0; i < kFrames; ++i) {
-    pictures.push_back(std::make_shared<const Image>(film.Luminance(i)));
+  for (int i = 0; i < count; ++i) {
+    pictures.push_back(std::make_shared<const Image>(film.Luminance(first + i)));
   }
-  ThreadPool pool(2);
+  ThreadPool pool(threads);
   Found found;
-  found.motion = FindMovingRegions({kFrames, [&](int frame) { return pictures[frame]; }},
+  found.motion = FindMovingRegions({count, [&](int frame) { return pictures[frame]; }},
                                    pool,
                                    CancellationToken(),
                                    [&](int frame, const Image& moving) {
                                      EXPECT_TRUE(found.moving.emplace(frame, moving).second);
                                    });
-  EXPECT_EQ(found.moving.size(), static_cast<size_t>(kFrames));
+  EXPECT_EQ(found.moving.size(), static_cast<size_t>(count));
   return found;
 }
 
@@ -118,6 +118,17 @@ TEST(MovingRegions, ACameraThatTurnsDoesNotStandStill) {
   const Found found = Find(film);
   EXPECT_FALSE(found.motion.camera_stands_still);
   EXPECT_GT(AgreementWithTruth(found, film), 0.6);
+}
+
+// Each pair of frames is measured once, in blocks of frames from the shot's beginning on.
+TEST(MovingRegions, NeitherThreadsNorTheShotsBeginningChangeWhatIsFound) {
+  const Film film{.step = 0.0, .noise = 1.0};
+  constexpr int kLater = 3, kCount = 24, kFarthest = 8;
+  const Found found = Find(film, 0, kCount, 1), later = Find(film, kLater, kCount, 3);
+  for (int frame = kLater + kFarthest; frame < kCount - kFarthest; ++frame) {
+    EXPECT_EQ(found.moving.at(frame).data, later.moving.at(frame - kLater).data) << frame;
+  }
+  EXPECT_GT(found.motion.moving_share, 0.01);
 }
 
 TEST(MovingRegions, AccountsOfTwoFrames) {
