@@ -375,15 +375,15 @@ std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames,
 }
 
 CarriedColor CarryFoundAgain(const FilmKey& key,
-                             const Image& key_luminance,
+                             const FoundAgain& again,
                              const Image& frame,
                              const FilmCarryOptions& options,
                              const CancellationToken& cancel) {
   constexpr float kNowhere = -1e4f;
-  const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(key_luminance);
+  const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(again.key());
   const Image nowhere(frame.width, frame.height, 2, kNowhere);
   FilmTrack track{nowhere, nowhere};
-  TakeFoundAgain(FoundAgain(key_luminance), frame, contrast, key_contrast, options, cancel, &track);
+  TakeFoundAgain(again, frame, contrast, key_contrast, options, cancel, &track);
   return ColorOf(key, key_contrast, contrast, track, options);
 }
 

@@ -78,10 +78,10 @@ struct NearKeyFrames {
 std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames, const std::vector<int>& keys);
 
 // What a frame that nothing leads to from a key frame, as behind a cut, shows of it as far as local
-// features find that; confidence 0 elsewhere. `key_luminance`, `frame`: as FilmFrames' luminance.
-// Throws Error{kCancelled}.
+// features find that; confidence 0 elsewhere. `again`: of the key frame; `frame`: as FilmFrames'
+// luminance. Throws Error{kCancelled}.
 CarriedColor CarryFoundAgain(const FilmKey& key,
-                             const Image& key_luminance,
+                             const FoundAgain& again,
                              const Image& frame,
                              const FilmCarryOptions& options,
                              const CancellationToken& cancel);

@@ -21,6 +21,7 @@ class FoundAgain {
   // `key`: L in 0..100, 1 channel; must outlive the object.
   explicit FoundAgain(const Image& key);
 
+  const Image& key() const { return key_; }
   // What the frame may show of the key frame, each as one plane moves and flow around it (DIS); the
   // plane that most features agree on first. None where features do not agree. Thread-safe.
   std::vector<FilmTrack> TracksTo(const Image& frame, const CancellationToken& cancel) const;

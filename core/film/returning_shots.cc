@@ -25,17 +25,31 @@ std::vector<int> MiddlesWithoutKey(const std::vector<int>& shot, const std::vect
   return middles;
 }
 
-std::optional<FilmKey> KeyOfReturningShot(const FilmFrames& frames,
-                                          int frame,
-                                          const std::vector<FilmKey>& keys,
-                                          const FilmCarryOptions& options,
-                                          ThreadPool& pool,
-                                          const CancellationToken& cancel) {
-  const auto luminance = frames.luminance(frame);
-  std::vector<CarriedColor> colors(keys.size());
+ReturningShots::ReturningShots(const FilmFrames& frames,
+                               const std::vector<FilmKey>& keys,
+                               const FilmCarryOptions& options,
+                               ThreadPool& pool,
+                               const CancellationToken& cancel)
+    : frames_(frames),
+      keys_(keys),
+      options_(options),
+      pool_(pool),
+      cancel_(cancel),
+      pictures_(keys.size()),
+      again_(keys.size()) {
   pool.ForEach(static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
-    colors[i] =
-        CarryFoundAgain(keys[i], *frames.luminance(keys[i].frame), *luminance, options, cancel);
+    cancel.ThrowIfCancelled();
+    pictures_[i] = frames.luminance(keys[i].frame);
+    again_[i].emplace(*pictures_[i]);
+  });
+}
+
+std::optional<FilmKey> ReturningShots::KeyAt(int frame) const {
+  const auto luminance = frames_.luminance(frame);
+  std::vector<CarriedColor> colors(keys_.size());
+  pool_.ForEach(static_cast<int64_t>(keys_.size()), [&](int64_t i, int) {
+    cancel_.ThrowIfCancelled();
+    colors[i] = CarryFoundAgain(keys_[i], *again_[i], *luminance, options_, cancel_);
   });
   std::optional<FilmKey> found;
   double most = kLeastFound;

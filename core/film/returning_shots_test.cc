@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
+
 #include "core/base/random.h"
 #include "core/image/codec.h"
 
@@ -37,7 +40,7 @@ class Place {
 class ReturningShotsTest : public ::testing::Test {
  protected:
   std::optional<FilmKey> Find(int frame, const std::vector<FilmKey>& keys) {
-    return KeyOfReturningShot(frames_, frame, keys, {}, pool_, cancel_);
+    return ReturningShots(frames_, keys, {}, pool_, cancel_).KeyAt(frame);
   }
   FilmKey KeyAt(int frame, float a) const {
     const auto luminance = frames_.luminance(frame);
@@ -46,8 +49,10 @@ class ReturningShotsTest : public ::testing::Test {
              Image(luminance->width, luminance->height, 1, 1.0f)}};
   }
   const Place one_{1}, other_{2};
+  mutable std::array<std::atomic<int>, 9> reads_{};  // of each frame
   // There, elsewhere, back again, and a flash.
   const FilmFrames frames_{{0, 0, 0, 1, 1, 2, 2, 2, 3}, [this](int frame) {
+                             ++reads_[frame];
                              const bool elsewhere = frame == 3 || frame == 4;
                              return (elsewhere ? other_ : one_).Seen(4 * frame);
                            }};
@@ -70,6 +75,16 @@ TEST_F(ReturningShotsTest, AnotherPlaceIsNotTakenForIt) {
   EXPECT_FALSE(Find(3, {KeyAt(1, 30.0f)}));
   EXPECT_FALSE(Find(6, {KeyAt(3, 30.0f)}));
   EXPECT_FALSE(Find(6, {}));
+}
+
+TEST_F(ReturningShotsTest, FeaturesOfAKeyFrameAreMadeOnceForAllShots) {
+  const std::vector<FilmKey> keys = {KeyAt(1, 30.0f)};
+  reads_[1] = 0;
+  const ReturningShots returning(frames_, keys, {}, pool_, cancel_);
+  EXPECT_TRUE(returning.KeyAt(6));
+  EXPECT_FALSE(returning.KeyAt(3));
+  EXPECT_TRUE(returning.KeyAt(8));
+  EXPECT_EQ(reads_[1], 1);
 }
 
 TEST(ReturningShots, OnlyShotsWithoutAKeyFrameAreAsked) {

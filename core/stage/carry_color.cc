@@ -200,9 +200,15 @@ void CarryByMotion(const CarryColorOptions& options, const Scene& scene, StageCo
   };
   carry(keys);
   const std::vector<int> key_views = ViewsOf(keys, &FilmKey::frame);
-  for (const int middle : MiddlesWithoutKey(frames.shot, key_views)) {
-    const auto key =
-        KeyOfReturningShot(frames, middle, keys, options.film, context.pool(), context.cancel());
+  const std::vector<int> middles = MiddlesWithoutKey(frames.shot, key_views);
+  std::optional<ReturningShots> returning;
+  for (size_t i = 0; i < middles.size(); ++i) {
+    done.Tell(fmt::format(
+        "looking for what key frames show in shot {} of {} that have none", i + 1, middles.size()));
+    if (!returning) {
+      returning.emplace(frames, keys, options.film, context.pool(), context.cancel());
+    }
+    const auto key = returning->KeyAt(middles[i]);
     if (key) carry({*key});
   }
   Conclude(scene, key_views, done.coverage(), context);

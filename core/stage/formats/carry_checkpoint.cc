@@ -124,6 +124,11 @@ void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
   SaveWhenDue();
 }
 
+void CarryCheckpoint::Tell(const std::string& message) const {
+  const std::lock_guard lock(mutex_);
+  context_.progress().OnProgress(done_, static_cast<int64_t>(scene_.views.size()), message);
+}
+
 std::string CarryCheckpoint::Png(int view) const {
   return context_.ReadOutput(ViewArtifact(artifact::kCarried, scene_.views[view], ".png"));
 }

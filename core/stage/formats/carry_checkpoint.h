@@ -27,6 +27,8 @@ class CarryCheckpoint {
   bool WasDone(int view) const { return was_done_[static_cast<size_t>(view)] != 0; }
   // Writes the output, reports progress, saves a checkpoint when it is time. `coverage`: 0..1.
   void Add(int view, double coverage, const std::string& png);
+  // Reports what is done beside that.
+  void Tell(const std::string& message) const;
   // The output of a view that was added.
   std::string Png(int view) const;
   // Writes another one in its place, saves a checkpoint when it is time.
