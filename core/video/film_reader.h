@@ -20,7 +20,7 @@ struct FilmFacts {
   double first_s = 0.0;   // the file's own time of the first frame, which times() count from
   bool constant_rate = true;
   bool has_sound = false;
-  bool interlaced = false;  // its first frame is; of each frame Read then takes one field
+  bool interlaced = false;  // its first whole frame is; of each frame Read then takes one field
 };
 
 // Not thread-safe.
@@ -36,12 +36,18 @@ class FilmReader {
 
   const FilmFacts& facts() const;
   // When each frame is shown: s from the first one, strictly ascending, never empty. Frames that
-  // the file gives one time count once, those that its edit list cuts off do not.
+  // the file gives one time count once, those that its edit list cuts off do not. H.264 in AVI has
+  // no times of its own: its frames are put in order by their numbers, and may come a frame or two
+  // late against the sound. Of recordings put behind one another (MPEG-TS, MPEG-PS) each begins
+  // where the one before it ends; sound has only the first one.
   const std::vector<double>& times() const;
 
   // sRGB in 0..1, 3 channels, facts().width x facts().height. The frame after the last one read
   // costs the least; others are decoded from the key frame before them. Throws Error{kDataLoss}
-  // that names the frame and its time when it is damaged (others may still be whole).
+  // that names the frame and its time when it is damaged (others may still be whole): it, or one
+  // since the last key frame that it may be predicted from, is flagged by the decoder, refused or
+  // missing. What the decoder makes up without a word, and what is predicted from a frame that the
+  // file has lost without a trace, is not known to be damaged and handed over.
   Image Read(int frame);
 
  private:

@@ -107,7 +107,7 @@ void ExpectBeeps(const HeardSound& sound, double begin_s, double end_s, double t
 
 TEST_F(FilmSoundTest, SoundGoesAlongAsItIs) {
   const std::pair<const char*, const char*> kinds[] = {
-      {"aac", ".mp4"}, {"ac3", ".mp4"}, {"aac", ".mkv"}, {"aac", ".mov"}};
+      {"aac", ".mp4"}, {"ac3", ".mp4"}, {"aac", ".mkv"}, {"aac", ".mov"}, {"ac3", ".mts"}};
   for (const auto& [codec, ending] : kinds) {
     SCOPED_TRACE(std::string(codec) + ending);
     const fs::path film = WithSound({.encoder = codec, .seconds = 5.0, .level = Beeps}, ending);

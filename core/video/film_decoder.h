@@ -1,0 +1,81 @@
+// Frames of a film, decoded when they are asked for, and which of them are whole. For this folder
+// only.
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "core/video/film_index.h"
+#include "core/video/film_packets.h"
+#include "core/video/libav.h"
+
+namespace color3d {
+
+// Not thread-safe.
+class FilmDecoder {
+ public:
+  // Reads the file once through. Throws as FilmReader does.
+  explicit FilmDecoder(std::filesystem::path file);
+
+  const FilmPackets& packets() const { return *packets_; }
+  const AVCodecContext& codec() const { return *codec_; }
+  const FilmIndex& index() const { return index_; }
+
+  // Decodes up to `frame`; false when it does not come out whole. The one after the last costs the
+  // least.
+  bool Decode(int frame);
+  // The frame that was decoded last, whole or not.
+  const AVFrame& picture() const { return *picture_; }
+
+ private:
+  struct Waiting {
+    int packet;
+    bool is_flagged;
+    std::unique_ptr<AVFrame, FreeFrame> picture;
+  };
+
+  void StartAt(int packet);
+  bool SeekTo(int packet, int goal);
+  bool ReadUpTo(int packet, bool to_the_end);
+  bool IsLike(int packet) const;
+  bool IsThat(int packet) const;
+  int PlacedBefore(int packet) const;
+  int Recognize();
+  bool Feed();
+  bool Receive();
+  void Take(std::unique_ptr<AVFrame, FreeFrame> picture);
+  void PassTo(int frame);
+  bool Await();
+  bool Find(int frame);
+
+  int GroupOf(int packet) const;
+  int FirstPacketOf(int group) const;
+  void NoteDamage(int packet);
+  bool IsBroken(int packet) const;
+
+  const std::filesystem::path file_;
+  std::unique_ptr<FilmPackets> packets_;
+  std::unique_ptr<AVPacket, FreePacket> packet_;
+  std::unique_ptr<AVFrame, FreeFrame> picture_;
+  FilmIndex index_;
+  std::unique_ptr<AVCodecContext, FreeCodec> codec_;
+  std::vector<bool> is_damaged_;  // frames that are known not to come out whole
+  int tried_again_ = -2;          // group
+  int at_ = -1;                   // frame of picture_; -1: none
+  bool is_whole_ = false;         // and whether it is undamaged
+
+  // A run: packets decoded one after the other.
+  int begin_ = -1;               // its first packet; -1: there is none
+  int next_ = 0;                 // packet that comes next
+  bool has_packet_ = false;      // it lies in packet_
+  bool has_ended_ = false;       // nothing more comes
+  int passed_ = -1;              // frame that came out last
+  int reached_ = -1;             // frame that was asked for last, or skipped
+  std::deque<Waiting> waiting_;  // came out before it was known whether they are damaged
+  std::map<int, int> damage_;    // by group: its first damaged packet
+};
+
+}  // namespace color3d
