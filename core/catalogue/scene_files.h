@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <string>
 #include <string_view>
 
@@ -18,17 +19,33 @@ inline bool HasSplatExtension(std::string_view path) {
   return ending == ".ply" || ending == ".sog" || ending == ".spz";
 }
 
+inline constexpr std::string_view kFilmEndings[] = {".mp4",
+                                                    ".m4v",
+                                                    ".mov",
+                                                    ".3gp",
+                                                    ".mkv",
+                                                    ".webm",
+                                                    ".avi",
+                                                    ".dv",
+                                                    ".mpg",
+                                                    ".mpeg",
+                                                    ".vob",
+                                                    ".ts",
+                                                    ".mts",
+                                                    ".m2ts",
+                                                    ".mxf",
+                                                    ".flv",
+                                                    ".ogv",
+                                                    ".wmv"};
+
 // True for the file name endings of films that we read, any case.
 inline bool HasFilmExtension(std::string_view path) {
   std::string ending(path.substr(std::min(path.size(), path.find_last_of('.'))));
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) {
     return static_cast<char>(std::tolower(c));
   });
-  for (const char* known :
-       {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".mts", ".ogv", ".wmv"}) {
-    if (ending == known) return true;
-  }
-  return false;
+  return std::find(std::begin(kFilmEndings), std::end(kFilmEndings), ending) !=
+         std::end(kFilmEndings);
 }
 
 // Pictures in colour that the user gives for the colorizer to learn from: no photos of the scene.
