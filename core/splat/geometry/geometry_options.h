@@ -39,9 +39,12 @@ struct GeometryTuning {
   // Of pictures for which what belongs to their own moment is left out, so that what belongs to the
   // moments before and after learns to move there.
   double moment_drop_rate = 0.2;
-  double least_width = 0.9;  // of a window in time, of the interval between moments
-  double seed_width = 1.0;   // the first
-  int mover_sh_degree = 0;   // of what moves: few views see it, each from a direction of its own
+  double least_width = 0.9;    // of a window in time, of the interval between moments
+  double seed_width = 1.0;     // the first
+  double share_motion = 0.05;  // ShareMotion, every so many iterations; 0: never
+  int share_motion_every = 10;
+  int motion_neighbors = 24;
+  int mover_sh_degree = 0;  // of what moves: few views see it, each from a direction of its own
   double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
 
   bool operator==(const GeometryTuning&) const = default;
@@ -76,6 +79,9 @@ void VisitFields(Tuning& tuning, Visit&& visit) {
   visit("moment_drop_rate", tuning.moment_drop_rate);
   visit("least_width", tuning.least_width);
   visit("seed_width", tuning.seed_width);
+  visit("share_motion", tuning.share_motion);
+  visit("share_motion_every", tuning.share_motion_every);
+  visit("motion_neighbors", tuning.motion_neighbors);
   visit("mover_sh_degree", tuning.mover_sh_degree);
   visit("last_rate", tuning.last_rate);
 }

@@ -14,6 +14,7 @@
 #include "core/splat/geometry/training_schedule.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/motion/motion.h"
+#include "core/splat/motion/shared_motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/loss.h"
@@ -259,6 +260,7 @@ class GeometryTrainer {
       LimitWindows(static_cast<float>(std::log(schedule_.tuning().least_width * times_.Interval())),
                    state_.parameters.rows(),
                    moving.parameters);
+      if (finite) ShareMotionWhenDue();
     }
     const GeometryTuning& tuning = schedule_.tuning();
     if (tuning.opacity_penalty > 0.0 || tuning.scale_penalty > 0.0) {
@@ -271,6 +273,15 @@ class GeometryTrainer {
     finite = UpdatePart(gradient_, std::move(rates), state_.parameters, state_.moments) && finite;
     clock_.Enter(Phase::kOther);
     return finite;
+  }
+
+  void ShareMotionWhenDue() {
+    const GeometryTuning& tuning = schedule_.tuning();
+    if (!(tuning.share_motion > 0.0) || state_.iteration % tuning.share_motion_every != 0) return;
+    ShareMotion(
+        {state_.parameters.rows(), times_.Interval(), tuning.motion_neighbors, tuning.share_motion},
+        run_.pool,
+        state_.moving.parameters);
   }
 
   bool UpdatePart(ParameterBlock& gradient,
