@@ -20,6 +20,7 @@
 #include "core/stage/film/colored_frames.h"
 #include "core/stage/film/temporal_scores.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/chroma_budget.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -84,7 +85,7 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   NoCheckpoints none;
   return FitChroma(geometry,
                    ChromaProblemOf(scene, images, targets),
-                   geometry.motion.size() > 0 ? ForManyFrames(options) : options,
+                   ChromaWithinMemory(options, scene, geometry),
                    {context.pool(), none, progress, context.cancel()});
 }
 

@@ -2,6 +2,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/sources/chroma_budget.h"
 #include "core/stage/stages.h"
 
 namespace color3d {
@@ -29,7 +30,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   };
   GaussianModel model = FitChroma(geometry,
                                   ChromaProblemOf(scene, images, targets),
-                                  geometry.motion.size() > 0 ? ForManyFrames(options) : options,
+                                  ChromaWithinMemory(options, scene, geometry),
                                   context.control());
   AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
