@@ -77,7 +77,7 @@ class Key {
   };
   Fetched Fetch(const v1::Job& submitted) {
     std::vector<std::string> jobs = {submitted.name()};
-    if (submitted.kind() == kind::kSelectKeyView) {
+    if (AsksForImport()) {  // which was submitted with it
       jobs.insert(jobs.begin(), submitted.spec().inputs().begin(), submitted.spec().inputs().end());
     }
     const v1::Job job = Follow(jobs);

@@ -11,6 +11,13 @@ namespace {
 
 // Decoders hold back up to 16 pictures; more only wait where stamps are nonsense.
 constexpr size_t kMostWaiting = 32;
+constexpr size_t kFewestWaiting = 4;
+constexpr size_t kWaitingBytes = size_t{512} << 20;
+size_t MostWaiting(const AVCodecContext& codec) {
+  const auto pixels = static_cast<size_t>(std::max(codec.width, 1)) * std::max(codec.height, 1);
+  return std::clamp(kWaitingBytes / (3 * pixels), kFewestWaiting, kMostWaiting);
+}
+
 // After damage in the file packets may come otherwise than when it was read through.
 constexpr int kResyncPackets = 250;
 
@@ -221,7 +228,7 @@ bool FilmDecoder::Receive() {
 // may be shown after it. False at the end.
 bool FilmDecoder::Await() {
   while (waiting_.empty() || (passed_ < index_.packets[waiting_.front().packet].latest &&
-                              waiting_.size() < kMostWaiting)) {
+                              waiting_.size() < MostWaiting(*codec_))) {
     if (!Receive()) break;
   }
   return !waiting_.empty();

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <memory>
 
+#include "core/base/error.h"
+
 namespace color3d {
 namespace {
 
@@ -14,6 +16,7 @@ struct CloseParser {
 
 // Where times of decoding fall back by more, films were put behind one another.
 constexpr double kFallbackS = 1.0;
+constexpr size_t kMostPackets = 4'000'000;  // more than any part and stride asks for
 
 struct Scanned {
   FilmPacket packet;
@@ -216,7 +219,10 @@ void NumberFrames(FilmIndex* index) {
     FilmPacket& packet = index->packets[i];
     packet.frame = static_cast<int>(std::lower_bound(stamps.begin(), stamps.end(), packet.stamp) -
                                     stamps.begin());
-    if (packet.is_key) index->keys.push_back(static_cast<int>(i));
+    if (packet.is_key) {
+      index->keys.push_back(static_cast<int>(i));
+      latest = -1;  // what comes before it says nothing of what is behind it
+    }
     packet.is_leading =
         !index->keys.empty() && packet.stamp < index->packets[index->keys.back()].stamp;
     if (packet.is_shown) {
@@ -240,6 +246,9 @@ FilmIndex IndexFilm(FilmPackets* packets) {
   const std::unique_ptr<AVPacket, FreePacket> packet(av_packet_alloc());
   std::vector<Scanned> scanned;
   while (packets->Read(packet.get())) {
+    if (scanned.size() == kMostPackets) {
+      throw InvalidArgument("the film has more than {} pictures; cut it into parts", kMostPackets);
+    }
     Scanned next;
     headers.Read(*packet, &next);
     next.packet.pos = packet->pos;

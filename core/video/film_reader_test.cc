@@ -288,7 +288,9 @@ TEST_F(FilmReaderTest, EveryFrameOfEveryContainerIsFound) {
     const fs::path file = folder_.path() / kind.name;
     const NumberedFilm film = {
         .encoder = kind.encoder, .frames = 52, .b_frames = kind.b_frames, .is_flat = kind.is_flat};
-    if (WriteNumberedFilm(file, film)) ExpectEveryFrame(file, film.frames);
+    const bool is_written = WriteNumberedFilm(file, film);
+    EXPECT_TRUE(is_written || film.encoder == "libx264") << "the others are FFmpeg's own";
+    if (is_written) ExpectEveryFrame(file, film.frames);
   }
 }
 
@@ -361,7 +363,9 @@ TEST_F(FilmReaderTest, WhatIsPredictedFromADamagedFrameIsDamaged) {
     const fs::path file = folder_.path() / (std::string("whole") + kind.ending);
     const NumberedFilm numbered = {
         .encoder = kind.encoder, .frames = kFrames, .b_frames = kind.b_frames};
-    if (!WriteNumberedFilm(file, numbered)) continue;
+    const bool is_written = WriteNumberedFilm(file, numbered);
+    EXPECT_TRUE(is_written || numbered.encoder == "libx264") << "the others are FFmpeg's own";
+    if (!is_written) continue;
     std::string bytes = ReadFile(file);
     const PacketPlace place = PacketsOf(file).at(kDamaged);
     const fs::path broken = folder_.path() / (std::string("broken") + kind.ending);

@@ -15,7 +15,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr size_t kFewest = 4;           // neighbours, the Gaussian itself among them
+constexpr double kFirstTime =
+    -1.0;                      // GaussianMotion's t: with an even number of steps none is at 0
+constexpr size_t kFewest = 4;  // neighbours, the Gaussian itself among them
 constexpr double kOfAnotherStep = 0.5;  // weight
 constexpr double kLeastWeight = 1e-6;   // so that what nobody sees moves along
 constexpr double kStiffness = 0.01;     // of turning, against neighbours in one line
@@ -112,7 +114,8 @@ void MoveTowards(const Vector3d& to, double share, int row, int64_t i, Parameter
 void ShareMotion(const SharedMotionOptions& options, ThreadPool& pool, ParameterBlock& moving) {
   std::map<int64_t, std::vector<int64_t>> steps;
   for (int64_t i = 0; i < moving.count(); ++i) {
-    steps[std::llround(moving.Row(options.row + kCenterRow)[i] / options.interval)].push_back(i);
+    const double since = moving.Row(options.row + kCenterRow)[i] - kFirstTime;
+    steps[std::llround(since / options.interval)].push_back(i);
   }
   const ParameterBlock before = moving;
   for (const auto& [number, members] : steps) {
@@ -121,7 +124,7 @@ void ShareMotion(const SharedMotionOptions& options, ThreadPool& pool, Parameter
     for (const int64_t step : {number, number - 1, number + 1}) {
       const auto found = steps.find(step);
       if (found == steps.end()) continue;
-      const double time = static_cast<double>(number) * options.interval;
+      const double time = kFirstTime + static_cast<double>(number) * options.interval;
       for (const int64_t i : found->second) {
         all.push_back(NeighborAt(before, options.row, i, step == number, time));
         const Eigen::Vector3f p = all.back().position.cast<float>();

@@ -14,7 +14,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kRow = 12;
-constexpr double kInterval = 0.1;
 
 struct Rigid {
   Vector3d velocity = Vector3d::Zero();
@@ -32,7 +31,7 @@ class SharedMotionTest : public testing::Test {
       const Vector3d p = center + Normal();
       Set(kPositionRow, i, p);
       Set(kRow + kVelocityRow, i, motion.At(p) + noise * Normal());
-      moving_.Row(kRow + kCenterRow)[i] = static_cast<float>(step * kInterval);
+      moving_.Row(kRow + kCenterRow)[i] = static_cast<float>(step * interval_);
     }
   }
   Vector3d Normal() { return {random_.NextNormal(), random_.NextNormal(), random_.NextNormal()}; }
@@ -52,9 +51,10 @@ class SharedMotionTest : public testing::Test {
   }
   void Share(double share, int threads = 2) {
     ThreadPool pool(threads);
-    ShareMotion({kRow, kInterval, 24, share}, pool, moving_);
+    ShareMotion({kRow, interval_, 24, share}, pool, moving_);
   }
 
+  double interval_ = 0.1;
   Random random_{1};
   ParameterBlock moving_ = ParameterBlock(kRow + kMotionRows, 0);
 };
@@ -92,6 +92,26 @@ TEST_F(SharedMotionTest, NeighborsOfTheStepsBesideCountWhereTheyAreThen) {
   AddThing(3, {50, 0, 0}, 5, {}, 0.0);  // nothing is near in time
   Share(1.0);
   EXPECT_EQ(Off({}, 103, 106), 0.0) << "fewer than four keep their own";
+}
+
+// Unit time runs from -1 to 1: of 24 steps none lies at a whole number of intervals.
+TEST_F(SharedMotionTest, AnEvenNumberOfStepsHasStepsOfItsOwn) {
+  interval_ = 2.0 / 23.0;
+  const Vector3d velocity(40.0, 0.0, 0.0);
+  for (int step = 0; step < 24; ++step) {
+    const double t = -1.0 + step * interval_;
+    AddThing(50, t * velocity, 0, {velocity, {0, 0, 0}}, 0.0);
+    AddThing(2, t * velocity, 0, {{0, 0, 0}, {0, 0, 0}}, 0.0);  // has yet to learn to move
+    for (int64_t i = moving_.count() - 52; i < moving_.count(); ++i) {
+      const double trained = 0.02 * interval_ * random_.NextNormal();
+      moving_.Row(kRow + kCenterRow)[i] = static_cast<float>(t + trained);
+    }
+  }
+  Share(1.0);
+  for (int64_t i = 50; i < moving_.count(); i += 52) {
+    EXPECT_LT((Get(kRow + kVelocityRow, i) - velocity).norm(), 0.1 * velocity.norm()) << i;
+    EXPECT_LT((Get(kRow + kVelocityRow, i - 1) - velocity).norm(), 0.05 * velocity.norm()) << i;
+  }
 }
 
 TEST_F(SharedMotionTest, IsTheSameForAnyNumberOfThreadsAndAlwaysFinite) {

@@ -21,26 +21,31 @@
 namespace color3d {
 namespace {
 
+// Of a frame that is shown at nearly the time of the one before it, as in broken films.
+constexpr double kNoMoment = -std::numeric_limits<double>::infinity();
+
 struct Footage {
   PosedFilm film;
-  std::vector<double> times;  // of all its frames, s since the first of all films
+  std::vector<double> times;  // of all its frames, s since the first of all films; kNoMoment
   std::vector<int> frames;    // that are asked for, in their order
 };
 
 // The films with the times of their frames on the clock that they share.
 std::vector<Footage> FilmsInTime(StageContext& context) {
+  std::map<std::string, std::vector<double>> times;
   const auto size_of = [&](const std::string& file) {
     context.cancel().ThrowIfCancelled();
-    const FilmFacts facts = FilmReader(context.scene_folder() / file).facts();
+    const FilmReader reader(context.scene_folder() / file);
+    const FilmFacts& facts = reader.facts();
     CheckMovieSize(file, facts.width, facts.height);
+    times[file] = reader.times();
     return std::pair(facts.width, facts.height);
   };
   std::vector<Footage> all;
   double begin_s = std::numeric_limits<double>::infinity();
   for (PosedFilm& film : ReadPosedFilms(context.scene_folder(), size_of)) {
-    context.cancel().ThrowIfCancelled();
     Footage footage{std::move(film), {}, {}};
-    footage.times = FilmReader(context.scene_folder() / footage.film.file).times();
+    footage.times = times.at(footage.film.file);
     for (double& time_s : footage.times) time_s += footage.film.time_offset_s;
     begin_s = std::min(begin_s, footage.times.front());
     all.push_back(std::move(footage));
@@ -55,6 +60,27 @@ std::vector<Footage> FilmsInTime(StageContext& context) {
 bool IsInside(double time_s, const FilmOptions& options, double margin_s) {
   return time_s >= options.begin_s - margin_s &&
          (!options.end_s || time_s < *options.end_s + margin_s);
+}
+
+// Frames that are too near the one before them in time are no moments of their own.
+void DropRepeated(std::vector<Footage>* all) {
+  constexpr double kApart =
+      2e-6;  // of the time from first to last; nearer ones are one to MomentsOf
+  double first_s = std::numeric_limits<double>::infinity(), last_s = 0.0;
+  for (const Footage& footage : *all) {
+    first_s = std::min(first_s, footage.times.front());
+    last_s = std::max(last_s, footage.times.back());
+  }
+  for (Footage& footage : *all) {
+    double before_s = kNoMoment;
+    for (double& time_s : footage.times) {
+      if (time_s - before_s <= kApart * (last_s - first_s)) {
+        time_s = kNoMoment;
+      } else {
+        before_s = time_s;
+      }
+    }
+  }
 }
 
 // Gives frames of one moment one time, of those that may be asked for. Whether the films follow one
@@ -82,7 +108,12 @@ bool ShareMoments(const FilmOptions& options, std::vector<Footage>* all, StageCo
 // Every so many moments of the part that is asked for, the same of all films. Those that follow no
 // clock together have none: each counts its own frames.
 void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageContext& context) {
-  constexpr double kRoundedS = 1e-6;  // what adding an offset may take from a time
+  constexpr double kRoundedS = 1e-6;             // what adding an offset may take from a time
+  std::vector<std::pair<double, double>> spans;  // of each film, for errors
+  for (const Footage& footage : *all) {
+    spans.emplace_back(footage.times.front(), footage.times.back());
+  }
+  DropRepeated(all);
   const bool one_clock = ShareMoments(options, all, context);
   std::map<double, int> moments;  // of that part, and which each is
   for (const Footage& footage : *all) {
@@ -92,7 +123,8 @@ void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageCo
   }
   int count = 0;
   for (auto& [time_s, number] : moments) number = count++;
-  for (Footage& footage : *all) {
+  for (size_t film = 0; film < all->size(); ++film) {
+    Footage& footage = (*all)[film];
     int own = 0;
     for (size_t i = 0; i < footage.times.size(); ++i) {
       const auto moment = moments.find(footage.times[i]);
@@ -105,8 +137,8 @@ void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageCo
         "{}: the film has no frame of the moments that are asked for (film_begin_s, film_end_s, "
         "film_stride); it runs from {:.2f} to {:.2f} s of the time that all films share",
         footage.film.file,
-        footage.times.front(),
-        footage.times.back());
+        spans[film].first,
+        spans[film].second);
   }
 }
 
