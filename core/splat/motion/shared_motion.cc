@@ -15,9 +15,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kFirstTime =
-    -1.0;                      // GaussianMotion's t: with an even number of steps none is at 0
-constexpr size_t kFewest = 4;  // neighbours, the Gaussian itself among them
+// Of GaussianMotion. Steps are counted from it: with an even number of them none lies at 0.
+constexpr double kFirstTime = -1.0;
+constexpr size_t kFewest = 4;           // neighbours, the Gaussian itself among them
 constexpr double kOfAnotherStep = 0.5;  // weight
 constexpr double kLeastWeight = 1e-6;   // so that what nobody sees moves along
 constexpr double kStiffness = 0.01;     // of turning, against neighbours in one line

@@ -97,20 +97,22 @@ TEST_F(SharedMotionTest, NeighborsOfTheStepsBesideCountWhereTheyAreThen) {
 // Unit time runs from -1 to 1: of 24 steps none lies at a whole number of intervals.
 TEST_F(SharedMotionTest, AnEvenNumberOfStepsHasStepsOfItsOwn) {
   interval_ = 2.0 / 23.0;
-  const Vector3d velocity(40.0, 0.0, 0.0);
-  for (int step = 0; step < 24; ++step) {
-    const double t = -1.0 + step * interval_;
-    AddThing(50, t * velocity, 0, {velocity, {0, 0, 0}}, 0.0);
-    AddThing(2, t * velocity, 0, {{0, 0, 0}, {0, 0, 0}}, 0.0);  // has yet to learn to move
-    for (int64_t i = moving_.count() - 52; i < moving_.count(); ++i) {
+  const Vector3d velocity(100.0, 0.0, 0.0);
+  for (int step = 0; step < 23; ++step) {
+    const Vector3d here(0.0, 1000.0 * step, 0.0), there = here + interval_ * velocity;
+    const int64_t first = moving_.count();
+    AddThing(3, here, 0, {}, 0.0);                       // has yet to learn to move
+    AddThing(60, there, 0, {velocity, {0, 0, 0}}, 0.0);  // was here a step ago
+    AddThing(60, here, 0, {-velocity, {0, 0, 0}}, 0.0);  // came here since
+    for (int64_t i = first; i < moving_.count(); ++i) {
+      const double t = -1.0 + (i < first + 3 ? step : step + 1) * interval_;
       const double trained = 0.02 * interval_ * random_.NextNormal();
       moving_.Row(kRow + kCenterRow)[i] = static_cast<float>(t + trained);
     }
   }
   Share(1.0);
-  for (int64_t i = 50; i < moving_.count(); i += 52) {
-    EXPECT_LT((Get(kRow + kVelocityRow, i) - velocity).norm(), 0.1 * velocity.norm()) << i;
-    EXPECT_LT((Get(kRow + kVelocityRow, i - 1) - velocity).norm(), 0.05 * velocity.norm()) << i;
+  for (int64_t i = 0; i < moving_.count(); i += 123) {
+    EXPECT_LT((Get(kRow + kVelocityRow, i) - velocity).norm(), 0.3 * velocity.norm()) << i;
   }
 }
 
