@@ -23,12 +23,13 @@ int Present(int threads) {
 
 }  // namespace
 
-void SetTorchThreads(int threads) {
+void SetTorchThreads(int threads, int blas_threads) {
   threads = Present(threads);
+  if (blas_threads == 0) blas_threads = threads;
   static const SetBlasThreads set_blas_threads = FindSetBlasThreads();
-  static std::atomic<int> blas_threads = 0;
-  if (set_blas_threads != nullptr && blas_threads.exchange(threads) != threads) {
-    set_blas_threads(threads);
+  static std::atomic<int> now = 0;
+  if (set_blas_threads != nullptr && now.exchange(blas_threads) != blas_threads) {
+    set_blas_threads(blas_threads);
   }
   if (at::get_num_threads() != threads) at::set_num_threads(threads);
 }

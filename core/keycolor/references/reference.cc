@@ -171,7 +171,7 @@ KeyMatches Match(const std::vector<Image>& references,
                  const ReferenceOptions& options,
                  const RunControl& control) {
   torch::NoGradGuard no_grad;
-  SetTorchThreads(control.pool.thread_count());
+  SetTorchThreads(control.pool.thread_count(), /*blas_threads=*/1);
   control.progress.OnProgress(0, 0, "describing the reference pictures");
   const ReferenceCells known = CellsOf(references, luminance, encoder, options, control.cancel);
   std::vector<torch::Tensor> blocks;

@@ -118,7 +118,9 @@ void ShareMotion(const SharedMotionOptions& options, ThreadPool& pool, Parameter
     steps[std::llround(since / options.interval)].push_back(i);
   }
   const ParameterBlock before = moving;
-  for (const auto& [number, members] : steps) {
+  for (const auto& step_and_members : steps) {
+    const int64_t number = step_and_members.first;
+    const std::vector<int64_t>& members = step_and_members.second;
     std::vector<Neighbor> all;  // the members first
     std::vector<NeighborTree::Point> points;
     for (const int64_t step : {number, number - 1, number + 1}) {

@@ -2,7 +2,6 @@
 // tested on, in milliseconds.
 #pragma once
 
-#include <ATen/Parallel.h>
 #include <gtest/gtest.h>
 #include <torch/types.h>
 
@@ -14,6 +13,7 @@
 #include "core/colorizer/personal_model.h"
 #include "core/colorizer/recipe.h"
 #include "core/encoder/image_tensors.h"
+#include "core/encoder/torch_threads.h"
 #include "tests/support/networks/random_features.h"
 
 namespace color3d {
@@ -29,7 +29,7 @@ class SmallColorizerTest : public testing::Test {
  protected:
   SmallColorizerTest()
       : encoder_(SmallEncoder(), RandomFeatureWeights(SmallEncoder(), 1), "small") {
-    at::set_num_threads(1);
+    SetTorchThreads(1);  // also of the first call
     Image& luminance = pictures_[0].luminance;
     Image& ab = pictures_[0].ab;
     for (int y = 0; y < 64; ++y) {
