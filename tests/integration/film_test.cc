@@ -283,6 +283,7 @@ TEST_F(FilmTest, TheSelectionTakesFramesOfAFilm) {
                                        Path("key").string()});
   ASSERT_EQ(select.exit_code, 0) << select.out << select.err;
   EXPECT_THAT(select.err, testing::Not(HasSubstr("exposure is steadied"))) << "none jumps";
+  EXPECT_THAT(select.err, HasSubstr("exposure is steady"));
   const auto selected = nlohmann::json::parse(ReadFile(Path("key") / "key_view.json"));
   EXPECT_EQ(selected.at("key_views").size(), 2u);
   const ProcessResult create = Client({"scene", "create", Path("frames").string(), "--film"});

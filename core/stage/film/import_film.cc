@@ -164,6 +164,13 @@ void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageConte
               Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
               context);
   }
+  constexpr double kNothingL = 1e-6;
+  if (std::abs(tones.flicker_before - tones.flicker_after) < kNothingL) {
+    return context.progress().OnWarning(
+        fmt::format("exposure is steady: from a frame to the next it changes by {:.2f} L in the "
+                    "mean; it is left as it is",
+                    tones.flicker_before));
+  }
   context.progress().OnWarning(
       fmt::format("exposure is steadied: from a frame to the next it changed by {:.2f} L in the "
                   "mean, now by {:.2f}; the coloured film has the steady luminance",
