@@ -277,7 +277,8 @@ class GeometryTrainer {
 
   void ShareMotionWhenDue() {
     const GeometryTuning& tuning = schedule_.tuning();
-    if (!(tuning.share_motion > 0.0) || state_.iteration % tuning.share_motion_every != 0) return;
+    const int every = std::max(1, tuning.share_motion_every);
+    if (!(tuning.share_motion > 0.0) || state_.iteration % every != 0) return;
     ShareMotion(
         {state_.parameters.rows(), times_.Interval(), tuning.motion_neighbors, tuning.share_motion},
         run_.pool,

@@ -64,8 +64,8 @@ bool IsInside(double time_s, const FilmOptions& options, double margin_s) {
 
 // Frames that are too near the one before them in time are no moments of their own.
 void DropRepeated(std::vector<Footage>* all) {
-  constexpr double kApart =
-      2e-6;  // of the time from first to last; nearer ones are one to MomentsOf
+  // Of the time from first to last; what is nearer is one time to MomentsOf.
+  constexpr double kApart = 2e-6;
   double first_s = std::numeric_limits<double>::infinity(), last_s = 0.0;
   for (const Footage& footage : *all) {
     first_s = std::min(first_s, footage.times.front());
