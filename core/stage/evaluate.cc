@@ -293,7 +293,8 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
     json["held_out"] = std::move(by_how);
   }
   json["consistency"] = JsonOf(consistency);
-  if (ordered_json temporal = TemporalScores(scene, model, all, context); !temporal.empty()) {
+  if (ordered_json temporal = TemporalScores(scene, model, bound, all, context);
+      !temporal.empty()) {
     json["temporal"] = std::move(temporal);
   }
   if (!scores.sources().Empty()) json["sources"] = scores.sources().Result();

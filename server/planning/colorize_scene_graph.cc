@@ -155,6 +155,16 @@ std::string WhyNotForFilm(const std::string& kind, const ColorizeSceneSpec& scen
   return "";
 }
 
+constexpr int kMostLearntAtPx = 800;
+
+// Colours of a film are looked for at the size at which they were learnt (tests/bench/RESULTS.md);
+// the paper's recipe stays the paper's.
+void LearnAtTheSizeOfFrames(const ColorizeSceneSpec& scene, v1::PersonalizeSpec* spec) {
+  const v1::PersonalizeSpec& wanted = scene.personalize();
+  if (wanted.has_max_side_px() || wanted.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) return;
+  spec->set_max_side_px(std::min(scene.max_side_px(), kMostLearntAtPx));
+}
+
 // `scene`: as BuildColorizeSceneGraph takes it.
 void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const bool has_poses =
@@ -198,6 +208,9 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
     JobSpec spec = builder->StageSpec(kind);
     TakeSceneOptions(scene, &spec);
+    if (kind == kind::kPersonalize && facts.is_film) {
+      LearnAtTheSizeOfFrames(scene, spec.mutable_personalize());
+    }
     std::string skip_reason;
     if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&

@@ -128,6 +128,23 @@ TEST(Planner, AFilmIsColoredNotReconstructed) {
   EXPECT_THROW(refused(), Error);
 }
 
+TEST(Planner, AFilmIsLearntAtTheSizeAtWhichItIsColored) {
+  v1::JobSpec spec = SceneSpec();
+  const auto size = [&](bool is_film) {
+    const NewGraph graph = PlanJob(spec, {}, {.photos = 0, .is_film = is_film});
+    return SpecOf(graph, "personalize").personalize().max_side_px();
+  };
+  EXPECT_EQ(size(true), 500);
+  EXPECT_EQ(size(false), 0) << "photos: its own";
+  spec.mutable_colorize_scene()->set_max_side_px(1200);
+  EXPECT_EQ(size(true), 800);
+  spec.mutable_colorize_scene()->mutable_personalize()->set_max_side_px(320);
+  EXPECT_EQ(size(true), 320);
+  spec.mutable_colorize_scene()->clear_personalize();
+  spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
+  EXPECT_EQ(size(true), 0);
+}
+
 // As `color3d key accept` leaves it for `colorize --scene`.
 JobRecord GivenImport(const v1::ImportSceneSpec& options) {
   v1::JobSpec spec;

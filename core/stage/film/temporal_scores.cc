@@ -48,6 +48,7 @@ ordered_json JsonOf(const TemporalConsistency& figures) {
 
 ordered_json TemporalScores(const Scene& scene,
                             const std::optional<GaussianModel>& model,
+                            const std::optional<GaussianModel>& bound,
                             const std::map<int, std::filesystem::path>& truth,
                             StageContext& context) {
   ordered_json json = ordered_json::object();
@@ -61,15 +62,17 @@ ordered_json TemporalScores(const Scene& scene,
   source.colorings.emplace_back([&](int view) {
     return ColoredFrame(scene.views[view], view, view == key, images, context);
   });
-  if (model) {
-    names.emplace_back("rendered");
+  const auto add_pictures_of = [&](const GaussianModel& of, const char* name) {
+    names.emplace_back(name);
     source.colorings.emplace_back([&](int view) {
       ThreadPool one(1);
       const View& seen = scene.views[view];
       const Camera camera = images.WorkingCamera(view);
-      return RenderView(*model, camera, seen.cam_from_world, one, 0.0f, seen.time_s()).lab;
+      return RenderView(of, camera, seen.cam_from_world, one, 0.0f, seen.time_s()).lab;
     });
-  }
+  };
+  if (model) add_pictures_of(*model, "rendered");
+  if (bound) add_pictures_of(*bound, "bound");
   if (truth.size() == scene.views.size()) {
     names.emplace_back("truth");
     source.colorings.emplace_back(

@@ -95,6 +95,7 @@ void ColorFacts::AddRows(const ordered_json& found,
                          std::vector<Agreement>* rows) {
   const std::pair<const char*, const char*> pictures[] = {
       {"rendered", "rendered from the 3D scene"},
+      {"bound", "the same 3D scene under all true colours"},
       {"colored_views", "the photos in colour"},
       {"truth", "the true colours"}};
   for (const auto& [name, what] : pictures) {
@@ -144,6 +145,7 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
   const auto add = [&metrics](const std::vector<Agreement>& rows, std::vector<const char*> names) {
     for (const Agreement& row : rows) {
       const char* suffix = row.pictures == "truth"                 ? "_truth"
+                           : row.pictures == "bound"               ? "_bound"
                            : row.pictures == rows.front().pictures ? ""
                                                                    : "_2d";
       for (const char* name : names)
