@@ -1,10 +1,11 @@
 // Runs a fuzz target without libFuzzer: on its seeds, on every prefix of them, on a corpus, and on
 // seeded mutations. The same inputs on every run.
-//   NAME_replay CORPUS          the folder's files are seeds, too
+//   NAME_replay CORPUS [RUNS]   the folder's files are seeds, too; RUNS: of prefixes, and of mutations
 //   NAME_replay FILE...         only these
 //   NAME_replay --write FOLDER  writes the seeds there, for libFuzzer to start from
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -16,7 +17,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kMutations = 50000;
+constexpr size_t kRuns = 50000;  // of mutations; of prefixes all, if they are not more
 
 void RunOne(const std::string& input) {
   LLVMFuzzerTestOneInput(reinterpret_cast<const uint8_t*>(input.data()), input.size());
@@ -74,9 +75,15 @@ void Mutate(const std::vector<std::string>& seeds, Random& random, std::string& 
   }
 }
 
-void Replay(const std::vector<std::string>& seeds, const std::vector<std::string>& corpus) {
+void Replay(const std::vector<std::string>& seeds,
+            const std::vector<std::string>& corpus,
+            size_t runs) {
+  size_t bytes = 0;
+  for (const std::string& seed : seeds) bytes += seed.size();
+  const size_t step = 1 + bytes / runs;
   for (const std::string& seed : seeds) {
-    for (size_t size = 0; size <= seed.size(); ++size) RunOne(seed.substr(0, size));
+    for (size_t size = 0; size < seed.size(); size += step) RunOne(seed.substr(0, size));
+    RunOne(seed);
   }
   std::vector<std::string> all = seeds;
   for (const std::string& input : corpus) {
@@ -84,7 +91,7 @@ void Replay(const std::vector<std::string>& seeds, const std::vector<std::string
     all.push_back(input);
   }
   Random random(/*seed=*/4);
-  for (int i = 0; i < kMutations; ++i) {
+  for (size_t i = 0; i < runs; ++i) {
     std::string input = all[random.NextBelow(static_cast<uint32_t>(all.size()))];
     const uint32_t count = 1 + random.NextBelow(4);
     for (uint32_t j = 0; j < count; ++j) Mutate(all, random, input);
@@ -92,14 +99,14 @@ void Replay(const std::vector<std::string>& seeds, const std::vector<std::string
   }
 }
 
-int ReplayCorpus(const std::filesystem::path& folder) {
+int ReplayCorpus(const std::filesystem::path& folder, size_t runs) {
   std::vector<std::string> corpus;
   for (const std::string& file : ListFiles(folder)) corpus.push_back(ReadFile(folder / file));
   if (corpus.empty()) {
     std::fprintf(stderr, "%s holds no inputs\n", folder.c_str());
     return 1;
   }
-  Replay(FuzzSeeds(), corpus);
+  Replay(FuzzSeeds(), corpus, runs);
   return 0;
 }
 
@@ -120,8 +127,9 @@ int main(int argc, char** argv) {
     color3d::WriteSeeds(arguments[1]);
     return 0;
   }
-  if (arguments.size() == 1 && std::filesystem::is_directory(arguments[0])) {
-    return color3d::ReplayCorpus(arguments[0]);
+  if (!arguments.empty() && std::filesystem::is_directory(arguments[0])) {
+    const size_t runs = arguments.size() > 1 ? std::stoul(arguments[1]) : color3d::kRuns;
+    return color3d::ReplayCorpus(arguments[0], std::max<size_t>(1, runs));
   }
   if (arguments.empty()) {
     std::fprintf(stderr, "say a corpus, files, or --write FOLDER\n");

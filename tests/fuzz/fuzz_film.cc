@@ -1,0 +1,74 @@
+// Fuzz target: video files, read once through and then frame by frame, in order and back again.
+#include <cmath>
+#include <fstream>
+#include <string_view>
+
+#include "core/base/files.h"
+#include "core/video/film_reader.h"
+#include "tests/fuzz/fuzz_target.h"
+#include "tests/support/formats/numbered_film.h"
+#include "tests/support/memory_folder.h"
+
+namespace color3d {
+namespace {
+
+constexpr int64_t kDecodedPixels = 128 * 128;  // larger ones say no more, and take long
+constexpr int kFrames = 4;                     // that are read
+
+void CheckFrame(FilmReader& film, int frame) {
+  try {
+    const Image image = film.Read(frame);
+    if (image.width != film.facts().width || image.height != film.facts().height) std::abort();
+    for (const float sample : image.data) {
+      if (!(sample >= 0.0f && sample <= 1.0f)) std::abort();
+    }
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kDataLoss) throw;
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> FuzzSeeds() {
+  const ScratchFolder folder{MemoryFolder()};
+  const std::pair<const char*, NumberedFilm> films[] = {
+      {"a.mp4", {"libx264", 5, 3, 1, false, true}},
+      {"a.mkv", {"mpeg4", 4, 2, 0, false, true}},
+      {"a.avi", {"mpeg4", 5, 3, 1, true, true}},
+      {"a.ts", {"mpeg2video", 3, 3, 1, false, true}},
+      {"a.mpg", {"mpeg2video", 3, 3, 0, false, true}}};
+  std::vector<std::string> seeds;
+  for (const auto& [name, film] : films) {
+    if (WriteNumberedFilm(folder.path() / name, film)) {
+      seeds.push_back(ReadFile(folder.path() / name));
+    }
+  }
+  WriteFieldFilm(folder.path() / "b.ts", 3, /*one_packet=*/false);
+  seeds.push_back(ReadFile(folder.path() / "b.ts"));
+  return seeds;
+}
+
+}  // namespace color3d
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace color3d;
+  static const ScratchFolder folder{MemoryFolder()};
+  const std::filesystem::path file = folder.path() / "film";
+  std::ofstream(file, std::ios::binary | std::ios::trunc)
+      << std::string_view(reinterpret_cast<const char*>(data), size);
+  return ReadOrRefuse([&] {
+    FilmReader film(file);
+    const std::vector<double>& times = film.times();
+    if (times.empty() || times.front() != 0.0) std::abort();
+    for (size_t i = 1; i < times.size(); ++i) {
+      if (!(times[i] > times[i - 1])) std::abort();
+    }
+    const FilmFacts& facts = film.facts();
+    if (!std::isfinite(facts.seconds) || facts.seconds < 0.0) std::abort();
+    if (int64_t{facts.width} * facts.height > kDecodedPixels) return;
+    const int frames = std::min(kFrames, static_cast<int>(times.size()));
+    for (int i = 0; i < frames; ++i) CheckFrame(film, i);
+    CheckFrame(film, static_cast<int>(times.size()) - 1);
+    CheckFrame(film, 0);
+  });
+}
