@@ -90,6 +90,12 @@ void ResetPeakMemory() {
   clear << "5";
 }
 
+void ReleaseFreedMemory() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
+}
+
 void ShareMallocArenas([[maybe_unused]] int arenas) {
 #ifdef __GLIBC__
   ::mallopt(M_ARENA_MAX, std::max(1, arenas));

@@ -17,6 +17,10 @@ int64_t ResidentMemoryBytes();
 int64_t PeakMemoryBytes();
 void ResetPeakMemory();
 
+// Gives back to the system what was freed: glibc keeps it else, hundreds of MiB of a stage that has
+// ended. Costs some ms; no effect without glibc.
+void ReleaseFreedMemory();
+
 // Lets all threads allocate from at most `arenas` (>= 1) pools. glibc gives each thread one of its
 // own, which keeps what was freed in it: threads that take turns would keep a turn's memory each.
 // To be called before threads are started; no effect without glibc.

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -39,6 +40,22 @@ TEST(AvailableMemory, IsTheMinimumOfWhatTheSystemAndTheGroupsLeave) {
   EXPECT_EQ(AvailableMemoryBytes(root.path()), 0);  // over its limit: never negative
   EXPECT_GT(AvailableMemoryBytes(), 1 << 20);
 }
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST(ReleaseFreedMemory, WhatWasFreedGoesBackToTheSystem) {
+  constexpr size_t kBlock = 16 << 10, kBlocks = 8192;  // too small to be mapped each by itself
+  std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
+  for (auto& block : blocks) {
+    block.reset(new char[kBlock]);
+    std::memset(block.get(), 1, kBlock);
+  }
+  const int64_t full = ResidentMemoryBytes();
+  // The last one holds fast what lies below it.
+  for (size_t i = 0; i + 1 < kBlocks; ++i) blocks[i].reset();
+  ReleaseFreedMemory();
+  EXPECT_LT(ResidentMemoryBytes(), full - int64_t{kBlock * kBlocks / 2});
+}
+#endif
 
 // Pools of a process in which eight threads hold memory at the same time.
 int ArenasOfEightThreads() {

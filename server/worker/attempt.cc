@@ -413,6 +413,7 @@ void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares
     std::this_thread::sleep_for(context.timing.report_pause);
     GiveBack(context.store, job);
   }
+  ReleaseFreedMemory();
 }
 
 }  // namespace color3d

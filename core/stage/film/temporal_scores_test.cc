@@ -82,6 +82,26 @@ TEST_F(TemporalScoresTest, TheTruthOfAllFramesIsScoredBeside) {
   EXPECT_NEAR(truth.at("chroma"), std::hypot(8.0, 8.0), 0.5);
 }
 
+TEST_F(TemporalScoresTest, PicturesOfAModelAndOfItsBoundAreScoredBeside) {
+  GaussianModel model = SmallModel();
+  model.opacity_logit.assign(model.size(), 6.0f);
+  model.log_scale.assign(3 * model.size(), 1.0f);
+  AddInput(artifact::kModel, SerializeGaussians(model));
+  for (size_t i = 0; i < scene_.views.size(); ++i) {
+    scene_.views[i].cam_from_world.translation = {0.001 * static_cast<double>(i), 0.0, 0.0};
+  }
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  EvaluateOptions options;
+  options.truth = {truth_[0]};
+  options.training_truth = {truth_.begin() + 1, truth_.end()};
+  EXPECT_FALSE(Evaluated(options).at("temporal").contains("bound"));
+  options.bound = true;
+  const json temporal = Evaluated(options).at("temporal");
+  EXPECT_GT(temporal.at("rendered").at("pairs"), 0);
+  EXPECT_NE(temporal.at("bound").at("chroma"), temporal.at("rendered").at("chroma"));
+  EXPECT_NEAR(temporal.at("bound").at("chroma"), std::hypot(8.0, 8.0), 3.0);
+}
+
 TEST_F(TemporalScoresTest, PhotosHaveNoMoments) {
   for (View& view : scene_.views) view.moment.reset();
   const GaussianModel model = SmallModel();

@@ -95,8 +95,8 @@ void ColorFacts::AddRows(const ordered_json& found,
                          std::vector<Agreement>* rows) {
   const std::pair<const char*, const char*> pictures[] = {
       {"rendered", "rendered from the 3D scene"},
-      {"bound", "the same 3D scene under all true colours"},
       {"colored_views", "the photos in colour"},
+      {"bound", "the same 3D scene under all true colours"},
       {"truth", "the true colours"}};
   for (const auto& [name, what] : pictures) {
     if (!found.contains(name)) continue;

@@ -19,7 +19,8 @@ TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext)
   AddInput(artifact::kScores,
            R"({"mean": {}, "consistency": {"rendered": {"me": 0.02, "me_de00": 1.5, "tc": 0.001,
                "tc_short": 0.001, "tc_long": 0.001}}, "temporal": {"colored_views": {"pairs": 9,
-               "followed": 0.8, "tc_chroma": 1.25, "chroma": 14, "cdc": 0.002}, "truth": {"pairs": 9,
+               "followed": 0.8, "tc_chroma": 1.25, "chroma": 14, "cdc": 0.002}, "bound": {"pairs": 9,
+               "followed": 0.8, "tc_chroma": 0.5, "chroma": 15, "cdc": 0.001}, "truth": {"pairs": 9,
                "followed": 0.8, "tc_chroma": 0.75, "chroma": 16, "cdc": 0.001}}, "sources": {"share_seen": 0.6,
                "delta_e00_seen": 1.25, "confidence_rank_correlation": -0.5}})");
   AddInput(ViewArtifact(artifact::kTruths, scene_.views[scene_.FindView("p1.png")], ".jpg"), "");
@@ -40,6 +41,7 @@ TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext)
   EXPECT_EQ(metrics.at("me"), 0.02);
   EXPECT_EQ(metrics.at("tc"), 0.001);
   EXPECT_EQ(metrics.at("tc_chroma"), 1.25) << "without a model the frames are what is delivered";
+  EXPECT_EQ(metrics.at("tc_chroma_bound"), 0.5);
   EXPECT_EQ(metrics.at("cdc_truth"), 0.001);
   EXPECT_EQ(metrics.at("confidence_rank_correlation"), -0.5);
   const auto sections = facts.Sections({{"personalize", 1.0, 1, "validation_delta_e00", 9.0},
@@ -52,7 +54,8 @@ TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext)
   EXPECT_EQ(sections[0].tables[0].rows[0][0], "p2.png") << "least certain first";
   EXPECT_EQ(sections[0].rows.size(), 2u);
   EXPECT_EQ(sections[1].tables[0].rows[0][1], "0.0200");
-  EXPECT_EQ(sections[2].tables[0].rows[1][1], "0.75");
+  EXPECT_EQ(sections[2].tables[0].rows[1][1], "0.50");
+  EXPECT_EQ(sections[2].tables[0].rows[2][1], "0.75");
   EXPECT_EQ(sections[3].curves.size(), 3u);
   EXPECT_THAT(sections[3].notes.front(), testing::HasSubstr("from 9.0 after 1 s to 2.5 after 4 s"));
   EXPECT_THAT(sections[3].notes.front(), testing::HasSubstr("ended at iteration 60"));
