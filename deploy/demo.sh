@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Builds Color3D, starts its server, colours one scene end to end and says where the report is.
 #   deploy/demo.sh [PHOTOS] [OUT] [-- options of "color3d colorize"]
-# PHOTOS: a folder of photos, alone or with a COLMAP model (sparse/0) or transforms.json. Photos in
-# colour are run as a benchmark: their colour is dropped, one key view keeps its own, and the result
-# is scored against the truth. For monochrome photos the demo selects the key view and says how to
-# go on. Without PHOTOS a small procedural room is rendered first. OUT: default color3d-demo.
+# PHOTOS: a folder of photos, alone or with a COLMAP model (sparse/0) or transforms.json; a film
+# (.mp4, ...); or a folder of its frames, with "-- --film". What is in colour is run as a benchmark:
+# its colour is dropped, one key view keeps its own, and the result is scored against the truth. For
+# monochrome photos the demo selects the key view and says how to go on. Without PHOTOS a small
+# procedural room is rendered first. OUT: default color3d-demo.
 set -euo pipefail
 here=$(pwd)
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -12,7 +13,7 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 positional=()
 while [ "$#" -gt 0 ] && [ "$1" != "--" ]; do
   case "$1" in
-    -h | --help) sed -n '2,8p' "$0" | cut -c3-; exit 0 ;;
+    -h | --help) sed -n '2,9p' "$0" | cut -c3-; exit 0 ;;
     *) positional+=("$1") ;;
   esac
   shift
@@ -21,8 +22,8 @@ done
 options=("$@")
 photos=${positional[0]:-}
 out=${positional[1]:-$here/color3d-demo}
-if [ -n "$photos" ] && [ ! -d "$photos" ]; then
-  echo "demo: $photos is not a folder of photos" >&2
+if [ -n "$photos" ] && [ ! -e "$photos" ]; then
+  echo "demo: $photos is not there; name a folder of photos or a film" >&2
   exit 2
 fi
 
@@ -66,7 +67,7 @@ export COLOR3D_SERVER
 echo "demo: the server listens on $COLOR3D_SERVER, its store is $store"
 
 mode=()
-if "$bin/color3d" inspect "$photos" | grep -q '^colour'; then
+if [ -d "$photos" ] && "$bin/color3d" inspect "$photos" | grep -q '^colour'; then
   mode=(--benchmark)
   echo "demo: the photos are in colour: their colour is dropped and the result scored against it"
 fi
@@ -74,8 +75,12 @@ fi
 
 if [ -f "$out/report.html" ]; then
   echo "demo: the report is $out/report.html"
-  [ ! -f "$out/view.html" ] || echo "demo: turn the scene in a browser: $bin/color3d view $out"
-  echo "demo: mend a colour: $bin/color3d-server serve --data-dir $store & sleep 2; $bin/color3d correct $out"
+  if [ -f "$out/view.html" ]; then
+    echo "demo: turn the scene in a browser: $bin/color3d view $out"
+    echo "demo: mend a colour: $bin/color3d-server serve --data-dir $store & sleep 2; $bin/color3d correct $out"
+  elif [ -f "$out/scene.mp4" ]; then
+    echo "demo: the coloured film is $out/scene.mp4"
+  fi
 else
   echo "demo: colour $out/key_view.png by any means, then:"
   echo "  deploy/demo.sh $photos $out -- --key-color COLOURED.png"

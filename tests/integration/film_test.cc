@@ -330,6 +330,9 @@ TEST_F(FilmTest, WhatIsNoFilmIsRefused) {
   const ProcessResult text = Colorize(Path("text.mp4"), {"--auto"});
   EXPECT_NE(text.exit_code, 0);
   EXPECT_THAT(text.err, HasSubstr("text.mp4 is no film that can be read"));
+  const ProcessResult inspected = Client({"inspect", Path("text.mp4").string()});
+  EXPECT_EQ(inspected.exit_code, 2);
+  EXPECT_THAT(inspected.err, HasSubstr("text.mp4 is a film; inspect looks at pictures"));
   const fs::path film = WriteVideo();
   const ProcessResult benchmark = Colorize(film, {"--benchmark"});
   EXPECT_EQ(benchmark.exit_code, 2);
