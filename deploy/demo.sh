@@ -2,10 +2,10 @@
 # Builds Color3D, starts its server, colours one scene end to end and says where the report is.
 #   deploy/demo.sh [PHOTOS] [OUT] [-- options of "color3d colorize"]
 # PHOTOS: a folder of photos, alone or with a COLMAP model (sparse/0) or transforms.json; a film
-# (.mp4, ...); or a folder of its frames, with "-- --film". What is in colour is run as a benchmark:
-# its colour is dropped, one key view keeps its own, and the result is scored against the truth. For
-# monochrome photos the demo selects the key view and says how to go on. Without PHOTOS a small
-# procedural room is rendered first. OUT: default color3d-demo.
+# (.mp4, ...); or a folder of its frames, with "-- --film". Pictures in colour are run as a
+# benchmark: their colour is dropped, one key view keeps its own, and the result is scored against
+# the truth. For monochrome ones, and for a film, the demo selects the key view and says how to go
+# on. Without PHOTOS a small procedural room is rendered first. OUT: default color3d-demo.
 set -euo pipefail
 here=$(pwd)
 root=$(cd "$(dirname "$0")/.." && pwd)

@@ -106,7 +106,7 @@ std::chrono::milliseconds Maintenance::Reap() {
 
 void Maintenance::HoldBackWhenSpaceIsLow() {
   const bool held = store_.Holds().contains(Hold::kStorage);
-  const int64_t free = std::max<int64_t>(0, blobs_.FreeBytes());  // more may be promised than is
+  const int64_t free = blobs_.FreeBytes();
   const int64_t wanted = timing_.low_space_bytes + (held ? timing_.low_space_bytes / 10 : 0);
   if (held == (free < wanted)) return;
   store_.SetHold(Hold::kStorage, !held);

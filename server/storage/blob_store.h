@@ -75,7 +75,7 @@ class BlobStore {
   virtual void RequireSpace(int64_t bytes) const = 0;
   // The same, and keeps them from others of this process until they are used.
   virtual SpaceReservation Reserve(int64_t bytes) = 0;
-  // Less what is reserved.
+  // Less what is reserved; not below 0, though more may be promised than there is.
   virtual int64_t FreeBytes() const = 0;
 
   // Every blob, until `visit` returns false.

@@ -6,6 +6,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <ctime>
@@ -86,7 +87,9 @@ fs::path FileBlobStore::PlaceFor(const std::string& sha256) const {
   return path;
 }
 
-int64_t FileBlobStore::FreeBytes() const {
+int64_t FileBlobStore::FreeBytes() const { return std::max<int64_t>(0, UnpromisedBytes()); }
+
+int64_t FileBlobStore::UnpromisedBytes() const {
   struct statvfs status {};
   if (::statvfs(folder_.c_str(), &status) != 0) return 0;
   return static_cast<int64_t>(status.f_bavail) * static_cast<int64_t>(status.f_frsize) -
@@ -96,13 +99,13 @@ int64_t FileBlobStore::FreeBytes() const {
 SpaceReservation FileBlobStore::Reserve(int64_t bytes) {
   *reserved_ += bytes;
   SpaceReservation reservation(reserved_, bytes);
-  const int64_t left = FreeBytes();
+  const int64_t left = UnpromisedBytes();
   if (left < options_.reserve_bytes) ThrowFull(bytes, left + bytes);
   return reservation;
 }
 
 void FileBlobStore::RequireSpace(int64_t bytes) const {
-  const int64_t free = FreeBytes();
+  const int64_t free = UnpromisedBytes();
   if (free - bytes < options_.reserve_bytes) ThrowFull(bytes, free);
 }
 

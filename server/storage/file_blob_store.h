@@ -31,6 +31,7 @@ class FileBlobStore : public BlobStore {
   int RemoveLeftovers(std::chrono::seconds age) override;
 
  private:
+  int64_t UnpromisedBytes() const;  // below 0 where more is promised than there is
   [[noreturn]] void ThrowFull(int64_t bytes, int64_t free) const;
   std::filesystem::path PathOf(const std::string& sha256) const;
   // ... with its folder, of which every level is synced.

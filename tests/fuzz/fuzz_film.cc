@@ -1,7 +1,9 @@
 // Fuzz target: video files, read once through and then frame by frame, in order and back again.
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <string_view>
+#include <utility>
 
 #include "core/base/files.h"
 #include "core/video/film_reader.h"
@@ -32,19 +34,29 @@ void CheckFrame(FilmReader& film, int frame) {
 std::vector<std::string> FuzzSeeds() {
   const ScratchFolder folder{MemoryFolder()};
   const std::pair<const char*, NumberedFilm> films[] = {
-      {"a.mp4", {"libx264", 5, 3, 1, false, true}},
-      {"a.mkv", {"mpeg4", 4, 2, 0, false, true}},
-      {"a.avi", {"mpeg4", 5, 3, 1, true, true}},
-      {"a.ts", {"mpeg2video", 3, 3, 1, false, true}},
-      {"a.mpg", {"mpeg2video", 3, 3, 0, false, true}}};
+      {"a.mp4", {.frames = 5, .group = 3, .b_frames = 1, .is_flat = true}},
+      {"a.mkv", {.encoder = "mpeg4", .frames = 4, .group = 2, .b_frames = 0, .is_flat = true}},
+      {"a.avi",
+       {.encoder = "mpeg4",
+        .frames = 5,
+        .group = 3,
+        .b_frames = 1,
+        .is_packed = true,
+        .is_flat = true}},
+      {"a.ts", {.encoder = "mpeg2video", .frames = 12, .group = 3, .b_frames = 1}},
+      {"a.mpg",
+       {.encoder = "mpeg2video", .frames = 3, .group = 3, .b_frames = 0, .is_flat = true}}};
   std::vector<std::string> seeds;
+  const auto add = [&](const std::filesystem::path& file) {
+    FilmReader(file).Read(0);  // one that is refused would be no seed
+    seeds.push_back(ReadFile(file));
+  };
   for (const auto& [name, film] : films) {
-    if (WriteNumberedFilm(folder.path() / name, film)) {
-      seeds.push_back(ReadFile(folder.path() / name));
-    }
+    const std::filesystem::path file = folder.path() / name;
+    if (WriteNumberedFilm(file, film)) add(file);
   }
   WriteFieldFilm(folder.path() / "b.ts", 3, /*one_packet=*/false);
-  seeds.push_back(ReadFile(folder.path() / "b.ts"));
+  add(folder.path() / "b.ts");
   return seeds;
 }
 

@@ -15,9 +15,9 @@ namespace color3d {
 
 // Of the frames in colour ("colored_views"), of pictures of the model ("rendered") and of the same
 // geometry under true colours ("bound") where there are such, and of the true colours when every
-// view has them ("truth"): "pairs", "followed",
-// "tc_chroma", "chroma", "cdc", "cdc_1", "cdc_2", "cdc_4" (TemporalConsistency). `truth`: by view.
-// Empty when views have no moments, or no shot has two frames. Throws Error{kCancelled}.
+// view has them ("truth"): "pairs", "followed", "tc_chroma", "chroma", "cdc", "cdc_1", "cdc_2",
+// "cdc_4" (TemporalConsistency). `truth`: by view. Empty when views have no moments, or no shot has
+// two frames. Throws Error{kCancelled}.
 nlohmann::ordered_json TemporalScores(const Scene& scene,
                                       const std::optional<GaussianModel>& model,
                                       const std::optional<GaussianModel>& bound,
