@@ -32,7 +32,7 @@ Scrubber::Result Scrubber::Scrub(std::vector<StoredBlob> blobs,
                                  const std::function<bool()>& stop) {
   const auto name = [](const StoredBlob& blob) -> const std::string& { return blob.digest.sha256; };
   std::ranges::sort(blobs, {}, name);
-  std::ranges::rotate(blobs, std::ranges::upper_bound(blobs, last_, {}, name));
+  std::rotate(blobs.begin(), std::ranges::upper_bound(blobs, last_, {}, name), blobs.end());
   Result result;
   for (const StoredBlob& blob : blobs) {
     if (result.bytes >= bytes || stop()) break;
