@@ -121,6 +121,17 @@ RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
   return options;
 }
 
+// Of a film that no scene's size is asked for with, the size at which its frames are coloured then;
+// the paper's recipe stays the paper's.
+ColorizerOptions PersonalizeOptions(const v1::PersonalizeSpec& spec, const StageContext& context) {
+  ColorizerOptions options = ColorizerOptionsFrom(spec, context.seed());
+  if (!spec.has_max_side_px() && options.recipe != ColorizerOptions::Recipe::kPaper &&
+      ReadScene(context).IsFilm()) {
+    options.max_side_px = kDefaultMaxSidePx;
+  }
+  return options;
+}
+
 void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {
   EvaluateOptions options;
   for (const v1::TruthImage& image : spec.truth()) {
@@ -193,7 +204,7 @@ class CoreStageRunner : public StageRunner {
         return RunGenerateAugmentations(AugmentationOptionsFrom(spec.generate_augmentations()),
                                         context);
       case JobSpec::kPersonalize:
-        return RunPersonalize(ColorizerOptionsFrom(spec.personalize(), context.seed()),
+        return RunPersonalize(PersonalizeOptions(spec.personalize(), context),
                               context,
                               spec.personalize().encoder());
       case JobSpec::kCarryColor:
