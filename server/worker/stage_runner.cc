@@ -204,9 +204,8 @@ class CoreStageRunner : public StageRunner {
         return RunGenerateAugmentations(AugmentationOptionsFrom(spec.generate_augmentations()),
                                         context);
       case JobSpec::kPersonalize:
-        return RunPersonalize(PersonalizeOptions(spec.personalize(), context),
-                              context,
-                              spec.personalize().encoder());
+        return RunPersonalize(
+            PersonalizeOptions(spec.personalize(), context), context, spec.personalize().encoder());
       case JobSpec::kCarryColor:
         return RunCarryColor(CarryOptions(spec.carry_color(), blobs), context);
       case JobSpec::kCorrectColors:
