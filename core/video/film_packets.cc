@@ -18,6 +18,13 @@ AVStream* FindFilm(AVFormatContext* container) {
   return nullptr;
 }
 
+[[noreturn]] void RefuseContainer(const fs::path& file, int libav_result) {
+  RefuseFilm(file,
+             LibavError(libav_result) +
+                 "; it may be damaged or cut short: try another copy, or save it as .mp4 with a "
+                 "program that plays it");
+}
+
 }  // namespace
 
 void RefuseFilm(const fs::path& file, const std::string& why) {
@@ -32,11 +39,11 @@ FilmPackets::FilmPackets(const fs::path& file) {
   AVFormatContext* container = nullptr;
   if (const int result = avformat_open_input(&container, file.c_str(), nullptr, nullptr);
       result < 0) {
-    RefuseFilm(file, LibavError(result));
+    RefuseContainer(file, result);
   }
   container_.reset(container);
   if (const int result = avformat_find_stream_info(container, nullptr); result < 0) {
-    RefuseFilm(file, LibavError(result));
+    RefuseContainer(file, result);
   }
   stream_ = FindFilm(container);
   if (stream_ == nullptr) RefuseFilm(file, "it has no pictures, perhaps only sound");

@@ -354,6 +354,7 @@ TEST_F(FilmTest, WhatIsNoFilmIsRefused) {
   const ProcessResult text = Colorize(Path("text.mp4"), {"--auto"});
   EXPECT_NE(text.exit_code, 0);
   EXPECT_THAT(text.err, HasSubstr("text.mp4 is no film that can be read"));
+  EXPECT_THAT(text.err, HasSubstr("try another copy, or save it as .mp4"));
   const ProcessResult inspected = Client({"inspect", Path("text.mp4").string()});
   EXPECT_EQ(inspected.exit_code, 2);
   EXPECT_THAT(inspected.err, HasSubstr("text.mp4 is a film; inspect looks at pictures"));
