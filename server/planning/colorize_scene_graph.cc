@@ -7,6 +7,7 @@
 
 #include "core/catalogue/stages.h"
 #include "server/planning/job_spec.h"
+#include "server/planning/presets.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -155,16 +156,6 @@ std::string WhyNotForFilm(const std::string& kind, const ColorizeSceneSpec& scen
   return "";
 }
 
-constexpr int kMostLearntAtPx = 800;
-
-// Colours of a film are looked for at the size at which they were learnt (tests/bench/RESULTS.md);
-// the paper's recipe stays the paper's.
-void LearnAtTheSizeOfFrames(const ColorizeSceneSpec& scene, v1::PersonalizeSpec* spec) {
-  const v1::PersonalizeSpec& wanted = scene.personalize();
-  if (wanted.has_max_side_px() || wanted.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) return;
-  spec->set_max_side_px(std::min(scene.max_side_px(), kMostLearntAtPx));
-}
-
 // `scene`: as BuildColorizeSceneGraph takes it.
 void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const bool has_poses =
@@ -209,7 +200,8 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     JobSpec spec = builder->StageSpec(kind);
     TakeSceneOptions(scene, &spec);
     if (kind == kind::kPersonalize && facts.is_film) {
-      LearnAtTheSizeOfFrames(scene, spec.mutable_personalize());
+      *spec.mutable_personalize() = scene.personalize();
+      LearnAtTheSizeOfFrames(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
     if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);

@@ -121,4 +121,10 @@ void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
   MergeOver(*own, given);
 }
 
+void LearnAtTheSizeOfFrames(int frames_max_side_px, v1::PersonalizeSpec* spec) {
+  constexpr int kMostLearntAtPx = 800;
+  if (spec->has_max_side_px() || spec->recipe() == v1::PersonalizeSpec::RECIPE_PAPER) return;
+  spec->set_max_side_px(std::min(frames_max_side_px, kMostLearntAtPx));
+}
+
 }  // namespace color3d

@@ -30,4 +30,9 @@ v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given);
 // it) has for this stage.
 void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec);
 
+// Of a film: colours are looked for at the size at which they were learnt, that of the coloured
+// frames, up to 800 px (tests/bench/RESULTS.md). A size that was asked for stays, and the paper's
+// recipe stays the paper's.
+void LearnAtTheSizeOfFrames(int frames_max_side_px, v1::PersonalizeSpec* spec);
+
 }  // namespace color3d

@@ -8,6 +8,7 @@
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
 #include "server/backends/grpc_colorizer.h"
+#include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
 #include "server/store/job.h"
 #include "server/worker/stage_options.h"
@@ -121,15 +122,10 @@ RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
   return options;
 }
 
-// Of a film that no scene's size is asked for with, the size at which its frames are coloured then;
-// the paper's recipe stays the paper's.
-ColorizerOptions PersonalizeOptions(const v1::PersonalizeSpec& spec, const StageContext& context) {
-  ColorizerOptions options = ColorizerOptionsFrom(spec, context.seed());
-  if (!spec.has_max_side_px() && options.recipe != ColorizerOptions::Recipe::kPaper &&
-      ReadScene(context).IsFilm()) {
-    options.max_side_px = kDefaultMaxSidePx;
-  }
-  return options;
+ColorizerOptions PersonalizeOptions(v1::PersonalizeSpec spec, const StageContext& context) {
+  // As a part of colorize_scene it has its size already.
+  if (ReadScene(context).IsFilm()) LearnAtTheSizeOfFrames(kDefaultMaxSidePx, &spec);
+  return ColorizerOptionsFrom(spec, context.seed());
 }
 
 void RunEvaluation(const v1::EvaluateSpec& spec, BlobSource& blobs, StageContext& context) {

@@ -158,20 +158,14 @@ TEST_F(FilmTest, APersonalizeJobOfItsOwnLearnsAtTheSizeOfFrames) {
   ASSERT_EQ(Client({"key", "select", Path("frames").string(), "--film", "-o", key}).exit_code, 0);
   const std::string scene = NewestJob("select_key_view").spec().scene();
   ASSERT_EQ(Client({"key", "color", scene, "--auto", "-o", key}).exit_code, 0);
-  v1::CreateJobRequest request;
-  request.mutable_spec()->set_scene(scene);
-  request.mutable_spec()->mutable_personalize()->set_iterations(2);
+  v1::JobSpec spec;
+  spec.set_scene(scene);
+  spec.mutable_personalize()->set_iterations(2);
   for (const char* kind : {"import_scene", "select_key_view", "colorize_key_view"}) {
-    request.mutable_spec()->add_inputs(NewestJob(kind).name());
+    spec.add_inputs(NewestJob(kind).name());
   }
-  grpc::ClientContext context;
-  v1::Job job;
-  const grpc::Status status =
-      v1::JobService::NewStub(server().channel())->CreateJob(&context, request, &job);
-  ASSERT_TRUE(status.ok()) << status.error_message();
-  ASSERT_EQ(Client({"job", "watch", job.name()}).exit_code, 0);
   const std::string folder = Path("colorizer").string();
-  const ProcessResult got = Client({"artifact", "download", job.name(), "-o", folder});
+  const ProcessResult got = Client({"artifact", "download", RunJob(spec), "-o", folder});
   ASSERT_EQ(got.exit_code, 0) << got.err;
   EXPECT_THAT(ReadFile(Path("colorizer") / "colorizer.c3c"), HasSubstr(R"(max_side_px\":500)"));
 }

@@ -35,19 +35,14 @@ class LiveTest : public ServiceTest {
                                   Hints(),
                                   "-o",
                                   Path("key").string()});
-    v1::CreateJobRequest request;
-    request.mutable_spec()->set_scene(colored.at("scene"));
-    request.mutable_spec()->mutable_personalize()->set_iterations(3);
-    request.mutable_spec()->add_inputs(colored.at("job"));
+    v1::JobSpec spec;
+    spec.set_scene(colored.at("scene"));
+    spec.mutable_personalize()->set_iterations(3);
+    spec.add_inputs(colored.at("job"));
     for (const v1::Job& job : server().ListJobs()) {
-      if (job.name() != colored.at("job")) request.mutable_spec()->add_inputs(job.name());
+      if (job.name() != colored.at("job")) spec.add_inputs(job.name());
     }
-    grpc::ClientContext context;
-    v1::Job job;
-    const grpc::Status status =
-        v1::JobService::NewStub(server().channel())->CreateJob(&context, request, &job);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    EXPECT_EQ(Client({"job", "watch", job.name()}).exit_code, 0);
+    RunJob(spec);
     return colored.at("scene");
   }
   std::string Hints() {

@@ -166,6 +166,18 @@ v1::Job ServiceTest::NewestJob(const std::string& kind) const {
   return {};
 }
 
+std::string ServiceTest::RunJob(const v1::JobSpec& spec) const {
+  v1::CreateJobRequest request;
+  *request.mutable_spec() = spec;
+  grpc::ClientContext context;
+  v1::Job job;
+  const grpc::Status status =
+      v1::JobService::NewStub(server_->channel())->CreateJob(&context, request, &job);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(Client({"job", "watch", job.name()}).exit_code, 0);
+  return job.name();
+}
+
 void ServiceTest::ExpectRefusal(const ProcessResult& result,
                                 int exit_code,
                                 const std::vector<std::string>& words) {

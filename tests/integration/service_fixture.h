@@ -73,6 +73,8 @@ class ServiceTest : public testing::Test {
   std::vector<std::string> ClientCommand(const std::vector<std::string>& arguments) const;
   // The newest job of this kind; fails the test when there is none.
   v1::Job NewestJob(const std::string& kind) const;
+  // Creates a job and waits for its end; its name. Fails the test unless it succeeds.
+  std::string RunJob(const v1::JobSpec& spec) const;
 
   // What every refusal must be: this exit code, one line of complaint on stderr, the last one, that
   // holds all `words`, and a server that goes on.
