@@ -33,7 +33,7 @@ class Colorize {
     folder_ = CollectPhotos(options_.photos, options_.film);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
     if (options_.film) TakeAsFrames(&folder_);
-    if (options_.poses && !options_.film && !folder_.film) {
+    if (options_.poses && !options_.film && !folder_.film && folder_.camera_films.empty()) {
       throw InvalidArgument(
           "--poses is for films, and {} is none; photos get poses anyway (frames as pictures: add "
           "--film)",
@@ -73,11 +73,11 @@ class Colorize {
           "--benchmark needs the frames of {} as pictures in a folder; give that with --film",
           folder_.film->file.string());
     }
-    if (options_.benchmark && !folder_.posed_films.empty()) {
+    if (options_.benchmark && !folder_.camera_films.empty()) {
       throw InvalidArgument(
           "--benchmark needs the frames of {} as pictures, named in transforms.json with their "
           "times",
-          folder_.posed_films[0].file.string());
+          folder_.camera_films[0].file.string());
     }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);

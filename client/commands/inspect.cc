@@ -17,8 +17,8 @@ ExitCode RunInspect(const Context& context, const std::string& photos) {
   if (folder.splat) {
     throw InvalidArgument("{} is a splat; inspect looks at photos", folder.splat->file.string());
   }
-  if (folder.film || !folder.posed_films.empty()) {
-    const LocalFile& film = folder.film ? *folder.film : folder.posed_films.front();
+  if (folder.film || !folder.camera_films.empty()) {
+    const LocalFile& film = folder.film ? *folder.film : folder.camera_films.front();
     throw InvalidArgument(
         "{} is a film; inspect looks at pictures: give some of its frames as pictures in a folder",
         film.file.string());

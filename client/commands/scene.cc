@@ -28,6 +28,8 @@ std::string LayoutName(v1::Scene::Layout layout) {
       return "nerfies";
     case v1::Scene::LAYOUT_POSES_BOUNDS:
       return "poses_bounds";
+    case v1::Scene::LAYOUT_FILMS:
+      return "films";
     default:
       return "-";
   }

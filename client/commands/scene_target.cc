@@ -22,10 +22,12 @@ std::string UploadFolder(Connection& connection,
       });
   display.Say(folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
               : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
-              : !folder.posed_films.empty()
-                  ? fmt::format("{}: {} films of cameras with poses",
+              : !folder.camera_films.empty()
+                  ? fmt::format("{}: {} films of cameras{}",
                                 scene.name(),
-                                folder.posed_films.size())
+                                folder.camera_films.size(),
+                                folder.model_files.empty() ? "; their poses are looked for"
+                                                           : " with poses")
                   : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }

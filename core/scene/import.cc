@@ -280,10 +280,10 @@ ImportResult ImportScene(const fs::path& scene_folder,
   return result;
 }
 
-ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
-                            const fs::path& scratch_folder,
-                            const ImportOptions& options,
-                            const RunControl& run) {
+ImportResult PlaceSequence(const std::vector<SequenceFrame>& frames,
+                           const fs::path& scratch_folder,
+                           const ImportOptions& options,
+                           const RunControl& run) {
   options.Validate();
   std::vector<Photo> photos;
   for (const SequenceFrame& frame : frames) {
@@ -292,6 +292,7 @@ ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
     photo.name = frame.name;
     photo.file = frame.file.string();
     photo.mask_file = frame.mask_file.string();
+    photo.camera = frame.camera;
     ProbePhoto({}, &photo);
     photos.push_back(std::move(photo));
   }
@@ -302,7 +303,6 @@ ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
   result.scene = std::move(sfm.scene);
   result.sfm = std::move(sfm.report);
   result.ran_structure_from_motion = true;
-  FinishPosedScene(options, &result);
   return result;
 }
 

@@ -12,7 +12,7 @@
 
 namespace color3d {
 
-enum class SceneLayout { kPhotos, kColmap, kTransforms, kNerfies, kPosedFilms };
+enum class SceneLayout { kPhotos, kColmap, kTransforms, kNerfies, kPosedFilms, kFilms };
 
 // Which pairs of photos structure-from-motion matches: a planned few, with all as the way out when
 // those do not hang together, or all from the start.
@@ -84,12 +84,14 @@ struct SequenceFrame {
   std::string name;
   std::filesystem::path file;
   std::filesystem::path mask_file;  // what stands still (masks/photo_masks.h); empty: all of it
+  int camera = 0;                   // each has a lens of its own
 };
 
-// Poses by structure-from-motion, as of photos, but each frame is matched with its neighbours only,
-// and all pairs are never tried. The views have the frames' names, in their order; those that found
-// no place are missing. image_file and mask_file are the paths given. Throws Error as ImportScene.
-ImportResult ImportSequence(const std::vector<SequenceFrame>& frames,
+// Poses by structure-from-motion, as of photos, but each frame is matched with its neighbours and
+// with the likest of other cameras only, and all pairs are never tried. The views have the frames'
+// names, in their order; those that found no place are missing. image_file and mask_file are the
+// paths given. What FinishPosedScene does is left to the caller. Throws Error as ImportScene.
+ImportResult PlaceSequence(const std::vector<SequenceFrame>& frames,
                             const std::filesystem::path& scratch_folder,
                             const ImportOptions& options,
                             const RunControl& run);

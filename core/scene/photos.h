@@ -22,6 +22,7 @@ struct Photo {
   int height = 0;
   double focal_px = 0.0;  // from EXIF; 0: unknown
   std::string mask_file;  // as View::mask_file
+  int camera = 0;         // photos of different cameras never share a lens
 };
 
 // Photos in images/ (any depth) when there are some, else those directly in the folder, else those

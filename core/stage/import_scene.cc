@@ -10,7 +10,7 @@
 #include "core/splat/import/splat_scene.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/film/film_frames.h"
-#include "core/stage/film/import_posed_films.h"
+#include "core/stage/film/import_camera_films.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/import_output.h"
 #include "core/stage/stages.h"
@@ -77,7 +77,7 @@ void RunImportScene(const ImportOptions& options,
   options.Validate();
   splat_views.Validate();
   film_options.Validate();
-  if (ImportPosedFilms(options, film_options, context)) return;
+  if (ImportCameraFilms(options, film_options, context)) return;
   const std::string film = FindFilm(context.scene_folder());
   if (!film.empty()) {
     return ImportFilm(film, film_options, options, context);

@@ -66,13 +66,15 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
 
 SceneFacts FactsOf(const SceneRecord& scene) {
   const bool is_splat = scene.layout == StoredLayout::kSplat;
+  const bool is_film = scene.layout == StoredLayout::kFilm;
   return {.photos = is_splat ? kSplatViews : scene.photo_count,
-          .has_poses = scene.layout != StoredLayout::kPhotos && scene.layout != StoredLayout::kFilm,
+          .has_poses = scene.layout != StoredLayout::kPhotos && !is_film &&
+                       scene.layout != StoredLayout::kFilms,
           .augment_files = static_cast<int>(
               std::count_if(scene.files.begin(),
                             scene.files.end(),
                             [](const auto& file) { return IsAugmentFile(file.path); })),
-          .is_film = scene.layout == StoredLayout::kFilm,
+          .is_film = is_film,
           .is_splat = is_splat};
 }
 

@@ -128,10 +128,13 @@ bool HasNerfiesCameras(const std::vector<SceneFileRecord>& files) {
          });
 }
 
-bool HasFrames(const std::vector<SceneFileRecord>& files) {
-  return std::any_of(files.begin(), files.end(), [](const auto& file) {
-    return IsFrameFile(file.path) && HasImageExtension(file.path);
-  });
+// Folders that hold a film's frames as pictures; frames/ itself is one.
+std::set<std::string> FrameFolders(const std::vector<SceneFileRecord>& files) {
+  std::set<std::string> folders;
+  for (const SceneFileRecord& file : files) {
+    if (IsFrameFile(file.path) && HasImageExtension(file.path)) folders.insert(Folder(file.path));
+  }
+  return folders;
 }
 
 // One file's violations; counts it when it is a good photograph.
@@ -259,11 +262,14 @@ StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
   const bool has_photos = std::any_of(files.begin(), files.end(), [](const auto& file) {
     return HasImageExtension(file.path) && !IsAugmentFile(file.path) && !IsMaskFile(file.path);
   });
-  if (HasFrames(files)) return StoredLayout::kFilm;
-  // Several films are a rig's, whose poses a file beside them tells.
+  if (const size_t folders = FrameFolders(files).size(); folders > 0) {
+    return folders > 1 ? StoredLayout::kFilms : StoredLayout::kFilm;
+  }
+  // Several films are several cameras', whose poses a file beside them may tell.
   if (!has_photos && CountFilms(files) > 1) {
     if (HasFile(files, "transforms.json")) return StoredLayout::kTransforms;
     if (HasFile(files, "poses_bounds.npy")) return StoredLayout::kPosesBounds;
+    return StoredLayout::kFilms;
   }
   if (!has_photos && CountFilms(files) > 0) return StoredLayout::kFilm;
   if (!has_photos && CountSplats(files) > 0) return StoredLayout::kSplat;
@@ -308,13 +314,11 @@ SceneCheck CheckScene(const SceneRecord& scene,
                                         "splat a scene",
                                         splats)});
     }
-  } else if (check.layout == StoredLayout::kFilm) {
-    const int films = CountFilms(scene.files);
-    if (films > 1 || (films == 1 && check.photo_count > 0)) {
+  } else if (check.layout == StoredLayout::kFilm || check.layout == StoredLayout::kFilms) {
+    if (CountFilms(scene.files) > 0 && check.photo_count > 0) {
       violations.push_back(
           {"",
-           "the scene holds a film and more; give one video file, or frames/, a scene, or the "
-           "cameras' poses with their films (transforms.json, poses_bounds.npy)"});
+           "the scene holds pictures in frames/ and video files; give one of them"});
     }
   } else if (missing == 0 && check.photo_count == 0 && CountFilms(scene.files) == 0) {
     violations.push_back({"",

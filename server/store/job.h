@@ -117,7 +117,8 @@ enum class StoredLayout {
   kSplat,
   kFilm,
   kNerfies,
-  kPosesBounds
+  kPosesBounds,
+  kFilms
 };
 
 struct SceneFileRecord {

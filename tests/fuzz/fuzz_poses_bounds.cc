@@ -35,7 +35,7 @@ void CheckArray(const NpyArray& array) {
   }
 }
 
-void CheckFilm(const PosedFilm& film) {
+void CheckFilm(const CameraFilm& film) {
   const Camera& camera = film.view.captured_camera;
   if (!film.view.cam_from_world.Center().allFinite()) std::abort();
   if (!(camera.width > 0 && camera.height > 0 && camera.fx > 0.0)) std::abort();
@@ -73,8 +73,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (!is_array) return 0;
   std::ofstream(FolderOfFilms() / kPosesBounds, std::ios::binary) << bytes;
   return ReadOrRefuse([&] {
-    const std::vector<PosedFilm> films = ReadPosesBounds(FolderOfFilms());
+    const std::vector<CameraFilm> films = ReadPosesBounds(FolderOfFilms());
     if (films.size() != 2) std::abort();
-    for (const PosedFilm& film : films) CheckFilm(film);
+    for (const CameraFilm& film : films) CheckFilm(film);
   });
 }

@@ -117,10 +117,9 @@ void CollectNerfies(const fs::path& root, PhotoFolder* result) {
 }
 
 // Films directly in `root` and in the folders that transforms.json names, and the file that tells
-// where their cameras stand. Nothing when there is only one film, or no such file.
-void CollectPosedFilms(const fs::path& root, PhotoFolder* result) {
+// where their cameras stand, if there is one. Nothing when there is only one film.
+void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   const bool has_transforms = IsFile(root / kTransforms);
-  if (!has_transforms && !IsFile(root / kPosesBounds)) return;
   std::set<std::string> folders = {""};
   if (has_transforms) folders.merge(NamedFolders(root / kTransforms));
   std::vector<LocalFile> films;
@@ -136,8 +135,25 @@ void CollectPosedFilms(const fs::path& root, PhotoFolder* result) {
   std::sort(films.begin(), films.end(), [](const LocalFile& x, const LocalFile& y) {
     return x.path < y.path;
   });
-  result->posed_films = std::move(films);
-  if (!has_transforms) result->model_files.push_back({kPosesBounds, root / kPosesBounds});
+  result->camera_films = std::move(films);
+  if (!has_transforms && IsFile(root / kPosesBounds)) {
+    result->model_files.push_back({kPosesBounds, root / kPosesBounds});
+  }
+}
+
+// Folders of pictures in `root`, two or more: each camera's frames.
+void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result) {
+  std::error_code none;
+  PhotoFolder folders;
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with('.') || name == kAugment || !IsFolder(entry.path())) continue;
+    const size_t before = folders.photos.size();
+    AddDirectPhotos(root, name, &folders);
+    count += folders.photos.size() > before ? 1 : 0;
+  }
+  if (count > 1) result->photos = std::move(folders.photos);
 }
 
 void CollectImages(const fs::path& root, PhotoFolder* result) {
@@ -242,7 +258,7 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
 
 void CheckCounts(const PhotoFolder& folder, bool as_frames) {
   const std::string root = folder.root.string();
-  if (folder.splat || folder.film || !folder.posed_films.empty()) return;
+  if (folder.splat || folder.film || !folder.camera_films.empty()) return;
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPhotos(folder.root);
     throw InvalidArgument(
@@ -289,7 +305,7 @@ std::vector<LocalFile> PhotoFolder::AllFiles() const {
   std::vector<LocalFile> all = photos;
   if (splat) all.push_back(*splat);
   if (film) all.push_back(*film);
-  all.insert(all.end(), posed_films.begin(), posed_films.end());
+  all.insert(all.end(), camera_films.begin(), camera_films.end());
   all.insert(all.end(), model_files.begin(), model_files.end());
   all.insert(all.end(), augment_files.begin(), augment_files.end());
   all.insert(all.end(), mask_files.begin(), mask_files.end());
@@ -316,8 +332,9 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
     result.root = result.root.parent_path();
   }
   CollectImages(result.root, &result);
-  if (result.photos.empty()) CollectPosedFilms(result.root, &result);
-  if (!result.posed_films.empty()) {
+  if (result.photos.empty() && as_frames) CollectFoldersOfFrames(result.root, &result);
+  if (result.photos.empty()) CollectCameraFilms(result.root, &result);
+  if (!result.camera_films.empty()) {
     CollectModel(result.root, &result);
     CheckNames(result);
     return result;
@@ -344,24 +361,38 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
 
 void TakeAsFrames(PhotoFolder* folder) {
   if (folder->film) return;
-  if (!folder->posed_films.empty()) {
-    throw InvalidArgument("{} has {} films; give one of them (e.g. {}), or leave --film out",
+  if (!folder->camera_films.empty()) {
+    throw InvalidArgument("{} has {} films, of one camera each; give one of them (e.g. {}), or "
+                          "leave --film out: they become one scene",
                           folder->root.string(),
-                          folder->posed_films.size(),
-                          folder->posed_films[0].file.string());
+                          folder->camera_films.size(),
+                          folder->camera_films[0].file.string());
   }
   if (folder->photos.empty()) {
     throw InvalidArgument("{} has no pictures that could be frames of a film",
                           folder->root.string());
   }
   folder->model_files.clear();
+  std::set<fs::path> cameras;
+  for (const LocalFile& photo : folder->photos) cameras.insert(photo.file.parent_path());
+  if (cameras.size() > 1 &&
+      (cameras.contains(folder->root) || cameras.contains(folder->root / "images"))) {
+    throw InvalidArgument(
+        "{} has pictures beside folders of pictures; give one camera's frames, or each camera's in a "
+        "folder of its own",
+        folder->root.string());
+  }
   std::set<std::string> names;
   for (LocalFile& photo : folder->photos) {
-    photo.path = std::string(kFramesFolder) + photo.file.filename().string();
+    const std::string camera =
+        cameras.size() > 1 ? photo.file.parent_path().filename().string() + "/" : "";
+    photo.path = std::string(kFramesFolder) + camera + photo.file.filename().string();
     if (!names.insert(photo.path).second) {
-      throw InvalidArgument("two pictures in {} are called {}; give one camera's frames",
-                            folder->root.string(),
-                            photo.file.filename().string());
+      throw InvalidArgument(
+          "two pictures in {} are called {}{}; give each camera a folder of its own name",
+          folder->root.string(),
+          camera,
+          photo.file.filename().string());
     }
   }
   const auto as_counted = [](const LocalFile& x, const LocalFile& y) {
@@ -396,7 +427,7 @@ std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
 }
 
 void RequirePhoto(const PhotoFolder& folder, const std::string& name) {
-  if (folder.splat || folder.film || !folder.posed_films.empty()) return;
+  if (folder.splat || folder.film || !folder.camera_films.empty()) return;
   std::string known;
   for (size_t i = 0; i < folder.photos.size(); ++i) {
     const std::string& path = folder.photos[i].path;

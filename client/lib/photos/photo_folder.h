@@ -22,7 +22,7 @@ struct PhotoFolder {
   std::vector<LocalFile> mask_files;     // of photos, see mask_files.h
   std::optional<LocalFile> splat;        // in place of photos: views are drawn from it
   std::optional<LocalFile> film;         // in place of photos: a video file, whose frames are views
-  std::vector<LocalFile> posed_films;    // in place of photos: of cameras whose poses a file tells
+  std::vector<LocalFile> camera_films;   // in place of photos: of several cameras
   std::vector<std::string> notes;        // what the user may want to know, one line each
 
   std::vector<LocalFile> AllFiles() const;
@@ -36,14 +36,16 @@ struct PhotoFolder {
 // everything in augment/ (any depth). Of a folder of Nerfies or HyperNeRF: metadata.json, camera/,
 // points.npy and the pictures of one size, rgb/2x/, else 1x, 4x, 8x. Nothing else, but for a splat
 // (.ply .sog .spz) or a film (.mp4 .mov ...): `root` itself, or the only one in a folder without
-// photos; or several films beside a transforms.json that names them, or beside a poses_bounds.npy.
-// `as_frames`: TakeAsFrames follows, and what is wrong is told of frames. Throws Error: no such
+// photos; or several films, with a transforms.json that names them or a poses_bounds.npy, if there is
+// one. `as_frames`: TakeAsFrames follows; folders of pictures directly in `root` are taken, too, and
+// what is wrong is told of frames. Throws Error: no such
 // folder, another file instead of a folder, no photos, one photo, more than 10,000 files, names
 // that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root, bool as_frames = false);
 
-// The photos as frames of a film, in the order of their names (numbers count as numbers); poses are
-// of no use then. Throws Error{kInvalidArgument} when there are none, or two of one name.
+// The photos as frames of a film, in the order of their names (numbers count as numbers), or of
+// several, where they lie in several folders: one camera's each. Poses that files tell are of no
+// use then. Throws Error{kInvalidArgument} when there are none, or two of one name.
 void TakeAsFrames(PhotoFolder* folder);
 
 // The photo whose file stem is that of `file` ("x/0007_coloured.png" has the stem "0007_coloured"),

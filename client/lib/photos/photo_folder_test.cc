@@ -100,7 +100,10 @@ TEST_F(PhotoFolderTest, AFilmStandsForPhotosAndPhotosForAFilm) {
     EXPECT_TRUE(folder.film.has_value());
   }
   Write("second.mp4");
-  EXPECT_THAT(ErrorOf(root()), HasSubstr("2 films"));
+  PhotoFolder cameras = CollectPhotos(root());
+  EXPECT_THAT(Paths(cameras.AllFiles()), ElementsAre("second.mp4", "walk.MOV"));
+  EXPECT_FALSE(cameras.film.has_value());
+  EXPECT_THROW(TakeAsFrames(&cameras), Error);
   for (const char* name : {"images/b.jpg", "images/a.jpg"}) Write(name);
   PhotoFolder folder = CollectPhotos(root());
   EXPECT_FALSE(folder.film.has_value());
@@ -175,6 +178,18 @@ TEST_F(PhotoFolderTest, CamerasOfARigAreSubfolders) {
   Write("transforms.json",
         R"({"frames": [{"file_path": "./cam01/0001.jpg"}, {"file_path": "cam02/0001.jpg"}]})");
   EXPECT_THAT(Paths(CollectPhotos(root()).photos), ElementsAre("cam01/0001.jpg", "cam02/0001.jpg"));
+}
+
+TEST_F(PhotoFolderTest, FoldersOfFramesAreOfOneCameraEach) {
+  for (const char* name : {"right/10.png", "right/9.png", "left/9.png", "notes/a.txt"}) Write(name);
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("no photographs"));
+  PhotoFolder folder = CollectPhotos(root(), /*as_frames=*/true);
+  TakeAsFrames(&folder);
+  EXPECT_THAT(Paths(folder.AllFiles()),
+              ElementsAre("frames/left/9.png", "frames/right/9.png", "frames/right/10.png"));
+  EXPECT_NO_THROW(RequirePhoto(folder, "right/10.png"));
+  fs::remove_all(root() / "left");
+  EXPECT_THAT(ErrorOf(root(), /*as_frames=*/true), HasSubstr("did you mean"));
 }
 
 TEST_F(PhotoFolderTest, FilmsOfCamerasWithPosesStandForPhotos) {

@@ -58,7 +58,7 @@ View ViewOf(const double* row, const std::string& place) {
 
 }  // namespace
 
-std::vector<PosedFilm> ReadPosesBounds(const fs::path& scene_folder) {
+std::vector<CameraFilm> ReadPosesBounds(const fs::path& scene_folder) {
   std::vector<std::string> files;
   for (const std::string& file : ListFiles(scene_folder)) {
     if (HasFilmExtension(file) && file.find('/') == std::string::npos) files.push_back(file);
@@ -79,7 +79,7 @@ std::vector<PosedFilm> ReadPosesBounds(const fs::path& scene_folder) {
         files.front(),
         files.back());
   }
-  std::vector<PosedFilm> films;
+  std::vector<CameraFilm> films;
   for (size_t i = 0; i < files.size(); ++i) {
     const std::string place = fmt::format("{}: row {}", kPosesBounds, i);
     films.push_back(

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/scene/posed_films.h"
+#include "core/scene/camera_films.h"
 
 namespace color3d {
 
@@ -15,6 +15,6 @@ inline constexpr char kPosesBounds[] = "poses_bounds.npy";
 // directly in the folder. Empty without films. Throws Error{kInvalidArgument}: another shape, other
 // numbers of rows and films, axes that are no rotation, sizes or focal lengths that are not
 // positive.
-std::vector<PosedFilm> ReadPosesBounds(const std::filesystem::path& scene_folder);
+std::vector<CameraFilm> ReadPosesBounds(const std::filesystem::path& scene_folder);
 
 }  // namespace color3d

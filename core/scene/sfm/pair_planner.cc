@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
+#include <map>
 #include <numeric>
 #include <set>
+#include <utility>
 
 namespace color3d {
 namespace {
@@ -115,6 +117,15 @@ std::vector<PhotoPair> AllPairs(int count) {
 
 namespace {
 
+// Indices by camera, each ascending.
+std::vector<std::vector<int>> FramesOf(const std::vector<int>& camera) {
+  std::map<int, std::vector<int>> frames;
+  for (size_t i = 0; i < camera.size(); ++i) frames[camera[i]].push_back(static_cast<int>(i));
+  std::vector<std::vector<int>> all;
+  for (auto& [name, own] : frames) all.push_back(std::move(own));
+  return all;
+}
+
 // Photos of which another one shows the same: unrelated ones match by chance, a few times.
 int CountRelated(const SimilarityTable& similarity) {
   constexpr float kRelated = 10.0f;
@@ -129,15 +140,68 @@ int CountRelated(const SimilarityTable& similarity) {
 
 }  // namespace
 
-PairPlan PairsInSequence(int count) {
+PairPlan PairsInSequence(const std::vector<int>& camera) {
   PairPlan plan;
-  for (int i = 0; i < count; ++i) {
-    for (int step = 1; step <= 16 && i + step < count; step *= 2)
-      plan.pairs.emplace_back(i, i + step);
+  for (const std::vector<int>& frames : FramesOf(camera)) {
+    for (size_t i = 0; i < frames.size(); ++i) {
+      for (size_t step = 1; step <= 16 && i + step < frames.size(); step *= 2) {
+        plan.pairs.push_back(Sorted(frames[i], frames[i + step]));
+      }
+    }
   }
-  plan.reason = std::to_string(plan.pairs.size()) + " pairs of frames up to 16 apart";
-  plan.related = count;
+  std::sort(plan.pairs.begin(), plan.pairs.end());
+  plan.reason = fmt::format("{} pairs of frames up to 16 apart", plan.pairs.size());
+  plan.related = static_cast<int>(camera.size());
   return plan;
+}
+
+std::vector<int> FramesToCompare(const std::vector<int>& camera) {
+  constexpr size_t kMostCompared = 120;
+  const std::vector<std::vector<int>> cameras = FramesOf(camera);
+  if (cameras.size() < 2) return {};
+  const size_t share = std::max<size_t>(1, kMostCompared / cameras.size());
+  std::vector<int> compared;
+  for (const std::vector<int>& frames : cameras) {
+    const size_t count = std::min(share, frames.size());
+    for (size_t i = 0; i < count; ++i) {
+      compared.push_back(frames[(2 * i + 1) * frames.size() / (2 * count)]);
+    }
+  }
+  std::sort(compared.begin(), compared.end());
+  return compared;
+}
+
+void AddPairsAcross(const std::vector<int>& camera,
+                    const std::vector<int>& compared,
+                    const SimilarityTable& similarity,
+                    PairPlan* plan) {
+  constexpr size_t kAlike = 4, kAtAnyRate = 8;
+  // Of each frame and each other camera, and of each two cameras: how alike, and which.
+  using Candidates = std::vector<std::pair<float, PhotoPair>>;
+  std::map<std::pair<int, int>, Candidates> of_frame, of_cameras;
+  for (int i = 0; i < similarity.count(); ++i) {
+    for (int j = i + 1; j < similarity.count(); ++j) {
+      const int a = compared[i], b = compared[j];
+      if (camera[a] == camera[b]) continue;
+      const std::pair<float, PhotoPair> candidate{-similarity.At(i, j), {a, b}};
+      of_frame[{a, camera[b]}].push_back(candidate);
+      of_frame[{b, camera[a]}].push_back(candidate);
+      of_cameras[std::minmax(camera[a], camera[b])].push_back(candidate);
+    }
+  }
+  std::set<PhotoPair> across;
+  const auto take = [&](Candidates candidates, size_t most, float least) {
+    std::sort(candidates.begin(), candidates.end());
+    candidates.resize(std::min(most, candidates.size()));
+    for (const auto& [unlike, pair] : candidates) {
+      if (-unlike >= least) across.insert(pair);
+    }
+  };
+  for (const auto& [frame, candidates] : of_frame) take(candidates, kAlike, kClearlySimilar);
+  for (const auto& [cameras, candidates] : of_cameras) take(candidates, kAtAnyRate, 0.0f);
+  plan->pairs.insert(plan->pairs.end(), across.begin(), across.end());
+  std::sort(plan->pairs.begin(), plan->pairs.end());
+  plan->reason += fmt::format(", {} across cameras", across.size());
 }
 
 PairPlan PlanPairs(const SimilarityTable& similarity,

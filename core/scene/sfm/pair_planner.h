@@ -29,9 +29,21 @@ struct PairPlan {
 // All n (n - 1) / 2 pairs.
 std::vector<PhotoPair> AllPairs(int count);
 
-// Of photos that were taken one after the other, as frames of a film are: each with those 1, 2, 4,
-// 8 and 16 further on.
-PairPlan PairsInSequence(int count);
+// Of frames that one camera or several took, each camera's one after the other: each with those 1,
+// 2, 4, 8 and 16 further on of its own camera. `camera`: of each frame.
+PairPlan PairsInSequence(const std::vector<int>& camera);
+
+// The frames by which cameras are compared with each other: all of a few, else as many of each
+// camera, spread evenly. Ascending; empty where there is one camera.
+std::vector<int> FramesToCompare(const std::vector<int>& camera);
+
+// Adds the pairs across cameras: each of the frames `compared` with the 4 of every other camera that
+// are most like it, where they clearly are, and of every two cameras the 8 likest pairs at any rate.
+// `similarity` is of `compared`.
+void AddPairsAcross(const std::vector<int>& camera,
+                    const std::vector<int>& compared,
+                    const SimilarityTable& similarity,
+                    PairPlan* plan);
 
 // Every photo with the `neighbors` most similar ones (twice as many when none of them is clearly
 // similar), with the next two of its sequence, if `sequence` is not empty (a permutation of the

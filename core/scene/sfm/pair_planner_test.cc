@@ -92,13 +92,37 @@ TEST(PairPlanner, GrowsLinearlyAndFewPhotosAreMatchedCompletely) {
 }
 
 TEST(PairPlanner, FramesAreMatchedWithNearAndFarNeighbours) {
-  EXPECT_EQ(PairsInSequence(4).pairs,
+  const auto one_camera = [](int count) { return std::vector<int>(count, 0); };
+  EXPECT_EQ(PairsInSequence(one_camera(4)).pairs,
             (std::vector<PhotoPair>{{0, 1}, {0, 2}, {1, 2}, {1, 3}, {2, 3}}));
-  const PairPlan plan = PairsInSequence(100);
+  const PairPlan plan = PairsInSequence(one_camera(100));
   EXPECT_EQ(plan.pairs.size(), 99u + 98u + 96u + 92u + 84u);
   EXPECT_TRUE(std::is_sorted(plan.pairs.begin(), plan.pairs.end()));
   EXPECT_EQ(plan.related, 100);
-  EXPECT_TRUE(PairsInSequence(1).pairs.empty());
+  EXPECT_TRUE(PairsInSequence(one_camera(1)).pairs.empty());
+  EXPECT_TRUE(FramesToCompare(one_camera(100)).empty());
+}
+
+TEST(PairPlanner, CamerasAreMatchedWithinAndWhereTheySawTheSame) {
+  const std::vector<int> camera = {1, 1, 1, 2, 2, 2, 7};
+  PairPlan plan = PairsInSequence(camera);
+  EXPECT_EQ(plan.pairs, (std::vector<PhotoPair>{{0, 1}, {0, 2}, {1, 2}, {3, 4}, {3, 5}, {4, 5}}));
+  EXPECT_THAT(FramesToCompare(camera), ElementsAre(0, 1, 2, 3, 4, 5, 6));
+  std::vector<int> many(1000, 1);
+  many.resize(1500, 2);
+  const std::vector<int> compared = FramesToCompare(many);
+  ASSERT_EQ(compared.size(), 120u);
+  EXPECT_EQ(compared[0], 8);      // the middle of the first sixtieth
+  EXPECT_EQ(compared[60], 1004);  // of the second camera
+  SimilarityTable similarity(7);
+  similarity.Set(2, 3, 50.0f);
+  similarity.Set(0, 1, 90.0f);  // of one camera: nothing to look for
+  AddPairsAcross(camera, FramesToCompare(camera), similarity, &plan);
+  EXPECT_TRUE(Has(plan, 2, 3));
+  EXPECT_TRUE(Connected(7, plan.pairs)) << "some of each two cameras are tried at any rate";
+  EXPECT_EQ(plan.pairs.size(), 6u + 8u + 3u + 3u);
+  EXPECT_TRUE(std::is_sorted(plan.pairs.begin(), plan.pairs.end()));
+  EXPECT_THAT(plan.reason, HasSubstr("6 pairs of frames up to 16 apart, 14 across cameras"));
 }
 
 TEST(PairPlanner, SequenceOrderFromNames) {

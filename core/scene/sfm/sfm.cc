@@ -216,13 +216,27 @@ void RequireParallax(const std::vector<LocalFeatures>& features,
       colmap.log().filename().string());
 }
 
+PairPlan PlanFrames(const std::vector<Photo>& photos,
+                    const FeatureImages& copies,
+                    const RunControl& run) {
+  std::vector<int> camera;
+  for (const Photo& photo : photos) camera.push_back(photo.camera);
+  PairPlan plan = PairsInSequence(camera);
+  const std::vector<int> compared = FramesToCompare(camera);
+  if (compared.empty()) return plan;
+  std::vector<LocalFeatures> features;
+  for (const int frame : compared) features.push_back(copies.features[frame]);
+  AddPairsAcross(camera, compared, CompareAll(features, run.pool, run.cancel), &plan);
+  return plan;
+}
+
 PairPlan Plan(const std::vector<Photo>& photos,
               const FeatureImages& copies,
               const ImportOptions& options,
               PhotoOrder order,
               const RunControl& run) {
   const int count = static_cast<int>(photos.size());
-  if (order == PhotoOrder::kSequence) return PairsInSequence(count);
+  if (order == PhotoOrder::kSequence) return PlanFrames(photos, copies, run);
   if (options.sfm_pairs == SfmPairs::kExhaustive) {
     return {AllPairs(count), "all pairs, as asked for", count};
   }

@@ -18,8 +18,8 @@ struct SfmResult {
   SfmReport report;
 };
 
-// Photos of a place, or frames of a film in their order: those are matched with their neighbours,
-// at distances of 1 to 16, and all pairs of them are never tried.
+// Photos of a place, or frames of films in their order: those are matched with their neighbours, at
+// distances of 1 to 16, and with what other cameras saw alike; all pairs are never tried.
 enum class PhotoOrder { kAny, kSequence };
 
 // `photos` have been probed and are at least 2. Reduced 8-bit grey copies, COLMAP's database and

@@ -37,6 +37,7 @@ std::pair<float, float> UsedRange(const Image& image) {
 std::string GroupFolder(const FeatureImages::Group& group) {
   std::string name = fmt::format("{}x{}", group.width, group.height);
   if (group.focal_px > 0.0) name += fmt::format("_f{}", std::lround(group.focal_px));
+  if (group.camera > 0) name += fmt::format("_c{}", group.camera);
   return name;
 }
 
@@ -101,7 +102,7 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     const Photo& photo = photos[i];
     const Image image = FeatureImage(ReadImage(scene_folder / photo.file), max_side_px);
     const double focal_px = photo.focal_px * image.width / photo.width;
-    seen[i] = {image.width, image.height, focal_px, {}};
+    seen[i] = {image.width, image.height, focal_px, photo.camera, {}};
     folders[i] = GroupFolder(seen[i]);
     written.names[i] = fmt::format("{}/{:06}.png", folders[i], i + 1);
     fs::create_directories(folder / folders[i]);

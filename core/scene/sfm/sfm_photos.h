@@ -18,11 +18,12 @@ Image FeatureImage(const Image& photo, int max_side_px);
 
 // The copies on disk and what was seen on the way.
 struct FeatureImages {
-  // Photos that share a folder and with it a camera: the same size and the same focal length.
+  // Photos that share a folder and with it a lens: one camera, the same size and focal length.
   struct Group {
     int width = 0;  // of the copies, px
     int height = 0;
     double focal_px = 0.0;  // of the copies; 0: unknown
+    int camera = 0;         // as Photo::camera
     std::vector<std::string> names;
   };
   std::vector<std::string> names;       // of all copies, relative to the folder, in photos' order
@@ -31,8 +32,8 @@ struct FeatureImages {
   bool masked = false;                  // some photo has a mask
 };
 
-// Writes photo i as <width>x<height>[_f<focal>]/<i + 1 as 6 digits>.png below `folder`, EXIF
-// orientation applied, and its mask, if it has one, as the same name with .png added below
+// Writes photo i as <width>x<height>[_f<focal>][_c<camera>]/<i + 1 as 6 digits>.png below `folder`,
+// EXIF orientation applied, and its mask, if it has one, as the same name with .png added below
 // `mask_folder`, as COLMAP wants it. `local_features` > 0: also finds so many features in each
 // photo, of which those that are masked out are dropped.
 FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,

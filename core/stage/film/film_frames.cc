@@ -8,8 +8,11 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/name_order.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/image/probe/probe.h"
 #include "core/scene/camera.h"
 #include "core/video/mp4_writer.h"
 
@@ -23,6 +26,9 @@ const char* WhyUnused(NoFilm scene) {
     case NoFilm::kPosedFilms:
       return "films whose poses are given have times and places of their own, and are taken as "
              "exposed";
+    case NoFilm::kCameraFilms:
+    case NoFilm::kCameraPictures:
+      return "films of several cameras are taken as exposed, at their own times";
     case NoFilm::kTimedPictures:
       return "pictures whose times and poses are given are all taken, as exposed";
     case NoFilm::kPhotos:
@@ -32,6 +38,30 @@ const char* WhyUnused(NoFilm scene) {
 }
 
 }  // namespace
+
+Camera UnknownCamera(int width, int height) {
+  constexpr double kFocalOfLongerSide = 1.2;
+  const double focal = kFocalOfLongerSide * std::max(width, height);
+  return {width, height, focal, focal, 0.5 * width, 0.5 * height};
+}
+
+std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
+  std::vector<std::string> files;
+  for (const std::string& file : ListFiles(folder)) {
+    if (HasImageExtension(file)) files.push_back(file);
+  }
+  std::sort(files.begin(), files.end(), ComesBefore);
+  return files;
+}
+
+std::vector<double> TimesOfPictures(size_t count, const FilmOptions& options) {
+  constexpr double kFramesPerSecond = 25.0;  // where nobody tells
+  std::vector<double> times;
+  for (size_t i = 0; i < count; ++i) {
+    times.push_back(static_cast<double>(i) / options.frames_per_second.value_or(kFramesPerSecond));
+  }
+  return times;
+}
 
 std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options) {
   std::vector<int> wanted;
@@ -54,14 +84,16 @@ void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext&
   const auto add = [&](bool given, const char* name) {
     if (given) unused.emplace_back(name);
   };
-  if (scene != NoFilm::kPosedFilms) {
+  const bool pictures = scene == NoFilm::kCameraPictures;
+  const bool cameras = pictures || scene == NoFilm::kCameraFilms;
+  if (!cameras && scene != NoFilm::kPosedFilms) {
     add(options.stride != usual.stride, "film_stride");
     add(options.begin_s != usual.begin_s, "film_begin_s");
     add(options.end_s != usual.end_s, "film_end_s");
   }
-  add(options.frames_per_second != usual.frames_per_second, "film_frames_per_second");
+  add(!pictures && options.frames_per_second != usual.frames_per_second, "film_frames_per_second");
   add(options.deflicker != usual.deflicker, "film_deflicker");
-  add(options.poses != usual.poses, "film_poses");
+  add(!cameras && options.poses != usual.poses, "film_poses");
   if (unused.empty()) return;
   context.progress().OnWarning(fmt::format("{} {} left aside: {}",
                                            fmt::join(unused, ", "),

@@ -2,21 +2,31 @@
 // how large their movie is. For this folder only.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/image.h"
+#include "core/scene/camera.h"
 #include "core/stage/film/import_film.h"
 
 namespace color3d {
+
+// What is taken for a camera that nobody knows.
+Camera UnknownCamera(int width, int height);
+
+// Frames that come as pictures below `folder`: their names, in the order of their numbers ...
+std::vector<std::string> PicturesIn(const std::filesystem::path& folder);
+// ... and when so many of them are shown, s.
+std::vector<double> TimesOfPictures(size_t count, const FilmOptions& options);
 
 // Indices of the frames that are asked for, of a film whose frames are shown at `times`. Throws
 // Error{kInvalidArgument} when there is none.
 std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options);
 
 // What a scene is that is not a film of one camera without poses.
-enum class NoFilm { kPosedFilms, kTimedPictures, kPhotos };
+enum class NoFilm { kPosedFilms, kCameraFilms, kCameraPictures, kTimedPictures, kPhotos };
 
 // Warns of the options that were given and are of no use for it; nothing for none.
 void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext& context);

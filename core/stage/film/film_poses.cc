@@ -13,16 +13,13 @@
 #include "core/base/files.h"
 #include "core/base/median.h"
 #include "core/film/moving_regions.h"
-#include "core/image/codec.h"
-#include "core/scene/masks/photo_masks.h"
-#include "core/scene/view_images.h"
+#include "core/stage/film/moving_region_files.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr double kEnough = 0.8;  // of the frames, with poses
-constexpr int64_t kCacheBytes = int64_t{64} << 20;
 
 bool AreEnough(size_t some, size_t all) {
   return static_cast<double>(some) >= kEnough * static_cast<double>(all);
@@ -41,69 +38,25 @@ std::vector<int> LongestShot(const Scene& scene) {
   return longest->second;
 }
 
-// What of each frame moves, as a picture, and what stands still, as a mask of the frame's size.
-class RegionFiles {
- public:
-  RegionFiles(const Scene& scene, fs::path folder) : scene_(scene), folder_(std::move(folder)) {
-    for (const char* kind : {"moving", "still"}) fs::create_directories(folder_ / kind);
-  }
-
-  void Write(int view, const Image& moving) const {
-    WriteFileAtomic(MovingFile(view), EncodePng8(moving));
-    Image still = moving;
-    for (float& v : still.data) v = 1.0f - v;
-    // A mask that leaves nothing is none: such a frame finds its place by what moves, or not at
-    // all.
-    if (std::all_of(still.data.begin(), still.data.end(), [](float v) { return v == 0.0f; }))
-      return;
-    const Camera& camera = scene_.views[view].captured_camera;
-    WriteFileAtomic(StillFile(view), EncodePng8(ResizeMask(still, camera.width, camera.height)));
-  }
-  fs::path MovingFile(int view) const { return folder_ / "moving" / Name(view); }
-  fs::path StillFile(int view) const { return folder_ / "still" / Name(view); }
-
- private:
-  static std::string Name(int view) { return fmt::format("{:06}.png", view); }
-
-  const Scene& scene_;
-  fs::path folder_;
-};
-
-ShotMotion WriteRegions(const fs::path& frames_root,
-                        const Scene& scene,
-                        const std::vector<int>& shot,
-                        const RegionFiles& files,
-                        StageContext& context) {
-  const ViewImages images(scene, frames_root, kMotionSidePx, kCacheBytes);
-  const auto count = static_cast<int>(shot.size());
-  int done = 0;
-  return FindMovingRegions({count, [&](int frame) { return images.Luminance(shot[frame]); }},
-                           context.pool(),
-                           context.cancel(),
-                           [&](int frame, const Image& moving) {
-                             files.Write(shot[frame], moving);
-                             context.progress().OnProgress(
-                                 ++done, count, "looking for what moves on its own");
-                           });
-}
-
-// Throws what ImportSequence throws.
+// Throws what PlaceSequence and FinishPosedScene throw.
 ImportResult Place(const fs::path& frames_root,
                    const Scene& scene,
                    const std::vector<int>& shot,
-                   const RegionFiles& files,
+                   const MovingRegionFiles& files,
                    ImportOptions options,
                    StageContext& context) {
   options.hold_out_every_eighth = false;  // whoever imports the film does that
   options.hold_out_block = 0.0;
   std::vector<SequenceFrame> frames;
   for (const int view : shot) {
-    const fs::path mask = files.StillFile(view);
     frames.push_back({scene.views[view].name,
                       frames_root / scene.views[view].image_file,
-                      fs::exists(mask) ? mask : fs::path()});
+                      files.StillFile(view)});
   }
-  return ImportSequence(frames, context.scratch_folder() / "poses", options, context.control());
+  ImportResult result =
+      PlaceSequence(frames, context.scratch_folder() / "poses", options, context.control());
+  FinishPosedScene(options, &result);
+  return result;
 }
 
 // The placed frames as views of the film: their own files and moments.
@@ -190,8 +143,8 @@ void FindFilmPoses(const fs::path& frames_root,
         shot.size(),
         scene->views.size()));
   }
-  const RegionFiles files(*scene, context.scratch_folder() / "regions");
-  const ShotMotion motion = WriteRegions(frames_root, *scene, shot, files, context);
+  const MovingRegionFiles files(*scene, context.scratch_folder() / "regions");
+  const ShotMotion motion = WriteMovingRegions(frames_root, *scene, shot, files, context);
   facts->film->motion_energy = motion.moving_share;
   facts->film->background_px = motion.background_px;
   facts->film->camera_stands_still = motion.camera_stands_still;

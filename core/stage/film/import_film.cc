@@ -10,7 +10,6 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/name_order.h"
 #include "core/base/range_check.h"
 #include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
@@ -28,9 +27,6 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kFramesPerSecond = 25.0;  // of pictures, whose times nobody tells
-constexpr double kFocalOfLongerSide = 1.2;
-
 // Pictures of all frames that are wanted, one after the other: sRGB or grey.
 struct FrameStream {
   int count = 0;
@@ -39,11 +35,6 @@ struct FrameStream {
   std::function<std::string(int)> name;
   bool is_video = false;
 };
-
-Camera UnknownCamera(int width, int height) {
-  const double focal = kFocalOfLongerSide * std::max(width, height);
-  return {width, height, focal, focal, 0.5 * width, 0.5 * height};
-}
 
 // Indices of the frames that are asked for.
 std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
@@ -238,14 +229,8 @@ void ImportPictures(const FilmOptions& options,
                     const ImportOptions& import,
                     StageContext& context) {
   const fs::path folder = context.scene_folder() / kFramesFolder;
-  std::vector<std::string> files;
-  for (const std::string& file : ListFiles(folder)) {
-    if (HasImageExtension(file)) files.push_back(file);
-  }
-  std::sort(files.begin(), files.end(), ComesBefore);
-  std::vector<double> times;
-  const double rate = options.frames_per_second.value_or(kFramesPerSecond);
-  for (size_t i = 0; i < files.size(); ++i) times.push_back(static_cast<double>(i) / rate);
+  const std::vector<std::string> files = PicturesIn(folder);
+  const std::vector<double> times = TimesOfPictures(files.size(), options);
   const std::vector<int> wanted = Wanted(times, options);
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());

@@ -43,8 +43,8 @@ struct FilmingCamera {
 
 // What the import stage found out, for the plan and the report.
 struct ImportFacts {
-  std::string
-      layout;  // "photos", "colmap", "transforms", "nerfies", "posed_films", "splat", "film"
+  // "photos", "colmap", "transforms", "nerfies", "posed_films", "films", "splat", "film"
+  std::string layout;
   bool ran_structure_from_motion = false;
   std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
   bool undistorted = false;

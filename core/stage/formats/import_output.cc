@@ -18,6 +18,8 @@ const char* LayoutName(SceneLayout layout) {
       return "nerfies";
     case SceneLayout::kPosedFilms:
       return "posed_films";
+    case SceneLayout::kFilms:
+      return "films";
   }
   return "photos";
 }
@@ -26,7 +28,8 @@ const char* LayoutName(SceneLayout layout) {
 
 void WriteImported(const ImportResult& result,
                    StageContext& context,
-                   const std::map<std::string, std::string>& films) {
+                   const std::map<std::string, std::string>& films,
+                   const std::optional<FilmFindings>& film) {
   CheckStemsAreUnique(result.scene);
   for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
   ImportFacts facts;
@@ -38,6 +41,7 @@ void WriteImported(const ImportResult& result,
   facts.photos_found = result.photos_found;
   facts.photos_registered = result.photos_registered;
   facts.masked_views = result.masked_views;
+  facts.film = film;
   for (const std::string& camera : result.cameras) {
     if (result.cameras.size() < 2) break;
     const auto film = films.find(camera);

@@ -1,37 +1,29 @@
-#include "core/stage/film/import_posed_films.h"
+#include "core/stage/film/footage.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <set>
-#include <string>
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/color/lab.h"
+#include "core/base/files.h"
+#include "core/base/name_order.h"
+#include "core/catalogue/scene_files.h"
+#include "core/image/codec.h"
 #include "core/scene/frame_times.h"
-#include "core/scene/posed_films.h"
 #include "core/stage/film/film_frames.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/formats/import_output.h"
 #include "core/video/film_reader.h"
 
 namespace color3d {
+namespace fs = std::filesystem;
 namespace {
 
-// Of a frame that is shown at nearly the time of the one before it, as in broken films.
 constexpr double kNoMoment = -std::numeric_limits<double>::infinity();
 
-struct Footage {
-  PosedFilm film;
-  std::vector<double> times;  // of all its frames, s since the first of all films; kNoMoment
-  std::vector<int> frames;    // that are asked for, in their order
-};
-
 // The films with the times of their frames on the clock that they share.
-std::vector<Footage> FilmsInTime(StageContext& context) {
+std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& context) {
   std::map<std::string, std::vector<double>> times;
   const auto size_of = [&](const std::string& file) {
     context.cancel().ThrowIfCancelled();
@@ -43,9 +35,15 @@ std::vector<Footage> FilmsInTime(StageContext& context) {
   };
   std::vector<Footage> all;
   double begin_s = std::numeric_limits<double>::infinity();
-  for (PosedFilm& film : ReadPosedFilms(context.scene_folder(), size_of)) {
-    Footage footage{std::move(film), {}, {}};
-    footage.times = times.at(footage.film.file);
+  for (CameraFilm& film : ReadCameraFilms(context.scene_folder(), size_of)) {
+    Footage footage{std::move(film), {}, {}, {}};
+    if (footage.film.is_pictures) {
+      footage.pictures = PicturesIn(context.scene_folder() / footage.film.file);
+      footage.times = TimesOfPictures(footage.pictures.size(), options);
+    } else {
+      if (!times.contains(footage.film.file)) size_of(footage.film.file);
+      footage.times = times.at(footage.film.file);
+    }
     for (double& time_s : footage.times) time_s += footage.film.time_offset_s;
     begin_s = std::min(begin_s, footage.times.front());
     all.push_back(std::move(footage));
@@ -142,8 +140,11 @@ void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageCo
   }
 }
 
-std::vector<Footage> AllFootage(const FilmOptions& options, StageContext& context) {
-  std::vector<Footage> all = FilmsInTime(context);
+}  // namespace
+
+std::vector<Footage> ReadFootage(const FilmOptions& options, StageContext& context) {
+  std::vector<Footage> all = FilmsInTime(options, context);
+  if (all.empty()) return all;
   ChooseFrames(options, &all, context);
   size_t frames = 0;
   double seconds = 0.0;
@@ -156,98 +157,21 @@ std::vector<Footage> AllFootage(const FilmOptions& options, StageContext& contex
   return all;
 }
 
-// Cameras that run at their own rates or begin at odd times share no moment.
-void WarnOfOddTimes(const std::vector<View>& views, size_t longest, StageContext& context) {
-  std::set<double> times;
-  for (const View& view : views) times.insert(view.time_s());
-  if (2 * times.size() <= 3 * longest) return;
-  context.progress().OnWarning(fmt::format(
-      "the cameras' frames were not taken at the same times ({} times, {} frames of one camera): "
-      "are their rates the same?",
-      times.size(),
-      longest));
+FootageReader::FootageReader(const Footage& footage, const StageContext& context)
+    : footage_(footage), file_(context.scene_folder() / footage.film.file) {
+  if (!footage.film.is_pictures) video_ = std::make_unique<FilmReader>(file_);
 }
 
-class PosedFilmImport {
- public:
-  explicit PosedFilmImport(StageContext& context) : context_(context) {}
+FootageReader::~FootageReader() = default;
 
-  void Read(const std::vector<Footage>& all) {
-    for (const Footage& footage : all) count_ += static_cast<int>(footage.frames.size());
-    for (const Footage& footage : all) {
-      FilmReader reader(context_.scene_folder() / footage.film.file);
-      if (reader.facts().interlaced) {
-        context_.progress().OnWarning(footage.film.file +
-                                      " is interlaced: one field of each frame is taken");
-      }
-      for (const int frame : footage.frames) ReadFrame(footage, frame, &reader);
-    }
-    WarnOfFrames(damaged_, "cannot be decoded and are left out", context_);
-    if (views_.empty()) throw InvalidArgument("none of the {} frames can be decoded", count_);
-  }
+bool FootageReader::interlaced() const { return video_ && video_->facts().interlaced; }
 
-  ImportResult Finish(const ImportOptions& options, size_t longest) {
-    ImportResult result;
-    FrameMoments moments = MomentsOf(times_);
-    for (size_t i = 0; i < views_.size(); ++i) views_[i].moment = moments.moments[i];
-    result.cameras = std::move(moments.cameras);
-    if (!moments.note.empty()) result.warnings.push_back(std::move(moments.note));
-    if (views_[0].moment) WarnOfOddTimes(views_, longest, context_);
-    result.layout = SceneLayout::kPosedFilms;
-    result.photos_found = count_;
-    std::sort(
-        views_.begin(), views_.end(), [](const View& x, const View& y) { return x.name < y.name; });
-    result.scene.views = std::move(views_);
-    FinishPosedScene(options, &result);
-    return result;
-  }
+std::string FootageReader::NameOf(int frame) const {
+  return video_ ? fmt::format("f{:06}.png", frame) : footage_.pictures[frame];
+}
 
- private:
-  void ReadFrame(const Footage& footage, int frame, FilmReader* reader) {
-    const PosedFilm& film = footage.film;
-    context_.cancel().ThrowIfCancelled();
-    context_.progress().OnProgress(done_++, count_, "reading frames");
-    View view = film.view;
-    view.name = fmt::format("{}/f{:06}.png", film.camera, frame);
-    view.image_file = artifact::kGivenViews + view.name;
-    try {
-      context_.WriteOutput(view.image_file,
-                           EncodeGrayFrame(LuminanceFromSrgb(reader->Read(frame))));
-    } catch (const Error& e) {
-      if (e.code() != ErrorCode::kDataLoss) throw;
-      damaged_.push_back(view.name);
-      return;
-    }
-    times_.push_back({view.name, film.file, footage.times[frame], film.camera});
-    views_.push_back(std::move(view));
-  }
-
-  StageContext& context_;
-  int count_ = 0, done_ = 0;
-  std::vector<View> views_;
-  std::vector<FrameTime> times_;  // of views_
-  std::vector<std::string> damaged_;
-};
-
-}  // namespace
-
-bool ImportPosedFilms(const ImportOptions& options,
-                      const FilmOptions& film,
-                      StageContext& context) {
-  const std::vector<Footage> all = AllFootage(film, context);
-  if (all.empty()) return false;
-  WarnOfUnusedOptions(film, NoFilm::kPosedFilms, context);
-  size_t longest = 0;
-  std::map<std::string, std::string> films;
-  for (const Footage& footage : all) {
-    longest = std::max(longest, footage.frames.size());
-    films[footage.film.camera] = footage.film.file;
-  }
-  PosedFilmImport import(context);
-  import.Read(all);
-  const ImportResult result = import.Finish(options, longest);
-  WriteImported(result, context, films);
-  return true;
+Image FootageReader::Read(int frame) {
+  return video_ ? video_->Read(frame) : ReadImage(file_ / footage_.pictures[frame]);
 }
 
 }  // namespace color3d

@@ -20,7 +20,7 @@ using testing::Not;
 
 constexpr int kWidth = 96, kHeight = 64;
 
-class ImportPosedFilmsTest : public StageTest {
+class ImportCameraFilmsTest : public StageTest {
  protected:
   // Of one grey that tells camera and frame.
   static double Gray(int camera, int frame) { return 0.2 + 0.2 * camera + 0.02 * frame; }
@@ -87,7 +87,7 @@ class ImportPosedFilmsTest : public StageTest {
   }
 };
 
-TEST_F(ImportPosedFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
+TEST_F(ImportCameraFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
   WriteFilm(0, 12);
   WriteFilm(1, 9);  // cameras of different lengths
   WritePoses(2);
@@ -113,7 +113,7 @@ TEST_F(ImportPosedFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
   EXPECT_EQ(facts.photos_found, 21);
 }
 
-TEST_F(ImportPosedFilmsTest, StridesPartsAndHeldOutCameras) {
+TEST_F(ImportCameraFilmsTest, StridesPartsAndHeldOutCameras) {
   for (int camera = 0; camera < 3; ++camera) WriteFilm(camera, 12);
   WritePoses(3);
   ImportOptions options;
@@ -131,14 +131,14 @@ TEST_F(ImportPosedFilmsTest, StridesPartsAndHeldOutCameras) {
   EXPECT_THAT(Complaint({}, options), HasSubstr("the scene has cam00, cam01, cam02"));
 }
 
-TEST_F(ImportPosedFilmsTest, TooManyFramesOfAllCamerasAreRefusedWithNumbers) {
+TEST_F(ImportCameraFilmsTest, TooManyFramesOfAllCamerasAreRefusedWithNumbers) {
   for (int camera = 0; camera < 2; ++camera) WriteFilm(camera, 1510);
   WritePoses(2);
   EXPECT_THAT(Complaint({}), HasSubstr("3020 frames"));
   EXPECT_THAT(Complaint({}), HasSubstr("take every 2th (film_stride)"));
 }
 
-TEST_F(ImportPosedFilmsTest, OneTimeIsAStillScene) {
+TEST_F(ImportCameraFilmsTest, OneTimeIsAStillScene) {
   for (int camera = 0; camera < 3; ++camera) WriteFilm(camera, 4);
   WritePoses(3);
   const Scene scene = Import({.stride = 100});
@@ -147,7 +147,7 @@ TEST_F(ImportPosedFilmsTest, OneTimeIsAStillScene) {
   EXPECT_THAT(observer_.text, HasSubstr("stands still"));
 }
 
-TEST_F(ImportPosedFilmsTest, OddRatesAreTold) {
+TEST_F(ImportCameraFilmsTest, OddRatesAreTold) {
   WriteFilm(0, 8, 10);
   WriteFilm(1, 8, 17);
   WritePoses(2);
@@ -155,7 +155,7 @@ TEST_F(ImportPosedFilmsTest, OddRatesAreTold) {
   EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times"));
 }
 
-TEST_F(ImportPosedFilmsTest, ClocksThatAreOffAreSetByTheirOffset) {
+TEST_F(ImportCameraFilmsTest, ClocksThatAreOffAreSetByTheirOffset) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
   WriteTransforms("\"time_offset\":-0.25,");
@@ -187,7 +187,7 @@ FramesAt FramesOf(const Scene& scene) {
   return frames;
 }
 
-TEST_F(ImportPosedFilmsTest, AStrideTakesTheSameMomentsOfCamerasThatBeganApart) {
+TEST_F(ImportCameraFilmsTest, AStrideTakesTheSameMomentsOfCamerasThatBeganApart) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
   WriteTransforms("\"time_offset\":0.1,");  // one frame
@@ -198,7 +198,7 @@ TEST_F(ImportPosedFilmsTest, AStrideTakesTheSameMomentsOfCamerasThatBeganApart) 
           {"cam01", {{0.2, "f000001"}, {0.4, "f000003"}, {0.6, "f000005"}, {0.8, "f000007"}}}}));
 }
 
-TEST_F(ImportPosedFilmsTest, AStrideTakesTheSameMomentsWhereOneCameraDroppedAFrame) {
+TEST_F(ImportCameraFilmsTest, AStrideTakesTheSameMomentsWhereOneCameraDroppedAFrame) {
   WriteFilm(0, 8);
   WriteFilmWithout(1, 8, 3);
   WriteTransforms("");
@@ -209,7 +209,7 @@ TEST_F(ImportPosedFilmsTest, AStrideTakesTheSameMomentsWhereOneCameraDroppedAFra
           {"cam01", {{0.0, "f000000"}, {0.2, "f000002"}, {0.4, "f000003"}, {0.6, "f000005"}}}}));
 }
 
-TEST_F(ImportPosedFilmsTest, APartIsTheSameOfCamerasThatBeganApart) {
+TEST_F(ImportCameraFilmsTest, APartIsTheSameOfCamerasThatBeganApart) {
   WriteFilm(0, 9);
   WriteFilm(1, 9);
   WriteTransforms("\"time_offset\":0.3,");
@@ -221,7 +221,7 @@ TEST_F(ImportPosedFilmsTest, APartIsTheSameOfCamerasThatBeganApart) {
                         "(film_begin_s, film_end_s, film_stride); it runs from 0.30 to 1.10 s"));
 }
 
-TEST_F(ImportPosedFilmsTest, CamerasThatShareNoMomentsCountTheirOwnFrames) {
+TEST_F(ImportCameraFilmsTest, CamerasThatShareNoMomentsCountTheirOwnFrames) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
   WriteTransforms("\"time_offset\":0.05,");  // always between two frames of the other
@@ -230,7 +230,7 @@ TEST_F(ImportPosedFilmsTest, CamerasThatShareNoMomentsCountTheirOwnFrames) {
   EXPECT_EQ(frames.at("cam01").size(), 4u);
 }
 
-TEST_F(ImportPosedFilmsTest, OddTimesAreToldBesideWhatIsSaidOfTheClock) {
+TEST_F(ImportCameraFilmsTest, OddTimesAreToldBesideWhatIsSaidOfTheClock) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
   WriteTransforms("\"time_offset\":0.72,");
@@ -239,7 +239,7 @@ TEST_F(ImportPosedFilmsTest, OddTimesAreToldBesideWhatIsSaidOfTheClock) {
   EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times (15 times, 8 frames"));
 }
 
-TEST_F(ImportPosedFilmsTest, OptionsOfNoUseAreTold) {
+TEST_F(ImportCameraFilmsTest, OptionsOfNoUseAreTold) {
   for (int camera = 0; camera < 2; ++camera) WriteFilm(camera, 4);
   WritePoses(2);
   Import({.stride = 2});
@@ -249,7 +249,7 @@ TEST_F(ImportPosedFilmsTest, OptionsOfNoUseAreTold) {
               HasSubstr("film_frames_per_second, film_deflicker, film_poses are left aside"));
 }
 
-TEST_F(ImportPosedFilmsTest, FilmsThatAreNoneAreRefusedByName) {
+TEST_F(ImportCameraFilmsTest, FilmsThatAreNoneAreRefusedByName) {
   WriteFilm(0, 4);
   WriteFileAtomic(scratch_.path() / "cam01.mp4", "no film");
   WritePoses(2);

@@ -1,4 +1,4 @@
-#include "core/scene/posed_films.h"
+#include "core/scene/camera_films.h"
 
 #include <fmt/core.h>
 
@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
+#include "core/image/probe/probe.h"
 #include "core/scene/formats/poses_bounds.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/photos.h"
@@ -27,16 +28,16 @@ std::string FileOf(const FrameFields& frame) {
   return file;
 }
 
-void FitToFilm(const std::pair<int, int>& size, PosedFilm* film) {
+void FitToFilm(const std::pair<int, int>& size, CameraFilm* film) {
   const auto [width, height] = size;
   FitViewToPhoto({film->file, film->file, width, height, 1, width, height}, &film->view);
 }
 
-PosedFilm ReadFilm(const FrameFields& own,
+CameraFilm ReadFilm(const FrameFields& own,
                    const FrameFields& fields,
                    const fs::path& scene_folder,
                    const FilmSize& size) {
-  PosedFilm film;
+  CameraFilm film;
   film.file = FileOf(fields);
   if (!IsSafeRelativePath(film.file)) {
     throw InvalidArgument("{}: {} is no path below the scene's folder", fields.place(), film.file);
@@ -48,14 +49,16 @@ PosedFilm ReadFilm(const FrameFields& own,
   film.camera = own.TextOr("camera", fs::path(film.file).stem().string());
   film.time_offset_s = own.NumberOr("time_offset", 0.0);
   const auto [width, height] = size(film.file);
+  film.has_pose = own.Find("transform_matrix") != nullptr;
+  if (!film.has_pose) return film;
   ReadFrameCamera(fields, width, height, &film.view);
   FitToFilm({width, height}, &film);
   return film;
 }
 
-std::vector<PosedFilm> FilmsOfTransforms(const fs::path& scene_folder, const FilmSize& size) {
+std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const FilmSize& size) {
   const json root = ParseFrames(ReadFile(scene_folder / kTransforms), kTransforms);
-  std::vector<PosedFilm> films;
+  std::vector<CameraFilm> films;
   std::string photo;
   for (size_t i = 0; i < root["frames"].size(); ++i) {
     const json& frame = root["frames"][i];
@@ -84,9 +87,17 @@ std::vector<PosedFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fil
   return films;
 }
 
-void CheckFilms(const std::vector<PosedFilm>& films, const std::string& from) {
+void CheckFilms(const std::vector<CameraFilm>& films, const std::string& from) {
   std::set<std::string> cameras, files;
-  for (const PosedFilm& film : films) {
+  for (const CameraFilm& film : films) {
+    if (film.has_pose != films[0].has_pose) {
+      const CameraFilm& without = film.has_pose ? films[0] : film;
+      throw InvalidArgument(
+          "{}: {} has no transform_matrix, but others have one; give it to every film, or to none: "
+          "then all are looked for",
+          from,
+          without.file);
+    }
     if (!files.insert(film.file).second) {
       throw InvalidArgument("{} names the film {} twice", from, film.file);
     }
@@ -102,6 +113,9 @@ void CheckFilms(const std::vector<PosedFilm>& films, const std::string& from) {
           film.camera);
     }
   }
+  if (films.size() < 2 && !films[0].has_pose) {
+    throw InvalidArgument("{} names one film; colour it as a film, without {}", from, from);
+  }
   if (films.size() < 2) {
     throw InvalidArgument(
         "{} has the pose of one film; a camera that stands still tells no depth. "
@@ -111,25 +125,74 @@ void CheckFilms(const std::vector<PosedFilm>& films, const std::string& from) {
   }
 }
 
+// The folders in frames/, each a camera's; nothing where there is one, or none.
+std::vector<CameraFilm> FoldersOfPictures(const std::vector<std::string>& files) {
+  std::set<std::string> folders;
+  std::string direct;
+  for (const std::string& file : files) {
+    if (!IsFrameFile(file) || !HasImageExtension(file)) continue;
+    const size_t slash = file.rfind('/');
+    if (slash < kFramesFolder.size()) {
+      direct = file;
+    } else {
+      folders.insert(file.substr(0, slash));
+    }
+  }
+  if (!folders.empty() && !direct.empty()) {
+    throw InvalidArgument(
+        "{} lies beside the folder {}; give each camera's frames a folder, or all frames of one "
+        "camera without folders",
+        direct,
+        *folders.begin());
+  }
+  std::vector<CameraFilm> films;
+  if (folders.size() < 2) return films;
+  for (const std::string& folder : folders) {
+    films.push_back({.camera = folder.substr(kFramesFolder.size()),
+                     .file = folder,
+                     .has_pose = false,
+                     .is_pictures = true});
+  }
+  return films;
+}
+
+// Those of a folder that holds nothing else to look at.
+std::vector<CameraFilm> FilmsAlone(const std::vector<std::string>& files) {
+  std::vector<CameraFilm> films;
+  for (const std::string& file : files) {
+    if (IsAugmentFile(file) || IsMaskFile(file)) continue;
+    if (HasImageExtension(file)) return {};
+    if (!HasFilmExtension(file)) continue;
+    films.push_back({.camera = fs::path(file).stem().string(), .file = file, .has_pose = false});
+  }
+  if (films.size() < 2) films.clear();
+  return films;
+}
+
 }  // namespace
 
-std::vector<PosedFilm> ReadPosedFilms(const fs::path& scene_folder, const FilmSize& size_of) {
-  std::vector<PosedFilm> films;
+std::vector<CameraFilm> ReadCameraFilms(const fs::path& scene_folder, const FilmSize& size_of) {
   std::error_code error;
-  if (!fs::is_directory(scene_folder, error)) return films;
+  if (!fs::is_directory(scene_folder, error)) return {};
   const std::vector<std::string> files = ListFiles(scene_folder);
-  if (std::none_of(files.begin(), files.end(), HasFilmExtension)) return films;
-  std::string from = kTransforms;
-  if (fs::is_regular_file(scene_folder / kTransforms, error)) {
-    films = FilmsOfTransforms(scene_folder, size_of);
-  } else if (fs::is_regular_file(scene_folder / kPosesBounds, error)) {
-    from = kPosesBounds;
-    films = ReadPosesBounds(scene_folder);
-    for (PosedFilm& film : films) FitToFilm(size_of(film.file), &film);
+  std::vector<CameraFilm> films = FoldersOfPictures(files);
+  std::string from = "frames/";
+  if (films.empty() && std::any_of(files.begin(), files.end(), HasFilmExtension)) {
+    if (fs::is_regular_file(scene_folder / kTransforms, error)) {
+      from = kTransforms;
+      films = FilmsOfTransforms(scene_folder, size_of);
+    } else if (fs::is_regular_file(scene_folder / kPosesBounds, error)) {
+      from = kPosesBounds;
+      films = ReadPosesBounds(scene_folder);
+      for (CameraFilm& film : films) FitToFilm(size_of(film.file), &film);
+    } else {
+      from = "the scene";
+      films = FilmsAlone(files);
+    }
   }
   if (films.empty()) return films;
   CheckFilms(films, from);
-  std::sort(films.begin(), films.end(), [](const PosedFilm& x, const PosedFilm& y) {
+  std::sort(films.begin(), films.end(), [](const CameraFilm& x, const CameraFilm& y) {
     return x.camera < y.camera;
   });
   return films;

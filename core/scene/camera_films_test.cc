@@ -1,4 +1,4 @@
-#include "core/scene/posed_films.h"
+#include "core/scene/camera_films.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -28,16 +28,16 @@ std::vector<double> PosesOfThree() {
   return rows;
 }
 
-class PosedFilms : public testing::Test {
+class CameraFilms : public testing::Test {
  protected:
   void Touch(const std::string& name) {
     fs::create_directories((folder_.path() / name).parent_path());
     WriteFileAtomic(folder_.path() / name, "film");
   }
-  std::vector<PosedFilm> Read() {
-    return ReadPosedFilms(folder_.path(), [](const std::string&) { return std::pair(48, 32); });
+  std::vector<CameraFilm> Read() {
+    return ReadCameraFilms(folder_.path(), [](const std::string&) { return std::pair(48, 32); });
   }
-  std::vector<PosedFilm> Read(const std::string& frames) {
+  std::vector<CameraFilm> Read(const std::string& frames) {
     WriteFileAtomic(folder_.path() / "transforms.json",
                     "{\"fl_x\":60,\"w\":96,\"h\":64,\"frames\":[" + frames + "]}");
     return Read();
@@ -56,7 +56,7 @@ class PosedFilms : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(PosedFilms, ATransformsJsonNamesThem) {
+TEST_F(CameraFilms, ATransformsJsonNamesThem) {
   EXPECT_TRUE(Read().empty());
   EXPECT_TRUE(Read(Frame("a.png")).empty());
   Touch("films/b.mp4");
@@ -78,7 +78,7 @@ TEST_F(PosedFilms, ATransformsJsonNamesThem) {
       -1.5);
 }
 
-TEST_F(PosedFilms, WrongTransformsAreRefusedByName) {
+TEST_F(CameraFilms, WrongTransformsAreRefusedByName) {
   Touch("a.mp4");
   Touch("b.mp4");
   EXPECT_THAT(Said(Frame("a.mp4") + "," + Frame("c.mp4")), HasSubstr("there is no film c.mp4"));
@@ -97,7 +97,7 @@ TEST_F(PosedFilms, WrongTransformsAreRefusedByName) {
   EXPECT_THAT(Said(Frame("a.mp4", "\"h\":96,") + "," + Frame("b.mp4")), HasSubstr("96 x 96 px"));
 }
 
-TEST_F(PosedFilms, RowsOfPosesBoundsAreTheFilmsByName) {
+TEST_F(CameraFilms, RowsOfPosesBoundsAreTheFilmsByName) {
   const std::string poses = NpyOf({3, 17}, PosesOfThree());
   WriteFileAtomic(folder_.path() / "poses_bounds.npy", poses);
   EXPECT_TRUE(Read().empty());  // LLFF's photos: not read
@@ -113,7 +113,7 @@ TEST_F(PosedFilms, RowsOfPosesBoundsAreTheFilmsByName) {
   EXPECT_NEAR(view.camera.cy, 16.0, 1e-9);
 }
 
-TEST_F(PosedFilms, WrongPosesBoundsAreRefused) {
+TEST_F(CameraFilms, WrongPosesBoundsAreRefused) {
   for (const char* name : {"cam00.mp4", "cam01.mp4", "cam02.mp4"}) Touch(name);
   std::vector<double> rows = PosesOfThree();
   const std::string good = NpyOf({3, 17}, rows);
@@ -154,6 +154,42 @@ TEST(Npy, OrdersAndTypes) {
     } catch (const Error&) {
     }
   }
+}
+
+TEST_F(CameraFilms, WithoutPosesTheyAreAllLookedFor) {
+  Touch("b.mp4");
+  EXPECT_TRUE(Read().empty()) << "one film is a film";
+  Touch("a.mp4");
+  std::vector<CameraFilm> films = Read();
+  ASSERT_EQ(films.size(), 2u);
+  EXPECT_EQ(films[0].camera, "a");
+  EXPECT_FALSE(films[0].has_pose || films[0].is_pictures);
+  const auto unposed = [](const std::string& file, const std::string& more) {
+    return "{\"file_path\":\"" + file + "\"" + more + "}";
+  };
+  films = Read(unposed("a.mp4", "") + "," + unposed("b.mp4", ",\"time_offset\":0.25"));
+  ASSERT_EQ(films.size(), 2u);
+  EXPECT_FALSE(films[1].has_pose);
+  EXPECT_EQ(films[1].time_offset_s, 0.25);
+  EXPECT_THAT(Said(unposed("a.mp4", "") + "," + Frame("b.mp4")),
+              HasSubstr("a.mp4 has no transform_matrix, but others have one"));
+  EXPECT_THAT(Said(unposed("a.mp4", "")), HasSubstr("names one film; colour it as a film"));
+  fs::remove(folder_.path() / "transforms.json");
+  Touch("photo.png");
+  EXPECT_TRUE(Read().empty()) << "photos are the scene";
+}
+
+TEST_F(CameraFilms, FoldersOfPicturesAreCameras) {
+  Touch("frames/left/1.png");
+  EXPECT_TRUE(Read().empty()) << "one folder is a film";
+  Touch("frames/right/1.png");
+  const std::vector<CameraFilm> films = Read();
+  ASSERT_EQ(films.size(), 2u);
+  EXPECT_EQ(films[1].camera, "right");
+  EXPECT_EQ(films[1].file, "frames/right");
+  EXPECT_TRUE(films[1].is_pictures && !films[1].has_pose);
+  Touch("frames/2.png");
+  EXPECT_THAT(Refusal([&] { Read(); }), HasSubstr("frames/2.png lies beside the folder frames/"));
 }
 
 }  // namespace
