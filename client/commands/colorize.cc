@@ -75,9 +75,10 @@ class Colorize {
     }
     if (options_.benchmark && !folder_.camera_films.empty()) {
       throw InvalidArgument(
-          "--benchmark needs the frames of {} as pictures, named in transforms.json with their "
-          "times",
-          folder_.camera_films[0].file.string());
+          "--benchmark needs the frames of {} as pictures{}",
+          folder_.camera_films[0].file.string(),
+          folder_.model_files.empty() ? ", each camera's in a folder of its own, with --film"
+                                      : ", named in transforms.json with their times");
     }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);

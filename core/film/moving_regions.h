@@ -1,5 +1,5 @@
-// What moves on its own in a film, told from what only the camera moves (METHOD.md "Poses of a
-// film"): the residual of optical flow against the epipolar geometry of two frames. Pure functions,
+// What moves on its own in a film, told from what only the camera moves (METHOD.md "Poses of
+// films"): the residual of optical flow against the epipolar geometry of two frames. Pure functions,
 // thread-safe.
 #pragma once
 
