@@ -74,11 +74,11 @@ class Colorize {
           folder_.film->file.string());
     }
     if (options_.benchmark && !folder_.camera_films.empty()) {
-      throw InvalidArgument(
-          "--benchmark needs the frames of {} as pictures{}",
-          folder_.camera_films[0].file.string(),
-          folder_.model_files.empty() ? ", each camera's in a folder of its own, with --film"
-                                      : ", named in transforms.json with their times");
+      throw InvalidArgument("--benchmark needs the frames of {} as pictures{}",
+                            folder_.camera_films[0].file.string(),
+                            folder_.model_files.empty()
+                                ? ", each camera's in a folder of its own, with --film"
+                                : ", named in transforms.json with their times");
     }
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);

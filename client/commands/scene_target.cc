@@ -20,15 +20,15 @@ std::string UploadFolder(Connection& connection,
       UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
         display.OnTransfer("uploading", done, total);
       });
-  display.Say(folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
-              : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
-              : !folder.camera_films.empty()
-                  ? fmt::format("{}: {} films of cameras{}",
-                                scene.name(),
-                                folder.camera_films.size(),
-                                folder.model_files.empty() ? "; their poses are looked for"
-                                                           : " with poses")
-                  : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
+  display.Say(
+      folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
+      : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
+      : !folder.camera_films.empty()
+          ? fmt::format("{}: {} films of cameras{}",
+                        scene.name(),
+                        folder.camera_films.size(),
+                        folder.model_files.empty() ? "; their poses are looked for" : " with poses")
+          : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }
 

@@ -81,10 +81,11 @@ void DeclareImportFlags(CLI::App& app, ColorizeOptions* o) {
   app.add_flag("--deflicker",
                o->deflicker,
                "Take flicker of exposure out of a film; the coloured frames get steady luminance");
-  app.add_flag("--poses",
-               o->poses,
-               "Of a film by one moving camera: find the frames' poses by what stands still (those of "
-               "several are found anyway)");
+  app.add_flag(
+      "--poses",
+      o->poses,
+      "Of a film by one moving camera: find the frames' poses by what stands still (those of "
+      "several are found anyway)");
 }
 
 std::string ComplaintOfImport(const std::string& setting) {
@@ -308,11 +309,11 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
       o->bound,
       "With --benchmark: also score the same geometry under the true colours of all views");
   app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
-  app.add_flag(
-      "--film",
-      o->film,
-      "The photos are frames of a film: coloured one by one, not reconstructed; folders of them are "
-      "of several cameras: one scene that moves");
+  app.add_flag("--film",
+               o->film,
+               "The photos are frames of a film: coloured one by one, not reconstructed; folders "
+               "of them are "
+               "of several cameras: one scene that moves");
   DeclareImportFlags(app, o);
   app.add_flag("--detach", o->detach, "Return when the job is submitted");
   app.add_option("--notify",

@@ -1,6 +1,6 @@
 // What moves on its own in a film, told from what only the camera moves (METHOD.md "Poses of
-// films"): the residual of optical flow against the epipolar geometry of two frames. Pure functions,
-// thread-safe.
+// films"): the residual of optical flow against the epipolar geometry of two frames. Pure
+// functions, thread-safe.
 #pragma once
 
 #include <functional>

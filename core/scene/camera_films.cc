@@ -34,9 +34,9 @@ void FitToFilm(const std::pair<int, int>& size, CameraFilm* film) {
 }
 
 CameraFilm ReadFilm(const FrameFields& own,
-                   const FrameFields& fields,
-                   const fs::path& scene_folder,
-                   const FilmSize& size) {
+                    const FrameFields& fields,
+                    const fs::path& scene_folder,
+                    const FilmSize& size) {
   CameraFilm film;
   film.file = FileOf(fields);
   if (!IsSafeRelativePath(film.file)) {

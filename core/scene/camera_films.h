@@ -29,7 +29,8 @@ using FilmSize = std::function<std::pair<int, int>(const std::string& file)>;
 // - a transforms.json whose frames name films, one each, with a pose, or none of them with one, and
 //   no time, but perhaps with a `time_offset` in seconds, where the cameras' clocks differ or one
 //   began later;
-// - a poses_bounds.npy (LLFF, as DyNeRF and Neural 3D Video have it) with as many films beside it as
+// - a poses_bounds.npy (LLFF, as DyNeRF and Neural 3D Video have it) with as many films beside it
+// as
 //   it has rows, in the order of their names;
 // - films without such a file and without photos, or folders of pictures in frames/: no poses.
 // Throws Error{kInvalidArgument}: films and photos in one file, some films with a pose and some

@@ -92,9 +92,9 @@ struct SequenceFrame {
 // names, in their order; those that found no place are missing. image_file and mask_file are the
 // paths given. What FinishPosedScene does is left to the caller. Throws Error as ImportScene.
 ImportResult PlaceSequence(const std::vector<SequenceFrame>& frames,
-                            const std::filesystem::path& scratch_folder,
-                            const ImportOptions& options,
-                            const RunControl& run);
+                           const std::filesystem::path& scratch_folder,
+                           const ImportOptions& options,
+                           const RunControl& run);
 
 // What ImportScene does to every scene once its views have poses: the checks, the coordinates, the
 // points where there are none, what is held out.

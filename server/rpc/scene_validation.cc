@@ -317,8 +317,7 @@ SceneCheck CheckScene(const SceneRecord& scene,
   } else if (check.layout == StoredLayout::kFilm || check.layout == StoredLayout::kFilms) {
     if (CountFilms(scene.files) > 0 && check.photo_count > 0) {
       violations.push_back(
-          {"",
-           "the scene holds pictures in frames/ and video files; give one of them"});
+          {"", "the scene holds pictures in frames/ and video files; give one of them"});
     }
   } else if (missing == 0 && check.photo_count == 0 && CountFilms(scene.files) == 0) {
     violations.push_back({"",

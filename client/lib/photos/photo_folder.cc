@@ -362,11 +362,12 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
 void TakeAsFrames(PhotoFolder* folder) {
   if (folder->film) return;
   if (!folder->camera_films.empty()) {
-    throw InvalidArgument("{} has {} films, of one camera each; give one of them (e.g. {}), or "
-                          "leave --film out: they become one scene",
-                          folder->root.string(),
-                          folder->camera_films.size(),
-                          folder->camera_films[0].file.string());
+    throw InvalidArgument(
+        "{} has {} films, of one camera each; give one of them (e.g. {}), or "
+        "leave --film out: they become one scene",
+        folder->root.string(),
+        folder->camera_films.size(),
+        folder->camera_films[0].file.string());
   }
   if (folder->photos.empty()) {
     throw InvalidArgument("{} has no pictures that could be frames of a film",
@@ -378,7 +379,8 @@ void TakeAsFrames(PhotoFolder* folder) {
   if (cameras.size() > 1 &&
       (cameras.contains(folder->root) || cameras.contains(folder->root / "images"))) {
     throw InvalidArgument(
-        "{} has pictures beside folders of pictures; give one camera's frames, or each camera's in a "
+        "{} has pictures beside folders of pictures; give one camera's frames, or each camera's in "
+        "a "
         "folder of its own",
         folder->root.string());
   }

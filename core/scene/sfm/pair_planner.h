@@ -37,9 +37,9 @@ PairPlan PairsInSequence(const std::vector<int>& camera);
 // camera, spread evenly. Ascending; empty where there is one camera.
 std::vector<int> FramesToCompare(const std::vector<int>& camera);
 
-// Adds the pairs across cameras: each of the frames `compared` with the 4 of every other camera that
-// are most like it, where they clearly are, and of every two cameras the 8 likest pairs at any rate.
-// `similarity` is of `compared`.
+// Adds the pairs across cameras: each of the frames `compared` with the 4 of every other camera
+// that are most like it, where they clearly are, and of every two cameras the 8 likest pairs at any
+// rate. `similarity` is of `compared`.
 void AddPairsAcross(const std::vector<int>& camera,
                     const std::vector<int>& compared,
                     const SimilarityTable& similarity,

@@ -121,7 +121,8 @@ void RequireTwo(const std::vector<FramesOfCamera>& cameras,
   }
   if (staying < 2) {
     throw InvalidArgument(
-        "the cameras' places could not be joined: {} (frames that found a place among those of {}). "
+        "the cameras' places could not be joined: {} (frames that found a place among those of "
+        "{}). "
         "Cameras must see much of the same still things, from places that are not too far apart. "
         "Tell where they stood (transforms.json), or colour each film on its own",
         go,
@@ -138,7 +139,8 @@ Scene SceneOf(const Scene& placed,
               const std::vector<Sighting>& seen,
               const std::vector<double>& shares) {
   std::map<std::string, int> index;  // of a placed picture
-  for (size_t i = 0; i < placed.views.size(); ++i) index[placed.views[i].name] = static_cast<int>(i);
+  for (size_t i = 0; i < placed.views.size(); ++i)
+    index[placed.views[i].name] = static_cast<int>(i);
   std::vector<std::pair<View, int>> views;  // and the picture that it has its pose of
   for (size_t c = 0; c < seen.size(); ++c) {
     if (shares[c] < kEnough) continue;

@@ -25,8 +25,8 @@ struct Footage {
   std::vector<int> frames;  // that are asked for, in their order
 };
 
-// Empty when the scene has no films of several cameras (scene/camera_films.h). Moments, a part and a
-// stride of them, are asked for on the time that all cameras share; of frames where their clocks
+// Empty when the scene has no films of several cameras (scene/camera_films.h). Moments, a part and
+// a stride of them, are asked for on the time that all cameras share; of frames where their clocks
 // share no moments. Warns of clocks that differ. Throws Error{kInvalidArgument}: what
 // ReadCameraFilms refuses, a film without a frame that is asked for, more than kMaxFilmFrames in
 // all.

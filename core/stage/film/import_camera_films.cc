@@ -50,7 +50,8 @@ class CameraFilmsImport {
   ImportResult Import(const ImportOptions& options) {
     for (const Footage& footage : all_) ReadFilm(footage);
     WarnOfFrames(damaged_, "cannot be decoded and are left out", context_);
-    if (frames_.views.empty()) throw InvalidArgument("none of the {} frames can be decoded", count_);
+    if (frames_.views.empty())
+      throw InvalidArgument("none of the {} frames can be decoded", count_);
     ImportResult result;
     if (all_[0].film.has_pose) {
       result.scene = std::move(frames_);
@@ -131,7 +132,8 @@ class CameraFilmsImport {
       if (shots.fault[i] != FrameFault::kNone) continue;
       if (last >= 0 && shots.shot[i] != last) {
         throw InvalidArgument(
-            "{} is cut before {}: where the poses of several cameras are looked for, each film must "
+            "{} is cut before {}: where the poses of several cameras are looked for, each film "
+            "must "
             "be one shot; take a part of one (film_begin_s, film_end_s), or cut the films",
             camera.film,
             frames_.views[camera.views[i]].name);
@@ -172,9 +174,9 @@ class CameraFilmsImport {
   const std::vector<Footage>& all_;
   StageContext& context_;
   int count_ = 0, done_ = 0;
-  Scene frames_;                             // views of all cameras
-  std::vector<FramesOfCamera> cameras_;      // of frames_, where poses are looked for
-  std::map<std::string, FrameTime> times_;   // by the view's name
+  Scene frames_;                            // views of all cameras
+  std::vector<FramesOfCamera> cameras_;     // of frames_, where poses are looked for
+  std::map<std::string, FrameTime> times_;  // by the view's name
   std::vector<std::string> damaged_;
   std::optional<FilmFindings> findings_;
 };

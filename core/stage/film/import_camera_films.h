@@ -14,6 +14,8 @@ namespace color3d {
 // Decodes one frame at a time. Frames that cannot be decoded are left out and named in a warning.
 // Throws Error{kInvalidArgument}: what ReadFootage, PlaceCameras and FinishPosedScene refuse; films
 // that are cut, where poses are looked for.
-bool ImportCameraFilms(const ImportOptions& options, const FilmOptions& film, StageContext& context);
+bool ImportCameraFilms(const ImportOptions& options,
+                       const FilmOptions& film,
+                       StageContext& context);
 
 }  // namespace color3d

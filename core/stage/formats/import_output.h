@@ -12,7 +12,8 @@
 namespace color3d {
 
 // Tells the warnings, and leaves kScene, kImportFacts and, where there is one, kSfmLog. `films`: by
-// camera, those that its frames are of; `film`: what looking for their poses found. Throws as CheckStemsAreUnique.
+// camera, those that its frames are of; `film`: what looking for their poses found. Throws as
+// CheckStemsAreUnique.
 void WriteImported(const ImportResult& result,
                    StageContext& context,
                    const std::map<std::string, std::string>& films = {},
