@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "core/stage/film/import_film.h"
 #include "core/stage/stages.h"
+#include "core/video/mp4_writer.h"
 #include "tests/support/scenes/test_scenes.h"
 #include "tests/support/scenes/textured_corner.h"
 #include "tests/support/stages/stage_fixture.h"
@@ -111,6 +113,34 @@ TEST_F(CameraPosesTest, CamerasFindTheirPlacesButForOneThatSawAnother) {
     for (const int view : point.views) standing += view >= 2 * kFrames;
     EXPECT_TRUE(standing == 0 || standing == kFrames) << standing;
   }
+}
+
+TEST_F(CameraPosesTest, VideoFilesWithAnOffsetBetweenTheirClocks) {
+  ThreadPool pool(1);
+  for (const std::string camera : {"left", "right"}) {
+    const Camera lens = LensOf(camera);
+    Mp4Writer writer(
+        scratch_.path() / (camera + ".mp4"),
+        {.width = lens.width, .height = lens.height, .frames_per_second = 10, .threads = 1});
+    for (int i = 0; i < kFrames; ++i) {
+      const Image gray = RenderCorner(lens, PoseOf(camera, i), BoardAt(i));
+      Image srgb(gray.width, gray.height, 3);
+      for (int c = 0; c < 3; ++c) std::copy(gray.data.begin(), gray.data.end(), srgb.Plane(c));
+      writer.Add(srgb, pool);
+    }
+    writer.Finish();
+  }
+  WriteFileAtomic(scratch_.path() / "transforms.json",
+                  R"({"frames":[{"file_path":"left.mp4"},
+                                {"file_path":"right.mp4","time_offset":0.2}]})");
+  const Scene scene = Import();
+  ASSERT_EQ(scene.views.size(), 2u * kFrames) << observer_.text;
+  const View& view = scene.views[kFrames + 1];
+  EXPECT_EQ(view.name, "right/f000001.png");
+  EXPECT_NEAR(view.moment->time_s, 0.3, 1e-6);
+  EXPECT_EQ(view.moment->time_s, scene.views[3].moment->time_s);
+  EXPECT_EQ(ReadImage(scratch_.path() / "out" / view.image_file).width, kSecond.width);
+  EXPECT_EQ(facts_.cameras[1].film, "right.mp4");
 }
 
 TEST_F(CameraPosesTest, CamerasThatShareNothingAreRefusedWithTheRemedy) {
