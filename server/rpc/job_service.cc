@@ -200,7 +200,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::GetJob(grpc::CallbackServerContext* co
                                                  const v1::GetJobRequest* request,
                                                  v1::Job* response) {
   return AnswerRead(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
+      parts_, context, request, response, [](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
         *out = ToWaitingProto(call.store, call.store.GetJob(in.name()));
       });
@@ -213,7 +213,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::ListJobs(grpc::CallbackServerContext* 
                     context,
                     request,
                     response,
-                    [this](const Call& call, const auto& in, v1::ListJobsResponse* out) {
+                    [](const Call& call, const auto& in, v1::ListJobsResponse* out) {
                       ListJobPage(call.store, in, out);
                     });
 }
@@ -222,7 +222,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext*
                                                     const v1::CancelJobRequest* request,
                                                     v1::Job* response) {
   return AnswerWrite(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
+      parts_, context, request, response, [](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
         *out = ToProto(call.store.Cancel(in.name(), KeyOf("CancelJob", in)));
         spdlog::info("[job={}] cancellation asked for", in.name());
@@ -250,7 +250,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext*
                      context,
                      request,
                      response,
-                     [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
+                     [](const Call& call, const auto& in, v1::DeleteJobResponse*) {
                        CheckName(in.name(), "jobs");
                        call.store.Delete(in.name(), KeyOf("DeleteJob", in));
                      });
