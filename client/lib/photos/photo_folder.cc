@@ -380,8 +380,7 @@ void TakeAsFrames(PhotoFolder* folder) {
       (cameras.contains(folder->root) || cameras.contains(folder->root / "images"))) {
     throw InvalidArgument(
         "{} has pictures beside folders of pictures; give one camera's frames, or each camera's in "
-        "a "
-        "folder of its own",
+        "a folder of its own",
         folder->root.string());
   }
   std::set<std::string> names;

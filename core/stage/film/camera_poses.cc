@@ -122,8 +122,8 @@ void RequireTwo(const std::vector<FramesOfCamera>& cameras,
   if (staying < 2) {
     throw InvalidArgument(
         "the cameras' places could not be joined: {} (frames that found a place among those of "
-        "{}). "
-        "Cameras must see much of the same still things, from places that are not too far apart. "
+        "{}). Cameras must see much of the same still things, from places that are not too far "
+        "apart. "
         "Tell where they stood (transforms.json), or colour each film on its own",
         go,
         stay.empty() ? "the others" : stay);

@@ -8,9 +8,6 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/base/files.h"
-#include "core/base/name_order.h"
-#include "core/catalogue/scene_files.h"
 #include "core/image/codec.h"
 #include "core/scene/frame_times.h"
 #include "core/stage/film/film_frames.h"

@@ -54,6 +54,9 @@ class CameraFilmsImport {
       throw InvalidArgument("none of the {} frames can be decoded", count_);
     ImportResult result;
     if (all_[0].film.has_pose) {
+      std::sort(frames_.views.begin(), frames_.views.end(), [](const View& x, const View& y) {
+        return x.name < y.name;
+      });
       result.scene = std::move(frames_);
       result.layout = SceneLayout::kPosedFilms;
     } else {
@@ -62,9 +65,6 @@ class CameraFilmsImport {
     }
     result.photos_found = count_;
     TellMoments(&result);
-    std::sort(result.scene.views.begin(),
-              result.scene.views.end(),
-              [](const View& x, const View& y) { return x.name < y.name; });
     FinishPosedScene(options, &result);
     KeepFrames(result.scene);
     return result;
@@ -133,8 +133,7 @@ class CameraFilmsImport {
       if (last >= 0 && shots.shot[i] != last) {
         throw InvalidArgument(
             "{} is cut before {}: where the poses of several cameras are looked for, each film "
-            "must "
-            "be one shot; take a part of one (film_begin_s, film_end_s), or cut the films",
+            "must be one shot; take a part of one (film_begin_s, film_end_s), or cut the films",
             camera.film,
             frames_.views[camera.views[i]].name);
       }
