@@ -119,8 +119,8 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   int step = static_cast<int>(std::count(trace.begin(), trace.end(), '\n'));
   for (; step < script.steps; ++step) {
     cancel.ThrowIfCancelled();
-    std::this_thread::sleep_for(std::chrono::milliseconds(script.step_ms));
     LogEffect(".begun", run.job_name, step);
+    std::this_thread::sleep_for(std::chrono::milliseconds(script.step_ms));
     trace += std::to_string(step) + " " + std::to_string(::getpid()) + "\n";
     if (checkpoints.WantsSave()) {
       checkpoints.Save(trace);
