@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kLeastWeight = 1e-6;
+constexpr double kWeightFloor = 1e-6;
 constexpr double kMostlyKnown = 0.5;  // share of a cell whose position is known
 
 }  // namespace
@@ -47,7 +47,7 @@ KnownCells CellsOf(const TapEncoder& encoder,
   // Each pixel counts by its weight.
   const torch::Tensor weight = PaddedTensor(picture.weight);
   const torch::Tensor mean_weight = CellMeans(weight);
-  cells.colors = CellMeans(PaddedTensor(color) * weight) / mean_weight.clamp_min(kLeastWeight);
+  cells.colors = CellMeans(PaddedTensor(color) * weight) / mean_weight.clamp_min(kWeightFloor);
   cells.weights = mean_weight.squeeze(1).contiguous();
   return cells;
 }

@@ -348,4 +348,23 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
   return motion;
 }
 
+double FootRow(const Image& moving) {
+  constexpr double kLeastShare = 0.003;
+  cv::Mat is_moving(moving.height, moving.width, CV_8U);
+  std::transform(moving.data.begin(), moving.data.end(), is_moving.begin<uint8_t>(), [](float v) {
+    return v > 0.5f ? uint8_t{1} : uint8_t{0};
+  });
+  cv::Mat labels, statistics, centers;
+  const int count = cv::connectedComponentsWithStats(is_moving, labels, statistics, centers);
+  int largest = 0, foot = -1;
+  for (int i = 1; i < count; ++i) {  // 0 is what stands still
+    const int area = statistics.at<int>(i, cv::CC_STAT_AREA);
+    if (area <= largest) continue;
+    largest = area;
+    foot = statistics.at<int>(i, cv::CC_STAT_TOP) + statistics.at<int>(i, cv::CC_STAT_HEIGHT);
+  }
+  const double share = largest / static_cast<double>(moving.PlaneSize());
+  return share < kLeastShare ? -1.0 : foot / static_cast<double>(moving.height);
+}
+
 }  // namespace color3d

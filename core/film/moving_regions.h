@@ -67,4 +67,8 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
                              const CancellationToken& cancel,
                              const std::function<void(int frame, const Image& moving)>& on_frame);
 
+// Where the largest region of what moves stands: its lowest row, as a share of the picture's height
+// from its top; < 0 when less than 0.3 % of the picture moves. `moving` as FindMovingRegions says.
+double FootRow(const Image& moving);
+
 }  // namespace color3d

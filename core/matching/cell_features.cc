@@ -13,7 +13,7 @@ constexpr int kWindowRadii[] = {1, 3, 9};  // in cells
 static_assert(kLuminanceStatistics == 1 + 2 * std::size(kWindowRadii));
 constexpr double kMaxLuminance = 100.0;
 // Of L in 0..1, squared: below a third of a unit of L the deviation is rounding.
-constexpr double kVarianceFloor = 1e-5;
+constexpr double kMapVarianceFloor = 1e-5;
 
 // Means over squares of `side`; those at the right and lower border count what is there.
 torch::Tensor MeanPool(const torch::Tensor& x, int64_t side) {
@@ -45,7 +45,7 @@ torch::Tensor LuminanceStatistics(const torch::Tensor& luminance) {
     const torch::Tensor mean = WindowMean(l, radius);
     const torch::Tensor variance = (WindowMean(ll, radius) - mean.square()).clamp_min(0.0);
     maps.push_back(mean);
-    maps.push_back((variance + kVarianceFloor).sqrt());
+    maps.push_back((variance + kMapVarianceFloor).sqrt());
   }
   return torch::cat(maps, 1);
 }

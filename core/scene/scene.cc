@@ -70,9 +70,9 @@ int Scene::FindView(std::string_view name) const {
                                  : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
 }
 
-bool Scene::IsFilm() const { return HasMoments(views) && !HasPoses(views); }
+bool Scene::IsFilm() const { return HasMoments(views) && !HasPoses(views) && !relief; }
 
-bool Scene::IsDynamic() const { return HasMoments(views) && HasPoses(views); }
+bool Scene::IsDynamic() const { return HasMoments(views) && (HasPoses(views) || relief); }
 
 std::vector<int> Scene::ViewsInOrderOfTime() const {
   std::vector<int> order(views.size());

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/scene/camera.h"
+#include "core/scene/relief.h"
 
 namespace color3d {
 
@@ -34,7 +35,7 @@ struct View {
   Pose cam_from_world;
   bool held_out = false;  // used for evaluation only, never by any trainer
   // Of a frame of a film; none: the photo shows a place that stands still. Frames of a film need
-  // not have poses: theirs are then all the same.
+  // not have poses: theirs are then all the same, as are those of a relief.
   std::optional<Moment> moment;
 
   // 0 for a photo.
@@ -54,6 +55,8 @@ struct Scene {
   // every writer and export undoes: world = world_from_scene_scale * scene + world_offset.
   double world_from_scene_scale = 1.0;  // > 0
   Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
+  // Frames of one camera that stands still, at the origin: no depth is known, this is assumed.
+  std::optional<Relief> relief;
 
   std::vector<int> TrainingViews() const;
   std::vector<int> HeldOutViews() const;
@@ -63,7 +66,7 @@ struct Scene {
   // Every view has its moment: frames of a film, whose poses are all the same because nobody knows
   // them (coloured, not reconstructed) ...
   bool IsFilm() const;
-  // ... or of one or several cameras with poses: a scene that may move. Both false without views.
+  // ... or of one or several cameras with poses, or of a relief: a scene that may move. Both false without views.
   bool IsDynamic() const;
   // Indices of all views; those of one time, or without one, in their order.
   std::vector<int> ViewsInOrderOfTime() const;

@@ -166,6 +166,14 @@ View ViewFromJson(const Field& field) {
   return view;
 }
 
+Relief ReliefFromJson(const Field& field) {
+  const Relief relief{field["horizon"].Number(),
+                      field["foot"].Number(),
+                      field["backdrop_depth"].PositiveNumber()};
+  if (!(relief.horizon < relief.foot)) throw field["horizon"].Wrong("less than relief.foot");
+  return relief;
+}
+
 // [x, y, z, error, [views]]: there may be a million of them.
 SparsePoint PointFromJson(const Field& field, int view_count) {
   if (field.ArraySize() != 5) throw field.Wrong("[x, y, z, error, [views]]");
@@ -211,12 +219,17 @@ std::string SceneToJson(const Scene& scene) {
                                   point.reprojection_error_px,
                                   point.views}));
   }
-  const json root = {{"format", kFormat},
+  json root = {{"format", kFormat},
                      {"version", kVersion},
                      {"world_from_scene_scale", scene.world_from_scene_scale},
                      {"world_offset", Vector3ToJson(scene.world_offset)},
                      {"views", std::move(views)},
                      {"points", std::move(points)}};
+  if (scene.relief) {
+    root["relief"] = {{"horizon", scene.relief->horizon},
+                      {"foot", scene.relief->foot},
+                      {"backdrop_depth", scene.relief->backdrop_depth}};
+  }
   try {
     return root.dump();
   } catch (const json::exception& e) {  // a name that is not UTF-8
@@ -242,6 +255,7 @@ Scene SceneFromJson(std::string_view text) {
     scene.world_from_scene_scale = field["world_from_scene_scale"].PositiveNumber();
   }
   scene.world_offset = field["world_offset"].Vector3();
+  if (field.Has("relief")) scene.relief = ReliefFromJson(field["relief"]);
   const Field views = field["views"];
   const size_t view_count = views.ArraySize();
   std::set<std::string> names;

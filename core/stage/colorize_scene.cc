@@ -139,8 +139,9 @@ double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kin
   return -1.0;
 }
 
-std::string OfMotion(const FilmFindings& film) {
-  std::string text = film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
+std::string OfMotion(const FilmFindings& film, const Scene& scene) {
+  std::string text = scene.relief ? "the camera stands still, which tells no depth"
+                     : film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
                      : film.camera_stands_still ? "the camera stands still"
                                                 : "no poses were found";
   if (film.motion_energy >= 0.0) {
@@ -193,7 +194,11 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     }
   };
   add_reason(kind::kImportScene, facts.sfm_plan);
-  if (facts.film) add_reason(kind::kImportScene, OfMotion(*facts.film));
+  if (facts.film) add_reason(kind::kImportScene, OfMotion(*facts.film, scene));
+  if (scene.relief) {
+    add_reason(kind::kReconstructGeometry,
+               "2.5D: depth is assumed, ground in front of an upright backdrop");
+  }
   if (context.HasInput(artifact::kMemoryPlan)) {
     const auto memory = ReadJson(context, artifact::kMemoryPlan);
     add_reason(kind::kReconstructGeometry, memory.at("note"));

@@ -12,7 +12,8 @@
 namespace color3d {
 namespace {
 
-constexpr int64_t kFramesCacheBytes = int64_t{32} << 20;  // neighbours are read several times
+constexpr int64_t kColoredFramesCacheBytes = int64_t{32}
+                                             << 20;  // neighbours are read several times
 
 }  // namespace
 
@@ -37,7 +38,7 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const ViewPositions positions(scene, context);
   const bool are_frames = scene.IsFilm() || (scene.IsDynamic() && !positions.NothingMoves());
   const ViewImages images(
-      scene, context.scene_folder(), max_side_px, are_frames ? kFramesCacheBytes : 0);
+      scene, context.scene_folder(), max_side_px, are_frames ? kColoredFramesCacheBytes : 0);
   const auto total = static_cast<int64_t>(scene.views.size());
   const auto sources = [&](int number) {
     return SourcesOf(*colorizer, [&, number](const Image& luminance) {

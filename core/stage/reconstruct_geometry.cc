@@ -109,8 +109,9 @@ void RunReconstructGeometry(const GeometryOptions& options,
       scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
   const Scene unmasked = WithoutMaskedPoints(scene, images);
   const PictureSource still = StillRegionsOf(scene, images, context);
+  // One place shows no surface from two sides.
   const Scene start =
-      options.recipe == GeometryOptions::Recipe::kPaper
+      options.recipe == GeometryOptions::Recipe::kPaper || scene.relief
           ? unmasked
           : WithDensePoints(unmasked, images, still, planned.max_gaussians, context.control());
   GeometryProblem problem = GeometryProblemOf(start, images);

@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kNormEpsilon = 1e-5;
+constexpr double kLayerNormEpsilon = 1e-5;
 // The weights do not tell the number of heads. 64 channels each in all published models; narrower
 // towers, which only tests have, get two heads.
 constexpr int64_t kHeadChannels = 64;
@@ -36,7 +36,7 @@ int64_t HeadsOf(int64_t width) {
 torch::Tensor LayerNorm(const torch::Tensor& x,
                         const torch::Tensor& weight,
                         const torch::Tensor& bias) {
-  return torch::layer_norm(x, {x.size(-1)}, weight, bias, kNormEpsilon);
+  return torch::layer_norm(x, {x.size(-1)}, weight, bias, kLayerNormEpsilon);
 }
 
 }  // namespace

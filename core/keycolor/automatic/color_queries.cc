@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kHeads = 8;  // of all published models; the weights do not tell
-constexpr double kNormEpsilon = 1e-5;
+constexpr double kLayerNormEpsilon = 1e-5;
 constexpr double kPositionEpsilon = 1e-6;
 constexpr double kPositionTemperature = 10000.0;
 constexpr const char* kPrefix = "decoder.color_decoder.";
@@ -21,7 +21,7 @@ constexpr const char* kPrefix = "decoder.color_decoder.";
 torch::Tensor LayerNorm(const torch::Tensor& x,
                         const torch::Tensor& weight,
                         const torch::Tensor& bias) {
-  return torch::layer_norm(x, {x.size(-1)}, weight, bias, kNormEpsilon);
+  return torch::layer_norm(x, {x.size(-1)}, weight, bias, kLayerNormEpsilon);
 }
 
 // Sines and cosines of 1..count, scaled to one turn: [count, width].

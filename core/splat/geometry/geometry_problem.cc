@@ -91,6 +91,7 @@ GeometryProblem GeometryProblemOf(const Scene& scene,
     };
   }
   problem.extent = scene.Extent();
+  problem.is_relief = scene.relief.has_value();
   problem.initial = InitialGaussians(scene);
   if (SampleInitialColors(scene, problem) == 0) {
     throw InvalidArgument(

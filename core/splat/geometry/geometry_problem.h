@@ -24,6 +24,9 @@ struct GeometryProblem {
   // degree.
   GaussianModel initial;
   double extent = 1.0;  // of the scene, world units
+  // All views have one pose, and z is the depth in it: what they cannot tell, depth and thickness
+  // along it, stays as it begins.
+  bool is_relief = false;
   // Of pictures that are kept in the kernels' form, and a quarter of it of masks; the others are
   // asked for again.
   int64_t picture_cache_bytes = int64_t{512} << 20;

@@ -13,13 +13,12 @@
 #include "core/film/moving_regions.h"
 #include "core/scene/view_images.h"
 #include "core/stage/film/film_frames.h"
+#include "core/stage/film/film_poses.h"
 #include "core/stage/film/moving_region_files.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr double kEnough = 0.8;  // of a camera's frames, with poses
 
 // What structure-from-motion sees of one camera.
 struct Sighting {
@@ -112,10 +111,10 @@ void RequireTwo(const std::vector<FramesOfCamera>& cameras,
   std::string stay, go;
   size_t staying = 0;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    std::string& list = shares[i] >= kEnough ? stay : go;
-    staying += shares[i] >= kEnough;
+    std::string& list = shares[i] >= kLeastShareWithPoses ? stay : go;
+    staying += shares[i] >= kLeastShareWithPoses;
     list += (list.empty() ? "" : ", ") + cameras[i].film;
-    if (shares[i] >= kEnough) continue;
+    if (shares[i] >= kLeastShareWithPoses) continue;
     list += seen[i].motion.camera_stands_still ? " (stands still)"
                                                : fmt::format(" ({:.0f} %)", 100.0 * shares[i]);
   }
@@ -143,7 +142,7 @@ Scene SceneOf(const Scene& placed,
     index[placed.views[i].name] = static_cast<int>(i);
   std::vector<std::pair<View, int>> views;  // and the picture that it has its pose of
   for (size_t c = 0; c < seen.size(); ++c) {
-    if (shares[c] < kEnough) continue;
+    if (shares[c] < kLeastShareWithPoses) continue;
     for (size_t p = 0; p < seen[c].pictures.size(); ++p) {
       const auto found = index.find(seen[c].pictures[p].name);
       if (found == index.end()) continue;
@@ -229,7 +228,7 @@ PlacedCameras PlaceCameras(const fs::path& frames_root,
   std::set<std::string> names;
   for (const View& view : scene.views) names.insert(view.name);
   for (size_t i = 0; i < cameras.size(); ++i) {
-    if (shares[i] < kEnough) continue;
+    if (shares[i] < kLeastShareWithPoses) continue;
     for (const int view : cameras[i].views) {
       const std::string& name = frames.views[view].name;
       if (!names.contains(name)) without.push_back(name);

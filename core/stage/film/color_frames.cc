@@ -24,7 +24,7 @@ constexpr int64_t kStretchBytes = int64_t{128} << 20;
 constexpr int64_t kBytesPerPixel = 17 * sizeof(float);  // of a frame: colours, flow, two followed
 
 // All frames of one shot, and its anchors among them: numbers of frames in order of time.
-struct Shot {
+struct ShotToColor {
   std::vector<int> frames;
   std::vector<int> anchors;
 
@@ -69,7 +69,7 @@ using Flow = std::function<std::shared_ptr<const FlowPair>(int earlier, int late
 // shot's end. What is told of a frame depends on its neighbours, not on where stretches end.
 class ShotColorer {
  public:
-  ShotColorer(const Shot& shot,
+  ShotColorer(const ShotToColor& shot,
               const FilmFrames& frames,
               const std::vector<NearKeyFrames>& near,
               const std::vector<int>& view_of_frame,
@@ -324,7 +324,7 @@ class ShotColorer {
     delivered_ = end - done_with;
   }
 
-  const Shot& shot_;
+  const ShotToColor& shot_;
   const FilmFrames& frames_;
   const std::vector<NearKeyFrames>& near_;  // of each frame
   const std::vector<int>& view_of_frame_;
@@ -353,7 +353,7 @@ void ColorFrames(const Scene& scene,
     frames.time_s.push_back(scene.views[view].time_s());
   }
   frames.luminance = [&](int frame) { return images.Luminance(order[frame]); };
-  std::map<int, Shot> shots;
+  std::map<int, ShotToColor> shots;
   for (size_t i = 0; i < order.size(); ++i) {
     shots[frames.shot[i]].frames.push_back(static_cast<int>(i));
   }

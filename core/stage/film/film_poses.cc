@@ -13,16 +13,16 @@
 #include "core/base/files.h"
 #include "core/base/median.h"
 #include "core/film/moving_regions.h"
+#include "core/image/codec.h"
+#include "core/scene/relief.h"
 #include "core/stage/film/moving_region_files.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kEnough = 0.8;  // of the frames, with poses
-
 bool AreEnough(size_t some, size_t all) {
-  return static_cast<double>(some) >= kEnough * static_cast<double>(all);
+  return static_cast<double>(some) >= kLeastShareWithPoses * static_cast<double>(all);
 }
 
 // The frames of the shot that has most of them.
@@ -68,6 +68,36 @@ Scene DynamicScene(Scene placed, const Scene& film) {
     view.moment = frame.moment;
   }
   return placed;
+}
+
+// The frames of the shot as one camera that stands still took them.
+Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingRegionFiles& files) {
+  constexpr int kPoints = 20'000;
+  Scene scene;
+  std::vector<double> feet;
+  for (const int frame : shot) {
+    scene.views.push_back(film.views[frame]);
+    const std::string file = files.MovingFile(frame).string();
+    const double foot = FootRow(DecodeImage(ReadFile(file), file));
+    if (foot >= 0.0) feet.push_back(foot);
+  }
+  scene.relief = ReliefBehind(std::move(feet));
+  const int last = static_cast<int>(scene.views.size()) - 1;
+  const Camera& camera = scene.views[0].camera;
+  for (const Eigen::Vector3d& position : PointsOn(*scene.relief, camera, kPoints)) {
+    scene.points.push_back({position, -1.0, {0, last}});
+  }
+  return scene;
+}
+
+void LeaveMovingRegions(const Scene& film,
+                        const Scene& placed,
+                        const MovingRegionFiles& files,
+                        StageContext& context) {
+  for (const View& view : placed.views) {
+    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
+                       files.MovingFile(film.FindView(view.name)));
+  }
 }
 
 void WarnOfDropped(const Scene& film, const Scene& placed, StageContext& context) {
@@ -149,10 +179,18 @@ void FindFilmPoses(const fs::path& frames_root,
   facts->film->background_px = motion.background_px;
   facts->film->camera_stands_still = motion.camera_stands_still;
   if (motion.camera_stands_still) {
-    return stays(fmt::format(
-        "the camera stands still (what does not move of its own shifts by {:.2f} px at {} px)",
+    context.progress().OnWarning(fmt::format(
+        "the camera stands still (what does not move of its own shifts by {:.2f} px at {} px), "
+        "which tells no depth: the scene is a relief (2.5D), its depth is assumed. Ground in front "
+        "of an upright backdrop, and what moves stands on it; good for a look from nearby only",
         motion.background_px,
         kMotionSidePx));
+    facts->film->poses_found = true;
+    Scene relief = ReliefScene(*scene, shot, files);
+    WarnOfDropped(*scene, relief, context);
+    LeaveMovingRegions(*scene, relief, files, context);
+    *scene = std::move(relief);
+    return;
   }
   const fs::path log = context.scratch_folder() / "poses" / "sfm.log";
   const auto keep_log = [&] {
@@ -187,10 +225,7 @@ void FindFilmPoses(const fs::path& frames_root,
   WarnOfDropped(*scene, placed, context);
   facts->film->path_unevenness = Unevenness(placed);
   WarnOfUnevenPath(facts->film->path_unevenness, context);
-  for (const View& view : placed.views) {
-    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
-                       files.MovingFile(scene->FindView(view.name)));
-  }
+  LeaveMovingRegions(*scene, placed, files, context);
   *scene = placed;
 }
 

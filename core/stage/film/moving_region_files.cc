@@ -15,7 +15,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int64_t kCacheBytes = int64_t{64} << 20;
+constexpr int64_t kMotionFramesCacheBytes = int64_t{64} << 20;
 
 std::string Name(int view) { return fmt::format("{:06}.png", view); }
 
@@ -49,7 +49,7 @@ ShotMotion WriteMovingRegions(const fs::path& frames_root,
                               const std::vector<int>& shot,
                               const MovingRegionFiles& files,
                               StageContext& context) {
-  const ViewImages images(scene, frames_root, kMotionSidePx, kCacheBytes);
+  const ViewImages images(scene, frames_root, kMotionSidePx, kMotionFramesCacheBytes);
   const auto count = static_cast<int>(shot.size());
   int done = 0;
   return FindMovingRegions({count, [&](int frame) { return images.Luminance(shot[frame]); }},

@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int64_t kCacheBytes = int64_t{16} << 20;  // each frame is read twice, at once
+constexpr int64_t kScoredFramesCacheBytes = int64_t{16} << 20;  // each frame is read twice, at once
 
 std::vector<std::vector<int>> ShotsInOrderOfTime(const Scene& scene) {
   std::map<int, std::vector<int>> shots;
@@ -53,7 +53,8 @@ ordered_json TemporalScores(const Scene& scene,
                             StageContext& context) {
   ordered_json json = ordered_json::object();
   if (!scene.IsFilm() && !scene.IsDynamic()) return json;
-  const ViewImages images(scene, context.scene_folder(), kConsistencySidePx, kCacheBytes);
+  const ViewImages images(
+      scene, context.scene_folder(), kConsistencySidePx, kScoredFramesCacheBytes);
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
   TemporalSource source;
   source.shots = ShotsInOrderOfTime(scene);

@@ -26,11 +26,12 @@
 namespace color3d {
 namespace {
 
-constexpr size_t kAtOnce = 16;                      // frames
-constexpr int64_t kCacheBytes = int64_t{32} << 20;  // neighbours are read several times
+constexpr size_t kAtOnce = 16;  // frames
+constexpr int64_t kRecoloredFramesCacheBytes = int64_t{32}
+                                               << 20;  // neighbours are read several times
 
 // What the coloured film is read from, and who knows its colours.
-struct ColoredFilm {
+struct FilmToRecolor {
   const Scene& scene;
   const ViewImages& images;
   const Colorizer& colorizer;
@@ -118,7 +119,7 @@ void TakeShares(const Told& told, const Image& is_old, Image* provenance) {
 // Colours one range.
 class RangeColorer {
  public:
-  RangeColorer(const RecoloredRange& range, const ColoredFilm& film, std::filesystem::path folder)
+  RangeColorer(const RecoloredRange& range, const FilmToRecolor& film, std::filesystem::path folder)
       : range_(range), film_(film), folder_(std::move(folder)) {
     std::filesystem::create_directories(folder_);
   }
@@ -295,7 +296,7 @@ class RangeColorer {
   }
 
   const RecoloredRange& range_;
-  const ColoredFilm& film_;
+  const FilmToRecolor& film_;
   const std::filesystem::path folder_;
   std::vector<FilmKey> keys_;        // frames: places in range_.views
   std::vector<NearKeyFrames> near_;  // of each of them
@@ -332,9 +333,11 @@ void RecolorRanges(const std::vector<FurtherKeyView>& keys,
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
   const int key = ReadKeyView(context, scene);
-  const ViewImages images(
-      scene, context.scene_folder(), ColoredSide(context, scene.views[key]), kCacheBytes);
-  const ColoredFilm film{scene, images, *colorizer, key, context};
+  const ViewImages images(scene,
+                          context.scene_folder(),
+                          ColoredSide(context, scene.views[key]),
+                          kRecoloredFramesCacheBytes);
+  const FilmToRecolor film{scene, images, *colorizer, key, context};
   int64_t total = 0, done = 0;
   for (const RecoloredRange& range : ranges) total += static_cast<int64_t>(range.views.size());
   std::mutex outputs;
