@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 
+#include "core/splat/geometry/foot_depths.h"
 #include "core/splat/geometry/mover_velocity.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/motion/motion.h"
@@ -88,55 +89,13 @@ std::optional<double> Agreement(const Views& moment,
   return sum / seen;
 }
 
-double MedianDepth(const SurveyedView& view) {
-  std::vector<float> depths;
-  for (const float d : view.depth.data) {
-    if (d > 0.0f) depths.push_back(d);
-  }
-  if (depths.empty()) return 0.0;
-  std::nth_element(depths.begin(), depths.begin() + depths.size() / 2, depths.end());
-  return depths[depths.size() / 2];
-}
-
-// For every pixel, the depth of the standing surface at the lowest pixel of its moving region; 0
-// where nothing moves.
-Image FootDepths(const SurveyedView& view, double usual_depth) {
-  const Image& moving = view.moving;
-  Image depth(moving.width, moving.height, 1);
-  std::vector<char> reached(moving.data.size(), 0);
-  for (int y = 0; y < moving.height; ++y) {
-    for (int x = 0; x < moving.width; ++x) {
-      const size_t start = static_cast<size_t>(y) * moving.width + x;
-      if (moving.data[start] == 0.0f || reached[start] != 0) continue;
-      std::vector<Pixel> region{{x, y}};
-      reached[start] = 1;
-      Pixel foot{x, y};
-      for (size_t k = 0; k < region.size(); ++k) {
-        const Pixel p = region[k];
-        if (p.y > foot.y) foot = p;
-        for (const Pixel q :
-             {Pixel{p.x - 1, p.y}, {p.x + 1, p.y}, {p.x, p.y - 1}, {p.x, p.y + 1}}) {
-          if (q.x < 0 || q.y < 0 || q.x >= moving.width || q.y >= moving.height) continue;
-          const size_t index = static_cast<size_t>(q.y) * moving.width + q.x;
-          if (moving.data[index] == 0.0f || reached[index] != 0) continue;
-          reached[index] = 1;
-          region.push_back(q);
-        }
-      }
-      const float at_foot = view.depth.At(0, foot.y, foot.x);
-      for (const Pixel p : region) {
-        depth.At(0, p.y, p.x) = at_foot > 0.0f ? at_foot : static_cast<float>(usual_depth);
-      }
-    }
-  }
-  return depth;
-}
-
-std::vector<MoverSeed> SeedsOf(const SurveyedView& view, const Views& moment, int step) {
+std::vector<MoverSeed> SeedsOf(const SurveyedView& view,
+                               const Image& foot,
+                               const Views& moment,
+                               int step) {
   std::vector<MoverSeed> seeds;
   const double usual = MedianDepth(view);
   if (!(usual > 0.0)) return seeds;
-  const Image foot = FootDepths(view, usual);
   const Camera& camera = view.posed.camera;
   for (int y = 0; y < camera.height; y += step) {
     // Every other row begins half a step later.
@@ -213,8 +172,9 @@ ParameterBlock SeedMovers(const std::vector<SurveyedView>& views,
       static_cast<int>(
           std::ceil(std::sqrt(moving / static_cast<double>(std::max<int64_t>(1, options.most))))));
   std::vector<std::vector<MoverSeed>> seeds(views.size());
+  const std::vector<Image> feet = FootDepths(views, pool);
   pool.ForEach(static_cast<int64_t>(views.size()), [&](int64_t i, int) {
-    seeds[i] = SeedsOf(views[i], moments.at(views[i].posed.time_s), step);
+    seeds[i] = SeedsOf(views[i], feet[i], moments.at(views[i].posed.time_s), step);
   });
   FindVelocities(views, unit_time, step, pool, seeds);
   ParameterBlock block(options.rows + kMotionRows, 0);

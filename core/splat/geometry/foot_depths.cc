@@ -1,0 +1,181 @@
+#include "core/splat/geometry/foot_depths.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+
+#include "core/base/median.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kFramesBeside = 8;  // before and behind, that tell of a thing's depth
+
+// A region of what moves, or several that are one thing.
+struct Thing {
+  int left = 0, right = 0;  // columns, both included
+  int foot = 0;             // its lowest row
+  double depth = 0.0;       // there
+};
+
+struct Things {
+  std::vector<int> of_pixel;  // -1: nothing moves
+  std::vector<Thing> list;
+};
+
+// The connected regions of what moves.
+Things RegionsOf(const SurveyedView& view) {
+  const Image& moving = view.moving;
+  const double usual = MedianDepth(view);
+  Things things;
+  things.of_pixel.assign(moving.data.size(), -1);
+  std::vector<int> region;
+  for (int start = 0; start < static_cast<int>(moving.data.size()); ++start) {
+    if (moving.data[start] == 0.0f || things.of_pixel[start] >= 0) continue;
+    const auto number = static_cast<int>(things.list.size());
+    Thing thing{moving.width, -1, -1};
+    int foot_pixel = start;
+    const auto reach = [&](int x, int y) {
+      if (x < 0 || y < 0 || x >= moving.width || y >= moving.height) return;
+      const int pixel = y * moving.width + x;
+      if (moving.data[pixel] == 0.0f || things.of_pixel[pixel] >= 0) return;
+      things.of_pixel[pixel] = number;
+      region.push_back(pixel);
+    };
+    region.clear();
+    reach(start % moving.width, start / moving.width);
+    for (size_t k = 0; k < region.size(); ++k) {
+      const int x = region[k] % moving.width, y = region[k] / moving.width;
+      thing.left = std::min(thing.left, x);
+      thing.right = std::max(thing.right, x);
+      if (y > thing.foot) {
+        thing.foot = y;
+        foot_pixel = region[k];
+      }
+      reach(x - 1, y);
+      reach(x + 1, y);
+      reach(x, y - 1);
+      reach(x, y + 1);
+    }
+    const float at_foot = view.depth.data[foot_pixel];
+    thing.depth = at_foot > 0.0f ? at_foot : usual;
+    things.list.push_back(thing);
+  }
+  return things;
+}
+
+int SharedColumns(const Thing& a, const Thing& b) {
+  return std::max(0, std::min(a.right, b.right) - std::max(a.left, b.left) + 1);
+}
+
+int Columns(const Thing& thing) { return thing.right - thing.left + 1; }
+
+// Limbs that are torn off, and the shadow below, belong to what they hang over.
+void JoinOneAboveTheOther(Things* things) {
+  std::vector<int> joined(things->list.size());
+  std::vector<int> order(things->list.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return things->list[a].foot > things->list[b].foot;
+  });
+  std::vector<Thing> list;
+  for (const int region : order) {  // the lowest first: theirs is the foot
+    const Thing& thing = things->list[region];
+    const auto below = std::find_if(list.begin(), list.end(), [&](const Thing& other) {
+      return 2 * SharedColumns(thing, other) >= Columns(thing);
+    });
+    joined[region] = static_cast<int>(below - list.begin());
+    if (below == list.end()) {
+      list.push_back(thing);
+      continue;
+    }
+    below->left = std::min(below->left, thing.left);
+    below->right = std::max(below->right, thing.right);
+  }
+  for (int& number : things->of_pixel) {
+    if (number >= 0) number = joined[number];
+  }
+  things->list = std::move(list);
+}
+
+// The depth of what is in the same place in `frame`; 0 where nothing is.
+double DepthInPlaceOf(const Thing& thing, const Things& frame) {
+  double depth = 0.0;
+  int most = 0;
+  for (const Thing& other : frame.list) {
+    const int shared = SharedColumns(thing, other);
+    if (shared <= most || 2 * shared < std::min(Columns(thing), Columns(other))) continue;
+    most = shared;
+    depth = other.depth;
+  }
+  return depth;
+}
+
+std::vector<size_t> InOrderOfTime(const std::vector<SurveyedView>& views) {
+  std::vector<size_t> order(views.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return views[a].posed.time_s < views[b].posed.time_s;
+  });
+  return order;
+}
+
+void SteadyDepths(const std::vector<size_t>& order, std::vector<Things>* frames) {
+  const std::vector<Things> before = *frames;
+  const auto count = static_cast<int>(order.size());
+  for (int i = 0; i < count; ++i) {
+    for (Thing& thing : (*frames)[order[i]].list) {
+      std::vector<double> depths{thing.depth};
+      for (int k = std::max(0, i - kFramesBeside); k <= std::min(count - 1, i + kFramesBeside);
+           ++k) {
+        const double depth = k == i ? 0.0 : DepthInPlaceOf(thing, before[order[k]]);
+        if (depth > 0.0) depths.push_back(depth);
+      }
+      thing.depth = Median(std::move(depths));
+    }
+  }
+}
+
+bool AreOfOnePose(const std::vector<SurveyedView>& views) {
+  const Pose& first = views.front().posed.cam_from_world;
+  return std::all_of(views.begin(), views.end(), [&](const SurveyedView& view) {
+    const Pose& pose = view.posed.cam_from_world;
+    return pose.translation == first.translation &&
+           pose.rotation.coeffs() == first.rotation.coeffs();
+  });
+}
+
+}  // namespace
+
+double MedianDepth(const SurveyedView& view) {
+  std::vector<float> depths;
+  for (const float d : view.depth.data) {
+    if (d > 0.0f) depths.push_back(d);
+  }
+  if (depths.empty()) return 0.0;
+  std::nth_element(depths.begin(), depths.begin() + depths.size() / 2, depths.end());
+  return depths[depths.size() / 2];
+}
+
+std::vector<Image> FootDepths(const std::vector<SurveyedView>& views, ThreadPool& pool) {
+  if (views.empty()) return {};
+  const auto count = static_cast<int64_t>(views.size());
+  const bool are_of_one_pose = AreOfOnePose(views);
+  std::vector<Things> frames(views.size());
+  pool.ForEach(count, [&](int64_t i, int) {
+    frames[i] = RegionsOf(views[i]);
+    if (are_of_one_pose) JoinOneAboveTheOther(&frames[i]);
+  });
+  if (are_of_one_pose) SteadyDepths(InOrderOfTime(views), &frames);
+  std::vector<Image> depths(views.size());
+  pool.ForEach(count, [&](int64_t i, int) {
+    Image& depth = depths[i] = Image(views[i].moving.width, views[i].moving.height, 1);
+    for (size_t p = 0; p < depth.data.size(); ++p) {
+      const int number = frames[i].of_pixel[p];
+      if (number >= 0) depth.data[p] = static_cast<float>(frames[i].list[number].depth);
+    }
+  });
+  return depths;
+}
+
+}  // namespace color3d
