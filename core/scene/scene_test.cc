@@ -41,6 +41,26 @@ TEST(Scene, ExtentIsOfTrainingCameras) {
   EXPECT_EQ(Scene().Extent(), 1.0);
 }
 
+TEST(Scene, FramesOfOnePoseAreAFilmUntilTheyAreARelief) {
+  Scene scene = ArcScene(3);
+  for (View& view : scene.views) {
+    view.cam_from_world = {};
+    view.moment = Moment{0.1, 0};
+  }
+  EXPECT_TRUE(scene.IsFilm());
+  EXPECT_FALSE(scene.IsDynamic());
+  scene.relief = Relief{0.3, 0.5, 4.0};
+  const std::string text = SceneToJson(scene);
+  const Scene again = SceneFromJson(text);
+  EXPECT_EQ(again.relief, scene.relief);
+  EXPECT_FALSE(again.IsFilm());
+  EXPECT_TRUE(again.IsDynamic());
+  std::string wrong = text;
+  wrong.replace(wrong.find("\"horizon\":0.3"), 13, "\"horizon\":0.6");
+  EXPECT_THAT(Refusal([&] { SceneFromJson(wrong); }),
+              HasSubstr("relief.horizon must be less than relief.foot"));
+}
+
 TEST(Scene, JsonKeepsEveryBit) {
   Scene scene = ArcScene(4, {Distortion::Model::kBrown, {-0.1, 0.01, 1e-3, 2e-3}});
   scene.views[2].held_out = true;

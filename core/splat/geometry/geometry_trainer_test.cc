@@ -132,6 +132,35 @@ TEST(TrainGeometryTest, LearnsNothingFromWhatIsMaskedOut) {
   EXPECT_GT(masked, clean - 0.5);
 }
 
+// One camera tells nothing of depth: what is not told stays, whatever would draw as well.
+TEST(TrainGeometryTest, ARelief) {
+  ProceduralScene s = MakeRoomCorner(2, 96, 72, 800);
+  const Pose looks_from = s.scene.views[0].cam_from_world;
+  for (SparsePoint& point : s.scene.points) point.position = looks_from.Apply(point.position);
+  std::erase_if(s.scene.points, [](const SparsePoint& p) { return !(p.position.z() > 0.1); });
+  GeometryProblem problem = ProblemOf(s, 1);
+  problem.training[0].cam_from_world = Pose();
+  problem.held_out.clear();
+  problem.is_relief = true;
+  ThreadPool pool(2);
+  NoCheckpoints none;
+  Recorder recorder;
+  const RunControl run{pool, none, recorder, CancellationToken()};
+  GeometryOptions options = SmallOptions(60);  // before any is added or removed
+  options.max_gaussians = static_cast<int>(problem.initial.size());
+  const GaussianModel model = TrainGeometry(problem, options, run);
+  ASSERT_EQ(model.size(), problem.initial.size());
+  double moved = 0.0;
+  for (size_t i = 0; i < model.size(); ++i) {
+    EXPECT_EQ(model.position[3 * i + 2], problem.initial.position[3 * i + 2]);
+    EXPECT_EQ(model.log_scale[3 * i + 2], problem.initial.log_scale[3 * i + 2]);
+    EXPECT_EQ(model.rotation[4 * i + 1], 0.0f);
+    EXPECT_EQ(model.rotation[4 * i + 2], 0.0f);
+    moved += std::abs(model.position[3 * i] - problem.initial.position[3 * i]);
+  }
+  EXPECT_GT(moved, 0.0);
+}
+
 TEST(TrainGeometryTest, KeepsTheHardCap) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 64, 500);
   ThreadPool pool(2);

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 
+#include "core/film/moving_regions.h"
 #include "core/stage/film/import_film.h"
 #include "core/stage/stages.h"
 #include "tests/support/scenes/test_scenes.h"
@@ -110,18 +111,34 @@ TEST_F(FilmPosesTest, AMovingCameraBeforeWhichSomethingMoves) {
   }
 }
 
-TEST_F(FilmPosesTest, ACameraThatStandsStillIsSaidToAndNothingIsPlaced) {
+TEST_F(FilmPosesTest, ACameraThatStandsStillIsSaidToAndMakesARelief) {
   WriteFilm(0.0, 0.025);
+  options_.hold_out_every_eighth = true;
   const Scene scene = Import();
-  EXPECT_TRUE(scene.IsFilm());
+  ASSERT_TRUE(scene.relief.has_value());
+  EXPECT_TRUE(scene.IsDynamic());
   EXPECT_EQ(scene.views.size(), static_cast<size_t>(kFrames));
-  EXPECT_THAT(observer_.text, HasSubstr("stays without poses: the camera stands still"));
+  EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{4, 12}));
+  EXPECT_THAT(observer_.text, HasSubstr("the camera stands still"));
+  EXPECT_THAT(observer_.text, HasSubstr("a relief (2.5D), its depth is assumed"));
   EXPECT_TRUE(facts_.film->camera_stands_still);
-  EXPECT_FALSE(facts_.film->poses_found);
+  EXPECT_TRUE(facts_.film->poses_found);
   EXPECT_GT(facts_.film->motion_energy, 0.03);
   EXPECT_FALSE(facts_.ran_structure_from_motion);
   EXPECT_FALSE(fs::exists(scratch_.path() / "out/sfm.log"));
-  EXPECT_FALSE(fs::exists(scratch_.path() / "out/moving"));
+
+  EXPECT_GT(scene.points.size(), 10'000u);
+  const Camera& camera = scene.views[0].camera;
+  for (const SparsePoint& point : scene.points) {
+    const Eigen::Vector2d pixel = camera.Project(point.position);
+    ASSERT_TRUE(camera.Contains(pixel));
+    ASSERT_NEAR(point.position.z(), scene.relief->Depth(pixel.y() / camera.height), 1e-9);
+  }
+  for (int i = 0; i < kFrames; ++i) {
+    const Image moving = ReadImage(scratch_.path() / "out/moving" / Name(i));
+    const double foot = FootRow(moving);
+    EXPECT_GT(foot, scene.relief->foot) << "the board stands before the backdrop";
+  }
 }
 
 TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
