@@ -84,7 +84,8 @@ void DeclareImportFlags(CLI::App& app, ColorizeOptions* o) {
   app.add_flag(
       "--poses",
       o->poses,
-      "Of a film by one moving camera: find the frames' poses by what stands still (those of "
+      "Of a film by one moving camera: find the frames' poses by what stands still; of one that "
+      "stands, assume depth (2.5D) (those of "
       "several are found anyway)");
 }
 

@@ -218,7 +218,8 @@ void CheckMoves(const Scene& scene) {
   if (!scene.IsFilm()) return;
   throw InvalidArgument(
       "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
-      "Colour them as a film: leave the poses out and give --film, with --poses as a relief (2.5D)");
+      "Colour them as a film: leave the poses out and give --film, with --poses as a relief "
+      "(2.5D)");
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ Relief ReliefBehind(std::vector<double> feet) {
   constexpr double kDepthRatio = 4.0;              // of the backdrop to the nearest ground
   Relief relief;
   if (!feet.empty()) {
-    const auto nth = feet.begin() + static_cast<std::ptrdiff_t>(
-                                        kFarthest * static_cast<double>(feet.size() - 1));
+    const auto nth = feet.begin() +
+                     static_cast<std::ptrdiff_t>(kFarthest * static_cast<double>(feet.size() - 1));
     std::nth_element(feet.begin(), nth, feet.end());
     relief.foot = std::clamp(*nth - kMargin, kHighest, kLowest);
   }

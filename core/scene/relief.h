@@ -9,8 +9,8 @@
 
 namespace color3d {
 
-// Rows are shares of the picture's height, from its top; depths are along the optical axis, in units
-// of the scene. The camera's frame is the world's.
+// Rows are shares of the picture's height, from its top; depths are along the optical axis, in
+// units of the scene. The camera's frame is the world's.
 struct Relief {
   double horizon = 0.5;         // the row that the ground would reach far away; less than `foot`
   double foot = 0.6;            // the row where the backdrop stands on the ground

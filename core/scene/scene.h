@@ -66,7 +66,8 @@ struct Scene {
   // Every view has its moment: frames of a film, whose poses are all the same because nobody knows
   // them (coloured, not reconstructed) ...
   bool IsFilm() const;
-  // ... or of one or several cameras with poses, or of a relief: a scene that may move. Both false without views.
+  // ... or of one or several cameras with poses, or of a relief: a scene that may move. Both false
+  // without views.
   bool IsDynamic() const;
   // Indices of all views; those of one time, or without one, in their order.
   std::vector<int> ViewsInOrderOfTime() const;

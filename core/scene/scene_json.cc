@@ -167,9 +167,8 @@ View ViewFromJson(const Field& field) {
 }
 
 Relief ReliefFromJson(const Field& field) {
-  const Relief relief{field["horizon"].Number(),
-                      field["foot"].Number(),
-                      field["backdrop_depth"].PositiveNumber()};
+  const Relief relief{
+      field["horizon"].Number(), field["foot"].Number(), field["backdrop_depth"].PositiveNumber()};
   if (!(relief.horizon < relief.foot)) throw field["horizon"].Wrong("less than relief.foot");
   return relief;
 }
@@ -220,11 +219,11 @@ std::string SceneToJson(const Scene& scene) {
                                   point.views}));
   }
   json root = {{"format", kFormat},
-                     {"version", kVersion},
-                     {"world_from_scene_scale", scene.world_from_scene_scale},
-                     {"world_offset", Vector3ToJson(scene.world_offset)},
-                     {"views", std::move(views)},
-                     {"points", std::move(points)}};
+               {"version", kVersion},
+               {"world_from_scene_scale", scene.world_from_scene_scale},
+               {"world_offset", Vector3ToJson(scene.world_offset)},
+               {"views", std::move(views)},
+               {"points", std::move(points)}};
   if (scene.relief) {
     root["relief"] = {{"horizon", scene.relief->horizon},
                       {"foot", scene.relief->foot},

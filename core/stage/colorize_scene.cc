@@ -140,7 +140,7 @@ double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kin
 }
 
 std::string OfMotion(const FilmFindings& film, const Scene& scene) {
-  std::string text = scene.relief ? "the camera stands still, which tells no depth"
+  std::string text = scene.relief       ? "the camera stands still, which tells no depth"
                      : film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
                      : film.camera_stands_still ? "the camera stands still"
                                                 : "no poses were found";

@@ -33,8 +33,7 @@ constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 // What a picture does not tell of a Gaussian, and how that moves where it does: `rates` has
 // `still_rows` rows, and kMotionRows more of what moves.
 void KeepDepth(int still_rows, std::vector<float>* rates) {
-  std::vector<int> rows{
-      kPositionRow + 2, kLogScaleRow + 2, kRotationRow + 1, kRotationRow + 2};
+  std::vector<int> rows{kPositionRow + 2, kLogScaleRow + 2, kRotationRow + 1, kRotationRow + 2};
   if (static_cast<int>(rates->size()) > still_rows) {
     for (const int row : {kVelocityRow + 2, kAccelerationRow + 2, kSpinRow + 1, kSpinRow + 2}) {
       rows.push_back(still_rows + row);

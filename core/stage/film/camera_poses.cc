@@ -224,21 +224,13 @@ PlacedCameras PlaceCameras(const fs::path& frames_root,
   placed.result.scene = SceneOf(placed.result.scene, frames, seen, shares);
   const Scene& scene = placed.result.scene;
   placed.findings = FindingsOf(cameras, seen, static_cast<int>(scene.views.size()));
-  std::vector<std::string> without;
-  std::set<std::string> names;
-  for (const View& view : scene.views) names.insert(view.name);
+  std::vector<int> of_cameras;
   for (size_t i = 0; i < cameras.size(); ++i) {
     if (shares[i] < kLeastShareWithPoses) continue;
-    for (const int view : cameras[i].views) {
-      const std::string& name = frames.views[view].name;
-      if (!names.contains(name)) without.push_back(name);
-    }
+    of_cameras.insert(of_cameras.end(), cameras[i].views.begin(), cameras[i].views.end());
   }
-  WarnOfFrames(without, "found no place and are left out", context);
-  for (const View& view : scene.views) {
-    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
-                       sightings.files().MovingFile(frames.FindView(view.name)));
-  }
+  WarnOfFramesWithoutPlace(frames, of_cameras, scene, context);
+  sightings.files().Leave(scene, context);
   return placed;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "core/base/error.h"
@@ -154,6 +155,20 @@ void WarnOfFrames(const std::vector<std::string>& names, const char* what, Stage
                                            names.size() == 1 ? "frame" : "frames",
                                            what,
                                            NamesOfFrames(names)));
+}
+
+void WarnOfFramesWithoutPlace(const Scene& film,
+                              const std::vector<int>& views,
+                              const Scene& placed,
+                              StageContext& context) {
+  std::set<std::string> has_place;
+  for (const View& view : placed.views) has_place.insert(view.name);
+  std::vector<std::string> without;
+  for (const int view : views) {
+    if (!has_place.contains(film.views[view].name)) without.push_back(film.views[view].name);
+  }
+  WarnOfFrames(
+      without, fmt::format("of {} found no place, left out", views.size()).c_str(), context);
 }
 
 }  // namespace color3d

@@ -48,5 +48,10 @@ std::string EncodeGrayFrame(Image luminance);
 // One warning that names a few of the frames; none without frames.
 void WarnOfFrames(const std::vector<std::string>& names, const char* what, StageContext& context);
 std::string NamesOfFrames(const std::vector<std::string>& names);
+// The same of those of `film`'s views that `placed` has no view of.
+void WarnOfFramesWithoutPlace(const Scene& film,
+                              const std::vector<int>& views,
+                              const Scene& placed,
+                              StageContext& context);
 
 }  // namespace color3d

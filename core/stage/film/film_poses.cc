@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +15,7 @@
 #include "core/film/moving_regions.h"
 #include "core/image/codec.h"
 #include "core/scene/relief.h"
+#include "core/stage/film/film_frames.h"
 #include "core/stage/film/moving_region_files.h"
 
 namespace color3d {
@@ -90,36 +91,6 @@ Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingR
   return scene;
 }
 
-void LeaveMovingRegions(const Scene& film,
-                        const Scene& placed,
-                        const MovingRegionFiles& files,
-                        StageContext& context) {
-  for (const View& view : placed.views) {
-    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
-                       files.MovingFile(film.FindView(view.name)));
-  }
-}
-
-void WarnOfDropped(const Scene& film, const Scene& placed, StageContext& context) {
-  constexpr size_t kNamed = 5;
-  std::set<std::string> has_place;
-  for (const View& view : placed.views) has_place.insert(view.name);
-  std::vector<std::string> dropped;
-  for (const View& view : film.views) {
-    if (!has_place.contains(view.name)) dropped.push_back(view.name);
-  }
-  if (dropped.empty()) return;
-  std::string names;
-  for (size_t i = 0; i < std::min(kNamed, dropped.size()); ++i) {
-    names += (i == 0 ? "" : ", ") + dropped[i];
-  }
-  context.progress().OnWarning(fmt::format("{} of {} frames found no place and are left out: {}{}",
-                                           dropped.size(),
-                                           film.views.size(),
-                                           names,
-                                           dropped.size() > kNamed ? ", ..." : ""));
-}
-
 // How much the camera's steps differ from one frame to the next, in steps: near 0 for a camera that
 // is carried or driven.
 double Unevenness(const Scene& scene) {
@@ -166,6 +137,8 @@ void FindFilmPoses(const fs::path& frames_root,
     context.progress().OnWarning("the film stays without poses: " + why);
   };
   facts->film.emplace();
+  std::vector<int> all(scene->views.size());
+  std::iota(all.begin(), all.end(), 0);
   const std::vector<int> shot = LongestShot(*scene);
   if (!AreEnough(shot.size(), scene->views.size())) {
     return stays(fmt::format(
@@ -187,8 +160,8 @@ void FindFilmPoses(const fs::path& frames_root,
         kMotionSidePx));
     facts->film->poses_found = true;
     Scene relief = ReliefScene(*scene, shot, files);
-    WarnOfDropped(*scene, relief, context);
-    LeaveMovingRegions(*scene, relief, files, context);
+    WarnOfFramesWithoutPlace(*scene, all, relief, context);
+    files.Leave(relief, context);
     *scene = std::move(relief);
     return;
   }
@@ -222,10 +195,10 @@ void FindFilmPoses(const fs::path& frames_root,
   facts->random_points = result.random_points;
   facts->photos_registered = result.photos_registered;
   const Scene placed = DynamicScene(std::move(result.scene), *scene);
-  WarnOfDropped(*scene, placed, context);
+  WarnOfFramesWithoutPlace(*scene, all, placed, context);
   facts->film->path_unevenness = Unevenness(placed);
   WarnOfUnevenPath(facts->film->path_unevenness, context);
-  LeaveMovingRegions(*scene, placed, files, context);
+  files.Leave(placed, context);
   *scene = placed;
 }
 

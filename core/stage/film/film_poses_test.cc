@@ -69,8 +69,7 @@ TEST_F(FilmPosesTest, AMovingCameraBeforeWhichSomethingMoves) {
   const Scene scene = Import();
   ASSERT_TRUE(scene.IsDynamic());
   ASSERT_EQ(scene.views.size(), kFrames - 1u) << observer_.text;
-  EXPECT_THAT(observer_.text,
-              HasSubstr("1 of 16 frames found no place and are left out: n105.png"));
+  EXPECT_THAT(observer_.text, HasSubstr("1 frame of 16 found no place, left out: n105.png"));
   EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{4, 12}));
   EXPECT_GT(scene.points.size(), 200u);
   EXPECT_TRUE(fs::exists(scratch_.path() / "out/sfm.log"));

@@ -10,6 +10,7 @@
 #include "core/image/codec.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
+#include "core/stage/formats/artifacts.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -42,6 +43,13 @@ fs::path MovingRegionFiles::MovingFile(int view) const { return folder_ / "movin
 fs::path MovingRegionFiles::StillFile(int view) const {
   const fs::path file = folder_ / "still" / Name(view);
   return fs::exists(file) ? file : fs::path();
+}
+
+void MovingRegionFiles::Leave(const Scene& placed, StageContext& context) const {
+  for (const View& view : placed.views) {
+    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
+                       MovingFile(scene_.FindView(view.name)));
+  }
 }
 
 ShotMotion WriteMovingRegions(const fs::path& frames_root,

@@ -20,6 +20,8 @@ class MovingRegionFiles {
   std::filesystem::path MovingFile(int view) const;
   // None where nothing stands still.
   std::filesystem::path StillFile(int view) const;
+  // Of the scene's frames that `placed` has views of, by name: as kMovingRegions.
+  void Leave(const Scene& placed, StageContext& context) const;
 
  private:
   const Scene& scene_;
