@@ -117,7 +117,7 @@ public core/splat model/gaussian_cap model/gaussian_model model/memory_plan moti
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene
 public core/stage stages film/import_film formats/artifacts
-public core/video film_reader mp4_writer ticks
+public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
 public server/access notify_targets tls tokens

@@ -116,7 +116,10 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   // Frames with faults get the numbers behind.
   int shot = 0;
   for (size_t k = 0; k < kept.size(); ++k) {
-    if (k > 0 && cut[k - 1]) ++shot;
+    if (k > 0 && cut[k - 1]) {
+      ++shot;
+      result.cuts.push_back(kept[k]);
+    }
     result.shot[kept[k]] = shot;
   }
   result.count = kept.empty() ? 0 : shot + 1;

@@ -21,6 +21,7 @@ struct FilmShots {
   // others; the frames before and after it go on as one shot where they show the same.
   std::vector<int> shot;
   std::vector<FrameFault> fault;
+  std::vector<int> cuts;  // the frames that begin the second shot and those after it, ascending
   int count = 0;
 };
 

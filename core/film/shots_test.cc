@@ -46,6 +46,7 @@ TEST(Shots, CutsAreFoundAndMotionIsNone) {
   EXPECT_EQ(shots.shot[17], 2);
   for (int i = 18; i < 26; ++i) EXPECT_EQ(shots.shot[i], 3) << i;
   EXPECT_THAT(shots.fault, testing::Each(FrameFault::kNone));
+  EXPECT_THAT(shots.cuts, ElementsAre(10, 17, 18));
 }
 
 TEST(Shots, FaultsDoNotCutWhatGoesOn) {

@@ -11,6 +11,8 @@ extern "C" {
 #include <cstdint>
 #include <vector>
 
+#include "core/video/sound_stream.h"
+
 namespace color3d {
 namespace {
 
@@ -19,36 +21,6 @@ constexpr AVCodecID kCopied[] = {
     AV_CODEC_ID_AAC, AV_CODEC_ID_MP3, AV_CODEC_ID_AC3, AV_CODEC_ID_EAC3, AV_CODEC_ID_OPUS};
 constexpr int64_t kBitsPerChannel = 96000;
 constexpr double kGapS = 0.02;  // times that differ by less are rounded, not gaps
-
-AVStream* FirstSound(AVFormatContext* container) {
-  for (unsigned i = 0; i < container->nb_streams; ++i) {
-    const AVCodecParameters* codec = container->streams[i]->codecpar;
-    if (codec->codec_type == AVMEDIA_TYPE_AUDIO) return container->streams[i];
-  }
-  return nullptr;
-}
-
-// Sample i of a channel, -1..1.
-float SampleOf(const AVFrame& frame, int channel, int channels, int i) {
-  const auto format = static_cast<AVSampleFormat>(frame.format);
-  const bool planar = av_sample_fmt_is_planar(format) != 0;
-  const uint8_t* data = frame.extended_data[planar ? channel : 0];
-  const int at = planar ? i : i * channels + channel;
-  switch (av_get_packed_sample_fmt(format)) {
-    case AV_SAMPLE_FMT_U8:
-      return (static_cast<float>(data[at]) - 128.0f) / 128.0f;
-    case AV_SAMPLE_FMT_S16:
-      return static_cast<float>(reinterpret_cast<const int16_t*>(data)[at]) / 32768.0f;
-    case AV_SAMPLE_FMT_S32:
-      return static_cast<float>(reinterpret_cast<const int32_t*>(data)[at]) / 2147483648.0f;
-    case AV_SAMPLE_FMT_FLT:
-      return reinterpret_cast<const float*>(data)[at];
-    case AV_SAMPLE_FMT_DBL:
-      return static_cast<float>(reinterpret_cast<const double*>(data)[at]);
-    default:
-      return 0.0f;
-  }
-}
 
 }  // namespace
 

@@ -114,8 +114,7 @@ void WarnOfUnevenPath(double unevenness, StageContext& context) {
   if (unevenness < kUneven) return;
   context.progress().OnWarning(fmt::format(
       "the camera's path is uneven (its steps change by {:.0f} % from frame to frame): what was "
-      "taken "
-      "for the place may move itself; look at the poses, or leave them out (film_poses: off)",
+      "taken for the place may move itself; look at the poses, or leave them out (film_poses: off)",
       100.0 * unevenness));
 }
 
@@ -158,8 +157,9 @@ void FindFilmPoses(const fs::path& frames_root,
         "of an upright backdrop, and what moves stands on it; good for a look from nearby only",
         motion.background_px,
         kMotionSidePx));
-    facts->film->poses_found = true;
     Scene relief = ReliefScene(*scene, shot, files);
+    facts->film->poses_found = true;
+    facts->photos_registered = static_cast<int>(relief.views.size());
     WarnOfFramesWithoutPlace(*scene, all, relief, context);
     files.Leave(relief, context);
     *scene = std::move(relief);

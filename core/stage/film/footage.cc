@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "core/base/error.h"
@@ -12,12 +14,59 @@
 #include "core/scene/frame_times.h"
 #include "core/stage/film/film_frames.h"
 #include "core/video/film_reader.h"
+#include "core/video/sound_offset.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr double kNoMoment = -std::numeric_limits<double>::infinity();
+
+constexpr char kToldInTransforms[] = "transforms.json";  // when each film began
+
+// What a film's first minutes sound like.
+std::vector<float> LevelsOf(const Footage& footage, const StageContext& context) {
+  constexpr double kMostS = 600.0;
+  if (footage.film.is_pictures || footage.film.has_pose) return {};
+  const FilmReader reader(context.scene_folder() / footage.film.file);
+  const FilmFacts& facts = reader.facts();
+  if (!facts.has_sound) return {};
+  return SoundLevels({context.scene_folder() / footage.film.file,
+                      facts.first_s,
+                      facts.first_s + std::min(kMostS, facts.seconds)},
+                     context.cancel());
+}
+
+// Films of which nobody has said when they began are put on the clock of the first one by what both
+// hear. One that hears nothing in common keeps its time.
+void AlignBySound(std::vector<Footage>* all, StageContext& context) {
+  if (all->size() < 2) return;
+  const Footage& first = all->front();
+  const std::vector<float> heard = LevelsOf(first, context);
+  if (heard.empty()) return;
+  for (auto footage = all->begin() + 1; footage != all->end(); ++footage) {
+    const std::vector<float> levels = LevelsOf(*footage, context);
+    if (levels.empty()) continue;
+    const std::optional<double> offset_s = SoundOffset(heard, levels);
+    if (!offset_s) {
+      context.progress().OnWarning(fmt::format(
+          "{} and {} share no sound that tells when they began: taken to have begun together; else "
+          "give time_offset in transforms.json",
+          first.film.file,
+          footage->film.file));
+      continue;
+    }
+    const double interval_s =
+        footage->times.size() < 2 ? 0.0 : footage->times[1] - footage->times[0];
+    if (std::abs(*offset_s) < 0.5 * interval_s) continue;
+    for (double& time_s : footage->times) time_s += *offset_s;
+    context.progress().OnWarning(fmt::format("by their sound, {} began {:.2f} s {} {}",
+                                             footage->film.file,
+                                             std::abs(*offset_s),
+                                             *offset_s > 0.0 ? "after" : "before",
+                                             first.film.file));
+  }
+}
 
 // The films with the times of their frames on the clock that they share.
 std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& context) {
@@ -31,7 +80,6 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
     return std::pair(facts.width, facts.height);
   };
   std::vector<Footage> all;
-  double begin_s = std::numeric_limits<double>::infinity();
   for (CameraFilm& film : ReadCameraFilms(context.scene_folder(), size_of)) {
     Footage footage{std::move(film), {}, {}, {}};
     if (footage.film.is_pictures) {
@@ -42,9 +90,11 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
       footage.times = times.at(footage.film.file);
     }
     for (double& time_s : footage.times) time_s += footage.film.time_offset_s;
-    begin_s = std::min(begin_s, footage.times.front());
     all.push_back(std::move(footage));
   }
+  if (!fs::exists(context.scene_folder() / kToldInTransforms)) AlignBySound(&all, context);
+  double begin_s = std::numeric_limits<double>::infinity();
+  for (const Footage& footage : all) begin_s = std::min(begin_s, footage.times.front());
   for (Footage& footage : all) {
     for (double& time_s : footage.times) time_s -= begin_s;
   }

@@ -27,9 +27,10 @@ struct Footage {
 
 // Empty when the scene has no films of several cameras (scene/camera_films.h). Moments, a part and
 // a stride of them, are asked for on the time that all cameras share; of frames where their clocks
-// share no moments. Warns of clocks that differ. Throws Error{kInvalidArgument}: what
-// ReadCameraFilms refuses, a film without a frame that is asked for, more than kMaxFilmFrames in
-// all.
+// share no moments. Films without poses of which no transforms.json says when they began are put on
+// one clock by their sound, where they have some in common. Warns of that, and of clocks that
+// differ. Throws Error{kInvalidArgument}: what ReadCameraFilms refuses, a film without a frame that
+// is asked for, more than kMaxFilmFrames in all.
 std::vector<Footage> ReadFootage(const FilmOptions& options, StageContext& context);
 
 // The frames of one camera, one after the other. Not thread-safe.

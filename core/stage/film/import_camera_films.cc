@@ -127,18 +127,12 @@ class CameraFilmsImport {
 
   void RequireOneShot(const FramesOfCamera& camera, const std::vector<Image>& thumbnails) const {
     const FilmShots shots = FindShots(thumbnails);
-    int last = -1;
-    for (size_t i = 0; i < camera.views.size(); ++i) {
-      if (shots.fault[i] != FrameFault::kNone) continue;
-      if (last >= 0 && shots.shot[i] != last) {
-        throw InvalidArgument(
-            "{} is cut before {}: where the poses of several cameras are looked for, each film "
-            "must be one shot; take a part of one (film_begin_s, film_end_s), or cut the films",
-            camera.film,
-            frames_.views[camera.views[i]].name);
-      }
-      last = shots.shot[i];
-    }
+    if (shots.cuts.empty()) return;
+    throw InvalidArgument(
+        "{} is cut before {}: where the poses of several cameras are looked for, each film must be "
+        "one shot; take a part of one (film_begin_s, film_end_s), or cut the films",
+        camera.film,
+        frames_.views[camera.views[shots.cuts.front()]].name);
   }
 
   ImportResult Place(const ImportOptions& options) {

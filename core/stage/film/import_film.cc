@@ -50,24 +50,20 @@ std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& opt
 
 void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
   std::vector<std::string> blank, alien, cuts;
-  int last = -1;
   for (size_t i = 0; i < scene->views.size(); ++i) {
     View& view = scene->views[i];
     view.moment->shot = shots.shot[i];
     if (shots.fault[i] == FrameFault::kBlank) blank.push_back(view.name);
     if (shots.fault[i] == FrameFault::kAlien) alien.push_back(view.name);
-    if (shots.fault[i] != FrameFault::kNone) continue;
-    if (last >= 0 && shots.shot[i] != last) cuts.push_back(view.name);
-    last = shots.shot[i];
   }
+  for (const int frame : shots.cuts) cuts.push_back(scene->views[frame].name);
   WarnOfFrames(blank, "of one grey all over", context);
   WarnOfFrames(alien, "unlike those around (torn?), coloured on their own", context);
   if (cuts.empty()) return;
   context.progress().OnWarning(fmt::format(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
       "by likeness. Colour a frame of each (further key views; the selection of several names one "
-      "a "
-      "shot)",
+      "a shot)",
       NamesOfFrames(cuts),
       cuts.size() + 1));
 }

@@ -1,0 +1,14 @@
+// The stream of sound of a film's file, and its samples. For this folder only.
+#pragma once
+
+#include "core/video/libav.h"
+
+namespace color3d {
+
+// The first one; null: there is none.
+AVStream* FirstSound(AVFormatContext* container);
+
+// Sample i of a channel of decoded sound, -1..1; 0 in a format that no decoder of sound hands out.
+float SampleOf(const AVFrame& frame, int channel, int channels, int i);
+
+}  // namespace color3d
