@@ -37,34 +37,36 @@ std::vector<float> LevelsOf(const Footage& footage, const StageContext& context)
                      context.cancel());
 }
 
-// Films of which nobody has said when they began are put on the clock of the first one by what both
-// hear. One that hears nothing in common keeps its time.
+// Films of which nobody has said when they began are put on the clock of the first one with sound,
+// by what both hear. One that hears nothing in common keeps its time.
 void AlignBySound(std::vector<Footage>* all, StageContext& context) {
-  if (all->size() < 2) return;
-  const Footage& first = all->front();
-  const std::vector<float> heard = LevelsOf(first, context);
-  if (heard.empty()) return;
-  for (auto footage = all->begin() + 1; footage != all->end(); ++footage) {
-    const std::vector<float> levels = LevelsOf(*footage, context);
+  const Footage* first = nullptr;
+  std::vector<float> heard;
+  for (Footage& footage : *all) {
+    std::vector<float> levels = LevelsOf(footage, context);
     if (levels.empty()) continue;
+    if (first == nullptr) {
+      first = &footage;
+      heard = std::move(levels);
+      continue;
+    }
     const std::optional<double> offset_s = SoundOffset(heard, levels);
     if (!offset_s) {
       context.progress().OnWarning(fmt::format(
           "{} and {} share no sound that tells when they began: taken to have begun together; else "
           "give time_offset in transforms.json",
-          first.film.file,
-          footage->film.file));
+          first->film.file,
+          footage.film.file));
       continue;
     }
-    const double interval_s =
-        footage->times.size() < 2 ? 0.0 : footage->times[1] - footage->times[0];
+    const double interval_s = footage.times.size() < 2 ? 0.0 : footage.times[1] - footage.times[0];
     if (std::abs(*offset_s) < 0.5 * interval_s) continue;
-    for (double& time_s : footage->times) time_s += *offset_s;
+    for (double& time_s : footage.times) time_s += *offset_s;
     context.progress().OnWarning(fmt::format("by their sound, {} began {:.2f} s {} {}",
-                                             footage->film.file,
+                                             footage.film.file,
                                              std::abs(*offset_s),
                                              *offset_s > 0.0 ? "after" : "before",
-                                             first.film.file));
+                                             first->film.file));
   }
 }
 
