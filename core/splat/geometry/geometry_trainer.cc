@@ -30,18 +30,6 @@ constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
 constexpr double kSurveyAt = 0.15;  // of the schedule: where motion is looked for
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
-// What a picture does not tell of a Gaussian, and how that moves where it does: `rates` has
-// `still_rows` rows, and kMotionRows more of what moves.
-void KeepDepth(int still_rows, std::vector<float>* rates) {
-  std::vector<int> rows{kPositionRow + 2, kLogScaleRow + 2, kRotationRow + 1, kRotationRow + 2};
-  if (static_cast<int>(rates->size()) > still_rows) {
-    for (const int row : {kVelocityRow + 2, kAccelerationRow + 2, kSpinRow + 1, kSpinRow + 2}) {
-      rows.push_back(still_rows + row);
-    }
-  }
-  for (const int row : rows) (*rates)[row] = 0.0f;
-}
-
 class GeometryTrainer {
  public:
   GeometryTrainer(const GeometryProblem& problem,
@@ -52,7 +40,7 @@ class GeometryTrainer {
         options_(options),
         run_(run),
         trace_(trace),
-        schedule_(options, problem.extent),
+        schedule_(options, problem.extent, problem.is_relief),
         times_(TimeSpanOf(problem)),
         channels_(problem.colors ? 3 : 1),
         targets_(problem.colors ? problem.colors : problem.luminance,
@@ -302,7 +290,6 @@ class GeometryTrainer {
                   ParameterBlock& parameters,
                   AdamMoments& moments) {
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
-    if (problem_.is_relief) KeepDepth(state_.parameters.rows(), &rates);
     if (!AdamStep(gradient, rates, state_.iteration + 1, run_.pool, parameters, moments)) {
       return false;
     }

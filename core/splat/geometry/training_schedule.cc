@@ -74,6 +74,11 @@ std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels
   set(kPositionRow, 3, scale * PositionRate(fraction));
   set(kLogScaleRow, 3, fade * tuning_.scale_rate);
   set(kRotationRow, 4, fade * tuning_.rotation_rate);
+  if (is_relief_) {
+    for (const int row : {kPositionRow + 2, kLogScaleRow + 2, kRotationRow + 1, kRotationRow + 2}) {
+      set(row, 1, 0.0);
+    }
+  }
   set(kOpacityRow, 1, fade * tuning_.opacity_rate);
   for (int c = 0; c < channels; ++c) {
     const int row = kColorRow + c * coefficients;
@@ -104,6 +109,11 @@ std::vector<float> TrainingSchedule::MoverRates(double fraction,
       3,
       scale * kAccelerationShare * PositionRate(fraction) / interval / interval);
   set(kSpinRow, 4, scale * tuning_.rotation_rate / interval);
+  if (is_relief_) {
+    for (const int row : {kVelocityRow + 2, kAccelerationRow + 2, kSpinRow + 1, kSpinRow + 2}) {
+      set(row, 1, 0.0);
+    }
+  }
   set(kCenterRow, 1, scale * kCenterRate * interval);
   set(kLogWidthRow, 1, scale * tuning_.scale_rate);
   return rates;

@@ -13,9 +13,10 @@ namespace color3d {
 
 class TrainingSchedule {
  public:
-  // `options` must outlive this object. `extent`: world units.
-  TrainingSchedule(const GeometryOptions& options, double extent)
-      : options_(options), tuning_(TuningOf(options)), extent_(extent) {}
+  // `options` must outlive this object. `extent`: world units. Of a relief, what its one pose does
+  // not tell has rates of 0 (GeometryProblem::is_relief).
+  TrainingSchedule(const GeometryOptions& options, double extent, bool is_relief = false)
+      : options_(options), tuning_(TuningOf(options)), extent_(extent), is_relief_(is_relief) {}
   const GeometryTuning& tuning() const { return tuning_; }
 
   // The larger of the iterations' and the time limit's share.
@@ -50,6 +51,7 @@ class TrainingSchedule {
   const GeometryOptions& options_;
   const GeometryTuning tuning_;
   double extent_;
+  bool is_relief_;
 };
 
 }  // namespace color3d

@@ -24,12 +24,20 @@ constexpr double kNoMoment = -std::numeric_limits<double>::infinity();
 
 constexpr char kToldInTransforms[] = "transforms.json";  // when each film began
 
+// What its file tells of a film.
+struct IndexedFilm {
+  FilmFacts facts;
+  std::vector<double> times;
+};
+using IndexedFilms = std::map<std::string, IndexedFilm>;  // by file
+
 // What a film's first minutes sound like.
-std::vector<float> LevelsOf(const Footage& footage, const StageContext& context) {
+std::vector<float> LevelsOf(const Footage& footage,
+                            const IndexedFilms& films,
+                            const StageContext& context) {
   constexpr double kMostS = 600.0;
   if (footage.film.is_pictures || footage.film.has_pose) return {};
-  const FilmReader reader(context.scene_folder() / footage.film.file);
-  const FilmFacts& facts = reader.facts();
+  const FilmFacts& facts = films.at(footage.film.file).facts;
   if (!facts.has_sound) return {};
   return SoundLevels({context.scene_folder() / footage.film.file,
                       facts.first_s,
@@ -39,11 +47,11 @@ std::vector<float> LevelsOf(const Footage& footage, const StageContext& context)
 
 // Films of which nobody has said when they began are put on the clock of the first one with sound,
 // by what both hear. One that hears nothing in common keeps its time.
-void AlignBySound(std::vector<Footage>* all, StageContext& context) {
+void AlignBySound(const IndexedFilms& films, std::vector<Footage>* all, StageContext& context) {
   const Footage* first = nullptr;
   std::vector<float> heard;
   for (Footage& footage : *all) {
-    std::vector<float> levels = LevelsOf(footage, context);
+    std::vector<float> levels = LevelsOf(footage, films, context);
     if (levels.empty()) continue;
     if (first == nullptr) {
       first = &footage;
@@ -72,13 +80,13 @@ void AlignBySound(std::vector<Footage>* all, StageContext& context) {
 
 // The films with the times of their frames on the clock that they share.
 std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& context) {
-  std::map<std::string, std::vector<double>> times;
+  IndexedFilms films;
   const auto size_of = [&](const std::string& file) {
     context.cancel().ThrowIfCancelled();
     const FilmReader reader(context.scene_folder() / file);
     const FilmFacts& facts = reader.facts();
     CheckMovieSize(file, facts.width, facts.height);
-    times[file] = reader.times();
+    films[file] = {facts, reader.times()};
     return std::pair(facts.width, facts.height);
   };
   std::vector<Footage> all;
@@ -88,13 +96,13 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
       footage.pictures = PicturesIn(context.scene_folder() / footage.film.file);
       footage.times = TimesOfPictures(footage.pictures.size(), options);
     } else {
-      if (!times.contains(footage.film.file)) size_of(footage.film.file);
-      footage.times = times.at(footage.film.file);
+      if (!films.contains(footage.film.file)) size_of(footage.film.file);
+      footage.times = films.at(footage.film.file).times;
     }
     for (double& time_s : footage.times) time_s += footage.film.time_offset_s;
     all.push_back(std::move(footage));
   }
-  if (!fs::exists(context.scene_folder() / kToldInTransforms)) AlignBySound(&all, context);
+  if (!fs::exists(context.scene_folder() / kToldInTransforms)) AlignBySound(films, &all, context);
   double begin_s = std::numeric_limits<double>::infinity();
   for (const Footage& footage : all) begin_s = std::min(begin_s, footage.times.front());
   for (Footage& footage : all) {

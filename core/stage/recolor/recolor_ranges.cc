@@ -27,8 +27,8 @@ namespace color3d {
 namespace {
 
 constexpr size_t kAtOnce = 16;  // frames
-constexpr int64_t kRecoloredFramesCacheBytes = int64_t{32}
-                                               << 20;  // neighbours are read several times
+// Neighbours are read several times.
+constexpr int64_t kRecoloredFramesCacheBytes = int64_t{32} << 20;
 
 // What the coloured film is read from, and who knows its colours.
 struct FilmToRecolor {
