@@ -21,7 +21,7 @@ struct TrainingRecipe {
   // Share of the neighbors in the blend with the decoder, by how well they agree on a colour:
   // certainty = doubt^2 / (doubt^2 + variance of the matches' ab). A decoder trained for a few
   // iterations is trusted less: share = 1 - (1 - certainty) (1 - exp(-iterations / trust)).
-  double neighbor_doubt = 10.0;  // Lab units
+  double neighbor_doubt = 4.0;  // Lab units
   double trust_iterations = 100.0;
 };
 
