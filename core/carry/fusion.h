@@ -23,9 +23,9 @@ struct FusionOptions {
   double edge_sigma = 1.0;
   // Feature distances (ColorPrediction::distance) where the automatic guess begins to replace the
   // inferred colour and where it has its full share.
-  double guess_begins = 3.5;
-  double guess_ends = 7.0;
-  double max_guessed = 0.6;   // that full share, 0..1
+  double guess_begins = 3.0;
+  double guess_ends = 5.0;
+  double max_guessed = 0.9;   // that full share, 0..1
   double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
   // A colourful guess (sky, leaves) is seldom made without reason: between these feature distances
   // and chromas (Lab units) it comes to decide alone, unfaded.

@@ -12,14 +12,13 @@ import grpc
 _PROTO = "color3d/backend/v1/backend.proto"
 
 
-def _generate():
-    """Makes the protocol's Python files in a folder that goes with the process; returns it."""
+def _generate(folder):
+    """Makes the protocol's Python files in `folder`."""
     here = os.path.dirname(os.path.abspath(__file__))
     root = os.environ.get("COLOR3D_PROTO", os.path.join(here, "..", "..", "..", "proto"))
     if not os.path.exists(os.path.join(root, _PROTO)):
         sys.exit(f"there is no {_PROTO} in {root}; set COLOR3D_PROTO to color3d's folder proto")
-    folder = tempfile.TemporaryDirectory(prefix="color3d-proto-")
-    outputs = [f"-I{root}", f"--python_out={folder.name}", f"--grpc_python_out={folder.name}"]
+    outputs = [f"-I{root}", f"--python_out={folder}", f"--grpc_python_out={folder}"]
     protoc, plugin = shutil.which("protoc"), shutil.which("grpc_python_plugin")
     if protoc and plugin:
         command = [protoc, f"--plugin=protoc-gen-grpc_python={plugin}"]
@@ -31,15 +30,18 @@ def _generate():
             "the protocol's Python files cannot be made: install Debian's protobuf-compiler and "
             f"protobuf-compiler-grpc, or pip's grpcio-tools ({made.stderr.strip()})"
         )
-    return folder
 
 
 try:
     from color3d.backend.v1 import backend_pb2, backend_pb2_grpc
 except ImportError:
-    _generated = _generate()
-    sys.path.insert(0, _generated.name)
-    from color3d.backend.v1 import backend_pb2, backend_pb2_grpc
+    # Once they are imported nobody needs them: a server that is killed leaves nothing behind.
+    with tempfile.TemporaryDirectory(prefix="color3d-proto-") as _generated:
+        _generate(_generated)
+        sys.path.insert(0, _generated)
+        from color3d.backend.v1 import backend_pb2, backend_pb2_grpc
+
+        sys.path.remove(_generated)
 
 MAX_MESSAGE_BYTES = 256 << 20
 
