@@ -351,18 +351,15 @@ TEST_F(FusionTest, StrangePlacesTakeTheFadedGuessAndSharesSumToOne) {
       luminance_.At(0, y, x) = x < 16 ? 10.0f : 90.0f;
     }
   }
-  const double share = FusionOptions{}.max_guessed;
   const FusedColor fused = Fuse(distance, guess);
   EXPECT_NEAR(fused.ab.At(0, 12, 4), -20.0, 1.0);
-  EXPECT_NEAR(fused.ab.At(0, 12, 28),
-              (1.0 - share) * -20.0 + share * FusionOptions{}.guess_chroma * 10.0,
-              1.0);
+  EXPECT_NEAR(fused.ab.At(0, 12, 28), 0.1 * -20.0 + 0.9 * 0.7 * 10.0, 1.0);
   for (size_t i = 0; i < luminance_.PlaneSize(); ++i) {
     const double sum =
         fused.provenance.Plane(0)[i] + fused.provenance.Plane(1)[i] + fused.provenance.Plane(2)[i];
     ASSERT_NEAR(sum, 1.0, 1e-5);
   }
-  EXPECT_NEAR(fused.provenance.At(0, 12, 28), share, 1e-5);
+  EXPECT_NEAR(fused.provenance.At(0, 12, 28), 0.9, 1e-5);
 }
 
 TEST_F(FusionTest, AColourfulGuessDecidesWhereThingsAreStrangeAndNowhereElse) {
