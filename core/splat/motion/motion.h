@@ -20,6 +20,10 @@ inline constexpr int kCenterRow = 10;
 inline constexpr int kLogWidthRow = 11;
 inline constexpr int kMotionRows = 12;
 
+// Opacity below which a Gaussian is not drawn anyway, and its logit.
+inline constexpr float kUnseenOpacity = 1e-4f;
+inline constexpr float kUnseenLogit = -9.2102404f;
+
 // The motion alone, kMotionRows rows for model.motion.size() Gaussians.
 ParameterBlock MotionFromModel(const GaussianModel& model);
 // The inverse, from rows [row, row + kMotionRows) of `moving`; begin and end stay as they are.
