@@ -4,6 +4,7 @@
 
 #include "core/simd/instruction_set.h"
 #include "core/splat/geometry/regularize.h"
+#include "core/splat/motion/motion.h"
 #include "tests/bench/splat/synthetic_splats.h"
 
 namespace color3d {
@@ -35,6 +36,18 @@ void MeasurePenalties(benchmark::State& state) {
   for (auto _ : state) AddPenaltyGradients(p, 0.01f, 0.01f, pool, gradient);
 }
 
+// Moving Gaussians to a moment, and the adjoint.
+void MeasureMotion(benchmark::State& state) {
+  constexpr float kMoment = 0.3f;
+  ThreadPool pool(1);
+  const ParameterBlock moving(kColorRow + 1 + kMotionRows, state.range(0));
+  ParameterBlock at(kColorRow + 1, state.range(0)), gradient;
+  for (auto _ : state) {
+    ApplyMotion(moving, kColorRow + 1, kMoment, 0, pool, at);
+    ApplyMotionBackward(moving, kColorRow + 1, kMoment, 0, at, at, pool, gradient);
+  }
+}
+
 void Loads(benchmark::internal::Benchmark* b) {
   b->Unit(benchmark::kMillisecond)->UseRealTime()->MinTime(0.2);
   b->ArgNames({"gaussians", "channels", "threads"});
@@ -52,6 +65,7 @@ BENCHMARK_CAPTURE(MeasureStep, project_backward, &SyntheticIteration::ProjectBac
     ->Apply(Loads);
 BENCHMARK_CAPTURE(MeasureStep, adam, &SyntheticIteration::Adam)->Apply(Loads);
 BENCHMARK(MeasurePenalties)->Unit(benchmark::kMillisecond)->MinTime(0.2)->Arg(50'000);
+BENCHMARK(MeasureMotion)->Unit(benchmark::kMillisecond)->MinTime(0.2)->Arg(20'000);
 
 }  // namespace
 }  // namespace color3d
