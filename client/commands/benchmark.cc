@@ -208,7 +208,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   const GrayCopies copies = MakeGrayCopies(folder, scratch.path(), *context.interrupt);
   const v1::Scene scene = UploadScene(
       connection,
-      BuildManifest(copies.folder, *context.interrupt),
+      BuildManifest(copies.folder, MaxFileBytes(connection), *context.interrupt),
       std::filesystem::absolute(folder.root).filename().string() + " (grey)",
       [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
   const Selection selection = SelectKeyView(connection, context, options, scene.name(), display);

@@ -52,7 +52,7 @@ ExitCode RunCreate(const Context& context,
   for (const std::string& note : folder.notes) PrintNote(context, note);
   Connection connection(context.server, *context.interrupt);
   ProgressDisplay display(context.json);
-  const auto entries = BuildManifest(folder, *context.interrupt);
+  const auto entries = BuildManifest(folder, MaxFileBytes(connection), *context.interrupt);
   const v1::Scene scene =
       UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
         display.OnTransfer("uploading", done, total);

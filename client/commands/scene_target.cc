@@ -15,7 +15,7 @@ std::string UploadFolder(Connection& connection,
                          const Context& context,
                          const PhotoFolder& folder,
                          ProgressDisplay& display) {
-  const auto entries = BuildManifest(folder, *context.interrupt);
+  const auto entries = BuildManifest(folder, MaxFileBytes(connection), *context.interrupt);
   const v1::Scene scene =
       UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
         display.OnTransfer("uploading", done, total);

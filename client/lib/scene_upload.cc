@@ -3,9 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <optional>
+#include <system_error>
 
 #include "client/lib/names.h"
+#include "client/lib/text.h"
 #include "core/base/files.h"
 #include "core/base/parallel.h"
 #include "core/base/utf8.h"
@@ -29,6 +32,19 @@ constexpr std::chrono::seconds kCommitTimeLimit{600};
     if (complaints.size() > kMaxListed) message += "\n  ...";
   }
   throw InvalidArgument(message);
+}
+
+void CheckSizes(const std::vector<LocalFile>& files, int64_t max_bytes) {
+  for (const LocalFile& file : files) {
+    std::error_code unreadable;  // told when it is read
+    const auto bytes = static_cast<int64_t>(std::filesystem::file_size(file.file, unreadable));
+    if (unreadable || bytes <= max_bytes) continue;
+    throw InvalidArgument(
+        "{} has {}; the server takes files of up to {}: cut it into parts, or encode it smaller",
+        file.file.string(),
+        HumanBytes(bytes),
+        HumanBytes(max_bytes));
+  }
 }
 
 // Named by content: the paths and digests of all files.
@@ -66,8 +82,19 @@ v1::Digest ToProto(const FileDigest& digest) {
   return proto;
 }
 
-std::vector<SceneEntry> BuildManifest(const PhotoFolder& folder, const CancellationToken& cancel) {
+int64_t MaxFileBytes(Connection& connection) {
+  return connection
+      .Call(
+          &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest())
+      .limits()
+      .max_blob_bytes();
+}
+
+std::vector<SceneEntry> BuildManifest(const PhotoFolder& folder,
+                                      int64_t max_file_bytes,
+                                      const CancellationToken& cancel) {
   const std::vector<LocalFile> files = folder.AllFiles();
+  CheckSizes(files, max_file_bytes);
   std::vector<SceneEntry> entries(files.size());
   std::vector<std::string> complaint(files.size());
   ThreadPool pool(2);

@@ -16,9 +16,15 @@ struct SceneEntry {
   FileDigest digest;
 };
 
-// Digests of all files. Photos are also checked to be whole images, so that a bad one is found
-// before anything is sent: throws Error{kInvalidArgument} that lists up to 10 of them.
-std::vector<SceneEntry> BuildManifest(const PhotoFolder& folder, const CancellationToken& cancel);
+// The largest file that the server takes, bytes. Throws RpcError.
+int64_t MaxFileBytes(Connection& connection);
+
+// Digests of all files. Before anything is sent (or a long film read), throws
+// Error{kInvalidArgument} for a file of more than `max_file_bytes`, and one that lists up to 10
+// photos that are not whole images.
+std::vector<SceneEntry> BuildManifest(const PhotoFolder& folder,
+                                      int64_t max_file_bytes,
+                                      const CancellationToken& cancel);
 
 // Uploads what is missing, declares and commits the scene. Its id follows from its files, so the
 // same folder gives the same scene. Throws RpcError; one with violations names each file that the
