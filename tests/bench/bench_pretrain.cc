@@ -86,7 +86,7 @@ PretrainLosses Sum(const PretrainLosses& x, const PretrainLosses& y) {
 }
 
 void RunPretrain(const PretrainArguments& args) {
-  SetTorchThreads(args.threads, 1);
+  SetTorchThreads(args.threads, /*blas_threads=*/1);
   const PhotoSet photos(ParseFolders(args.photos), ParseFolders(args.clips));
   std::optional<SqueezeNet> teacher;
   if (!args.teacher_file.empty()) teacher.emplace(args.teacher_file);

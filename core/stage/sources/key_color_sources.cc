@@ -234,7 +234,7 @@ const char* KeyColorSourceName(ColorizeKeyViewOptions::Source source) { return F
 KeyColorResult SolveKeyColor(const ColorizeKeyViewOptions& options,
                              const KeyPhoto& photo,
                              StageContext& context) {
-  SetTorchThreads(context.pool().thread_count());
+  SetTorchThreads(context.pool().thread_count(), /*blas_threads=*/1);
   return Find(options.source).solve(options, photo, context);
 }
 

@@ -44,7 +44,7 @@ nlohmann::ordered_json Json(const AutomaticScore& score) {
 }
 
 void RunAutomatic(const AutomaticArguments& args) {
-  SetTorchThreads(args.threads);
+  SetTorchThreads(args.threads, /*blas_threads=*/1);
   const auto colorizer = MakeColorizer(args);
   std::vector<AutomaticScore> scores;
   nlohmann::ordered_json result{{"colorizer", colorizer->description()}};
