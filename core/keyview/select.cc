@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/median.h"
@@ -132,11 +134,12 @@ void SetAsideUnusable(const std::vector<std::vector<double>>& descriptors, Guard
       count > 8 ? ", ..." : ""));
 }
 
-// A frame whose mean similarity to the others lies far below the rest's is equally unlike all
-// others, which the entropy formula takes for variety.
-void SetAsideOutliers(GuardedViews* guarded) {
+// A frame of a group whose mean similarity to the others lies far below the rest's is equally
+// unlike all others, which the entropy formula takes for variety.
+void SetAsideOutliers(const std::vector<int>& group, GuardedViews* guarded) {
   std::vector<double> means;
-  for (const RankedView& view : guarded->views) {
+  for (const int i : group) {
+    const RankedView& view = guarded->views[i];
     if (view.set_aside.empty()) means.push_back(view.mean_similarity);
   }
   if (static_cast<int>(means.size()) < kGuardMinViews) return;
@@ -144,25 +147,43 @@ void SetAsideOutliers(GuardedViews* guarded) {
   std::vector<double> deviations;
   for (double mean : means) deviations.push_back(std::abs(mean - median));
   const double limit = median - kGuardDeviations * Median(deviations) - kGuardSlack;
-  for (RankedView& view : guarded->views) {
+  for (const int i : group) {
+    RankedView& view = guarded->views[i];
     if (view.set_aside.empty() && view.mean_similarity < limit)
       view.set_aside = "unlike the others";
   }
 }
 
-// Mean cosine to the other kept views; of kept views and of all others alike.
+// Mean cosine to the other kept views of the group; of kept views and of all others alike.
 void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
+                          const std::vector<int>& group,
                           GuardedViews* guarded) {
   const std::vector<bool> kept = guarded->Kept();
-  const Matrix kept_rows = UnitRows(descriptors, IndicesOf(kept));
+  std::vector<int> kept_of_group;
+  for (const int i : group) {
+    if (kept[i]) kept_of_group.push_back(i);
+  }
+  const Matrix kept_rows = UnitRows(descriptors, kept_of_group);
   const Eigen::VectorXd total = kept_rows.colwise().sum().transpose();
   const double count = static_cast<double>(kept_rows.rows());
-  for (RankedView& view : guarded->views) {
+  for (const int i : group) {
+    RankedView& view = guarded->views[i];
     if (!IsUsable(descriptors[view.index])) continue;
     const double sum = UnitRows(descriptors, {view.index}).row(0).dot(total);
     const double own = kept[view.index] ? 1.0 : 0.0;
     view.mean_similarity = count - own > 0.0 ? (sum - own) / (count - own) : 1.0;
   }
+}
+
+// The indices of each group.
+std::vector<std::vector<int>> Members(const std::vector<int>& groups, size_t count) {
+  std::map<int, std::vector<int>> members;
+  for (size_t i = 0; i < count; ++i) {
+    members[groups.empty() ? 0 : groups[i]].push_back(static_cast<int>(i));
+  }
+  std::vector<std::vector<int>> result;
+  for (auto& [group, indices] : members) result.push_back(std::move(indices));
+  return result;
 }
 
 }  // namespace
@@ -181,9 +202,15 @@ std::vector<bool> GuardedViews::Kept() const {
 
 GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
                         const std::vector<std::string>& unfit,
-                        const KeyViewOptions& options) {
+                        const KeyViewOptions& options,
+                        const std::vector<int>& groups) {
   options.Validate();
   CheckLengths(descriptors);
+  if (!groups.empty() && groups.size() != descriptors.size()) {
+    throw InvalidArgument("groups are given for {} views, descriptors are there for {}",
+                          groups.size(),
+                          descriptors.size());
+  }
   if (!unfit.empty() && unfit.size() != descriptors.size()) {
     throw InvalidArgument("frames were examined for {} views, descriptors are there for {}",
                           unfit.size(),
@@ -201,8 +228,10 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
     const std::vector<bool> kept = fit.Kept();
     if (std::find(kept.begin(), kept.end(), true) != kept.end()) guarded = std::move(fit);
   }
-  FillMeanSimilarities(descriptors, &guarded);
-  if (options.outlier_guard) SetAsideOutliers(&guarded);
+  for (const std::vector<int>& group : Members(groups, descriptors.size())) {
+    FillMeanSimilarities(descriptors, group, &guarded);
+    if (options.outlier_guard) SetAsideOutliers(group, &guarded);
+  }
   return guarded;
 }
 

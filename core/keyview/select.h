@@ -42,11 +42,13 @@ struct GuardedViews {
 
 // descriptors[i] is view i's (any length >= 1, all equal). Zero or non-finite ones are set aside in
 // any case; unfit[i] (UnfitFrames; may be empty for no such check) and the similarity guard count
-// when options.outlier_guard. Throws Error{kInvalidArgument} for no views, descriptors of several
-// lengths, or when no view is left.
+// when options.outlier_guard. groups[i] (may be empty: one group): views are compared with those of
+// their own group, as a film's with those of their shot. Throws Error{kInvalidArgument} for no
+// views, descriptors of several lengths, or when no view is left.
 GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
                         const std::vector<std::string>& unfit,
-                        const KeyViewOptions& options);
+                        const KeyViewOptions& options,
+                        const std::vector<int>& groups = {});
 
 // The paper's score of every kept view, 0 for the others: H_i = -sum_j P_ij log P_ij (nats) with P
 // the row softmax of S / temperature, S the cosine similarities among the kept views. Memory grows

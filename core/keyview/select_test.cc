@@ -211,6 +211,21 @@ TEST(SelectKeyViewTest, WhenEveryFrameIsUnfitNoneIsSetAside) {
   EXPECT_EQ(guarded.Kept(), std::vector<bool>(3, true));
 }
 
+TEST(SelectKeyViewTest, ViewsAreComparedWithThoseOfTheirGroup) {
+  Matrix features;  // of two shots, the second with a frame that is unlike its others
+  for (int i = 0; i < 12; ++i) features.push_back({1.0, 0.01 * (i % 3), 0.0});
+  for (int i = 0; i < 5; ++i) features.push_back({0.0, 1.0, 0.01 * (i % 2)});
+  features.push_back({0.0, 0.5, -1.0});
+  std::vector<int> shots(12, 4);
+  shots.resize(features.size(), 7);
+  const std::vector<bool> alone = GuardViews(features, {}, {}).Kept();
+  EXPECT_EQ(std::count(alone.begin() + 12, alone.end(), true), 0) << "the shorter shot is unlike";
+  const std::vector<bool> kept = GuardViews(features, {}, {}, shots).Kept();
+  EXPECT_EQ(std::count(kept.begin(), kept.end() - 1, true), 17);
+  EXPECT_FALSE(kept.back());
+  EXPECT_THROW(GuardViews(features, {}, {}, {1, 2}), Error);
+}
+
 TEST(SelectKeyViewTest, MarginSaysHowClearlyTheWinnerStandsOut) {
   GuardedViews guarded = GuardViews(RandomFeatures(5, 4, 8), {}, {.outlier_guard = false});
   const KeyViewSelection selection = RankViews(guarded, {1.0, 9.0, 7.0, 3.0, 5.0});

@@ -99,6 +99,9 @@ void Conclude(const Scene& scene,
   for (const int view : key_views) facts.key_views.push_back(scene.views[view].name);
   const double mean = MeanCoverage(coverage, key_views);
   facts.coverage = mean;
+  for (size_t i = 0; i < coverage.size(); ++i) {
+    facts.view_coverage[scene.views[i].name] = coverage[i];
+  }
   context.progress().OnError(0, "coverage", mean);
   if (mean < kSmallCoverage) {
     context.progress().OnWarning(
@@ -106,7 +109,7 @@ void Conclude(const Scene& scene,
                     "are inferred from likeness. Colour a second key view, or choose another one",
                     100.0 * mean));
   }
-  WriteCarryFacts(facts, scene, coverage, context);
+  WriteCarryFacts(facts, context);
 }
 
 // Into a view of a scene that moves: by motion within the camera of a key view, from that camera's

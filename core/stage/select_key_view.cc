@@ -139,7 +139,11 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
     descriptors.push_back(view.descriptor);
     contents.push_back(view.content);
   }
-  GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents), options);
+  std::vector<int> shots;  // of a film
+  if (scene.IsFilm()) {
+    for (const int view : candidates) shots.push_back(scene.views[view].moment->shot);
+  }
+  GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents), options, shots);
   const std::vector<bool> kept = guarded.Kept();
   // A view that the user names is the first of several; the others stand in the sheet by coverage.
   KeyViewStrategy strategy =

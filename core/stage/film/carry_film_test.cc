@@ -4,10 +4,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/base/random.h"
 #include "core/color/lab.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
+#include "tests/support/scenes/noise_place.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
@@ -146,25 +146,12 @@ class ReturningShotTest : public StageTest {
           view.captured_camera = {kSideX, kSideY, 100.0, 100.0, kSideX / 2.0, kSideY / 2.0};
       view.moment = Moment{0.04 * i, shot};
       WriteFileAtomic(scratch_.path() / view.image_file,
-                      EncodePng8(Noise(shot == 1 ? 2 : 1, 2 * i)));
+                      EncodePng8(NoisePlace(shot == 1 ? 2 : 1, kSideX, kSideY, 2 * i)));
       scene_.views.push_back(view);
     }
     AddInput(artifact::kScene, SceneToJson(scene_));
     AddInput(artifact::kKeyView, R"({"view": "f101.png"})");
     AddInput(artifact::kKeyColor, EncodeAbPng(Image(kSideX, kSideY, 2, 30.0f)));
-  }
-  // Part of a picture of smooth noise, 0.2 to 0.8.
-  static Image Noise(uint64_t seed, int from) {
-    constexpr int kGrainPx = 4;
-    Random random(seed);
-    Image coarse(kSideX / kGrainPx + 10, kSideY / kGrainPx, 1);
-    for (float& value : coarse.data) value = static_cast<float>(0.2 + 0.6 * random.NextUniform());
-    const Image fine = Resize(coarse, coarse.width * kGrainPx, kSideY);
-    Image part(kSideX, kSideY, 1);
-    for (int y = 0; y < kSideY; ++y) {
-      for (int x = 0; x < kSideX; ++x) part.At(0, y, x) = fine.At(0, y, x + from);
-    }
-    return part;
   }
   std::string Run() {
     StageContext context = MakeContext();

@@ -5,9 +5,13 @@
 #include <set>
 
 #include "core/base/error.h"
+#include "core/film/returning_shots.h"
+#include "core/scene/view_images.h"
 
 namespace color3d {
 namespace {
+
+constexpr int kReturnSidePx = 500;  // as frames are when their colours are carried
 
 // All views of a shot, ascending.
 struct Shot {
@@ -42,23 +46,55 @@ std::vector<int> TrainingViewsOf(const Shot& shot, const Scene& scene) {
   return views;
 }
 
-// Where the next key frame goes: the longest shot without one, else the one with the most frames
-// for each. `keys`: those of each shot, `possible` at most. -1: every shot is full.
-int NextShot(const std::vector<Shot>& shots,
-             const std::vector<int>& keys,
-             const std::vector<int>& possible) {
+// The key frames of a shot.
+struct ShotKeys {
+  int possible = 0;
+  int own = 0;
+  // Shows, behind a cut, what a shot with a key frame shows, and has its colours; nothing until
+  // somebody has looked.
+  std::optional<bool> returns;
+
+  int Serving() const { return std::max(own, returns.value_or(false) ? 1 : 0); }
+};
+
+// Where the next key frame goes: the longest shot that none serves, else the one with the most
+// frames for each. -1: every shot is full.
+int NextShot(const std::vector<Shot>& shots, const std::vector<ShotKeys>& keys) {
   int next = -1;
   const auto frames_for_each = [&](int i) {
-    return static_cast<double>(shots[i].views.size()) / (keys[i] + 1);
+    return static_cast<double>(shots[i].views.size()) / (keys[i].Serving() + 1);
   };
+  const auto unserved = [&](int i) { return keys[i].Serving() == 0; };
   for (int i = 0; i < static_cast<int>(shots.size()); ++i) {
-    if (keys[i] >= possible[i]) continue;
-    if (next < 0 || (keys[i] == 0) > (keys[next] == 0) ||
-        ((keys[i] == 0) == (keys[next] == 0) && frames_for_each(i) > frames_for_each(next))) {
+    if (keys[i].own >= keys[i].possible) continue;
+    if (next < 0 || unserved(i) > unserved(next) ||
+        (unserved(i) == unserved(next) && frames_for_each(i) > frames_for_each(next))) {
       next = i;
     }
   }
   return next;
+}
+
+int MiddleOf(const Shot& shot) { return shot.views[shot.views.size() / 2]; }
+
+// Whether the middle of `shot` shows what the middle of one of `others` shows, as carry_color finds
+// out with their colours.
+bool Returns(const Shot& shot,
+             const std::vector<const Shot*>& others,
+             const ViewImages& images,
+             StageContext& context) {
+  const FilmFrames frames{{}, [&](int frame) { return images.Luminance(frame); }, nullptr};
+  std::vector<FilmKey> keys;
+  for (const Shot* other : others) {
+    const int frame = MiddleOf(*other);
+    const auto luminance = images.Luminance(frame);
+    keys.push_back({frame,
+                    {Image(luminance->width, luminance->height, 2),
+                     Image(luminance->width, luminance->height, 1, 1.0f)}});
+  }
+  return ReturningShots(frames, keys, {}, context.pool(), context.cancel())
+      .KeyAt(MiddleOf(shot))
+      .has_value();
 }
 
 }  // namespace
@@ -121,20 +157,27 @@ ChosenKeyViews ChooseFilmKeys(const Scene& scene,
     return scene.views[candidates[candidate]].moment->shot;
   };
   std::vector<std::vector<bool>> may(shots.size());
-  std::vector<int> possible, keys(shots.size(), 0), firsts(shots.size(), -1), order;
+  std::vector<ShotKeys> keys(shots.size());
+  std::vector<int> firsts(shots.size(), -1), order;
+  std::vector<const Shot*> with_key;
+  const auto take = [&](int shot) {
+    ++keys[shot].own;
+    order.push_back(shot);
+    with_key.push_back(&shots[shot]);
+  };
   for (size_t i = 0; i < shots.size(); ++i) {
     for (size_t c = 0; c < candidates.size(); ++c) {
       may[i].push_back(kept[c] && shot_of(static_cast<int>(c)) == shots[i].number);
     }
-    possible.push_back(static_cast<int>(std::count(may[i].begin(), may[i].end(), true)));
+    keys[i].possible = static_cast<int>(std::count(may[i].begin(), may[i].end(), true));
     if (first < 0 || shot_of(first) != shots[i].number) continue;
-    if (!may[i][first]) ++possible[i];
+    if (!may[i][first]) ++keys[i].possible;
     firsts[i] = first;
-    keys[i] = 1;
-    order.push_back(static_cast<int>(i));
+    take(static_cast<int>(i));
   }
+  const ViewImages images(scene, context.scene_folder(), kReturnSidePx, 0);
   while (static_cast<int>(order.size()) < count) {
-    const int next = NextShot(shots, keys, possible);
+    const int next = NextShot(shots, keys);
     if (next < 0) {
       throw InvalidArgument(
           "{} key views are asked for, but only {} frames can be one (of those that are compared, "
@@ -142,19 +185,23 @@ ChosenKeyViews ChooseFilmKeys(const Scene& scene,
           count,
           order.size());
     }
-    ++keys[next];
-    order.push_back(next);
+    std::optional<bool>& returns = keys[next].returns;
+    if (keys[next].own == 0 && !returns && !with_key.empty()) {
+      returns = Returns(shots[next], with_key, images, context);
+      if (*returns) continue;
+    }
+    take(next);
   }
   std::vector<std::vector<int>> chosen(shots.size());
   for (size_t i = 0; i < shots.size(); ++i) {
-    if (keys[i] == 0) continue;
+    if (keys[i].own == 0) continue;
     // Only its own frames ask for it.
     std::vector<bool> asked = may[i];
     if (firsts[i] >= 0) asked[firsts[i]] = true;
     chosen[i] = ChooseKeyViews(none,
                                FindNearestDistances(features, asked, context.control()),
                                may[i],
-                               keys[i],
+                               keys[i].own,
                                firsts[i])
                     .views;
   }
@@ -170,24 +217,27 @@ ChosenKeyViews ChooseFilmKeys(const Scene& scene,
   return result;
 }
 
-std::optional<NextFilmKey> AdviseNextFilmKey(const Scene& scene, const std::vector<int>& keys) {
+std::optional<NextFilmKey> AdviseNextFilmKey(const Scene& scene,
+                                             const std::vector<int>& keys,
+                                             const std::vector<double>& coverage) {
   std::set<int> with_key;
   for (const int key : keys) with_key.insert(scene.views[key].moment->shot);
-  double frames = 0.0, without = 0.0, gained = 0.0;
+  double without = 0.0, gained = 0.0;  // frames that no key frame shows; parts count as parts
   NextFilmKey next;
   for (const Shot& shot : ShotsOf(scene)) {
-    const auto length = static_cast<double>(shot.views.size());
-    frames += length;
     if (with_key.contains(shot.number)) continue;
-    without += length;
+    double open = 0.0;
+    for (const int view : shot.views) open += 1.0 - coverage[view];
+    without += open;
     const std::vector<int> training = TrainingViewsOf(shot, scene);
-    if (gained > 0.0 || training.empty() || length < 2.0) continue;
-    gained = length;
+    if (open <= gained || training.empty() || shot.views.size() < 2) continue;
+    gained = open;
     next.view = training[training.size() / 2];
   }
   if (gained == 0.0) return std::nullopt;
   const auto error = [&](double inferred) {
-    return kErrorSeen + (kErrorInferred - kErrorSeen) * inferred / frames;
+    return kErrorSeen +
+           (kErrorInferred - kErrorSeen) * inferred / static_cast<double>(scene.views.size());
   };
   next.error_now = error(without);
   next.error_with = error(without - gained);

@@ -26,10 +26,11 @@ bool TakeFromLongestShot(const Scene& scene,
                          const std::vector<int>& candidates,
                          KeyViewSelection* selection);
 
-// `count` of the candidates: as many as there are shots, each in another one, the longest first;
-// further ones where the most frames are for each key frame. Within a shot those that are expected
-// to serve its frames best. `kept`: candidates that may be chosen; `first` >= 0: is the first
-// whatever it costs. Throws as ChooseKeyViews.
+// `count` of the candidates: as many as there are shots, each in another one, the longest first,
+// and those that show what a shot with a key frame shows behind the others; further ones where the
+// most frames are for each key frame. Within a shot those that are expected to serve its frames
+// best. `kept`: candidates that may be chosen; `first` >= 0: is the first whatever it costs. Throws
+// as ChooseKeyViews.
 ChosenKeyViews ChooseFilmKeys(const Scene& scene,
                               const std::vector<int>& candidates,
                               const std::vector<ViewFeatures>& features,
@@ -39,11 +40,14 @@ ChosenKeyViews ChooseFilmKeys(const Scene& scene,
                               StageContext& context);
 
 struct NextFilmKey {
-  int view = 0;             // the middle of the longest shot without a key frame
+  int view = 0;             // the middle of the shot without a key frame of which most is open
   double error_now = 0.0;   // CIEDE2000 that is expected over all frames
   double error_with = 0.0;  // ... with this frame coloured, too
 };
-// Nothing when every shot of two frames or more has a key frame. `keys`: views.
-std::optional<NextFilmKey> AdviseNextFilmKey(const Scene& scene, const std::vector<int>& keys);
+// `keys`: views. `coverage`: of each view, 0..1, what key frames show of it, also behind a cut in a
+// shot that returns. Nothing when every shot of two frames or more has a key frame or is covered.
+std::optional<NextFilmKey> AdviseNextFilmKey(const Scene& scene,
+                                             const std::vector<int>& keys,
+                                             const std::vector<double>& coverage);
 
 }  // namespace color3d

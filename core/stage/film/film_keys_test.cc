@@ -4,19 +4,22 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "core/base/error.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/stages.h"
+#include "tests/support/scenes/noise_place.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 namespace {
 
 using testing::ElementsAre;
+
+constexpr int kWidth = 176, kHeight = 132;
 
 // Shots of these lengths, one after the other; without pictures.
 Scene FilmOf(const std::vector<int>& lengths) {
@@ -26,7 +29,8 @@ Scene FilmOf(const std::vector<int>& lengths) {
       View view;
       view.name = fmt::format("f{:04}.png", scene.views.size());
       view.image_file = view.name;
-      view.camera = view.captured_camera = {64, 48, 70.0, 70.0, 32.0, 24.0};
+      view.camera =
+          view.captured_camera = {kWidth, kHeight, 180.0, 180.0, kWidth / 2.0, kHeight / 2.0};
       view.moment = Moment{0.04 * static_cast<double>(scene.views.size()), static_cast<int>(shot)};
       scene.views.push_back(view);
     }
@@ -51,37 +55,31 @@ TEST(FilmKeys, EveryShotHasACandidateAndFaultsHaveNone) {
 
 TEST(FilmKeys, TheLongestShotWithoutAKeyFrameIsNext) {
   const Scene scene = FilmOf({20, 40, 1, 30});
-  const auto next = AdviseNextFilmKey(scene, {45});
+  std::vector<double> coverage(scene.views.size(), 0.0);
+  const auto next = AdviseNextFilmKey(scene, {45}, coverage);
   ASSERT_TRUE(next);
   EXPECT_EQ(scene.views[next->view].moment->shot, 3);
   EXPECT_EQ(next->view, 61 + 15);
   EXPECT_GT(next->error_now, next->error_with);
-  EXPECT_EQ(scene.views[AdviseNextFilmKey(scene, {45, 70})->view].moment->shot, 0);
-  EXPECT_FALSE(AdviseNextFilmKey(scene, {45, 70, 3}));
+  EXPECT_EQ(scene.views[AdviseNextFilmKey(scene, {45, 70}, coverage)->view].moment->shot, 0);
+  EXPECT_FALSE(AdviseNextFilmKey(scene, {45, 70, 3}, coverage));
+  // A shot that returns behind a cut asks for less than one that shows something new.
+  std::fill(coverage.begin() + 61, coverage.end(), 0.9);
+  const auto other = AdviseNextFilmKey(scene, {45}, coverage);
+  ASSERT_TRUE(other);
+  EXPECT_EQ(scene.views[other->view].moment->shot, 0);
+  EXPECT_LT(other->error_now, next->error_now);
 }
 
-// Pictures of three places, as a film.
+// A film of these shots, of these places.
 class FilmKeysStageTest : public StageTest {
  protected:
-  void WriteFilm(const std::vector<int>& lengths) {
+  void WriteFilm(const std::vector<int>& lengths, const std::vector<uint64_t>& places) {
     scene_ = FilmOf(lengths);
     for (size_t i = 0; i < scene_.views.size(); ++i) {
-      const int place = scene_.views[i].moment->shot;
-      Image image(64, 48, 1);
-      for (int y = 0; y < 48; ++y) {
-        for (int x = 0; x < 64; ++x) {
-          double v = 0.5;
-          for (int k = 1; k <= 4; ++k) {
-            const double a = 1.7 * (place + 1) + 2.3 * k;
-            v += 0.1 *
-                 std::sin(0.2 * k *
-                              ((x + 0.5 * static_cast<double>(i)) * std::cos(a) + y * std::sin(a)) +
-                          3.1 * a);
-          }
-          image.At(0, y, x) = static_cast<float>(v);
-        }
-      }
-      WriteFileAtomic(scratch_.path() / scene_.views[i].image_file, EncodePng8(image));
+      const int shot = scene_.views[i].moment->shot;
+      WriteFileAtomic(scratch_.path() / scene_.views[i].image_file,
+                      EncodePng8(NoisePlace(places[shot], kWidth, kHeight, static_cast<int>(i))));
     }
     AddInput(artifact::kScene, SceneToJson(scene_));
   }
@@ -114,7 +112,7 @@ class FilmKeysStageTest : public StageTest {
 };
 
 TEST_F(FilmKeysStageTest, ShotsGetKeyFramesTheLongestFirst) {
-  WriteFilm({6, 14, 9});
+  WriteFilm({6, 14, 9}, {1, 2, 3});
   EXPECT_THAT(Select(1), ElementsAre(1));
   EXPECT_THAT(Select(2), ElementsAre(1, 2));
   EXPECT_THAT(Select(3), ElementsAre(1, 2, 0));
@@ -122,8 +120,15 @@ TEST_F(FilmKeysStageTest, ShotsGetKeyFramesTheLongestFirst) {
   EXPECT_THAT(Select(3, "f0002"), ElementsAre(0, 1, 2));
 }
 
+TEST_F(FilmKeysStageTest, AShotThatReturnsWaitsForThoseThatShowSomethingNew) {
+  WriteFilm({12, 7, 9}, {1, 2, 1});
+  EXPECT_THAT(Select(2), ElementsAre(0, 1));
+  EXPECT_THAT(Select(3), ElementsAre(0, 1, 0));
+  EXPECT_THAT(Select(4), ElementsAre(0, 1, 0, 2));
+}
+
 TEST_F(FilmKeysStageTest, MoreKeyFramesThanFramesAreRefused) {
-  WriteFilm({2, 2});
+  WriteFilm({2, 2}, {1, 2});
   EXPECT_THROW(Select(5), Error);
 }
 

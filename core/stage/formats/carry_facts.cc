@@ -17,6 +17,11 @@ CarryFacts ReadCarryFacts(const StageContext& context) {
     const auto json = ordered_json::parse(context.ReadInput(artifact::kCarryFacts));
     if (json.contains("coverage")) facts.coverage = json.at("coverage").get<double>();
     if (json.contains("key_views")) json.at("key_views").get_to(facts.key_views);
+    if (json.contains("views")) {
+      for (const ordered_json& view : json.at("views")) {
+        facts.view_coverage[view.at("view").get<std::string>()] = view.at("coverage").get<double>();
+      }
+    }
   } catch (const ordered_json::exception& e) {
     throw InvalidArgument(
         "{} is damaged: {}; run {} again", artifact::kCarryFacts, e.what(), kind::kCarryColor);
@@ -24,13 +29,10 @@ CarryFacts ReadCarryFacts(const StageContext& context) {
   return facts;
 }
 
-void WriteCarryFacts(const CarryFacts& facts,
-                     const Scene& scene,
-                     const std::vector<double>& coverage,
-                     StageContext& context) {
+void WriteCarryFacts(const CarryFacts& facts, StageContext& context) {
   ordered_json json{{"key_views", facts.key_views}};
-  for (size_t i = 0; i < coverage.size(); ++i) {
-    json["views"].push_back({{"view", scene.views[i].name}, {"coverage", coverage[i]}});
+  for (const auto& [view, coverage] : facts.view_coverage) {
+    json["views"].push_back({{"view", view}, {"coverage", coverage}});
   }
   if (facts.coverage) json["coverage"] = *facts.coverage;
   context.WriteOutput(artifact::kCarryFacts, json.dump(1) + "\n");

@@ -2,11 +2,11 @@
 // carry_color, read by the stages after it.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/scene/scene.h"
 #include "core/stage/stage.h"
 
 namespace color3d {
@@ -15,15 +15,12 @@ struct CarryFacts {
   // Share of the other views' pixels that a key view shows, mean over the views that are not key
   // views, 0..1; nothing when nobody measured it.
   std::optional<double> coverage;
-  std::vector<std::string> key_views;  // names
+  std::vector<std::string> key_views;           // names
+  std::map<std::string, double> view_coverage;  // of every view, by its name
 };
 
 // Empty facts when the job has no such input. Throws Error{kInvalidArgument} when it is damaged.
 CarryFacts ReadCarryFacts(const StageContext& context);
-// `coverage`: of every view of the scene, for people; the stages do not read it.
-void WriteCarryFacts(const CarryFacts& facts,
-                     const Scene& scene,
-                     const std::vector<double>& coverage,
-                     StageContext& context);
+void WriteCarryFacts(const CarryFacts& facts, StageContext& context);
 
 }  // namespace color3d

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 
 #include "core/keyview/collect_features.h"
 #include "core/keyview/expected_error.h"
 #include "core/stage/film/film_keys.h"
 #include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/carry_facts.h"
 #include "core/stage/sources/seen_samples.h"
 
 namespace color3d {
@@ -17,7 +19,13 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
   if (scene.IsFilm()) {
     std::vector<int> of_film;
     for (const std::string& name : key_views) of_film.push_back(scene.FindView(name));
-    const auto next = AdviseNextFilmKey(scene, of_film);
+    const std::map<std::string, double> covered = ReadCarryFacts(context).view_coverage;
+    std::vector<double> coverage;
+    for (const View& view : scene.views) {
+      const auto found = covered.find(view.name);
+      coverage.push_back(found == covered.end() ? 0.0 : found->second);
+    }
+    const auto next = AdviseNextFilmKey(scene, of_film, coverage);
     if (!next) return std::nullopt;
     return NextKeyViewFacts{scene.views[next->view].name, next->error_now, next->error_with};
   }

@@ -17,9 +17,9 @@ struct NextKeyViewFacts {
 };
 
 // From the model's geometry and the photos' features (kept from the selection of the key view, or
-// found again); of a film the middle of its longest shot without a key view. Nothing without a
-// model, with more than 500 training views, or when no view would save anything. `key_views`:
-// names.
+// found again); of a film the middle of the shot without a key view of which most is open. Nothing
+// without a model, with more than 500 training views, or when no view would save anything.
+// `key_views`: names.
 std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
                                                   const std::vector<std::string>& key_views,
                                                   StageContext& context);
