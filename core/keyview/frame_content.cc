@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/base/error.h"
 #include "core/base/median.h"
@@ -87,6 +88,15 @@ double MedianOf(const std::vector<FrameContent>& frames, Field field) {
   return Median(std::move(values));
 }
 
+// The medians of some frames.
+struct Usual {
+  double detail = 0.0;
+  double structure = 0.0;
+};
+Usual UsualOf(const std::vector<FrameContent>& frames) {
+  return {MedianOf(frames, &FrameContent::detail), MedianOf(frames, &FrameContent::structure)};
+}
+
 }  // namespace
 
 FrameContent MeasureFrameContent(const Image& luminance) {
@@ -103,22 +113,32 @@ FrameContent MeasureFrameContent(const Image& luminance) {
           NeighbourCorrelation(finite, whole.variance)};
 }
 
-std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames) {
+std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,
+                                     const std::vector<int>& groups) {
   std::vector<std::string> reasons(frames.size());
   if (frames.empty()) return reasons;
-  const double detail = MedianOf(frames, &FrameContent::detail);
-  const double structure = MedianOf(frames, &FrameContent::structure);
+  std::map<int, std::vector<FrameContent>> of_group;
+  const auto group_of = [&](size_t i) { return groups.empty() ? 0 : groups[i]; };
+  for (size_t i = 0; i < frames.size(); ++i) of_group[group_of(i)].push_back(frames[i]);
+  std::map<int, Usual> usual;
+  const Usual all = UsualOf(frames);
+  for (const auto& [group, members] : of_group) {
+    Usual& own = usual[group] = UsualOf(members);
+    own.structure = std::max(own.structure, 0.5 * all.structure);
+    own.detail = std::max(own.detail, 0.5 * all.detail);
+  }
   const double correlation = MedianOf(frames, &FrameContent::correlation);
   size_t unfit = 0;
   for (size_t i = 0; i < frames.size(); ++i) {
     const FrameContent& frame = frames[i];
+    const Usual& own = usual.at(group_of(i));
     if (frame.deviation < kBlankDeviation) {
       reasons[i] = "blank";
     } else if (frame.correlation < kNoiseCorrelation && correlation > 1.5 * kNoiseCorrelation) {
       reasons[i] = "noise";
-    } else if (frame.structure < kMinStructure * structure) {
+    } else if (frame.structure < kMinStructure * own.structure) {
       reasons[i] = "much of it is empty";
-    } else if (frame.detail < kMinDetail * detail) {
+    } else if (frame.detail < kMinDetail * own.detail) {
       reasons[i] = "blurred";
     }
     if (!reasons[i].empty()) ++unfit;

@@ -23,7 +23,10 @@ FrameContent MeasureFrameContent(const Image& luminance);
 
 // For every frame why it cannot be the key view, empty when it can. Judged against the median of
 // all frames, so that a scene in fog or of film grain keeps its views; when every frame would be
-// unfit, none is.
-std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames);
+// unfit, none is. `groups` (of each frame; empty: one group): the shots of a film, each of which
+// has detail and structure of its own; half of what is asked of one group is asked of all alike, or
+// title cards would be fit.
+std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,
+                                     const std::vector<int>& groups = {});
 
 }  // namespace color3d

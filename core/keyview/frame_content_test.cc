@@ -90,6 +90,22 @@ TEST(UnfitFramesTest, EachDefectIsNamedEvenBesideTwoGoodViews) {
   }
 }
 
+TEST(UnfitFramesTest, AShotIsComparedWithItself) {
+  const FrameContent rich{20.0, 4.0, 0.8, 0.95}, plain{12.0, 2.5, 0.45, 0.97};
+  const FrameContent blurred{12.0, 0.7, 0.45, 0.99}, title{25.0, 1.5, 0.15, 0.9};
+  const FrameContent blank{0.5, 0.1, 0.0, 0.99};
+  std::vector<FrameContent> frames(9, rich);
+  frames.insert(frames.end(), {plain, plain, plain, blurred, title, title, blank, blank});
+  std::vector<int> shots(9, 0);
+  shots.insert(shots.end(), {1, 1, 1, 1, 2, 2, 3, 3});
+  const std::vector<std::string> unfit = UnfitFrames(frames, shots);
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(unfit[i], "") << i;
+  EXPECT_EQ(unfit[12], "blurred");
+  EXPECT_EQ(unfit[13], "much of it is empty");
+  EXPECT_EQ(unfit[15], "blank");
+  EXPECT_EQ(UnfitFrames(frames)[9], "much of it is empty") << "beside the others of one shot";
+}
+
 TEST(UnfitFramesTest, AllAlikeBadIsNoReason) {
   const FrameContent blank = MeasureFrameContent(Image(40, 30, 1));
   EXPECT_EQ(UnfitFrames({blank, blank, blank}), std::vector<std::string>(3));

@@ -143,7 +143,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   if (scene.IsFilm()) {
     for (const int view : candidates) shots.push_back(scene.views[view].moment->shot);
   }
-  GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents), options, shots);
+  GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents, shots), options, shots);
   const std::vector<bool> kept = guarded.Kept();
   // A view that the user names is the first of several; the others stand in the sheet by coverage.
   KeyViewStrategy strategy =
