@@ -103,8 +103,18 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve
       ->add_option("--project-gib",
                    options->project_gib,
-                   "What one project may have stored, GiB; 0: no limit of its own")
+                   "What one project may have stored, files and rows, GiB; 0: no limit of its own")
       ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  serve
+      ->add_option("--project-scenes", options->project_scenes, "Scenes that one project may have")
+      ->check(CLI::Range(1, 10'000'000))
+      ->capture_default_str();
+  serve
+      ->add_option("--keep-uncommitted-days",
+                   options->keep_uncommitted_days,
+                   "Delete scenes that were never committed so long after they were made; 0: never")
+      ->check(CLI::Range(0, 36'500))
       ->capture_default_str();
   serve
       ->add_option(
@@ -164,7 +174,17 @@ struct KeepingArguments {
 int SayWhatLacks(const CopiedBlobs& copied, const std::filesystem::path& from) {
   for (const std::string& sha256 : copied.missing) std::cout << "missing: " << sha256 << "\n";
   for (const std::string& sha256 : copied.damaged) std::cout << "damaged: " << sha256 << "\n";
+  for (const std::string& what : copied.unreadable) std::cout << "unreadable: " << what << "\n";
+  if (copied.awaited > 0) {
+    std::cout << fmt::format("{} files of scenes that are not committed were not uploaded yet\n",
+                             copied.awaited);
+  }
   if (copied.IsWhole()) return 0;
+  if (!copied.unreadable.empty()) {
+    std::cout << "change the owner or rights of what is unreadable, or look after the disk, and copy "
+                 "again\n";
+  }
+  if (copied.missing.empty() && copied.damaged.empty()) return 1;
   std::cout << fmt::format(
       "{} blobs of {} are missing and {} damaged, the copy is without them: upload their scenes' "
       "files again, or run their jobs anew with skip_cache\n",
@@ -176,11 +196,15 @@ int SayWhatLacks(const CopiedBlobs& copied, const std::filesystem::path& from) {
 
 int RunBackUp(const KeepingArguments& arguments) {
   const CopiedBlobs copied = BackUp(arguments.data_folder, arguments.copy);
-  std::cout << fmt::format("{}: {} blobs copied ({} MiB), {} were there\n",
+  std::cout << fmt::format("{}: {} blobs copied ({} MiB), {} were there and are good{}\n",
                            arguments.copy.string(),
                            copied.copied,
                            copied.bytes >> 20,
-                           copied.kept);
+                           copied.kept,
+                           copied.mended > 0
+                               ? fmt::format("; {} that were damaged there are copied again",
+                                             copied.mended)
+                               : "");
   return SayWhatLacks(copied, arguments.data_folder);
 }
 
@@ -202,17 +226,22 @@ int RunFsck(const KeepingArguments& arguments) {
     std::cout << "jobs.db: " << problem << "\n";
   for (const std::string& sha256 : result.missing) std::cout << "missing: " << sha256 << "\n";
   for (const std::string& sha256 : result.damaged) std::cout << "damaged: " << sha256 << "\n";
+  for (const std::string& what : result.unreadable) std::cout << "unreadable: " << what << "\n";
   std::cout << fmt::format(
       "{} blobs ({} MiB), {} named by nothing; {} missing, {} damaged, {} damaged and named by "
-      "nothing\n",
+      "nothing, {} unreadable; {} not uploaded yet, for scenes that are not committed\n",
       result.blobs,
       result.bytes >> 20,
       result.unnamed,
       result.missing.size(),
       result.damaged.size(),
-      result.damaged_unnamed);
+      result.damaged_unnamed,
+      result.unreadable.size(),
+      result.awaited);
   if (!result.store_problems.empty()) {
     std::cout << "restore jobs.db from a backup (color3d-server restore)\n";
+  } else if (result.missing.empty() && result.damaged.empty() && !result.unreadable.empty()) {
+    std::cout << "change the owner or rights of what is unreadable, or look after the disk\n";
   } else if (!result.IsGood()) {
     std::cout << (arguments.repair ? "what was damaged is set aside: "
                                    : "say --repair to set aside what is damaged, then ")

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
+#include <utility>
 
 #include "core/base/error.h"
+#include "core/base/folder_walk.h"
 #include "server/storage/collector.h"
 
 namespace color3d {
@@ -39,11 +42,10 @@ Scrubber::Result Scrubber::Scrub(std::vector<StoredBlob> blobs,
     result.bytes += blob.digest.size_bytes;
     last_ = name(blob);
     try {
-      if (IsIntact(blobs_, blob.digest)) continue;
-      blobs_.SetAside(last_);
-      result.damaged.push_back(last_);
+      if (!IsIntact(blobs_, blob.digest) && blobs_.SetAside(last_)) result.damaged.push_back(last_);
     } catch (const Error& e) {
-      if (e.code() != ErrorCode::kNotFound) throw;  // removed since
+      if (e.code() == ErrorCode::kNotFound) continue;  // removed since
+      result.unreadable.push_back(last_ + ": " + e.what());
     }
   }
   return result;
@@ -98,10 +100,18 @@ std::chrono::milliseconds Maintenance::Reap() {
     counts_.attempts_lost += reaped;
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
     HoldBackWhenSpaceIsLow();
+    GiveBackSpace();
   } catch (const std::exception& e) {
     spdlog::error("cannot look after leases: {}", e.what());
   }
   return timing_.reap;
+}
+
+void Maintenance::GiveBackSpace() {
+  store_.GiveBackSpace(timing_.keep_free_rows_bytes);
+  Ballast* const ballast = timing_.ballast;
+  if (ballast == nullptr || ballast->IsThere()) return;
+  if (blobs_.FreeBytes() >= timing_.reserve_bytes + 2 * ballast->bytes()) ballast->Make();
 }
 
 void Maintenance::HoldBackWhenSpaceIsLow() {
@@ -121,30 +131,50 @@ void Maintenance::HoldBackWhenSpaceIsLow() {
 
 std::chrono::milliseconds Maintenance::Sweep() {
   try {
-    const int uploads = uploads_.ReapOlderThan(timing_.grace);
+    const auto [uploads, unread_uploads] = uploads_.ReapOlderThan(timing_.grace);
     if (uploads > 0) spdlog::info("swept {} unfinished uploads", uploads);
-    const std::vector<StoredBlob> blobs = ListBlobs(blobs_, [this] { return IsStopping(); });
+    auto [blobs, unreadable] = ListBlobs(blobs_, [this] { return IsStopping(); });
+    unreadable.insert(unreadable.end(), unread_uploads.begin(), unread_uploads.end());
     ExpireJobs();
     CollectBlobs(blobs);
-    SweepScratch();
-    SweepJobLogs();
+    SweepScratch(&unreadable);
+    SweepJobLogs(&unreadable);
     const auto before = [this](std::chrono::milliseconds age) { return clock_() - age.count(); };
     store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
-    const Scrubber::Result scrubbed =
-        scrubber_.Scrub(blobs, timing_.scrub_bytes, [this] { return IsStopping(); });
-    counts_.blobs_damaged += static_cast<int64_t>(scrubbed.damaged.size());
-    for (const std::string& sha256 : scrubbed.damaged) {
-      spdlog::error(
-          "the blob {} was damaged on the disk and is set aside{}",
-          sha256,
-          store_.IsReferenced(sha256) ? "; what names it needs it uploaded or made again" : "");
+    Scrub(blobs, &unreadable);
+    if (unreadable.empty()) return timing_.sweep;
+    ++counts_.sweeps_failed;
+    constexpr size_t kTold = 5;
+    for (size_t i = 0; i < std::min(kTold, unreadable.size()); ++i) {
+      spdlog::error("the sweep cannot read {}", unreadable[i]);
     }
-    return timing_.sweep;
+    spdlog::error("the sweep passed over {} places that it cannot read and is tried again soon; "
+                  "change their owner or rights, or look after the disk",
+                  unreadable.size());
   } catch (const std::exception& e) {
     ++counts_.sweeps_failed;
     spdlog::error("the sweep failed and is tried again soon: {}", e.what());
-    return timing_.sweep_again;
   }
+  return timing_.sweep_again;
+}
+
+// As often as the sweep is due, not as often as a failed one is tried again.
+void Maintenance::Scrub(const std::vector<StoredBlob>& blobs,
+                        std::vector<std::string>* unreadable) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_scrub_) return;
+  next_scrub_ = now + timing_.sweep;
+  const Scrubber::Result scrubbed =
+      scrubber_.Scrub(blobs, timing_.scrub_bytes, [this] { return IsStopping(); });
+  for (const std::string& sha256 : scrubbed.damaged) {
+    spdlog::error("the blob {} was damaged on the disk and is set aside{}",
+                  sha256,
+                  store_.IsReferenced(sha256)
+                      ? "; what names it needs it uploaded or made again"
+                      : "");
+  }
+  unreadable->insert(
+      unreadable->end(), scrubbed.unreadable.begin(), scrubbed.unreadable.end());
 }
 
 void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
@@ -160,58 +190,74 @@ void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
 
 // In two phases, too: a clock that jumps makes nothing old.
 void Maintenance::ExpireJobs() {
-  if (timing_.keep_jobs.count() == 0) return;
-  const std::chrono::milliseconds age = timing_.keep_jobs, grace = timing_.grace;
-  const int64_t before = clock_() - age.count();
-  for (const std::string& scene : store_.AgeUnusedScenes(before, grace.count())) {
+  constexpr int64_t kNever = INT64_MIN;
+  const auto before = [this](std::chrono::milliseconds age) {
+    return age.count() == 0 ? kNever : clock_() - age.count();
+  };
+  const std::chrono::milliseconds grace = timing_.grace;
+  const auto make_room = [this] { return timing_.ballast != nullptr && timing_.ballast->Release(); };
+  const auto remove = [&](const auto& body) {
     if (IsStopping()) return;
     try {
-      store_.DeleteScene(scene, {});
-      spdlog::info("{} was old, without a job, and is deleted", scene);
+      WithRoomMade(make_room, body);
     } catch (const Error& e) {
-      // Used or deleted meanwhile.
+      // Used, retried, read or deleted meanwhile.
       if (e.code() != ErrorCode::kFailedPrecondition && e.code() != ErrorCode::kNotFound) throw;
     }
+  };
+  for (const std::string& scene : store_.AgeUnusedScenes(
+           before(timing_.keep_jobs), before(timing_.keep_uncommitted), grace.count())) {
+    remove([&] {
+      store_.DeleteScene(scene, {});
+      spdlog::info("{} was old, without a job, and is deleted", scene);
+    });
   }
-  for (const std::string& name : store_.AgeExpired(before, grace.count())) {
-    if (IsStopping()) return;
-    try {
+  if (timing_.keep_jobs.count() == 0) return;
+  for (const std::string& name : store_.AgeExpired(before(timing_.keep_jobs), grace.count())) {
+    remove([&] {
       const std::string scene = store_.GetJob(name).scene;
       store_.Delete(name, {});
       ++counts_.jobs_expired;
       spdlog::info("[job={}] was old and is deleted", name);
-      if (!store_.ListJobs({"", scene, std::nullopt}, 0, 1).empty()) continue;
+      if (!store_.ListJobs({"", scene, std::nullopt}, 0, 1, {}).empty()) return;
       store_.DeleteScene(scene, {});
       spdlog::info("{} had no job left and is deleted", scene);
-    } catch (const Error& e) {
-      // Retried, read or deleted meanwhile.
-      if (e.code() != ErrorCode::kFailedPrecondition && e.code() != ErrorCode::kNotFound) throw;
-    }
+    });
   }
 }
 
-void Maintenance::SweepJobLogs() {
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(paths_.JobLogs(), error)) {
-    if (IsStopping()) return;
-    try {
-      store_.GetJob("jobs/" + entry.path().stem().string());
-    } catch (const Error& e) {
-      if (e.code() == ErrorCode::kNotFound) fs::remove(entry.path(), error);
-    }
-  }
+void Maintenance::SweepJobLogs(std::vector<std::string>* unreadable) {
+  const auto problems =
+      WalkFolder(paths_.JobLogs(), WalkDepth::kFolder, [this](const fs::directory_entry& entry) {
+        if (IsStopping()) return false;
+        try {
+          store_.GetJob("jobs/" + entry.path().stem().string());
+        } catch (const Error& e) {
+          std::error_code error;
+          if (e.code() == ErrorCode::kNotFound) fs::remove(entry.path(), error);
+        }
+        return true;
+      });
+  unreadable->insert(unreadable->end(), problems.begin(), problems.end());
 }
 
 // Folders "<job id>-<epoch>" of attempts that no longer run.
-void Maintenance::SweepScratch() {
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator(paths_.Scratch(), error)) {
-    const std::string name = entry.path().filename().string();
-    const size_t dash = name.rfind('-');
-    if (dash == std::string::npos) continue;
-    const int64_t epoch = store_.RunningEpoch("jobs/" + name.substr(0, dash));
-    if (std::to_string(epoch) != name.substr(dash + 1)) fs::remove_all(entry.path(), error);
-  }
+void Maintenance::SweepScratch(std::vector<std::string>* unreadable) {
+  std::vector<std::string> unremoved;
+  const auto problems =
+      WalkFolder(paths_.Scratch(), WalkDepth::kFolder, [&](const fs::directory_entry& entry) {
+        const std::string name = entry.path().filename().string();
+        const size_t dash = name.rfind('-');
+        if (dash == std::string::npos) return true;
+        const int64_t epoch = store_.RunningEpoch("jobs/" + name.substr(0, dash));
+        if (std::to_string(epoch) == name.substr(dash + 1)) return true;
+        std::error_code error;
+        fs::remove_all(entry.path(), error);
+        if (error) unremoved.push_back(entry.path().string() + ": " + error.message());
+        return true;
+      });
+  unreadable->insert(unreadable->end(), problems.begin(), problems.end());
+  unreadable->insert(unreadable->end(), unremoved.begin(), unremoved.end());
 }
 
 }  // namespace color3d

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/storage/ballast.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/upload_store.h"
@@ -26,9 +27,14 @@ struct MaintenanceTiming {
   std::chrono::hours keep_events{30 * 24};        // after the job's end
   std::chrono::hours keep_request_ids{7 * 24};
   std::chrono::hours keep_jobs{0};  // after their end, unless pinned; 0: for ever
+  std::chrono::hours keep_uncommitted{7 * 24};  // scenes, after they were made; 0: for ever
   int64_t low_space_bytes = 0;      // free; below it no job is begun, until there is a tenth more
   int64_t scrub_bytes = int64_t{2} << 30;  // read and compared with their digests at each sweep
+  int64_t keep_free_rows_bytes = int64_t{4} << 20;  // in the database; more is given back
   std::function<void()> on_life = {};      // called at each `reap` when the store could be read
+  // Made while there is room beyond `reserve_bytes`, given up where a chore's deletion needs it.
+  Ballast* ballast = nullptr;
+  int64_t reserve_bytes = 0;
 };
 
 // Blobs whose bytes are no longer those of their digest are set aside, so that an upload or another
@@ -40,6 +46,7 @@ class Scrubber {
   struct Result {
     int64_t bytes = 0;
     std::vector<std::string> damaged;
+    std::vector<std::string> unreadable;  // "DIGEST: REASON"
   };
   // Goes on in `blobs`, which are all that there are, where the last call ended, for about so many
   // bytes; `stop` is asked between blobs.
@@ -54,7 +61,6 @@ class Scrubber {
 struct ChoreCounts {
   std::atomic<int64_t> attempts_lost{0};
   std::atomic<int64_t> blobs_removed{0};
-  std::atomic<int64_t> blobs_damaged{0};
   std::atomic<int64_t> jobs_expired{0};
   std::atomic<int64_t> sweeps_failed{0};
 };
@@ -80,10 +86,13 @@ class Maintenance {
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
   void HoldBackWhenSpaceIsLow();
+  void GiveBackSpace();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();
-  void SweepScratch();
-  void SweepJobLogs();
+  // What could not be read is added to `unreadable`.
+  void SweepScratch(std::vector<std::string>* unreadable);
+  void SweepJobLogs(std::vector<std::string>* unreadable);
+  void Scrub(const std::vector<StoredBlob>& blobs, std::vector<std::string>* unreadable);
   bool IsStopping();
 
   JobStore& store_;
@@ -93,6 +102,7 @@ class Maintenance {
   const Clock clock_;
   const MaintenanceTiming timing_;
   Scrubber scrubber_;
+  std::chrono::steady_clock::time_point next_scrub_{};
   ChoreCounts counts_;
   std::mutex mutex_;
   std::condition_variable wake_;

@@ -11,6 +11,7 @@
 #include "server/storage/collector.h"
 #include "server/storage/file_blob_store.h"
 #include "tests/support/service/job_store_fixture.h"
+#include "tests/support/unprivileged.h"
 
 namespace color3d {
 namespace {
@@ -66,9 +67,10 @@ TEST_F(MaintenanceTest, WhatNothingNamesGoesAfterItsTimeByTheSteadyClock) {
 class BlobsOfABusyDisk : public FileBlobStore {
  public:
   explicit BlobsOfABusyDisk(const fs::path& folder) : FileBlobStore(folder, {0}) {}
-  void ForEach(const std::function<bool(const StoredBlob&)>& visit) const override {
+  std::vector<std::string> ForEach(
+      const std::function<bool(const StoredBlob&)>& visit) const override {
     if (++sweeps == 1) throw Error(ErrorCode::kUnavailable, "the disk does not answer");
-    FileBlobStore::ForEach(visit);
+    return FileBlobStore::ForEach(visit);
   }
   mutable std::atomic<int> sweeps{0};
 };
@@ -89,7 +91,7 @@ TEST_F(MaintenanceTest, WhoeverOnlyLooksNotesNothing) {
   blobs_.PutBytes("orphan");
   const auto never = [] { return false; };
   const auto due = [&](auto look) {
-    return look(*store_, ListBlobs(blobs_, never), milliseconds(10));
+    return look(*store_, ListBlobs(blobs_, never).blobs, milliseconds(10));
   };
   EXPECT_TRUE(due(DueBlobsSoFar).empty());
   now_ += 10;
@@ -152,6 +154,59 @@ TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
   RunUntil([&] { return fs::is_empty(paths_.JobLogs()); }, timing);
 }
 
+TEST_F(MaintenanceTest, ScenesThatAreNeverCommittedGoByThemselves) {
+  SceneRecord scene;
+  scene.name = "scenes/abandoned";
+  store_->CreateScene(scene, {}, {});
+  wall_ += int64_t{8} * 24 * 3600 * 1000;
+  RunForAWhile();
+  EXPECT_EQ(store_->GetScene(scene.name).name, scene.name) << "noted, not deleted";
+  now_ += int64_t{25} * 3600 * 1000;
+  RunUntil([&] {
+    return ReasonThrown([&] { store_->GetScene(scene.name); }) == "SCENE_NOT_FOUND";
+  });
+  EXPECT_EQ(store_->GetScene("scenes/test").name, "scenes/test") << "committed, though without a job";
+}
+
+class UnreadableMaintenanceTest : private testing::Unprivileged, public MaintenanceTest {};
+
+TEST_F(UnreadableMaintenanceTest, AFolderThatCannotBeReadStopsNoSweepSilently) {
+  const FileDigest hidden = blobs_.PutBytes("hidden"), orphan = blobs_.PutBytes("orphan");
+  const fs::path folder = blobs_.Fetch(hidden.sha256).parent_path().parent_path();
+  ASSERT_NE(folder, blobs_.Fetch(orphan.sha256).parent_path().parent_path());
+  fs::permissions(folder, fs::perms::none);
+  RunForAWhile();
+  now_ += int64_t{25} * 3600 * 1000;
+  {
+    const Maintenance chores(
+        *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, Quick());
+    for (int i = 0; i < 1000 && chores.counts().blobs_removed < 1; ++i) {
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    EXPECT_EQ(chores.counts().blobs_removed, 1) << "the others are collected";
+    EXPECT_FALSE(blobs_.Look(orphan.sha256).has_value());
+    for (int i = 0; i < 1000 && chores.counts().sweeps_failed < 1; ++i) {
+      std::this_thread::sleep_for(milliseconds(5));
+    }
+    EXPECT_GE(chores.counts().sweeps_failed, 1);
+  }
+  fs::permissions(folder, fs::perms::owner_all);
+  EXPECT_TRUE(blobs_.Look(hidden.sha256).has_value());
+}
+
+TEST_F(MaintenanceTest, BallastIsMadeWhileThereIsRoom) {
+  Ballast ballast(paths_.BallastFile(), 1 << 20);
+  MaintenanceTiming timing = Quick();
+  timing.ballast = &ballast;
+  RunUntil([&] { return ballast.IsThere(); }, timing);
+  ballast.Release();
+  timing.reserve_bytes = int64_t{1} << 60;
+  Maintenance chores(
+      *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
+  std::this_thread::sleep_for(milliseconds(100));
+  EXPECT_FALSE(ballast.IsThere()) << "there is no room beyond the reserve";
+}
+
 TEST_F(MaintenanceTest, NoJobIsBegunWhileSpaceIsLow) {
   CreateSingle();
   MaintenanceTiming timing = Quick();
@@ -174,7 +229,7 @@ TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
   std::vector<std::string> found;
   int64_t bytes = 0;
   for (int round = 0; round < 10; ++round) {  // a few blobs each
-    const Scrubber::Result result = scrubber.Scrub(ListBlobs(blobs_, go_on), 14, go_on);
+    const Scrubber::Result result = scrubber.Scrub(ListBlobs(blobs_, go_on).blobs, 14, go_on);
     EXPECT_LE(result.bytes, 14 + 7);
     bytes += result.bytes;
     found.insert(found.end(), result.damaged.begin(), result.damaged.end());
@@ -182,7 +237,7 @@ TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
   EXPECT_GE(bytes, 20 * 6) << "all of them";
   EXPECT_EQ(found, std::vector<std::string>{all[7].sha256});
   EXPECT_FALSE(blobs_.Touch(all[7]));
-  EXPECT_EQ(scrubber.Scrub(ListBlobs(blobs_, go_on), 1000, [] { return true; }).bytes, 0);
+  EXPECT_EQ(scrubber.Scrub(ListBlobs(blobs_, go_on).blobs, 1000, [] { return true; }).bytes, 0);
 }
 
 class FullStore : public SqliteJobStore {
@@ -217,7 +272,8 @@ TEST_F(MaintenanceTest, LeasesAreLookedAfterWhateverTheSweepDoes) {
   class HangingBlobs : public FileBlobStore {
    public:
     using FileBlobStore::FileBlobStore;
-    void ForEach(const std::function<bool(const StoredBlob&)>&) const override {
+    std::vector<std::string> ForEach(
+        const std::function<bool(const StoredBlob&)>&) const override {
       while (!released) std::this_thread::sleep_for(milliseconds(1));
       throw Error(ErrorCode::kInternal, "the disk is gone");
     }

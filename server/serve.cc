@@ -28,6 +28,7 @@
 #include "server/ops/process.h"
 #include "server/ops/socket_folder.h"
 #include "server/rpc/rpc_server.h"
+#include "server/storage/ballast.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
@@ -170,6 +171,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
 ServerSample SampleOf(const ServeOptions& options,
                       const RpcServer& server,
                       const Maintenance& maintenance,
+                      const BlobStore& blobs,
                       bool draining) {
   const RpcServer::Open open = server.open();
   const ChoreCounts& counts = maintenance.counts();
@@ -181,7 +183,7 @@ ServerSample SampleOf(const ServeOptions& options,
   sample.draining = draining;
   sample.attempts_lost = counts.attempts_lost;
   sample.blobs_removed = counts.blobs_removed;
-  sample.blobs_damaged = counts.blobs_damaged;
+  sample.blobs_damaged = blobs.damaged();
   sample.jobs_expired = counts.jobs_expired;
   sample.sweeps_failed = counts.sweeps_failed;
   sample.reserve_bytes = options.reserve_mib << 20;
@@ -244,6 +246,7 @@ void Serve(const ServeOptions& options) {
   BlobStoreOptions blob_options;
   blob_options.reserve_bytes = options.reserve_mib << 20;
   FileBlobStore blobs(paths.Blobs(), blob_options);
+  Ballast ballast(paths.BallastFile(), BallastBytes(paths.root));
   RpcServerOptions rpc;
   rpc.listen = options.listen;
   rpc.version = COLOR3D_VERSION;
@@ -251,7 +254,10 @@ void Serve(const ServeOptions& options) {
   rpc.limits.project_max_unfinished_jobs = options.project_jobs;
   rpc.limits.project_max_streams = options.project_streams;
   rpc.limits.project_max_stored_bytes = static_cast<int64_t>(options.project_gib * (1 << 30));
+  rpc.limits.project_max_scenes = options.project_scenes;
+  rpc.limits.low_space_bytes = options.low_space_mib << 20;
   rpc.job_logs = paths.JobLogs();
+  rpc.make_room = [&ballast] { return ballast.Release(); };
   rpc.notify_allowed = options.notify_allow;
   rpc.drain = [] { ::kill(::getpid(), SIGTERM); };
   rpc.models = models;
@@ -276,7 +282,10 @@ void Serve(const ServeOptions& options) {
                            std::chrono::milliseconds(5'000));
   // No sign of life while the store cannot be read: systemd's watchdog then starts us anew.
   chores.keep_jobs = std::chrono::hours(24) * options.keep_days;
+  chores.keep_uncommitted = std::chrono::hours(24) * options.keep_uncommitted_days;
   chores.low_space_bytes = options.low_space_mib << 20;
+  chores.ballast = &ballast;
+  chores.reserve_bytes = options.reserve_mib << 20;
   chores.on_life = [] { NotifyServiceManager("WATCHDOG=1"); };
   Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
   std::optional<Notifier> notifier;
@@ -286,7 +295,7 @@ void Serve(const ServeOptions& options) {
   const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });
   if (!options.metrics_listen.empty()) {
     const int port = metrics.Listen(options.metrics_listen, store, blobs, [&] {
-      return SampleOf(options, server, maintenance, draining);
+      return SampleOf(options, server, maintenance, blobs, draining);
     });
     spdlog::info("metrics on port {}", port);
   }

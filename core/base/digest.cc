@@ -2,6 +2,8 @@
 
 #include <openssl/evp.h>
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <vector>
 
@@ -51,8 +53,15 @@ std::string Sha256Hex(std::string_view bytes) {
 }
 
 FileDigest DigestFile(const std::filesystem::path& path) {
+  errno = 0;
   std::ifstream in(path, std::ios::binary);
-  if (!in) throw Error(ErrorCode::kNotFound, "cannot open {}", path.string());
+  if (!in) {
+    const int error = errno;
+    const ErrorCode code = error == ENOENT || error == ENOTDIR ? ErrorCode::kNotFound
+                           : error == EIO                      ? ErrorCode::kDataLoss
+                                                               : ErrorCode::kFailedPrecondition;
+    throw Error(code, "cannot open {}: {}", path.string(), std::strerror(error));
+  }
   Sha256 hash;
   FileDigest result;
   std::vector<char> buffer(1 << 18);

@@ -120,16 +120,26 @@ std::vector<std::string> ListFiles(const fs::path& folder) {
     throw Error(ErrorCode::kNotFound, "{} is not a folder", folder.string());
   }
   std::vector<std::string> files;
-  fs::recursive_directory_iterator it(folder, fs::directory_options::skip_permission_denied);
-  for (const fs::recursive_directory_iterator end; it != end; ++it) {
+  fs::path reached = folder;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error)) {
+    std::error_code unknown;
     const std::string name = it->path().filename().string();
     if (!name.empty() && name[0] == '.') {
-      if (it->is_directory(error)) it.disable_recursion_pending();
+      if (it->is_directory(unknown)) it.disable_recursion_pending();
       continue;
     }
-    if (it->is_regular_file(error)) {
+    if (it->is_regular_file(unknown)) {
       files.push_back(it->path().lexically_relative(folder).generic_string());
     }
+    reached = it->path();
+  }
+  if (error) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot read the folder {} (at {}): {}; make what is in it readable, or move it away",
+                folder.string(),
+                reached.string(),
+                error.message());
   }
   std::sort(files.begin(), files.end());
   return files;

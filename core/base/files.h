@@ -25,7 +25,8 @@ void SyncFolder(const std::filesystem::path& folder);
 void PublishFile(const std::filesystem::path& temporary, const std::filesystem::path& final_path);
 
 // Regular files below `folder`, recursively, as sorted relative paths with '/' separators. Hidden
-// files are left out. Throws Error{kNotFound} when there is no such folder.
+// files are left out. Throws Error{kNotFound} when there is no such folder, kFailedPrecondition
+// naming one that cannot be read.
 std::vector<std::string> ListFiles(const std::filesystem::path& folder);
 
 // True when `path` is relative, not empty, and has no "..", ".", empty or NUL component, no

@@ -25,6 +25,7 @@ using testing::TestClient;
 
 constexpr char kScript[] = "steps=30,ms=100";
 constexpr char kDiskSize[] = "size=32m";
+constexpr char kLargeDiskSize[] = "size=300m";
 constexpr int64_t kUploadBytes = 2'000'000;
 
 bool Says(const char* file, const std::string& text) {
@@ -51,10 +52,11 @@ std::string LeaveTheMountsOfOthers() {
 
 class ChaosDiskTest : public ::testing::Test {
  protected:
+  explicit ChaosDiskTest(const char* size = kDiskSize) : size_(size) {}
   void SetUp() override {
     std::string why = LeaveTheMountsOfOthers();
     fs::create_directory(disk_);
-    if (why.empty() && ::mount("none", disk_.c_str(), "tmpfs", 0, kDiskSize) != 0) {
+    if (why.empty() && ::mount("none", disk_.c_str(), "tmpfs", 0, size_) != 0) {
       why = std::string("mount: ") + std::strerror(errno);
     }
     if (!why.empty()) GTEST_SKIP() << "A FULL DISK WAS NOT TESTED: " << why;
@@ -81,6 +83,7 @@ class ChaosDiskTest : public ::testing::Test {
                  const std::string& low_space_mib,
                  int64_t free_bytes);
 
+  const char* const size_;
   ScratchFolder scratch_;
   const fs::path disk_ = scratch_.path() / "data";
   const fs::path filler_ = disk_ / "filler";
@@ -214,6 +217,96 @@ TEST_F(ChaosDiskTest, WithoutALastByteJobsWaitOrFailAndReadsAreAnswered) {
   const Outcome outcome = Endure("0", "0", 0);
   EXPECT_GT(outcome.failed + outcome.lost_attempts + outcome.refused, 0)
       << "the disk was never full: the test proves nothing";
+}
+
+class LargeDiskTest : public ChaosDiskTest {
+ protected:
+  LargeDiskTest() : ChaosDiskTest(kLargeDiskSize) {}
+  int64_t Free() const { return static_cast<int64_t>(fs::space(disk_).available); }
+};
+
+// As large as a request takes, of paths that share no byte with others'.
+v1::CreateSceneRequest LargeScene(int number) {
+  v1::CreateSceneRequest request;
+  for (int i = 0; i < 2100; ++i) {
+    v1::SceneFile* file = request.add_files();
+    const std::string part = std::to_string(number) + "-" + std::to_string(i) + "-";
+    file->set_path(part + std::string(230, 'a') + "/" + part + std::string(230, 'b') + "/" + part +
+                   std::string(230, 'c') + "/" + part + std::string(230, 'd'));
+    *file->mutable_digest() = testing::DigestOf(part);
+  }
+  return request;
+}
+
+template <typename Stub, typename Request, typename Response>
+grpc::Status Answer(Stub& stub,
+                    grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                    const Request& request,
+                    Response* response) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(20));
+  return (stub.*method)(&context, request, response);
+}
+
+TEST_F(LargeDiskTest, RowsLeaveTheReserveAndCanBeDeletedOnADiskWithoutALastByte) {
+  constexpr int64_t kReserve = 40 << 20, kLow = 60 << 20;
+  ChaosService service(scratch_.path(), {"--reserve-mib", "40", "--low-space-mib", "60"});
+  TestClient& client = service.client();
+  using Scenes = v1::SceneService::Stub;
+  const fs::path ballast = disk_ / "ballast";
+  for (int i = 0; i < 200 && !fs::exists(ballast); ++i) SleepMs(50);
+  ASSERT_TRUE(fs::exists(ballast));
+  const v1::Scene photos = client.MakeScene();
+  const std::string job = client.Create(ScriptedSpec(photos.name(), "steps=1")).name();
+  client.WaitFinished(job);
+
+  std::vector<std::string> scenes;
+  grpc::Status status;
+  while (scenes.size() < 190) {
+    v1::Scene scene;
+    status = Answer(*client.scenes, &Scenes::CreateScene, LargeScene(static_cast<int>(scenes.size())), &scene);
+    if (!status.ok()) break;
+    scenes.push_back(scene.name());
+  }
+  EXPECT_EQ(testing::ReasonOfStatus(status), "STORAGE_FULL") << scenes.size() << " scenes";
+  EXPECT_GT(scenes.size(), 20u);
+  EXPECT_GT(Free(), kReserve) << "what was created left the reserve";
+  EXPECT_EQ(testing::ReasonOfStatus(TryCreate(client, ScriptedSpec(photos.name(), "steps=1", 2))),
+            "STORAGE_FULL");
+
+  Fill(0);
+  v1::DeleteSceneRequest remove;
+  v1::DeleteSceneResponse removed;
+  remove.set_name(scenes.back());
+  status = Answer(*client.scenes, &Scenes::DeleteScene, remove, &removed);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_FALSE(fs::exists(ballast)) << "it was given up: without it the disk was not full enough";
+  v1::DeleteJobRequest remove_job;
+  v1::DeleteJobResponse removed_job;
+  remove_job.set_name(job);
+  status = Answer(*client.jobs, &v1::JobService::Stub::DeleteJob, remove_job, &removed_job);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  scenes.pop_back();
+  for (const std::string& scene : scenes) {
+    remove.set_name(scene);
+    status = Answer(*client.scenes, &Scenes::DeleteScene, remove, &removed);
+    EXPECT_TRUE(status.ok()) << scene << ": " << status.error_message();
+  }
+  // The database gives back what they took, with the filler still there.
+  const auto wanted = static_cast<int64_t>(scenes.size()) << 20;
+  for (int i = 0; i < 400 && Free() < wanted; ++i) SleepMs(50);
+  EXPECT_GE(Free(), wanted);
+  fs::remove(filler_);
+  for (int i = 0; i < 400 && (!fs::exists(ballast) || Free() < kLow); ++i) SleepMs(50);
+  EXPECT_TRUE(fs::exists(ballast)) << "there is room for it again";
+  // The mark is left some seconds after there is a tenth more.
+  for (int i = 0; i < 200; ++i) {
+    status = TryCreate(client, ScriptedSpec(photos.name(), "steps=1", 3));
+    if (status.ok()) break;
+    SleepMs(50);
+  }
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_THAT(service.EndAndAudit(), IsEmpty());
 }
 
 }  // namespace

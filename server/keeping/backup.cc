@@ -1,14 +1,17 @@
 #include "server/keeping/backup.h"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "server/service_error.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
@@ -17,6 +20,8 @@
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
+
+constexpr char kUnreadable[] = "BLOB_UNREADABLE";
 
 Error Refused(const fs::path& folder, const char* why) {
   return Error(ErrorCode::kFailedPrecondition, "{} {}", folder.string(), why);
@@ -35,6 +40,13 @@ Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& p
   fs::copy_file(from, part, fs::copy_options::overwrite_existing, error);
   if (error == std::errc::no_such_file_or_directory) return Copy::kMissing;
   if (error == std::errc::io_error) return Copy::kDamaged;
+  if (::access(from.c_str(), R_OK) != 0) {
+    throw ServiceError(ErrorCode::kUnavailable,
+                       kUnreadable,
+                       "cannot read {}: {}",
+                       from.string(),
+                       error.message());
+  }
   if (error) {
     throw Error(ErrorCode::kUnavailable,
                 "cannot copy the blob {} to {}: {}",
@@ -46,12 +58,13 @@ Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& p
   return DigestFile(part).sha256 == sha256 ? Copy::kWhole : Copy::kDamaged;
 }
 
-std::optional<fs::path> Find(const BlobStore& blobs, const std::string& sha256) {
-  try {
-    return blobs.Fetch(sha256);
-  } catch (const Error&) {
-    return std::nullopt;
-  }
+enum class Kept { kGood, kDamaged, kNone };
+
+// What an earlier backup has of the blob. What it does not give is not good.
+Kept LookInCopy(const BlobStore& copy, const std::string& sha256) {
+  const std::optional<StoredBlob> blob = copy.Look(sha256);
+  if (!blob) return Kept::kNone;
+  return IsIntact(copy, blob->digest) ? Kept::kGood : Kept::kDamaged;
 }
 
 // Blobs that the copied store names. It drops checkpoints that could not be copied.
@@ -60,23 +73,38 @@ CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const D
   const FileBlobStore source(from.Blobs());
   FileBlobStore target(to.Blobs());
   const fs::path part = to.root / ".blob.part";
+  const std::set<std::string> awaited = store.AwaitedBlobs();
   CopiedBlobs result;
   for (const std::string& sha256 : store.ReferencedBlobs()) {
-    if (Find(target, sha256)) {
+    const Kept kept = LookInCopy(target, sha256);
+    if (kept == Kept::kGood) {
       ++result.kept;
       continue;
     }
-    const std::optional<fs::path> file = Find(source, sha256);
-    const Copy copy = file ? CopyBlob(*file, sha256, part) : Copy::kMissing;
+    Copy copy = Copy::kMissing;
+    try {
+      if (source.Look(sha256)) copy = CopyBlob(source.Fetch(sha256), sha256, part);
+    } catch (const Error& e) {
+      if (ReasonOf(e) != kUnreadable) throw;
+      result.unreadable.push_back(sha256 + ": " + e.what());
+      continue;
+    }
     if (copy == Copy::kWhole) {
       const auto size = static_cast<int64_t>(fs::file_size(part));
       target.Adopt(part, {sha256, size});
       ++result.copied;
+      result.mended += kept == Kept::kDamaged ? 1 : 0;
       result.bytes += size;
       continue;
     }
+    // Nobody takes it for good.
+    if (kept == Kept::kDamaged) target.SetAside(sha256);
     DropCheckpoint(copied_store, sha256);
     if (!store.IsReferenced(sha256)) continue;
+    if (copy == Copy::kMissing && awaited.contains(sha256)) {
+      ++result.awaited;
+      continue;
+    }
     (copy == Copy::kMissing ? result.missing : result.damaged).push_back(sha256);
   }
   std::error_code error;

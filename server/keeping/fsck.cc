@@ -3,6 +3,7 @@
 #include <set>
 
 #include "core/base/digest.h"
+#include "core/base/error.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
@@ -20,23 +21,43 @@ FsckResult Fsck(const fs::path& data_folder,
   FsckResult result;
   result.store_problems = StoreProblems(paths.Store());
   if (!result.store_problems.empty()) return result;  // what it names cannot be believed
-  std::set<std::string> named =
-      SqliteJobStore(paths.Store(), StoreRole::kWorker, SystemClocks()).ReferencedBlobs();
+  SqliteJobStore store(paths.Store(), StoreRole::kWorker, SystemClocks());
+  std::set<std::string> named = store.ReferencedBlobs();
   FileBlobStore blobs(paths.Blobs());
   std::vector<std::string> damaged;
-  blobs.ForEach([&](const StoredBlob& blob) {
+  const auto check = [&](const StoredBlob& blob) {
     const bool is_named = named.erase(blob.digest.sha256) > 0;
-    if (!IsIntact(blobs, blob.digest)) {
-      damaged.push_back(blob.digest.sha256);
-      if (is_named) result.damaged.push_back(blob.digest.sha256);
-      result.damaged_unnamed += is_named ? 0 : 1;
-    }
     result.unnamed += is_named ? 0 : 1;
+    try {
+      if (!IsIntact(blobs, blob.digest)) {
+        damaged.push_back(blob.digest.sha256);
+        if (is_named) result.damaged.push_back(blob.digest.sha256);
+        result.damaged_unnamed += is_named ? 0 : 1;
+      }
+    } catch (const Error& e) {
+      result.unreadable.push_back(blob.digest.sha256 + ": " + e.what());
+    }
     result.bytes += blob.digest.size_bytes;
     progress(++result.blobs);
     return true;
-  });
-  result.missing.assign(named.begin(), named.end());
+  };
+  const std::vector<std::string> unlisted = blobs.ForEach(check);
+  result.unreadable.insert(result.unreadable.end(), unlisted.begin(), unlisted.end());
+  // What no folder has told of is looked for by its name.
+  const std::set<std::string> awaited = store.AwaitedBlobs();
+  for (const std::string& sha256 : std::vector<std::string>(named.begin(), named.end())) {
+    try {
+      if (const auto blob = blobs.Look(sha256)) {
+        check(*blob);
+      } else if (awaited.contains(sha256)) {
+        ++result.awaited;
+      } else {
+        result.missing.push_back(sha256);
+      }
+    } catch (const Error& e) {
+      result.unreadable.push_back(sha256 + ": " + e.what());
+    }
+  }
   if (repair) {
     for (const std::string& sha256 : damaged) blobs.SetAside(sha256);
   }

@@ -7,6 +7,7 @@
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "tests/support/service/job_store_fixture.h"
+#include "tests/support/unprivileged.h"
 
 namespace color3d {
 namespace {
@@ -22,7 +23,7 @@ class KeepingTest : public testing::Test {
     photo_ = blobs_.PutBytes("photo");
     scene.files = {{"a.jpg", photo_}};
     store_ = Open(paths_.root, StoreRole::kServer);
-    store_->CreateScene(scene, {});
+    store_->CreateScene(scene, {}, {});
     store_->ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
     job_ = Run("result");
     blobs_.PutBytes("named by nothing");
@@ -102,6 +103,74 @@ TEST_F(KeepingTest, WhatIsDamagedIsLeftOutAndListed) {
   EXPECT_EQ(BackUp(paths_.root, other).missing, photo);
   EXPECT_EQ(Restore(other, fresh_).missing, photo);
   EXPECT_EQ(ResultIn(fresh_, later), "later");
+}
+
+// Somebody declared a scene and never sent its photos: nothing is lost.
+TEST_F(KeepingTest, UploadsThatWereAbandonedAreNoFault) {
+  SceneRecord abandoned;
+  abandoned.name = "scenes/abandoned";
+  abandoned.files = {{"a.jpg", photo_}, {"b.jpg", {Sha256Hex("never sent"), 10}}};
+  store_->CreateScene(abandoned, {}, {});
+  const CopiedBlobs copied = BackUp(paths_.root, backup_);
+  EXPECT_TRUE(copied.IsWhole());
+  EXPECT_EQ(copied.awaited, 1);
+  EXPECT_TRUE(Restore(backup_, fresh_).IsWhole());
+  FsckResult result = Check(fresh_);
+  EXPECT_TRUE(result.IsGood());
+  EXPECT_EQ(result.awaited, 1);
+  blobs_.Remove(photo_.sha256);
+  const CopiedBlobs lacking = BackUp(paths_.root, scratch_.path() / "other");
+  EXPECT_EQ(lacking.missing, std::vector<std::string>{photo_.sha256})
+      << "a committed scene names it, too";
+}
+
+TEST_F(KeepingTest, ASecondBackupBelievesNothingThatItHasNotRead) {
+  BackUp(paths_.root, backup_);
+  const fs::path copy = FileBlobStore(DataPaths(backup_).Blobs()).Fetch(photo_.sha256);
+  fs::permissions(copy, fs::perms::owner_all);
+  std::ofstream(copy, std::ios::binary) << "phot!";
+  const CopiedBlobs second = BackUp(paths_.root, backup_);
+  EXPECT_TRUE(second.IsWhole());
+  EXPECT_EQ(second.mended, 1);
+  EXPECT_EQ(second.copied, 1);
+  EXPECT_EQ(second.kept, 1);
+  EXPECT_EQ(ReadFile(copy), "photo");
+  EXPECT_TRUE(Restore(backup_, fresh_).IsWhole());
+
+  // Where the original is gone as well it is said, and nobody finds the bad bytes there.
+  fs::permissions(copy, fs::perms::owner_all);
+  std::ofstream(copy, std::ios::binary) << "phot!";
+  blobs_.Remove(photo_.sha256);
+  EXPECT_EQ(BackUp(paths_.root, backup_).missing, std::vector<std::string>{photo_.sha256});
+  EXPECT_FALSE(fs::exists(copy));
+}
+
+class UnreadableKeepingTest : private testing::Unprivileged, public KeepingTest {};
+
+TEST_F(UnreadableKeepingTest, WhatCannotBeReadIsNeitherMissingNorPassedOver) {
+  const fs::path folder = blobs_.Fetch(photo_.sha256).parent_path();
+  fs::permissions(folder, fs::perms::none);
+  const CopiedBlobs copied = BackUp(paths_.root, backup_);
+  EXPECT_FALSE(copied.IsWhole());
+  EXPECT_TRUE(copied.missing.empty());
+  EXPECT_EQ(copied.unreadable.size(), 1u);
+  EXPECT_EQ(copied.copied, 1) << "all else is";
+  store_.reset();
+  FsckResult result = Check(paths_.root);
+  EXPECT_FALSE(result.IsGood());
+  EXPECT_TRUE(result.missing.empty());
+  EXPECT_EQ(result.unreadable.size(), 2u) << "the folder, and the blob that is named";
+  EXPECT_EQ(result.blobs, 2);
+  fs::permissions(folder, fs::perms::owner_all);
+  const fs::path file = blobs_.Fetch(photo_.sha256);
+  fs::permissions(file, fs::perms::none);
+  result = Check(paths_.root, /*repair=*/true);
+  EXPECT_FALSE(result.IsGood());
+  EXPECT_TRUE(result.missing.empty());
+  EXPECT_EQ(result.unreadable.size(), 1u);
+  EXPECT_TRUE(fs::exists(file)) << "nobody knows that it is damaged";
+  fs::permissions(file, fs::perms::owner_read);
+  EXPECT_TRUE(Check(paths_.root).IsGood());
 }
 
 // A worker replaces its checkpoint while the backup runs.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "core/base/error.h"
@@ -17,10 +18,16 @@ namespace color3d {
 namespace {
 
 constexpr int kGone = 410;  // the receiver wants to hear no more
+constexpr int kOfEachReceiver = 50;
 
 std::string TimeText(int64_t ms) {
   return LogTime(std::chrono::system_clock::time_point(std::chrono::milliseconds(ms)));
 }
+
+// Scheme, host and port.
+std::string ReceiverOf(const std::string& url) { return url.substr(0, url.find('/', 8)); }
+
+std::pair<int64_t, int64_t> KeyOf(const Notification& due) { return {due.job_id, due.first_ms}; }
 
 // What a query holds may be a secret.
 std::string ForLog(const std::string& url) { return url.substr(0, url.find('?')); }
@@ -65,62 +72,162 @@ void Notifier::Loop() {
   while (true) {
     std::optional<Notification> due;
     try {
-      due = TakeDue();
+      WriteRemembered();
+      {
+        std::lock_guard lock(mutex_);
+        due = TakeDue();
+      }
       if (due) Deliver(*due);
     } catch (const std::exception& e) {
       spdlog::warn("cannot look after notifications: {}", e.what());
     }
     std::unique_lock lock(mutex_);
-    if (due) under_way_.erase(due->job_id);
+    if (due) {
+      under_way_.erase(KeyOf(*due));
+      --receivers_[ReceiverOf(due->url)].sending;
+    }
     if (stopping_) return;
     if (due) continue;
     if (wake_.wait_for(lock, options_.poll, [this] { return stopping_.load(); })) return;
   }
 }
 
-// One that no other thread is sending.
+// One that may be sent now: the store is asked when what it said is used up, at each poll.
 std::optional<Notification> Notifier::TakeDue() {
-  std::lock_guard lock(mutex_);
-  for (const Notification& due : store_.DueNotifications(options_.at_once + 1)) {
-    if (under_way_.insert(due.job_id).second) return due;
+  if (auto next = NextOf(due_)) return next;
+  const auto now = Steady::now();
+  if (now < next_poll_) return std::nullopt;
+  next_poll_ = now + options_.poll;
+  due_ = store_.DueNotifications(kOfEachReceiver);
+  std::set<Key> owed;
+  for (const Notification& due : due_) owed.insert(KeyOf(due));
+  // What is owed no more by the store is forgotten, unless it was not told that yet.
+  std::erase_if(remembered_, [&](const auto& entry) {
+    return !owed.contains(entry.first) && (entry.second.written || !entry.second.ended);
+  });
+  std::erase_if(receivers_, [&](const auto& entry) {
+    const Receiver& receiver = entry.second;
+    return receiver.sending == 0 && now > receiver.again + std::chrono::hours(1);
+  });
+  return NextOf(due_);
+}
+
+std::optional<Notification> Notifier::NextOf(const std::vector<Notification>& all) {
+  const auto now = Steady::now();
+  for (const Notification& due : all) {
+    if (under_way_.contains(KeyOf(due))) continue;
+    const auto known = remembered_.find(KeyOf(due));
+    if (known != remembered_.end() && (known->second.ended || now < known->second.again)) continue;
+    Receiver& receiver = receivers_[ReceiverOf(due.url)];
+    const int most = receiver.silences > 0 ? 1 : options_.at_once_to_one;
+    if (receiver.sending >= most || now < receiver.again) continue;
+    ++receiver.sending;
+    under_way_.insert(KeyOf(due));
+    Notification next = due;
+    if (known != remembered_.end()) next.tries = known->second.tries;
+    return next;
   }
   return std::nullopt;
 }
 
 void Notifier::Deliver(const Notification& due) {
-  const JobRecord job = store_.GetJob(due.job);
   WebhookAnswer answer;
   try {
+    const JobRecord job = store_.GetJob(due.job);
     CheckNotifyUrl(due.url, options_.allowed);
     const WebhookMessage message{due.url,
                                  fmt::format("{}-{}", due.job.substr(5), due.first_ms),
                                  clock_() / 1000,
                                  NotificationBody(job)};
     answer = SendWebhook(message, options_.secret, stopping_);
+    if (stopping_ && answer.status == 0) return;
+    NoteAnswer(due.url, answer.status != 0);
   } catch (const Error& e) {
     answer.problem = e.what();
   }
-  if (stopping_ && answer.status == 0) return;
   const bool delivered = answer.status >= 200 && answer.status < 300;
   const std::string how =
       answer.status != 0 ? fmt::format("HTTP status {}", answer.status) : answer.problem;
   if (delivered || answer.status == kGone || due.tries + 1 >= options_.max_tries) {
-    store_.EndNotification(due.job_id);
     spdlog::log(delivered ? spdlog::level::info : spdlog::level::warn,
                 "[job={}] word of its end {} {} ({})",
                 due.job,
                 delivered ? "was sent to" : "is not sent any more to",
                 ForLog(due.url),
                 how);
-    return;
+    return Conclude(due, {true, due.tries + 1, {}});
   }
-  const size_t next = std::min(static_cast<size_t>(due.tries), options_.pauses.size() - 1);
-  store_.DelayNotification(due.job_id, options_.pauses[next].count());
+  const std::chrono::milliseconds pause = PauseAfter(due.tries);
   spdlog::warn("[job={}] word of its end was not taken by {} ({}); again in {} s",
                due.job,
                ForLog(due.url),
                how,
-               options_.pauses[next].count() / 1000);
+               pause.count() / 1000);
+  Conclude(due, {false, due.tries + 1, Steady::now() + pause});
+}
+
+std::chrono::milliseconds Notifier::PauseAfter(int tries) const {
+  return options_.pauses[std::min(static_cast<size_t>(tries), options_.pauses.size() - 1)];
+}
+
+void Notifier::NoteAnswer(const std::string& url, bool answered) {
+  std::lock_guard lock(mutex_);
+  Receiver& receiver = receivers_[ReceiverOf(url)];
+  if (answered) {
+    receiver.silences = 0;
+    return;
+  }
+  receiver.again = Steady::now() + options_.silence * (1 << std::min(receiver.silences, 4));
+  ++receiver.silences;
+}
+
+void Notifier::Conclude(const Notification& due, const Outcome& outcome) {
+  {
+    // Before the store is told: whatever becomes of that, it is not sent again.
+    std::lock_guard lock(mutex_);
+    remembered_[KeyOf(due)] = outcome;
+  }
+  Write(KeyOf(due), outcome);
+}
+
+bool Notifier::Write(const Key& key, const Outcome& outcome) {
+  const auto& [job_id, first_ms] = key;
+  try {
+    if (outcome.ended) {
+      store_.EndNotification(job_id, first_ms);
+    } else {
+      store_.DelayNotification(job_id, first_ms, PauseAfter(outcome.tries - 1).count());
+    }
+    std::lock_guard lock(mutex_);
+    if (const auto known = remembered_.find(key); known != remembered_.end()) {
+      known->second.written = true;
+    }
+    return true;
+  } catch (const Error& e) {
+    std::lock_guard lock(mutex_);
+    next_write_ = Steady::now() + options_.store_pause;
+    spdlog::warn("what became of word of an end cannot be written down and is remembered: {}",
+                 e.what());
+    return false;
+  }
+}
+
+// What is tried again is written down after its next try.
+void Notifier::WriteRemembered() {
+  std::vector<std::pair<Key, Outcome>> unwritten;
+  {
+    std::lock_guard lock(mutex_);
+    if (Steady::now() < next_write_) return;
+    for (const auto& [key, outcome] : remembered_) {
+      if (outcome.ended && !outcome.written && !under_way_.contains(key)) {
+        unwritten.emplace_back(key, outcome);
+      }
+    }
+    if (!unwritten.empty()) next_write_ = Steady::now() + options_.store_pause;
+  }
+  for (const auto& [key, outcome] : unwritten) {
+    if (!Write(key, outcome)) return;
+  }
 }
 
 }  // namespace color3d

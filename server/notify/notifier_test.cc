@@ -123,14 +123,20 @@ class NotifierTest : public JobStoreTest {
     FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
     return store_->GetJob(job.name);
   }
-  std::unique_ptr<Notifier> Start(const std::vector<std::string>& allowed,
-                                  int max_tries = NotifierOptions().max_tries) {
+  NotifierOptions Options(const std::vector<std::string>& allowed) const {
     NotifierOptions options;
-    options.max_tries = max_tries;
     options.allowed = allowed;
     options.secret = secret_;
     options.poll = milliseconds(5);
     options.pauses = {milliseconds(0)};
+    options.silence = milliseconds(0);
+    options.store_pause = milliseconds(5);
+    return options;
+  }
+  std::unique_ptr<Notifier> Start(const std::vector<std::string>& allowed,
+                                  int max_tries = NotifierOptions().max_tries) {
+    NotifierOptions options = Options(allowed);
+    options.max_tries = max_tries;
     return std::make_unique<Notifier>(
         *store_, [this] { return wall_.load(); }, options);
   }
@@ -207,6 +213,92 @@ TEST_F(NotifierTest, OnlyWhoIsStillAllowed) {
   const auto notifier = Start({"https://elsewhere.example.org"});
   std::this_thread::sleep_for(milliseconds(100));
   EXPECT_TRUE(receiver.requests().empty());
+}
+
+// On a full disk nothing can be written down.
+class FullStore : public SqliteJobStore {
+ public:
+  using SqliteJobStore::SqliteJobStore;
+  void EndNotification(int64_t job_id, int64_t first_ms) override {
+    RequireRoom();
+    SqliteJobStore::EndNotification(job_id, first_ms);
+  }
+  void DelayNotification(int64_t job_id, int64_t first_ms, int64_t pause_ms) override {
+    RequireRoom();
+    SqliteJobStore::DelayNotification(job_id, first_ms, pause_ms);
+  }
+  bool WaitForTries(int count) const {
+    for (int i = 0; i < 2000 && refused < count; ++i) std::this_thread::sleep_for(milliseconds(5));
+    return refused >= count;
+  }
+  std::atomic<bool> is_full{true};
+  std::atomic<int> refused{0};
+
+ private:
+  void RequireRoom() {
+    if (!is_full) return;
+    ++refused;
+    throw ServiceError(ErrorCode::kResourceExhausted, "STORAGE_FULL", "full");
+  }
+};
+
+TEST_F(NotifierTest, OnAFullDiskEachWordIsSentOnce) {
+  Receiver receiver({"200 OK"});
+  StoreOptions store_options;
+  store_options.boot_id = boot_id_;
+  FullStore full(File(), StoreRole::kServer, TestClocks(), store_options);
+  const JobRecord job = EndedJob(receiver.url());
+  EndedJob(receiver.url());
+  {
+    const Notifier notifier(
+        full, [this] { return wall_.load(); }, Options({receiver.url()}));
+    ASSERT_TRUE(receiver.WaitFor(2));
+    ASSERT_TRUE(full.WaitForTries(10)) << "it goes on trying to write down what was delivered";
+    EXPECT_EQ(receiver.requests().size(), 2u);
+    // Another end of the same job is another word.
+    wall_ += 1000;
+    store_->Retry(job.name, false, {}, kNoLimit);
+    FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
+    ASSERT_TRUE(receiver.WaitFor(3));
+    full.is_full = false;
+    EXPECT_TRUE(NothingIsOwed()) << "there is room again";
+  }
+  EXPECT_EQ(receiver.requests().size(), 3u);
+}
+
+TEST_F(NotifierTest, OnAFullDiskTriesHavePausesAndAnEndAllTheSame) {
+  Receiver receiver({"500 Oops"});
+  StoreOptions store_options;
+  store_options.boot_id = boot_id_;
+  FullStore full(File(), StoreRole::kServer, TestClocks(), store_options);
+  EndedJob(receiver.url());
+  NotifierOptions options = Options({receiver.url()});
+  options.max_tries = 3;
+  options.pauses = {milliseconds(100)};
+  const auto begin = std::chrono::steady_clock::now();
+  const Notifier notifier(
+      full, [this] { return wall_.load(); }, options);
+  ASSERT_TRUE(receiver.WaitFor(3));
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, milliseconds(200));
+  ASSERT_TRUE(full.WaitForTries(10));
+  EXPECT_EQ(receiver.requests().size(), 3u) << "given up, and remembered";
+}
+
+TEST_F(NotifierTest, ReceiversThatDoNotAnswerKeepNoOtherWaiting) {
+  std::vector<std::unique_ptr<Receiver>> hanging;
+  std::vector<std::string> allowed;
+  for (int i = 0; i < 3; ++i) {
+    hanging.push_back(std::make_unique<Receiver>(std::vector<std::string>{"hang"}));
+    allowed.push_back(hanging.back()->url());
+    for (int k = 0; k < 6; ++k) EndedJob(hanging.back()->url());
+  }
+  Receiver good({"200 OK"});
+  allowed.push_back(good.url());
+  const auto notifier = Start(allowed);
+  for (const auto& receiver : hanging) ASSERT_TRUE(receiver->WaitFor(2));
+  for (int i = 0; i < 5; ++i) EndedJob(good.url());
+  EXPECT_TRUE(good.WaitFor(5)) << "eighteen words wait for those that hang";
+  for (const auto& receiver : hanging) EXPECT_EQ(receiver->requests().size(), 2u);
 }
 
 // The example of the specification's own libraries.

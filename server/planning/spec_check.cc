@@ -76,6 +76,11 @@ void CheckRepeated(const Message& message, const FieldDescriptor* field, const s
     CheckEnum(field, value, entry);
     if (value == 0) Reject(entry, " is unspecified; name a value or leave the entry out");
   }
+  for (int i = 0; field->cpp_type() == FieldDescriptor::CPPTYPE_STRING && i < count; ++i) {
+    CheckText(field,
+              reflection->GetRepeatedString(message, field, i).size(),
+              fmt::format("{}[{}]", path, i));
+  }
   if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return;
   for (int i = 0; i < count; ++i) {
     CheckMessage(reflection->GetRepeatedMessage(message, field, i), fmt::format("{}[{}]", path, i));
@@ -326,6 +331,12 @@ void CheckSpec(const v1::JobSpec& spec) {
         ErrorCode::kUnimplemented,
         "NOT_BUILT",
         fmt::format("{} is not built yet; GetServerInfo lists the job kinds that are", kind));
+  }
+  if (spec.ByteSizeLong() > kMaxSpecBytes) {
+    Reject("spec",
+           fmt::format(" has {} bytes; at most {} are allowed: give fewer entries or shorter texts",
+                       spec.ByteSizeLong(),
+                       kMaxSpecBytes));
   }
   CheckMessage(spec, "");
   if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene(), spec.inputs_size() > 0);

@@ -11,6 +11,9 @@
 
 namespace color3d {
 
+// Of a spec, serialised.
+constexpr size_t kMaxSpecBytes = 64 << 10;
+
 // The stage's field name in JobSpec, e.g. "personalize". Throws Error{kInvalidArgument} when the
 // spec has no stage.
 std::string KindOf(const v1::JobSpec& spec);

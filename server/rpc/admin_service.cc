@@ -36,8 +36,15 @@ void CollectNow(const RpcParts& parts,
                           kLeastGraceSeconds);
   }
   const auto stop = [&parts] { return parts.draining.load(); };
-  const std::vector<StoredBlob> blobs = ListBlobs(parts.blobs, stop);
+  const auto [blobs, unreadable] = ListBlobs(parts.blobs, stop);
   RequireNotDraining(parts);
+  for (const std::string& problem : unreadable) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "nothing is collected: {} places of the blobs cannot be looked at, first {}; change "
+                "their owner or rights, or look after the disk",
+                unreadable.size(),
+                problem);
+  }
   std::vector<FileDigest> gone;
   if (request.dry_run()) {
     for (const StoredBlob& blob : DueBlobsSoFar(parts.store, blobs, std::chrono::seconds(grace))) {

@@ -99,13 +99,19 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   // be.
   void RequireIntact() {
     if (!is_whole_ || sent_.FinishHex() == sha256_) return;
-    parts_.blobs.SetAside(sha256_);
-    throw ServiceError(
-        ErrorCode::kDataLoss,
-        "BLOB_DAMAGED",
-        "'{}' was damaged on the server's disk and is set aside; upload it again, or "
-        "run the job anew with skip_cache",
-        request_.resource_name());
+    if (parts_.blobs.SetAside(sha256_)) {
+      throw ServiceError(
+          ErrorCode::kDataLoss,
+          "BLOB_DAMAGED",
+          "'{}' was damaged on the server's disk and is set aside; upload it again, or "
+          "run the job anew with skip_cache",
+          request_.resource_name());
+    }
+    throw ServiceError(ErrorCode::kUnavailable,
+                       "BLOB_MENDED",
+                       "'{}' was damaged on the server's disk while it was sent, and is whole now; "
+                       "download it again",
+                       request_.resource_name());
   }
 
   const RpcParts& parts_;

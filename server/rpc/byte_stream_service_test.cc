@@ -101,6 +101,7 @@ TEST_F(ByteStreamServiceTest, DamagedBlobsAreSaidToBeAndHealed) {
     return ReasonOfStatus(stream->Finish());
   };
   EXPECT_EQ(read(), "BLOB_DAMAGED");
+  EXPECT_EQ(blobs_.damaged(), 1) << "what a metric shows";
   EXPECT_EQ(read(), "BLOB_MISSING");
   client_->Upload(content);
   EXPECT_EQ(client_->Download(digest), content);

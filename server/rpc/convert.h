@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "color3d/v1/colorizer.pb.h"
 #include "color3d/v1/job.pb.h"
 #include "color3d/v1/scene.pb.h"
+#include "server/planning/spec_check.h"
 #include "server/store/job_store.h"
 
 namespace color3d {
@@ -32,21 +35,38 @@ int64_t ParsePageToken(const std::string& token, const std::string& listing);
 // 1..1000; 0 means 50. Throws Error{kInvalidArgument}.
 int PageSize(int requested);
 
-// Answers a List call: `read(before_id, limit)` gives records, newest first; `add(record)` puts one
-// into the response. `listing` says what is listed: page tokens of other listings are refused.
+// A page of a list is about so long at most: it ends early, and the next one goes on.
+constexpr size_t kMaxPageBytes = 1 << 20;
+// What the records of one page may take. Older releases took longer specs: in lists theirs are left
+// out.
+constexpr ListBudget kListBudget = {2 << 20, kMaxSpecBytes};
+
+template <typename Message>
+size_t Put(Message message, Message* place) {
+  *place = std::move(message);
+  return place->ByteSizeLong();
+}
+
+// Answers a List call: `read(before_id, limit, &is_cut)` gives records, newest first, and says
+// whether there are fewer than `limit` for what they take; `add(record)` puts one into the response
+// and says how long it is, bytes. `listing` says what is listed: page tokens of other listings are refused.
 template <typename Request, typename Response, typename Read, typename Add>
 void AnswerPage(const Request& request,
                 const std::string& listing,
                 Response* response,
                 const Read& read,
                 const Add& add) {
-  const int size = PageSize(request.page_size());
+  const auto size = static_cast<size_t>(PageSize(request.page_size()));
+  bool is_cut = false;
   // One more than fits tells whether there is another page.
-  const auto records = read(ParsePageToken(request.page_token(), listing), size + 1);
-  const size_t fits = std::min(static_cast<size_t>(size), records.size());
-  for (size_t i = 0; i < fits; ++i) add(records[i]);
-  if (records.size() > fits) {
-    response->set_next_page_token(MakePageToken(records[fits - 1].id, listing));
+  const auto records =
+      read(ParsePageToken(request.page_token(), listing), static_cast<int>(size) + 1, &is_cut);
+  size_t added = 0;
+  for (size_t bytes = 0; added < std::min(size, records.size()) && bytes < kMaxPageBytes; ++added) {
+    bytes += add(records[added]);
+  }
+  if (added > 0 && (is_cut || added < records.size())) {
+    response->set_next_page_token(MakePageToken(records[added - 1].id, listing));
   }
 }
 

@@ -96,10 +96,12 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
             in,
             "colorizers of " + in.scene(),
             out,
-            [&](int64_t before_id, int limit) {
+            [&](int64_t before_id, int limit, bool*) {
               return call.store.ListColorizers(in.scene(), before_id, limit);
             },
-            [&](const ColorizerRecord& colorizer) { *out->add_colorizers() = ToProto(colorizer); });
+            [&](const ColorizerRecord& colorizer) {
+              return Put(ToProto(colorizer), out->add_colorizers());
+            });
       });
 }
 

@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <set>
 
 #include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
@@ -15,19 +16,22 @@
 #include "server/rpc/convert.h"
 #include "server/rpc/job_log_stream.h"
 #include "server/service_error.h"
+#include "server/storage/ballast.h"
 
 namespace color3d {
 namespace {
 
-// Whoever asks for work hears at once what would keep it waiting for a long time.
-void RequireRoomOnDisk(const RpcParts& parts, const ProjectStore& store) {
-  RequireQuota(parts, store, 0);
-  if (!parts.store.Holds().contains(Hold::kStorage)) return;
-  throw ServiceError(ErrorCode::kResourceExhausted,
-                     "STORAGE_FULL",
-                     "the server's disk is nearly full ({} MiB are free) and no job is begun; free "
-                     "some space there, or try again later",
-                     parts.blobs.FreeBytes() >> 20);
+// What the rows of a graph take, before it is known which of its blobs the project holds.
+int64_t RowBytesOf(const NewGraph& graph) {
+  int64_t bytes = 0;
+  for (const NewJob& job : graph.jobs) {
+    JobRecord record;
+    record.spec = job.spec;
+    record.skip_reason = job.skip_reason;
+    record.notify_url = graph.notify_url;
+    bytes += RowBytes(record, job.inputs.size() + job.input_jobs.size(), job.blobs.size());
+  }
+  return bytes;
 }
 
 void CheckBlobs(const RpcParts& parts, const ProjectStore& store, const v1::JobSpec& spec) {
@@ -56,8 +60,10 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
                           spec.inputs_size());
   }
   std::vector<JobRecord> inputs;
+  std::set<std::string> seen;
   for (const std::string& name : spec.inputs()) {
     CheckName(name, "jobs");
+    if (!seen.insert(name).second) continue;
     inputs.push_back(store.GetJob(name));
     for (JobRecord& child : store.ListChildren(name)) inputs.push_back(std::move(child));
   }
@@ -138,13 +144,15 @@ JobRecord CreateJobRecord(const RpcParts& parts,
     throw InvalidArgument("priority is {}; the range is 0 to 1000", priority);
   }
   if (!request.notify_url().empty()) CheckNotifyUrl(request.notify_url(), parts.notify_allowed);
-  RequireRoomOnDisk(parts, store);
+  // Whoever asks for work hears at once what would keep it waiting for a long time.
+  RequireRoomForRows(parts, store, 0);
   CheckSpec(spec);
   CheckNames(spec, parts.models);
   CheckBlobs(parts, store, spec);
   NewGraph graph = PlanRequest(store, spec);
   graph.priority = priority;
   graph.notify_url = request.notify_url();
+  RequireRoomForRows(parts, store, RowBytesOf(graph));
   graph.trace = call.trace;
   JobRecord job = store.CreateGraph(graph, key, LimitsOfQueue(parts));
   spdlog::info("[job={}{}{}] accepted {} of {} ({} jobs)",
@@ -181,8 +189,14 @@ void ListJobPage(const ProjectStore& store,
       request,
       "jobs of " + request.parent(),
       response,
-      [&](int64_t before_id, int limit) { return store.ListJobs(filter, before_id, limit); },
-      [&](const JobRecord& job) { *response->add_jobs() = ToWaitingProto(store, job); });
+      [&](int64_t before_id, int limit, bool* is_cut) {
+        std::vector<JobRecord> jobs = store.ListJobs(filter, before_id, limit, kListBudget);
+        int64_t bytes = 0;
+        for (const JobRecord& job : jobs) bytes += MemoryBytes(job);
+        *is_cut = bytes >= kListBudget.bytes;
+        return jobs;
+      },
+      [&](const JobRecord& job) { return Put(ToWaitingProto(store, job), response->add_jobs()); });
 }
 
 }  // namespace
@@ -222,9 +236,11 @@ grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext*
                                                     const v1::CancelJobRequest* request,
                                                     v1::Job* response) {
   return AnswerWrite(
-      parts_, context, request, response, [](const Call& call, const auto& in, v1::Job* out) {
+      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
-        *out = ToProto(call.store.Cancel(in.name(), KeyOf("CancelJob", in)));
+        *out = ToProto(WithRoomMade(parts_.make_room, [&] {
+          return call.store.Cancel(in.name(), KeyOf("CancelJob", in));
+        }));
         spdlog::info("[job={}] cancellation asked for", in.name());
       });
 }
@@ -237,7 +253,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* 
         CheckName(in.name(), "jobs");
         const RequestKey key = KeyOf("RetryJob", in);
         RequireNotDraining(parts_);
-        if (!call.store.FindRequest(key)) RequireRoomOnDisk(parts_, call.store);
+        if (!call.store.FindRequest(key)) RequireRoomForRows(parts_, call.store, 0);
         *out = ToProto(call.store.Retry(in.name(), in.from_scratch(), key, LimitsOfQueue(parts_)));
         spdlog::info("[job={}] retried", in.name());
       });
@@ -250,9 +266,11 @@ grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext*
                      context,
                      request,
                      response,
-                     [](const Call& call, const auto& in, v1::DeleteJobResponse*) {
+                     [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
                        CheckName(in.name(), "jobs");
-                       call.store.Delete(in.name(), KeyOf("DeleteJob", in));
+                       WithRoomMade(parts_.make_room, [&] {
+                         call.store.Delete(in.name(), KeyOf("DeleteJob", in));
+                       });
                      });
 }
 

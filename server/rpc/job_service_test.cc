@@ -86,6 +86,66 @@ TEST_F(JobServiceTest, ListsArePaged) {
   EXPECT_EQ(scenes.scenes_size(), 1);
 }
 
+TEST_F(JobServiceTest, APageIsBoundedInBytes) {
+  const std::string scene = client_->MakeScene().name();
+  NewGraph graph;
+  graph.scene = scene;
+  graph.jobs.resize(1);
+  graph.jobs[0].kind = kind::kImportScene;
+  v1::JobSpec spec = ScriptedSpec(scene, std::string(60'000, 's'));
+  graph.jobs[0].spec = spec.SerializeAsString();
+  for (int i = 0; i < 30; ++i) store_.CreateGraph(graph, {}, 1000);
+  // As older releases took them.
+  spec = ScriptedSpec(scene, std::string(7 << 20, 's'));
+  graph.jobs[0].spec = spec.SerializeAsString();
+  const std::string old = store_.CreateGraph(graph, {}, 1000).name;
+  std::set<std::string> names;
+  v1::ListJobsRequest request;
+  request.set_page_size(1000);
+  int pages = 0;
+  do {
+    grpc::ClientContext context;
+    v1::ListJobsResponse response;
+    const grpc::Status status = client_->jobs->ListJobs(&context, request, &response);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+    EXPECT_LT(response.ByteSizeLong(), (1u << 20) + (100u << 10));
+    for (const v1::Job& job : response.jobs()) {
+      EXPECT_TRUE(names.insert(job.name()).second);
+      EXPECT_EQ(job.has_spec() && job.spec().has_select_key_view(), job.name() != old);
+    }
+    request.set_page_token(response.next_page_token());
+    ++pages;
+  } while (!request.page_token().empty() && pages < 20);
+  EXPECT_EQ(names.size(), 31u);
+  EXPECT_GE(pages, 2);
+
+  // Nor does a watch bring more than its reader takes.
+  v1::WatchJobsRequest watch;
+  watch.add_names(old);
+  grpc::ClientContext context;
+  const auto stream = client_->jobs->WatchJobs(&context, watch);
+  v1::JobEvent event;
+  ASSERT_TRUE(stream->Read(&event));
+  EXPECT_EQ(event.job().name(), old);
+  context.TryCancel();
+}
+
+TEST_F(JobServiceTest, ASpecHasALimit) {
+  const std::string scene = client_->MakeScene().name();
+  v1::JobSpec spec;
+  spec.set_scene(scene);
+  for (int i = 0; i < 20; ++i) spec.mutable_render()->add_views(std::string(4000, 'v'));
+  grpc::Status status = CreateStatus(spec);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("at most 65536 are allowed"));
+  spec.mutable_render()->clear_views();
+  spec.mutable_render()->add_views("a");
+  spec.mutable_render()->add_views(std::string(5000, 'v'));
+  status = CreateStatus(spec);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("render.views[1] has 5000 bytes"));
+}
+
 TEST_F(JobServiceTest, CancelRetryDelete) {
   const std::string scene = client_->MakeScene().name();
   const std::string name = client_->Create(ScriptedSpec(scene, "steps=1")).name();

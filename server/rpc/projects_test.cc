@@ -22,7 +22,8 @@ class ProjectsTest : public RpcTest {
     options.listen = "unix:" + (scratch_.path() / "socket").string();
     options.credentials = grpc::experimental::LocalServerCredentials(UDS);
     options.tokens = std::make_shared<TokenBook>(file);
-    options.limits.project_max_stored_bytes = 4000;
+    options.limits.project_max_stored_bytes = 200'000;
+    options.limits.project_max_scenes = 3;
     options.limits.project_max_unfinished_jobs = 20;
     options.limits.project_max_streams = 2;
     options.job_logs = scratch_.path();
@@ -202,13 +203,13 @@ TEST_F(ProjectsTest, WhatOneHasCannotBeNamedByTheOther) {
 }
 
 TEST_F(ProjectsTest, QuotasSayWhatIsFullAndWhenToTryAgain) {
-  attic_->Upload(std::string(3000, 'a'));
+  attic_->Upload(std::string(180'000, 'a'));
   grpc::ClientContext context;
   google::bytestream::WriteResponse response;
   auto stream = attic_->bytes->Write(&context, &response);
-  const std::string more(2000, 'b');
+  const std::string more(20'000, 'b');
   google::bytestream::WriteRequest request;
-  request.set_resource_name("uploads/u2/blobs/" + Sha256Hex(more) + "/2000");
+  request.set_resource_name("uploads/u2/blobs/" + Sha256Hex(more) + "/20000");
   request.set_data(more);
   request.set_finish_write(true);
   stream->Write(request);
@@ -230,8 +231,8 @@ TEST_F(ProjectsTest, QuotasSayWhatIsFullAndWhenToTryAgain) {
   Call(*attic_->server, &v1::ServerService::Stub::GetServerInfo, v1::GetServerInfoRequest(), &info);
   EXPECT_EQ(info.project(), "attic");
   EXPECT_EQ(info.role(), "submit");
-  EXPECT_EQ(info.usage().stored_bytes(), 3000);
-  EXPECT_EQ(info.usage().max_stored_bytes(), 4000);
+  EXPECT_EQ(info.usage().stored_bytes(), 180'000 + 4096) << "with what the file takes besides";
+  EXPECT_EQ(info.usage().max_stored_bytes(), 200'000);
   v1::ListProjectsResponse projects;
   ASSERT_TRUE(Call(*admin_->admin,
                    &v1::AdminService::Stub::ListProjects,
@@ -249,10 +250,10 @@ TEST_F(ProjectsTest, UploadsSideBySideShareTheQuota) {
     grpc::ClientContext& context = contexts.emplace_back();
     context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
     auto stream = attic_->bytes->Write(&context, response);
-    const std::string content(3000, uuid[0]);
+    const std::string content(120'000, uuid[0]);
     google::bytestream::WriteRequest request;
     request.set_resource_name("uploads/" + std::string(uuid) + "/blobs/" + Sha256Hex(content) +
-                              "/3000");
+                              "/120000");
     request.set_data(content.substr(0, 1000));
     stream->Write(request);
     return stream;
@@ -262,7 +263,7 @@ TEST_F(ProjectsTest, UploadsSideBySideShareTheQuota) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   EXPECT_EQ(ReasonOfStatus(write("b")->Finish()), "QUOTA_EXCEEDED");
-  cellar_->Upload(std::string(3000, 'c'));  // its quota is its own
+  cellar_->Upload(std::string(120'000, 'c'));  // its quota is its own
   contexts[0].TryCancel();
   first->Finish();
 }
@@ -277,13 +278,63 @@ TEST_F(ProjectsTest, NothingIsRetriedBeyondTheQuotaOrOnAFullDisk) {
   store_.SetHold(Hold::kStorage, true);
   EXPECT_EQ(reason(), "STORAGE_FULL");
   store_.SetHold(Hold::kStorage, false);
-  store_.HoldBlob("attic", {Sha256Hex("much"), 5000});
+  store_.HoldBlob("attic", {Sha256Hex("much"), 300'000});
   EXPECT_EQ(reason(), "QUOTA_EXCEEDED");
   store_.ForgetBlob(Sha256Hex("much"));
   retry.set_request_id(kUuid);
   EXPECT_EQ(reason(), "");
   store_.SetHold(Hold::kStorage, true);
   EXPECT_EQ(reason(), "") << "the same call, made before";
+}
+
+// A scene of long paths and a job of a long spec take space in the database.
+TEST_F(ProjectsTest, RowsCountInTheQuota) {
+  v1::CreateSceneRequest create;
+  for (int i = 0; i < 130; ++i) {
+    v1::SceneFile* file = create.add_files();
+    file->set_path(std::to_string(i) + "/" + std::string(250, 'x') + "/" + std::string(250, 'y'));
+    *file->mutable_digest() = DigestOf("a");
+  }
+  const auto reason = [&](TestClient& client) {
+    return ReasonOfStatus(
+        Call(*client.scenes, &v1::SceneService::Stub::CreateScene, create));
+  };
+  EXPECT_EQ(reason(*attic_), "");
+  EXPECT_EQ(reason(*attic_), "");
+  const grpc::Status refused =
+      Call(*attic_->scenes, &v1::SceneService::Stub::CreateScene, create);
+  EXPECT_EQ(ReasonOfStatus(refused), "QUOTA_EXCEEDED") << "twice 90 kB are there";
+  EXPECT_NE(refused.error_message().find("rows"), std::string::npos);
+  EXPECT_EQ(reason(*cellar_), "") << "another's quota is his";
+
+  const std::string scene = cellar_->MakeScene().name();
+  v1::CreateJobRequest job;
+  *job.mutable_spec() = ScriptedSpec(scene, std::string(4000, 's'));
+  int made = 0;
+  grpc::Status status;
+  while (made < 100 && status.ok()) {
+    v1::Job created;
+    status = Call(*cellar_->jobs, &v1::JobService::Stub::CreateJob, job, &created);
+    if (!status.ok()) break;
+    ++made;
+    Call(*cellar_->jobs, &v1::JobService::Stub::CancelJob, Named<v1::CancelJobRequest>(created.name()));
+  }
+  EXPECT_EQ(ReasonOfStatus(status), "QUOTA_EXCEEDED") << made << " jobs";
+  EXPECT_LT(made, 20);
+}
+
+TEST_F(ProjectsTest, ScenesOfAProjectAreCounted) {
+  v1::CreateSceneRequest create;
+  v1::SceneFile* file = create.add_files();
+  file->set_path("a.png");
+  *file->mutable_digest() = DigestOf("a");
+  const auto reason = [&](TestClient& client) {
+    return ReasonOfStatus(
+        Call(*client.scenes, &v1::SceneService::Stub::CreateScene, create));
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(reason(*attic_), "");
+  EXPECT_EQ(reason(*attic_), "QUOTA_EXCEEDED");
+  EXPECT_EQ(reason(*cellar_), "");
 }
 
 TEST_F(ProjectsTest, StreamsOfAProjectAreCounted) {
@@ -373,14 +424,41 @@ TEST_F(ProjectsTest, WhoRunsTheServerPausesKillsAndCollects) {
   EXPECT_EQ(collected.blobs(), 0);
 }
 
-TEST_F(RpcTest, JobsAreNotAcceptedOnADiskThatIsNearlyFull) {
+TEST_F(RpcTest, JobsAndScenesAreNotAcceptedOnADiskThatIsNearlyFull) {
   const std::string scene = client_->MakeScene().name();
   store_.SetHold(Hold::kStorage, true);
+  v1::Scene made;
+  EXPECT_EQ(ReasonOfStatus(Commit({{"a.png", TinyPng()}}, &made)), "STORAGE_FULL");
   const grpc::Status refused = CreateStatus(ScriptedSpec(scene, "a"));
   EXPECT_EQ(ReasonOfStatus(refused), "STORAGE_FULL");
   EXPECT_TRUE(HasRetryInfo(refused));
   store_.SetHold(Hold::kStorage, false);
   EXPECT_TRUE(CreateStatus(ScriptedSpec(scene, "a")).ok());
+}
+
+// What was found some seconds ago is not believed: a few large calls fill a disk in less.
+TEST_F(RpcTest, BelowLowSpaceNothingIsCreatedFromTheFirstCallOn) {
+  const std::string scene = client_->MakeScene().name();
+  RpcServerOptions options;
+  options.listen = "127.0.0.1:0";
+  options.limits.low_space_bytes = int64_t{1} << 60;
+  RpcServer full(options, store_, blobs_, uploads_, SystemClock());
+  TestClient client(full.address());
+  v1::CreateSceneRequest create;
+  v1::SceneFile* file = create.add_files();
+  file->set_path("a.png");
+  *file->mutable_digest() = DigestOf("a");
+  v1::Scene made;
+  grpc::ClientContext first, second, third;
+  EXPECT_EQ(ReasonOfStatus(client.scenes->CreateScene(&first, create, &made)), "STORAGE_FULL");
+  v1::CreateJobRequest job;
+  *job.mutable_spec() = ScriptedSpec(scene, "a");
+  v1::Job created;
+  EXPECT_EQ(ReasonOfStatus(client.jobs->CreateJob(&second, job, &created)), "STORAGE_FULL");
+  v1::DeleteSceneRequest remove;
+  remove.set_name(scene);
+  v1::DeleteSceneResponse removed;
+  EXPECT_TRUE(client.scenes->DeleteScene(&third, remove, &removed).ok());
 }
 
 }  // namespace

@@ -11,6 +11,11 @@
 #include "server/service_error.h"
 
 namespace color3d {
+namespace {
+
+double InMib(int64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
+
+}  // namespace
 
 void CheckRequestId(const std::string& request_id) {
   if (request_id.empty()) return;
@@ -52,17 +57,34 @@ bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest&
 void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes) {
   const int64_t most = parts.limits.project_max_stored_bytes;
   if (most == 0) return;
-  const int64_t stored = store.Usage().stored_bytes;
+  const ProjectRecord usage = store.Usage();
+  const int64_t stored = usage.stored_bytes + usage.row_bytes;
   if (stored + more_bytes <= most) return;
   throw ServiceError(
       ErrorCode::kResourceExhausted,
       "QUOTA_EXCEEDED",
-      fmt::format("your project has {} MiB on the server and {} MiB would come, at most {} MiB are "
-                  "allowed; delete jobs and scenes that you need no more",
-                  stored >> 20,
-                  more_bytes >> 20,
-                  most >> 20),
+      fmt::format("your project has {:.1f} MiB on the server, files and rows of its scenes and jobs, "
+                  "and {:.1f} MiB would come, at most {:.1f} MiB are allowed; delete jobs and scenes "
+                  "that you need no more",
+                  InMib(stored),
+                  InMib(more_bytes),
+                  InMib(most)),
       {{"project:" + store.project() + " stored_bytes", fmt::format("{} of {}", stored, most)}});
+}
+
+void RequireRoomForRows(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes) {
+  RequireQuota(parts, store, more_bytes);
+  const int64_t free = parts.blobs.FreeBytes();
+  // The store says what was found some seconds ago, and until when.
+  if (free - more_bytes < parts.limits.low_space_bytes ||
+      parts.store.Holds().contains(Hold::kStorage)) {
+    throw ServiceError(ErrorCode::kResourceExhausted,
+                       "STORAGE_FULL",
+                       "the server's disk is nearly full ({} MiB are free) and nothing is created; "
+                       "free some space there, or try again later",
+                       free >> 20);
+  }
+  parts.blobs.RequireSpace(more_bytes);
 }
 
 QueueLimits LimitsOfQueue(const RpcParts& parts) {
@@ -73,7 +95,7 @@ QueueLimits LimitsOfQueue(const RpcParts& parts) {
 v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limits) {
   v1::ProjectUsage usage;
   usage.set_project(project.name);
-  usage.set_stored_bytes(project.stored_bytes);
+  usage.set_stored_bytes(project.stored_bytes + project.row_bytes);
   usage.set_max_stored_bytes(limits.project_max_stored_bytes);
   usage.set_unfinished_jobs(project.unfinished_jobs);
   usage.set_max_unfinished_jobs(limits.project_max_unfinished_jobs);

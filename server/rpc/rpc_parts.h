@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,6 +48,12 @@ struct ServiceLimits {
   int project_max_unfinished_jobs = 0;
   int64_t project_max_stored_bytes = 0;
   int project_max_streams = 0;  // of each kind
+  // Of each project.
+  int64_t project_max_scenes = 10'000;
+  int64_t project_max_uncommitted_scenes = 200;
+  int64_t max_manifest_bytes = 2 << 20;  // the paths of a scene's files, in sum
+  // Free space below which nothing is created.
+  int64_t low_space_bytes = 0;
 };
 
 // What a backend said of itself, or why it did not.
@@ -72,6 +79,7 @@ struct RpcParts {
   Executor& quick;  // reads of the job store and of the disk's cache: what answers GetJob
   Executor& slow;   // what hashes, syncs, writes or asks others
   Executor& bulk;   // blobs on their way: down- and uploads, of which one may hash 8 GiB
+  Executor& checks;  // reads whole scenes
   StreamLimits& streams;
   CallMemory& memory;
   const Access& access;
@@ -85,6 +93,7 @@ struct RpcParts {
   std::filesystem::path job_logs;           // folder; empty: there are none
   std::vector<std::string> notify_allowed;  // as CheckNotifyUrl
   std::function<void()> drain;              // asks the program to end
+  std::function<bool()> make_room;          // as WithRoomMade; may be empty
 };
 
 // One call of somebody who may make it, and what his project sees.
@@ -102,13 +111,16 @@ void RequireNotDraining(const RpcParts& parts);
 bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest& blob);
 // Throws QUOTA_EXCEEDED where the project would have more bytes than it may.
 void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes);
+// Before rows of so many bytes are written: throws QUOTA_EXCEEDED where the project would have more
+// than it may, STORAGE_FULL where the disk is nearly full or would be.
+void RequireRoomForRows(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes);
 QueueLimits LimitsOfQueue(const RpcParts& parts);
 v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limits);
 // Why workers are given no job, for people; empty: they are.
 std::string WhyHeld(const RpcParts& parts);
 
-// Answers a unary call from that executor, where the caller has the role:
-// `body(call, request, response)` may block and throw.
+// Answers a unary call from that executor, in the line of the caller's project, where the caller has
+// the role: `body(call, request, response)` may block and throw.
 template <typename Request, typename Response, typename Body>
 grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Executor& executor,
@@ -119,13 +131,22 @@ grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Body body) {
   auto* reactor = new UnaryReactor(parts.memory, context->peer());
   reactor->Hold(*request);
-  const bool accepted = executor.TryPost([&parts, role, context, reactor, request, response, body] {
-    reactor->Finish(Guard([&] {
-      reactor->RequireShare();
-      body(Admit(parts, role, *context), *request, response);
-      reactor->Hold(*response);
-    }));
-  });
+  std::optional<Call> call;
+  const grpc::Status allowed = Guard([&] { call = Admit(parts, role, *context); });
+  if (!allowed.ok()) {
+    reactor->Finish(allowed);
+    return reactor;
+  }
+  const std::string owner = call->caller.project;
+  const bool accepted = executor.TryPost(
+      [call = *std::move(call), reactor, request, response, body] {
+        reactor->Finish(Guard([&] {
+          reactor->RequireShare();
+          body(call, *request, response);
+          reactor->Hold(*response);
+        }));
+      },
+      owner);
   if (!accepted) reactor->Finish(OverloadedStatus());
   return reactor;
 }

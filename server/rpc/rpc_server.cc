@@ -8,6 +8,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -20,6 +21,8 @@
 
 namespace color3d {
 namespace {
+
+constexpr size_t kMaxChecksWaiting = 500;
 
 // gRPC does not say why it could not bind: try it with a plain socket first.
 void CheckAddress(const std::string& listen) {
@@ -82,6 +85,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   quick_ = std::make_unique<Executor>(options.quick_threads);
   slow_ = std::make_unique<Executor>(options.slow_threads);
   bulk_ = std::make_unique<Executor>(options.bulk_threads);
+  checks_ = std::make_unique<Executor>(
+      options.check_threads, kMaxChecksWaiting, std::max(1, options.check_threads / 2));
   const int of_project = options.limits.project_max_streams;
   streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project},
                                   {"downloads", options.limits.max_reads, of_project},
@@ -95,6 +100,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             *quick_,
                             *slow_,
                             *bulk_,
+                            *checks_,
                             *streams_,
                             *memory_,
                             *access_,
@@ -107,7 +113,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             options.probe_backends,
                             options.job_logs,
                             options.notify_allowed,
-                            options.drain});
+                            options.drain,
+                            options.make_room});
   hub_ = std::make_unique<WatchHub>(*parts_, options.watch);
   colorize_hub_ = std::make_unique<ColorizeHub>(*parts_, options.inference, options.live);
   services_ = std::make_unique<Services>(*parts_, *hub_, *colorize_hub_);
@@ -179,6 +186,7 @@ void RpcServer::Shutdown(std::chrono::milliseconds grace) {
   quick_.reset();
   slow_.reset();
   bulk_.reset();
+  checks_.reset();
 }
 
 }  // namespace color3d

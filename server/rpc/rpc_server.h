@@ -22,6 +22,7 @@ struct RpcServerOptions {
   int quick_threads = 4;
   int slow_threads = 6;
   int bulk_threads = 6;
+  int check_threads = 4;  // of which one project has half at most
   std::shared_ptr<grpc::ServerCredentials> credentials;  // null: in the clear
   std::shared_ptr<TokenBook> tokens;                     // null: nobody is asked
   ServiceLimits limits;
@@ -32,6 +33,7 @@ struct RpcServerOptions {
   std::filesystem::path job_logs;           // folder of DataPaths::JobLogs; empty: there are none
   std::vector<std::string> notify_allowed;  // as CheckNotifyUrl
   std::function<void()> drain = [] {};      // what AdminService.Drain does
+  std::function<bool()> make_room;          // gives disk space up for a deletion; may be empty
   CallObserver on_call;                     // may be empty
   InferenceLink inference;
   ColorizeLimits live;
@@ -67,7 +69,7 @@ class RpcServer {
   std::string address_;
   std::atomic<bool> draining_{false};
   std::unique_ptr<FileDigests> digests_;
-  std::unique_ptr<Executor> quick_, slow_, bulk_;
+  std::unique_ptr<Executor> quick_, slow_, bulk_, checks_;
   std::unique_ptr<StreamLimits> streams_;
   std::unique_ptr<CallMemory> memory_;
   std::unique_ptr<Access> access_;

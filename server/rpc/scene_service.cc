@@ -2,6 +2,7 @@
 
 #include "server/rpc/convert.h"
 #include "server/rpc/scene_validation.h"
+#include "server/storage/ballast.h"
 
 namespace color3d {
 grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerContext* context,
@@ -10,7 +11,12 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerCont
   return AnswerWrite(
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
         const RequestKey key = KeyOf("CreateScene", in);
-        *out = ToProto(call.store.CreateScene(CheckedScene(in, parts_.limits), key));
+        const SceneRecord scene = CheckedScene(in, parts_.limits);
+        if (!call.store.FindRequest(key)) RequireRoomForRows(parts_, call.store, RowBytes(scene));
+        *out = ToProto(call.store.CreateScene(scene,
+                                              key,
+                                              {parts_.limits.project_max_scenes,
+                                               parts_.limits.project_max_uncommitted_scenes}));
       });
 }
 
@@ -37,16 +43,24 @@ grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerConte
             in,
             "scenes",
             out,
-            [&](int64_t before_id, int limit) { return call.store.ListScenes(before_id, limit); },
-            [&](const SceneRecord& scene) { *out->add_scenes() = ToProto(scene); });
+            [&](int64_t before_id, int limit, bool*) {
+              return call.store.ListScenes(before_id, limit);
+            },
+            [&](const SceneRecord& scene) { return Put(ToProto(scene), out->add_scenes()); });
       });
 }
 
 grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerContext* context,
                                                         const v1::CommitSceneRequest* request,
                                                         v1::Scene* response) {
-  return AnswerWrite(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
+  return AnswerUnary(
+      parts_,
+      parts_.checks,
+      Role::kSubmit,
+      context,
+      request,
+      response,
+      [this, context](const Call& call, const auto& in, v1::Scene* out) {
         CheckName(in.name(), "scenes");
         const RequestKey key = KeyOf("CommitScene", in);
         const SceneRecord scene = call.store.GetScene(in.name());
@@ -54,7 +68,10 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerCont
           *out = ToProto(scene);
           return;
         }
-        const SceneCheck check = CheckScene(scene, parts_.blobs, call.store, parts_.limits);
+        parts_.blobs.RequireSpace(0);
+        const SceneCheck check = CheckScene(scene, parts_.blobs, call.store, parts_.limits, [context] {
+          return context->IsCancelled();
+        });
         *out = ToProto(call.store.ActivateScene(scene.name, check.layout, check.photo_count, key));
       });
 }
@@ -66,6 +83,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::AcceptKeyColor(grpc::CallbackServerC
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
         CheckName(in.name(), "scenes");
         if (!in.job().empty()) CheckName(in.job(), "jobs");
+        RequireRoomForRows(parts_, call.store, 0);
         *out = ToProto(call.store.AcceptKeyColor(in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
       });
 }
@@ -79,7 +97,9 @@ grpc::ServerUnaryReactor* SceneServiceImpl::DeleteScene(grpc::CallbackServerCont
                      response,
                      [this](const Call& call, const auto& in, v1::DeleteSceneResponse*) {
                        CheckName(in.name(), "scenes");
-                       call.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
+                       WithRoomMade(parts_.make_room, [&] {
+                         call.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
+                       });
                      });
 }
 

@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "core/base/files.h"
@@ -26,9 +28,10 @@ constexpr int64_t kMaxTransformsBytes = int64_t{64} << 20;  // 10,000 photos nee
 constexpr int64_t kMaxTimesBytes = int64_t{16} << 20;       // with the longest names about 10
 
 // Reads it all. Mapped, what a disk does not give would be a signal that ends the server.
-bool IsReadable(int fd, size_t size) {
+bool IsReadable(int fd, size_t size, const std::function<bool()>& is_cancelled) {
   std::vector<char> piece(std::min<size_t>(size, 1 << 20));
   for (size_t at = 0; at < size;) {
+    if (is_cancelled()) throw Error(ErrorCode::kCancelled, "the caller is gone");
     const ssize_t got = ::pread(fd, piece.data(), piece.size(), static_cast<off_t>(at));
     if (got <= 0) return false;
     at += static_cast<size_t>(got);
@@ -39,11 +42,13 @@ bool IsReadable(int fd, size_t size) {
 // A file's bytes mapped read-only: pages come and go, the heap does not grow.
 class MappedFile {
  public:
-  MappedFile(const fs::path& path, int64_t size) : size_(static_cast<size_t>(size)) {
+  MappedFile(const fs::path& path, int64_t size, const std::function<bool()>& is_cancelled)
+      : size_(static_cast<size_t>(size)) {
     const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    is_readable_ = fd >= 0 && IsReadable(fd, size_);
+    if (fd < 0) return;
+    const std::shared_ptr<void> closed(nullptr, [fd](void*) { ::close(fd); });
+    is_readable_ = IsReadable(fd, size_, is_cancelled);
     if (is_readable_ && size_ > 0) data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, fd, 0);
-    if (fd >= 0) ::close(fd);
   }
   ~MappedFile() {
     if (data_ != MAP_FAILED) ::munmap(data_, size_);
@@ -92,15 +97,11 @@ bool IsWholeModel(const std::set<std::string>& names) {
   return false;
 }
 
-void CheckTransforms(const std::string& path,
-                     std::string_view bytes,
-                     std::vector<FieldViolation>* violations) {
+// Empty: it is one.
+std::string WhyNoTransforms(std::string_view bytes) {
   const TransformsOutline outline = OutlineOfTransforms(bytes);
-  if (!outline.is_object) {
-    violations->push_back({path, "is not a JSON object"});
-  } else if (outline.frames == 0) {
-    violations->push_back({path, "has no \"frames\""});
-  }
+  if (!outline.is_object) return "is not a JSON object";
+  return outline.frames == 0 ? "has no \"frames\"" : "";
 }
 
 // Of a scene without photographs.
@@ -137,53 +138,80 @@ std::set<std::string> FrameFolders(const std::vector<SceneFileRecord>& files) {
   return folders;
 }
 
-// One file's violations; counts it when it is a good photograph.
-void CheckFile(const SceneFileRecord& file,
-               const BlobStore& blobs,
-               const std::set<std::string>& held,
-               const ServiceLimits& limits,
-               SceneCheck* check,
-               std::vector<FieldViolation>* violations) {
-  if (!held.contains(file.digest.sha256) || !blobs.Touch(file.digest)) {
-    violations->push_back(
-        {file.path, fmt::format("was not uploaded (blob {})", file.digest.sha256)});
-    return;
+// What is wrong with the files of a scene. Equal files are read once.
+class FileChecks {
+ public:
+  FileChecks(const BlobStore& blobs,
+             const ServiceLimits& limits,
+             const std::function<bool()>& is_cancelled)
+      : blobs_(blobs), limits_(limits), is_cancelled_(is_cancelled) {}
+
+  // One file's violation; counts it when it is a good photograph.
+  void Check(const SceneFileRecord& file, bool is_held, SceneCheck* check);
+  std::vector<FieldViolation> violations;
+
+ private:
+  // Empty: nothing. What is told of a picture is told of the path that it was read for.
+  struct Problem {
+    std::string path, text;
+  };
+  Problem ProblemOf(const SceneFileRecord& file, bool is_transforms) const;
+
+  const BlobStore& blobs_;
+  const ServiceLimits& limits_;
+  const std::function<bool()>& is_cancelled_;
+  std::map<std::pair<std::string, bool>, Problem> known_;  // by digest, and whether transforms.json
+};
+
+FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, bool is_transforms) const {
+  const MappedFile mapped(
+      blobs_.Fetch(file.digest.sha256), file.digest.size_bytes, is_cancelled_);
+  if (!mapped.is_readable()) {
+    return {file.path, "cannot be read from the server's disk; upload it again"};
+  }
+  if (is_transforms) return {file.path, WhyNoTransforms(mapped.bytes())};
+  try {
+    ImageLimits image_limits;
+    image_limits.max_pixels = limits_.max_pixels_per_image;
+    image_limits.max_side_px = limits_.max_image_side_px;
+    ProbeImage(mapped.bytes(), file.path, image_limits);
+    return {file.path, ""};
+  } catch (const Error& e) {
+    return {file.path, e.what()};
+  }
+}
+
+void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* check) {
+  if (is_cancelled_()) throw Error(ErrorCode::kCancelled, "the caller is gone");
+  const auto refuse = [&](const std::string& why) { violations.push_back({file.path, why}); };
+  if (!is_held || !blobs_.Touch(file.digest)) {
+    return refuse(fmt::format("was not uploaded (blob {})", file.digest.sha256));
   }
   const bool is_photo = HasImageExtension(file.path);
   const bool is_transforms = BaseName(file.path) == "transforms.json";
   const bool is_augmentation = IsAugmentFile(file.path), is_mask = IsMaskFile(file.path);
-  if (is_mask && !is_photo) {
-    violations->push_back({file.path, "is no picture (PNG); remove it from masks/"});
-    return;
-  }
+  if (is_mask && !is_photo) return refuse("is no picture (PNG); remove it from masks/");
   if (is_augmentation && !is_photo) {
-    violations->push_back(
-        {file.path, "is no picture (JPEG, PNG or TIFF); remove it from augment/"});
-    return;
+    return refuse("is no picture (JPEG, PNG or TIFF); remove it from augment/");
   }
   const int64_t max_bytes = is_transforms ? kMaxTransformsBytes : kMaxTimesBytes;
   if ((is_transforms || file.path == kTimesFile) && file.digest.size_bytes > max_bytes) {
-    violations->push_back(
-        {file.path,
-         fmt::format("has {} bytes; at most {} are allowed", file.digest.size_bytes, max_bytes)});
-    return;
+    return refuse(
+        fmt::format("has {} bytes; at most {} are allowed", file.digest.size_bytes, max_bytes));
   }
   if (!is_photo && !is_transforms) return;
-  const MappedFile mapped(blobs.Fetch(file.digest.sha256), file.digest.size_bytes);
-  if (!mapped.is_readable()) {
-    violations->push_back({file.path, "cannot be read from the server's disk; upload it again"});
+  const std::pair<std::string, bool> key(file.digest.sha256, is_transforms);
+  auto known = known_.find(key);
+  if (known == known_.end()) known = known_.emplace(key, ProblemOf(file, is_transforms)).first;
+  Problem problem = known->second;
+  if (problem.text.empty()) {
+    if (is_photo && !is_augmentation && !is_mask) ++check->photo_count;
     return;
   }
-  if (is_transforms) return CheckTransforms(file.path, mapped.bytes(), violations);
-  try {
-    ImageLimits image_limits;
-    image_limits.max_pixels = limits.max_pixels_per_image;
-    image_limits.max_side_px = limits.max_image_side_px;
-    ProbeImage(mapped.bytes(), file.path, image_limits);
-    if (!is_augmentation && !is_mask) ++check->photo_count;
-  } catch (const Error& e) {
-    violations->push_back({file.path, e.what()});
+  if (problem.text.starts_with(problem.path)) {
+    problem.text.replace(0, problem.path.size(), file.path);
   }
+  refuse(problem.text);
 }
 
 [[noreturn]] void ThrowInvalid(const SceneRecord& scene,
@@ -232,6 +260,17 @@ SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLim
   record.name = "scenes/" + (request.scene_id().empty() ? "s" + NewId() : request.scene_id());
   record.display_name = request.display_name();
   std::set<std::string> paths;
+  int64_t path_bytes = 0;
+  for (const v1::SceneFile& file : request.files()) {
+    path_bytes += static_cast<int64_t>(file.path().size());
+  }
+  if (path_bytes > limits.max_manifest_bytes) {
+    throw InvalidArgument(
+        "the paths of files have {} bytes in sum; at most {} are allowed: use shorter names, or "
+        "several scenes",
+        path_bytes,
+        limits.max_manifest_bytes);
+  }
   for (const v1::SceneFile& file : request.files()) {
     if (!IsSafeRelativePath(file.path())) {
       throw ServiceError(
@@ -284,12 +323,14 @@ StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
 SceneCheck CheckScene(const SceneRecord& scene,
                       const BlobStore& blobs,
                       const ProjectStore& store,
-                      const ServiceLimits& limits) {
+                      const ServiceLimits& limits,
+                      const std::function<bool()>& is_cancelled) {
   SceneCheck check;
   std::vector<std::string> named;
   for (const SceneFileRecord& file : scene.files) named.push_back(file.digest.sha256);
   const std::set<std::string> held = store.HeldBlobs(named);
-  std::vector<FieldViolation> violations;
+  FileChecks checks(blobs, limits, is_cancelled);
+  std::vector<FieldViolation>& violations = checks.violations;
   check.layout = DetectLayout(scene.files);
   const auto folders = ModelFolders(scene.files);
   const bool has_model = std::any_of(folders.begin(), folders.end(), [](const auto& folder) {
@@ -304,7 +345,7 @@ SceneCheck CheckScene(const SceneRecord& scene,
   size_t missing = 0;
   for (const SceneFileRecord& file : scene.files) {
     const size_t before = violations.size();
-    CheckFile(file, blobs, held, limits, &check, &violations);
+    checks.Check(file, held.contains(file.digest.sha256), &check);
     missing += violations.size() - before;
   }
   if (check.layout == StoredLayout::kSplat) {

@@ -2,6 +2,8 @@
 // there, every file what it claims to be, enough photographs, a layout we know.
 #pragma once
 
+#include <functional>
+
 #include "color3d/v1/scene.pb.h"
 #include "server/rpc/rpc_parts.h"
 #include "server/storage/blob_store.h"
@@ -10,7 +12,7 @@
 namespace color3d {
 
 // The scene that a request declares, under a new id where it names none. Throws
-// Error{kInvalidArgument}: bad id, too many files, a path that is unsafe (UNSAFE_PATH), there twice
+// Error{kInvalidArgument}: bad id, too many files, paths that are too long in sum, a path that is unsafe (UNSAFE_PATH), there twice
 // or both file and folder, no digest.
 SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLimits& limits);
 
@@ -19,12 +21,14 @@ struct SceneCheck {
   int photo_count = 0;
 };
 
-// Of blobs that the project of `store` holds. Throws ServiceError{kInvalidArgument, SCENE_INVALID}
+// Of blobs that the project of `store` holds; each is read once, whatever paths it has.
+// `is_cancelled` is asked while they are read: then throws Error{kCancelled}. Throws ServiceError{kInvalidArgument, SCENE_INVALID}
 // with one violation for each bad file; its message names the first three and counts the rest.
 SceneCheck CheckScene(const SceneRecord& scene,
                       const BlobStore& blobs,
                       const ProjectStore& store,
-                      const ServiceLimits& limits);
+                      const ServiceLimits& limits,
+                      const std::function<bool()>& is_cancelled);
 
 // Which kind of input the paths look like; COLMAP wins over other poses.
 StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files);

@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <future>
+#include <thread>
+
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
@@ -52,7 +56,7 @@ TEST_F(SceneValidationTest, APhotoThatCannotBeReadIsNamed) {
   scene.name = "scenes/test";
   scene.files = {{"a.png", blob}};
   try {
-    CheckScene(scene, lossy, store, {});
+    CheckScene(scene, lossy, store, {}, [] { return false; });
     FAIL();
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("a.png cannot be read"));
@@ -124,6 +128,127 @@ TEST_F(SceneValidationTest, TimesGoWithAColmapModel) {
   EXPECT_EQ(scene.photo_count(), 2);
 }
 
+// Counts how often blobs are read.
+class CountingBlobs : public FileBlobStore {
+ public:
+  using FileBlobStore::FileBlobStore;
+  std::filesystem::path Fetch(const std::string& sha256) const override {
+    ++fetched;
+    return FileBlobStore::Fetch(sha256);
+  }
+  mutable std::atomic<int> fetched{0};
+};
+
+TEST_F(SceneValidationTest, ABlobIsReadOnceWhateverPathsItHas) {
+  const CountingBlobs counting(scratch_.path() / "blobs", BlobStoreOptions{0});
+  const ProjectStore store(store_, "");
+  SceneRecord scene;
+  scene.name = "scenes/test";
+  const FileDigest good = blobs_.PutBytes(TinyPng()), bad = blobs_.PutBytes("no image");
+  for (const FileDigest& blob : {good, bad}) store.HoldBlob(blob);
+  for (int i = 0; i < 50; ++i) {
+    scene.files.push_back({"good/" + std::to_string(i) + ".png", good});
+    scene.files.push_back({"bad/" + std::to_string(i) + ".png", bad});
+  }
+  try {
+    CheckScene(scene, counting, store, {}, [] { return false; });
+    FAIL();
+  } catch (const ServiceError& e) {
+    ASSERT_EQ(e.violations().size(), 50u);
+    EXPECT_THAT(e.violations()[49].description, HasSubstr(scene.files[99].path));
+  }
+  EXPECT_EQ(counting.fetched, 2);
+  std::erase_if(scene.files, [](const auto& file) { return file.path.starts_with("bad"); });
+  EXPECT_EQ(CheckScene(scene, counting, store, {}, [] { return false; }).photo_count, 50);
+}
+
+TEST_F(SceneValidationTest, WhoIsGoneIsCheckedNoFurther) {
+  const CountingBlobs counting(scratch_.path() / "blobs", BlobStoreOptions{0});
+  const ProjectStore store(store_, "");
+  SceneRecord scene;
+  scene.name = "scenes/test";
+  for (int i = 0; i < 20; ++i) {
+    scene.files.push_back({std::to_string(i) + ".png", blobs_.PutBytes(std::to_string(i))});
+    store.HoldBlob(scene.files.back().digest);
+  }
+  try {
+    CheckScene(scene, counting, store, {}, [&] { return counting.fetched >= 3; });
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kCancelled);
+  }
+  EXPECT_EQ(counting.fetched, 3);
+}
+
+// A project that commits much, over a disk that does not answer, leaves threads to the others.
+TEST_F(SceneValidationTest, CommitsOfOneProjectLeaveRoomForThoseOfAnother) {
+  class HangingBlobs : public FileBlobStore {
+   public:
+    using FileBlobStore::FileBlobStore;
+    std::filesystem::path Fetch(const std::string& sha256) const override {
+      while (sha256 == hangs && !released) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      return FileBlobStore::Fetch(sha256);
+    }
+    std::string hangs;
+    std::atomic<bool> released{false};
+  };
+  HangingBlobs hanging(scratch_.path() / "blobs", BlobStoreOptions{0});
+  hanging.hangs = DigestOf("slow").sha256();
+  const auto tokens = scratch_.path() / "tokens";
+  const std::string attic = AddToken(tokens, "anna", Role::kSubmit, "attic");
+  const std::string cellar = AddToken(tokens, "carl", Role::kSubmit, "cellar");
+  RpcServerOptions options;
+  options.listen = "unix:" + (scratch_.path() / "socket").string();
+  options.credentials = grpc::experimental::LocalServerCredentials(UDS);
+  options.tokens = std::make_shared<TokenBook>(tokens);
+  RpcServer server(options, store_, hanging, uploads_, SystemClock());
+  const auto open = [&](const std::string& token) {
+    return TestClient(grpc::CreateChannel(
+        server.address(),
+        grpc::CompositeChannelCredentials(grpc::experimental::LocalCredentials(UDS),
+                                          grpc::AccessTokenCredentials(token))));
+  };
+  TestClient busy = open(attic), other = open(cellar);
+  std::vector<std::thread> commits;
+  for (int i = 0; i < 8; ++i) {
+    v1::CreateSceneRequest create;
+    v1::SceneFile* file = create.add_files();
+    file->set_path("a.png");
+    *file->mutable_digest() = busy.Upload("slow");
+    grpc::ClientContext context;
+    v1::Scene scene;
+    ASSERT_TRUE(busy.scenes->CreateScene(&context, create, &scene).ok());
+    commits.emplace_back([&busy, name = scene.name()] {
+      v1::CommitSceneRequest commit;
+      commit.set_name(name);
+      grpc::ClientContext waiting;
+      v1::Scene ignored;
+      busy.scenes->CommitScene(&waiting, commit, &ignored);
+    });
+  }
+  auto made = std::async(std::launch::async, [&] { return other.MakeScene(); });
+  EXPECT_EQ(made.wait_for(std::chrono::seconds(20)), std::future_status::ready);
+  hanging.released = true;
+  EXPECT_EQ(made.get().state(), v1::Scene::STATE_ACTIVE);
+  for (std::thread& commit : commits) commit.join();
+}
+
+TEST_F(SceneValidationTest, PathsHaveALimitInSum) {
+  v1::CreateSceneRequest request;
+  for (int i = 0; i < 3000; ++i) {
+    v1::SceneFile* file = request.add_files();
+    file->set_path(std::to_string(i) + "/" + std::string(250, 'a') + "/" + std::string(250, 'b') +
+                   "/" + std::string(250, 'c'));
+    *file->mutable_digest() = DigestOf("a");
+  }
+  try {
+    CheckedScene(request, {});
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("at most 2097152 are allowed"));
+  }
+}
+
 TEST_F(SceneValidationTest, TimesHaveALimit) {
   const ProjectStore store(store_, "");
   const FileDigest blob = blobs_.PutBytes(std::string((16 << 20) + 1, '#'));
@@ -132,7 +257,7 @@ TEST_F(SceneValidationTest, TimesHaveALimit) {
   scene.name = "scenes/test";
   scene.files = {{"times.txt", blob}};
   try {
-    CheckScene(scene, blobs_, store, {});
+    CheckScene(scene, blobs_, store, {}, [] { return false; });
     FAIL();
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("times.txt has 16777217 bytes; at most 16777216 are allowed"));

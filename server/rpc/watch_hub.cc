@@ -14,7 +14,9 @@
 namespace color3d {
 namespace {
 using SteadyClock = std::chrono::steady_clock;
-constexpr size_t kJobsAtOnce = 8;  // whole jobs that wait to be written
+// Whole jobs that wait to be written: so many, and fewer where they are long.
+constexpr size_t kJobsAtOnce = 8;
+constexpr ListBudget kBudgetAtOnce = {128 << 10, kMaxSpecBytes};
 }  // namespace
 
 // One stream. gRPC calls (StartWrite, Finish) are decided under the mutex and made outside it: they
@@ -166,28 +168,26 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     status.ok() ? Pump() : End(status);
   }
 
-  std::map<int64_t, JobRecord> Jobs(const std::vector<int64_t>& ids) const {
-    std::map<int64_t, JobRecord> jobs;
-    if (ids.empty()) return jobs;
-    for (JobRecord& job : store_->Snapshot(ids).jobs) {
-      const int64_t id = job.id;
-      jobs.emplace(id, std::move(job));
-    }
-    return jobs;
-  }
-
   // On the executor: the jobs of the states that are to be written next. Those behind them wait as
   // what they are in the table of events, so that a reader who is slow holds few whole jobs.
   void Load() {
     const grpc::Status status = Guard([&] {
-      std::set<int64_t> wanted;
+      std::vector<int64_t> wanted;
       {
         std::lock_guard lock(mutex_);
         for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size()); ++i) {
-          if (queue_[i].state) wanted.insert(queue_[i].state->job_id);
+          if (!queue_[i].state) continue;
+          const int64_t id = queue_[i].state->job_id;
+          if (std::ranges::find(wanted, id) == wanted.end()) wanted.push_back(id);
         }
       }
-      const std::map<int64_t, JobRecord> jobs = Jobs({wanted.begin(), wanted.end()});
+      LoadedJobs loaded = store_->LoadJobs(wanted, kBudgetAtOnce);
+      wanted.resize(loaded.looked_for);
+      std::map<int64_t, JobRecord> jobs;
+      for (JobRecord& job : loaded.jobs) {
+        const int64_t id = job.id;
+        jobs.emplace(id, std::move(job));
+      }
       std::lock_guard lock(mutex_);
       // What was queued meanwhile is behind; nothing with a state in front was taken.
       for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size());) {
@@ -195,7 +195,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
         const auto job = item.state ? jobs.find(item.state->job_id) : jobs.end();
         if (job != jobs.end()) {
           item = {StateEvent(Then(job->second, *item.state), *item.state), std::nullopt};
-        } else if (item.state && wanted.contains(item.state->job_id)) {  // it was deleted
+        } else if (item.state && std::ranges::find(wanted, item.state->job_id) != wanted.end()) {  // it was deleted
           queue_.erase(queue_.begin() + static_cast<std::ptrdiff_t>(i));
           continue;
         }

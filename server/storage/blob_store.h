@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -56,8 +57,11 @@ class BlobStore {
   virtual ~BlobStore() = default;
 
   // Whether the blob is there with this size; also says that somebody counts on it
-  // (RemoveIfUntouched).
+  // (RemoveIfUntouched). As all that look for a blob it throws Error{kUnavailable, BLOB_UNREADABLE}
+  // where the disk does not say whether it is there.
   virtual bool Touch(const FileDigest& digest) const = 0;
+  // The blob as it is, without touching it; nothing where it is not there.
+  virtual std::optional<StoredBlob> Look(const std::string& sha256) const = 0;
   // Path of a read-only file. Throws Error{kNotFound, BLOB_MISSING}.
   virtual std::filesystem::path Fetch(const std::string& sha256) const = 0;
   // Good bytes take the place of damaged ones.
@@ -67,9 +71,12 @@ class BlobStore {
   // As PutFile, for a file whose digest the caller has just computed.
   virtual void Adopt(const std::filesystem::path& file, const FileDigest& digest) = 0;
   virtual void Remove(const std::string& sha256) = 0;
-  // Sets a blob aside of which the bytes are no longer those of its digest: it is missing from then
-  // on, so that an upload puts good bytes in its place.
-  virtual void SetAside(const std::string& sha256) = 0;
+  // Reads the blob again, and sets it aside where its bytes are not those of its digest: it is
+  // missing from then on, so that an upload puts good bytes in its place. False where the bytes are
+  // good, as when somebody has put good ones there since they were found damaged.
+  virtual bool SetAside(const std::string& sha256) = 0;
+  // Blobs that were found damaged, by whomever in this process.
+  virtual int64_t damaged() const = 0;
 
   // Throws Error{kResourceExhausted, STORAGE_FULL} when `bytes` more would not leave the reserve.
   virtual void RequireSpace(int64_t bytes) const = 0;
@@ -78,8 +85,10 @@ class BlobStore {
   // Less what is reserved; not below 0, though more may be promised than there is.
   virtual int64_t FreeBytes() const = 0;
 
-  // Every blob, until `visit` returns false.
-  virtual void ForEach(const std::function<bool(const StoredBlob&)>& visit) const = 0;
+  // Every blob, until `visit` returns false. Returns what could not be looked at, "PATH: REASON":
+  // whether there are blobs is not known.
+  virtual std::vector<std::string> ForEach(
+      const std::function<bool(const StoredBlob&)>& visit) const = 0;
   // False when it was touched since, when it is gone, or when somebody uses the store just now.
   virtual bool RemoveIfUntouched(const StoredBlob& blob) = 0;
   // Files that a crash left half-written, and what was set aside, older than `age` at this
@@ -87,10 +96,16 @@ class BlobStore {
   virtual int RemoveLeftovers(std::chrono::seconds age) = 0;
 };
 
-// All of them, or those that were found until `stop` said so.
-std::vector<StoredBlob> ListBlobs(const BlobStore& blobs, const std::function<bool()>& stop);
+struct ListedBlobs {
+  std::vector<StoredBlob> blobs;
+  std::vector<std::string> unreadable;  // as BlobStore::ForEach
+};
 
-// Whether the bytes are those of the digest. Throws Error{kNotFound, BLOB_MISSING}.
+// All of them, or those that were found until `stop` said so.
+ListedBlobs ListBlobs(const BlobStore& blobs, const std::function<bool()>& stop);
+
+// Whether the bytes are those of the digest; not, where the disk does not give them. Throws
+// Error{kNotFound, BLOB_MISSING}; kFailedPrecondition where they may not be read.
 bool IsIntact(const BlobStore& blobs, const FileDigest& digest);
 
 }  // namespace color3d

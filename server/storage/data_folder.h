@@ -19,6 +19,8 @@ struct DataPaths {
   std::filesystem::path JobLogs() const { return Logs() / "jobs"; }
   // Private sockets between the server and its workers.
   std::filesystem::path Sockets() const { return root / "sockets"; }
+  // Given up when the disk is full.
+  std::filesystem::path BallastFile() const { return root / "ballast"; }
   std::filesystem::path Lock() const { return root / "lock"; }
 };
 

@@ -10,8 +10,12 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <memory>
+#include <optional>
+#include <vector>
 
 #include "core/base/files.h"
+#include "core/base/folder_walk.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -39,8 +43,45 @@ class FolderLock {
   bool held_ = false;
 };
 
+// Nothing: there is no such file. Nobody may say so of one that could not be looked at.
+std::optional<struct stat> StatusOf(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) == 0) return status;
+  const int error = errno;
+  if (error == ENOENT || error == ENOTDIR) return std::nullopt;
+  throw ServiceError(ErrorCode::kUnavailable,
+                     "BLOB_UNREADABLE",
+                     "cannot look at the blob {}: {}; its owner, rights and disk on the server need "
+                     "a look",
+                     path.filename().string(),
+                     std::strerror(error));
+}
+
 int64_t TouchedNs(const struct stat& status) {
   return static_cast<int64_t>(status.st_mtim.tv_sec) * 1'000'000'000 + status.st_mtim.tv_nsec;
+}
+
+// The clock of files moves by milliseconds: two touches would be one.
+void TouchFile(const fs::path& path, const struct stat& before) {
+  timespec times[2] = {{0, UTIME_OMIT}, {}};
+  ::clock_gettime(CLOCK_REALTIME, &times[1]);
+  if (times[1].tv_sec == before.st_mtim.tv_sec && times[1].tv_nsec == before.st_mtim.tv_nsec) {
+    times[1].tv_nsec += times[1].tv_nsec == 999'999'999 ? -1 : 1;
+  }
+  ::utimensat(AT_FDCWD, path.c_str(), times, 0);
+}
+
+// Of an open file; nothing where the disk does not give it.
+std::optional<std::string> DigestOf(int fd) {
+  Sha256 hash;
+  std::vector<char> buffer(1 << 18);
+  while (true) {
+    const ssize_t got = ::read(fd, buffer.data(), buffer.size());
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return std::nullopt;
+    if (got == 0) return hash.FinishHex();
+    hash.Update({buffer.data(), static_cast<size_t>(got)});
+  }
 }
 
 }  // namespace
@@ -62,16 +103,21 @@ fs::path FileBlobStore::PathOf(const std::string& sha256) const {
 bool FileBlobStore::Touch(const FileDigest& digest) const {
   const fs::path path = PathOf(digest.sha256);
   FolderLock lock(folder_, LOCK_SH);
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0 || status.st_size != digest.size_bytes) return false;
-  ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
+  const auto status = StatusOf(path);
+  if (!status || status->st_size != digest.size_bytes) return false;
+  TouchFile(path, *status);
   return true;
+}
+
+std::optional<StoredBlob> FileBlobStore::Look(const std::string& sha256) const {
+  const auto status = StatusOf(PathOf(sha256));
+  if (!status || !S_ISREG(status->st_mode)) return std::nullopt;
+  return StoredBlob{{sha256, static_cast<int64_t>(status->st_size)}, TouchedNs(*status)};
 }
 
 fs::path FileBlobStore::Fetch(const std::string& sha256) const {
   const fs::path path = PathOf(sha256);
-  std::error_code error;
-  if (!fs::is_regular_file(path, error)) {
+  if (const auto status = StatusOf(path); !status || !S_ISREG(status->st_mode)) {
     throw ServiceError(
         ErrorCode::kNotFound, "BLOB_MISSING", "the blob {} is not stored; upload it", sha256);
   }
@@ -126,8 +172,15 @@ void FileBlobStore::ThrowFull(int64_t bytes, int64_t free) const {
                      options_.reserve_bytes);
 }
 
+bool FileBlobStore::IsThere(const FileDigest& digest) {
+  if (!Touch(digest)) return false;
+  if (IsIntact(*this, digest)) return true;
+  ++damaged_;
+  return false;
+}
+
 void FileBlobStore::Adopt(const fs::path& file, const FileDigest& digest) {
-  if (Touch(digest) && IsIntact(*this, digest)) {
+  if (IsThere(digest)) {
     ::unlink(file.c_str());
     return;
   }
@@ -135,12 +188,13 @@ void FileBlobStore::Adopt(const fs::path& file, const FileDigest& digest) {
   ::chmod(file.c_str(), 0444);
   FolderLock lock(folder_, LOCK_SH);
   PublishFile(file, path);
-  ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
+  struct stat status {};
+  if (::stat(path.c_str(), &status) == 0) TouchFile(path, status);
 }
 
 FileDigest FileBlobStore::PutBytes(std::string_view bytes) {
   const FileDigest digest{Sha256Hex(bytes), static_cast<int64_t>(bytes.size())};
-  if (Touch(digest) && IsIntact(*this, digest)) return digest;
+  if (IsThere(digest)) return digest;
   RequireSpace(digest.size_bytes);
   const fs::path path = PlaceFor(digest.sha256);
   try {
@@ -163,21 +217,49 @@ FileDigest FileBlobStore::PutFile(const fs::path& file) {
 
 void FileBlobStore::Remove(const std::string& sha256) { ::unlink(PathOf(sha256).c_str()); }
 
-void FileBlobStore::SetAside(const std::string& sha256) {
+bool FileBlobStore::SetAside(const std::string& sha256) {
   const fs::path path = PathOf(sha256);
-  ::rename(path.c_str(), (path.string() + kSetAside).c_str());
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const std::shared_ptr<void> closed(nullptr, [fd](void*) { ::close(fd); });
+  if (DigestOf(fd) == sha256) return false;
+  // Good bytes come as another file: what was read must be what is there, and what is moved.
+  struct stat read {};
+  if (::fstat(fd, &read) != 0) return false;
+  const auto is_read = [&](const fs::path& file) {
+    struct stat status {};
+    return ::stat(file.c_str(), &status) == 0 && status.st_ino == read.st_ino &&
+           status.st_dev == read.st_dev;
+  };
+  const FolderLock lock(folder_, LOCK_EX);
+  const fs::path aside = path.string() + kSetAside;
+  if (!is_read(path) || ::rename(path.c_str(), aside.c_str()) != 0) return false;
+  if (!is_read(aside)) {
+    ::rename(aside.c_str(), path.c_str());
+    return false;
+  }
+  ++damaged_;
+  return true;
 }
 
-void FileBlobStore::ForEach(const std::function<bool(const StoredBlob&)>& visit) const {
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(folder_, error), end; it != end; it.increment(error)) {
-    if (error) break;
-    const std::string name = it->path().filename().string();
-    struct stat status {};
-    if (!IsSha256Hex(name) || ::stat(it->path().c_str(), &status) != 0) continue;
-    if (!S_ISREG(status.st_mode)) continue;
-    if (!visit({{name, static_cast<int64_t>(status.st_size)}, TouchedNs(status)})) return;
-  }
+std::vector<std::string> FileBlobStore::ForEach(
+    const std::function<bool(const StoredBlob&)>& visit) const {
+  std::vector<std::string> unknown;
+  std::vector<std::string> unreadable =
+      WalkFolder(folder_, WalkDepth::kBelow, [&](const fs::directory_entry& entry) {
+        const std::string name = entry.path().filename().string();
+        if (!IsSha256Hex(name)) return true;
+        try {
+          const std::optional<StoredBlob> blob = Look(name);
+          // A file of this name elsewhere is none of ours.
+          return !blob || entry.path() != PathOf(name) || visit(*blob);
+        } catch (const Error& e) {
+          unknown.push_back(entry.path().string() + ": " + e.what());
+          return true;
+        }
+      });
+  unreadable.insert(unreadable.end(), unknown.begin(), unknown.end());
+  return unreadable;
 }
 
 bool FileBlobStore::RemoveIfUntouched(const StoredBlob& blob) {
@@ -190,15 +272,14 @@ bool FileBlobStore::RemoveIfUntouched(const StoredBlob& blob) {
 
 int FileBlobStore::RemoveLeftovers(std::chrono::seconds age) {
   int removed = 0;
-  std::error_code error;
   stale_.Look(age);
-  for (fs::recursive_directory_iterator it(folder_, error), end; it != end; it.increment(error)) {
-    if (error) break;
-    const std::string name = it->path().filename().string();
-    if (!name.ends_with(".part") && !name.ends_with(kSetAside)) continue;
-    if (!stale_.IsStale(it->path())) continue;
-    if (::unlink(it->path().c_str()) == 0) ++removed;
-  }
+  // ForEach tells what cannot be read.
+  WalkFolder(folder_, WalkDepth::kBelow, [&](const fs::directory_entry& entry) {
+    const std::string name = entry.path().filename().string();
+    const bool is_one = name.ends_with(".part") || name.ends_with(kSetAside);
+    if (is_one && stale_.IsStale(entry.path()) && ::unlink(entry.path().c_str()) == 0) ++removed;
+    return true;
+  });
   return removed;
 }
 

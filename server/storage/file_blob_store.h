@@ -17,21 +17,26 @@ class FileBlobStore : public BlobStore {
   explicit FileBlobStore(const std::filesystem::path& folder, BlobStoreOptions options = {});
 
   bool Touch(const FileDigest& digest) const override;
+  std::optional<StoredBlob> Look(const std::string& sha256) const override;
   std::filesystem::path Fetch(const std::string& sha256) const override;
   FileDigest PutBytes(std::string_view bytes) override;
   FileDigest PutFile(const std::filesystem::path& file) override;
   void Adopt(const std::filesystem::path& file, const FileDigest& digest) override;
   void Remove(const std::string& sha256) override;
-  void SetAside(const std::string& sha256) override;
+  bool SetAside(const std::string& sha256) override;
+  int64_t damaged() const override { return damaged_; }
   void RequireSpace(int64_t bytes) const override;
   SpaceReservation Reserve(int64_t bytes) override;
   int64_t FreeBytes() const override;
-  void ForEach(const std::function<bool(const StoredBlob&)>& visit) const override;
+  std::vector<std::string> ForEach(
+      const std::function<bool(const StoredBlob&)>& visit) const override;
   bool RemoveIfUntouched(const StoredBlob& blob) override;
   int RemoveLeftovers(std::chrono::seconds age) override;
 
  private:
   int64_t UnpromisedBytes() const;  // below 0 where more is promised than there is
+  // Whether the blob is there and good. Counts it where it is damaged.
+  bool IsThere(const FileDigest& digest);
   [[noreturn]] void ThrowFull(int64_t bytes, int64_t free) const;
   std::filesystem::path PathOf(const std::string& sha256) const;
   // ... with its folder, of which every level is synced.
@@ -40,6 +45,7 @@ class FileBlobStore : public BlobStore {
   std::filesystem::path folder_;
   BlobStoreOptions options_;
   StaleFiles stale_;
+  std::atomic<int64_t> damaged_{0};
   std::shared_ptr<std::atomic<int64_t>> reserved_ = std::make_shared<std::atomic<int64_t>>(0);
 };
 

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "tests/support/service/storage_fixture.h"
+#include "tests/support/unprivileged.h"
 
 namespace color3d {
 namespace {
@@ -117,6 +118,52 @@ TEST_F(FileBlobStoreTest, GoodBytesTakeThePlaceOfDamagedOnes) {
   EXPECT_FALSE(blobs_.Touch(digest));
   blobs_.PutBytes("some bytes");
   EXPECT_TRUE(IsIntact(blobs_, digest));
+}
+
+// Good bytes have come since somebody read damaged ones.
+TEST_F(FileBlobStoreTest, WhatIsWholeIsNotSetAside) {
+  const FileDigest digest = blobs_.PutBytes("some bytes");
+  Damage(blobs_.Fetch(digest.sha256));
+  blobs_.PutBytes("some bytes");
+  EXPECT_EQ(blobs_.damaged(), 1);
+  EXPECT_FALSE(blobs_.SetAside(digest.sha256));
+  EXPECT_TRUE(blobs_.Touch(digest));
+  Damage(blobs_.Fetch(digest.sha256));
+  EXPECT_TRUE(blobs_.SetAside(digest.sha256));
+  EXPECT_EQ(blobs_.damaged(), 2);
+  EXPECT_FALSE(blobs_.SetAside(digest.sha256)) << "gone";
+}
+
+TEST_F(FileBlobStoreTest, EachTouchIsAnother) {
+  const FileDigest digest = blobs_.PutBytes("x");
+  std::optional<StoredBlob> before = blobs_.Look(digest.sha256);
+  ASSERT_TRUE(before.has_value());
+  EXPECT_EQ(before->digest.size_bytes, 1);
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_TRUE(blobs_.Touch(digest));
+    const auto now = blobs_.Look(digest.sha256);
+    EXPECT_NE(now->touched_ns, before->touched_ns) << "though no time may have passed";
+    before = now;
+  }
+  EXPECT_FALSE(blobs_.Look(Sha256Hex("no")).has_value());
+}
+
+class UnreadableBlobsTest : private testing::Unprivileged, public StorageTest {};
+
+TEST_F(UnreadableBlobsTest, WhatCannotBeLookedAtIsNotCalledMissing) {
+  const FileDigest lost = blobs_.PutBytes("lost"), other = blobs_.PutBytes("other");
+  const fs::path folder = blobs_.Fetch(lost.sha256).parent_path();
+  fs::permissions(folder, fs::perms::none);
+  EXPECT_EQ(ReasonThrown([&] { blobs_.Fetch(lost.sha256); }), "BLOB_UNREADABLE");
+  EXPECT_EQ(ReasonThrown([&] { blobs_.Touch(lost); }), "BLOB_UNREADABLE");
+  EXPECT_EQ(ReasonThrown([&] { blobs_.Look(lost.sha256); }), "BLOB_UNREADABLE");
+  const ListedBlobs listed = ListBlobs(blobs_, [] { return false; });
+  ASSERT_EQ(listed.blobs.size(), 1u);
+  EXPECT_EQ(listed.blobs[0].digest.sha256, other.sha256);
+  ASSERT_EQ(listed.unreadable.size(), 1u);
+  EXPECT_NE(listed.unreadable[0].find(folder.string()), std::string::npos);
+  fs::permissions(folder, fs::perms::owner_all);
+  EXPECT_TRUE(blobs_.Touch(lost));
 }
 
 TEST_F(FileBlobStoreTest, ReserveOfFreeSpaceIsKept) {

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <ctime>
 
+#include "core/base/folder_walk.h"
 #include "server/service_error.h"
 
 namespace color3d {
@@ -61,8 +62,14 @@ UploadStore::UploadStore(const fs::path& folder, BlobStore& blobs, int64_t max_b
     : folder_(folder), blobs_(blobs), max_blob_bytes_(max_blob_bytes) {
   std::error_code error;
   fs::create_directories(folder_, error);
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
-    CountOnDisk(entry.path().filename().string());
+  for (const std::string& problem :
+       WalkFolder(folder_, WalkDepth::kFolder, [&](const fs::directory_entry& entry) {
+         CountOnDisk(entry.path().filename().string());
+         return true;
+       })) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot read the unfinished uploads of {}; change the folder's permissions",
+                problem);
   }
 }
 
@@ -213,18 +220,19 @@ void UploadStore::Writer::Finish() {
   store_->blobs_.Adopt(path, actual);
 }
 
-int UploadStore::ReapOlderThan(std::chrono::seconds age) {
-  int reaped = 0;
-  std::error_code error;
+UploadStore::Reaped UploadStore::ReapOlderThan(std::chrono::seconds age) {
+  Reaped reaped;
   stale_.Look(age);
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
-    if (!stale_.IsStale(entry.path())) continue;
-    const std::string part = entry.path().filename().string();
-    std::lock_guard lock(mutex_);
-    if (sessions_.contains(part)) continue;
-    if (::unlink(entry.path().c_str()) == 0) ++reaped;
-    CountOnDisk(part);
-  }
+  reaped.unreadable =
+      WalkFolder(folder_, WalkDepth::kFolder, [&](const fs::directory_entry& entry) {
+        if (!stale_.IsStale(entry.path())) return true;
+        const std::string part = entry.path().filename().string();
+        std::lock_guard lock(mutex_);
+        if (sessions_.contains(part)) return true;
+        if (::unlink(entry.path().c_str()) == 0) ++reaped.uploads;
+        CountOnDisk(part);
+        return true;
+      });
   return reaped;
 }
 

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/base/digest.h"
 #include "server/storage/blob_store.h"
@@ -68,9 +69,13 @@ class UploadStore {
   std::unique_ptr<Writer> Open(
       const UploadName& name, int64_t offset, const Admission& admit = [](int64_t) {});
 
+  struct Reaped {
+    int uploads = 0;
+    std::vector<std::string> unreadable;  // as WalkFolder
+  };
   // Removes uploads that nobody writes and that have not grown for `age`, at this call and at the
-  // last one; returns how many.
-  int ReapOlderThan(std::chrono::seconds age);
+  // last one.
+  Reaped ReapOlderThan(std::chrono::seconds age);
 
  private:
   std::filesystem::path PartPath(const UploadName& name) const;

@@ -63,12 +63,12 @@ TEST_F(UploadStoreTest, HostileNamesAndSizesAreRefused) {
 TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
   const UploadName name{"u", DigestOf("abc")};
   uploads_.Open(name, 0)->Append(0, "a");
-  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)), 0);
+  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)).uploads, 0);
   for (const std::string& file : ListFiles(scratch_.path() / "uploads")) {
     MakeOld(scratch_.path() / "uploads" / file, 25);
   }
-  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)), 0) << "the clock may have been set";
-  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)), 1);
+  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)).uploads, 0) << "the clock may have been set";
+  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)).uploads, 1);
   EXPECT_EQ(uploads_.CommittedSize(name), 0);
 }
 

@@ -69,4 +69,27 @@ std::string NewId() {
   return id;
 }
 
+int64_t MemoryBytes(const JobRecord& job) {
+  size_t bytes = sizeof(JobRecord) + job.spec.size() + job.skip_reason.size();
+  for (const ArtifactRecord& artifact : job.artifacts) {
+    bytes += sizeof(ArtifactRecord) + artifact.name.size() + artifact.digest.sha256.size();
+  }
+  for (const std::string& warning : job.usage.warnings) bytes += warning.size();
+  return static_cast<int64_t>(bytes);
+}
+
+// Measured: rows with their entries in the indexes, and the events of a job's life.
+int64_t RowBytes(const SceneRecord& scene) {
+  int64_t bytes = 512 + static_cast<int64_t>(scene.display_name.size());
+  for (const SceneFileRecord& file : scene.files) {
+    bytes += 200 + static_cast<int64_t>(file.path.size());
+  }
+  return bytes;
+}
+
+int64_t RowBytes(const JobRecord& job, size_t inputs, size_t blobs) {
+  return 2048 + static_cast<int64_t>(job.spec.size() + job.notify_url.size() +
+                                     job.skip_reason.size() + 40 * inputs + 200 * blobs);
+}
+
 }  // namespace color3d

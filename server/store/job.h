@@ -99,7 +99,11 @@ struct JobRecord {
   int64_t end_ms = 0;
   std::string worker;
   int64_t revision = 0;
+  int64_t row_bytes = 0;  // about what its rows take in the database
 };
+
+// About what the record takes in memory.
+int64_t MemoryBytes(const JobRecord& job);
 
 // What the owner of a running job shows to prove that it still is: every write of a worker names
 // the epoch of its claim, and is refused once another claim has raised it.
@@ -138,7 +142,13 @@ struct SceneRecord {
   int64_t create_ms = 0;
   int64_t commit_ms = 0;
   std::string key_color_job;  // accepted; empty: none
+  int64_t row_bytes = 0;      // about what its rows take in the database
 };
+
+// About what a record and the rows that belong to it take in the database, bytes.
+int64_t RowBytes(const SceneRecord& scene);
+int64_t RowBytes(const JobRecord& job, size_t inputs, size_t blobs);
+constexpr int64_t kArtifactRowBytes = 300;
 
 struct WorkerRecord {
   std::string worker_id;
@@ -158,6 +168,11 @@ struct ProjectRecord {
   std::string name;          // empty: of all without a project
   int64_t stored_bytes = 0;  // of the blobs that it holds
   int64_t unfinished_jobs = 0;
+  // About what its scenes, jobs and blobs take in the database, and what files take beyond their
+  // length.
+  int64_t row_bytes = 0;
+  int64_t scenes = 0;
+  int64_t uncommitted_scenes = 0;
 };
 
 // 16 random lower-case hexadecimal digits, from the system's random source.

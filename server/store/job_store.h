@@ -52,10 +52,22 @@ struct QueueLimits {
   int64_t of_project;
 };
 
+// How many scenes a project may have.
+struct SceneLimits {
+  int64_t all = INT64_MAX;
+  int64_t uncommitted = INT64_MAX;
+};
+
 struct JobFilter {
   std::string parent;                  // "jobs/..."
   std::string scene;                   // stored
   std::optional<std::string> project;  // nothing: all
+};
+
+// How much a list of jobs may bring into memory.
+struct ListBudget {
+  int64_t bytes = INT64_MAX;       // the list ends with the job that reaches it (MemoryBytes)
+  int64_t spec_bytes = INT64_MAX;  // a longer spec is left empty
 };
 
 // Why workers are given no job.
@@ -103,8 +115,14 @@ struct EventRecord {
 
 // The present state of some jobs together with the newest revision of the store, read at one time.
 struct JobsSnapshot {
-  std::vector<JobRecord> jobs;  // by revision, oldest first
+  std::vector<JobRecord> jobs;  // by revision, oldest first; without spec and artifacts
   int64_t revision = 0;
+};
+
+// As many of the jobs that were asked for as fit.
+struct LoadedJobs {
+  std::vector<JobRecord> jobs;
+  size_t looked_for = 0;  // so many of the ids; those of them that are not in `jobs` were deleted
 };
 
 struct ColorizerRecord {
@@ -134,8 +152,11 @@ class JobStore {
  public:
   virtual ~JobStore() = default;
 
-  // Scenes. `record.name` must be set; its id and times are not read.
-  virtual SceneRecord CreateScene(const SceneRecord& record, const RequestKey& request) = 0;
+  // Scenes. `record.name` must be set; its id and times are not read. kResourceExhausted
+  // (QUOTA_EXCEEDED) when the project would have more scenes than `limits` allow.
+  virtual SceneRecord CreateScene(const SceneRecord& record,
+                                  const RequestKey& request,
+                                  const SceneLimits& limits) = 0;
   virtual SceneRecord GetScene(const std::string& name) = 0;
   // Newest first, ids below `before_id` (0: from the newest); of a project, or of all.
   virtual std::vector<SceneRecord> ListScenes(const std::optional<std::string>& project,
@@ -162,9 +183,11 @@ class JobStore {
   // The job made by an earlier request, if it was made: lets a repeated call skip planning.
   virtual std::optional<std::string> FindRequest(const RequestKey& request) = 0;
   virtual JobRecord GetJob(const std::string& name) = 0;
+  // Newest first, ids below `before_id` (0: from the newest).
   virtual std::vector<JobRecord> ListJobs(const JobFilter& filter,
                                           int64_t before_id,
-                                          int limit) = 0;
+                                          int limit,
+                                          const ListBudget& budget) = 0;
   // In order of creation, with artifacts.
   virtual std::vector<JobRecord> ListChildren(const std::string& name) = 0;
   virtual JobRecord Cancel(const std::string& name, const RequestKey& request) = 0;
@@ -242,6 +265,8 @@ class JobStore {
                                                int limit) = 0;
   virtual bool AllFinished(const std::vector<int64_t>& job_ids) = 0;
   virtual JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) = 0;
+  // In the order of the ids, with artifacts, as far as the budget goes.
+  virtual LoadedJobs LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) = 0;
   // The named jobs and their children.
   virtual std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) = 0;
 
@@ -258,10 +283,13 @@ class JobStore {
   virtual void ForgetBlob(const std::string& sha256) = 0;
 
   // Notifications. A pause is an hour at most.
-  virtual std::vector<Notification> DueNotifications(int limit) = 0;
-  // Delivered or given up.
-  virtual void EndNotification(int64_t job_id) = 0;
-  virtual void DelayNotification(int64_t job_id, int64_t pause_ms) = 0;
+  // The ones that have been due for longest, of each receiver (scheme, host and port of the
+  // address) at most so many, so that none keeps the others out.
+  virtual std::vector<Notification> DueNotifications(int of_each_receiver) = 0;
+  // Delivered or given up. Nothing happens where the job has ended anew since `first_ms`: that is
+  // another word.
+  virtual void EndNotification(int64_t job_id, int64_t first_ms) = 0;
+  virtual void DelayNotification(int64_t job_id, int64_t first_ms, int64_t pause_ms) = 0;
 
   // Others.
   // Kept over restarts.
@@ -279,14 +307,18 @@ class JobStore {
   // this time, are not pinned and are read by no unfinished job, and forgets those that are no
   // longer so. Returns the ones noted for `grace_ms` by the steady clock.
   virtual std::vector<std::string> AgeExpired(int64_t ended_before_ms, int64_t grace_ms) = 0;
-  // The same for scenes, also uploading ones, that were made and committed before this time and
-  // have no job.
-  virtual std::vector<std::string> AgeUnusedScenes(int64_t before_ms, int64_t grace_ms) = 0;
+  // The same for scenes that were made and committed before `before_ms` and have no job, and for
+  // those that were made before `uncommitted_before_ms` and were never committed.
+  virtual std::vector<std::string> AgeUnusedScenes(int64_t before_ms,
+                                                   int64_t uncommitted_before_ms,
+                                                   int64_t grace_ms) = 0;
   // Deletes events of finished jobs from before the given time, and request ids from before theirs,
   // as it was told at a call a day ago by the steady clock, too.
   virtual void Compact(int64_t events_before_ms, int64_t requests_before_ms) = 0;
   // Digests of artifacts, scene files, checkpoints and of blobs that specs name.
   virtual std::set<std::string> ReferencedBlobs() = 0;
+  // Those of them that only scenes name which are not committed: their upload may never come.
+  virtual std::set<std::string> AwaitedBlobs() = 0;
   virtual bool IsReferenced(const std::string& sha256) = 0;
   // First of the two phases of collection: takes note of blobs that nothing names, and forgets
   // those that are not told again. Returns the ones that have been untouched, and this store open,
@@ -297,6 +329,9 @@ class JobStore {
   virtual std::vector<BlobCandidate> AgedCandidates(int64_t grace_ms) = 0;
   // Epoch of the job's present lease; 0 when it is not running or does not exist.
   virtual int64_t RunningEpoch(const std::string& job_name) = 0;
+  // Gives the file system back what deleted rows have left free in the database beyond `keep_bytes`,
+  // some MiB at a call; how many bytes are still free in it.
+  virtual int64_t GiveBackSpace(int64_t keep_bytes) = 0;
 };
 
 }  // namespace color3d

@@ -44,10 +44,12 @@ std::string ProjectStore::Stored(const std::string& scene) const {
   return StoredScene(scene, project_);
 }
 
-SceneRecord ProjectStore::CreateScene(SceneRecord record, const RequestKey& request) const {
+SceneRecord ProjectStore::CreateScene(SceneRecord record,
+                                      const RequestKey& request,
+                                      const SceneLimits& limits) const {
   record.name = Stored(record.name);
   record.project = project_;
-  return AsNamed(store_->CreateScene(record, Own(request)));
+  return AsNamed(store_->CreateScene(record, Own(request), limits));
 }
 
 SceneRecord ProjectStore::GetScene(const std::string& name) const {
@@ -100,10 +102,11 @@ JobRecord ProjectStore::GetJob(const std::string& name) const {
 
 std::vector<JobRecord> ProjectStore::ListJobs(JobFilter filter,
                                               int64_t before_id,
-                                              int limit) const {
+                                              int limit,
+                                              const ListBudget& budget) const {
   filter.project = project_;
   filter.scene = Stored(filter.scene);
-  return AsNamed(store_->ListJobs(filter, before_id, limit));
+  return AsNamed(store_->ListJobs(filter, before_id, limit, budget));
 }
 
 std::vector<JobRecord> ProjectStore::ListChildren(const std::string& name) const {
@@ -144,6 +147,13 @@ JobsSnapshot ProjectStore::Snapshot(const std::vector<int64_t>& job_ids) const {
   JobsSnapshot snapshot = store_->Snapshot(job_ids);
   snapshot.jobs = AsNamed(std::move(snapshot.jobs));
   return snapshot;
+}
+
+LoadedJobs ProjectStore::LoadJobs(const std::vector<int64_t>& job_ids,
+                                  const ListBudget& budget) const {
+  LoadedJobs loaded = store_->LoadJobs(job_ids, budget);
+  loaded.jobs = AsNamed(std::move(loaded.jobs));
+  return loaded;
 }
 
 std::vector<int64_t> ProjectStore::ResolveWatch(const std::vector<std::string>& names) const {

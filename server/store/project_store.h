@@ -20,7 +20,9 @@ class ProjectStore {
   const std::string& project() const { return project_; }
 
   // As those of JobStore.
-  SceneRecord CreateScene(SceneRecord record, const RequestKey& request) const;
+  SceneRecord CreateScene(SceneRecord record,
+                          const RequestKey& request,
+                          const SceneLimits& limits) const;
   SceneRecord GetScene(const std::string& name) const;
   std::vector<SceneRecord> ListScenes(int64_t before_id, int limit) const;
   SceneRecord ActivateScene(const std::string& name,
@@ -35,7 +37,10 @@ class ProjectStore {
   JobRecord CreateGraph(NewGraph graph, const RequestKey& request, const QueueLimits& limits) const;
   std::optional<std::string> FindRequest(const RequestKey& request) const;
   JobRecord GetJob(const std::string& name) const;
-  std::vector<JobRecord> ListJobs(JobFilter filter, int64_t before_id, int limit) const;
+  std::vector<JobRecord> ListJobs(JobFilter filter,
+                                  int64_t before_id,
+                                  int limit,
+                                  const ListBudget& budget) const;
   // With artifacts, in order of creation.
   std::vector<JobRecord> ListChildren(const std::string& name) const;
   std::vector<JobRecord> GetInputs(const JobRecord& job) const;
@@ -49,6 +54,7 @@ class ProjectStore {
   QueuePlace PlaceInQueue(const JobRecord& job) const { return store_->PlaceInQueue(job); }
   // As JobStore::Snapshot, of ids that ResolveWatch gave.
   JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) const;
+  LoadedJobs LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) const;
   // Ids of the named jobs and their children.
   std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) const;
 

@@ -15,7 +15,7 @@ class ProjectStoreTest : public JobStoreTest {
       SceneRecord scene;
       scene.name = "scenes/house";
       scene.files = {{"a.jpg", {Sha256Hex("photo"), 5}}};
-      project.CreateScene(scene, {"CreateScene", "same id", "same body"});
+      project.CreateScene(scene, {"CreateScene", "same id", "same body"}, {});
       project.ActivateScene("scenes/house", StoredLayout::kPhotos, 1, {});
     }
   }
@@ -36,13 +36,13 @@ TEST_F(ProjectStoreTest, EachHasItsOwn) {
   const JobRecord job = Create(a_);
   EXPECT_EQ(job.scene, "scenes/house");
   EXPECT_EQ(a_.GetJob(job.name).scene, "scenes/house");
-  EXPECT_EQ(a_.ListJobs({"", "scenes/house", {}}, 0, 10).size(), 1u);
+  EXPECT_EQ(a_.ListJobs({"", "scenes/house", {}}, 0, 10, {}).size(), 1u);
   EXPECT_EQ(a_.ListScenes(0, 10).size(), 1u);
   EXPECT_EQ(a_.GetScene("scenes/house").name, "scenes/house");
   EXPECT_EQ(none_.ListScenes(0, 10).size(), 1u) << "that of the fixture";
   EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 3u);
   for (const ProjectStore& other : {b_, none_}) {
-    EXPECT_TRUE(other.ListJobs({}, 0, 10).empty());
+    EXPECT_TRUE(other.ListJobs({}, 0, 10, {}).empty());
     const std::vector<std::function<void()>> looks = {
         [&] { other.GetJob(job.name); },
         [&] { other.ListChildren(job.name); },
@@ -116,6 +116,58 @@ TEST_F(ProjectStoreTest, ABlobIsForThoseWhoBroughtOrMadeIt) {
   EXPECT_EQ(b_.Usage().stored_bytes, 0);
 }
 
+TEST_F(ProjectStoreTest, RowsCountInWhatAProjectHas) {
+  const int64_t before = a_.Usage().row_bytes;
+  SceneRecord scene;
+  scene.name = "scenes/long";
+  for (int i = 0; i < 100; ++i) {
+    scene.files.push_back({std::string(900, 'x') + std::to_string(i), {Sha256Hex("a"), 1}});
+  }
+  a_.CreateScene(scene, {}, {});
+  EXPECT_GE(a_.Usage().row_bytes - before, 100 * 900);
+  EXPECT_EQ(a_.Usage().scenes, 2);
+  EXPECT_EQ(a_.Usage().uncommitted_scenes, 1);
+  a_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+  a_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+  EXPECT_EQ(a_.Usage().uncommitted_scenes, 0);
+  const int64_t of_others = b_.Usage().row_bytes, without_job = a_.Usage().row_bytes;
+  NewGraph graph = Graph();
+  graph.scene = scene.name;
+  graph.jobs[0].spec = std::string(50'000, 's');
+  const std::string job = a_.CreateGraph(graph, {}, kNoLimit).name;
+  EXPECT_GE(a_.Usage().row_bytes - without_job, 50'000);
+  const int64_t queued = a_.Usage().row_bytes;
+  Publication publication;
+  publication.artifacts = {{"result", {Sha256Hex("r"), 3}, "text/plain"}};
+  store_->Publish(LeaseOf(ClaimOne()), publication);
+  EXPECT_GT(a_.Usage().row_bytes, queued) << "an artifact has a row, its blob a block";
+  a_.Delete(job, {});
+  a_.DeleteScene(scene.name, {});
+  EXPECT_EQ(a_.Usage().row_bytes, before);
+  EXPECT_EQ(b_.Usage().row_bytes, of_others);
+  a_.Cancel(Create(a_).name, {"CancelJob", "id", "body"});
+  EXPECT_GT(a_.Usage().row_bytes, before + 2048 + 300 - 1) << "request ids have rows, too";
+}
+
+TEST_F(ProjectStoreTest, ScenesHaveALimitAndThoseThatAreNeverCommittedASmallerOne) {
+  const SceneLimits limits{4, 2};
+  const auto create = [&](const ProjectStore& project, const std::string& name) {
+    SceneRecord scene;
+    scene.name = "scenes/" + name;
+    return ReasonThrown([&] { project.CreateScene(scene, {}, limits); });
+  };
+  EXPECT_EQ(create(a_, "one"), "nothing");
+  EXPECT_EQ(create(a_, "two"), "nothing");
+  EXPECT_EQ(create(a_, "three"), "QUOTA_EXCEEDED") << "two are not committed";
+  EXPECT_EQ(create(b_, "three"), "nothing") << "another project";
+  a_.ActivateScene("scenes/one", StoredLayout::kPhotos, 1, {});
+  EXPECT_EQ(create(a_, "three"), "nothing");
+  a_.ActivateScene("scenes/two", StoredLayout::kPhotos, 1, {});
+  EXPECT_EQ(create(a_, "four"), "QUOTA_EXCEEDED") << "four in all";
+  a_.DeleteScene("scenes/one", {});
+  EXPECT_EQ(create(a_, "four"), "nothing");
+}
+
 TEST_F(ProjectStoreTest, OneDoesNotFillTheQueueOfAll) {
   const QueueLimits limits(5, 2);
   Create(a_, limits);
@@ -134,7 +186,7 @@ TEST_F(ProjectStoreTest, TheyTakeTurns) {
   std::string order;
   for (int i = 0; i < 6; ++i) order += ClaimOne().project;
   EXPECT_EQ(order, "ababaa");
-  EXPECT_EQ(store_->ListProjects().size(), 2u);
+  EXPECT_EQ(store_->ListProjects().size(), 3u) << "with the scene of none";
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 namespace color3d {
 
-constexpr int kSchemaVersion = 5;
+constexpr int kSchemaVersion = 6;
 
 // Since version 4. A project holds the blobs that it uploaded and that its jobs left.
 #define COLOR3D_PROJECT_TABLES                                                                  \
@@ -24,6 +24,49 @@ constexpr int kSchemaVersion = 5;
   "create table expiry_candidate(job_id integer primary key references job on delete cascade, " \
   "age_ms integer not null);"                                                                   \
   "insert into meta values('hold_paused', 0), ('hold_storage', 0), ('expiry_steady_ms', 0);"
+
+// Since version 6: what rows take counts in what a project has (row_bytes), and its scenes are
+// counted. A blob counts a block of the disk besides its length, a request id its row.
+#define COLOR3D_ACCOUNT(event, sum, name, amount)                                             \
+  "create trigger " event " begin insert into project(name, " sum ") values(" name            \
+  ", " amount ") on conflict(name) do update set " sum "=" sum "+excluded." sum "; end;"
+#define COLOR3D_REQUEST_PROJECT(id) \
+  "case instr(" id ", '@') when 0 then '' else substr(" id ", instr(" id ", '@')+1) end"
+#define COLOR3D_ACCOUNTS                                                                      \
+  "alter table project add column row_bytes integer not null default 0;"                      \
+  "alter table project add column scenes integer not null default 0;"                         \
+  "alter table project add column uncommitted integer not null default 0;"                    \
+  COLOR3D_ACCOUNT("scene_rows after insert on scene", "row_bytes", "new.project",             \
+                  "new.row_bytes")                                                            \
+  COLOR3D_ACCOUNT("scene_counted after insert on scene", "scenes", "new.project", "1")        \
+  COLOR3D_ACCOUNT("scene_begun after insert on scene when new.active=0", "uncommitted",       \
+                  "new.project", "1")                                                         \
+  COLOR3D_ACCOUNT("scene_committed after update of active on scene when old.active<>"         \
+                  "new.active", "uncommitted", "new.project", "old.active-new.active")        \
+  "create trigger scene_gone after delete on scene begin update project set "                 \
+  "row_bytes=row_bytes-old.row_bytes, scenes=scenes-1, "                                      \
+  "uncommitted=uncommitted-(old.active=0) where name=old.project; end;"                       \
+  COLOR3D_ACCOUNT("job_rows after insert on job", "row_bytes", "new.project", "new.row_bytes") \
+  COLOR3D_ACCOUNT("job_grown after update of row_bytes on job", "row_bytes", "new.project",   \
+                  "new.row_bytes-old.row_bytes")                                              \
+  COLOR3D_ACCOUNT("job_gone after delete on job", "row_bytes", "old.project",                 \
+                  "-old.row_bytes")                                                           \
+  COLOR3D_ACCOUNT("blob_rows after insert on blob_holding", "row_bytes", "new.project", "4096") \
+  COLOR3D_ACCOUNT("blob_rows_gone after delete on blob_holding", "row_bytes", "old.project",  \
+                  "-4096")                                                                    \
+  COLOR3D_ACCOUNT("request_rows after insert on request_id", "row_bytes",                     \
+                  COLOR3D_REQUEST_PROJECT("new.id"), "300")                                   \
+  COLOR3D_ACCOUNT("request_rows_gone after delete on request_id", "row_bytes",                \
+                  COLOR3D_REQUEST_PROJECT("old.id"), "-300")
+
+// Since version 6: with the path in a key, an index held it a second time, and one of 970 bytes took
+// two pages of its own.
+#define COLOR3D_SCENE_FILES                                                                   \
+  "create table scene_file(scene_file_id integer primary key, "                               \
+  "scene_id integer not null references scene on delete cascade, path text not null, "        \
+  "sha256 text not null, size_bytes integer not null);"                                       \
+  "create index scene_file_scene on scene_file(scene_id);"                                    \
+  "create index scene_file_blob on scene_file(sha256);"
 
 // From version 1 to 2, from 2 to 3 and so on.
 constexpr const char* kMigrations[kSchemaVersion - 1] = {
@@ -57,7 +100,31 @@ constexpr const char* kMigrations[kSchemaVersion - 1] = {
     "create index request_id_age on request_id(at_ms);"
     "alter table scene add column unused_age_ms integer not null default -1;"
     "insert into meta values('requests_steady_ms', 0), ('requests_age_ms', 0), "
-    "('requests_noted_ms', 0), ('scenes_steady_ms', 0)"};
+    "('requests_noted_ms', 0), ('scenes_steady_ms', 0)",
+    "drop index scene_file_blob; alter table scene_file rename to scene_file_before;" //
+    COLOR3D_SCENE_FILES
+    "insert into scene_file(scene_id, path, sha256, size_bytes) "
+    "select scene_id, path, sha256, size_bytes from scene_file_before;"
+    "drop table scene_file_before;"
+    "alter table scene add column row_bytes integer not null default 0;"
+    "alter table job add column row_bytes integer not null default 0;"
+    "update scene set row_bytes=512+length(display_name)+(select coalesce(sum(200+length(path)), "
+    "0) from scene_file f where f.scene_id=scene.scene_id);"
+    "update job set row_bytes=2048+length(spec)+length(notify_url)+length(skip_reason)+"
+    "300*(select count(*) from artifact a where a.job_id=job.job_id)+"
+    "200*(select count(*) from job_blob b where b.job_id=job.job_id)+"
+    "40*(select count(*) from job_dependency d where d.job_id=job.job_id);"  //
+    COLOR3D_ACCOUNTS
+    "insert or ignore into project(name) select distinct project from scene;"
+    "insert or ignore into project(name) select distinct project from job;"
+    "update project set "
+    "scenes=(select count(*) from scene where scene.project=project.name), "
+    "uncommitted=(select count(*) from scene where scene.project=project.name and active=0), "
+    "row_bytes=(select coalesce(sum(row_bytes), 0) from scene where "
+    "scene.project=project.name)+(select coalesce(sum(row_bytes), 0) from job where "
+    "job.project=project.name)+4096*(select count(*) from blob_holding h where "
+    "h.project=project.name)+300*(select count(*) from request_id r where "  //
+    COLOR3D_REQUEST_PROJECT("r.id") "=project.name)"};
 
 constexpr char kSchema[] = R"sql(
 create table scene(
@@ -67,13 +134,8 @@ create table scene(
   photo_count integer not null default 0,
   create_ms integer not null, commit_ms integer not null default 0,
   key_color_job text not null default '', project text not null default '',
-  unused_age_ms integer not null default -1);
+  unused_age_ms integer not null default -1, row_bytes integer not null default 0);
 create index scene_project on scene(project, scene_id);
-create table scene_file(
-  scene_id integer not null references scene on delete cascade,
-  path text not null, sha256 text not null, size_bytes integer not null,
-  primary key(scene_id, path)) without rowid;
-create index scene_file_blob on scene_file(sha256);
 
 create table job(
   job_id integer primary key autoincrement,
@@ -104,7 +166,7 @@ create table job(
   pinned integer not null default 0, queued_ms integer not null default 0,
   queued_since_ms integer not null default 0, running_key text not null default '',
   joins_key text not null default '', notify_url text not null default '',
-  trace text not null default '',
+  trace text not null default '', row_bytes integer not null default 0,
   check((state='RUNNING') = (lease_expires_ms is not null)),
   check((state in('SUCCEEDED','FAILED','CANCELLED','SKIPPED')) = (end_ms <> 0)));
 create index job_claim on job(priority, job_id) where state='QUEUED';
@@ -161,6 +223,6 @@ create table meta(name text primary key, value integer not null) without rowid;
 insert into meta values('compacted_revision', 0), ('collected_steady_ms', 0),
   ('requests_steady_ms', 0), ('requests_age_ms', 0), ('requests_noted_ms', 0),
   ('scenes_steady_ms', 0);
-)sql" COLOR3D_PROJECT_TABLES;
+)sql" COLOR3D_SCENE_FILES COLOR3D_PROJECT_TABLES COLOR3D_ACCOUNTS;
 
 }  // namespace color3d

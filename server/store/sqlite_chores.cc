@@ -1,4 +1,6 @@
 // What the server's chores ask of the store: whether it takes writes, what is old, what is named.
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <thread>
 
@@ -130,6 +132,19 @@ std::set<std::string> SqliteJobStore::ReferencedBlobs() {
   return digests;
 }
 
+std::set<std::string> SqliteJobStore::AwaitedBlobs() {
+  const auto held = connections_.Read();
+  SqliteStatement select(
+      (*held).handle(),
+      "select f.sha256 from scene_file f join scene s on s.scene_id=f.scene_id where s.active=0 "
+      "except select f.sha256 from scene_file f join scene s on s.scene_id=f.scene_id where "
+      "s.active=1 except select sha256 from artifact except select sha256 from job_blob "
+      "except select checkpoint_sha256 from job where checkpoint_sha256 <> ''");
+  std::set<std::string> digests;
+  while (select.Step()) digests.insert(select.Text(0));
+  return digests;
+}
+
 bool SqliteJobStore::IsReferenced(const std::string& sha256) {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
@@ -186,6 +201,27 @@ std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobC
 
 std::vector<BlobCandidate> SqliteJobStore::AgedCandidates(int64_t grace_ms) {
   return CandidatesOf(*connections_.Read(), grace_ms);
+}
+
+// In steps whose log is short: on a disk that is nearly full there is no room for a long one.
+int64_t SqliteJobStore::GiveBackSpace(int64_t keep_bytes) {
+  constexpr int64_t kPagesAtOnce = 500;
+  const auto held = connections_.Write();
+  SqliteDatabase& db = *held;
+  const auto number = [&](const char* pragma) {
+    SqliteStatement select(db.handle(), pragma);
+    return select.Step() ? select.Int(0) : 0;
+  };
+  const int64_t page_bytes = number("pragma page_size");
+  const int64_t keep = keep_bytes / page_bytes;
+  int64_t free = number("pragma freelist_count");
+  for (int step = 0; step < 4 && free > keep; ++step) {
+    db.Run(fmt::format("pragma incremental_vacuum({})", std::min(kPagesAtOnce, free - keep)));
+    // The file is cut where its log is folded into it; whoever reads meanwhile delays that.
+    db.Run("pragma wal_checkpoint(passive)");
+    free = number("pragma freelist_count");
+  }
+  return free * page_bytes;
 }
 
 }  // namespace color3d

@@ -4,6 +4,8 @@
 #include <sqlite3.h>
 
 #include <atomic>
+#include <cerrno>
+#include <exception>
 
 #include "server/service_error.h"
 
@@ -36,6 +38,11 @@ std::atomic<int64_t> g_steps{0};
                          "{}; restore jobs.db from a backup or start with a fresh --data-dir",
                          text);
     default:
+      // The log's index says of a full disk that it cannot grow.
+      if (db != nullptr && (sqlite3_system_errno(db) == ENOSPC || code == SQLITE_IOERR_SHMSIZE)) {
+        throw ServiceError(
+            ErrorCode::kResourceExhausted, "STORAGE_FULL", "{}; free some disk space", text);
+      }
       throw ServiceError(ErrorCode::kInternal, "STORE_ERROR", text);
   }
 }
@@ -111,6 +118,9 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
     // Files for large statements would lie where a worker that is locked in may not write.
     Exec("pragma temp_store=MEMORY");
     if (writes) {
+      // Of a fresh file, and of one that is vacuumed: GiveBackSpace can make it shorter.
+      Exec("pragma auto_vacuum=INCREMENTAL");
+      Exec("pragma journal_size_limit=4194304");
       Exec("pragma journal_mode=WAL");
       Exec("pragma synchronous=FULL");
       Exec("pragma foreign_keys=ON");
@@ -132,6 +142,22 @@ void SqliteDatabase::SetBusyTimeout(std::chrono::milliseconds timeout) {
 void SqliteDatabase::Exec(const char* sql) {
   const int code = sqlite3_exec(db_, sql, nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) ThrowSqlite(db_, code, fmt::format("cannot run '{}'", sql));
+}
+
+void SqliteDatabase::BuildAnew(const std::filesystem::path& temporary) {
+  char* const before = sqlite3_temp_directory;
+  sqlite3_temp_directory = sqlite3_mprintf("%s", temporary.c_str());
+  Exec("pragma temp_store=FILE");
+  std::exception_ptr failed;
+  try {
+    Exec("vacuum");
+  } catch (const Error&) {
+    failed = std::current_exception();
+  }
+  Exec("pragma temp_store=MEMORY");
+  sqlite3_free(sqlite3_temp_directory);
+  sqlite3_temp_directory = before;
+  if (failed) std::rethrow_exception(failed);
 }
 
 int64_t SqliteDatabase::Steps() { return g_steps; }

@@ -275,10 +275,11 @@ void SqliteJobStore::Publish(const Lease& lease, const Publication& publication)
       lease.job_id);
   StoreUsage(db, lease.job_id, publication.usage);
   db.Run(
-      "update job set stage_key=?, cached=?, checkpoint_sha256='', checkpoint_bytes=0 "
-      "where job_id=?",
+      "update job set stage_key=?, cached=?, checkpoint_sha256='', checkpoint_bytes=0, "
+      "row_bytes=row_bytes+? where job_id=?",
       publication.stage_key,
       publication.cached,
+      kArtifactRowBytes * static_cast<int64_t>(publication.artifacts.size()),
       lease.job_id);
   FinishAttempt(db, lease, "SUCCEEDED");
   SetState(db, lease.job_id, JobState::kSucceeded);

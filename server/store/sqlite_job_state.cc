@@ -177,6 +177,7 @@ void SqliteJobStore::InsertJob(SqliteDatabase& db,
   record.skipped_by_plan = skipped;
   record.create_ms = Now();
   if (skipped) record.end_ms = record.create_ms;
+  record.row_bytes = RowBytes(record, job.inputs.size() + job.input_jobs.size(), job.blobs.size());
   const int64_t id = InsertJobRow(db, record);
   ids->push_back(id);
   std::set<int64_t> inputs;
@@ -257,6 +258,11 @@ JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& requ
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   // The submitted job first: its children then find it finished and leave it alone.
   const std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
+  const auto is_left_alone = [](const JobRecord& job) {
+    return IsFinished(job.state) || job.cancel_requested;
+  };
+  // Asked again it changes nothing either: nothing is written down.
+  if (std::ranges::all_of(graph, is_left_alone)) return graph.back();
   for (auto it = graph.rbegin(); it != graph.rend(); ++it) {
     const JobRecord job = JobById(db, it->id);
     if (IsFinished(job.state) || job.cancel_requested) continue;

@@ -141,13 +141,13 @@ TEST_F(SqliteJobStateTest, QueueLimitCountsWholeGraphs) {
   graph.jobs = {Job("a"), Job("b", {0})};
   store_->CreateGraph(graph, {}, 3);
   EXPECT_EQ(ReasonThrown([&] { store_->CreateGraph(graph, {}, 3); }), "QUEUE_FULL");
-  EXPECT_EQ(store_->ListJobs({}, 0, 100).size(), 2u) << "all of a graph or nothing";
+  EXPECT_EQ(store_->ListJobs({}, 0, 100, {}).size(), 2u) << "all of a graph or nothing";
 }
 
 TEST_F(SqliteJobStateTest, GraphOfAnInactiveSceneIsRefused) {
   SceneRecord scene;
   scene.name = "scenes/open";
-  store_->CreateScene(scene, {});
+  store_->CreateScene(scene, {}, {});
   NewGraph graph;
   graph.scene = "scenes/open";
   graph.jobs = {Job("a")};
@@ -159,7 +159,7 @@ TEST_F(SqliteJobStateTest, GraphOfAnInactiveSceneIsRefused) {
 TEST_F(SqliteJobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   SceneRecord scene;
   scene.name = "scenes/other";
-  store_->CreateScene(scene, {});
+  store_->CreateScene(scene, {}, {});
   NewGraph graph = PersonalizeJobs(2);
   graph.jobs[1].scene = "scenes/other";
   EXPECT_EQ(ReasonThrown([&] { store_->CreateGraph(graph, {}, kNoLimit); }), "SCENE_NOT_ACTIVE");

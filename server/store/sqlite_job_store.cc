@@ -31,6 +31,14 @@ SqliteJobStore::SqliteJobStore(const std::filesystem::path& file,
 
 SqliteJobStore::~SqliteJobStore() = default;
 
+namespace {
+
+ServiceError NoSuchJob(const std::string& name) {
+  return ServiceError(ErrorCode::kNotFound, "JOB_NOT_FOUND", "there is no job '{}'", name);
+}
+
+}  // namespace
+
 std::optional<JobRecord> SqliteJobStore::FindJob(SqliteDatabase& db, const std::string& name) {
   SqliteStatement select(db.handle(), SelectJob("where name=?"));
   select.Bind(name);
@@ -42,9 +50,7 @@ std::optional<JobRecord> SqliteJobStore::FindJob(SqliteDatabase& db, const std::
 
 JobRecord SqliteJobStore::RequireJob(SqliteDatabase& db, const std::string& name) {
   std::optional<JobRecord> job = FindJob(db, name);
-  if (!job) {
-    throw ServiceError(ErrorCode::kNotFound, "JOB_NOT_FOUND", "there is no job '{}'", name);
-  }
+  if (!job) throw NoSuchJob(name);
   return *std::move(job);
 }
 
@@ -71,10 +77,18 @@ std::vector<ArtifactRecord> SqliteJobStore::LoadArtifacts(SqliteDatabase& db, in
   return artifacts;
 }
 
-std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteDatabase& db, SqliteStatement& select) {
+std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteDatabase& db,
+                                                SqliteStatement& select,
+                                                const ListBudget& budget) {
   std::vector<JobRecord> jobs;
-  while (select.Step()) jobs.push_back(JobFromRow(select));
-  for (JobRecord& job : jobs) job.artifacts = LoadArtifacts(db, job.id);
+  int64_t bytes = 0;
+  while (bytes < budget.bytes && select.Step()) {
+    JobRecord job = JobFromRow(select);
+    if (static_cast<int64_t>(job.spec.size()) > budget.spec_bytes) job.spec = {};
+    job.artifacts = LoadArtifacts(db, job.id);
+    bytes += MemoryBytes(job);
+    jobs.push_back(std::move(job));
+  }
   return jobs;
 }
 
@@ -95,7 +109,8 @@ JobRecord SqliteJobStore::GetJob(const std::string& name) {
 
 std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
                                                 int64_t before_id,
-                                                int limit) {
+                                                int limit,
+                                                const ListBudget& budget) {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
   std::string tail = "where job_id < ?";
@@ -110,7 +125,7 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
   if (!filter.scene.empty()) select.Bind(filter.scene);
   if (filter.project) select.Bind(*filter.project);
   select.Bind(limit);
-  return ReadJobs(db, select);
+  return ReadJobs(db, select, budget);
 }
 
 std::vector<JobRecord> SqliteJobStore::ListChildren(const std::string& name) {
@@ -234,10 +249,28 @@ JobsSnapshot SqliteJobStore::Snapshot(const std::vector<int64_t>& job_ids) {
   JobsSnapshot snapshot;
   SqliteStatement sequence(db.handle(), "select seq from sqlite_sequence where name='job_event'");
   if (sequence.Step()) snapshot.revision = sequence.Int(0);
-  SqliteStatement select(db.handle(),
-                         SelectJob("where job_id in (" + JoinIds(job_ids) + ") order by revision"));
-  snapshot.jobs = ReadJobs(db, select);
+  SqliteStatement select(
+      db.handle(),
+      SelectJobWithoutSpec("where job_id in (" + JoinIds(job_ids) + ") order by revision"));
+  while (select.Step()) snapshot.jobs.push_back(JobFromRow(select));
   return snapshot;
+}
+
+LoadedJobs SqliteJobStore::LoadJobs(const std::vector<int64_t>& job_ids,
+                                    const ListBudget& budget) {
+  const auto held = connections_.Read();
+  SqliteDatabase& db = *held;
+  LoadedJobs loaded;
+  int64_t bytes = 0;
+  for (; loaded.looked_for < job_ids.size() && bytes < budget.bytes; ++loaded.looked_for) {
+    SqliteStatement select(db.handle(), SelectJob("where job_id=?"));
+    select.Bind(job_ids[loaded.looked_for]);
+    for (JobRecord& job : ReadJobs(db, select, budget)) {
+      bytes += MemoryBytes(job);
+      loaded.jobs.push_back(std::move(job));
+    }
+  }
+  return loaded;
 }
 
 std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>& names) {
@@ -245,7 +278,12 @@ std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>
   SqliteDatabase& db = *held;
   std::set<int64_t> ids;
   for (const std::string& name : names) {
-    for (const JobRecord& job : GraphOf(db, RequireJob(db, name))) ids.insert(job.id);
+    SqliteStatement select(db.handle(), "select job_id from job where name=?1 or parent=?1");
+    select.Bind(name);
+    if (!select.Step()) throw NoSuchJob(name);
+    do {
+      ids.insert(select.Int(0));
+    } while (select.Step());
   }
   return {ids.begin(), ids.end()};
 }

@@ -32,7 +32,9 @@ class SqliteJobStore : public JobStore {
                  StoreOptions options = {});
   ~SqliteJobStore() override;
 
-  SceneRecord CreateScene(const SceneRecord& record, const RequestKey& request) override;
+  SceneRecord CreateScene(const SceneRecord& record,
+                          const RequestKey& request,
+                          const SceneLimits& limits) override;
   SceneRecord GetScene(const std::string& name) override;
   std::vector<SceneRecord> ListScenes(const std::optional<std::string>& project,
                                       int64_t before_id,
@@ -51,7 +53,10 @@ class SqliteJobStore : public JobStore {
                         const QueueLimits& limits) override;
   std::optional<std::string> FindRequest(const RequestKey& request) override;
   JobRecord GetJob(const std::string& name) override;
-  std::vector<JobRecord> ListJobs(const JobFilter& filter, int64_t before_id, int limit) override;
+  std::vector<JobRecord> ListJobs(const JobFilter& filter,
+                                  int64_t before_id,
+                                  int limit,
+                                  const ListBudget& budget) override;
   std::vector<JobRecord> ListChildren(const std::string& name) override;
   JobRecord Cancel(const std::string& name, const RequestKey& request) override;
   JobRecord Retry(const std::string& name,
@@ -97,6 +102,7 @@ class SqliteJobStore : public JobStore {
                                        int limit) override;
   bool AllFinished(const std::vector<int64_t>& job_ids) override;
   JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) override;
+  LoadedJobs LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) override;
   std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) override;
 
   std::vector<ProjectRecord> ListProjects() override;
@@ -106,9 +112,9 @@ class SqliteJobStore : public JobStore {
                                   const std::vector<std::string>& sha256) override;
   void ForgetBlob(const std::string& sha256) override;
 
-  std::vector<Notification> DueNotifications(int limit) override;
-  void EndNotification(int64_t job_id) override;
-  void DelayNotification(int64_t job_id, int64_t pause_ms) override;
+  std::vector<Notification> DueNotifications(int of_each_receiver) override;
+  void EndNotification(int64_t job_id, int64_t first_ms) override;
+  void DelayNotification(int64_t job_id, int64_t first_ms, int64_t pause_ms) override;
 
   void SetHold(Hold hold, bool on) override;
   std::set<Hold> Holds() override;
@@ -120,14 +126,18 @@ class SqliteJobStore : public JobStore {
   ColorizerRecord GetColorizer(const std::optional<std::string>& project,
                                const std::string& sha256) override;
   std::vector<std::string> AgeExpired(int64_t ended_before_ms, int64_t grace_ms) override;
-  std::vector<std::string> AgeUnusedScenes(int64_t before_ms, int64_t grace_ms) override;
+  std::vector<std::string> AgeUnusedScenes(int64_t before_ms,
+                                           int64_t uncommitted_before_ms,
+                                           int64_t grace_ms) override;
   void Compact(int64_t events_before_ms, int64_t requests_before_ms) override;
   std::set<std::string> ReferencedBlobs() override;
+  std::set<std::string> AwaitedBlobs() override;
   bool IsReferenced(const std::string& sha256) override;
   std::vector<BlobCandidate> AgeCandidates(const std::vector<BlobCandidate>& unnamed,
                                            int64_t grace_ms) override;
   std::vector<BlobCandidate> AgedCandidates(int64_t grace_ms) override;
   int64_t RunningEpoch(const std::string& job_name) override;
+  int64_t GiveBackSpace(int64_t keep_bytes) override;
 
  private:
   // Reading (sqlite_job_store.cc).
@@ -135,8 +145,10 @@ class SqliteJobStore : public JobStore {
   JobRecord RequireJob(SqliteDatabase& db, const std::string& name);
   JobRecord JobById(SqliteDatabase& db, int64_t job_id);
   std::vector<ArtifactRecord> LoadArtifacts(SqliteDatabase& db, int64_t job_id);
-  // All rows of a SelectJob statement, with artifacts.
-  std::vector<JobRecord> ReadJobs(SqliteDatabase& db, SqliteStatement& select);
+  // The rows of a SelectJob statement, with artifacts, as far as the budget goes.
+  std::vector<JobRecord> ReadJobs(SqliteDatabase& db,
+                                  SqliteStatement& select,
+                                  const ListBudget& budget = {});
   std::vector<JobRecord> GraphOf(SqliteDatabase& db, const JobRecord& root);
   SceneRecord RequireScene(SqliteDatabase& db, const std::string& name, bool with_files);
 
@@ -180,6 +192,10 @@ class SqliteJobStore : public JobStore {
                    const std::string& project,
                    int64_t jobs,
                    const QueueLimits& limits);
+  // Throws QUOTA_EXCEEDED.
+  void RequireRoomForScene(SqliteDatabase& db,
+                           const std::string& project,
+                           const SceneLimits& limits);
   void ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch);
   void StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsage& usage);
   // Steady time since the last call of this name; 0 at the first one after a start of the machine.

@@ -13,7 +13,7 @@ TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
   const RequestKey key{"CreateJob", "id-1", "body-1"};
   const JobRecord first = CreateDiamond(key);
   EXPECT_EQ(CreateDiamond(key).name, first.name);
-  EXPECT_EQ(store_->ListJobs({}, 0, 100).size(), 4u);
+  EXPECT_EQ(store_->ListJobs({}, 0, 100, {}).size(), 4u);
   EXPECT_EQ(ReasonThrown([&] {
               CreateDiamond({"CreateJob", "id-1", "other body"});
             }),
@@ -44,7 +44,7 @@ TEST_F(SqliteJobStoreTest, EqualRequestsAtOnceMakeOneJob) {
   }
   for (std::thread& thread : threads) thread.join();
   for (const std::string& name : names) EXPECT_EQ(name, names[0]);
-  EXPECT_EQ(store_->ListJobs({}, 0, 100).size(), 1u);
+  EXPECT_EQ(store_->ListJobs({}, 0, 100, {}).size(), 1u);
 }
 
 TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
@@ -145,7 +145,7 @@ TEST_F(SqliteJobStoreTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
   store_->Delete(root.name, {"DeleteJob", "d", "b"});
   EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "JOB_NOT_FOUND");
   EXPECT_EQ(store_->ReferencedBlobs().count(digest), 0u);
-  EXPECT_EQ(store_->ListJobs({}, 0, 10).size(), 1u);
+  EXPECT_EQ(store_->ListJobs({}, 0, 10, {}).size(), 1u);
   store_->DeleteScene("scenes/test", {});
   EXPECT_EQ(ReasonThrown([&] { store_->GetScene("scenes/test"); }), "SCENE_NOT_FOUND");
 }
@@ -153,14 +153,33 @@ TEST_F(SqliteJobStoreTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
 TEST_F(SqliteJobStoreTest, ListsArePagedNewestFirst) {
   const JobRecord root = CreateDiamond();
   CreateSingle();
-  const auto first = store_->ListJobs({}, 0, 3);
+  const auto first = store_->ListJobs({}, 0, 3, {});
   ASSERT_EQ(first.size(), 3u);
-  const auto rest = store_->ListJobs({}, first.back().id, 3);
+  const auto rest = store_->ListJobs({}, first.back().id, 3, {});
   ASSERT_EQ(rest.size(), 2u);
   EXPECT_GT(first.back().id, rest.front().id);
-  EXPECT_EQ(store_->ListJobs({root.name, ""}, 0, 10).size(), 3u);
-  EXPECT_EQ(store_->ListJobs({"", "scenes/test"}, 0, 10).size(), 5u);
-  EXPECT_TRUE(store_->ListJobs({"", "scenes/other"}, 0, 10).empty());
+  EXPECT_EQ(store_->ListJobs({root.name, ""}, 0, 10, {}).size(), 3u);
+  EXPECT_EQ(store_->ListJobs({"", "scenes/test"}, 0, 10, {}).size(), 5u);
+  EXPECT_TRUE(store_->ListJobs({"", "scenes/other"}, 0, 10, {}).empty());
+}
+
+TEST_F(SqliteJobStoreTest, ListsKeepToTheirBudgetAlsoWithLongRowsOfOlderReleases) {
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  graph.jobs = {Job("a")};
+  graph.jobs[0].spec = std::string(5 << 20, 's');
+  std::vector<int64_t> ids;
+  for (int i = 0; i < 3; ++i) ids.push_back(store_->CreateGraph(graph, {}, kNoLimit).id);
+  EXPECT_EQ(store_->ListJobs({}, 0, 10, {6 << 20, INT64_MAX}).size(), 2u);
+  const auto without = store_->ListJobs({}, 0, 10, {6 << 20, 1 << 16});
+  ASSERT_EQ(without.size(), 3u);
+  EXPECT_TRUE(without[0].spec.empty());
+  const LoadedJobs loaded = store_->LoadJobs(ids, {1, INT64_MAX});
+  EXPECT_EQ(loaded.looked_for, 1u);
+  ASSERT_EQ(loaded.jobs.size(), 1u);
+  EXPECT_EQ(loaded.jobs[0].spec.size(), size_t{5} << 20);
+  EXPECT_EQ(store_->LoadJobs({ids[0] + 1000, ids[1]}, {1, INT64_MAX}).looked_for, 2u);
+  for (const JobRecord& job : store_->Snapshot(ids).jobs) EXPECT_TRUE(job.spec.empty());
 }
 
 }  // namespace

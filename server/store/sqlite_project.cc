@@ -11,11 +11,11 @@ namespace {
 const char* NameOf(Hold hold) { return hold == Hold::kPaused ? "hold_paused" : "hold_storage"; }
 
 constexpr char kProject[] =
-    "select name, bytes, (select count(*) from job where end_ms=0 and +job.project=project.name) "
-    "from project ";
+    "select name, bytes, (select count(*) from job where end_ms=0 and "
+    "+job.project=project.name), row_bytes, scenes, uncommitted from project ";
 
 ProjectRecord ProjectFromRow(const SqliteStatement& row) {
-  return {row.Text(0), row.Int(1), row.Int(2)};
+  return {row.Text(0), row.Int(1), row.Int(2), row.Int(3), row.Int(4), row.Int(5)};
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ ProjectRecord SqliteJobStore::GetProject(const std::string& name) {
   const auto held = connections_.Read();
   SqliteStatement select((*held).handle(), std::string(kProject) + "where name=?");
   select.Bind(name);
-  return select.Step() ? ProjectFromRow(select) : ProjectRecord{name, 0, 0};
+  return select.Step() ? ProjectFromRow(select) : ProjectRecord{name};
 }
 
 void SqliteJobStore::HoldBlob(const std::string& project, const FileDigest& blob) {
@@ -171,18 +171,24 @@ std::vector<std::string> SqliteJobStore::AgeExpired(int64_t ended_before_ms, int
   return due;
 }
 
-std::vector<std::string> SqliteJobStore::AgeUnusedScenes(int64_t before_ms, int64_t grace_ms) {
+std::vector<std::string> SqliteJobStore::AgeUnusedScenes(int64_t before_ms,
+                                                         int64_t uncommitted_before_ms,
+                                                         int64_t grace_ms) {
+  // Jobs are of scenes that are committed.
   constexpr char kUnused[] =
-      "(max(create_ms, commit_ms)<? and not exists(select 1 from job where job.scene=scene.name))";
+      "((active=0 and create_ms<?2) or (max(create_ms, commit_ms)<?1 and not exists("
+      "select 1 from job where job.scene=scene.name)))";
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
   db.Run("update scene set unused_age_ms=unused_age_ms+? where unused_age_ms>=0",
          ElapsedSinceLast(db, "scenes_steady_ms"));
   db.Run(std::string("update scene set unused_age_ms=-1 where unused_age_ms>=0 and not ") + kUnused,
-         before_ms);
+         before_ms,
+         uncommitted_before_ms);
   db.Run(std::string("update scene set unused_age_ms=0 where unused_age_ms<0 and ") + kUnused,
-         before_ms);
+         before_ms,
+         uncommitted_before_ms);
   std::vector<std::string> due;
   {
     SqliteStatement select(
@@ -198,14 +204,17 @@ namespace {
 constexpr int64_t kLongestPauseMs = 3'600'000;  // and some more; further away: the clock was set
 }
 
-std::vector<Notification> SqliteJobStore::DueNotifications(int limit) {
+std::vector<Notification> SqliteJobStore::DueNotifications(int of_each_receiver) {
   const auto held = connections_.Read();
+  // A receiver is what stands before the address's third slash.
   SqliteStatement select(
       (*held).handle(),
-      "select n.job_id, job.name, n.url, n.tries, n.first_ms from notification n "
-      "join job on job.job_id=n.job_id where n.next_ms<=? or n.next_ms>? order by n.next_ms "
-      "limit ?");
-  select.Bind(Now(), Now() + kLongestPauseMs, limit);
+      "select n.job_id, job.name, n.url, n.tries, n.first_ms from (select *, row_number() over("
+      "partition by case instr(substr(url, 9), '/') when 0 then url else "
+      "substr(url, 1, instr(substr(url, 9), '/')+7) end order by next_ms, job_id) as place "
+      "from notification where next_ms<=? or next_ms>?) n join job on job.job_id=n.job_id "
+      "where n.place<=? order by n.next_ms, n.job_id");
+  select.Bind(Now(), Now() + kLongestPauseMs, of_each_receiver);
   std::vector<Notification> due;
   while (select.Step()) {
     due.push_back({select.Int(0),
@@ -217,20 +226,23 @@ std::vector<Notification> SqliteJobStore::DueNotifications(int limit) {
   return due;
 }
 
-void SqliteJobStore::EndNotification(int64_t job_id) {
+void SqliteJobStore::EndNotification(int64_t job_id, int64_t first_ms) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
-  db.Run("delete from notification where job_id=?", job_id);
+  db.Run("delete from notification where job_id=? and first_ms=?", job_id, first_ms);
   transaction.Commit();
 }
 
-void SqliteJobStore::DelayNotification(int64_t job_id, int64_t pause_ms) {
+void SqliteJobStore::DelayNotification(int64_t job_id, int64_t first_ms, int64_t pause_ms) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
   db.Run(
-      "update notification set tries=tries+1, next_ms=? where job_id=?", Now() + pause_ms, job_id);
+      "update notification set tries=tries+1, next_ms=? where job_id=? and first_ms=?",
+      Now() + pause_ms,
+      job_id,
+      first_ms);
   transaction.Commit();
 }
 

@@ -143,9 +143,11 @@ TEST_F(QueueTest, ScenesWithoutJobsGoInTwoPhases) {
   constexpr int64_t kGrace = 1000;
   SceneRecord abandoned;
   abandoned.name = "scenes/abandoned";  // never committed
-  store_->CreateScene(abandoned, {});
+  store_->CreateScene(abandoned, {}, {});
   CreateSingle();  // of scenes/test
-  const auto unused = [&](int64_t before) { return store_->AgeUnusedScenes(before, kGrace); };
+  const auto unused = [&](int64_t before) {
+    return store_->AgeUnusedScenes(before, INT64_MIN, kGrace);
+  };
   EXPECT_TRUE(unused(wall_ + (int64_t{1} << 40)).empty()) << "the clock jumped: noted only";
   now_ += kGrace;
   EXPECT_TRUE(unused(wall_).empty()) << "the clock was set right: forgotten";
@@ -154,6 +156,45 @@ TEST_F(QueueTest, ScenesWithoutJobsGoInTwoPhases) {
   EXPECT_TRUE(unused(wall_).empty());
   now_ += kGrace;
   EXPECT_EQ(unused(wall_), std::vector<std::string>{abandoned.name});
+}
+
+TEST_F(QueueTest, ScenesThatAreNeverCommittedGoEarlier) {
+  constexpr int64_t kGrace = 1000;
+  SceneRecord scene;
+  for (const char* name : {"scenes/abandoned", "scenes/young"}) {
+    scene.name = name;
+    store_->CreateScene(scene, {}, {});
+    wall_ += 10;
+  }
+  const auto unused = [&] { return store_->AgeUnusedScenes(INT64_MIN, wall_ - 10, kGrace); };
+  EXPECT_TRUE(unused().empty()) << "noted only";
+  now_ += kGrace;
+  EXPECT_EQ(unused(), std::vector<std::string>{"scenes/abandoned"})
+      << "not the one that is committed and has no job, nor the young one";
+  store_->ActivateScene("scenes/abandoned", StoredLayout::kPhotos, 1, {});
+  EXPECT_TRUE(unused().empty());
+}
+
+TEST_F(QueueTest, NoReceiverKeepsAnotherOut) {
+  const auto end = [&](const std::string& url) {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    graph.notify_url = url;
+    graph.jobs = {Job("single")};
+    store_->CreateGraph(graph, {}, kNoLimit);
+    FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
+    wall_ += 1;
+  };
+  for (int i = 0; i < 5; ++i) end("https://dead.example.org:8443/hook?" + std::to_string(i));
+  end("http://b.example.org");
+  end("https://good.example.org/hook");
+  std::vector<std::string> urls;
+  for (const Notification& due : store_->DueNotifications(2)) urls.push_back(due.url);
+  EXPECT_EQ(urls,
+            (std::vector<std::string>{"https://dead.example.org:8443/hook?0",
+                                      "https://dead.example.org:8443/hook?1",
+                                      "http://b.example.org",
+                                      "https://good.example.org/hook"}));
 }
 
 TEST_F(QueueTest, WordOfAnEndIsOwedUntilItIsDelivered) {
@@ -169,11 +210,11 @@ TEST_F(QueueTest, WordOfAnEndIsOwedUntilItIsDelivered) {
   const Notification due = store_->DueNotifications(10)[0];
   EXPECT_EQ(due.job, root.name);
   EXPECT_EQ(due.url, graph.notify_url);
-  store_->DelayNotification(due.job_id, 500);
+  store_->DelayNotification(due.job_id, due.first_ms, 500);
   EXPECT_TRUE(store_->DueNotifications(10).empty());
   wall_ += 500;
   EXPECT_EQ(store_->DueNotifications(10)[0].tries, 1);
-  store_->DelayNotification(due.job_id, 500);
+  store_->DelayNotification(due.job_id, due.first_ms, 500);
   wall_ -= int64_t{5} * 24 * 3600 * 1000;
   EXPECT_EQ(store_->DueNotifications(10).size(), 1u) << "a clock that is set back stalls nothing";
   wall_ += int64_t{5} * 24 * 3600 * 1000;
@@ -181,7 +222,10 @@ TEST_F(QueueTest, WordOfAnEndIsOwedUntilItIsDelivered) {
   EXPECT_TRUE(store_->DueNotifications(10).empty()) << "it has not ended";
   Succeed(ClaimOne());
   Succeed(ClaimOne());
-  store_->EndNotification(store_->DueNotifications(10).at(0).job_id);
+  store_->EndNotification(due.job_id, due.first_ms - 1);
+  const std::vector<Notification> owed = store_->DueNotifications(10);
+  ASSERT_EQ(owed.size(), 1u) << "word of another end is another word";
+  store_->EndNotification(owed[0].job_id, owed[0].first_ms);
   EXPECT_TRUE(store_->DueNotifications(10).empty());
 }
 

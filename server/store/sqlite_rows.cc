@@ -54,6 +54,7 @@ void VisitColumns(JobRecord& job, Visit&& visit) {
   visit("start_ms", job.start_ms);
   visit("end_ms", job.end_ms);
   visit("revision", job.revision);
+  visit("row_bytes", job.row_bytes);
   if (!error.reason.empty()) job.error = error;
   if (!checkpoint.sha256.empty()) job.checkpoint = checkpoint;
 }
@@ -70,6 +71,7 @@ void VisitColumns(SceneRecord& scene, Visit&& visit) {
   visit("create_ms", scene.create_ms);
   visit("commit_ms", scene.commit_ms);
   visit("key_color_job", scene.key_color_job);
+  visit("row_bytes", scene.row_bytes);
 }
 
 template <typename T>
@@ -139,6 +141,15 @@ int64_t InsertRow(SqliteDatabase& db, const char* table, Record record) {
 
 std::string SelectJob(const std::string& tail) {
   static const std::string columns = fmt::format("{}", fmt::join(ColumnNames<JobRecord>(), ", "));
+  return fmt::format("select {} from job {}", columns, tail);
+}
+
+std::string SelectJobWithoutSpec(const std::string& tail) {
+  static const std::string columns = [] {
+    std::vector<std::string> names = ColumnNames<JobRecord>();
+    std::ranges::replace(names, "spec", "''");
+    return fmt::format("{}", fmt::join(names, ", "));
+  }();
   return fmt::format("select {} from job {}", columns, tail);
 }
 

@@ -11,6 +11,8 @@ namespace color3d {
 
 // "select <columns> from job <tail>", and such a row as a record (without artifacts).
 std::string SelectJob(const std::string& tail);
+// The same with an empty spec.
+std::string SelectJobWithoutSpec(const std::string& tail);
 JobRecord JobFromRow(const SqliteStatement& row);
 // A new row with all of the record but its id; returns the id.
 int64_t InsertJobRow(SqliteDatabase& db, const JobRecord& job);

@@ -30,7 +30,34 @@ SceneRecord SqliteJobStore::RequireScene(SqliteDatabase& db,
   return scene;
 }
 
-SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record, const RequestKey& request) {
+void SqliteJobStore::RequireRoomForScene(SqliteDatabase& db,
+                                         const std::string& project,
+                                         const SceneLimits& limits) {
+  SqliteStatement select(db.handle(), "select scenes, uncommitted from project where name=?");
+  select.Bind(project);
+  if (!select.Step()) return;
+  const auto refuse = [&](const char* what, int64_t count, int64_t most, const char* remedy) {
+    throw ServiceError(
+        ErrorCode::kResourceExhausted,
+        "QUOTA_EXCEEDED",
+        fmt::format(
+            "your project has {} {}, at most {} are allowed; {}", count, what, most, remedy),
+        {{"project:" + project + " scenes", fmt::format("{} of {}", count, most)}});
+  };
+  if (select.Int(0) >= limits.all) {
+    refuse("scenes", select.Int(0), limits.all, "delete scenes that you need no more");
+  }
+  if (select.Int(1) >= limits.uncommitted) {
+    refuse("scenes that are not committed",
+           select.Int(1),
+           limits.uncommitted,
+           "commit or delete some of them");
+  }
+}
+
+SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record,
+                                        const RequestKey& request,
+                                        const SceneLimits& limits) {
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
@@ -43,14 +70,16 @@ SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record, const Request
                        "the scene '{}' exists; choose another scene_id",
                        PublicScene(record.name));
   }
+  RequireRoomForScene(db, record.project, limits);
   SceneRecord fresh;
+  fresh.row_bytes = RowBytes(record);
   fresh.name = record.name;
   fresh.project = record.project;
   fresh.display_name = record.display_name;
   fresh.create_ms = Now();
   const int64_t scene_id = InsertSceneRow(db, fresh);
   for (const SceneFileRecord& file : record.files) {
-    db.Run("insert into scene_file values(?,?,?,?)",
+    db.Run("insert into scene_file(scene_id, path, sha256, size_bytes) values(?,?,?,?)",
            scene_id,
            file.path,
            file.digest.sha256,

@@ -9,7 +9,7 @@ using SqliteSceneTest = JobStoreTest;
 TEST_F(SqliteSceneTest, OnlyAColoredKeyViewOfTheSceneIsAccepted) {
   SceneRecord other;
   other.name = "scenes/other";
-  store_->CreateScene(other, {});
+  store_->CreateScene(other, {}, {});
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("colorize_key_view")};

@@ -2,7 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
 #include <optional>
+#include <system_error>
 
 #include "core/base/files.h"
 #include "server/service_error.h"
@@ -13,6 +15,8 @@
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
+
+constexpr int64_t kSpareBytes = int64_t{16} << 20;
 
 // Nothing: the file has no tables.
 std::optional<int64_t> VersionOf(SqliteDatabase& db) {
@@ -50,6 +54,34 @@ void Migrate(SqliteDatabase& db) {
   db.Run("update schema_version set version=?", kSchemaVersion);
   transaction.Commit();
   spdlog::info("the job store was brought from version {} to {}", from, kSchemaVersion);
+}
+
+// A store of before version 6 keeps what deleted rows leave free, for ever. Building it anew takes
+// twice its length on the disk; where that is not free it is done at another start.
+void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
+  const auto number = [&](const char* pragma) {
+    SqliteStatement select(db.handle(), pragma);
+    return select.Step() ? select.Int(0) : 0;
+  };
+  if (number("pragma auto_vacuum") != 0) return;
+  const int64_t bytes = (number("pragma page_count") - number("pragma freelist_count")) *
+                        number("pragma page_size");
+  std::error_code error;
+  const auto free = static_cast<int64_t>(fs::space(file.parent_path(), error).available);
+  if (error || free < 2 * bytes + kSpareBytes) {
+    spdlog::warn(
+        "the job store cannot give back space yet: {} MiB must be free on its disk at a start, {} "
+        "are",
+        (2 * bytes + kSpareBytes) >> 20,
+        free >> 20);
+    return;
+  }
+  try {
+    db.BuildAnew(file.parent_path());
+    spdlog::info("the job store was built anew: it gives back space from now on");
+  } catch (const Error& e) {
+    spdlog::warn("the job store cannot give back space yet: {}", e.what());
+  }
 }
 
 void MakeTables(SqliteDatabase& db) {
@@ -117,6 +149,7 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
     KeepCopy(file, *version);
     Migrate(db);
   }
+  MakeShrinkable(file, db);
   SayWhoServes(db, identity);
 }
 

@@ -29,9 +29,21 @@ class StoreSchemaTest : public JobStoreTest {
   void MakeOld() {
     store_.reset();
     SqliteDatabase old(File(), SqliteAccess::kWrite);
-    for (const char* trigger : {"blob_held", "blob_let_go"}) {
-      old.Exec((std::string("drop trigger ") + trigger).c_str());
+    old.Exec("pragma auto_vacuum=NONE");
+    old.Exec("vacuum");
+    std::vector<std::string> triggers;
+    {
+      SqliteStatement all(old.handle(), "select name from sqlite_master where type='trigger'");
+      while (all.Step()) triggers.push_back(all.Text(0));
     }
+    for (const std::string& trigger : triggers) old.Exec(("drop trigger " + trigger).c_str());
+    old.Exec(
+        "drop index scene_file_blob; alter table scene_file rename to newer; create table "
+        "scene_file(scene_id integer not null references scene on delete cascade, path text not "
+        "null, sha256 text not null, size_bytes integer not null, primary key(scene_id, path)) "
+        "without rowid; create index scene_file_blob on scene_file(sha256); insert into scene_file "
+        "select scene_id, path, sha256, size_bytes from newer; drop table newer; alter table scene "
+        "drop column row_bytes; alter table job drop column row_bytes");
     for (const char* table : {"project", "blob_holding", "notification", "expiry_candidate"}) {
       old.Exec((std::string("drop table ") + table).c_str());
     }
@@ -75,6 +87,9 @@ TEST_F(StoreSchemaTest, TheServerBringsAnOldStoreUpToDateAndKeepsACopy) {
   const std::string result = store_->GetJob(done.name).artifacts[0].digest.sha256;
   EXPECT_EQ(store_->HeldBlobs("", {result}).size(), 1u) << "what was there can still be read";
   EXPECT_EQ(store_->GetProject("").stored_bytes, 4) << "a scene of 1 byte, a result of 3";
+  EXPECT_EQ(store_->GetProject("").scenes, 1);
+  EXPECT_GT(store_->GetProject("").row_bytes, 3 * 2048 + 512) << "three jobs and a scene";
+  EXPECT_EQ(store_->GetScene("scenes/test").files.at(0).path, "a.jpg");
   EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "");
   EXPECT_EQ(StateOf(running.name), JobState::kRunning);
   EXPECT_EQ(store_->ReapExpired(), 1) << "its lease was by another clock";
@@ -84,6 +99,39 @@ TEST_F(StoreSchemaTest, TheServerBringsAnOldStoreUpToDateAndKeepsACopy) {
   Open();  // nothing is left to be done
   EXPECT_FALSE(fs::exists(copy));
   EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 1u);
+}
+
+// Free pages of the database, and how long its file is once the log is folded into it.
+int64_t FreePages(const fs::path& file) {
+  SqliteDatabase db(file, SqliteAccess::kWrite);
+  db.Run("pragma wal_checkpoint(truncate)");
+  SqliteStatement free(db.handle(), "pragma freelist_count");
+  return free.Step() ? free.Int(0) : -1;
+}
+
+TEST_F(StoreSchemaTest, ADatabaseGivesBackWhatWasDeletedAlsoAnOldOne) {
+  for (const bool is_old : {false, true}) {
+    SceneRecord scene;
+    scene.name = "scenes/large";
+    for (int i = 0; i < 5000; ++i) {
+      scene.files.push_back({std::string(970, 'x') + std::to_string(i), {Sha256Hex("a"), 1}});
+    }
+    store_->CreateScene(scene, {}, {});
+    if (is_old) {
+      MakeOld();
+      Open();
+    }
+    EXPECT_EQ(FreePages(File()), 0) << "it was built anew";
+    const auto before = static_cast<int64_t>(fs::file_size(File()));
+    EXPECT_LT(before, 10 << 20) << "not much more than its paths";
+    store_->DeleteScene(scene.name, {});
+    EXPECT_GT(FreePages(File()), 1000);
+    int64_t left = 1;
+    for (int i = 0; i < 10 && left > 0; ++i) left = store_->GiveBackSpace(0);
+    EXPECT_EQ(left, 0);
+    EXPECT_EQ(FreePages(File()), 0);
+    EXPECT_LT(static_cast<int64_t>(fs::file_size(File())), before - (4 << 20));
+  }
 }
 
 TEST_F(StoreSchemaTest, AWorkerChangesNothing) {
@@ -159,7 +207,7 @@ TEST_F(StoreSchemaTest, ReadsDoNotWaitForAWriter) {
   frozen.Exec("update job set priority=7");
   const auto start = std::chrono::steady_clock::now();
   EXPECT_EQ(store_->GetJob(job.name).priority, 100);
-  EXPECT_EQ(store_->ListJobs({}, 0, 10).size(), 1u);
+  EXPECT_EQ(store_->ListJobs({}, 0, 10, {}).size(), 1u);
   EXPECT_EQ(store_->CountJobs().queued, 1);
   // ... nor do they wait for a thread of ours that waits for it (its time-out is 10 s).
   std::thread writer([&] { ReasonThrown([&] { store_->Cancel(job.name, {}); }); });
@@ -217,9 +265,9 @@ class StoreCostTest : public JobStoreTest {
     Publication publication;
     publication.artifacts = {{"colorizer.c3c", {Sha256Hex(NewId()), 3}, "text/plain"}};
     count("publish", [&] { store_->Publish(LeaseOf(job), publication); });
-    count("a scene's jobs", [&] { mine.ListJobs({"", "scenes/now"}, 0, 5); });
-    count("a job's children", [&] { mine.ListJobs({root.name, ""}, 0, 5); });
-    count("all jobs", [&] { mine.ListJobs({}, 0, 5); });
+    count("a scene's jobs", [&] { mine.ListJobs({"", "scenes/now"}, 0, 5, {}); });
+    count("a job's children", [&] { mine.ListJobs({root.name, ""}, 0, 5, {}); });
+    count("all jobs", [&] { mine.ListJobs({}, 0, 5, {}); });
     count("children", [&] { mine.ListChildren(root.name); });
     count("snapshot", [&] { mine.Snapshot(mine.ResolveWatch({root.name})); });
     count("events", [&] { store_->EventsSince(store_->NewestRevision() - 3, 100); });
@@ -241,7 +289,7 @@ TEST_F(StoreCostTest, CostDoesNotGrowWithHistory) {
   for (const char* scene : {"scenes/past", "scenes/now"}) {
     SceneRecord record;
     record.name = scene;
-    Mine().CreateScene(record, {});
+    Mine().CreateScene(record, {}, {});
     Mine().ActivateScene(scene, StoredLayout::kPhotos, 1, {});
   }
   AddHistory(40);

@@ -45,21 +45,37 @@ bool BlobCheckpoints::LoadTo(const std::filesystem::path& file) {
 
 bool BlobCheckpoints::WantsSave() { return pace_.IsDue(std::chrono::steady_clock::now()); }
 
-void BlobCheckpoints::Save(const std::string& state) { Name(blobs_.PutBytes(state)); }
-
-void BlobCheckpoints::SaveFile(const std::filesystem::path& file) { Name(blobs_.PutFile(file)); }
-
-void BlobCheckpoints::Name(const FileDigest& digest) {
-  const std::optional<FileDigest> before = store_.SetCheckpoint(lease_, digest);
-  newest_ = digest;
-  pace_.OnSaved(std::chrono::steady_clock::now());
-  if (before && before->sha256 != digest.sha256 && !store_.IsReferenced(before->sha256)) {
-    blobs_.Remove(before->sha256);
-  }
+void BlobCheckpoints::Save(const std::string& state) {
+  Replace({Sha256Hex(state), static_cast<int64_t>(state.size())},
+          [&] { blobs_.PutBytes(state); });
 }
 
+void BlobCheckpoints::SaveFile(const std::filesystem::path& file) {
+  const FileDigest digest = DigestFile(file);
+  Replace(digest, [&] { blobs_.Adopt(file, digest); });
+}
+
+void BlobCheckpoints::Replace(const FileDigest& digest, const std::function<void()>& put) {
+  const std::optional<StoredBlob> there = blobs_.Look(digest.sha256);
+  const bool is_ours = !there || (own_ && own_->digest.sha256 == digest.sha256 &&
+                                  own_->touched_ns == there->touched_ns);
+  put();
+  const std::optional<StoredBlob> stored = is_ours ? blobs_.Look(digest.sha256) : std::nullopt;
+  store_.SetCheckpoint(lease_, digest);
+  if (own_ && own_->digest.sha256 != digest.sha256) RemoveOwn(*own_);
+  newest_ = digest;
+  own_ = stored;
+  pace_.OnSaved(std::chrono::steady_clock::now());
+}
+
+void BlobCheckpoints::RemoveOwn(const StoredBlob& blob) {
+  if (!store_.IsReferenced(blob.digest.sha256)) blobs_.RemoveIfUntouched(blob);
+}
+
+// One that an earlier attempt stored goes with the sweep.
 void BlobCheckpoints::RemoveNewest() {
-  if (newest_ && !store_.IsReferenced(newest_->sha256)) blobs_.Remove(newest_->sha256);
+  if (own_) RemoveOwn(*own_);
+  own_.reset();
 }
 
 }  // namespace color3d

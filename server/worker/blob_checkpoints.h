@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -30,8 +31,11 @@ class BlobCheckpoints : public CheckpointStore {
 
  private:
   std::optional<std::filesystem::path> Newest();
-  // A blob that was just put becomes the checkpoint.
-  void Name(const FileDigest& digest);
+  // Puts the blob and makes it the checkpoint.
+  void Replace(const FileDigest& digest, const std::function<void()>& put);
+  // Removes what this attempt has stored, unless somebody else counts on the same bytes: he may
+  // name them at any time.
+  void RemoveOwn(const StoredBlob& blob);
 
   JobStore& store_;
   BlobStore& blobs_;
@@ -39,6 +43,8 @@ class BlobCheckpoints : public CheckpointStore {
   const std::string tag_;  // of log lines
   CheckpointPace pace_;
   std::optional<FileDigest> newest_;
+  // The newest as it was stored, where nobody had stored its bytes before.
+  std::optional<StoredBlob> own_;
 };
 
 }  // namespace color3d

@@ -117,7 +117,7 @@ class World {
     SceneRecord scene;
     scene.name = kScene;
     scene.files = {{"a.jpg", name.digest}};
-    store_.CreateScene(scene, {});
+    store_.CreateScene(scene, {}, {});
     store_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
   }
 
@@ -160,7 +160,9 @@ class World {
   }
 
   // By what has become of them, with their children.
-  std::vector<JobRecord> Jobs() { return store_.Snapshot(store_.ResolveWatch(roots_)).jobs; }
+  std::vector<JobRecord> Jobs() { 
+    return store_.LoadJobs(store_.ResolveWatch(roots_), {}).jobs;
+  }
 
   // What must hold whatever has failed.
   void CheckWhole() {
@@ -304,7 +306,7 @@ TEST(FaultInjectionTest, EveryCallIsPartOfTheLife) {
                   {"Adopt",        "Claim",        "ClaimForBatch", "Fail",         "Fetch",
                    "FindStage",    "GetInputs",    "GetScene",      "IsReferenced", "JoinEqual",
                    "ListChildren", "Publish",      "PutBytes",      "PutFile",      "Release",
-                   "Remove",       "RemoveWorker", "RequireSpace",  "Reserve",      "SetCheckpoint",
+                   "Look",         "RemoveIfUntouched", "RemoveWorker", "RequireSpace", "Reserve", "SetCheckpoint",
                    "Touch",        "UpdateWorker"}));
 }
 

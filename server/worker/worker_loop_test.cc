@@ -70,7 +70,7 @@ class WorkerLoopTest : public testing::Test {
   WorkerLoopTest() : store_(StoreIn(folder_.path()), StoreRole::kServer, SystemClocks()) {
     SceneRecord scene;
     scene.name = "scenes/test";
-    store_.CreateScene(scene, {});
+    store_.CreateScene(scene, {}, {});
     store_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
     options_.data_folder = folder_.path();
     options_.code_version = "test";

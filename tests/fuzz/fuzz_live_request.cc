@@ -55,7 +55,7 @@ struct Fixture {
     scene.name = kScene;
     scene.files = {{"a.png", picture}};
     store.HoldBlob("", picture);
-    store.CreateScene(scene, {});
+    store.CreateScene(scene, {}, {});
     store.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
     v1::JobSpec spec;
     spec.set_scene(kScene);

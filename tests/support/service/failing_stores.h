@@ -156,8 +156,11 @@ class FailingBlobs : public FileBlobStore {
   void Adopt(const std::filesystem::path& file, const FileDigest& digest) override {
     faults_.Around("Adopt", [&] { FileBlobStore::Adopt(file, digest); });
   }
-  void Remove(const std::string& sha256) override {
-    faults_.Around("Remove", [&] { FileBlobStore::Remove(sha256); });
+  std::optional<StoredBlob> Look(const std::string& sha256) const override {
+    return faults_.Around("Look", [&] { return FileBlobStore::Look(sha256); });
+  }
+  bool RemoveIfUntouched(const StoredBlob& blob) override {
+    return faults_.Around("RemoveIfUntouched", [&] { return FileBlobStore::RemoveIfUntouched(blob); });
   }
   void RequireSpace(int64_t bytes) const override {
     faults_.Around("RequireSpace", [&] { FileBlobStore::RequireSpace(bytes); });

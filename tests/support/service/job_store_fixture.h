@@ -27,7 +27,7 @@ class JobStoreTest : public ::testing::Test {
     SceneRecord scene;
     scene.name = "scenes/test";
     scene.files = {{"a.jpg", {Sha256Hex("a"), 1}}};
-    store_->CreateScene(scene, {});
+    store_->CreateScene(scene, {}, {});
     store_->ActivateScene("scenes/test", StoredLayout::kPhotos, 1, {});
   }
   void Open() {
