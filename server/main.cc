@@ -106,8 +106,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
                    "What one project may have stored, files and rows, GiB; 0: no limit of its own")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  serve
-      ->add_option("--project-scenes", options->project_scenes, "Scenes that one project may have")
+  serve->add_option("--project-scenes", options->project_scenes, "Scenes that one project may have")
       ->check(CLI::Range(1, 10'000'000))
       ->capture_default_str();
   serve
@@ -181,8 +180,9 @@ int SayWhatLacks(const CopiedBlobs& copied, const std::filesystem::path& from) {
   }
   if (copied.IsWhole()) return 0;
   if (!copied.unreadable.empty()) {
-    std::cout << "change the owner or rights of what is unreadable, or look after the disk, and copy "
-                 "again\n";
+    std::cout
+        << "change the owner or rights of what is unreadable, or look after the disk, and copy "
+           "again\n";
   }
   if (copied.missing.empty() && copied.damaged.empty()) return 1;
   std::cout << fmt::format(
@@ -196,15 +196,15 @@ int SayWhatLacks(const CopiedBlobs& copied, const std::filesystem::path& from) {
 
 int RunBackUp(const KeepingArguments& arguments) {
   const CopiedBlobs copied = BackUp(arguments.data_folder, arguments.copy);
-  std::cout << fmt::format("{}: {} blobs copied ({} MiB), {} were there and are good{}\n",
-                           arguments.copy.string(),
-                           copied.copied,
-                           copied.bytes >> 20,
-                           copied.kept,
-                           copied.mended > 0
-                               ? fmt::format("; {} that were damaged there are copied again",
-                                             copied.mended)
-                               : "");
+  std::cout << fmt::format(
+      "{}: {} blobs copied ({} MiB), {} were there and are good{}\n",
+      arguments.copy.string(),
+      copied.copied,
+      copied.bytes >> 20,
+      copied.kept,
+      copied.mended > 0
+          ? fmt::format("; {} that were damaged there are copied again", copied.mended)
+          : "");
   return SayWhatLacks(copied, arguments.data_folder);
 }
 

@@ -148,9 +148,10 @@ std::chrono::milliseconds Maintenance::Sweep() {
     for (size_t i = 0; i < std::min(kTold, unreadable.size()); ++i) {
       spdlog::error("the sweep cannot read {}", unreadable[i]);
     }
-    spdlog::error("the sweep passed over {} places that it cannot read and is tried again soon; "
-                  "change their owner or rights, or look after the disk",
-                  unreadable.size());
+    spdlog::error(
+        "the sweep passed over {} places that it cannot read and is tried again soon; "
+        "change their owner or rights, or look after the disk",
+        unreadable.size());
   } catch (const std::exception& e) {
     ++counts_.sweeps_failed;
     spdlog::error("the sweep failed and is tried again soon: {}", e.what());
@@ -167,14 +168,12 @@ void Maintenance::Scrub(const std::vector<StoredBlob>& blobs,
   const Scrubber::Result scrubbed =
       scrubber_.Scrub(blobs, timing_.scrub_bytes, [this] { return IsStopping(); });
   for (const std::string& sha256 : scrubbed.damaged) {
-    spdlog::error("the blob {} was damaged on the disk and is set aside{}",
-                  sha256,
-                  store_.IsReferenced(sha256)
-                      ? "; what names it needs it uploaded or made again"
-                      : "");
+    spdlog::error(
+        "the blob {} was damaged on the disk and is set aside{}",
+        sha256,
+        store_.IsReferenced(sha256) ? "; what names it needs it uploaded or made again" : "");
   }
-  unreadable->insert(
-      unreadable->end(), scrubbed.unreadable.begin(), scrubbed.unreadable.end());
+  unreadable->insert(unreadable->end(), scrubbed.unreadable.begin(), scrubbed.unreadable.end());
 }
 
 void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
@@ -195,7 +194,9 @@ void Maintenance::ExpireJobs() {
     return age.count() == 0 ? kNever : clock_() - age.count();
   };
   const std::chrono::milliseconds grace = timing_.grace;
-  const auto make_room = [this] { return timing_.ballast != nullptr && timing_.ballast->Release(); };
+  const auto make_room = [this] {
+    return timing_.ballast != nullptr && timing_.ballast->Release();
+  };
   const auto remove = [&](const auto& body) {
     if (IsStopping()) return;
     try {

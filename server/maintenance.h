@@ -26,12 +26,12 @@ struct MaintenanceTiming {
   std::chrono::seconds grace{24 * 3600};          // of unreferenced blobs and dead uploads
   std::chrono::hours keep_events{30 * 24};        // after the job's end
   std::chrono::hours keep_request_ids{7 * 24};
-  std::chrono::hours keep_jobs{0};  // after their end, unless pinned; 0: for ever
+  std::chrono::hours keep_jobs{0};              // after their end, unless pinned; 0: for ever
   std::chrono::hours keep_uncommitted{7 * 24};  // scenes, after they were made; 0: for ever
-  int64_t low_space_bytes = 0;      // free; below it no job is begun, until there is a tenth more
+  int64_t low_space_bytes = 0;  // free; below it no job is begun, until there is a tenth more
   int64_t scrub_bytes = int64_t{2} << 30;  // read and compared with their digests at each sweep
   int64_t keep_free_rows_bytes = int64_t{4} << 20;  // in the database; more is given back
-  std::function<void()> on_life = {};      // called at each `reap` when the store could be read
+  std::function<void()> on_life = {};  // called at each `reap` when the store could be read
   // Made while there is room beyond `reserve_bytes`, given up where a chore's deletion needs it.
   Ballast* ballast = nullptr;
   int64_t reserve_bytes = 0;

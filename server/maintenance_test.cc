@@ -162,10 +162,10 @@ TEST_F(MaintenanceTest, ScenesThatAreNeverCommittedGoByThemselves) {
   RunForAWhile();
   EXPECT_EQ(store_->GetScene(scene.name).name, scene.name) << "noted, not deleted";
   now_ += int64_t{25} * 3600 * 1000;
-  RunUntil([&] {
-    return ReasonThrown([&] { store_->GetScene(scene.name); }) == "SCENE_NOT_FOUND";
-  });
-  EXPECT_EQ(store_->GetScene("scenes/test").name, "scenes/test") << "committed, though without a job";
+  RunUntil(
+      [&] { return ReasonThrown([&] { store_->GetScene(scene.name); }) == "SCENE_NOT_FOUND"; });
+  EXPECT_EQ(store_->GetScene("scenes/test").name, "scenes/test")
+      << "committed, though without a job";
 }
 
 class UnreadableMaintenanceTest : private testing::Unprivileged, public MaintenanceTest {};
@@ -272,8 +272,7 @@ TEST_F(MaintenanceTest, LeasesAreLookedAfterWhateverTheSweepDoes) {
   class HangingBlobs : public FileBlobStore {
    public:
     using FileBlobStore::FileBlobStore;
-    std::vector<std::string> ForEach(
-        const std::function<bool(const StoredBlob&)>&) const override {
+    std::vector<std::string> ForEach(const std::function<bool(const StoredBlob&)>&) const override {
       while (!released) std::this_thread::sleep_for(milliseconds(1));
       throw Error(ErrorCode::kInternal, "the disk is gone");
     }

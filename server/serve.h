@@ -30,7 +30,7 @@ struct ServeOptions {
   int project_jobs = 0, project_streams = 0;
   double project_gib = 0.0;
   int project_scenes = 10'000;
-  int keep_uncommitted_days = 7;  // of scenes that were never committed; 0: for ever
+  int keep_uncommitted_days = 7;          // of scenes that were never committed; 0: for ever
   int keep_days = 0;                      // of jobs after their end, unless pinned; 0: for ever
   std::string metrics_listen;             // HOST:PORT for Prometheus; empty: none
   bool sandbox = true;                    // workers are locked in, where the machine can

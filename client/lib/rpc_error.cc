@@ -73,8 +73,9 @@ bool RpcError::IsTransient() const {
 bool RpcError::IsTurnedAway() const {
   if (grpc_code_ != grpc::StatusCode::RESOURCE_EXHAUSTED || retry_delay_.count() <= 0) return false;
   // What is stored grows less by nothing but its owner's doing.
-  const bool is_full = std::ranges::any_of(
-      violations_, [](const auto& entry) { return entry.field.ends_with("stored_bytes"); });
+  const bool is_full = std::ranges::any_of(violations_, [](const auto& entry) {
+    return entry.field.ends_with("stored_bytes") || entry.field.ends_with(" scenes");
+  });
   return reason_ == "QUEUE_FULL" || reason_ == "TOO_MANY_STREAMS" ||
          (reason_ == "QUOTA_EXCEEDED" && !is_full);
 }

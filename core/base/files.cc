@@ -135,11 +135,12 @@ std::vector<std::string> ListFiles(const fs::path& folder) {
     reached = it->path();
   }
   if (error) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "cannot read the folder {} (at {}): {}; make what is in it readable, or move it away",
-                folder.string(),
-                reached.string(),
-                error.message());
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "cannot read the folder {} (at {}): {}; make what is in it readable, or move it away",
+        folder.string(),
+        reached.string(),
+        error.message());
   }
   std::sort(files.begin(), files.end());
   return files;

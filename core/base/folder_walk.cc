@@ -38,10 +38,9 @@ struct Walk {
 
 }  // namespace
 
-std::vector<std::string> WalkFolder(
-    const fs::path& folder,
-    WalkDepth depth,
-    const std::function<bool(const fs::directory_entry&)>& visit) {
+std::vector<std::string> WalkFolder(const fs::path& folder,
+                                    WalkDepth depth,
+                                    const std::function<bool(const fs::directory_entry&)>& visit) {
   Walk walk{depth, visit, {}, false};
   walk.Folder(folder);
   return std::move(walk.unreadable);

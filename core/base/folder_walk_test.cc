@@ -38,8 +38,9 @@ TEST_F(FolderWalkTest, WhatCannotBeReadIsToldAndAllElseIsVisited) {
       });
   EXPECT_THAT(seen, ElementsAre("a", "a/file", "b", "c", "c/file"));
   EXPECT_THAT(unreadable, ElementsAre(HasSubstr("/b: Permission denied")));
-  EXPECT_THAT(WalkFolder(scratch_.path() / "none", WalkDepth::kFolder, [](const auto&) { return true; }),
-              ElementsAre(HasSubstr("/none: No such file")));
+  EXPECT_THAT(
+      WalkFolder(scratch_.path() / "none", WalkDepth::kFolder, [](const auto&) { return true; }),
+      ElementsAre(HasSubstr("/none: No such file")));
 }
 
 TEST_F(FolderWalkTest, TheVisitEndsIt) {

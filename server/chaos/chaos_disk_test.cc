@@ -11,6 +11,7 @@
 #include <fstream>
 
 #include "core/base/files.h"
+#include "server/store/sqlite_db.h"
 #include "tests/support/service/chaos_service.h"
 
 namespace color3d {
@@ -264,7 +265,8 @@ TEST_F(LargeDiskTest, RowsLeaveTheReserveAndCanBeDeletedOnADiskWithoutALastByte)
   grpc::Status status;
   while (scenes.size() < 190) {
     v1::Scene scene;
-    status = Answer(*client.scenes, &Scenes::CreateScene, LargeScene(static_cast<int>(scenes.size())), &scene);
+    status = Answer(
+        *client.scenes, &Scenes::CreateScene, LargeScene(static_cast<int>(scenes.size())), &scene);
     if (!status.ok()) break;
     scenes.push_back(scene.name());
   }
@@ -274,6 +276,8 @@ TEST_F(LargeDiskTest, RowsLeaveTheReserveAndCanBeDeletedOnADiskWithoutALastByte)
   EXPECT_EQ(testing::ReasonOfStatus(TryCreate(client, ScriptedSpec(photos.name(), "steps=1", 2))),
             "STORAGE_FULL");
 
+  // Without the space that the store's log has taken already.
+  SqliteDatabase(disk_ / "jobs.db", SqliteAccess::kWrite).Run("pragma wal_checkpoint(truncate)");
   Fill(0);
   v1::DeleteSceneRequest remove;
   v1::DeleteSceneResponse removed;

@@ -41,11 +41,8 @@ Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& p
   if (error == std::errc::no_such_file_or_directory) return Copy::kMissing;
   if (error == std::errc::io_error) return Copy::kDamaged;
   if (::access(from.c_str(), R_OK) != 0) {
-    throw ServiceError(ErrorCode::kUnavailable,
-                       kUnreadable,
-                       "cannot read {}: {}",
-                       from.string(),
-                       error.message());
+    throw ServiceError(
+        ErrorCode::kUnavailable, kUnreadable, "cannot read {}: {}", from.string(), error.message());
   }
   if (error) {
     throw Error(ErrorCode::kUnavailable,

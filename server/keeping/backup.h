@@ -23,10 +23,11 @@ struct CopiedBlobs {
 
 // Everything that jobs and scenes name, as it is at one moment; a server may run meanwhile. Into an
 // empty folder, or over an earlier backup, of which blobs that are there are read and compared with
-// their digest, and copied again only where they are damaged. The store is replaced last: a backup that was cut off is the earlier one still. Blobs that are
-// missing or damaged are left out and listed; a job whose checkpoint was one, or was replaced
-// meanwhile, begins anew in the copy. What a scene that is not committed still waits for is no fault. Throws Error: kFailedPrecondition where there is no store of
-// this release or `target` is none of ours.
+// their digest, and copied again only where they are damaged. The store is replaced last: a backup
+// that was cut off is the earlier one still. Blobs that are missing or damaged are left out and
+// listed; a job whose checkpoint was one, or was replaced meanwhile, begins anew in the copy. What
+// a scene that is not committed still waits for is no fault. Throws Error: kFailedPrecondition
+// where there is no store of this release or `target` is none of ours.
 CopiedBlobs BackUp(const std::filesystem::path& data_folder, const std::filesystem::path& target);
 
 // A backup as a fresh data folder. Every blob is read and compared with its digest. As BackUp, and

@@ -39,11 +39,12 @@ void CollectNow(const RpcParts& parts,
   const auto [blobs, unreadable] = ListBlobs(parts.blobs, stop);
   RequireNotDraining(parts);
   for (const std::string& problem : unreadable) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "nothing is collected: {} places of the blobs cannot be looked at, first {}; change "
-                "their owner or rights, or look after the disk",
-                unreadable.size(),
-                problem);
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "nothing is collected: {} places of the blobs cannot be looked at, first {}; change "
+        "their owner or rights, or look after the disk",
+        unreadable.size(),
+        problem);
   }
   std::vector<FileDigest> gone;
   if (request.dry_run()) {

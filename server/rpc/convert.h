@@ -49,7 +49,8 @@ size_t Put(Message message, Message* place) {
 
 // Answers a List call: `read(before_id, limit, &is_cut)` gives records, newest first, and says
 // whether there are fewer than `limit` for what they take; `add(record)` puts one into the response
-// and says how long it is, bytes. `listing` says what is listed: page tokens of other listings are refused.
+// and says how long it is, bytes. `listing` says what is listed: page tokens of other listings are
+// refused.
 template <typename Request, typename Response, typename Read, typename Add>
 void AnswerPage(const Request& request,
                 const std::string& listing,

@@ -52,9 +52,7 @@ size_t Executor::NextTurn() const {
 void Executor::Loop() {
   std::unique_lock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [this] {
-      return NextTurn() < turns_.size() || (stopping_ && waiting_ == 0);
-    });
+    wake_.wait(lock, [this] { return NextTurn() < turns_.size() || (stopping_ && waiting_ == 0); });
     const size_t turn = NextTurn();
     if (turn == turns_.size()) return;
     const std::string owner = turns_[turn];

@@ -1,6 +1,6 @@
 // A few threads for work that touches disk or the job store, so that gRPC's callback threads never
-// block. Whoever has much to do shares them with the others: tasks stand in a line of their owner's,
-// and lines take turns. Thread-safe.
+// block. Whoever has much to do shares them with the others: tasks stand in a line of their
+// owner's, and lines take turns. Thread-safe.
 #pragma once
 
 #include <condition_variable>

@@ -85,24 +85,23 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
     grpc::CallbackServerContext* context,
     const v1::ListColorizersRequest* request,
     v1::ListColorizersResponse* response) {
-  return AnswerRead(
-      parts_,
-      context,
-      request,
-      response,
-      [this](const Call& call, const auto& in, v1::ListColorizersResponse* out) {
-        if (!in.scene().empty()) CheckName(in.scene(), "scenes");
-        AnswerPage(
-            in,
-            "colorizers of " + in.scene(),
-            out,
-            [&](int64_t before_id, int limit, bool*) {
-              return call.store.ListColorizers(in.scene(), before_id, limit);
-            },
-            [&](const ColorizerRecord& colorizer) {
-              return Put(ToProto(colorizer), out->add_colorizers());
-            });
-      });
+  return AnswerRead(parts_,
+                    context,
+                    request,
+                    response,
+                    [this](const Call& call, const auto& in, v1::ListColorizersResponse* out) {
+                      if (!in.scene().empty()) CheckName(in.scene(), "scenes");
+                      AnswerPage(
+                          in,
+                          "colorizers of " + in.scene(),
+                          out,
+                          [&](int64_t before_id, int limit, bool*) {
+                            return call.store.ListColorizers(in.scene(), before_id, limit);
+                          },
+                          [&](const ColorizerRecord& colorizer) {
+                            return Put(ToProto(colorizer), out->add_colorizers());
+                          });
+                    });
 }
 
 grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>*

@@ -268,9 +268,8 @@ grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext*
                      response,
                      [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
                        CheckName(in.name(), "jobs");
-                       WithRoomMade(parts_.make_room, [&] {
-                         call.store.Delete(in.name(), KeyOf("DeleteJob", in));
-                       });
+                       WithRoomMade(parts_.make_room,
+                                    [&] { call.store.Delete(in.name(), KeyOf("DeleteJob", in)); });
                      });
 }
 

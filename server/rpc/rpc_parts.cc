@@ -63,12 +63,13 @@ void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more
   throw ServiceError(
       ErrorCode::kResourceExhausted,
       "QUOTA_EXCEEDED",
-      fmt::format("your project has {:.1f} MiB on the server, files and rows of its scenes and jobs, "
-                  "and {:.1f} MiB would come, at most {:.1f} MiB are allowed; delete jobs and scenes "
-                  "that you need no more",
-                  InMib(stored),
-                  InMib(more_bytes),
-                  InMib(most)),
+      fmt::format(
+          "your project has {:.1f} MiB on the server, files and rows of its scenes and jobs, "
+          "and {:.1f} MiB would come, at most {:.1f} MiB are allowed; delete jobs and scenes "
+          "that you need no more",
+          InMib(stored),
+          InMib(more_bytes),
+          InMib(most)),
       {{"project:" + store.project() + " stored_bytes", fmt::format("{} of {}", stored, most)}});
 }
 
@@ -99,6 +100,10 @@ v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limi
   usage.set_max_stored_bytes(limits.project_max_stored_bytes);
   usage.set_unfinished_jobs(project.unfinished_jobs);
   usage.set_max_unfinished_jobs(limits.project_max_unfinished_jobs);
+  usage.set_scenes(project.scenes);
+  usage.set_max_scenes(limits.project_max_scenes);
+  usage.set_uncommitted_scenes(project.uncommitted_scenes);
+  usage.set_max_uncommitted_scenes(limits.project_max_uncommitted_scenes);
   return usage;
 }
 

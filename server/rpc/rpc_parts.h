@@ -76,9 +76,9 @@ struct RpcParts {
   JobStore& store;  // of all projects; clients see theirs by Call::store
   BlobStore& blobs;
   UploadStore& uploads;
-  Executor& quick;  // reads of the job store and of the disk's cache: what answers GetJob
-  Executor& slow;   // what hashes, syncs, writes or asks others
-  Executor& bulk;   // blobs on their way: down- and uploads, of which one may hash 8 GiB
+  Executor& quick;   // reads of the job store and of the disk's cache: what answers GetJob
+  Executor& slow;    // what hashes, syncs, writes or asks others
+  Executor& bulk;    // blobs on their way: down- and uploads, of which one may hash 8 GiB
   Executor& checks;  // reads whole scenes
   StreamLimits& streams;
   CallMemory& memory;
@@ -119,8 +119,8 @@ v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limi
 // Why workers are given no job, for people; empty: they are.
 std::string WhyHeld(const RpcParts& parts);
 
-// Answers a unary call from that executor, in the line of the caller's project, where the caller has
-// the role: `body(call, request, response)` may block and throw.
+// Answers a unary call from that executor, in the line of the caller's project, where the caller
+// has the role: `body(call, request, response)` may block and throw.
 template <typename Request, typename Response, typename Body>
 grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Executor& executor,

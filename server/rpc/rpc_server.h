@@ -22,7 +22,7 @@ struct RpcServerOptions {
   int quick_threads = 4;
   int slow_threads = 6;
   int bulk_threads = 6;
-  int check_threads = 4;  // of which one project has half at most
+  int check_threads = 4;                                 // of which one project has half at most
   std::shared_ptr<grpc::ServerCredentials> credentials;  // null: in the clear
   std::shared_ptr<TokenBook> tokens;                     // null: nobody is asked
   ServiceLimits limits;

@@ -13,10 +13,10 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerCont
         const RequestKey key = KeyOf("CreateScene", in);
         const SceneRecord scene = CheckedScene(in, parts_.limits);
         if (!call.store.FindRequest(key)) RequireRoomForRows(parts_, call.store, RowBytes(scene));
-        *out = ToProto(call.store.CreateScene(scene,
-                                              key,
-                                              {parts_.limits.project_max_scenes,
-                                               parts_.limits.project_max_uncommitted_scenes}));
+        *out = ToProto(call.store.CreateScene(
+            scene,
+            key,
+            {parts_.limits.project_max_scenes, parts_.limits.project_max_uncommitted_scenes}));
       });
 }
 
@@ -69,9 +69,10 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerCont
           return;
         }
         parts_.blobs.RequireSpace(0);
-        const SceneCheck check = CheckScene(scene, parts_.blobs, call.store, parts_.limits, [context] {
-          return context->IsCancelled();
-        });
+        const SceneCheck check =
+            CheckScene(scene, parts_.blobs, call.store, parts_.limits, [context] {
+              return context->IsCancelled();
+            });
         *out = ToProto(call.store.ActivateScene(scene.name, check.layout, check.photo_count, key));
       });
 }

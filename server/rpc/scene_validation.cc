@@ -164,8 +164,7 @@ class FileChecks {
 };
 
 FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, bool is_transforms) const {
-  const MappedFile mapped(
-      blobs_.Fetch(file.digest.sha256), file.digest.size_bytes, is_cancelled_);
+  const MappedFile mapped(blobs_.Fetch(file.digest.sha256), file.digest.size_bytes, is_cancelled_);
   if (!mapped.is_readable()) {
     return {file.path, "cannot be read from the server's disk; upload it again"};
   }

@@ -12,8 +12,8 @@
 namespace color3d {
 
 // The scene that a request declares, under a new id where it names none. Throws
-// Error{kInvalidArgument}: bad id, too many files, paths that are too long in sum, a path that is unsafe (UNSAFE_PATH), there twice
-// or both file and folder, no digest.
+// Error{kInvalidArgument}: bad id, too many files, paths that are too long in sum, a path that is
+// unsafe (UNSAFE_PATH), there twice or both file and folder, no digest.
 SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLimits& limits);
 
 struct SceneCheck {
@@ -22,8 +22,9 @@ struct SceneCheck {
 };
 
 // Of blobs that the project of `store` holds; each is read once, whatever paths it has.
-// `is_cancelled` is asked while they are read: then throws Error{kCancelled}. Throws ServiceError{kInvalidArgument, SCENE_INVALID}
-// with one violation for each bad file; its message names the first three and counts the rest.
+// `is_cancelled` is asked while they are read: then throws Error{kCancelled}. Throws
+// ServiceError{kInvalidArgument, SCENE_INVALID} with one violation for each bad file; its message
+// names the first three and counts the rest.
 SceneCheck CheckScene(const SceneRecord& scene,
                       const BlobStore& blobs,
                       const ProjectStore& store,

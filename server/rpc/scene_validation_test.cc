@@ -186,7 +186,8 @@ TEST_F(SceneValidationTest, CommitsOfOneProjectLeaveRoomForThoseOfAnother) {
    public:
     using FileBlobStore::FileBlobStore;
     std::filesystem::path Fetch(const std::string& sha256) const override {
-      while (sha256 == hangs && !released) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      while (sha256 == hangs && !released)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
       return FileBlobStore::Fetch(sha256);
     }
     std::string hangs;

@@ -195,7 +195,8 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
         const auto job = item.state ? jobs.find(item.state->job_id) : jobs.end();
         if (job != jobs.end()) {
           item = {StateEvent(Then(job->second, *item.state), *item.state), std::nullopt};
-        } else if (item.state && std::ranges::find(wanted, item.state->job_id) != wanted.end()) {  // it was deleted
+        } else if (item.state && std::ranges::find(wanted, item.state->job_id) !=
+                                     wanted.end()) {  // it was deleted
           queue_.erase(queue_.begin() + static_cast<std::ptrdiff_t>(i));
           continue;
         }

@@ -33,10 +33,11 @@ bool Ballast::Make() {
 bool Ballast::Release() {
   std::lock_guard lock(mutex_);
   if (::unlink(file_.c_str()) != 0) return false;
-  spdlog::warn("the disk is full: the {} MiB of {} are given up, so that jobs and scenes can be "
-               "deleted",
-               bytes_ >> 20,
-               file_.string());
+  spdlog::warn(
+      "the disk is full: the {} MiB of {} are given up, so that jobs and scenes can be "
+      "deleted",
+      bytes_ >> 20,
+      file_.string());
   return true;
 }
 

@@ -33,9 +33,8 @@ TEST_F(StorageTest, WhatFreesSpaceIsDoneAgainOnceThereIsRoom) {
   tries = 0;
   EXPECT_EQ(ReasonThrown([&] { WithRoomMade(make_room, full_at_first); }), "STORAGE_FULL")
       << "there is none left";
-  EXPECT_EQ(ReasonThrown([&] {
-              WithRoomMade(make_room, [] { throw Error(ErrorCode::kNotFound, "no"); });
-            }),
+  EXPECT_EQ(ReasonThrown(
+                [&] { WithRoomMade(make_room, [] { throw Error(ErrorCode::kNotFound, "no"); }); }),
             "NOT_FOUND");
   EXPECT_EQ(rooms, 2) << "nothing is given up for another reason";
 }

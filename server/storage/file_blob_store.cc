@@ -49,12 +49,13 @@ std::optional<struct stat> StatusOf(const fs::path& path) {
   if (::stat(path.c_str(), &status) == 0) return status;
   const int error = errno;
   if (error == ENOENT || error == ENOTDIR) return std::nullopt;
-  throw ServiceError(ErrorCode::kUnavailable,
-                     "BLOB_UNREADABLE",
-                     "cannot look at the blob {}: {}; its owner, rights and disk on the server need "
-                     "a look",
-                     path.filename().string(),
-                     std::strerror(error));
+  throw ServiceError(
+      ErrorCode::kUnavailable,
+      "BLOB_UNREADABLE",
+      "cannot look at the blob {}: {}; its owner, rights and disk on the server need "
+      "a look",
+      path.filename().string(),
+      std::strerror(error));
 }
 
 int64_t TouchedNs(const struct stat& status) {

@@ -67,7 +67,8 @@ TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
   for (const std::string& file : ListFiles(scratch_.path() / "uploads")) {
     MakeOld(scratch_.path() / "uploads" / file, 25);
   }
-  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)).uploads, 0) << "the clock may have been set";
+  EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)).uploads, 0)
+      << "the clock may have been set";
   EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)).uploads, 1);
   EXPECT_EQ(uploads_.CommittedSize(name), 0);
 }

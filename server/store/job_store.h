@@ -329,8 +329,8 @@ class JobStore {
   virtual std::vector<BlobCandidate> AgedCandidates(int64_t grace_ms) = 0;
   // Epoch of the job's present lease; 0 when it is not running or does not exist.
   virtual int64_t RunningEpoch(const std::string& job_name) = 0;
-  // Gives the file system back what deleted rows have left free in the database beyond `keep_bytes`,
-  // some MiB at a call; how many bytes are still free in it.
+  // Gives the file system back what deleted rows have left free in the database beyond
+  // `keep_bytes`, some MiB at a call; how many bytes are still free in it.
   virtual int64_t GiveBackSpace(int64_t keep_bytes) = 0;
 };
 

@@ -27,12 +27,12 @@ constexpr int kSchemaVersion = 6;
 
 // Since version 6: what rows take counts in what a project has (row_bytes), and its scenes are
 // counted. A blob counts a block of the disk besides its length, a request id its row.
-#define COLOR3D_ACCOUNT(event, sum, name, amount)                                             \
-  "create trigger " event " begin insert into project(name, " sum ") values(" name            \
-  ", " amount ") on conflict(name) do update set " sum "=" sum "+excluded." sum "; end;"
+#define COLOR3D_ACCOUNT(event, sum, name, amount)                                              \
+  "create trigger " event " begin insert into project(name, " sum ") values(" name ", " amount \
+  ") on conflict(name) do update set " sum "=" sum "+excluded." sum "; end;"
 #define COLOR3D_REQUEST_PROJECT(id) \
   "case instr(" id ", '@') when 0 then '' else substr(" id ", instr(" id ", '@')+1) end"
-#define COLOR3D_ACCOUNTS                                                                      \
+#define COLOR3D_ACCOUNTS \
   "alter table project add column row_bytes integer not null default 0;"                      \
   "alter table project add column scenes integer not null default 0;"                         \
   "alter table project add column uncommitted integer not null default 0;"                    \
@@ -59,13 +59,13 @@ constexpr int kSchemaVersion = 6;
   COLOR3D_ACCOUNT("request_rows_gone after delete on request_id", "row_bytes",                \
                   COLOR3D_REQUEST_PROJECT("old.id"), "-300")
 
-// Since version 6: with the path in a key, an index held it a second time, and one of 970 bytes took
-// two pages of its own.
-#define COLOR3D_SCENE_FILES                                                                   \
-  "create table scene_file(scene_file_id integer primary key, "                               \
-  "scene_id integer not null references scene on delete cascade, path text not null, "        \
-  "sha256 text not null, size_bytes integer not null);"                                       \
-  "create index scene_file_scene on scene_file(scene_id);"                                    \
+// Since version 6: with the path in a key, an index held it a second time, and one of 970 bytes
+// took two pages of its own.
+#define COLOR3D_SCENE_FILES                                                            \
+  "create table scene_file(scene_file_id integer primary key, "                        \
+  "scene_id integer not null references scene on delete cascade, path text not null, " \
+  "sha256 text not null, size_bytes integer not null);"                                \
+  "create index scene_file_scene on scene_file(scene_id);"                             \
   "create index scene_file_blob on scene_file(sha256);"
 
 // From version 1 to 2, from 2 to 3 and so on.
@@ -101,7 +101,7 @@ constexpr const char* kMigrations[kSchemaVersion - 1] = {
     "alter table scene add column unused_age_ms integer not null default -1;"
     "insert into meta values('requests_steady_ms', 0), ('requests_age_ms', 0), "
     "('requests_noted_ms', 0), ('scenes_steady_ms', 0)",
-    "drop index scene_file_blob; alter table scene_file rename to scene_file_before;" //
+    "drop index scene_file_blob; alter table scene_file rename to scene_file_before;"  //
     COLOR3D_SCENE_FILES
     "insert into scene_file(scene_id, path, sha256, size_bytes) "
     "select scene_id, path, sha256, size_bytes from scene_file_before;"

@@ -63,8 +63,8 @@ class SqliteDatabase {
   // How long a statement waits for others that write.
   void SetBusyTimeout(std::chrono::milliseconds timeout);
   void Exec(const char* sql);
-  // Writes the whole file again, without what is free in it; nothing changes when it throws. What it
-  // needs meanwhile lies in `temporary`. Not while other threads use any database.
+  // Writes the whole file again, without what is free in it; nothing changes when it throws. What
+  // it needs meanwhile lies in `temporary`. Not while other threads use any database.
   void BuildAnew(const std::filesystem::path& temporary);
   // Prepares, binds and runs to the end; returns the number of rows changed.
   template <typename... Values>

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/base/utf8.h"
 #include "server/service_error.h"
 #include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
@@ -11,6 +12,9 @@
 
 namespace color3d {
 namespace {
+
+// Of a worker's progress: what it says may come from a user's file.
+constexpr size_t kMaxMessageBytes = 1000;
 
 ServiceError LeaseLost(const Lease& lease) {
   return ServiceError(ErrorCode::kAborted,
@@ -172,6 +176,7 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db, /*durable=*/false);
   const JobRecord before = RequireLease(db, lease);
+  const std::string message = CleanUtf8(progress.message, kMaxMessageBytes);
   db.Run(
       "update job set lease_expires_ms=?, progress_step=?, progress_total=?, progress_message=?, "
       "progress_error_name=?, progress_error_value=?, seconds=?, eta_seconds=?, warnings=? "
@@ -179,15 +184,14 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
       SteadyNow() + lease_ms,
       progress.step,
       progress.total_steps,
-      progress.message,
-      progress.error_name,
+      message,
+      CleanUtf8(progress.error_name, kMaxMessageBytes),
       progress.error_value,
       usage.seconds,
       progress.eta_seconds,
       JoinLines(usage.warnings),
       lease.job_id);
-  const bool moved = before.progress.step != progress.step ||
-                     before.progress.message != progress.message ||
+  const bool moved = before.progress.step != progress.step || before.progress.message != message ||
                      before.progress.error_value != progress.error_value;
   if (moved) AddEvent(db, lease.job_id, /*progress=*/true);
   transaction.Commit();

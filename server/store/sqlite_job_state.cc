@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <deque>
 
+#include "core/base/utf8.h"
 #include "server/service_error.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"
@@ -12,6 +13,9 @@
 
 namespace color3d {
 namespace {
+
+// All that wait for a job that failed repeat what it says.
+constexpr size_t kMaxErrorBytes = 4000;
 
 ServiceError WrongState(const JobRecord& job, const std::string& remedy) {
   return ServiceError(ErrorCode::kFailedPrecondition,
@@ -89,7 +93,7 @@ void SqliteJobStore::EndFailed(SqliteDatabase& db, int64_t job_id, const JobErro
   db.Run("update job set error_code=?, error_reason=?, error_message=? where job_id=?",
          static_cast<int>(error.code),
          error.reason.empty() ? std::string(ErrorCodeName(error.code)) : error.reason,
-         error.message,
+         CleanUtf8(error.message, kMaxErrorBytes),
          job_id);
   SetState(db, job_id, JobState::kFailed);
   PropagateEnd(db, JobById(db, job_id));

@@ -256,8 +256,7 @@ JobsSnapshot SqliteJobStore::Snapshot(const std::vector<int64_t>& job_ids) {
   return snapshot;
 }
 
-LoadedJobs SqliteJobStore::LoadJobs(const std::vector<int64_t>& job_ids,
-                                    const ListBudget& budget) {
+LoadedJobs SqliteJobStore::LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) {
   const auto held = connections_.Read();
   SqliteDatabase& db = *held;
   LoadedJobs loaded;

@@ -238,11 +238,10 @@ void SqliteJobStore::DelayNotification(int64_t job_id, int64_t first_ms, int64_t
   const auto held = connections_.Write();
   SqliteDatabase& db = *held;
   SqliteTransaction transaction(db);
-  db.Run(
-      "update notification set tries=tries+1, next_ms=? where job_id=? and first_ms=?",
-      Now() + pause_ms,
-      job_id,
-      first_ms);
+  db.Run("update notification set tries=tries+1, next_ms=? where job_id=? and first_ms=?",
+         Now() + pause_ms,
+         job_id,
+         first_ms);
   transaction.Commit();
 }
 

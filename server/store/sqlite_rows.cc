@@ -8,6 +8,8 @@
 namespace color3d {
 namespace {
 
+constexpr size_t kMaxLinesBytes = 64 << 10;
+
 // The columns of a table and where a record keeps their values: the one list that reading and
 // inserting follow. The id comes first; the database gives it.
 template <typename Visit>
@@ -172,6 +174,7 @@ std::string JoinLines(const std::vector<std::string>& lines) {
   std::string text;
   for (std::string line : lines) {
     std::replace(line.begin(), line.end(), '\n', ' ');
+    if (text.size() + line.size() > kMaxLinesBytes) break;
     if (!text.empty()) text += '\n';
     text += line;
   }

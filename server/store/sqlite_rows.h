@@ -22,7 +22,7 @@ std::string SelectScene(const std::string& tail);
 SceneRecord SceneFromRow(const SqliteStatement& row);
 int64_t InsertSceneRow(SqliteDatabase& db, const SceneRecord& scene);
 
-// Warnings are single lines, stored joined by newlines.
+// Warnings are single lines, stored joined by newlines; beyond 64 KiB they are left out.
 std::string JoinLines(const std::vector<std::string>& lines);
 std::vector<std::string> SplitLines(const std::string& text);
 

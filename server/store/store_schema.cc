@@ -64,8 +64,8 @@ void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
     return select.Step() ? select.Int(0) : 0;
   };
   if (number("pragma auto_vacuum") != 0) return;
-  const int64_t bytes = (number("pragma page_count") - number("pragma freelist_count")) *
-                        number("pragma page_size");
+  const int64_t bytes =
+      (number("pragma page_count") - number("pragma freelist_count")) * number("pragma page_size");
   std::error_code error;
   const auto free = static_cast<int64_t>(fs::space(file.parent_path(), error).available);
   if (error || free < 2 * bytes + kSpareBytes) {

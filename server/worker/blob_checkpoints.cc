@@ -46,8 +46,7 @@ bool BlobCheckpoints::LoadTo(const std::filesystem::path& file) {
 bool BlobCheckpoints::WantsSave() { return pace_.IsDue(std::chrono::steady_clock::now()); }
 
 void BlobCheckpoints::Save(const std::string& state) {
-  Replace({Sha256Hex(state), static_cast<int64_t>(state.size())},
-          [&] { blobs_.PutBytes(state); });
+  Replace({Sha256Hex(state), static_cast<int64_t>(state.size())}, [&] { blobs_.PutBytes(state); });
 }
 
 void BlobCheckpoints::SaveFile(const std::filesystem::path& file) {

@@ -160,9 +160,7 @@ class World {
   }
 
   // By what has become of them, with their children.
-  std::vector<JobRecord> Jobs() { 
-    return store_.LoadJobs(store_.ResolveWatch(roots_), {}).jobs;
-  }
+  std::vector<JobRecord> Jobs() { return store_.LoadJobs(store_.ResolveWatch(roots_), {}).jobs; }
 
   // What must hold whatever has failed.
   void CheckWhole() {
@@ -302,12 +300,29 @@ JobState EndOf(const JobRecord& job) {
 
 TEST(FaultInjectionTest, EveryCallIsPartOfTheLife) {
   EXPECT_THAT(Live(0, false, ErrorCode::kUnavailable).seen,
-              ::testing::IsSupersetOf(
-                  {"Adopt",        "Claim",        "ClaimForBatch", "Fail",         "Fetch",
-                   "FindStage",    "GetInputs",    "GetScene",      "IsReferenced", "JoinEqual",
-                   "ListChildren", "Publish",      "PutBytes",      "PutFile",      "Release",
-                   "Look",         "RemoveIfUntouched", "RemoveWorker", "RequireSpace", "Reserve", "SetCheckpoint",
-                   "Touch",        "UpdateWorker"}));
+              ::testing::IsSupersetOf({"Adopt",
+                                       "Claim",
+                                       "ClaimForBatch",
+                                       "Fail",
+                                       "Fetch",
+                                       "FindStage",
+                                       "GetInputs",
+                                       "GetScene",
+                                       "IsReferenced",
+                                       "JoinEqual",
+                                       "ListChildren",
+                                       "Publish",
+                                       "PutBytes",
+                                       "PutFile",
+                                       "Release",
+                                       "Look",
+                                       "RemoveIfUntouched",
+                                       "RemoveWorker",
+                                       "RequireSpace",
+                                       "Reserve",
+                                       "SetCheckpoint",
+                                       "Touch",
+                                       "UpdateWorker"}));
 }
 
 TEST(FaultInjectionTest, WhateverFailsOnceInPassingCostsNoJob) {

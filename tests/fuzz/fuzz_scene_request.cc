@@ -70,7 +70,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     for (const SceneFileRecord& file : scene.files) {
       if (!IsSafeRelativePath(file.path) || !IsSha256Hex(file.digest.sha256)) std::abort();
     }
-    const SceneCheck check = 
+    const SceneCheck check =
         CheckScene(scene, Shared().blobs, Shared().project, limits, [] { return false; });
     if (check.layout != DetectLayout(scene.files) || check.photo_count < 0) std::abort();
   });

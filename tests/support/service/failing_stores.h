@@ -160,7 +160,8 @@ class FailingBlobs : public FileBlobStore {
     return faults_.Around("Look", [&] { return FileBlobStore::Look(sha256); });
   }
   bool RemoveIfUntouched(const StoredBlob& blob) override {
-    return faults_.Around("RemoveIfUntouched", [&] { return FileBlobStore::RemoveIfUntouched(blob); });
+    return faults_.Around("RemoveIfUntouched",
+                          [&] { return FileBlobStore::RemoveIfUntouched(blob); });
   }
   void RequireSpace(int64_t bytes) const override {
     faults_.Around("RequireSpace", [&] { FileBlobStore::RequireSpace(bytes); });
