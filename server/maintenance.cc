@@ -14,6 +14,13 @@
 
 namespace color3d {
 namespace fs = std::filesystem;
+namespace {
+
+bool IsRetryableLater(const Error& error) {
+  return error.code() == ErrorCode::kResourceExhausted || error.code() == ErrorCode::kUnavailable;
+}
+
+}  // namespace
 
 void ExpireDeadWorkers(JobStore& store) {
   for (const WorkerRecord& worker : store.ListWorkers()) {
@@ -108,7 +115,12 @@ std::chrono::milliseconds Maintenance::Reap() {
 }
 
 void Maintenance::GiveBackSpace() {
-  store_.GiveBackSpace(timing_.keep_free_rows_bytes);
+  try {
+    store_.GiveBackSpace(timing_.keep_free_rows_bytes);
+  } catch (const Error& e) {
+    // On a full disk, or beside somebody who writes for long: later.
+    if (!IsRetryableLater(e)) throw;
+  }
   Ballast* const ballast = timing_.ballast;
   if (ballast == nullptr || ballast->IsThere()) return;
   if (blobs_.FreeBytes() >= timing_.reserve_bytes + 2 * ballast->bytes()) ballast->Make();

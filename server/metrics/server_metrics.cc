@@ -188,7 +188,7 @@ class Sampled : public prometheus::Collectable {
             sample.attempts_lost);
     counter("color3d_blobs_removed_total", "Blobs that nothing named.", sample.blobs_removed);
     counter("color3d_blobs_damaged_total",
-            "Blobs that the disk had damaged, as the sweep found.",
+            "Blobs that the disk had damaged, as sweeps, downloads and uploads found.",
             sample.blobs_damaged);
     counter("color3d_jobs_expired_total", "Jobs deleted for their age.", sample.jobs_expired);
     counter("color3d_sweeps_failed_total", "Sweeps that did not end well.", sample.sweeps_failed);

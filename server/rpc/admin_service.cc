@@ -38,7 +38,7 @@ void CollectNow(const RpcParts& parts,
   const auto stop = [&parts] { return parts.draining.load(); };
   const auto [blobs, unreadable] = ListBlobs(parts.blobs, stop);
   RequireNotDraining(parts);
-  for (const std::string& problem : unreadable) {
+  if (!unreadable.empty()) {
     throw Error(
         ErrorCode::kFailedPrecondition,
         "nothing is collected: {} places of the blobs cannot be looked at, first {}; change "

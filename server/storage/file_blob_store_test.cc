@@ -114,7 +114,8 @@ TEST_F(FileBlobStoreTest, GoodBytesTakeThePlaceOfDamagedOnes) {
   WriteFileAtomic(file, "some bytes");
   blobs_.PutFile(file);
   EXPECT_TRUE(IsIntact(blobs_, digest));
-  blobs_.SetAside(digest.sha256);
+  Damage(blobs_.Fetch(digest.sha256));
+  EXPECT_TRUE(blobs_.SetAside(digest.sha256));
   EXPECT_FALSE(blobs_.Touch(digest));
   blobs_.PutBytes("some bytes");
   EXPECT_TRUE(IsIntact(blobs_, digest));

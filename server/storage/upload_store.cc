@@ -62,14 +62,15 @@ UploadStore::UploadStore(const fs::path& folder, BlobStore& blobs, int64_t max_b
     : folder_(folder), blobs_(blobs), max_blob_bytes_(max_blob_bytes) {
   std::error_code error;
   fs::create_directories(folder_, error);
-  for (const std::string& problem :
-       WalkFolder(folder_, WalkDepth::kFolder, [&](const fs::directory_entry& entry) {
-         CountOnDisk(entry.path().filename().string());
-         return true;
-       })) {
+  const auto unreadable =
+      WalkFolder(folder_, WalkDepth::kFolder, [&](const fs::directory_entry& entry) {
+        CountOnDisk(entry.path().filename().string());
+        return true;
+      });
+  if (!unreadable.empty()) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot read the unfinished uploads of {}; change the folder's permissions",
-                problem);
+                unreadable.front());
   }
 }
 

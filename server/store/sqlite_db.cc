@@ -12,6 +12,8 @@
 namespace color3d {
 namespace {
 
+constexpr char kShrinkable[] = "pragma auto_vacuum=INCREMENTAL";
+
 std::atomic<int64_t> g_steps{0};
 
 [[noreturn]] void ThrowSqlite(sqlite3* db, int code, const std::string& what) {
@@ -118,8 +120,8 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
     // Files for large statements would lie where a worker that is locked in may not write.
     Exec("pragma temp_store=MEMORY");
     if (writes) {
-      // Of a fresh file, and of one that is vacuumed: GiveBackSpace can make it shorter.
-      Exec("pragma auto_vacuum=INCREMENTAL");
+      // Of a fresh file, so that GiveBackSpace can make it shorter. Said of another it would write.
+      if (IsEmpty()) Exec(kShrinkable);
       Exec("pragma journal_size_limit=4194304");
       Exec("pragma journal_mode=WAL");
       Exec("pragma synchronous=FULL");
@@ -135,6 +137,11 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
 
 SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
 
+bool SqliteDatabase::IsEmpty() {
+  SqliteStatement pages(db_, "pragma page_count");
+  return !pages.Step() || pages.Int(0) == 0;
+}
+
 void SqliteDatabase::SetBusyTimeout(std::chrono::milliseconds timeout) {
   sqlite3_busy_timeout(db_, static_cast<int>(timeout.count()));
 }
@@ -147,6 +154,7 @@ void SqliteDatabase::Exec(const char* sql) {
 void SqliteDatabase::BuildAnew(const std::filesystem::path& temporary) {
   char* const before = sqlite3_temp_directory;
   sqlite3_temp_directory = sqlite3_mprintf("%s", temporary.c_str());
+  Exec(kShrinkable);
   Exec("pragma temp_store=FILE");
   std::exception_ptr failed;
   try {

@@ -82,6 +82,8 @@ class SqliteDatabase {
   static int64_t Steps();
 
  private:
+  bool IsEmpty();
+
   sqlite3* db_ = nullptr;
 };
 
