@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // A data folder with one scene, one job and its result.
-class KeepingTest : public testing::Test {
+class KeepingTest : public ::testing::Test {
  protected:
   KeepingTest() {
     PrepareDataFolder(paths_);
