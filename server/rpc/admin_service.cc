@@ -44,7 +44,7 @@ void CollectNow(const RpcParts& parts,
         "nothing is collected: {} places of the blobs cannot be looked at, first {}; change "
         "their owner or rights, or look after the disk",
         unreadable.size(),
-                unreadable.front());
+        unreadable.front());
   }
   std::vector<FileDigest> gone;
   if (request.dry_run()) {
