@@ -118,8 +118,9 @@ void SqliteJobStore::PropagateEnd(SqliteDatabase& db, const JobRecord& cause) {
     {
       SqliteStatement select(
           db.handle(),
-          SelectJob("where state='BLOCKED' and job_id in "
-                    "(select job_id from job_dependency where input_id=?) order by job_id"));
+          SelectJobWithoutSpec(
+              "where state='BLOCKED' and job_id in "
+              "(select job_id from job_dependency where input_id=?) order by job_id"));
       select.Bind(from.id);
       while (select.Step()) waiting.push_back(JobFromRow(select));
     }

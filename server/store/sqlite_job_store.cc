@@ -94,7 +94,7 @@ std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteDatabase& db,
 
 std::vector<JobRecord> SqliteJobStore::GraphOf(SqliteDatabase& db, const JobRecord& root) {
   std::vector<JobRecord> jobs;
-  SqliteStatement select(db.handle(), SelectJob("where parent=? order by job_id"));
+  SqliteStatement select(db.handle(), SelectJobWithoutSpec("where parent=? order by job_id"));
   select.Bind(root.name);
   while (select.Step()) jobs.push_back(JobFromRow(select));
   jobs.push_back(root);

@@ -149,6 +149,7 @@ class SqliteJobStore : public JobStore {
   std::vector<JobRecord> ReadJobs(SqliteDatabase& db,
                                   SqliteStatement& select,
                                   const ListBudget& budget = {});
+  // The children, without spec and artifacts, then the job itself.
   std::vector<JobRecord> GraphOf(SqliteDatabase& db, const JobRecord& root);
   SceneRecord RequireScene(SqliteDatabase& db, const std::string& name, bool with_files);
 
