@@ -281,8 +281,14 @@ int Main(int argc, char** argv) {
   try {
     if (keeping.run) return keeping.run();
     if (token->parsed()) {
+      std::error_code error;
+      const bool is_fresh = !std::filesystem::exists(token_file, error);
       std::cout << AddToken(token_file, token_name, RoleFromName(token_role), token_project)
                 << "\n";
+      if (is_fresh && ::geteuid() == 0) {
+        std::cerr << "color3d-server: note: " << token_file.string()
+                  << " is new and root's alone; let the service's user read it (chown)\n";
+      }
       return 0;
     }
     Serve(options);

@@ -124,11 +124,14 @@ std::string AddToken(const fs::path& file,
     throw InvalidArgument("'{}' is no name: 1 to 64 of letters, digits, '.', '-', '_' and '@'",
                           name.substr(0, 80));
   }
-  std::string text;
+  // Through a link, so that the link stays; alone, so that two at once do not lose one.
   std::error_code error;
-  const bool is_fresh = !fs::exists(file, error);
-  if (!is_fresh) {
-    text = ReadFile(file);
+  const fs::path real = fs::weakly_canonical(file, error);
+  const fs::path& target = error ? file : real;
+  const FolderLock lock(target.has_parent_path() ? target.parent_path() : fs::path("."));
+  std::string text;
+  if (fs::exists(target, error)) {
+    text = ReadFile(target);
     for (const TokenRecord& record : ParseTokens(text, file.string())) {
       if (record.name != name) continue;
       throw Error(ErrorCode::kAlreadyExists,
@@ -147,7 +150,7 @@ std::string AddToken(const fs::path& file,
                       project);
   const mode_t before = ::umask(0077);
   try {
-    WriteFileAtomic(file, text);
+    WriteFileAtomic(target, text);
   } catch (...) {
     ::umask(before);
     throw;

@@ -37,8 +37,9 @@ void CheckProject(const std::string& project);
 // Error{kInvalidArgument} naming file and line.
 std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file);
 
-// A fresh token of 256 random bits, of which the record is added to the file; a new file can be
-// read by its owner alone. Throws Error{kAlreadyExists} when the name is there.
+// A fresh token of 256 random bits, of which the record is added to the file, which keeps its owner
+// and rights; a new file can be read by its owner alone. Processes that add at the same time wait
+// for each other. Throws Error{kAlreadyExists} when the name is there.
 std::string AddToken(const std::filesystem::path& file,
                      const std::string& name,
                      Role role,
