@@ -60,6 +60,16 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--tls-client-ca",
                     options->tls_client_ca,
                     "PEM file: clients must show a certificate that one of these signed");
+  serve->add_option("--certificate-roles",
+                    options->certificate_roles,
+                    "File of what clients may do by their certificate: lines NAME ROLE [PROJECT], "
+                    "'*' for any name; read again when it changes");
+  serve
+      ->add_option("--max-connections",
+                   options->max_connections,
+                   "Connections that may be open; fewer where the limit of open files is lower")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
   serve->add_option(
       "--tokens",
       options->tokens,
@@ -142,6 +152,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--max-attempts", options->max_attempts)->group("");
   serve->add_option("--stop-grace-seconds", options->stop_grace_seconds)->group("");
   serve->add_option("--worker-backoff-ms", options->worker_backoff_ms)->group("");
+  serve->add_option("--probe-seconds", options->probe_seconds)->group("");
 }
 
 // Flags win over the environment.
@@ -295,7 +306,7 @@ int Main(int argc, char** argv) {
     return 0;
   } catch (const Error& e) {
     std::cerr << "color3d-server: " << e.what() << "\n";
-    return 2;
+    return e.code() == ErrorCode::kUnavailable ? 1 : 2;  // 1: another try may help
   } catch (const std::exception& e) {
     std::cerr << "color3d-server: unexpected: " << e.what() << "\n";
     return 1;

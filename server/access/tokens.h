@@ -2,13 +2,13 @@
 // nowhere on the server. Functions are pure but for the files that they name.
 #pragma once
 
-#include <chrono>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "server/access/guarded_file.h"
 
 namespace color3d {
 
@@ -57,13 +57,8 @@ class TokenBook {
   std::optional<TokenRecord> Find(std::string_view token);
 
  private:
-  void ReadAgain();
-
-  const std::filesystem::path file_;
-  std::mutex mutex_;
   std::vector<TokenRecord> records_;
-  std::string identity_;  // of the file that was read
-  std::chrono::steady_clock::time_point next_look_;
+  GuardedFile file_;  // the last: it fills the records
 };
 
 }  // namespace color3d

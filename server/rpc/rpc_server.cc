@@ -57,7 +57,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                                   {"uploads", options.limits.max_writes, of_project},
                                   {"live streams", options.live.max_streams, of_project}});
   memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
-  access_ = std::make_unique<Access>(options.tokens);
+  access_ = std::make_unique<Access>(options.tokens, options.certificates);
   parts_.reset(new RpcParts{store,
                             blobs,
                             uploads,

@@ -28,7 +28,9 @@ struct RpcServerOptions {
   int slow_threads = 6;
   int bulk_threads = 6;
   std::shared_ptr<grpc::ServerCredentials> credentials;  // null: in the clear
-  std::shared_ptr<TokenBook> tokens;                     // null: nobody is asked
+  // Both null: nobody is asked.
+  std::shared_ptr<TokenBook> tokens;
+  std::shared_ptr<CertificateRoles> certificates;
   ServiceLimits limits;
   int max_connections = 4096;  // fewer where the process may not have so many descriptors
   WatchTiming watch;
