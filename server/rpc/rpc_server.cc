@@ -52,10 +52,13 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   slow_ = std::make_unique<Executor>(options.slow_threads);
   bulk_ = std::make_unique<Executor>(options.bulk_threads);
   const int of_project = options.limits.project_max_streams;
-  streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project},
-                                  {"downloads", options.limits.max_reads, of_project},
-                                  {"uploads", options.limits.max_writes, of_project},
-                                  {"live streams", options.live.max_streams, of_project}});
+  // Without tokens and roles there is one project alone.
+  const bool shared = options.tokens != nullptr || options.certificates != nullptr;
+  streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project, shared},
+                                  {"downloads", options.limits.max_reads, of_project, shared},
+                                  {"uploads", options.limits.max_writes, of_project, shared},
+                                  {"live streams", options.live.max_streams, of_project, shared}});
+  silence_ = std::make_unique<SilenceWatch>(options.limits.stream_silence);
   memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
   access_ = std::make_unique<Access>(options.tokens, options.certificates);
   parts_.reset(new RpcParts{store,
@@ -65,6 +68,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             *slow_,
                             *bulk_,
                             *streams_,
+                            *silence_,
                             *memory_,
                             *access_,
                             draining_,

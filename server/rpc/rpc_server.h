@@ -80,6 +80,7 @@ class RpcServer {
   std::unique_ptr<FileDigests> digests_;
   std::unique_ptr<Executor> quick_, slow_, bulk_;
   std::unique_ptr<StreamLimits> streams_;
+  std::unique_ptr<SilenceWatch> silence_;
   std::unique_ptr<CallMemory> memory_;
   std::unique_ptr<Access> access_;
   std::unique_ptr<RpcParts> parts_;
