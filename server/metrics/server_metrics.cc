@@ -268,7 +268,16 @@ int ServerMetrics::Listen(const std::string& address,
                           const BlobStore& blobs,
                           std::function<ServerSample()> sample) {
   try {
-    parts_->exposer = std::make_unique<prometheus::Exposer>(address);
+    // Who says nothing is given up soon, and takes one of several threads meanwhile.
+    parts_->exposer =
+        std::make_unique<prometheus::Exposer>(std::vector<std::string>{"listening_ports",
+                                                                       address,
+                                                                       "num_threads",
+                                                                       "8",
+                                                                       "request_timeout_ms",
+                                                                       "500",
+                                                                       "enable_keep_alive",
+                                                                       "no"});
   } catch (const std::runtime_error&) {  // it does not say why
     throw Error(
         ErrorCode::kFailedPrecondition,

@@ -24,7 +24,8 @@ std::string HostOf(const std::string& address) {
   const HostPort parts = SplitHostPort(address);
   const bool everywhere = parts.host == "0.0.0.0" || parts.host == "::";
   const std::string host = everywhere ? "127.0.0.1" : parts.host;
-  return fmt::format(host.find(':') == std::string::npos ? "{}:{}" : "[{}]:{}", host, parts.port);
+  const bool is_v6 = host.find(':') != std::string::npos;
+  return (is_v6 ? "[" + host + "]" : host) + ":" + parts.port;
 }
 
 }  // namespace
