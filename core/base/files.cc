@@ -70,7 +70,7 @@ void SyncFolder(const fs::path& folder) {
   if (fd.get() >= 0) ::fsync(fd.get());
 }
 
-FolderLock::FolderLock(const fs::path& folder)
+FolderTurn::FolderTurn(const fs::path& folder)
     : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (fd_ < 0) ThrowErrno("cannot open the folder", folder);
   while (::flock(fd_, LOCK_EX) != 0) {
@@ -82,7 +82,7 @@ FolderLock::FolderLock(const fs::path& folder)
   }
 }
 
-FolderLock::~FolderLock() { ::close(fd_); }
+FolderTurn::~FolderTurn() { ::close(fd_); }
 
 std::string ReadFile(const fs::path& path, int64_t max_bytes) {
   FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));

@@ -20,12 +20,12 @@ void WriteFileAtomic(const std::filesystem::path& path, std::string_view bytes);
 
 // The only one of all processes that holds this on the folder: for changes that read a file and
 // write it anew. Waits for its turn. Throws Error when the folder cannot be opened or locked.
-class FolderLock {
+class FolderTurn {
  public:
-  explicit FolderLock(const std::filesystem::path& folder);
-  ~FolderLock();
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
+  explicit FolderTurn(const std::filesystem::path& folder);
+  ~FolderTurn();
+  FolderTurn(const FolderTurn&) = delete;
+  FolderTurn& operator=(const FolderTurn&) = delete;
 
  private:
   int fd_ = -1;

@@ -104,7 +104,7 @@ std::string AddToken(const fs::path& file,
   std::error_code error;
   const fs::path real = fs::weakly_canonical(file, error);
   const fs::path& target = error ? file : real;
-  const FolderLock lock(target.has_parent_path() ? target.parent_path() : fs::path("."));
+  const FolderTurn turn(target.has_parent_path() ? target.parent_path() : fs::path("."));
   std::string text;
   if (fs::exists(target, error)) {
     text = ReadFile(target);

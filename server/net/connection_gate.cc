@@ -175,10 +175,12 @@ bool ConnectionGate::Accept(int listener) {
     }
     if (fd < 0) return true;  // EAGAIN: nobody waits
     if (!MakeRoom(fd)) {
-      ::close(fd);
       LogRefusal("all that may be open have calls");
-      std::lock_guard lock(mutex_);
-      ++counts_.refused;
+      {
+        std::lock_guard lock(mutex_);
+        ++counts_.refused;
+      }
+      ::close(fd);
       continue;
     }
     epoll_event event{};

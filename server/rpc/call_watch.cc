@@ -1,5 +1,6 @@
 #include "server/rpc/call_watch.h"
 
+#include <grpcpp/server_context.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
