@@ -121,7 +121,7 @@ public core/stage stages film/import_film formats/artifacts
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
-public server/access notify_targets tls tokens
+public server/access certificate_roles notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
