@@ -299,8 +299,9 @@ void Serve(const ServeOptions& options) {
   probe_timing.pause = Milliseconds(options.probe_seconds);
   const auto probe = std::make_unique<SelfProbe>(
       probe_timing,
-      [&server, &tls](std::chrono::milliseconds limit) {
-        return ProbeOurselves(server, tls, limit);
+      [&](std::chrono::milliseconds limit) {
+        const std::string why = ProbeOurselves(server, tls, limit);
+        return draining ? "" : why;  // who drains closes his port, too
       },
       [&](const std::string& why) {
         if (draining) return;

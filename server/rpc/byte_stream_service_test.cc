@@ -159,6 +159,8 @@ class SilentStreamsTest : public RpcTest {
     options.limits.stream_silence = std::chrono::milliseconds(300);
     options.limits.max_writes = 4;
     options.limits.max_reads = 4;
+    options.live.silence = std::chrono::milliseconds(300);
+    options.inference.target = "unix:" + (scratch_.path() / "nobody").string();
     impatient_ = std::make_unique<RpcServer>(options, store_, blobs_, uploads_, SystemClock());
     other_ = std::make_unique<TestClient>(impatient_->address());
   }
@@ -225,6 +227,16 @@ TEST_F(SilentStreamsTest, ADownloadThatNobodyReadsGivesItsPlaceBack) {
     }
     EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
   }
+}
+
+TEST_F(SilentStreamsTest, ALiveStreamToWhichNoPictureComesEnds) {
+  grpc::ClientContext context;
+  const auto stream = other_->colorizers->ColorizeImages(&context);
+  v1::ColorizeImagesResponse response;
+  EXPECT_FALSE(stream->Read(&response));
+  const grpc::Status status = stream->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE) << status.error_message();
+  EXPECT_EQ(ReasonOfStatus(status), "STREAM_SILENT");
 }
 
 }  // namespace

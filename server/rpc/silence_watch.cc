@@ -24,10 +24,10 @@ void SilenceWatch::Loop() {
       std::clamp(limit_ / 10, std::chrono::milliseconds(10), std::chrono::milliseconds(1'000));
   std::unique_lock lock(mutex_);
   while (!wake_.wait_for(lock, tick, [this] { return stopping_; })) {
-    const auto long_ago = std::chrono::steady_clock::now() - limit_;
+    const auto now = std::chrono::steady_clock::now();
     std::vector<std::function<void()>> calls;
     for (Stream* stream : streams_) {
-      if (!stream->waiting_ || stream->silent_ || stream->since_ > long_ago) continue;
+      if (!stream->waiting_ || stream->silent_ || now - stream->since_ < stream->limit_) continue;
       stream->silent_ = true;
       calls.push_back(stream->on_silence_);
     }
@@ -37,8 +37,12 @@ void SilenceWatch::Loop() {
   }
 }
 
-SilenceWatch::Stream::Stream(SilenceWatch& watch, std::function<void()> on_silence)
-    : watch_(watch), on_silence_(std::move(on_silence)) {
+SilenceWatch::Stream::Stream(SilenceWatch& watch,
+                             std::function<void()> on_silence,
+                             std::chrono::milliseconds limit)
+    : watch_(watch),
+      on_silence_(std::move(on_silence)),
+      limit_(limit.count() > 0 ? limit : watch.limit_) {
   std::lock_guard lock(watch_.mutex_);
   watch_.streams_.insert(this);
 }

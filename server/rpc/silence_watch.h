@@ -26,8 +26,11 @@ class SilenceWatch {
   class Stream {
    public:
     // `on_silence` is called at most once, without a lock, on the watch's thread; from then on the
-    // stream is over, and only `on_silence` may let this be destroyed.
-    Stream(SilenceWatch& watch, std::function<void()> on_silence);
+    // stream is over, and only `on_silence` may let what it uses be destroyed.
+    // `limit` 0: the watch's own.
+    Stream(SilenceWatch& watch,
+           std::function<void()> on_silence,
+           std::chrono::milliseconds limit = std::chrono::milliseconds(0));
     ~Stream();
     Stream(const Stream&) = delete;
     Stream& operator=(const Stream&) = delete;
@@ -41,6 +44,7 @@ class SilenceWatch {
     friend class SilenceWatch;
     SilenceWatch& watch_;
     const std::function<void()> on_silence_;
+    const std::chrono::milliseconds limit_;
     bool waiting_ = false, silent_ = false;
     std::chrono::steady_clock::time_point since_;
   };
