@@ -18,7 +18,7 @@ packages=(
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus systemd
     python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
   --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;
   *) echo "install-deps: unknown option $1; there are --tests and --fuzz" >&2; exit 2 ;;

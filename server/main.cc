@@ -60,6 +60,16 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--tls-client-ca",
                     options->tls_client_ca,
                     "PEM file: clients must show a certificate that one of these signed");
+  serve->add_option("--certificate-roles",
+                    options->certificate_roles,
+                    "File of what clients may do by their certificate: lines NAME ROLE [PROJECT], "
+                    "'*' for any name; read again when it changes");
+  serve
+      ->add_option("--max-connections",
+                   options->max_connections,
+                   "Connections that may be open; fewer where the limit of open files is lower")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
   serve->add_option(
       "--tokens",
       options->tokens,
@@ -151,6 +161,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--max-attempts", options->max_attempts)->group("");
   serve->add_option("--stop-grace-seconds", options->stop_grace_seconds)->group("");
   serve->add_option("--worker-backoff-ms", options->worker_backoff_ms)->group("");
+  serve->add_option("--probe-seconds", options->probe_seconds)->group("");
 }
 
 // Flags win over the environment.
@@ -310,15 +321,21 @@ int Main(int argc, char** argv) {
   try {
     if (keeping.run) return keeping.run();
     if (token->parsed()) {
+      std::error_code error;
+      const bool is_fresh = !std::filesystem::exists(token_file, error);
       std::cout << AddToken(token_file, token_name, RoleFromName(token_role), token_project)
                 << "\n";
+      if (is_fresh && ::geteuid() == 0) {
+        std::cerr << "color3d-server: note: " << token_file.string()
+                  << " is new and root's alone; let the service's user read it (chown)\n";
+      }
       return 0;
     }
     Serve(options);
     return 0;
   } catch (const Error& e) {
     std::cerr << "color3d-server: " << e.what() << "\n";
-    return 2;
+    return e.code() == ErrorCode::kUnavailable ? 1 : 2;  // 1: another try may help
   } catch (const std::exception& e) {
     std::cerr << "color3d-server: unexpected: " << e.what() << "\n";
     return 1;

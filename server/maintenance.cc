@@ -1,6 +1,5 @@
 #include "server/maintenance.h"
 
-#include <signal.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/folder_walk.h"
+#include "server/ops/process_state.h"
 #include "server/storage/collector.h"
 
 namespace color3d {
@@ -24,7 +24,7 @@ bool IsRetryableLater(const Error& error) {
 
 void ExpireDeadWorkers(JobStore& store) {
   for (const WorkerRecord& worker : store.ListWorkers()) {
-    if (::kill(static_cast<pid_t>(worker.pid), 0) == 0 || errno != ESRCH) continue;
+    if (IsRunning(static_cast<pid_t>(worker.pid))) continue;
     try {
       for (const std::string& job : store.ExpireLeasesOf(worker.worker_id)) {
         spdlog::info("[job={}] its worker {} is gone", job, worker.worker_id);

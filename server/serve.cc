@@ -15,6 +15,7 @@
 #include "core/base/address.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "server/access/certificate_roles.h"
 #include "server/access/notify_targets.h"
 #include "server/access/tls.h"
 #include "server/access/tokens.h"
@@ -22,11 +23,15 @@
 #include "server/backends/backend_prober.h"
 #include "server/maintenance.h"
 #include "server/metrics/server_metrics.h"
+#include "server/net/descriptors.h"
+#include "server/net/port_probe.h"
+#include "server/net/self_probe.h"
 #include "server/notify/notifier.h"
 #include "server/notify/webhook.h"
 #include "server/ops/notify.h"
 #include "server/ops/process.h"
 #include "server/ops/socket_folder.h"
+#include "server/ops/stop_signals.h"
 #include "server/rpc/rpc_server.h"
 #include "server/storage/ballast.h"
 #include "server/storage/data_folder.h"
@@ -38,6 +43,10 @@
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
+
+constexpr int64_t kFewDescriptors = 4096;
+// Beyond the time in which a worker drains.
+constexpr double kOrphanSeconds = 10.0;
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
@@ -56,13 +65,27 @@ void CheckOptions(const ServeOptions& options) {
                 "--metrics-listen 127.0.0.1:PORT, or --insecure-any-address in a network you trust",
                 options.metrics_listen);
   }
+  if (!options.certificate_roles.empty() && options.tls_client_ca.empty()) {
+    throw InvalidArgument(
+        "--certificate-roles needs --tls-client-ca: no client shows a certificate");
+  }
+  if (!options.tls_client_ca.empty() && options.certificate_roles.empty() &&
+      options.tokens.empty()) {
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "refusing to let every certificate of {} drain the server and see all projects; say "
+        "who may what with --certificate-roles FILE (lines NAME ROLE [PROJECT]; '* submit' "
+        "for all others), or give --tokens",
+        options.tls_client_ca.string());
+  }
   const bool is_safe = !options.tls_certificate.empty() &&
                        (!options.tokens.empty() || !options.tls_client_ca.empty());
   if (!IsLoopback(options.listen) && !is_safe && !options.insecure_any_address) {
     throw Error(
         ErrorCode::kFailedPrecondition,
         "refusing to listen on {}: anybody who reaches the port could use it, or read along; "
-        "give --tls-cert, --tls-key and --tokens (or --tls-client-ca), listen on 127.0.0.1, "
+        "give --tls-cert, --tls-key and --tokens (or --tls-client-ca and --certificate-roles), "
+        "listen on 127.0.0.1, "
         "or say --insecure-any-address in a network you trust",
         options.listen);
   }
@@ -172,6 +195,7 @@ ServerSample SampleOf(const ServeOptions& options,
                       const RpcServer& server,
                       const Maintenance& maintenance,
                       const BlobStore& blobs,
+                      const SelfProbe& probe,
                       bool draining) {
   const RpcServer::Open open = server.open();
   const ChoreCounts& counts = maintenance.counts();
@@ -181,11 +205,18 @@ ServerSample SampleOf(const ServeOptions& options,
   sample.uploads = open.uploads;
   sample.live_pictures = open.live_pictures;
   sample.draining = draining;
+  sample.answering = probe.IsAnswering();
   sample.attempts_lost = counts.attempts_lost;
   sample.blobs_removed = counts.blobs_removed;
   sample.blobs_damaged = blobs.damaged();
   sample.jobs_expired = counts.jobs_expired;
   sample.sweeps_failed = counts.sweeps_failed;
+  const ConnectionGate::Counts connections = server.connections();
+  sample.connections = connections.open;
+  sample.silent_connections = connections.silent;
+  sample.max_connections = connections.max;
+  sample.connections_closed = connections.closed;
+  sample.connections_refused = connections.refused;
   sample.reserve_bytes = options.reserve_mib << 20;
   if (!options.tls_certificate.empty()) {
     sample.certificate_end_s = CertificateEnd(options.tls_certificate);
@@ -193,37 +224,24 @@ ServerSample SampleOf(const ServeOptions& options,
   return sample;
 }
 
-// Blocks the stop signals for all threads that start later, and waits for them here.
-class StopSignals {
- public:
-  StopSignals() {
-    ::sigemptyset(&signals_);
-    ::sigaddset(&signals_, SIGTERM);
-    ::sigaddset(&signals_, SIGINT);
-    ::pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
-    ::signal(SIGPIPE, SIG_IGN);
-  }
-  void Wait() const {
-    int signal = 0;
-    ::sigwait(&signals_, &signal);
-  }
-  // The second signal ends the process at once; its workers then drain by themselves.
-  void ExitOnNext() const {
-    std::thread([signals = signals_] {
-      int signal = 0;
-      ::sigwait(&signals, &signal);
-      ::_exit(1);
-    }).detach();
-  }
-
- private:
-  sigset_t signals_;
-};
+// As a client would find us. While there is no room for it the gate has spoken for itself.
+std::string ProbeOurselves(const RpcServer& server,
+                           const TlsFiles& tls,
+                           std::chrono::milliseconds limit) {
+  const int64_t refused = server.connections().refused;
+  const std::string why = ProbePort({server.address(), !tls.empty()}, limit);
+  return server.connections().refused == refused ? why : "";
+}
 
 }  // namespace
 
 void Serve(const ServeOptions& options) {
   SetUpLog("server", options.log_level, options.log_format, {});
+  if (RaiseDescriptorLimit() < kFewDescriptors) {
+    spdlog::warn("only {} files and connections may be open (ulimit -n); raise it to {} or more",
+                 DescriptorLimit(),
+                 kFewDescriptors);
+  }
   CheckOptions(options);
   const UserModels models = ParseUserModels(options.models, options.backends);
   RequireReadable(models);
@@ -236,6 +254,8 @@ void Serve(const ServeOptions& options) {
   const DataPaths paths(options.data_folder);
   PrepareDataFolder(paths);
   const DataFolderLock lock(paths);
+  worker_setup.orphans = std::make_shared<OrphanedWorkers>(
+      paths.root, Milliseconds(options.drain_seconds + kOrphanSeconds));
   const SocketFolder sockets(paths.Sockets());
   const Clock clock = SystemClock();
   StoreOptions store_options;
@@ -267,6 +287,10 @@ void Serve(const ServeOptions& options) {
   const TlsFiles tls{options.tls_certificate, options.tls_key, options.tls_client_ca};
   if (!tls.empty()) rpc.credentials = MakeServerCredentials(tls);
   if (!options.tokens.empty()) rpc.tokens = std::make_shared<TokenBook>(options.tokens);
+  if (!options.certificate_roles.empty()) {
+    rpc.certificates = std::make_shared<CertificateRoles>(options.certificate_roles);
+  }
+  rpc.max_connections = options.max_connections;
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
   ExpireDeadWorkers(store);
 
@@ -275,49 +299,79 @@ void Serve(const ServeOptions& options) {
     metrics.CountCall(method, StatusName(code), seconds);
   };
   RpcServer server(rpc, store, blobs, uploads, clock);
+  std::atomic<bool> draining{false};
+  std::string deaf;  // why, once the server does not answer any more
+  SelfProbeTiming probe_timing;
+  probe_timing.pause = Milliseconds(options.probe_seconds);
+  const auto probe = std::make_unique<SelfProbe>(
+      probe_timing,
+      [&](std::chrono::milliseconds limit) {
+        const std::string why = ProbeOurselves(server, tls, limit);
+        return draining ? "" : why;  // who drains closes his port, too
+      },
+      [&](const std::string& why) {
+        if (draining) return;
+        deaf = why;
+        ::kill(::getpid(), SIGTERM);
+      });
   if (!options.port_file.empty()) WriteFileAtomic(options.port_file, server.address() + "\n");
   MaintenanceTiming chores;
   chores.reap = std::clamp(Milliseconds(options.lease_seconds / 10.0),
                            std::chrono::milliseconds(100),
                            std::chrono::milliseconds(5'000));
-  // No sign of life while the store cannot be read: systemd's watchdog then starts us anew.
+  // No sign of life while the store cannot be read, or nobody would be answered: systemd's watchdog
+  // then starts us anew.
   chores.keep_jobs = std::chrono::hours(24) * options.keep_days;
   chores.keep_uncommitted = std::chrono::hours(24) * options.keep_uncommitted_days;
   chores.low_space_bytes = options.low_space_mib << 20;
   chores.ballast = &ballast;
   chores.reserve_bytes = options.reserve_mib << 20;
-  chores.on_life = [] { NotifyServiceManager("WATCHDOG=1"); };
+  chores.on_life = [&probe] {
+    if (probe->IsAnswering()) NotifyServiceManager("WATCHDOG=1");
+  };
   Maintenance maintenance(store, blobs, uploads, paths, clock, chores);
   std::optional<Notifier> notifier;
   if (!options.notify_allow.empty()) notifier.emplace(store, clock, notify);
   Supervisor supervisor(worker_setup, store);
-  std::atomic<bool> draining{false};
   const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });
   if (!options.metrics_listen.empty()) {
     const int port = metrics.Listen(options.metrics_listen, store, blobs, [&] {
-      return SampleOf(options, server, maintenance, blobs, draining);
+      return SampleOf(options, server, maintenance, blobs, *probe, draining);
     });
     spdlog::info("metrics on port {}", port);
   }
   spdlog::info("listening on {}{}{}, data in {}, {} workers",
                server.address(),
                tls.empty() ? "" : " with TLS",
-               options.tokens.empty() ? "" : ", for those with a token",
+               options.tokens.empty() && options.certificate_roles.empty()
+                   ? ""
+                   : ", for those with a token or a role",
                paths.root.string(),
                options.workers);
 
   NotifyServiceManager("READY=1");
 
-  signals.Wait();
+  signals.Wait([] {
+    spdlog::info(
+        "SIGHUP: tokens, roles and certificates are read again by themselves; whatever else "
+        "changed "
+        "needs a restart");
+  });
+  draining = true;
   NotifyServiceManager("STOPPING=1");
   spdlog::info("draining: no new jobs, running ones are saved and released");
   signals.ExitOnNext();
-  draining = true;
   server.StartDraining();
   supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
   supervisor.Wait();
   server.Shutdown(Milliseconds(std::min(2.0, options.drain_seconds * 0.1)));
   spdlog::info("ended");
+  if (!deaf.empty()) {
+    throw Error(ErrorCode::kUnavailable,
+                "ended, because nobody was answered on {} any more ({}); start it again",
+                server.address(),
+                deaf);
+  }
 }
 
 }  // namespace color3d

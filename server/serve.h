@@ -14,6 +14,9 @@ struct ServeOptions {
   // PEM files; a certificate and its key: TLS. A client CA: clients must show a certificate, too.
   std::filesystem::path tls_certificate, tls_key, tls_client_ca;
   std::filesystem::path tokens;  // empty: nobody is asked for one
+  // What the certificates of tls_client_ca may; empty: it needs tokens.
+  std::filesystem::path certificate_roles;
+  int max_connections = 4096;
   std::filesystem::path data_folder;
   std::filesystem::path port_file;  // empty: none
   int workers = 1;
@@ -48,10 +51,12 @@ struct ServeOptions {
   int64_t retry_backoff_ms = 2'000;
   int max_attempts = 3;
   double stop_grace_seconds = 60.0;
+  double probe_seconds = 10.0;  // between two looks whether the server answers
   int64_t worker_backoff_ms = 10'000;
 };
 
-// Returns after a drain. Throws Error for what the user can mend (exit status 2).
+// Returns after a drain. Throws Error for what the user can mend (exit status 2), and
+// Error{kUnavailable} when it ended because nobody was answered any more (exit status 1).
 void Serve(const ServeOptions& options);
 
 }  // namespace color3d

@@ -2,7 +2,7 @@
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
 #           <- {keyview, augment, carry, splat, metrics, report, video, view, matching <- {keycolor, colorizer}} <- stage
-#   server: store <- {planning, storage} <- rpc; backends and worker beside it; client apart from all.
+#   server: store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers and SQL never below the server. What tests
 # (*_test.cc) set up is not held against their folder; the product never includes tests/.
 set -euo pipefail
@@ -71,10 +71,11 @@ allow server/keeping 'core/base|server/(store|storage|keeping)'
 allow server/planning 'core/(base|catalogue)|server/(store|planning)'
 allow server/access 'core/base|server/access'
 allow server/notify 'core/base|server/(access|store|ops|notify)'
-allow server/metrics 'core/base|server/(store|storage|metrics)'
+allow server/metrics 'core/base|server/(net|store|storage|metrics)'
 allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
-allow server/rpc 'core/(base|catalogue|image/probe)|server/(access|store|planning|storage|ops|rpc)'
+allow server/net 'core/base|server/net'
+allow server/rpc 'core/(base|catalogue|image/probe)|server/(access|net|store|planning|storage|ops|rpc)'
 allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
@@ -120,7 +121,7 @@ public core/stage stages film/import_film formats/artifacts
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
-public server/access notify_targets tls tokens
+public server/access certificate_roles notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics

@@ -2,12 +2,14 @@
 
 #include <fmt/core.h>
 #include <google/protobuf/util/json_util.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <iostream>
 
 #include "client/lib/rpc_error.h"
 #include "core/base/error.h"
+#include "core/base/utf8.h"
 
 namespace color3d::client {
 namespace {
@@ -16,7 +18,7 @@ constexpr size_t kMaxViolations = 10;
 
 void PrintError(const Context& context, const std::string& code, const std::string& message) {
   if (message.empty()) return;
-  std::cerr << "color3d: " << message << std::endl;
+  std::cerr << "color3d: " << EscapeControls(message, Lines::kMany) << std::endl;
   if (context.json) PrintJson({{"error", {{"code", code}, {"message", message}}}});
 }
 
@@ -37,11 +39,17 @@ std::string WithViolations(const RpcError& error) {
 
 }  // namespace
 
-void PrintText(const std::string& text) { std::cout << text << std::flush; }
+void PrintText(const std::string& text) {
+  static const bool is_terminal = ::isatty(STDOUT_FILENO) == 1;
+  std::cout << (is_terminal ? EscapeControls(text, Lines::kMany) : text) << std::flush;
+}
 
 void PrintJson(const nlohmann::ordered_json& value) {
-  // Names that are not UTF-8 must not stop the answer.
-  std::cout << value.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
+  // Names that are not UTF-8 must not stop the answer. For a terminal ASCII alone: it finds no
+  // control character there.
+  const bool is_terminal = ::isatty(STDOUT_FILENO) == 1;
+  std::cout << value.dump(2, ' ', is_terminal, nlohmann::json::error_handler_t::replace)
+            << std::endl;
 }
 
 nlohmann::ordered_json ToJson(const google::protobuf::Message& message) {
@@ -61,7 +69,7 @@ nlohmann::ordered_json ToJson(const google::protobuf::Message& message) {
 void PrintJson(const google::protobuf::Message& message) { PrintJson(ToJson(message)); }
 
 void PrintNote(const Context& context, const std::string& text) {
-  if (!context.json) std::cerr << "color3d: note: " << text << std::endl;
+  if (!context.json) std::cerr << "color3d: note: " << EscapeControls(text) << std::endl;
 }
 
 ExitCode ReportException(const Context& context, const std::exception& exception) {

@@ -11,6 +11,7 @@
 
 namespace color3d::client {
 
+// On a terminal nothing but line ends and tabs controls it: names and messages are a server's.
 void PrintText(const std::string& text);
 void PrintJson(const nlohmann::ordered_json& value);
 // Protobuf's JSON mapping, with fields that have their default value.

@@ -216,17 +216,22 @@ ExitCode RunLog(const Context& context, const std::string& name, bool follow) {
   request.set_name(ResourceName(name, "jobs"));
   request.set_follow(follow);
   Backoff backoff;
+  std::string rest;  // of a line that is not whole yet
   while (true) {
     grpc::ClientContext call;
     const auto stream = connection.jobs().ReadJobLog(&call, request);
     v1::JobLogChunk chunk;
     while (stream->Read(&chunk)) {
-      std::cout << chunk.data() << std::flush;
+      rest += chunk.data();
+      const size_t whole = rest.rfind('\n') + 1;  // 0: no line is
+      PrintText(rest.substr(0, whole));
+      rest.erase(0, whole);
       request.set_offset(chunk.offset() + static_cast<int64_t>(chunk.data().size()));
       backoff.Reset();
       if (context.interrupt->IsCancelled()) return ExitCode::kDetached;
     }
     const grpc::Status status = stream->Finish();
+    if (status.ok()) PrintText(rest);
     if (status.ok()) return ExitCode::kOk;
     const RpcError error(status);
     if (!error.IsTransient() || !backoff.Wait(*context.interrupt, error.RetryDelay())) throw error;

@@ -10,6 +10,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/text.h"
 #include "core/base/error.h"
+#include "core/base/utf8.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {
@@ -88,7 +89,7 @@ void ProgressDisplay::OnTransfer(const std::string& what, int64_t done, int64_t 
 void ProgressDisplay::Say(const std::string& line) {
   if (quiet_) return;
   Clear();
-  std::cerr << line << std::endl;
+  std::cerr << EscapeControls(line) << std::endl;
   last_ = steady_clock::now();
 }
 
@@ -97,10 +98,10 @@ void ProgressDisplay::Draw(const std::string& line) {
   if (quiet_ || steady_clock::now() - last_ < interval) return;
   last_ = steady_clock::now();
   if (!terminal_) {
-    std::cerr << line << std::endl;
+    std::cerr << EscapeControls(line) << std::endl;
     return;
   }
-  std::cerr << "\r\033[K" << line << std::flush;
+  std::cerr << "\r\033[K" << EscapeControls(line) << std::flush;
   drawn_ = true;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <ctime>
 
+#include "core/base/utf8.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {
@@ -159,8 +160,11 @@ std::string ShellLine(const std::vector<std::string>& arguments) {
   return line;
 }
 
-std::string Table(const std::vector<std::vector<std::string>>& rows) {
+std::string Table(std::vector<std::vector<std::string>> rows) {
   std::vector<size_t> widths;
+  for (auto& row : rows) {
+    for (std::string& cell : row) cell = EscapeControls(cell);
+  }
   for (const auto& row : rows) {
     widths.resize(std::max(widths.size(), row.size()), 0);
     for (size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());

@@ -31,7 +31,8 @@ std::string EndLine(const v1::Job& job);
 // A line that a POSIX shell reads as these arguments.
 std::string ShellLine(const std::vector<std::string>& arguments);
 
-// Columns padded to the widest cell, two spaces between; the first row is the heading.
-std::string Table(const std::vector<std::vector<std::string>>& rows);
+// Columns padded to the widest cell, two spaces between; the first row is the heading. A cell is
+// one line, whatever it holds (EscapeControls).
+std::string Table(std::vector<std::vector<std::string>> rows);
 
 }  // namespace color3d::client

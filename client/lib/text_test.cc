@@ -89,6 +89,8 @@ TEST(Text, ShellLineQuotesWhatNeedsIt) {
 
 TEST(Text, TablesAlign) {
   EXPECT_EQ(Table({{"NAME", "STATE"}, {"jobs/1", "X"}}), "NAME    STATE\njobs/1  X\n");
+  EXPECT_EQ(Table({{"A"}, {"x\njobs/2\x1b[2J"}}), "A\nx\\njobs/2\\x1b[2J\n")
+      << "a name must not be a row of its own, or reach the terminal";
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -47,12 +48,41 @@ class FileDescriptor {
   int fd_;
 };
 
+// The new file's rights and owner become those of the file that it will replace. Who may not give
+// files away keeps the file as his own, and only the rights.
+void TakeAfter(int fd, const fs::path& replaced) {
+  struct stat before {
+  }, now{};
+  if (::stat(replaced.c_str(), &before) != 0 || !S_ISREG(before.st_mode)) return;
+  if (::fstat(fd, &now) != 0) return;
+  if (before.st_uid != now.st_uid || before.st_gid != now.st_gid) {
+    // Not both at once: the group can often be kept where the owner cannot.
+    [[maybe_unused]] const int group = ::fchown(fd, static_cast<uid_t>(-1), before.st_gid);
+    [[maybe_unused]] const int owner = ::fchown(fd, before.st_uid, static_cast<gid_t>(-1));
+  }
+  if (::fchmod(fd, before.st_mode & 0777) != 0) ThrowErrno("cannot set the rights of", replaced);
+}
+
 }  // namespace
 
 void SyncFolder(const fs::path& folder) {
   FileDescriptor fd(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (fd.get() >= 0) ::fsync(fd.get());
 }
+
+FolderTurn::FolderTurn(const fs::path& folder)
+    : fd_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (fd_ < 0) ThrowErrno("cannot open the folder", folder);
+  while (::flock(fd_, LOCK_EX) != 0) {
+    if (errno == EINTR) continue;
+    const int error = errno;
+    ::close(fd_);
+    errno = error;
+    ThrowErrno("cannot lock the folder", folder);
+  }
+}
+
+FolderTurn::~FolderTurn() { ::close(fd_); }
 
 std::string ReadFile(const fs::path& path, int64_t max_bytes) {
   FileDescriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
@@ -99,6 +129,7 @@ void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
     {
       FileDescriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
       if (fd.get() < 0) ThrowErrno("cannot create", temporary);
+      TakeAfter(fd.get(), path);
       size_t done = 0;
       while (done < bytes.size()) {
         const ssize_t put = ::write(fd.get(), bytes.data() + done, bytes.size() - done);

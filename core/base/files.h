@@ -13,9 +13,23 @@ namespace color3d {
 // `max_bytes`.
 std::string ReadFile(const std::filesystem::path& path, int64_t max_bytes = int64_t{1} << 34);
 
-// Replaces `path` atomically and durably. Throws Error{kResourceExhausted} when the disk is full,
-// kFailedPrecondition when the folder cannot be written.
+// Replaces `path` atomically and durably; a file that is there keeps its rights, and its owner and
+// group where this process may give files away. Throws Error{kResourceExhausted} when the disk is
+// full, kFailedPrecondition when the folder cannot be written.
 void WriteFileAtomic(const std::filesystem::path& path, std::string_view bytes);
+
+// The only one of all processes that holds this on the folder: for changes that read a file and
+// write it anew. Waits for its turn. Throws Error when the folder cannot be opened or locked.
+class FolderTurn {
+ public:
+  explicit FolderTurn(const std::filesystem::path& folder);
+  ~FolderTurn();
+  FolderTurn(const FolderTurn&) = delete;
+  FolderTurn& operator=(const FolderTurn&) = delete;
+
+ private:
+  int fd_ = -1;
+};
 
 // Names that were made in the folder survive a power failure. Nothing happens where it cannot be
 // opened.

@@ -1,6 +1,8 @@
 #include "core/base/files.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <string>
@@ -22,6 +24,23 @@ TEST(Files, WriteIsAtomicAndReadable) {
   EXPECT_EQ(ReadFile(path), std::string("two\0three", 9));
   EXPECT_EQ(DigestFile(path).sha256, Sha256Hex(std::string("two\0three", 9)));
   EXPECT_EQ(ListFiles(scratch.path()), std::vector<std::string>{"value.bin"});
+}
+
+TEST(Files, AFileThatIsReplacedKeepsItsRightsAndOwner) {
+  ScratchFolder scratch;
+  const fs::path path = scratch.path() / "file";
+  WriteFileAtomic(path, "one");
+  for (const mode_t mode : {0600, 0640, 0664}) {
+    ASSERT_EQ(::chmod(path.c_str(), mode), 0);
+    const bool is_root = ::geteuid() == 0;
+    ASSERT_TRUE(!is_root || ::chown(path.c_str(), 1234, 1235) == 0);
+    WriteFileAtomic(path, "two");
+    struct stat status {};
+    ASSERT_EQ(::stat(path.c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 0777u, mode);
+    EXPECT_TRUE(!is_root || status.st_uid == 1234u);
+    EXPECT_TRUE(!is_root || status.st_gid == 1235u);
+  }
 }
 
 TEST(Files, ErrorsNameThePathAndLeaveNothing) {

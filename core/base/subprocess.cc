@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -13,9 +14,8 @@
 #include <string_view>
 #include <thread>
 
+#include "core/base/environment.h"
 #include "core/base/error.h"
-
-extern char** environ;
 
 namespace color3d {
 namespace {
@@ -36,24 +36,23 @@ std::string FindProgram(const std::string& name) {
   return "";
 }
 
-// What every program may know: no token, key or password is among it.
-bool IsHarmless(std::string_view variable) {
-  for (const std::string_view name : {"PATH=", "LANG=", "LC_", "TZ=", "LD_LIBRARY_PATH=", "OMP_"}) {
-    if (variable.starts_with(name)) return true;
-  }
-  return false;
+std::vector<char*> Pointers(std::vector<std::string>& texts) {
+  std::vector<char*> pointers;
+  for (std::string& text : texts) pointers.push_back(text.data());
+  pointers.push_back(nullptr);
+  return pointers;
 }
 
-std::vector<char*> Environment(const SubprocessOptions& options) {
-  std::vector<char*> environment;
-  for (const std::string& e : options.environment) {
-    environment.push_back(const_cast<char*>(e.c_str()));
+// What was given goes before what is handed on.
+std::vector<std::string> VariablesOf(const SubprocessOptions& options) {
+  std::vector<std::string> variables = options.environment;
+  for (const std::string& variable : EnvironmentToHandOn()) {
+    const std::string_view name = std::string_view(variable).substr(0, variable.find('=') + 1);
+    const bool given = std::ranges::any_of(
+        options.environment, [&](const std::string& own) { return own.starts_with(name); });
+    if (!given) variables.push_back(variable);
   }
-  for (char** e = environ; *e != nullptr; ++e) {
-    if (options.inherits_all || IsHarmless(*e)) environment.push_back(*e);
-  }
-  environment.push_back(nullptr);
-  return environment;
+  return variables;
 }
 
 std::unique_ptr<Sandbox> PrepareSandbox(const SubprocessOptions& options,
@@ -80,10 +79,10 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
                 options.arguments[0]);
   }
   // Everything the child needs is prepared before fork: only async-signal-safe calls after it.
-  std::vector<char*> arguments;
-  for (const std::string& a : options.arguments) arguments.push_back(const_cast<char*>(a.c_str()));
-  arguments.push_back(nullptr);
-  const std::vector<char*> environment = Environment(options);
+  std::vector<std::string> argument_texts = options.arguments;
+  const std::vector<char*> arguments = Pointers(argument_texts);
+  std::vector<std::string> variables = VariablesOf(options);
+  const std::vector<char*> environment = Pointers(variables);
   const std::unique_ptr<Sandbox> sandbox = PrepareSandbox(options, program);
   const std::string log = options.log_path.empty() ? "/dev/null" : options.log_path.string();
   const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);

@@ -16,10 +16,8 @@ namespace color3d {
 
 struct SubprocessOptions {
   std::vector<std::string> arguments;    // arguments[0] is looked up on PATH
-  std::vector<std::string> environment;  // "NAME=value", added to what it inherits
-  // Of ours: all, or only what tells where things are and which language is spoken.
-  bool inherits_all = true;
-  std::filesystem::path log_path;  // stdout and stderr are appended here; empty: discarded
+  std::vector<std::string> environment;  // "NAME=value", besides what is handed on (environment.h)
+  std::filesystem::path log_path;        // stdout and stderr are appended here; empty: discarded
   std::chrono::seconds timeout{3600};
   ProcessLimits limits;
   std::optional<SandboxRules> sandbox;  // the program itself may be read besides

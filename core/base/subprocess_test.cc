@@ -119,7 +119,6 @@ TEST(Subprocess, TokensAreNotHandedOn) {
   SubprocessOptions options;
   options.arguments = {"env"};
   options.environment = {"GIVEN=yes"};
-  options.inherits_all = false;
   options.log_path = scratch.path() / "log";
   EXPECT_EQ(RunSubprocess(options, CancellationToken()).exit_code, 0);
   ::unsetenv("COLOR3D_TOKEN");

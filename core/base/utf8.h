@@ -14,4 +14,14 @@ bool IsUtf8(std::string_view text);
 // without splitting a character.
 std::string CleanUtf8(std::string_view text, size_t max_bytes = 16384);
 
+enum class Lines {
+  kOne,   // line ends and tabs are escaped, too
+  kMany,  // line ends and tabs stay
+};
+
+// `text` as it may stand in a log or on a terminal: valid UTF-8 in which nothing ends a line, moves
+// the cursor, changes colours or turns the direction of writing. What would is written as "\n",
+// "\t", "\r", "\x1b" or "\u202e"; bytes that are no UTF-8 become '?'. Not cut.
+std::string EscapeControls(std::string_view text, Lines lines = Lines::kOne);
+
 }  // namespace color3d

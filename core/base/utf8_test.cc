@@ -40,5 +40,23 @@ TEST(CleanUtf8, CutsBetweenCharacters) {
   EXPECT_EQ(CleanUtf8("a\xe2\x82\xac", 4), "a\xe2\x82\xac");
 }
 
+TEST(EscapeControls, NothingEndsALineOrReachesTheTerminal) {
+  EXPECT_EQ(EscapeControls("plain \xc3\xa9 \xf0\x9f\x98\x80"), "plain \xc3\xa9 \xf0\x9f\x98\x80");
+  EXPECT_EQ(EscapeControls("a\nb\rc\td"), "a\\nb\\rc\\td");
+  EXPECT_EQ(EscapeControls("\x1b[2J\x7f"), "\\x1b[2J\\x7f");
+  EXPECT_EQ(EscapeControls(std::string_view("\0", 1)), "\\x00");
+  EXPECT_EQ(EscapeControls("\xc2\x9b"
+                           "31m"),
+            "\\u009b31m")
+      << "CSI as one character";
+  EXPECT_EQ(EscapeControls("\xe2\x80\xae"
+                           "txt.exe"),
+            "\\u202etxt.exe")
+      << "right to left";
+  EXPECT_EQ(EscapeControls("\xe2\x80\xa8"), "\\u2028") << "line separator";
+  EXPECT_EQ(EscapeControls("\x9b"), "?") << "no UTF-8";
+  EXPECT_EQ(EscapeControls("a\n\tb\r\x1b", Lines::kMany), "a\n\tb\\r\\x1b");
+}
+
 }  // namespace
 }  // namespace color3d

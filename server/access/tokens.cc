@@ -22,7 +22,6 @@ namespace {
 
 constexpr std::array<const char*, 3> kRoleNames = {"read", "submit", "admin"};
 constexpr size_t kTokenBytes = 32;
-constexpr auto kLook = std::chrono::seconds(1);
 constexpr char kPrefix[] = "c3d_";  // by which leak scanners know one
 
 bool IsName(const std::string& name) {
@@ -40,29 +39,6 @@ std::string RandomToken() {
   std::string token = kPrefix;
   for (const unsigned char byte : bytes) token += fmt::format("{:02x}", byte);
   return token;
-}
-
-// Of its bytes and rights, as far as the disk tells.
-std::string IdentityOf(const fs::path& file) {
-  struct stat status {};
-  if (::stat(file.c_str(), &status) != 0) return "";
-  return fmt::format("{} {} {} {} {}",
-                     status.st_ino,
-                     status.st_size,
-                     status.st_mtim.tv_sec,
-                     status.st_mtim.tv_nsec,
-                     status.st_mode);
-}
-
-std::vector<TokenRecord> ReadTokens(const fs::path& file) {
-  struct stat status {};
-  if (::stat(file.c_str(), &status) == 0 && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "others may write to the token file {}, and so let themselves in; chmod 600 {}",
-                file.string(),
-                file.string());
-  }
-  return ParseTokens(ReadFile(file), file.string());
 }
 
 }  // namespace
@@ -124,11 +100,14 @@ std::string AddToken(const fs::path& file,
     throw InvalidArgument("'{}' is no name: 1 to 64 of letters, digits, '.', '-', '_' and '@'",
                           name.substr(0, 80));
   }
-  std::string text;
+  // Through a link, so that the link stays; alone, so that two at once do not lose one.
   std::error_code error;
-  const bool is_fresh = !fs::exists(file, error);
-  if (!is_fresh) {
-    text = ReadFile(file);
+  const fs::path real = fs::weakly_canonical(file, error);
+  const fs::path& target = error ? file : real;
+  const FolderTurn turn(target.has_parent_path() ? target.parent_path() : fs::path("."));
+  std::string text;
+  if (fs::exists(target, error)) {
+    text = ReadFile(target);
     for (const TokenRecord& record : ParseTokens(text, file.string())) {
       if (record.name != name) continue;
       throw Error(ErrorCode::kAlreadyExists,
@@ -147,7 +126,7 @@ std::string AddToken(const fs::path& file,
                       project);
   const mode_t before = ::umask(0077);
   try {
-    WriteFileAtomic(file, text);
+    WriteFileAtomic(target, text);
   } catch (...) {
     ::umask(before);
     throw;
@@ -157,35 +136,22 @@ std::string AddToken(const fs::path& file,
 }
 
 TokenBook::TokenBook(const fs::path& file)
-    : file_(file), records_(ReadTokens(file)), identity_(IdentityOf(file)) {
+    : file_(file, "token file", [this, file](const std::string& bytes) {
+        records_ = ParseTokens(bytes, file.string());
+      }) {
   if (records_.empty()) {
     spdlog::warn("{} names nobody: every call will be refused", file.string());
   }
 }
 
-void TokenBook::ReadAgain() {
-  const auto now = std::chrono::steady_clock::now();
-  if (now < next_look_) return;
-  next_look_ = now + kLook;
-  const std::string identity = IdentityOf(file_);
-  if (identity == identity_) return;
-  identity_ = identity;
-  try {
-    records_ = ReadTokens(file_);
-    spdlog::info("{} was read again: {} tokens", file_.string(), records_.size());
-  } catch (const Error& e) {
-    spdlog::error("the tokens stay as they were: {}", e.what());
-  }
-}
-
 std::optional<TokenRecord> TokenBook::Find(std::string_view token) {
   const std::string digest = Sha256Hex(token);
-  std::lock_guard lock(mutex_);
-  ReadAgain();
   std::optional<TokenRecord> found;
-  for (const TokenRecord& record : records_) {
-    if (CRYPTO_memcmp(record.sha256.data(), digest.data(), digest.size()) == 0) found = record;
-  }
+  file_.WithLatest([&] {
+    for (const TokenRecord& record : records_) {
+      if (CRYPTO_memcmp(record.sha256.data(), digest.data(), digest.size()) == 0) found = record;
+    }
+  });
   return found;
 }
 

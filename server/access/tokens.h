@@ -2,13 +2,13 @@
 // nowhere on the server. Functions are pure but for the files that they name.
 #pragma once
 
-#include <chrono>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "server/access/guarded_file.h"
 
 namespace color3d {
 
@@ -37,8 +37,9 @@ void CheckProject(const std::string& project);
 // Error{kInvalidArgument} naming file and line.
 std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file);
 
-// A fresh token of 256 random bits, of which the record is added to the file; a new file can be
-// read by its owner alone. Throws Error{kAlreadyExists} when the name is there.
+// A fresh token of 256 random bits, of which the record is added to the file, which keeps its owner
+// and rights; a new file can be read by its owner alone. Processes that add at the same time wait
+// for each other. Throws Error{kAlreadyExists} when the name is there.
 std::string AddToken(const std::filesystem::path& file,
                      const std::string& name,
                      Role role,
@@ -56,13 +57,8 @@ class TokenBook {
   std::optional<TokenRecord> Find(std::string_view token);
 
  private:
-  void ReadAgain();
-
-  const std::filesystem::path file_;
-  std::mutex mutex_;
   std::vector<TokenRecord> records_;
-  std::string identity_;  // of the file that was read
-  std::chrono::steady_clock::time_point next_look_;
+  GuardedFile file_;  // the last: it fills the records
 };
 
 }  // namespace color3d

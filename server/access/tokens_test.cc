@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <thread>
 
@@ -85,6 +86,39 @@ TEST_F(TokensTest, WrongFilesAreNamed) {
   ::chmod(File().c_str(), 0620);
   EXPECT_THROW(TokenBook{File()}, Error) << "others may write to it";
   EXPECT_THROW(TokenBook{scratch_.path() / "none"}, Error);
+}
+
+TEST_F(TokensTest, TheFileKeepsItsOwnerRightsAndPlace) {
+  const fs::path real = scratch_.path() / "real", link = scratch_.path() / "link";
+  AddToken(real, "anna", Role::kSubmit);
+  ::chmod(real.c_str(), 0640);
+  const bool is_root = ::geteuid() == 0;
+  ASSERT_TRUE(!is_root || ::chown(real.c_str(), 1234, 1235) == 0);
+  fs::create_symlink("real", link);
+  AddToken(link, "bert", Role::kSubmit);
+  struct stat status {};
+  ASSERT_EQ(::lstat(real.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777u, 0640u);
+  if (is_root) {
+    EXPECT_EQ(status.st_uid, 1234u) << "the service could not read its tokens any more";
+    EXPECT_EQ(status.st_gid, 1235u);
+  }
+  EXPECT_TRUE(fs::is_symlink(link)) << "the link was replaced by a file";
+  EXPECT_EQ(ParseTokens(ReadFile(real), "real").size(), 2u);
+}
+
+TEST_F(TokensTest, AddedAtOnceNoneIsLost) {
+  constexpr int kThreads = 8, kEach = 8;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < kThreads; ++i) {
+    threads.emplace_back([this, i] {
+      for (int k = 0; k < kEach; ++k) {
+        AddToken(File(), "t" + std::to_string(i * kEach + k), Role::kRead);
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(ParseTokens(ReadFile(File()), "tokens").size(), size_t{kThreads * kEach});
 }
 
 }  // namespace

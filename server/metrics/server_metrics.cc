@@ -16,6 +16,7 @@
 
 #include "core/base/error.h"
 #include "core/base/memory.h"
+#include "server/net/descriptors.h"
 
 namespace color3d {
 namespace {
@@ -27,12 +28,6 @@ using prometheus::MetricType;
 constexpr int kEventsAtOnce = 500;
 const prometheus::Histogram::BucketBoundaries kSeconds = {
     0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.5, 1, 5, 30, 300};
-
-int64_t OpenDescriptors() {
-  std::error_code error;
-  const std::filesystem::directory_iterator all("/proc/self/fd", error);
-  return error ? 0 : std::distance(begin(all), end(all));
-}
 
 ClientMetric Value(MetricType type, double value, const Labels& labels = {}) {
   ClientMetric metric;
@@ -178,6 +173,28 @@ class Sampled : public prometheus::Collectable {
     gauge("color3d_open_descriptors",
           "Of the server's process.",
           static_cast<double>(OpenDescriptors()));
+    gauge("color3d_max_descriptors",
+          "That the server's process may have open.",
+          static_cast<double>(DescriptorLimit()));
+    MetricFamily connections{
+        "color3d_connections", "Connections that are open.", MetricType::Gauge, {}};
+    const auto connection = [&](const char* state, int64_t count) {
+      connections.metric.push_back(
+          Value(MetricType::Gauge, static_cast<double>(count), {{"state", state}}));
+    };
+    connection("open", sample.connections);
+    connection("silent", sample.silent_connections);
+    families->push_back(std::move(connections));
+    gauge("color3d_max_connections",
+          "That may be open.",
+          static_cast<double>(sample.max_connections));
+    counter("color3d_connections_closed_total",
+            "Closed without a call to make room.",
+            sample.connections_closed);
+    counter("color3d_connections_refused_total",
+            "Refused for want of room.",
+            sample.connections_refused);
+    gauge("color3d_answering", "1: the server's own calls are answered.", sample.answering);
     if (sample.certificate_end_s > 0) {
       gauge("color3d_certificate_end_seconds",
             "When the TLS certificate ends, since the epoch.",
@@ -251,7 +268,16 @@ int ServerMetrics::Listen(const std::string& address,
                           const BlobStore& blobs,
                           std::function<ServerSample()> sample) {
   try {
-    parts_->exposer = std::make_unique<prometheus::Exposer>(address);
+    // Who says nothing is given up soon, and takes one of several threads meanwhile.
+    parts_->exposer =
+        std::make_unique<prometheus::Exposer>(std::vector<std::string>{"listening_ports",
+                                                                       address,
+                                                                       "num_threads",
+                                                                       "8",
+                                                                       "request_timeout_ms",
+                                                                       "500",
+                                                                       "enable_keep_alive",
+                                                                       "no"});
   } catch (const std::runtime_error&) {  // it does not say why
     throw Error(
         ErrorCode::kFailedPrecondition,

@@ -16,9 +16,11 @@ namespace color3d {
 struct ServerSample {
   int watches = 0, downloads = 0, uploads = 0, live_pictures = 0;  // open
   bool draining = false;
+  bool answering = true;  // its own calls, as a client's
+  int64_t connections = 0, silent_connections = 0, max_connections = 0;
   // Since the start.
   int64_t attempts_lost = 0, blobs_removed = 0, blobs_damaged = 0, jobs_expired = 0,
-          sweeps_failed = 0;
+          sweeps_failed = 0, connections_closed = 0, connections_refused = 0;
   int64_t reserve_bytes = 0;      // of the disk, that is kept free
   int64_t certificate_end_s = 0;  // since the epoch; 0: no TLS
 };

@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <regex>
 #include <set>
 
@@ -85,6 +86,25 @@ TEST_F(ServerMetricsTest, TellsOfQueueCallsAndEnds) {
   EXPECT_NE(Get(port, "/").find("404"), std::string::npos);
   metrics_.StopListening();
   EXPECT_EQ(Get(port, "/metrics"), "");
+}
+
+// Connections that say nothing are given up one after the other, and the next who asks is answered.
+TEST_F(ServerMetricsTest, ConnectionsThatSayNothingDoNotShutItOut) {
+  const int port = Listen();
+  std::vector<int> silent;
+  for (int i = 0; i < 100; ++i) {
+    silent.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    ASSERT_EQ(::connect(silent.back(), reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
+  }
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_NE(Get(port, "/metrics").find("color3d_jobs"), std::string::npos);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  for (const int fd : silent) ::close(fd);
+  EXPECT_NE(Get(port, "/metrics").find("color3d_jobs"), std::string::npos);
 }
 
 TEST_F(ServerMetricsTest, AnAddressThatIsTakenIsNamed) {

@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <memory>
 #include <mutex>
 #include <string_view>
@@ -22,14 +21,12 @@ constexpr std::string_view kTag = "[job=jobs/";
 constexpr int64_t kMaxBytes = 1 << 20;
 constexpr std::string_view kFull = "the log is full; what follows is in the worker's own\n";
 
-// One line; control characters would end it or hide what it says.
 std::string LineOf(const spdlog::details::log_msg& message, std::string_view text) {
   const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
-  std::string clean = CleanUtf8(std::string(text));
-  std::replace_if(
-      clean.begin(), clean.end(), [](unsigned char c) { return c < 32; }, ' ');
-  return fmt::format(
-      "{} {} {}\n", LogTime(message.time), std::string_view(level.data(), level.size()), clean);
+  return fmt::format("{} {} {}\n",
+                     LogTime(message.time),
+                     std::string_view(level.data(), level.size()),
+                     EscapeControls(CleanUtf8(text)));
 }
 
 class JobLogSink : public spdlog::sinks::base_sink<std::mutex> {

@@ -11,14 +11,14 @@ namespace {
 TEST(JobLogTest, LinesOfAJobGoToItsFile) {
   ScratchFolder scratch;
   spdlog::logger logger("test", MakeJobLogSink(scratch.path()));
-  logger.info("[job=jobs/ab12 attempt=1] begins\nwith two lines");
+  logger.info("[job=jobs/ab12 attempt=1] begins\nwith two \x1b[2Jlines");
   logger.warn("[job=jobs/cd34] of another");
   logger.info("of none");
   logger.info("[job=jobs/broken");
   const std::string text = ReadFile(JobLogFile(scratch.path(), "jobs/ab12"));
-  EXPECT_TRUE(text.ends_with("Z info begins with two lines\n")) << text;
+  EXPECT_TRUE(text.ends_with("Z info begins\\nwith two \\x1b[2Jlines\n")) << text;
   EXPECT_EQ(text.size(),
-            std::string("2026-01-31T12:00:00.000Z info begins with two lines\n").size());
+            std::string("2026-01-31T12:00:00.000Z info begins\\nwith two \\x1b[2Jlines\n").size());
   EXPECT_EQ(ListFiles(scratch.path()).size(), 2u);
 }
 

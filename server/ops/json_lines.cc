@@ -40,8 +40,9 @@ class JsonLines : public spdlog::formatter {
         {"from", std::string(message.logger_name.data(), message.logger_name.size())}};
     TakeTag(&text, &line);
     line["message"] = std::string(text);
+    // ASCII alone: a terminal that shows the log finds no control character in it.
     const std::string bytes =
-        line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+        line.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
     into.append(bytes.data(), bytes.data() + bytes.size());
   }
   std::unique_ptr<spdlog::formatter> clone() const override {

@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "server/ops/job_log.h"
 #include "server/ops/json_lines.h"
+#include "server/ops/text_lines.h"
 
 namespace color3d {
 std::filesystem::path ProgramFolder() {
@@ -43,7 +44,7 @@ void SetUpLog(const std::string& name,
   if (format == "json") {
     logger->set_formatter(MakeJsonLines());
   } else {
-    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l %n %v");
+    logger->set_formatter(MakeTextLines());
   }
   spdlog::set_default_logger(logger);
 }

@@ -1,8 +1,11 @@
 #include "server/rpc/access.h"
 
+#include <grpc/grpc_security_constants.h>
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <optional>
+#include <vector>
 
 #include "server/service_error.h"
 
@@ -15,6 +18,18 @@ std::string_view AuthorizationOf(const grpc::CallbackServerContext& context) {
   const auto entry = context.client_metadata().find("authorization");
   if (entry == context.client_metadata().end()) return {};
   return {entry->second.data(), entry->second.size()};
+}
+
+// Of the certificate that the client showed: its common name, then its alternative names.
+std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& context) {
+  const auto identity = context.auth_context();
+  std::vector<std::string> names;
+  for (const char* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME}) {
+    for (const grpc::string_ref& name : identity->FindPropertyValues(property)) {
+      names.emplace_back(name.data(), name.size());
+    }
+  }
+  return names;
 }
 
 }  // namespace
@@ -35,8 +50,24 @@ void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContex
 }
 
 Caller Access::Require(Role role, const grpc::CallbackServerContext& context) const {
-  if (!tokens_) return {};
+  if (!tokens_ && !certificates_) return {};
   const std::string_view token = TokenOf(AuthorizationOf(context));
+  const bool by_token = tokens_ && (!certificates_ || !token.empty());
+  const Caller caller = by_token ? ByToken(token, context) : ByCertificate(context);
+  if (caller.role < role) {
+    LogRefusal(caller.name + " may only " + RoleName(caller.role), context);
+    throw ServiceError(ErrorCode::kFailedPrecondition,
+                       "ROLE_TOO_LOW",
+                       "the {} of '{}' has the role {}; this call needs {}",
+                       by_token ? "token" : "certificate",
+                       caller.name,
+                       RoleName(caller.role),
+                       RoleName(role));
+  }
+  return caller;
+}
+
+Caller Access::ByToken(std::string_view token, const grpc::CallbackServerContext& context) const {
   if (token.empty()) {
     LogRefusal("it brings no token", context);
     throw ServiceError(ErrorCode::kFailedPrecondition,
@@ -50,14 +81,20 @@ Caller Access::Require(Role role, const grpc::CallbackServerContext& context) co
                        "TOKEN_UNKNOWN",
                        "this server does not know the token; ask who runs it for a fresh one");
   }
-  if (record->role < role) {
-    LogRefusal(record->name + " may only " + RoleName(record->role), context);
+  return {record->name, record->role, record->project};
+}
+
+Caller Access::ByCertificate(const grpc::CallbackServerContext& context) const {
+  const std::vector<std::string> names = CertificateNames(context);
+  const std::optional<CertificateRecord> record = certificates_->Find(names);
+  if (!record) {
+    const std::string name = names.empty() ? "" : names.front();
+    LogRefusal("the certificate of '" + name + "' has no role", context);
     throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "ROLE_TOO_LOW",
-                       "the token of '{}' has the role {}; this call needs {}",
-                       record->name,
-                       RoleName(record->role),
-                       RoleName(role));
+                       "CERTIFICATE_UNKNOWN",
+                       "this server gives the certificate of '{}' no role; ask who runs it to name "
+                       "it in --certificate-roles",
+                       name);
   }
   return {record->name, record->role, record->project};
 }

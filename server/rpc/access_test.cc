@@ -174,6 +174,42 @@ TEST_F(AccessTest, TlsIsForThoseWhoBelieveEachOther) {
   EXPECT_FALSE(answered(ours.Issue("late", -7200, -3600)));
 }
 
+// A certificate says who somebody is; what he may do stands in the file.
+TEST_F(AccessTest, ACertificateHasTheRoleThatTheFileGivesIt) {
+  TestAuthority ours(scratch_.path(), "ours");
+  const CertificateFiles server = ours.Issue("server");
+  const auto file = scratch_.path() / "roles";
+  WriteFileAtomic(file, "chief admin\nguest read\n");
+  options_.credentials =
+      MakeServerCredentials({server.certificate, server.key, ours.certificate()});
+  options_.certificates = std::make_shared<CertificateRoles>(file);
+  const auto call = [&](const std::string& name, const char* method, const std::string& token) {
+    const CertificateFiles own = ours.Issue(name);
+    return Call(Open(grpc::SslCredentials(
+                    {ReadFile(ours.certificate()), ReadFile(own.key), ReadFile(own.certificate)})),
+                method,
+                token.empty() ? "" : "Bearer " + token);
+  };
+  constexpr char kLook[] = "/color3d.v1.ServerService/GetServerInfo";
+  constexpr char kPause[] = "/color3d.v1.AdminService/PauseQueue";
+  const auto tokens = options_.tokens;
+  options_.tokens = nullptr;
+  Start();
+  EXPECT_TRUE(call("chief", kPause, "").ok());
+  EXPECT_TRUE(call("guest", kLook, "").ok());
+  EXPECT_EQ(ReasonOfStatus(call("guest", kPause, "")), "ROLE_TOO_LOW");
+  const grpc::Status nobody = call("nobody", kLook, "");
+  EXPECT_EQ(nobody.error_code(), StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(ReasonOfStatus(nobody), "CERTIFICATE_UNKNOWN");
+  // A token says more than the certificate under it.
+  guarded_.reset();
+  options_.tokens = tokens;
+  Start();
+  EXPECT_EQ(ReasonOfStatus(call("chief", kPause, read_)), "ROLE_TOO_LOW");
+  EXPECT_TRUE(call("guest", kPause, admin_).ok());
+  EXPECT_EQ(ReasonOfStatus(call("guest", kPause, "")), "ROLE_TOO_LOW");
+}
+
 TEST_F(AccessTest, ARenewedCertificateNeedsNoRestart) {
   TestAuthority before(scratch_.path(), "before"), after(scratch_.path(), "after");
   const CertificateFiles server = before.Issue("server");

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <optional>
 
@@ -23,15 +24,19 @@ constexpr size_t kNameBytes = 1024;  // of a message besides its data
 class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
  public:
   BlobReader(const RpcParts& parts,
-             const grpc::CallbackServerContext& context,
+             grpc::CallbackServerContext& context,
              const ReadRequest& request)
-      : parts_(parts), context_(context), request_(request) {
+      : parts_(parts),
+        context_(context),
+        request_(request),
+        silence_(parts.silence, [this] { GiveUp(); }) {
     parts_.bulk.Post([this] { Step(); });
   }
   ~BlobReader() override {
     if (fd_ >= 0) ::close(fd_);
   }
   void OnWriteDone(bool ok) override {
+    if (!silence_.Resume()) return FinishGivenUp();
     if (!ok) return Finish(grpc::Status::CANCELLED);
     parts_.bulk.Post([this] { Step(); });
   }
@@ -48,7 +53,18 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
       if (!more) RequireIntact();
     });
     if (!status.ok() || !more) return Finish(status);
+    silence_.Wait();
     StartWrite(&response_);
+  }
+
+  // Nobody reads. What was written is taken back, so that the write ends, too.
+  void GiveUp() {
+    context_.TryCancel();
+    FinishGivenUp();
+  }
+  // By whichever of the two, the write's end or the watch, comes last: this lives until then.
+  void FinishGivenUp() {
+    if (given_up_.exchange(true)) Finish(grpc::Status::CANCELLED);
   }
 
   void Open() {
@@ -115,7 +131,7 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   }
 
   const RpcParts& parts_;
-  const grpc::CallbackServerContext& context_;
+  grpc::CallbackServerContext& context_;
   const ReadRequest request_;
   ReadResponse response_;
   int fd_ = -1;
@@ -125,6 +141,8 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   std::string sha256_;
   Sha256 sent_;
   StreamLimit::Place place_;
+  std::atomic<bool> given_up_{false};
+  SilenceWatch::Stream silence_;
 };
 
 class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
@@ -132,15 +150,18 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   BlobWriter(const RpcParts& parts,
              const grpc::CallbackServerContext& context,
              WriteResponse* response)
-      : parts_(parts), response_(response) {
+      : parts_(parts),
+        response_(response),
+        silence_(parts.silence, [this] { parts_.bulk.Post([this] { GiveUp(); }); }) {
     // Nothing is read for whoever may not write, or has as many streams as he may.
     const grpc::Status allowed = Guard([&] {
       call_ = Admit(parts_, Role::kSubmit, context);
       place_ = parts_.streams.writes.Take(call_->caller.project);
     });
-    allowed.ok() ? StartRead(&request_) : Finish(allowed);
+    allowed.ok() ? ReadNext() : Finish(allowed);
   }
   void OnReadDone(bool ok) override {
+    if (!silence_.Resume()) return;  // it is given up
     // Refused here, so that no large message waits for its turn.
     const grpc::Status fits = Guard([&] {
       if (ok) RequireSmallChunk();
@@ -155,8 +176,26 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   void Consume() {
     bool finished = false;
     const grpc::Status status = Guard([&] { finished = Store(); });
-    if (status.ok() && !finished) return StartRead(&request_);
+    if (status.ok() && !finished) return ReadNext();
     End(status);
+  }
+
+  void ReadNext() {
+    silence_.Wait();
+    StartRead(&request_);
+  }
+
+  // Others may have the place. The read that is under way ends with the call.
+  void GiveUp() {
+    End(Guard([&] {
+      if (writer_) writer_->Sync();
+      throw ServiceError(
+          ErrorCode::kUnavailable,
+          "UPLOAD_SILENT",
+          "nothing came for {} s; what came before is kept: ask QueryWriteStatus and go "
+          "on from there",
+          parts_.silence.limit().count() / 1000);
+    }));
   }
 
   void End(const grpc::Status& status) {
@@ -216,6 +255,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   std::optional<Call> call_;  // nothing: refused
   std::unique_ptr<UploadStore::Writer> writer_;
   StreamLimit::Place place_;
+  SilenceWatch::Stream silence_;
 };
 
 }  // namespace

@@ -151,5 +151,94 @@ TEST_F(ByteStreamServiceTest, TransfersKeepNoOtherCallWaiting) {
   }
 }
 
+// A place is for those who do something with it.
+class SilentStreamsTest : public RpcTest {
+ protected:
+  SilentStreamsTest() {
+    RpcServerOptions options;
+    options.listen = "127.0.0.1:0";
+    options.limits.stream_silence = std::chrono::milliseconds(300);
+    options.limits.max_writes = 4;
+    options.limits.max_reads = 4;
+    options.live.silence = std::chrono::milliseconds(300);
+    options.inference.target = "unix:" + (scratch_.path() / "nobody").string();
+    impatient_ = std::make_unique<RpcServer>(options, store_, blobs_, uploads_, SystemClock());
+    other_ = std::make_unique<TestClient>(impatient_->address());
+  }
+  bool BecomesTrue(const std::function<bool()>& condition) const {
+    for (int i = 0; i < 1000 && !condition(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return condition();
+  }
+
+  std::unique_ptr<RpcServer> impatient_;
+  std::unique_ptr<TestClient> other_;
+};
+
+TEST_F(SilentStreamsTest, AnUploadThatSendsNothingGivesItsPlaceBackAndGoesOn) {
+  const std::string content = "0123456789";
+  const v1::Digest digest = DigestOf(content);
+  google::bytestream::WriteRequest request;
+  request.set_resource_name("uploads/u/blobs/" + digest.sha256() + "/10");
+  request.set_data(content.substr(0, 4));
+  std::deque<grpc::ClientContext> contexts(4);
+  std::vector<std::unique_ptr<grpc::ClientWriter<google::bytestream::WriteRequest>>> streams;
+  std::deque<google::bytestream::WriteResponse> answers(4);
+  for (size_t i = 0; i < 4; ++i) streams.push_back(other_->bytes->Write(&contexts[i], &answers[i]));
+  ASSERT_TRUE(streams[0]->Write(request));  // the others say nothing at all
+  ASSERT_TRUE(BecomesTrue([&] { return impatient_->open().uploads == 4; }));
+  ASSERT_TRUE(BecomesTrue([&] { return impatient_->open().uploads == 0; })) << "for ever";
+  for (const auto& stream : streams) {
+    const grpc::Status status = stream->Finish();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE) << status.error_message();
+    EXPECT_EQ(ReasonOfStatus(status), "UPLOAD_SILENT");
+  }
+  google::bytestream::QueryWriteStatusRequest query;
+  query.set_resource_name(request.resource_name());
+  google::bytestream::QueryWriteStatusResponse so_far;
+  grpc::ClientContext context;
+  ASSERT_TRUE(other_->bytes->QueryWriteStatus(&context, query, &so_far).ok());
+  EXPECT_EQ(so_far.committed_size(), 4);
+  EXPECT_EQ(other_->Download(other_->Upload(content)), content);
+}
+
+TEST_F(SilentStreamsTest, ADownloadThatNobodyReadsGivesItsPlaceBack) {
+  const std::string content(8 << 20, 'x');  // more than lies in buffers on the way
+  const v1::Digest digest = DigestOf(content);
+  store_.HoldBlob("", blobs_.PutBytes(content));
+  google::bytestream::ReadRequest request;
+  request.set_resource_name("blobs/" + digest.sha256() + "/" + std::to_string(content.size()));
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
+  TestClient slow(grpc::CreateCustomChannel(
+      impatient_->address(), grpc::InsecureChannelCredentials(), arguments));
+  std::deque<grpc::ClientContext> contexts(4);
+  std::vector<std::unique_ptr<grpc::ClientReader<google::bytestream::ReadResponse>>> streams;
+  for (grpc::ClientContext& context : contexts) {
+    streams.push_back(slow.bytes->Read(&context, request));
+  }
+  ASSERT_TRUE(BecomesTrue([&] { return impatient_->open().downloads == 4; }));
+  ASSERT_TRUE(BecomesTrue([&] { return impatient_->open().downloads == 0; })) << "for ever";
+  EXPECT_EQ(other_->Download(digest).size(), content.size());
+  google::bytestream::ReadResponse response;
+  for (const auto& stream : streams) {
+    while (stream->Read(&response)) {
+    }
+    EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+}
+
+TEST_F(SilentStreamsTest, ALiveStreamToWhichNoPictureComesEnds) {
+  grpc::ClientContext context;
+  const auto stream = other_->colorizers->ColorizeImages(&context);
+  v1::ColorizeImagesResponse response;
+  EXPECT_FALSE(stream->Read(&response));
+  const grpc::Status status = stream->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE) << status.error_message();
+  EXPECT_EQ(ReasonOfStatus(status), "STREAM_SILENT");
+}
+
 }  // namespace
 }  // namespace color3d::testing

@@ -1,5 +1,6 @@
 #include "server/rpc/call_watch.h"
 
+#include <grpcpp/server_context.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -27,16 +28,20 @@ bool IsSaneId(std::string_view id) {
 
 class CallWatch final : public grpc::experimental::Interceptor {
  public:
-  CallWatch(const CallObserver& observer, const grpc::experimental::ServerRpcInfo* info)
-      : observer_(observer), method_(info->method()) {}
+  CallWatch(const CallObserver& observer,
+            const PeerObserver& peers,
+            grpc::experimental::ServerRpcInfo* info)
+      : observer_(observer), peers_(peers), info_(info), method_(info->method()) {}
   // A call that was cancelled may end without a status of ours.
   ~CallWatch() override {
     if (!ended_) End(grpc::StatusCode::CANCELLED);
+    if (!peer_.empty()) peers_.on_end(peer_);
   }
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
       TakeMetadata(*methods->GetRecvInitialMetadata());
+      TakePeer();
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       methods->GetSendTrailingMetadata()->insert({"x-request-id", request_id_});
@@ -56,6 +61,12 @@ class CallWatch final : public grpc::experimental::Interceptor {
     trace_ = TraceIdOf(find("traceparent"));
   }
 
+  void TakePeer() {
+    if (!peers_.on_begin || method_.starts_with("/grpc.")) return;
+    peer_ = info_->server_context()->peer();
+    if (!peer_.empty()) peers_.on_begin(peer_);
+  }
+
   void End(grpc::StatusCode code) {
     ended_ = true;
     const double seconds = std::chrono::duration<double>(SteadyClock::now() - start_).count();
@@ -73,7 +84,10 @@ class CallWatch final : public grpc::experimental::Interceptor {
   }
 
   const CallObserver& observer_;
+  const PeerObserver& peers_;
+  grpc::experimental::ServerRpcInfo* const info_;
   const std::string method_;
+  std::string peer_;  // empty: nobody was told
   const SteadyClock::time_point start_ = SteadyClock::now();
   std::string request_id_, trace_;
   bool ended_ = false;
@@ -81,14 +95,16 @@ class CallWatch final : public grpc::experimental::Interceptor {
 
 class CallWatchFactory final : public grpc::experimental::ServerInterceptorFactoryInterface {
  public:
-  explicit CallWatchFactory(CallObserver observer) : observer_(std::move(observer)) {}
+  CallWatchFactory(CallObserver observer, PeerObserver peers)
+      : observer_(std::move(observer)), peers_(std::move(peers)) {}
   grpc::experimental::Interceptor* CreateServerInterceptor(
       grpc::experimental::ServerRpcInfo* info) override {
-    return new CallWatch(observer_, info);
+    return new CallWatch(observer_, peers_, info);
   }
 
  private:
   const CallObserver observer_;
+  const PeerObserver peers_;
 };
 
 }  // namespace
@@ -140,8 +156,8 @@ std::string RequestIdOf(std::string_view header) {
 }
 
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
-    CallObserver observer) {
-  return std::make_unique<CallWatchFactory>(std::move(observer));
+    CallObserver observer, PeerObserver peers) {
+  return std::make_unique<CallWatchFactory>(std::move(observer), std::move(peers));
 }
 
 }  // namespace color3d

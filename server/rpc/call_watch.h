@@ -27,8 +27,14 @@ std::string TraceIdOf(std::string_view traceparent);
 // one.
 std::string RequestIdOf(std::string_view header);
 
-// Trailers of each call carry "x-request-id", as RequestIdOf.
+// Told when a call begins, and when it is over: `peer` as gRPC names it. gRPC's own services, which
+// answer everybody, are not among them.
+struct PeerObserver {
+  std::function<void(const std::string&peer)> on_begin, on_end;
+};
+
+// Trailers of each call carry "x-request-id", as RequestIdOf. What observes may be empty.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
-    CallObserver observer);
+    CallObserver observer, PeerObserver peers = {});
 
 }  // namespace color3d

@@ -22,7 +22,8 @@ grpc::StatusCode CodeOf(const std::string& reason, ErrorCode code) {
   if (reason == "TOKEN_MISSING" || reason == "TOKEN_UNKNOWN") {
     return grpc::StatusCode::UNAUTHENTICATED;
   }
-  if (reason == "ROLE_TOO_LOW") return grpc::StatusCode::PERMISSION_DENIED;
+  if (reason == "ROLE_TOO_LOW" || reason == "CERTIFICATE_UNKNOWN")
+    return grpc::StatusCode::PERMISSION_DENIED;
   switch (code) {
     case ErrorCode::kCancelled:
       return grpc::StatusCode::CANCELLED;

@@ -6,6 +6,7 @@
 #include <grpcpp/support/server_callback.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -20,6 +21,7 @@
 #include "server/rpc/call_memory.h"
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/executor.h"
+#include "server/rpc/silence_watch.h"
 #include "server/rpc/stream_limit.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/upload_store.h"
@@ -40,6 +42,8 @@ struct ServiceLimits {
   int max_watches = 1'000;
   int max_reads = 256;
   int max_writes = 128;
+  // An upload that sends nothing, or a download that nobody reads, for so long is ended.
+  std::chrono::milliseconds stream_silence{60'000};
   int max_connection_calls = 2'000;  // at once; further ones wait on the client's side
   // Of unary calls, shared among connections (CallMemory), and gRPC's own buffers.
   int64_t call_memory_bytes = int64_t{128} << 20;
@@ -81,6 +85,7 @@ struct RpcParts {
   Executor& bulk;    // blobs on their way: down- and uploads, of which one may hash 8 GiB
   Executor& checks;  // reads whole scenes
   StreamLimits& streams;
+  SilenceWatch& silence;
   CallMemory& memory;
   const Access& access;
   const std::atomic<bool>& draining;

@@ -4,15 +4,10 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
-#include <netdb.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 
-#include "core/base/address.h"
+#include "server/net/descriptors.h"
 #include "server/rpc/admin_service.h"
 #include "server/rpc/blob_service.h"
 #include "server/rpc/info_services.h"
@@ -23,37 +18,11 @@ namespace color3d {
 namespace {
 
 constexpr size_t kMaxChecksWaiting = 500;
-
-// gRPC does not say why it could not bind: try it with a plain socket first.
-void CheckAddress(const std::string& listen) {
-  if (listen.rfind("unix:", 0) == 0) return;
-  const HostPort address = SplitHostPort(listen);
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
-  addrinfo* found = nullptr;
-  const int failed = ::getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found);
-  if (failed != 0) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "cannot listen on {}: {}; choose another with --listen",
-                listen,
-                ::gai_strerror(failed));
-  }
-  const int fd = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const int on = 1;
-  ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-  const bool bound = ::bind(fd, found->ai_addr, found->ai_addrlen) == 0 && ::listen(fd, 1) == 0;
-  const int error = errno;
-  ::close(fd);
-  ::freeaddrinfo(found);
-  if (bound) return;
-  const std::string why = error == EADDRINUSE ? "the address is in use (is another server running?)"
-                                              : std::string(std::strerror(error));
-  throw Error(ErrorCode::kFailedPrecondition,
-              "cannot listen on {}: {}; choose another with --listen",
-              listen,
-              why);
-}
+constexpr int kHandshakeLimitMs = 10'000;
+// Without a call for so long a connection is closed; clients open another when they need one.
+constexpr int kIdleLimitMs = 5 * 60'000;
+// Besides streams: the job store, logs, metrics, gRPC itself, and room to spare.
+constexpr int kOtherDescriptors = 128;
 
 }  // namespace
 
@@ -80,7 +49,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                      BlobStore& blobs,
                      UploadStore& uploads,
                      const Clock& clock) {
-  CheckAddress(options.listen);
+  sockets_ = std::make_unique<ListenSockets>(options.listen);
   digests_ = std::make_unique<FileDigests>();
   quick_ = std::make_unique<Executor>(options.quick_threads);
   slow_ = std::make_unique<Executor>(options.slow_threads);
@@ -88,12 +57,15 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   checks_ = std::make_unique<Executor>(
       options.check_threads, kMaxChecksWaiting, std::max(1, options.check_threads / 2));
   const int of_project = options.limits.project_max_streams;
-  streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project},
-                                  {"downloads", options.limits.max_reads, of_project},
-                                  {"uploads", options.limits.max_writes, of_project},
-                                  {"live streams", options.live.max_streams, of_project}});
+  // Without tokens and roles there is one project alone.
+  const bool shared = options.tokens != nullptr || options.certificates != nullptr;
+  streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project, shared},
+                                  {"downloads", options.limits.max_reads, of_project, shared},
+                                  {"uploads", options.limits.max_writes, of_project, shared},
+                                  {"live streams", options.live.max_streams, of_project, shared}});
+  silence_ = std::make_unique<SilenceWatch>(options.limits.stream_silence);
   memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
-  access_ = std::make_unique<Access>(options.tokens);
+  access_ = std::make_unique<Access>(options.tokens, options.certificates);
   parts_.reset(new RpcParts{store,
                             blobs,
                             uploads,
@@ -102,6 +74,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             *bulk_,
                             *checks_,
                             *streams_,
+                            *silence_,
                             *memory_,
                             *access_,
                             draining_,
@@ -121,13 +94,15 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
-  int port = 0;
-  builder.AddListeningPort(
-      options.listen,
-      options.credentials ? options.credentials : grpc::InsecureServerCredentials(),
-      &port);
-  // Without this two servers could share a port, each answering half of the calls.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  // gRPC is given connections and does not listen itself: it would stop to for ever once it has run
+  // out of descriptors.
+  acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      options.credentials ? options.credentials : grpc::InsecureServerCredentials());
+  MakeGate(options);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeLimitMs);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, kIdleLimitMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 60'000);
   builder.SetMaxReceiveMessageSize(16 << 20);
@@ -146,18 +121,34 @@ RpcServer::RpcServer(const RpcServerOptions& options,
     builder.RegisterService(service);
   }
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
-  interceptors.push_back(MakeCallWatch(options.on_call));
+  interceptors.push_back(
+      MakeCallWatch(options.on_call,
+                    {[this](const std::string& peer) { gate_->BeginCall(peer); },
+                     [this](const std::string& peer) { gate_->EndCall(peer); }}));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   server_ = builder.BuildAndStart();
   if (!server_) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot listen on {}; choose another with --listen",
+                "gRPC cannot answer on {}; choose another with --listen",
                 options.listen);
   }
-  address_ = options.listen.rfind("unix:", 0) == 0
-                 ? options.listen
-                 : options.listen.substr(0, options.listen.rfind(':') + 1) + std::to_string(port);
+  gate_->Open();
 }
+
+void RpcServer::MakeGate(const RpcServerOptions& options) {
+  const int reserve = options.limits.max_reads + options.limits.max_writes + kOtherDescriptors;
+  const GateLimits limits = GateLimitsFor(DescriptorLimit(), reserve, options.max_connections);
+  gate_ = std::make_unique<ConnectionGate>(*sockets_, limits, [this](int listener, int fd) {
+    grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+    connection.listener_fd = listener;
+    connection.fd = fd;
+    acceptor_->HandleNewConnection(&connection);
+  });
+}
+
+const std::string& RpcServer::address() const { return sockets_->address(); }
+
+ConnectionGate::Counts RpcServer::connections() const { return gate_->counts(); }
 
 RpcServer::~RpcServer() { Shutdown(std::chrono::milliseconds(0)); }
 
@@ -177,6 +168,8 @@ void RpcServer::StartDraining() {
 
 void RpcServer::Shutdown(std::chrono::milliseconds grace) {
   if (!server_) return;
+  gate_->Stop();
+  sockets_->Close();
   hub_->Drain();
   colorize_hub_->Drain();
   server_->Shutdown(std::chrono::system_clock::now() + grace);

@@ -6,6 +6,8 @@
 #include <memory>
 #include <string>
 
+#include "server/net/connection_gate.h"
+#include "server/net/listen_sockets.h"
 #include "server/rpc/call_watch.h"
 #include "server/rpc/live/colorize_hub.h"
 #include "server/rpc/rpc_parts.h"
@@ -13,7 +15,10 @@
 
 namespace grpc {
 class Server;
+namespace experimental {
+class ExternalConnectionAcceptor;
 }
+}  // namespace grpc
 
 namespace color3d {
 
@@ -24,8 +29,11 @@ struct RpcServerOptions {
   int bulk_threads = 6;
   int check_threads = 4;                                 // of which one project has half at most
   std::shared_ptr<grpc::ServerCredentials> credentials;  // null: in the clear
-  std::shared_ptr<TokenBook> tokens;                     // null: nobody is asked
+  // Both null: nobody is asked.
+  std::shared_ptr<TokenBook> tokens;
+  std::shared_ptr<CertificateRoles> certificates;
   ServiceLimits limits;
+  int max_connections = 4096;  // fewer where the process may not have so many descriptors
   WatchTiming watch;
   std::string version = "0";
   UserModels models;
@@ -53,12 +61,13 @@ class RpcServer {
   RpcServer& operator=(const RpcServer&) = delete;
 
   // "127.0.0.1:50551" with the port that was bound.
-  const std::string& address() const { return address_; }
+  const std::string& address() const;
   // Streams that are open, and pictures that are not answered yet.
   struct Open {
     int watches = 0, downloads = 0, uploads = 0, live_pictures = 0;
   };
   Open open() const;
+  ConnectionGate::Counts connections() const;
   // Health turns NOT_SERVING, new jobs are refused, streams end with UNAVAILABLE.
   void StartDraining();
   // Waits for open RPCs at most this long, then cancels them.
@@ -66,17 +75,22 @@ class RpcServer {
 
  private:
   struct Services;
-  std::string address_;
+  void MakeGate(const RpcServerOptions& options);
+
+  std::unique_ptr<ListenSockets> sockets_;
   std::atomic<bool> draining_{false};
   std::unique_ptr<FileDigests> digests_;
   std::unique_ptr<Executor> quick_, slow_, bulk_, checks_;
   std::unique_ptr<StreamLimits> streams_;
+  std::unique_ptr<SilenceWatch> silence_;
   std::unique_ptr<CallMemory> memory_;
   std::unique_ptr<Access> access_;
   std::unique_ptr<RpcParts> parts_;
   std::unique_ptr<WatchHub> hub_;
   std::unique_ptr<ColorizeHub> colorize_hub_;
   std::unique_ptr<Services> services_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
+  std::unique_ptr<ConnectionGate> gate_;  // calls of the server tell it
   std::unique_ptr<grpc::Server> server_;
 };
 

@@ -12,9 +12,11 @@ namespace color3d {
 
 class StreamLimit {
  public:
-  // `what`, in the plural, is for the message. `max_of_project` 0: no limit of its own.
-  StreamLimit(const char* what, int max, int max_of_project)
-      : what_(what), max_(max), max_of_project_(max_of_project) {}
+  // `what`, in the plural, is for the message. `max_of_project` 0: no limit of its own. `shared`: a
+  // project may have no more than would stay free, so that one has half of all, two a third each,
+  // and so on, and there is always a place for the next one.
+  StreamLimit(const char* what, int max, int max_of_project, bool shared = false)
+      : what_(what), max_(max), max_of_project_(max_of_project), shared_(shared) {}
 
   // One open stream; its place is free again when this is destroyed.
   class Place {
@@ -42,7 +44,7 @@ class StreamLimit {
     return all_;
   }
 
-  // Throws Error{kResourceExhausted}: TOO_MANY_STREAMS, or QUOTA_EXCEEDED of the project.
+  // Throws Error{kResourceExhausted}: TOO_MANY_STREAMS, or QUOTA_EXCEEDED of the project's share.
   Place Take(const std::string& project) {
     std::lock_guard lock(mutex_);
     const auto of_project = open_.find(project);
@@ -64,6 +66,18 @@ class StreamLimit {
                          max_,
                          what_);
     }
+    if (shared_ && own > 0 && own >= max_ - all_) {
+      throw ServiceError(
+          ErrorCode::kResourceExhausted,
+          "QUOTA_EXCEEDED",
+          fmt::format(
+              "{} {} of your project are open, which is its share of the {} that this server "
+              "allows; close some, or try again later",
+              own,
+              what_,
+              max_),
+          {{"project:" + project + " " + what_, fmt::format("{} of {} in all", own, max_)}});
+    }
     ++all_;
     ++open_[project];
     return Place(this, project);
@@ -78,6 +92,7 @@ class StreamLimit {
 
   const char* what_;
   const int max_, max_of_project_;
+  const bool shared_;
   std::mutex mutex_;
   int all_ = 0;
   std::map<std::string, int> open_;  // by project

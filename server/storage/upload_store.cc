@@ -21,6 +21,9 @@ struct UploadStore::Writer::Session {
 
 namespace {
 
+// Of one owner: each is a file, be it small.
+constexpr size_t kMaxUnfinished = 1'000;
+
 void CheckName(const UploadName& name, int64_t max_blob_bytes) {
   constexpr char kAllowed[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-";
   if (name.uuid.empty() || name.uuid.size() > 64 ||
@@ -112,6 +115,16 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
     std::map<std::string, int64_t>& owned = bytes_[name.owner];
     int64_t others = 0;
     for (const auto& [other, bytes] : owned) others += other == part ? 0 : bytes;
+    if (!owned.contains(part) && owned.size() >= kMaxUnfinished) {
+      throw ServiceError(
+          ErrorCode::kResourceExhausted,
+          "QUOTA_EXCEEDED",
+          fmt::format("{} uploads of your project are unfinished, which is as many as "
+                      "it may have; finish some, or wait a day until they are removed",
+                      owned.size()),
+          {{"project:" + name.owner + " unfinished uploads",
+            fmt::format("{} of {}", owned.size(), kMaxUnfinished)}});
+    }
     admit(others + name.digest.size_bytes);
     owned[part] = name.digest.size_bytes;
     writer.reset(new Writer());
@@ -154,6 +167,11 @@ UploadStore::Writer::~Writer() {
   const auto entry = store_->sessions_.find(key);
   if (entry == store_->sessions_.end() || !entry->second.expired()) return;
   store_->sessions_.erase(entry);
+  // Nothing has come: there is nothing to go on from.
+  std::error_code error;
+  if (fs::file_size(store_->folder_ / key, error) == 0 && !error) {
+    fs::remove(store_->folder_ / key, error);
+  }
   store_->CountOnDisk(key);
 }
 

@@ -64,8 +64,9 @@ class UploadStore {
   // May refuse an upload, by throwing, that would bring what its owner's unfinished uploads take to
   // so many bytes. Decides for one upload at a time.
   using Admission = std::function<void(int64_t owner_bytes)>;
-  // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). A blob that is there
-  // need not be written again.
+  // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). An owner may have
+  // 1,000 unfinished uploads (kResourceExhausted, QUOTA_EXCEEDED). A blob that is there need not be
+  // written again.
   std::unique_ptr<Writer> Open(
       const UploadName& name, int64_t offset, const Admission& admit = [](int64_t) {});
 

@@ -111,5 +111,22 @@ TEST_F(UploadStoreTest, EmptyBlobs) {
   EXPECT_TRUE(blobs_.Touch(name.digest));
 }
 
+TEST_F(UploadStoreTest, AnUploadOfWhichNothingCameLeavesNothing) {
+  uploads_.Open({"u", DigestOf("abc")}, 0).reset();
+  EXPECT_EQ(ReasonThrown([&] { uploads_.Open({"v", DigestOf("abc")}, 2); }), "OFFSET_MISMATCH");
+  EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());
+}
+
+TEST_F(UploadStoreTest, UnfinishedUploadsOfAnOwnerAreCounted) {
+  const FileDigest digest = DigestOf("abc");
+  const auto leave = [&](const std::string& owner, int i) {
+    uploads_.Open({"u" + std::to_string(i), digest, owner}, 0)->Append(0, "a");
+  };
+  for (int i = 0; i < 1000; ++i) leave("attic", i);
+  EXPECT_EQ(ReasonThrown([&] { leave("attic", 1000); }), "QUOTA_EXCEEDED");
+  leave("cellar", 0);
+  uploads_.Open({"u7", digest, "attic"}, 1)->Append(1, "b");  // what is there goes on
+}
+
 }  // namespace
 }  // namespace color3d

@@ -9,27 +9,19 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <map>
 
-extern char** environ;
+#include "core/base/environment.h"
+#include "server/ops/process_state.h"
 
 namespace color3d {
 namespace {
 constexpr auto kTick = std::chrono::milliseconds(50);
 constexpr auto kListening = std::chrono::seconds(2);
+constexpr auto kOrphans = std::chrono::milliseconds(500);
 // A worker that lived this long did not fail to start.
 constexpr auto kHealthyLife = std::chrono::seconds(60);
 
-// State T of /proc/<pid>/stat, which follows the program's name in parentheses.
-bool IsStopped(pid_t pid) {
-  std::ifstream stream("/proc/" + std::to_string(pid) + "/stat");
-  std::string line;
-  std::getline(stream, line);
-  const size_t name_end = line.rfind(')');
-  return name_end != std::string::npos && name_end + 2 < line.size() &&
-         (line[name_end + 2] == 'T' || line[name_end + 2] == 't');
-}
 }  // namespace
 
 Supervisor::Supervisor(const SupervisorOptions& options, JobStore& store)
@@ -85,16 +77,20 @@ void Supervisor::StartWorker(Slot* slot) {
   sigset_t none;
   ::sigemptyset(&none);
   sigset_t defaults;
-  ::sigemptyset(&defaults);
-  for (const int signal : {SIGTERM, SIGINT, SIGPIPE}) ::sigaddset(&defaults, signal);
+  ::sigfillset(&defaults);
   ::posix_spawnattr_setsigmask(&attributes, &none);
   ::posix_spawnattr_setsigdefault(&attributes, &defaults);
   ::posix_spawnattr_setpgroup(&attributes, 0);
   ::posix_spawnattr_setflags(
       &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  // Neither tokens nor keys of ours: workers decode strangers' files.
+  std::vector<std::string> variables = EnvironmentToHandOn();
+  std::vector<char*> environment;
+  for (std::string& variable : variables) environment.push_back(variable.data());
+  environment.push_back(nullptr);
   pid_t pid = 0;
-  const int error =
-      ::posix_spawn(&pid, options_.program.c_str(), nullptr, &attributes, argv.data(), environ);
+  const int error = ::posix_spawn(
+      &pid, options_.program.c_str(), nullptr, &attributes, argv.data(), environment.data());
   ::posix_spawnattr_destroy(&attributes);
   slot->started = SteadyClock::now();
   if (error != 0) {
@@ -219,9 +215,38 @@ void Supervisor::KillTheSilent() {
   }
 }
 
+void Supervisor::SeeOrphansOff() {
+  const auto now = SteadyClock::now();
+  if (!options_.orphans || now < next_orphans_) return;
+  next_orphans_ = now + kOrphans;
+  for (const std::string& id : options_.orphans->Look()) {
+    try {
+      for (const std::string& job : store_.ExpireLeasesOf(id)) {
+        spdlog::info("[job={}] its worker {} is gone", job, id);
+      }
+      store_.RemoveWorker(id);
+    } catch (const Error& e) {
+      spdlog::warn("{}: {}", id, e.what());
+    }
+  }
+}
+
+// As the first process of a container we inherit whatever has lost its parent.
+void Supervisor::ReapStrangers() {
+  while (true) {
+    siginfo_t ended{};
+    if (::waitid(P_ALL, 0, &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid == 0) return;
+    const auto is_it = [&](const Slot& slot) { return slot.pid == ended.si_pid; };
+    if (std::ranges::any_of(slots_, is_it)) return;  // at the next turn
+    ::waitpid(ended.si_pid, nullptr, WNOHANG);
+  }
+}
+
 void Supervisor::Loop() {
   while (true) {
     for (Slot& slot : slots_) CheckWorker(&slot);
+    ReapStrangers();
+    SeeOrphansOff();
     KillTheSilent();
     if (draining_.load()) {
       const bool kill = SteadyClock::now() >= kill_at_.load();

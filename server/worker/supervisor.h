@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "server/store/job_store.h"
+#include "server/worker/orphaned_workers.h"
 
 namespace color3d {
 
@@ -52,6 +53,8 @@ struct SupervisorOptions {
   // ... or for this long while nobody can write to the store, which it may have stopped in: before
   // the leases of all others run out with its own.
   std::chrono::milliseconds max_stopped_holding{10'000};
+  // Those of an earlier server, to be seen to their end; may be null.
+  std::shared_ptr<OrphanedWorkers> orphans;
   // A worker that runs but has not reported itself for so long is killed, too; not where no report
   // can be written, for the disk is full.
   std::chrono::milliseconds max_silent{180'000};
@@ -96,11 +99,13 @@ class Supervisor {
   bool IsStoreHeld() const;
   bool IsStoreFull() const;
   void KillTheSilent();
+  void SeeOrphansOff();
+  void ReapStrangers();
 
   const SupervisorOptions options_;
   JobStore& store_;
   std::vector<Slot> slots_;  // supervisor's thread only
-  SteadyClock::time_point next_listening_;
+  SteadyClock::time_point next_listening_, next_orphans_;
   std::atomic<bool> draining_{false};
   std::atomic<SteadyClock::time_point> kill_at_;
   std::thread thread_;

@@ -15,6 +15,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/sandbox.h"
 #include "server/ops/process.h"
+#include "server/ops/stop_signals.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/worker/inference_worker.h"
@@ -122,10 +123,12 @@ void HandleStopSignals() {
   struct sigaction action {};
   action.sa_flags = SA_RESTART;
   action.sa_handler = OnTerminate;
-  ::sigaction(SIGTERM, &action, nullptr);
+  for (const int signal : {SIGTERM, SIGHUP, SIGQUIT, SIGPWR, SIGXCPU}) {
+    ::sigaction(signal, &action, nullptr);
+  }
   action.sa_handler = OnInterrupt;
   ::sigaction(SIGINT, &action, nullptr);
-  ::signal(SIGPIPE, SIG_IGN);
+  IgnoreStraySignals();
 }
 
 // What this process decodes is strangers'. Threads that were there before are OpenBLAS's own.

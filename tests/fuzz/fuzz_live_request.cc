@@ -23,15 +23,16 @@ struct Fixture {
   SqliteJobStore store{scratch.path() / "jobs.db", StoreRole::kServer, SystemClocks()};
   Executor quick{1}, slow{1}, bulk{1};
   StreamLimits streams{{"watches", 1, 0}, {"downloads", 1, 0}, {"uploads", 1, 0}, {"live", 1, 0}};
+  SilenceWatch silence{std::chrono::minutes(1)};
   CallMemory memory{1 << 20};
   Access access{nullptr};
   FileDigests digests;
   const std::atomic<bool> draining{false};
   const FileDigest colorizer = blobs.PutBytes("colorizer");
   const FileDigest picture = blobs.PutBytes("picture");
-  RpcParts parts{store,  blobs,    uploads, quick,         slow,   bulk, slow,    streams, memory,
-                 access, draining, {},      SystemClock(), "fuzz", {},   digests, {},      {},
-                 {},     {},       {}};
+  RpcParts parts{store,   blobs,   uploads,  quick,  slow, bulk, slow,  streams,
+                 silence, memory,  access,   draining, {}, SystemClock(), "fuzz", {},
+                 digests, {},      {},       {},     {},   {}};
   ProjectStore project{store, ""};
 
   Fixture() {

@@ -85,7 +85,6 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   // Its work lies beside its log, and nothing else is its business.
   const fs::path folder = fs::absolute(log_).parent_path();
   child.environment = {"QT_QPA_PLATFORM=offscreen", "TMPDIR=" + folder.string()};
-  child.inherits_all = false;
   if (IsSandboxing()) {
     child.sandbox = SandboxRules();
     child.sandbox->writable = {folder};

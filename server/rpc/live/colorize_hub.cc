@@ -37,12 +37,22 @@ class ColorizeStream final
     Pump();
   }
 
+  // Before it is pumped for the first time.
+  void WatchSilence() {
+    silence_.emplace(
+        parts_.silence,
+        [stream = weak_from_this(), limit = hub_.limits_.silence] {
+          if (const auto self = stream.lock()) self->End(SilentStatus(limit));
+        },
+        hub_.limits_.silence);
+  }
+
   void Pump() {
     const auto self = shared_from_this();
     while (true) {
       switch (Decide()) {
         case Step::kNothing:
-          return;
+          return NoteTurn();
         case Step::kRead: {
           StartRead(&incoming_);
           std::lock_guard lock(mutex_);
@@ -120,6 +130,26 @@ class ColorizeStream final
     reading_ = true;
     starting_read_ = true;
     return Step::kRead;
+  }
+
+  static grpc::Status SilentStatus(std::chrono::milliseconds limit) {
+    return ToGrpcStatus(ServiceError(ErrorCode::kUnavailable,
+                                     "STREAM_SILENT",
+                                     "no picture came for {} s; open another stream for the next",
+                                     limit.count() / 1000));
+  }
+
+  // Silence is the client's when all that it sent is answered.
+  void NoteTurn() {
+    std::lock_guard lock(mutex_);
+    const bool waits = reading_ && !writing_ && !end_ && pictures_.empty() && replies_.empty();
+    if (waits == waits_for_client_) return;
+    waits_for_client_ = waits;
+    if (waits) {
+      silence_->Wait();
+    } else {
+      silence_->Resume();
+    }
   }
 
   // On the executor.
@@ -203,6 +233,8 @@ class ColorizeStream final
   bool writing_ = false;
   bool abandoned_ = false;
   bool finished_ = false;
+  bool waits_for_client_ = false;
+  std::optional<SilenceWatch::Stream> silence_;
   grpc::Status last_status_;         // set once, when finished_ is
   std::optional<grpc::Status> end_;  // how the stream will end; no more pictures are taken
   std::set<std::shared_ptr<Picture>> pictures_;  // under way
@@ -244,6 +276,7 @@ grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* 
   client_.WarmUp();
   const auto stream =
       std::make_shared<ColorizeStream>(*this, context, call->store, std::move(place));
+  stream->WatchSilence();
   {
     std::lock_guard lock(mutex_);
     if (draining_) return new RefusedStream(DrainingStatus());

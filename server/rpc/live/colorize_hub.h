@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -20,6 +21,8 @@ struct ColorizeLimits {
   int window = 16;         // pictures of one stream that are read and not yet answered
   int max_streams = 64;    // further ones: RESOURCE_EXHAUSTED (TOO_MANY_STREAMS)
   int max_pictures = 128;  // of all streams; each may have one in any case
+  // A stream without an unanswered picture, to which none came for so long, is ended.
+  std::chrono::milliseconds silence{15 * 60'000};
 };
 
 class ColorizeHub {

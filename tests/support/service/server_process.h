@@ -3,6 +3,7 @@
 
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -24,9 +25,11 @@ inline void SleepMs(int ms) { std::this_thread::sleep_for(std::chrono::milliseco
 // One `color3d-server serve` on a data folder.
 class ServerProcess {
  public:
+  // `max_descriptors`: what it may have open at all; 0: as this process.
   ServerProcess(const std::filesystem::path& folder,
                 std::vector<std::string> extra,
-                int workers = 1) {
+                int workers = 1,
+                rlim_t max_descriptors = 0) {
     const std::filesystem::path port_file = folder / "port";
     std::filesystem::remove(port_file);
     std::vector<std::string> arguments = {COLOR3D_SERVER,
@@ -61,10 +64,12 @@ class ServerProcess {
     argv.push_back(nullptr);
     pid_ = ::fork();
     if (pid_ == 0) {
+      const rlimit limit{max_descriptors, max_descriptors};
+      if (max_descriptors > 0) ::setrlimit(RLIMIT_NOFILE, &limit);
       ::execv(COLOR3D_SERVER, argv.data());
       ::_exit(127);
     }
-    for (int i = 0; i < 200 && !std::filesystem::exists(port_file); ++i) SleepMs(50);
+    for (int i = 0; i < 400 && !std::filesystem::exists(port_file) && !HasEnded(); ++i) SleepMs(25);
     std::ifstream(port_file) >> address_;
     client_ = std::make_unique<TestClient>(address_);
   }
@@ -75,6 +80,11 @@ class ServerProcess {
   const std::string& address() const { return address_; }
   pid_t pid() const { return pid_; }
   void Signal(int signal) { ::kill(pid_, signal); }
+  bool HasEnded() const {
+    siginfo_t ended{};
+    return ::waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           ended.si_pid == pid_;
+  }
   // Exit status, or 128 + signal.
   int Wait() {
     int status = 0;

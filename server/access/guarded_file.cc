@@ -1,0 +1,72 @@
+#include "server/access/guarded_file.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr auto kLook = std::chrono::seconds(1);
+
+// Of its bytes and rights, as far as the disk tells.
+std::string IdentityOf(const fs::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return "";
+  return fmt::format("{} {} {} {} {}",
+                     status.st_ino,
+                     status.st_size,
+                     status.st_mtim.tv_sec,
+                     status.st_mtim.tv_nsec,
+                     status.st_mode);
+}
+
+}  // namespace
+
+GuardedFile::GuardedFile(const fs::path& file,
+                         const char* what,
+                         std::function<void(const std::string&)> take)
+    : file_(file), what_(what), take_(std::move(take)), identity_(IdentityOf(file)) {
+  take_(Read());
+}
+
+std::string GuardedFile::Read() const {
+  struct stat status {};
+  if (::stat(file_.c_str(), &status) == 0 && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "others may write to the {} {}, and so let themselves in; chmod 600 {}",
+                what_,
+                file_.string(),
+                file_.string());
+  }
+  return ReadFile(file_);
+}
+
+void GuardedFile::ReadAgain() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_look_) return;
+  next_look_ = now + kLook;
+  const std::string identity = IdentityOf(file_);
+  if (identity == identity_) return;
+  identity_ = identity;
+  try {
+    take_(Read());
+    spdlog::info("{} was read again", file_.string());
+  } catch (const Error& e) {
+    spdlog::error("the {} stays as it was: {}", what_, e.what());
+  }
+}
+
+void GuardedFile::WithLatest(const std::function<void()>& use) {
+  std::lock_guard lock(mutex_);
+  ReadAgain();
+  use();
+}
+
+}  // namespace color3d

@@ -1,0 +1,194 @@
+#include "server/net/listen_sockets.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <string_view>
+
+#include "core/base/address.h"
+#include "core/base/error.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kBacklog = 4096;  // the kernel takes as many as net.core.somaxconn says
+constexpr int kType = SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC;
+constexpr unsigned kUserTimeoutMs = 20'000;  // of bytes that the other side does not acknowledge
+constexpr int kPortTries = 8;
+
+Error CannotListen(const std::string& address, const std::string& why) {
+  return Error(ErrorCode::kFailedPrecondition,
+               "cannot listen on {}: {}; choose another with --listen",
+               address,
+               why);
+}
+
+std::string WhyOf(int error) {
+  return error == EADDRINUSE ? "the address is in use (is another server running?)"
+                             : std::strerror(error);
+}
+
+int BoundPort(int fd) {
+  sockaddr_storage address{};
+  socklen_t size = sizeof(address);
+  ::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
+  return ntohs(address.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(address).sin6_port
+                                             : reinterpret_cast<sockaddr_in&>(address).sin_port);
+}
+
+void SetPort(addrinfo* where, int port) {
+  (where->ai_family == AF_INET6 ? reinterpret_cast<sockaddr_in6*>(where->ai_addr)->sin6_port
+                                : reinterpret_cast<sockaddr_in*>(where->ai_addr)->sin_port) =
+      htons(static_cast<uint16_t>(port));
+}
+
+// What a socket sets, those that it accepts have, too. -1 with errno.
+int Listen(const addrinfo& where, bool both_families) {
+  const int fd = ::socket(where.ai_family, kType, 0);
+  if (fd < 0) return -1;
+  const int on = 1, off = 0;
+  ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
+  ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &kUserTimeoutMs, sizeof(kUserTimeoutMs));
+  if (where.ai_family == AF_INET6) {
+    const int& only = both_families ? off : on;
+    ::setsockopt(fd, IPPROTO_IPV6, IPV6_V6ONLY, &only, sizeof(only));
+  }
+  if (::bind(fd, where.ai_addr, where.ai_addrlen) == 0 && ::listen(fd, kBacklog) == 0) return fd;
+  const int error = errno;
+  ::close(fd);
+  errno = error;
+  return -1;
+}
+
+// Whether somebody answers there; throws nothing.
+bool IsAlive(const sockaddr_un& address) {
+  const int fd = ::socket(AF_UNIX, kType, 0);
+  if (fd < 0) return true;
+  const bool reached =
+      ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+  const int error = errno;
+  ::close(fd);
+  return reached || (error != ECONNREFUSED && error != ENOENT);
+}
+
+}  // namespace
+
+ListenSockets::ListenSockets(const std::string& address) : address_(address) {
+  try {
+    address.starts_with("unix:") ? ListenOnUnix() : ListenOnTcp();
+  } catch (...) {
+    Close();
+    throw;
+  }
+}
+
+ListenSockets::~ListenSockets() { Close(); }
+
+void ListenSockets::Close() {
+  struct stat status {};
+  // Not one that somebody put there since.
+  if (inode_ != 0 && ::stat(path_.c_str(), &status) == 0 && status.st_ino == inode_) {
+    ::unlink(path_.c_str());
+  }
+  for (const int fd : descriptors_) ::close(fd);
+  descriptors_.clear();
+  // The lock's file stays: who waits for it must not hold one that has no name any more.
+  if (lock_ >= 0) ::close(lock_);
+  lock_ = -1;
+}
+
+void ListenSockets::ListenOnUnix() {
+  path_ = address_.substr(std::string_view("unix:").size());
+  if (path_.starts_with("//")) path_.erase(0, 2);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path_.empty()) throw CannotListen(address_, "the path is empty");
+  if (path_.size() >= sizeof(address.sun_path)) {
+    throw CannotListen(address_,
+                       fmt::format("the path of a socket may have {} bytes, this one has {}",
+                                   sizeof(address.sun_path) - 1,
+                                   path_.size()));
+  }
+  std::memcpy(address.sun_path, path_.data(), path_.size());
+  // One of two that start at once: to look whether the other lives is not enough.
+  lock_ = ::open((path_ + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (lock_ < 0) throw CannotListen(address_, std::strerror(errno));
+  struct stat status {};
+  const bool is_there = ::lstat(path_.c_str(), &status) == 0;
+  if (::flock(lock_, LOCK_EX | LOCK_NB) != 0 ||
+      (is_there && S_ISSOCK(status.st_mode) && IsAlive(address))) {
+    throw CannotListen(address_, "another server listens there");
+  }
+  if (is_there && !S_ISSOCK(status.st_mode)) {
+    throw CannotListen(address_, "there is a file that is no socket");
+  }
+  if (is_there && ::unlink(path_.c_str()) != 0) {
+    throw CannotListen(address_, fmt::format("the old socket stays: {}", std::strerror(errno)));
+  }
+  const int fd = ::socket(AF_UNIX, kType, 0);
+  if (fd < 0) throw CannotListen(address_, std::strerror(errno));
+  descriptors_.push_back(fd);
+  if (::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 ||
+      ::listen(fd, kBacklog) != 0) {
+    throw CannotListen(address_, WhyOf(errno));
+  }
+  if (::stat(path_.c_str(), &status) == 0) inode_ = status.st_ino;
+}
+
+void ListenSockets::ListenOnTcp() {
+  const HostPort parts = SplitHostPort(address_);
+  const bool everywhere = parts.host == "0.0.0.0" || parts.host == "::";
+  int port = 0, error = 0;
+  for (int tries = 0; port == 0 && tries < kPortTries; ++tries) {
+    port = BindAll(everywhere ? "::" : parts.host, parts.port, everywhere, &error);
+    // A machine without IPv6.
+    if (port == 0 && everywhere) port = BindAll("0.0.0.0", parts.port, false, &error);
+    if (error != EADDRINUSE || parts.port != "0") break;
+  }
+  if (port == 0) throw CannotListen(address_, WhyOf(error));
+  address_ = address_.substr(0, address_.rfind(':') + 1) + std::to_string(port);
+}
+
+int ListenSockets::BindAll(const std::string& host,
+                           const std::string& port,
+                           bool both_families,
+                           int* error) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
+  addrinfo* first = nullptr;
+  const int failed = ::getaddrinfo(host.c_str(), port.c_str(), &hints, &first);
+  if (failed != 0) throw CannotListen(address_, ::gai_strerror(failed));
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(first, &::freeaddrinfo);
+  int bound_port = 0;
+  *error = 0;
+  for (addrinfo* where = first; where != nullptr; where = where->ai_next) {
+    if (bound_port != 0) SetPort(where, bound_port);  // the same one on each address
+    const int fd = Listen(*where, both_families);
+    if (fd >= 0) {
+      descriptors_.push_back(fd);
+      bound_port = BoundPort(fd);
+      continue;
+    }
+    *error = errno;
+    if (*error != EADDRINUSE) continue;  // a family that this machine does not have
+    for (const int other : descriptors_) ::close(other);
+    descriptors_.clear();
+    return 0;
+  }
+  return bound_port;
+}
+
+}  // namespace color3d
