@@ -1,19 +1,24 @@
 #!/usr/bin/env bash
 # Builds Color3D, starts its server, colours one scene end to end and says where the report is.
-#   deploy/demo.sh [PHOTOS] [OUT] [-- options of "color3d colorize"]
+#   deploy/demo.sh [--benchmark | --no-benchmark] [PHOTOS] [OUT] [-- options of "color3d colorize"]
 # PHOTOS: a folder of photos, alone or with a COLMAP model (sparse/0) or transforms.json; a film
 # (.mp4, ...); or a folder of its frames, with "-- --film". Pictures in colour are run as a
 # benchmark: their colour is dropped, one key view keeps its own, and the result is scored against
 # the truth. For monochrome ones, and for a film, the demo selects the key view and says how to go
-# on. Without PHOTOS a small procedural room is rendered first. OUT: default color3d-demo.
+# on. Photos that may be either (stained prints, for example): it asks, when it has a terminal;
+# --benchmark or --no-benchmark decides.
+# Without PHOTOS a small procedural room is rendered first. OUT: default color3d-demo.
 set -euo pipefail
 here=$(pwd)
 root=$(cd "$(dirname "$0")/.." && pwd)
 
 positional=()
+benchmark= # --benchmark, --no-benchmark, or empty: as the photos are
 while [ "$#" -gt 0 ] && [ "$1" != "--" ]; do
   case "$1" in
-    -h | --help) sed -n '2,9p' "$0" | cut -c3-; exit 0 ;;
+    -h | --help) sed -n '2,11p' "$0" | cut -c3-; exit 0 ;;
+    --benchmark | --no-benchmark) benchmark=$1 ;;
+    -*) echo "demo: there is no option $1; see deploy/demo.sh --help (options of color3d colorize come after --)" >&2; exit 2 ;;
     *) positional+=("$1") ;;
   esac
   shift
@@ -66,8 +71,23 @@ COLOR3D_SERVER=$(cat "$store/address")
 export COLOR3D_SERVER
 echo "demo: the server listens on $COLOR3D_SERVER, its store is $store"
 
+if [ -z "$benchmark" ] && [ -d "$photos" ]; then
+  seen=$("$bin/color3d" inspect "$photos") || seen=
+  case "$seen" in colour*) benchmark=--benchmark ;; *) benchmark=--no-benchmark ;; esac
+  if [[ "$seen" == *unsure* ]]; then
+    echo "demo: $seen"
+    if [ -t 0 ] && [ -t 2 ]; then
+      read -r -p "demo: are the photos in colour, to be dropped and scored against? [y/n] " answer || answer=
+      case "$answer" in
+        [yY]*) benchmark=--benchmark ;;
+        [nN]*) benchmark=--no-benchmark ;;
+      esac
+    fi
+    echo "demo: goes on with $benchmark; say --benchmark or --no-benchmark to decide"
+  fi
+fi
 mode=()
-if [ -d "$photos" ] && "$bin/color3d" inspect "$photos" | grep -q '^colour'; then
+if [ "$benchmark" = --benchmark ]; then
   mode=(--benchmark)
   echo "demo: the photos are in colour: their colour is dropped and the result scored against it"
 fi

@@ -43,6 +43,14 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
           "Threads of the inference worker, which answers ColorizeImages; 0: the machine's")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  serve
+      ->add_option("--worker-memory-mib",
+                   options->worker_memory_mib,
+                   "Memory that each worker may take, and COLMAP beside it, MiB; what needs more "
+                   "fails. 0: three quarters of the machine's or the container's, shared among the "
+                   "workers, and half of it for the inference worker")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 30))
+      ->capture_default_str();
   serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");
   serve->add_option("--log-level", options->log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();

@@ -15,6 +15,7 @@
 #include "core/base/address.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/memory.h"
 #include "server/access/certificate_roles.h"
 #include "server/access/notify_targets.h"
 #include "server/access/tls.h"
@@ -47,12 +48,31 @@ namespace {
 constexpr int64_t kFewDescriptors = 4096;
 // Beyond the time in which a worker drains.
 constexpr double kOrphanSeconds = 10.0;
+// Less is taken by the libraries alone, or by the first photo.
+constexpr int64_t kLeastWorkerMemoryMib = 1024;
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
 }
 
+// MiB that a worker may take: what the options say, else this share of the machine's memory. 0: no
+// limit, where the machine does not tell.
+int64_t WorkerMemoryMib(const ServeOptions& options, double share) {
+  if (options.worker_memory_mib > 0) return options.worker_memory_mib;
+  const int64_t machine = MachineMemoryBytes();
+  if (machine == INT64_MAX) return 0;
+  return std::max(kLeastWorkerMemoryMib,
+                  static_cast<int64_t>(share * static_cast<double>(machine >> 20)));
+}
+
 void CheckOptions(const ServeOptions& options) {
+  if (options.worker_memory_mib > 0 && options.worker_memory_mib < kLeastWorkerMemoryMib) {
+    throw InvalidArgument("--worker-memory-mib is {}; it must be 0 or at least {}",
+                          options.worker_memory_mib,
+                          kLeastWorkerMemoryMib);
+  }
+  CheckAddressForm("--listen", options.listen);
+  if (!options.metrics_listen.empty()) CheckAddressForm("--metrics-listen", options.metrics_listen);
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
   if (options.notify_allow.empty() == !options.notify_secret.empty()) {
@@ -105,10 +125,13 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   const int machine = std::max(1u, std::thread::hardware_concurrency());
   const int threads =
       options.threads > 0 ? options.threads : std::max(1, machine / std::max(1, options.workers));
+  const int64_t memory_mib = WorkerMemoryMib(options, 0.75 / std::max(1, options.workers));
   setup.arguments = {"--data-dir",
                      options.data_folder.string(),
                      "--threads",
                      fmt::to_string(threads),
+                     "--memory-mib",
+                     fmt::to_string(memory_mib),
                      "--log-level",
                      options.log_level,
                      "--log-format",
@@ -170,6 +193,8 @@ InferenceLink InferenceSetup(const ServeOptions& options,
       options.data_folder.string(),
       "--threads",
       fmt::to_string(options.live_threads > 0 ? options.live_threads : machine),
+      "--memory-mib",
+      fmt::to_string(WorkerMemoryMib(options, 0.5)),
       "--log-level",
       options.log_level,
       "--log-format",

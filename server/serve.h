@@ -23,6 +23,9 @@ struct ServeOptions {
   int threads = 0;  // of each worker; 0: the machine's, shared among the workers
   // Of the inference worker; 0: the machine's.
   int live_threads = 0;
+  // Of each worker, MiB; 0: three quarters of the machine's, shared among the workers, and half of
+  // the machine's for the inference worker.
+  int64_t worker_memory_mib = 0;
   std::string log_level = "info";
   double drain_seconds = 20.0;
   int64_t reserve_mib = 256;

@@ -141,7 +141,7 @@ v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const 
 void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job& before) {
   const fs::path folder = out / artifact::kPaint;
   std::error_code none;
-  if (!fs::is_directory(folder, none)) return;
+  if (!fs::is_directory(fs::symlink_status(folder, none))) return;
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file() && entry.path().stem().extension() != ".painted") {

@@ -11,6 +11,8 @@ namespace color3d::client {
 namespace {
 
 constexpr int kMaxPhotos = 24;
+constexpr char kUnsure[] =
+    "; unsure: they may be prints with stains or tints, or photos most of which has one hue";
 
 ExitCode RunInspect(const Context& context, const std::string& photos) {
   const PhotoFolder folder = CollectPhotos(photos);
@@ -30,13 +32,16 @@ ExitCode RunInspect(const Context& context, const std::string& photos) {
                {"photos", count.photos},
                {"looked_at", count.looked_at},
                {"in_colour", count.in_color},
-               {"monochrome", count.looked_at - count.in_color}});
+               {"monochrome", count.looked_at - count.in_color},
+               {"unsure", count.unsure},
+               {"sure", count.IsSure()}});
   } else {
-    PrintText(fmt::format("{}: {} of {} photos looked at are in colour ({} photos)\n",
+    PrintText(fmt::format("{}: {} of {} photos looked at are in colour ({} photos){}\n",
                           kind,
                           count.in_color,
                           count.looked_at,
-                          count.photos));
+                          count.photos,
+                          count.IsSure() ? "" : kUnsure));
   }
   return ExitCode::kOk;
 }

@@ -9,6 +9,7 @@
 #include "client/commands/console.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/names.h"
+#include "client/lib/out_folder.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
 #include "core/image/probe/probe.h"
@@ -97,17 +98,30 @@ LiveSummary ColorizeToFiles(Connection& connection,
       }
       return;
     }
+    const fs::path file = PlaceBelow(out, names[i]);
     if (answer.has_image_digest()) {
       const FileDigest digest{answer.image_digest().sha256(), answer.image_digest().size_bytes()};
-      DownloadBlob(connection, digest, out / names[i], [](int64_t) {});
+      DownloadBlob(connection, digest, file, [](int64_t) {});
     } else {
-      WriteFileAtomic(out / names[i], answer.image());
+      WriteFileAtomic(file, answer.image());
     }
     written[i] = names[i];
     summary.colorizer = answer.colorizer();
     summary.encoder_digest = answer.encoder_digest();
   };
-  ColorizeLive(connection, source, pictures, options, on_answer);
+  try {
+    ColorizeLive(connection, source, pictures, options, on_answer);
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::kUnavailable) throw;
+    const auto there = std::count_if(
+        written.begin(), written.end(), [](const std::string& name) { return !name.empty(); });
+    throw Error(ErrorCode::kUnavailable,
+                "{}; {} of {} pictures are in {}, whole; run the command again for the rest",
+                e.what(),
+                there,
+                pictures.size(),
+                out.string());
+  }
   for (size_t i = 0; i < pictures.size(); ++i) {
     if (!written[i].empty()) summary.files.push_back(written[i]);
     if (!errors[i].empty()) summary.errors.push_back(errors[i]);

@@ -150,22 +150,13 @@ std::vector<std::string> Fetch(Connection& connection,
                                const std::string& movie_name,
                                ProgressDisplay& display) {
   const fs::path folder = IsMovieName(out) ? out.parent_path() : out;
-  std::vector<std::string> files;
-  std::vector<v1::Artifact> rest;
-  for (const v1::Artifact& artifact : job.artifacts()) {
-    if (artifact.name() != artifact::kMovie) {
-      rest.push_back(artifact);
-      continue;
-    }
-    const fs::path file = IsMovieName(out) ? out : folder / movie_name;
-    const FileDigest digest{artifact.digest().sha256(), artifact.digest().size_bytes()};
-    DownloadBlob(connection, digest, file, [&](int64_t received) {
-      display.OnTransfer("downloading", received, digest.size_bytes);
-    });
-    display.Clear();
-    files.push_back(file.string());
+  std::vector<v1::Artifact> artifacts(job.artifacts().begin(), job.artifacts().end());
+  for (v1::Artifact& artifact : artifacts) {
+    if (artifact.name() != artifact::kMovie) continue;
+    artifact.set_name(IsMovieName(out) ? out.filename().string() : movie_name);
   }
-  for (const std::string& name : DownloadArtifacts(connection, rest, folder, display)) {
+  std::vector<std::string> files;
+  for (const std::string& name : DownloadArtifacts(connection, artifacts, folder, display)) {
     files.push_back((folder / name).string());
   }
   return files;

@@ -9,6 +9,7 @@
 
 #include "client/commands/follow.h"
 #include "client/lib/blob_transfer.h"
+#include "client/lib/result_download.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
@@ -98,28 +99,48 @@ void PrepareOut(const fs::path& out) {
   }
 }
 
+namespace {
+
+// `go_on`: how to fetch the rest when the server is gone.
+std::vector<std::string> Fetch(Connection& connection,
+                               const std::vector<v1::Artifact>& artifacts,
+                               const fs::path& out,
+                               ProgressDisplay& display,
+                               const std::string& go_on) {
+  std::vector<ResultFile> files;
+  std::vector<std::string> names;
+  for (const v1::Artifact& artifact : artifacts) {
+    files.push_back({artifact.name(), DigestOf(artifact)});
+    names.push_back(artifact.name());
+  }
+  const auto progress = [&](int64_t received, int64_t total) {
+    display.OnTransfer("downloading", received, total);
+  };
+  try {
+    DownloadBelow(connection, files, out, progress, go_on);
+  } catch (...) {
+    display.Clear();
+    throw;
+  }
+  display.Clear();
+  return names;
+}
+
+std::string FetchCommand(const Context& context, const v1::Job& job, const fs::path& out) {
+  return CommandLine(context, {"artifact", "download", job.name(), "-o", out.string()});
+}
+
+}  // namespace
+
 std::vector<std::string> DownloadArtifacts(Connection& connection,
                                            const std::vector<v1::Artifact>& artifacts,
                                            const fs::path& out,
                                            ProgressDisplay& display) {
-  int64_t total = 0;
-  for (const v1::Artifact& artifact : artifacts) {
-    if (!IsSafeRelativePath(artifact.name())) {
-      throw Error(ErrorCode::kDataLoss, "the artifact name '{}' is not safe", artifact.name());
-    }
-    total += artifact.digest().size_bytes();
-  }
-  int64_t before = 0;
-  std::vector<std::string> names;
-  for (const v1::Artifact& artifact : artifacts) {
-    DownloadBlob(connection, DigestOf(artifact), out / artifact.name(), [&](int64_t received) {
-      display.OnTransfer("downloading", before + received, total);
-    });
-    before += artifact.digest().size_bytes();
-    names.push_back(artifact.name());
-  }
-  display.Clear();
-  return names;
+  return Fetch(connection,
+               artifacts,
+               out,
+               display,
+               "run the command again: what is there is not fetched again");
 }
 
 std::vector<std::string> DownloadResults(Connection& connection,
@@ -128,16 +149,18 @@ std::vector<std::string> DownloadResults(Connection& connection,
                                          const fs::path& out,
                                          ProgressDisplay& display) {
   try {
-    return DownloadArtifacts(
-        connection, {job.artifacts().begin(), job.artifacts().end()}, out, display);
+    return Fetch(connection,
+                 {job.artifacts().begin(), job.artifacts().end()},
+                 out,
+                 display,
+                 "fetch the rest with `" + FetchCommand(context, job, out) + "`");
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kCancelled) throw;
     throw CommandFailure(
         ExitCode::kDetached,
-        fmt::format(
-            "{} is done, its results are partly here; fetch them with `{}`",
-            job.name(),
-            CommandLine(context, {"artifact", "download", job.name(), "-o", out.string()})));
+        fmt::format("{} is done, its results are partly here; fetch them with `{}`",
+                    job.name(),
+                    FetchCommand(context, job, out)));
   }
 }
 

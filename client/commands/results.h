@@ -23,7 +23,8 @@ std::string ReadArtifact(Connection& connection, const v1::Job& job, const std::
 // cannot be written.
 void PrepareOut(const std::filesystem::path& out);
 
-// Writes them to out/NAME; returns the names in order. Files that are there already are kept.
+// Writes them to out/NAME (DownloadBelow); returns the names in order. Files that are there already
+// are kept.
 std::vector<std::string> DownloadArtifacts(Connection& connection,
                                            const std::vector<v1::Artifact>& artifacts,
                                            const std::filesystem::path& out,

@@ -65,6 +65,7 @@ std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const ServerTarget& ser
 
 std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   const std::string address = server.HostPort();
+  CheckAddressForm("--server", address);
   const bool is_here = IsLoopback(address);
   if (!server.token.empty() && !server.UsesTls() && !is_here) {
     throw InvalidArgument(
@@ -158,6 +159,7 @@ std::string ServerTarget::HostPort() const {
 Connection::Connection(const ServerTarget& server, const CancellationToken& cancel)
     : address_(server.address),
       on_wait_(server.on_wait),
+      patience_(server.patience),
       cancel_(cancel),
       channel_(MakeChannel(server)) {
   const auto end = std::chrono::system_clock::now() + kConnectLimit;
@@ -199,11 +201,11 @@ void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& 
     const grpc::Status status = call(&context);
     if (status.ok()) return;
     const RpcError error(status);
-    if (!backoff) backoff.emplace();
+    if (!backoff) backoff.emplace(patience_);
     if (error.IsTransient() && backoff->Wait(cancel_, error.RetryDelay())) continue;
     if (turned_away.Wait(error)) continue;
     if (error.grpc_code() == grpc::StatusCode::UNAVAILABLE && error.IsUnreachable()) {
-      throw UnreachableError(address_);
+      throw LostServerError(address_);
     }
     throw WithRequestId(error, status, context);
   }
@@ -213,6 +215,13 @@ Error UnreachableError(const std::string& address) {
   return Error(ErrorCode::kUnavailable,
                "cannot reach a server at {}: start one with `color3d-server serve --data-dir DIR`, "
                "or name another with --server",
+               address);
+}
+
+Error LostServerError(const std::string& address) {
+  return Error(ErrorCode::kUnavailable,
+               "lost the server at {}, which was there before; run the command again when it is "
+               "back (what it was sent is kept)",
                address);
 }
 

@@ -50,6 +50,8 @@ struct ServerTarget {
   std::string token;                       // empty: none
   // Told when a server that is full lets us wait; empty: nobody.
   std::function<void(const std::string&)> on_wait = {};
+  // How long a server that is gone is waited for.
+  std::chrono::milliseconds patience = std::chrono::seconds(30);
 
   bool UsesTls() const;
   // Without the scheme.
@@ -66,6 +68,8 @@ class Connection {
 
   const std::string& address() const { return address_; }
   const CancellationToken& cancel() const { return cancel_; }
+  // With the patience that the target says.
+  Backoff NewBackoff() const { return Backoff(patience_); }
   // Says that a full server lets us wait, to whoever wants to know.
   void SayWait(const RpcError& error) const;
 
@@ -101,6 +105,7 @@ class Connection {
 
   std::string address_;
   const std::function<void(const std::string&)> on_wait_;
+  const std::chrono::milliseconds patience_;
   const CancellationToken& cancel_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::SceneService::Stub> scenes_;
@@ -131,5 +136,8 @@ class FullServerWait {
 
 // "cannot reach a server at ...: start one with ...".
 Error UnreachableError(const std::string& address);
+
+// "lost the server at ...": of one that was there before.
+Error LostServerError(const std::string& address);
 
 }  // namespace color3d::client

@@ -24,6 +24,22 @@ TEST(Connection, SaysHowToStartAServer) {
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
 }
 
+TEST(Connection, AnAddressThatIsWrittenWronglySaysHow) {
+  const CancellationToken cancel;
+  const auto refusal = [&](const std::string& address) -> std::string {
+    try {
+      const Connection nobody({.address = address}, cancel);
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument) << address;
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal("http://127.0.0.1:50551"),
+              ::testing::HasSubstr("http:// is not needed; say --server 127.0.0.1:50551"));
+  EXPECT_THAT(refusal("unix:/" + std::string(200, 'a')), ::testing::HasSubstr("201 bytes"));
+}
+
 TEST(Connection, NoTokenTravelsInTheClearToAnotherMachine) {
   const CancellationToken cancel;
   for (const char* elsewhere :

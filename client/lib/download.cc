@@ -2,6 +2,7 @@
 
 #include "client/lib/blob_transfer.h"
 #include "client/lib/names.h"
+#include "client/lib/out_folder.h"
 #include "core/base/files.h"
 
 namespace color3d::client {
@@ -21,10 +22,11 @@ class Download {
 
   // Leaves the whole verified blob in the part file.
   void Run(const std::function<void(int64_t)>& progress) {
+    RemoveUnlessPlainFile(part_);
     std::error_code none;
     received_ = fs::exists(part_, none) ? static_cast<int64_t>(fs::file_size(part_, none)) : 0;
     if (received_ > digest_.size_bytes) fs::remove(part_, none), received_ = 0;
-    Backoff backoff;
+    Backoff backoff = connection_.NewBackoff();
     FullServerWait turned_away(connection_);
     while (received_ < digest_.size_bytes) {
       connection_.cancel().ThrowIfCancelled();
@@ -37,7 +39,7 @@ class Download {
           status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) {
         throw RpcError(status);
       }
-      if (!backoff.Wait(connection_.cancel())) throw UnreachableError(connection_.address());
+      if (!backoff.Wait(connection_.cancel())) throw LostServerError(connection_.address());
     }
     if (digest_.size_bytes == 0) std::ofstream(part_, std::ios::binary);
     if (DigestFile(part_).sha256 == digest_.sha256) return;
@@ -101,7 +103,7 @@ class Download {
 
 bool HoldsAlready(const fs::path& path, const FileDigest& digest) {
   std::error_code none;
-  if (!fs::is_regular_file(path, none)) return false;
+  if (!fs::is_regular_file(fs::symlink_status(path, none))) return false;
   if (static_cast<int64_t>(fs::file_size(path, none)) != digest.size_bytes) return false;
   return DigestFile(path).sha256 == digest.sha256;
 }
@@ -112,6 +114,14 @@ void DownloadBlob(Connection& connection,
                   const FileDigest& digest,
                   const fs::path& path,
                   const std::function<void(int64_t)>& progress) {
+  if (!IsSha256Hex(digest.sha256) || digest.size_bytes < 0) {
+    throw Error(ErrorCode::kDataLoss,
+                "the server names the bytes of {} by '{}', {} bytes, which is no digest; nothing "
+                "was written",
+                path.filename().string(),
+                digest.sha256,
+                digest.size_bytes);
+  }
   if (HoldsAlready(path, digest)) return progress(digest.size_bytes);
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);

@@ -142,7 +142,7 @@ void ColorizeLive(Connection& connection,
                   const OnAnswer& on_answer) {
   std::set<size_t> pending;
   for (size_t i = 0; i < pictures.size(); ++i) pending.insert(i);
-  Backoff backoff;
+  Backoff backoff = connection.NewBackoff();
   FullServerWait turned_away(connection);
   while (!pending.empty()) {
     const size_t before = pending.size();

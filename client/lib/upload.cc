@@ -49,7 +49,7 @@ class Upload {
       : connection_(connection), file_(file), resource_(UploadResource(NewUuid(), file.digest)) {}
 
   void Run(const std::function<void(int64_t committed_bytes)>& progress) {
-    Backoff backoff;
+    Backoff backoff = connection_.NewBackoff();
     FullServerWait turned_away(connection_);
     int64_t best = 0;
     while (!complete_) {
@@ -124,7 +124,7 @@ class Upload {
 
   [[noreturn]] void GiveUp(const grpc::Status& status) const {
     if (status.ok() || RpcError(status).IsUnreachable()) {
-      throw UnreachableError(connection_.address());
+      throw LostServerError(connection_.address());
     }
     throw RpcError(status);
   }

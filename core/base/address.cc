@@ -2,6 +2,9 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <sys/un.h>
+
+#include <string_view>
 
 #include "core/base/error.h"
 
@@ -17,6 +20,35 @@ HostPort SplitHostPort(const std::string& text) {
     host = host.substr(1, host.size() - 2);
   }
   return {host, text.substr(colon + 1)};
+}
+
+void CheckAddressForm(const std::string& flag, const std::string& address) {
+  constexpr std::string_view kUnix = "unix:";
+  constexpr size_t kMostPathBytes = sizeof(sockaddr_un::sun_path) - 1;
+  if (address.starts_with(kUnix)) {
+    std::string_view path = std::string_view(address).substr(kUnix.size());
+    if (path.starts_with("//")) path.remove_prefix(2);
+    if (path.empty()) throw InvalidArgument("{} {}: the path is missing", flag, address);
+    if (path.size() > kMostPathBytes) {
+      throw InvalidArgument(
+          "{} {}: the path has {} bytes, a Unix socket's may have {}; take a shorter one, e.g. "
+          "unix:/tmp/color3d.sock",
+          flag,
+          address,
+          path.size(),
+          kMostPathBytes);
+    }
+    return;
+  }
+  const size_t scheme_end = address.find("://");
+  if (scheme_end == std::string::npos) return;
+  const size_t start = scheme_end + 3;
+  throw InvalidArgument("{} {}: {} is not needed; say {} {}",
+                        flag,
+                        address,
+                        address.substr(0, start),
+                        flag,
+                        address.substr(start, address.find('/', start) - start));
 }
 
 bool IsLoopback(const std::string& address) {

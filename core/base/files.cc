@@ -127,7 +127,9 @@ void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
       fmt::format(".{}.{}.{}.part", path.filename().string(), ::getpid(), counter.fetch_add(1));
   try {
     {
-      FileDescriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+      // What lies there, a link perhaps, is never written to.
+      ::unlink(temporary.c_str());
+      FileDescriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
       if (fd.get() < 0) ThrowErrno("cannot create", temporary);
       TakeAfter(fd.get(), path);
       size_t done = 0;

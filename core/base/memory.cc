@@ -1,10 +1,18 @@
 #include "core/base/memory.h"
 
+#include <fmt/format.h>
+#include <sys/resource.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <fstream>
+#include <functional>
+#include <new>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
 
 #ifdef __GLIBC__  // known only after a standard header
 #include <malloc.h>
@@ -42,28 +50,29 @@ int64_t LeftInGroup(const fs::path& folder, const char* limit_file, const char* 
   return std::max<int64_t>(0, *limit - NumberIn(folder / usage_file).value_or(0));
 }
 
-int64_t MemAvailable(const fs::path& root) {
+// A line of /proc/meminfo, in bytes.
+int64_t MemInfo(const fs::path& root, std::string_view name) {
   std::ifstream in(root / "proc/meminfo");
   std::string key;
   int64_t kib = 0;
   while (in >> key >> kib) {
-    if (key == "MemAvailable:") return kib * 1024;
+    if (key == name) return kib * 1024;
     std::getline(in, key);
   }
   return INT64_MAX;
 }
 
-}  // namespace
-
-int64_t AvailableMemoryBytes(const fs::path& root) {
-  int64_t available = MemAvailable(root);
+// Calls `consider` with the folder of each control group of the process and with the names of the
+// files that tell its limit and its use.
+void ForEachGroup(
+    const fs::path& root,
+    const std::function<void(const fs::path&, const char* limit, const char* usage)>& consider) {
   const fs::path v2 = root / "sys/fs/cgroup", v1 = v2 / "memory";
   const auto consider_v2 = [&](const fs::path& group) {
-    available = std::min(available, LeftInGroup(v2 / group, "memory.max", "memory.current"));
+    consider(v2 / group, "memory.max", "memory.current");
   };
   const auto consider_v1 = [&](const fs::path& group) {
-    available = std::min(available,
-                         LeftInGroup(v1 / group, "memory.limit_in_bytes", "memory.usage_in_bytes"));
+    consider(v1 / group, "memory.limit_in_bytes", "memory.usage_in_bytes");
   };
   // A container sees its own group as the root; elsewhere every group on the way up may limit.
   consider_v2("");
@@ -79,7 +88,67 @@ int64_t AvailableMemoryBytes(const fs::path& root) {
       if (controllers == "memory") consider_v1(group);
     }
   }
+}
+
+}  // namespace
+
+int64_t AvailableOnMachineBytes(const fs::path& root) {
+  int64_t available = MemInfo(root, "MemAvailable:");
+  ForEachGroup(root, [&](const fs::path& group, const char* limit, const char* usage) {
+    available = std::min(available, LeftInGroup(group, limit, usage));
+  });
   return available;
+}
+
+int64_t MachineMemoryBytes(const fs::path& root) {
+  int64_t total = MemInfo(root, "MemTotal:");
+  ForEachGroup(root, [&](const fs::path& group, const char* limit, const char*) {
+    total = std::min(total, NumberIn(group / limit).value_or(INT64_MAX));
+  });
+  return total;
+}
+
+int64_t OwnMemoryLimitBytes() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_DATA, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return INT64_MAX;
+  return static_cast<int64_t>(std::min<rlim_t>(limit.rlim_cur, INT64_MAX));
+}
+
+int64_t OwnMemoryBytes() { return StatusBytes("VmData:"); }
+
+int64_t OwnMemoryLeftBytes() {
+  const int64_t limit = OwnMemoryLimitBytes();
+  return limit == INT64_MAX ? limit : std::max<int64_t>(0, limit - OwnMemoryBytes());
+}
+
+int64_t AvailableMemoryBytes(const fs::path& root) {
+  return std::min(AvailableOnMachineBytes(root), OwnMemoryLeftBytes());
+}
+
+bool IsOutOfMemory(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) return true;
+  if (const auto* system = dynamic_cast<const std::system_error*>(&error)) {
+    // EAGAIN: a thread's stack does not fit, either.
+    const int code = system->code().value();
+    return system->code().category() == std::generic_category() &&
+           (code == ENOMEM || code == EAGAIN);
+  }
+  const std::string_view text = error.what();
+  for (const std::string_view sign : {"allocate memory",       // torch, glibc
+                                      "Insufficient memory",   // OpenCV
+                                      "Failed to allocate",    // OpenCV
+                                      "std::bad_alloc",        // wrapped by others
+                                      "not enough memory"}) {  // torch
+    if (text.find(sign) != std::string_view::npos) return true;
+  }
+  return false;
+}
+
+std::string MemoryRemedy() {
+  const int64_t limit = OwnMemoryLimitBytes();
+  if (limit == INT64_MAX) return "use a machine with more memory";
+  return fmt::format(
+      "give workers more than {} MiB each (color3d-server serve --worker-memory-mib)", limit >> 20);
 }
 
 int64_t ResidentMemoryBytes() { return StatusBytes("VmRSS:"); }

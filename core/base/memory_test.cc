@@ -2,19 +2,28 @@
 
 #include <gtest/gtest.h>
 #include <malloc.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <barrier>
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <functional>
 #include <memory>
+#include <new>
+#include <stdexcept>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "core/base/files.h"
+#include "core/base/process_limits.h"
 
 namespace color3d {
 namespace {
@@ -40,6 +49,71 @@ TEST(AvailableMemory, IsTheMinimumOfWhatTheSystemAndTheGroupsLeave) {
   EXPECT_EQ(AvailableMemoryBytes(root.path()), 0);  // over its limit: never negative
   EXPECT_GT(AvailableMemoryBytes(), 1 << 20);
 }
+
+TEST(MachineMemory, IsTheMinimumOfTheMachineAndTheGroupsLimits) {
+  const ScratchFolder root;
+  const auto put = [&](const std::string& file, const std::string& text) {
+    fs::create_directories((root.path() / file).parent_path());
+    WriteFileAtomic(root.path() / file, text);
+  };
+  EXPECT_EQ(MachineMemoryBytes(root.path()), INT64_MAX);
+  put("proc/meminfo", "MemTotal:  9000 kB\nMemAvailable:   5000 kB\n");
+  EXPECT_EQ(MachineMemoryBytes(root.path()), 9000 * 1024);
+  put("proc/self/cgroup", "0::/c/d\n");
+  put("sys/fs/cgroup/c/memory.max", "4000000\n");
+  put("sys/fs/cgroup/c/memory.current", "3999999\n");  // what is used is part of it
+  EXPECT_EQ(MachineMemoryBytes(root.path()), 4000000);
+}
+
+TEST(IsOutOfMemory, KnowsWhatLibrariesSay) {
+  EXPECT_TRUE(IsOutOfMemory(std::bad_alloc()));
+  EXPECT_TRUE(IsOutOfMemory(std::system_error(EAGAIN, std::generic_category())));
+  EXPECT_TRUE(IsOutOfMemory(std::runtime_error(
+      "[enforce fail at alloc_cpu.cpp:66] . DefaultCPUAllocator: can't allocate memory: you tried "
+      "to allocate 4000000000 bytes.")));
+  EXPECT_TRUE(IsOutOfMemory(std::runtime_error("resizing failed: Failed to allocate 9 bytes")));
+  EXPECT_FALSE(IsOutOfMemory(std::runtime_error("a.png is damaged")));
+  EXPECT_FALSE(IsOutOfMemory(std::system_error(ENOENT, std::generic_category())));
+}
+
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// In a process of its own: a limit cannot be raised again.
+int InLimitedProcess(int64_t memory_bytes, const std::function<bool()>& check) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ProcessLimits limits;
+    limits.memory_bytes = memory_bytes;
+    const bool limited = LimitProcess(limits) && BeEndedFirstWhenMemoryRunsOut();
+    ::_exit(limited && check() ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+TEST(OwnMemory, IsLimitedAndSaysWhatIsLeft) {
+  EXPECT_EQ(OwnMemoryLimitBytes(), INT64_MAX);
+  EXPECT_EQ(OwnMemoryLeftBytes(), INT64_MAX);
+  constexpr int64_t kLimit = int64_t{256} << 20, kBlock = int64_t{64} << 20;
+  EXPECT_EQ(InLimitedProcess(kLimit,
+                             [&] {
+                               const int64_t left = OwnMemoryLeftBytes();
+                               const auto block = std::make_unique<char[]>(kBlock);
+                               return OwnMemoryLimitBytes() == kLimit && left < kLimit &&
+                                      OwnMemoryLeftBytes() <= left - kBlock &&
+                                      AvailableMemoryBytes() <= left - kBlock &&
+                                      MemoryRemedy().find("256 MiB") != std::string::npos;
+                             }),
+            0);
+  EXPECT_EQ(InLimitedProcess(kLimit,
+                             [] {
+                               std::ifstream score("/proc/self/oom_score_adj");
+                               int value = 0;
+                               return score >> value && value == 500;
+                             }),
+            0);
+}
+#endif
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(ReleaseFreedMemory, WhatWasFreedGoesBackToTheSystem) {

@@ -1,10 +1,13 @@
 #include "core/base/process_limits.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <string_view>
 
 namespace color3d {
 namespace {
@@ -30,6 +33,16 @@ bool LimitProcess(const ProcessLimits& limits) noexcept {
          LowerIfGiven(RLIMIT_CPU, limits.cpu_seconds) &&
          LowerIfGiven(RLIMIT_NOFILE, limits.descriptors) &&
          LowerIfGiven(RLIMIT_NPROC, limits.processes);
+}
+
+bool BeEndedFirstWhenMemoryRunsOut() noexcept {
+  // Of -1000 to 1000; what a process takes of the machine adds up to 1000.
+  constexpr std::string_view kScore = "500";
+  const int fd = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const bool written = ::write(fd, kScore.data(), kScore.size()) == ssize_t(kScore.size());
+  ::close(fd);
+  return written;
 }
 
 std::string LikelyCause(int signal, const ProcessLimits& limits) {

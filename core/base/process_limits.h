@@ -19,6 +19,10 @@ struct ProcessLimits {
 // kernel refuses.
 bool LimitProcess(const ProcessLimits& limits) noexcept;
 
+// When the machine's memory runs out, the kernel ends this process and what it starts before others
+// of its user's. False when the kernel does not take it.
+bool BeEndedFirstWhenMemoryRunsOut() noexcept;
+
 // What a process that was ended by `signal` most likely ran into, as a part of a sentence:
 // "it wrote a file of more than 64 MiB".
 std::string LikelyCause(int signal, const ProcessLimits& limits);

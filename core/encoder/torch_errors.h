@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/memory.h"
 
 namespace color3d {
 
@@ -19,10 +20,13 @@ auto WithTorchErrors(const char* what, Body&& body) {
   } catch (const c10::Error& error) {
     const std::string text = error.what_without_backtrace();
     const bool memory = text.find("allocate memory") != std::string::npos;
-    throw Error(memory ? ErrorCode::kResourceExhausted : ErrorCode::kInternal,
-                "{}: {}",
+    const std::string line = text.substr(0, text.find('\n'));
+    if (!memory) throw Error(ErrorCode::kInternal, "{}: {}", what, line);
+    throw Error(ErrorCode::kResourceExhausted,
+                "{} ran out of memory ({}); use fewer or smaller pictures, or {}",
                 what,
-                text.substr(0, text.find('\n')));
+                line,
+                MemoryRemedy());
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
@@ -9,8 +10,10 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/range_check.h"
+#include "core/image/area_reducer.h"
+#include "core/image/decode.h"
+#include "core/image/decode_budget.h"
 #include "core/image/probe/orientation.h"
-#include "core/image/reduced.h"
 
 namespace color3d {
 namespace {
@@ -34,6 +37,28 @@ Image PlanarFromMat(const cv::Mat& mat, float scale) {
   return image;
 }
 
+// The same, averaged over areas on the way: only what it is reduced to is held as floats.
+template <typename Sample>
+Image ReducedFromMat(const cv::Mat& mat, float scale, const PictureSize& size) {
+  const int channels = mat.channels();
+  AreaReducer reducer(mat.cols, mat.rows, channels, size.width, size.height);
+  for (int y = 0; y < mat.rows; ++y) reducer.AddRow(mat.ptr<Sample>(y));
+  Image image = reducer.Take();
+  for (float& v : image.data) v *= scale;
+  if (channels >= 3) {
+    std::swap_ranges(image.Plane(0), image.Plane(0) + image.PlaneSize(), image.Plane(2));
+  }
+  return image;
+}
+
+template <typename Sample>
+Image FloatsFromMat(const cv::Mat& mat, float scale, const PictureSize& size) {
+  if (size.width == mat.cols && size.height == mat.rows) {
+    return PlanarFromMat<Sample>(mat, scale);
+  }
+  return ReducedFromMat<Sample>(mat, scale, size);
+}
+
 template <typename Sample>
 cv::Mat MatFromPlanar(const Image& image, int type, float scale) {
   const int channels = image.channels;
@@ -54,7 +79,7 @@ cv::Mat MatFromPlanar(const Image& image, int type, float scale) {
 }
 
 // EXIF 2.3, tag 274: where the stored row 0 and column 0 belong in the picture.
-Image Oriented(const Image& stored, int orientation) {
+Image Oriented(Image stored, int orientation) {
   if (orientation == 1) return stored;
   const bool swap = OrientationSwapsSides(orientation);
   Image image(
@@ -108,6 +133,7 @@ cv::Mat DecodeStored(std::string_view bytes,
     mat = cv::imdecode(
         input, reduction == 1 ? flags : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION));
   } catch (const cv::Exception& e) {
+    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
     throw InvalidArgument("{} cannot be decoded ({}); save it again", file_name, e.err);
   }
   if (mat.empty()) {
@@ -130,6 +156,7 @@ std::string Encode(const cv::Mat& mat, const char* extension, const std::vector<
       return std::string(bytes.begin(), bytes.end());
     }
   } catch (const cv::Exception& e) {
+    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
     throw Error(ErrorCode::kInternal, "encoding {} failed: {}", extension, e.err);
   }
   throw Error(ErrorCode::kInternal, "encoding {} failed", extension);
@@ -143,48 +170,78 @@ void CheckEncodable(const Image& image, bool alpha_allowed) {
   }
 }
 
-Image Decode(std::string_view bytes,
-             const std::string& file_name,
-             const ImageInfo& info,
-             int reduction,
-             bool keep_alpha) {
-  const cv::Mat mat = DecodeStored(bytes, file_name, info, reduction);
-  Image image;
-  if (mat.depth() == CV_8U) {
-    image = PlanarFromMat<uint8_t>(mat, 1.0f / 255.0f);
-  } else if (mat.depth() == CV_16U) {
-    image = PlanarFromMat<uint16_t>(mat, 1.0f / 65535.0f);
-    // OpenCV turns 8-bit ones over, but not these (scans of film).
-    if (info.min_is_white) {
-      for (float& v : image.data) v = 1.0f - v;
-    }
-  } else {
-    throw InvalidArgument("{} has neither 8 nor 16 bits per channel; save it as such", file_name);
+// Floats that take no more than this are reduced as Resize does it, larger ones before they are
+// floats.
+constexpr int64_t kMaxFloatBytes = int64_t{256} << 20;
+
+// The size at which the stored picture becomes floats: its own, or `size` where that saves much
+// memory. Both as stored, before orientation.
+PictureSize FloatSize(const cv::Mat& mat, const ImageInfo& info, const PictureSize& size) {
+  if (FloatBytes(info, mat.cols, mat.rows) <= kMaxFloatBytes) return {mat.cols, mat.rows};
+  return {std::clamp(size.width, 1, mat.cols), std::clamp(size.height, 1, mat.rows)};
+}
+
+PictureSize Turned(const PictureSize& size, bool swap) {
+  return swap ? PictureSize{size.height, size.width} : size;
+}
+
+// What is decoded when its sides are divided by `reduction`.
+ImageInfo ReducedInfo(ImageInfo info, int reduction) {
+  info.width = (info.width + reduction - 1) / reduction;
+  info.height = (info.height + reduction - 1) / reduction;
+  return info;
+}
+
+// Of Decode at its peak, where `wanted` (as stored) is the size of its result.
+int64_t BytesOfDecoding(const ImageInfo& info, const PictureSize& wanted, bool copies) {
+  const int64_t whole = DecodingBytes(info, copies);
+  const int64_t floats = FloatBytes(info, info.width, info.height);
+  if (floats <= kMaxFloatBytes || (wanted.width >= info.width && wanted.height >= info.height)) {
+    return whole;
   }
-  image = SelectChannels(std::move(image), info, keep_alpha);
-  return Oriented(image, ReadOrientation(bytes));
+  const PictureSize size{std::min(wanted.width, info.width), std::min(wanted.height, info.height)};
+  return std::min(whole, whole - floats + 2 * FloatBytes(info, size.width, size.height));
 }
 
 }  // namespace
 
-Image DecodeImage(std::string_view bytes, const std::string& file_name, bool keep_alpha) {
-  return Decode(bytes, file_name, ProbeImage(bytes, file_name), /*reduction=*/1, keep_alpha);
+Image Decode(std::string_view bytes,
+             const std::string& file_name,
+             const ImageInfo& info,
+             const DecodeRequest& request) {
+  const ImageInfo decoded = ReducedInfo(info, request.jpeg_reduction);
+  const int orientation = ReadOrientation(bytes);
+  const bool swap = OrientationSwapsSides(orientation);
+  const PictureSize own = Turned({decoded.width, decoded.height}, swap);
+  const PictureSize wanted = request.wanted ? request.wanted(own) : own;
+  const bool has_alpha = info.channels == 2 || info.channels == 4;
+  const bool copies = orientation != 1 || (has_alpha && !request.keep_alpha);
+  const PictureTurn turn(
+      {file_name, info.width, info.height, BytesOfDecoding(decoded, Turned(wanted, swap), copies)});
+  Image image;
+  {
+    const cv::Mat mat = DecodeStored(bytes, file_name, info, request.jpeg_reduction);
+    const PictureSize size = FloatSize(mat, info, Turned(wanted, swap));
+    if (mat.depth() == CV_8U) {
+      image = FloatsFromMat<uint8_t>(mat, 1.0f / 255.0f, size);
+    } else if (mat.depth() == CV_16U) {
+      image = FloatsFromMat<uint16_t>(mat, 1.0f / 65535.0f, size);
+      // OpenCV turns 8-bit ones over, but not these (scans of film).
+      if (info.min_is_white) {
+        for (float& v : image.data) v = 1.0f - v;
+      }
+    } else {
+      throw InvalidArgument("{} has neither 8 nor 16 bits per channel; save it as such", file_name);
+    }
+  }
+  image = SelectChannels(std::move(image), info, request.keep_alpha);
+  image = Oriented(std::move(image), orientation);
+  if (image.width == wanted.width && image.height == wanted.height) return image;
+  return Resize(image, wanted.width, wanted.height);
 }
 
-Image ReadImageWithin(const std::filesystem::path& path, int max_side_px) {
-  if (max_side_px < 1) {
-    throw InvalidArgument("a picture cannot be reduced to {} px", max_side_px);
-  }
-  const std::string bytes = ReadFile(path);
-  const std::string name = path.filename().string();
-  const ImageInfo info = ProbeImage(bytes, name);
-  int reduction = 1;
-  if (info.format == ImageFormat::kJpeg) {
-    // Twice the wanted size is left, so that the last step still averages areas.
-    const int side = std::max(info.width, info.height);
-    while (reduction < 8 && side / (2 * reduction) >= 2 * max_side_px) reduction *= 2;
-  }
-  return FitWithin(Decode(bytes, name, info, reduction, /*keep_alpha=*/false), max_side_px);
+Image DecodeImage(std::string_view bytes, const std::string& file_name, bool keep_alpha) {
+  return Decode(bytes, file_name, ProbeImage(bytes, file_name), {.keep_alpha = keep_alpha});
 }
 
 Image ReadImage(const std::filesystem::path& path, bool keep_alpha) {

@@ -1,11 +1,12 @@
 #include <algorithm>
-#include <cmath>
+#include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "core/base/error.h"
 #include "core/image/codec.h"
+#include "core/image/reduced.h"
 
 namespace color3d {
 namespace {
@@ -31,6 +32,7 @@ Image ResizeWith(const Image& image, int width, int height, int interpolation) {
       KeepRange(image.Plane(c), image.PlaneSize(), out.Plane(c), out.PlaneSize());
     }
   } catch (const cv::Exception& e) {
+    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
     throw Error(ErrorCode::kInternal, "resizing failed: {}", e.err);
   }
   return out;
@@ -55,12 +57,9 @@ Image Resize(const Image& image, int width, int height) {
 }
 
 Image FitWithin(const Image& image, int max_side_px) {
-  const int side = std::max(image.width, image.height);
-  if (max_side_px <= 0 || side <= max_side_px) return image;
-  const double scale = static_cast<double>(max_side_px) / side;
-  return Resize(image,
-                std::max(1, static_cast<int>(std::lround(image.width * scale))),
-                std::max(1, static_cast<int>(std::lround(image.height * scale))));
+  const PictureSize size = SizeWithin({image.width, image.height}, max_side_px);
+  if (size.width == image.width && size.height == image.height) return image;
+  return Resize(image, size.width, size.height);
 }
 
 }  // namespace color3d

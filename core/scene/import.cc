@@ -14,6 +14,7 @@
 #include "core/scene/formats/nerfies.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/held_out.h"
+#include "core/scene/key_photo.h"
 #include "core/scene/lens.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/normalise.h"
@@ -116,6 +117,17 @@ void FindViewMasks(const fs::path& scene_folder,
   }
 }
 
+void RequireMemory(const ImportOptions& options, const std::string& file, int width, int height) {
+  if (options.memory_bytes > 0) RequireKeyViewMemory(file, width, height, options.memory_bytes);
+}
+
+void RequireMemory(const ImportOptions& options, const Scene& scene) {
+  for (const View& view : scene.views) {
+    const Camera& camera = view.captured_camera;
+    RequireMemory(options, view.image_file, camera.width, camera.height);
+  }
+}
+
 void ImportPhotos(const fs::path& scene_folder,
                   const fs::path& scratch_folder,
                   const ImportOptions& options,
@@ -131,6 +143,7 @@ void ImportPhotos(const fs::path& scene_folder,
     run.progress.OnProgress(
         static_cast<int64_t>(i), static_cast<int64_t>(photos.size()), "checking photos");
     ProbePhoto(scene_folder, &photos[i]);
+    RequireMemory(options, photos[i].file, photos[i].width, photos[i].height);
   }
   if (photos.size() == 1) {
     throw InvalidArgument(
@@ -261,17 +274,20 @@ ImportResult ImportScene(const fs::path& scene_folder,
     result.layout = SceneLayout::kColmap;
     result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings, &result.cameras);
     WarnOfUnposedPhotos(scene_folder, &result);
+    RequireMemory(options, result.scene);
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else if (IsNerfiesFolder(scene_folder)) {
     result.layout = SceneLayout::kNerfies;
     result.scene = ReadNerfies(scene_folder, &result.warnings, &result.cameras);
     result.photos_found = static_cast<int>(result.scene.views.size());
+    RequireMemory(options, result.scene);
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
     result.layout = SceneLayout::kTransforms;
     result.scene = ReadTransformsJson(
         scene_folder / "transforms.json", scene_folder, &result.warnings, &result.cameras);
     WarnOfUnposedPhotos(scene_folder, &result);
+    RequireMemory(options, result.scene);
     FindViewMasks(scene_folder, run.cancel, &result.scene.views);
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);

@@ -32,6 +32,8 @@ struct ImportOptions {
   SfmPairs sfm_pairs = SfmPairs::kPlanned;
   int sfm_neighbors = 8;  // 2..100, similar photos that each photo is matched with
   std::chrono::seconds sfm_timeout{3600};
+  // Photos that would take more than this as the key view are refused. 0: none are.
+  int64_t memory_bytes = 0;
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const ImportOptions&) const = default;
 };

@@ -17,6 +17,8 @@
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/image/decode_budget.h"
+#include "core/image/reduced.h"
 #include "core/scene/lens.h"
 #include "core/scene/masks/photo_masks.h"
 
@@ -164,26 +166,48 @@ struct ViewImages::Impl {
     return table;
   }
 
+  void RequireCapturedSize(const View& v, int width, int height) const {
+    const Camera& c = v.captured_camera;
+    if (width == c.width && height == c.height) return;
+    throw InvalidArgument("view {} was captured at {} but this picture of it has {}",
+                          v.name,
+                          Size(c.width, c.height),
+                          Size(width, height));
+  }
+
+  // The size at which a picture of the size `own` is undistorted: the working size where there is
+  // nothing to undistort.
+  PictureSize SizeBeforeRemap(const View& v, const PictureSize& own) const {
+    if (!IsUndistorted(v.distortion)) return SizeWithin(own, RemapSide());
+    const Camera working = v.camera.FitWithin(max_side_px);
+    return {working.width, working.height};
+  }
+
+  // Of a picture that has that size.
+  Image FromSizeBeforeRemap(int view, Image picture) {
+    const View& v = At(view);
+    if (IsUndistorted(v.distortion)) return picture;
+    const Camera working = v.camera.FitWithin(max_side_px);
+    return Resize(Remap(picture, *TableOf(view)), working.width, working.height);
+  }
+
   Image Undistorted(int view, const Image& captured) {
     const View& v = At(view);
-    const Camera& c = v.captured_camera;
-    if (captured.width != c.width || captured.height != c.height) {
-      throw InvalidArgument("view {} was captured at {} but this picture of it has {}",
-                            v.name,
-                            Size(c.width, c.height),
-                            Size(captured.width, captured.height));
-    }
-    const Camera working = v.camera.FitWithin(max_side_px);
-    if (IsUndistorted(v.distortion)) return Resize(captured, working.width, working.height);
-    const Image remapped = Remap(color3d::FitWithin(captured, RemapSide()), *TableOf(view));
-    return Resize(remapped, working.width, working.height);
+    RequireCapturedSize(v, captured.width, captured.height);
+    const PictureSize size = SizeBeforeRemap(v, {captured.width, captured.height});
+    return FromSizeBeforeRemap(view, Resize(captured, size.width, size.height));
   }
 
   // sRGB or grey, undistorted, working size.
-  Image Load(int view) {
+  Image UndistortedFile(int view, const std::filesystem::path& file) {
     const View& v = At(view);
-    return Undistorted(view, ReadImage(folder / v.image_file));
+    return FromSizeBeforeRemap(view, ReadImageResized(file, [&](const PictureSize& own) {
+                                 RequireCapturedSize(v, own.width, own.height);
+                                 return SizeBeforeRemap(v, own);
+                               }));
   }
+
+  Image Load(int view) { return UndistortedFile(view, folder / At(view).image_file); }
 
   int MaskKey(int view) const { return view + static_cast<int>(scene.views.size()); }
 
@@ -242,6 +266,7 @@ std::shared_ptr<const Image> ViewImages::Mask(int view) const {
   const std::lock_guard<std::mutex> lock(impl_->loading[view]);
   if (auto mask = impl_->FindCached(key)) return mask;
   const Camera& c = v.captured_camera;
+  const PictureTurn turn(MaskNeed(v.mask_file, c.width, c.height));
   const Image mask = impl_->Undistorted(
       view, ReadMask(impl_->folder, v.mask_file, v.image_file, c.width, c.height));
   auto whole = std::make_shared<const Image>(ResizeMask(mask, mask.width, mask.height));
@@ -259,6 +284,10 @@ Image ViewImages::Srgb(int view) const {
 
 Image ViewImages::Undistort(int view, const Image& captured) const {
   return impl_->Undistorted(view, captured);
+}
+
+Image ViewImages::UndistortFile(int view, const std::filesystem::path& file) const {
+  return impl_->UndistortedFile(view, file);
 }
 
 }  // namespace color3d

@@ -36,6 +36,8 @@ class ViewImages {
   // orientation: undistorted and reduced in the same way. Throws Error{kInvalidArgument} with both
   // sizes when the size is another.
   Image Undistort(int view, const Image& captured) const;
+  // The same of a picture in a file, in little memory. Channels as ReadImage gives them.
+  Image UndistortFile(int view, const std::filesystem::path& file) const;
 
  private:
   struct Impl;

@@ -244,7 +244,9 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   Scene scene = ReadScene(context);
   if (IsColoredAsFilm(context, scene)) return CarryByMotion(options, scene, context);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  const int64_t cache_bytes = scene.IsDynamic() ? kFramesCacheBytes : kPhotosCacheBytes;
+  // Of photos and of those for depth, each.
+  const int64_t cache_bytes = std::min(scene.IsDynamic() ? kFramesCacheBytes : kPhotosCacheBytes,
+                                       context.MemoryBytes() / 4);
   if (geometry.motion.size() == 0) ForgetTimes(scene);
   const ViewImages images(scene, context.scene_folder(), options.max_side_px, cache_bytes);
   const ViewImages sweep_images(scene, context.scene_folder(), options.depth_side_px, cache_bytes);

@@ -2,6 +2,7 @@
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/scene/key_photo.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/sources/key_color_sources.h"
@@ -18,7 +19,8 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
   KeyPhoto photo;
-  photo.srgb = ReadImage(context.scene_folder() / scene.views[key].image_file);
+  photo.srgb =
+      ReadKeyPhoto(context.scene_folder() / scene.views[key].image_file, context.MemoryBytes());
   photo.luminance = LuminanceFromSrgb(photo.srgb);
   const KeyColorResult result = SolveKeyColor(options, photo, context);
 

@@ -11,6 +11,7 @@
 #include "core/color/lab.h"
 #include "core/colorizer/corrector.h"
 #include "core/image/codec.h"
+#include "core/scene/key_photo.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifacts.h"
@@ -127,10 +128,11 @@ Painted ReadCorrection(const FurtherKeyView& wanted,
   }
   Painted painted{index, {views.Picture(index), {}, {}}};
   Correction& correction = painted.correction;
-  const GivenColors given = ReadGivenColors(wanted.color,
-                                            ReadImage(context.scene_folder() / view.image_file),
-                                            correction.picture.ab,
-                                            context);
+  const GivenColors given =
+      ReadGivenColors(wanted.color,
+                      ReadKeyPhoto(context.scene_folder() / view.image_file, context.MemoryBytes()),
+                      correction.picture.ab,
+                      context);
   CarriedColor undistorted = UndistortGiven(given.ab, given.given, index, views.images());
   correction.ab = std::move(undistorted.ab);
   correction.painted = std::move(undistorted.confidence);

@@ -77,7 +77,7 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   const ViewImages images(scene, context.scene_folder(), side, 0);
   const ChromaTargetSource targets = [&](int view) {
     auto target = std::make_shared<ChromaTarget>();
-    target->ab = ChromaOfLab(LabFromSrgb(images.Undistort(view, ReadImage(truth.at(view)))));
+    target->ab = ChromaOfLab(LabFromSrgb(images.UndistortFile(view, truth.at(view))));
     if (const auto mask = images.Mask(view)) target->weight = *mask;
     return target;
   };
@@ -85,7 +85,7 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
   NoCheckpoints none;
   return FitChroma(geometry,
                    ChromaProblemOf(scene, images, targets),
-                   ChromaWithinMemory(options, scene, geometry),
+                   ChromaWithinMemory(options, scene, geometry, context.MemoryBytes()),
                    {context.pool(), none, progress, context.cancel()});
 }
 
@@ -126,7 +126,7 @@ SceneConsistency CompareViews(const Scene& scene,
   };
   source.has_truth = [&](int number) { return truth.contains(order[number]); };
   source.true_srgb = [&](int number) {
-    return images.Undistort(order[number], ReadImage(truth.at(order[number])));
+    return images.UndistortFile(order[number], truth.at(order[number]));
   };
   return MeasureConsistency(source, context.pool(), context.cancel());
 }
@@ -146,9 +146,8 @@ class HeldOutScores {
     const std::string ab_name = ViewAbArtifact(context_, view);
     const Image ab = DecodeAbPng(context_.ReadInput(ab_name), ab_name).ab;
     const ViewImages images(scene_, context_.scene_folder(), std::max(ab.width, ab.height), 0);
-    const Image captured = ReadImage(truth);
-    if (captured.channels != 3) throw InvalidArgument("the truth of {} is grey", view.name);
-    const Image true_srgb = images.Undistort(index, captured);
+    const Image true_srgb = images.UndistortFile(index, truth);
+    if (true_srgb.channels != 3) throw InvalidArgument("the truth of {} is grey", view.name);
     const Camera camera = images.WorkingCamera(index);
     const Image delivered = model_ ? Rendered(*model_, camera, view)
                                    : ColoredFrame(view, index, /*is_key=*/false, images, context_);

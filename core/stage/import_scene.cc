@@ -87,8 +87,10 @@ void RunImportScene(const ImportOptions& options,
     WarnOfUnusedOptions(film_options, NoFilm::kPhotos, context);
     return ImportSplatScene(splat, options, splat_views, context);
   }
+  ImportOptions within = options;
+  within.memory_bytes = context.MemoryBytes();
   const ImportResult result =
-      ImportScene(context.scene_folder(), context.scratch_folder(), options, context.control());
+      ImportScene(context.scene_folder(), context.scratch_folder(), within, context.control());
   const NoFilm what = result.scene.IsDynamic() ? NoFilm::kTimedPictures : NoFilm::kPhotos;
   WarnOfUnusedOptions(film_options, what, context);
   WriteImported(result, context);

@@ -9,6 +9,7 @@
 #include "core/keyview/coverage.h"
 #include "core/keyview/expected_error.h"
 #include "core/keyview/tracks.h"
+#include "core/scene/key_photo.h"
 #include "core/stage/film/film_keys.h"
 #include "core/stage/formats/artifacts.h"
 #include "core/stage/formats/key_view_ranking.h"
@@ -214,7 +215,8 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   WarnOfViewsSetAside(ranking, context.progress());
   const View& key = scene.views[candidates[ranking.selection.index]];
   // The photo as captured, in grey: what the user colours.
-  Image gray = LuminanceFromSrgb(ReadImage(context.scene_folder() / key.image_file));
+  Image gray = LuminanceFromSrgb(
+      ReadKeyPhoto(context.scene_folder() / key.image_file, context.MemoryBytes()));
   for (float& v : gray.data) v = static_cast<float>(GrayFromLuminance(v));
   context.WriteOutput(artifact::kKeyView, KeyViewToJson(ranking));
   context.WriteOutput(artifact::kKeyViewGray, EncodePng8(gray));

@@ -28,10 +28,11 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     if (const auto mask = images.Mask(view)) target->weight = *mask;
     return target;
   };
-  GaussianModel model = FitChroma(geometry,
-                                  ChromaProblemOf(scene, images, targets),
-                                  ChromaWithinMemory(options, scene, geometry),
-                                  context.control());
+  GaussianModel model =
+      FitChroma(geometry,
+                ChromaProblemOf(scene, images, targets),
+                ChromaWithinMemory(options, scene, geometry, context.MemoryBytes()),
+                context.control());
   AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }

@@ -1,5 +1,7 @@
 #include "core/stage/stage.h"
 
+#include <algorithm>
+
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "core/catalogue/stages.h"
@@ -25,10 +27,13 @@ ThreadPool& StageContext::pool() {
 }
 
 int64_t StageContext::MemoryBytes() const {
-  // Other processes of this machine must be able to grow, too.
-  constexpr double kShare = 0.6;
+  // Other processes of this machine must be able to grow, too; of what is this process's alone, a
+  // little is left to what grows meanwhile.
+  constexpr double kShareOfMachine = 0.6, kShareOfOwn = 0.9;
   if (setup_.memory_bytes > 0) return setup_.memory_bytes;
-  return static_cast<int64_t>(kShare * static_cast<double>(AvailableMemoryBytes()));
+  return static_cast<int64_t>(
+      std::min(kShareOfMachine * static_cast<double>(AvailableOnMachineBytes()),
+               kShareOfOwn * static_cast<double>(OwnMemoryLeftBytes())));
 }
 
 std::filesystem::path StageContext::Model(const std::string& name) const {

@@ -29,7 +29,9 @@ class StageContext {
     std::filesystem::path scratch_folder;  // free to use, deleted by the caller
     int threads = 1;
     uint64_t seed = 1;
-    int64_t memory_bytes = 0;  // that the stage may take; 0: 60 % of what is available
+    // That the stage may take. 0: 60 % of what the machine has left, and not more than 90 % of what
+    // this process's own limit leaves.
+    int64_t memory_bytes = 0;
     std::map<std::string, std::filesystem::path> models;  // the user's weights, by name
     RemoteColorizerFactory remote_colorizers;             // the user's model servers; may be empty
     std::string attempt;                                  // unique to this run, e.g. "jobs/3f/2"

@@ -36,7 +36,10 @@ void RequireHostPort(const std::string& flag, const std::string& target) {
 
 BackendAddress ParseBackendAddress(const std::string& name, const std::string& address) {
   const std::string flag = "--backend " + name + "=" + address;
-  if (address.starts_with("unix:")) return {address, false};
+  if (address.starts_with("unix:")) {
+    CheckAddressForm("--backend " + name, address);
+    return {address, false};
+  }
   BackendAddress result{address, address.starts_with(kHttps)};
   const bool http = address.starts_with(kHttp);
   if (http) result.target = address.substr(sizeof(kHttp) - 1);

@@ -23,6 +23,7 @@ std::string Complaint(const std::string& address) {
 TEST(BackendAddress, SchemesSayHowItIsSpokenTo) {
   EXPECT_EQ(ParseBackendAddress("b", "127.0.0.1:7").target, "127.0.0.1:7");
   EXPECT_FALSE(ParseBackendAddress("b", "unix:/run/x").tls);
+  EXPECT_THAT(Complaint("unix:/" + std::string(107, 'x')), HasSubstr("108 bytes"));
   EXPECT_TRUE(ParseBackendAddress("b", "https://gpu.example:443").tls);
   EXPECT_EQ(ParseBackendAddress("b", "https://gpu.example:443").target, "gpu.example:443");
   EXPECT_FALSE(ParseBackendAddress("b", "http://gpu.example:80").tls);

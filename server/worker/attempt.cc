@@ -7,7 +7,6 @@
 
 #include <chrono>
 #include <map>
-#include <new>
 #include <thread>
 
 #include "core/base/files.h"
@@ -98,6 +97,7 @@ class Attempt {
   void Compute();
   void Publish(const StageOutput& output);
   void HandleError(const JobError& error);
+  JobError OutOfMemory(const std::exception& e) const;
   // Writes the end of an attempt that was told to stop; false when there was no such order.
   void Conclude(JobStore& store, StopReason reason, const JobError& error);
   [[noreturn]] void GiveUp(StopReason reason);
@@ -126,22 +126,36 @@ void Attempt::Run() {
     Prepare();
     if (!ServeFromCache() && !JoinEqual()) Compute();
   } catch (const Error& e) {
-    HandleError({e.code(), ReasonOf(e), e.what()});
-  } catch (const std::bad_alloc&) {
-    HandleError(
-        {ErrorCode::kResourceExhausted,
-         "OUT_OF_MEMORY",
-         fmt::format("{} ran out of memory; use smaller pictures (max_side_px) or a machine "
-                     "with more",
-                     job_.kind)});
+    // Libraries' exceptions become internal errors with their text.
+    if (e.code() == ErrorCode::kInternal && IsOutOfMemory(e)) {
+      HandleError(OutOfMemory(e));
+    } else {
+      HandleError({e.code(), ReasonOf(e), e.what()});
+    }
   } catch (const fs::filesystem_error& e) {
     const bool full = e.code() == std::errc::no_space_on_device;
     HandleError({full ? ErrorCode::kResourceExhausted : ErrorCode::kInternal,
                  full ? "STORAGE_FULL" : "INTERNAL",
                  std::string(e.what()) + (full ? "; free some disk space" : "")});
   } catch (const std::exception& e) {
-    HandleError({ErrorCode::kInternal, "INTERNAL", std::string("unexpected: ") + e.what()});
+    HandleError(
+        IsOutOfMemory(e)
+            ? OutOfMemory(e)
+            : JobError{ErrorCode::kInternal, "INTERNAL", std::string("unexpected: ") + e.what()});
   }
+}
+
+JobError Attempt::OutOfMemory(const std::exception& e) const {
+  spdlog::warn("{} ran out of memory at {} MiB ({}): {}",
+               tag_,
+               OwnMemoryBytes() >> 20,
+               MemoryRemedy(),
+               e.what());
+  return {ErrorCode::kResourceExhausted,
+          "OUT_OF_MEMORY",
+          fmt::format("{} ran out of memory; use fewer or smaller pictures (max_side_px), or {}",
+                      job_.kind,
+                      MemoryRemedy())};
 }
 
 void Attempt::Prepare() {

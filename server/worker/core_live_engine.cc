@@ -9,6 +9,7 @@
 #include "core/colorizer/scene_colorizers.h"
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
+#include "core/keycolor/picture_checks.h"
 #include "server/service_error.h"
 #include "server/worker/colorizer_cache.h"
 #include "server/worker/live_engine.h"
@@ -100,7 +101,8 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   const std::string bytes = ReadBlob(request.example_sha256());
   ProbeImage(bytes, "the example", kLimits);
   const Image srgb = DecodeImage(bytes, "the example");
-  if (srgb.channels != 3 || IsGray(srgb)) {
+  const Image lab = LabFromSrgb(FitWithin(srgb, kExampleSidePx));
+  if (srgb.channels != 3 || MeasureChroma(lab).IsGray()) {
     throw ServiceError(ErrorCode::kInvalidArgument,
                        "NO_COLOR",
                        "the example has no colour; send the coloured key view");
@@ -108,7 +110,6 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   ColorizerOptions options;
   options.iterations = 0;
   options.max_side_px = kExampleSidePx;
-  const Image lab = LabFromSrgb(FitWithin(srgb, options.max_side_px));
   LoadedColorizer loaded;
   loaded.encoder = FindEncoder(request.encoder());
   ThreadPool pool(setup_.threads);

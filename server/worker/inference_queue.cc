@@ -2,8 +2,10 @@
 
 #include <spdlog/spdlog.h>
 
+#include <exception>
 #include <utility>
 
+#include "core/base/memory.h"
 #include "server/rpc/error_mapping.h"
 #include "server/service_error.h"
 
@@ -14,6 +16,23 @@ grpc::Status EndingStatus() {
   return ToGrpcStatus(ServiceError(ErrorCode::kUnavailable,
                                    "INFERENCE_LOST",
                                    "the inference worker is ending; send the picture again"));
+}
+
+// Where memory ran out, with the limit and what to do.
+void RethrowNamingMemory(const std::exception_ptr& error) {
+  if (!error) return;
+  try {
+    std::rethrow_exception(error);
+  } catch (const ServiceError&) {
+    throw;
+  } catch (const std::exception& e) {
+    const auto* ours = dynamic_cast<const Error*>(&e);
+    if ((ours != nullptr && ours->code() != ErrorCode::kInternal) || !IsOutOfMemory(e)) throw;
+    throw ServiceError(ErrorCode::kResourceExhausted,
+                       "OUT_OF_MEMORY",
+                       "the picture takes more memory than there is; send a smaller one, or {}",
+                       MemoryRemedy());
+  }
 }
 
 }  // namespace
@@ -100,9 +119,7 @@ void InferenceQueue::Answer(std::vector<Waiting> batch) {
     for (LiveTask& task : tasks) task.error = std::current_exception();
   }
   for (size_t i = 0; i < batch.size(); ++i) {
-    batch[i].reactor->Finish(Guard([&] {
-      if (tasks[i].error) std::rethrow_exception(tasks[i].error);
-    }));
+    batch[i].reactor->Finish(Guard([&] { RethrowNamingMemory(tasks[i].error); }));
   }
 }
 

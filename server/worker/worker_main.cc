@@ -27,10 +27,13 @@ namespace {
 // The largest blob, twice: what is made of it may be larger.
 constexpr int64_t kMaxFileBytes = int64_t{16} << 30;
 
+constexpr int64_t kMaxMemoryMib = int64_t{1} << 30;
+
 struct WorkerArguments {
   WorkerOptions options;
   std::string log_level = "info", log_format = "text";
   bool sandbox = true;
+  int64_t memory_mib = 0;  // 0: no limit
   double lease_seconds = 60.0;
   double heartbeat_seconds = 10.0;
   double checkpoint_seconds = 20.0;
@@ -62,6 +65,10 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
                   "Scenes that are personalized at once, sharing the encoder")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+  app->add_option("--memory-mib",
+                  arguments->memory_mib,
+                  "Memory that this process may take, and each that it starts, MiB; 0: no limit")
+      ->check(CLI::Range(int64_t{0}, kMaxMemoryMib));
   app->add_flag("!--no-sandbox", arguments->sandbox, "Do not lock this process in");
   app->add_option("--log-format", arguments->log_format, "text or json")
       ->check(CLI::IsMember({"text", "json"}));
@@ -131,6 +138,40 @@ void HandleStopSignals() {
   IgnoreStraySignals();
 }
 
+// What strangers send may take much memory: better this process fails than the machine.
+void LimitMemory(int64_t memory_mib) {
+  // With less nothing can be computed.
+  constexpr int64_t kLeastBytes = int64_t{256} << 20;
+  // Sanitizers reserve terabytes, which the kernel would count.
+  constexpr int64_t kMostReserved = int64_t{1} << 40;
+  if (!BeEndedFirstWhenMemoryRunsOut()) {
+    spdlog::warn("the kernel may end the server before this worker when memory runs out");
+  }
+  if (memory_mib == 0) return;
+  const int64_t reserved = OwnMemoryBytes();
+  if (reserved > kMostReserved) {
+    spdlog::warn("the memory of this program cannot be limited: it reserves {} MiB at its start",
+                 reserved >> 20);
+    return;
+  }
+  ProcessLimits limits;
+  limits.memory_bytes = memory_mib << 20;
+  if (limits.memory_bytes < reserved + kLeastBytes) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "{} MiB of memory are too little: the program reserves {} MiB at its start; give "
+                "workers at least {} MiB each (color3d-server serve --worker-memory-mib)",
+                memory_mib,
+                reserved >> 20,
+                (reserved + kLeastBytes) >> 20);
+  }
+  if (!LimitProcess(limits)) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "the kernel does not let this worker limit its memory ({})",
+                std::strerror(errno));
+  }
+  spdlog::info("may take {} MiB of memory, {} MiB of it are reserved", memory_mib, reserved >> 20);
+}
+
 // What this process decodes is strangers'. Threads that were there before are OpenBLAS's own.
 void LockIn(const WorkerArguments& arguments) {
   SetSandboxing(arguments.sandbox);
@@ -195,6 +236,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
              arguments.log_level,
              arguments.log_format,
              paths.Logs() / (arguments.options.name + ".log"));
+    LimitMemory(arguments.memory_mib);
     LockIn(arguments);
     if (arguments.inference.empty()) {
       Complete(&arguments);

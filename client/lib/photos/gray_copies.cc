@@ -1,27 +1,25 @@
 #include "client/lib/photos/gray_copies.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "client/lib/photos/photo_color.h"
 #include "core/base/files.h"
 #include "core/base/parallel.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/image/decode_budget.h"
+#include "core/image/reduced.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr int kJpegQuality = 97;
-constexpr int kChromaSidePx = 160;
-constexpr int kLuminanceBins = 16;
-// Toned film measures 0.7..1.0, scenes in colour 7.6 and more.
-constexpr double kMinFreeChroma = 2.0;
+constexpr int kLookSidePx = 64;  // more than colour is judged at
 
 std::string EncodeGray(const Image& srgb, ImageFormat format) {
   Image gray = LuminanceFromSrgb(srgb);
@@ -29,38 +27,10 @@ std::string EncodeGray(const Image& srgb, ImageFormat format) {
   return format == ImageFormat::kJpeg ? EncodeJpeg(gray, kJpegQuality) : EncodePng16(gray);
 }
 
-// First and second moments of the chroma of pixels of like luminance.
-struct ChromaBin {
-  double count = 0.0;
-  double a = 0.0;
-  double b = 0.0;
-  double square = 0.0;
-};
+// The photo, its luminance and what is encoded, bytes a pixel.
+constexpr int64_t kBytesPerPixel = 40;
 
 }  // namespace
-
-double FreeChroma(const Image& srgb) {
-  if (srgb.channels != 3 || srgb.Empty()) return 0.0;
-  const Image lab = LabFromSrgb(FitWithin(srgb, kChromaSidePx));
-  std::array<ChromaBin, kLuminanceBins> bins;
-  for (size_t i = 0; i < lab.PlaneSize(); ++i) {
-    const int index = static_cast<int>(lab.Plane(0)[i] / 100.0f * kLuminanceBins);
-    ChromaBin& bin = bins[std::clamp(index, 0, kLuminanceBins - 1)];
-    const double a = lab.Plane(1)[i];
-    const double b = lab.Plane(2)[i];
-    bin.count += 1.0;
-    bin.a += a;
-    bin.b += b;
-    bin.square += a * a + b * b;
-  }
-  double sum = 0.0;
-  for (const ChromaBin& bin : bins) {
-    if (bin.count > 0.0) sum += bin.square - (bin.a * bin.a + bin.b * bin.b) / bin.count;
-  }
-  return std::sqrt(std::max(0.0, sum) / static_cast<double>(lab.PlaneSize()));
-}
-
-bool HasColor(const Image& srgb) { return FreeChroma(srgb) >= kMinFreeChroma; }
 
 ColorCount CountColorPhotos(const PhotoFolder& folder,
                             int max_photos,
@@ -68,14 +38,17 @@ ColorCount CountColorPhotos(const PhotoFolder& folder,
   ColorCount count;
   count.photos = static_cast<int>(folder.photos.size());
   count.looked_at = std::min(count.photos, max_photos);
-  std::atomic<int> in_color{0};
+  std::atomic<int> in_color{0}, unsure{0};
   ThreadPool pool(2);
   pool.ForEach(count.looked_at, [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
     const LocalFile& photo = folder.photos[i * count.photos / count.looked_at];
-    if (HasColor(ReadImage(photo.file))) ++in_color;
+    const ColorVerdict verdict = JudgeColor(MeasureHues(ReadImageWithin(photo.file, kLookSidePx)));
+    if (verdict.in_color) ++in_color;
+    if (!verdict.is_sure) ++unsure;
   });
   count.in_color = in_color;
+  count.unsure = unsure;
   return count;
 }
 
@@ -116,13 +89,16 @@ GrayCopies MakeGrayCopies(const PhotoFolder& folder,
     const LocalFile& photo = folder.photos[i];
     const std::string bytes = ReadFile(photo.file);
     const std::string name = photo.file.string();
+    const ImageInfo info = ProbeImage(bytes, name);
+    const PictureTurn turn(
+        {name, info.width, info.height, kBytesPerPixel * info.width * info.height});
     const Image image = DecodeImage(bytes, name);
     if (folder.mask_files.empty()) alpha[i] = SaveAlpha(bytes, photo, scratch);
     in_color[i] = HasColor(image) ? 1 : 0;
     const fs::path copy = scratch / photo.path;
     std::error_code error;
     fs::create_directories(copy.parent_path(), error);
-    WriteFileAtomic(copy, EncodeGray(image, ProbeImage(bytes, name).format));
+    WriteFileAtomic(copy, EncodeGray(image, info.format));
     copies.folder.photos[i].file = copy;
   });
   for (const std::optional<LocalFile>& mask : alpha) {

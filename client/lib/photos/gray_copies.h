@@ -7,25 +7,19 @@
 
 #include "client/lib/photos/photo_folder.h"
 #include "core/base/cancellation.h"
-#include "core/base/image.h"
 
 namespace color3d::client {
-
-// RMS distance of the chroma from the mean chroma of pixels of like luminance, in Lab units: colour
-// that luminance does not explain. Sepia and toned prints stay below 1, photographs in colour lie
-// at 5..20. 3-channel sRGB in 0..1; 0 for one channel.
-double FreeChroma(const Image& srgb);
-
-// True when the picture has colour of its own: FreeChroma of at least 2.
-bool HasColor(const Image& srgb);
 
 struct ColorCount {
   int looked_at = 0;  // a spread of the photos, at most `max_photos`
   int in_color = 0;
+  int unsure = 0;  // photos that may be either (ColorVerdict)
   int photos = 0;
 
   // True when most of those looked at are.
   bool MostlyColor() const { return 2 * in_color > looked_at; }
+  // False when at least half of those looked at may be either.
+  bool IsSure() const { return 2 * unsure < looked_at; }
 };
 // Decodes up to `max_photos` (>= 1) of them, evenly spread. Throws Error{kInvalidArgument} on one
 // that cannot be decoded.

@@ -27,25 +27,6 @@ Image Picture(bool color) {
   return SrgbFromLab(lab);
 }
 
-Image Sepia() {
-  Image lab = LabFromSrgb(Picture(false));
-  for (size_t i = 0; i < lab.PlaneSize(); ++i) {
-    lab.Plane(1)[i] = 8.0f;
-    lab.Plane(2)[i] = 10.0f + 0.1f * lab.Plane(0)[i];
-  }
-  return SrgbFromLab(lab);
-}
-
-TEST(GrayCopies, TonedPicturesHaveNoColor) {
-  EXPECT_FALSE(HasColor(Picture(false)));
-  EXPECT_FALSE(HasColor(Image(8, 8, 1, 0.5f)));
-  EXPECT_FALSE(HasColor(Sepia()));
-  EXPECT_FALSE(IsGray(Sepia()));  // which is why that test alone does not do
-  EXPECT_TRUE(HasColor(Picture(true)));
-  EXPECT_LT(FreeChroma(Sepia()), 1.0);
-  EXPECT_GT(FreeChroma(Picture(true)), 10.0);
-}
-
 class GrayCopiesTest : public ::testing::Test {
  protected:
   GrayCopiesTest() {

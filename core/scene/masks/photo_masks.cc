@@ -82,6 +82,11 @@ std::vector<std::string> FindMasks(const fs::path& scene_folder,
   return masks;
 }
 
+PictureNeed MaskNeed(const std::string& mask_file, int width, int height) {
+  constexpr int64_t kBytesPerPixel = 28;  // four channels as stored and as floats, and two masks
+  return {mask_file, width, height, kBytesPerPixel * width * height};
+}
+
 Image ReadMask(const fs::path& scene_folder,
                const std::string& mask_file,
                const std::string& photo_file,
@@ -90,6 +95,7 @@ Image ReadMask(const fs::path& scene_folder,
   const bool is_alpha = mask_file == photo_file;
   const std::string what =
       is_alpha ? "the alpha of " + photo_file : "the mask " + mask_file + " of " + photo_file;
+  const PictureTurn turn(MaskNeed(mask_file, width, height));
   const Image image = DecodeImage(ReadFile(scene_folder / mask_file), mask_file, is_alpha);
   if (image.width != width || image.height != height) {
     throw InvalidArgument("{} is {}, the photo {}; save it at the photo's size",

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/image.h"
+#include "core/image/decode_budget.h"
 
 namespace color3d {
 
@@ -27,6 +28,9 @@ Image ReadMask(const std::filesystem::path& scene_folder,
                const std::string& photo_file,
                int width,
                int height);
+
+// What ReadMask takes of a file of this size, and what is done with its mask at full size.
+PictureNeed MaskNeed(const std::string& mask_file, int width, int height);
 
 // Sets all channels of `image` to 0 where the mask (of its size; null: everything counts) is 0.
 void ClearMasked(const Image* mask, Image* image);

@@ -116,6 +116,15 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   }
   const SubprocessResult result = running.get();
   if (result.timed_out) ThrowTooSlow();
+  if (result.signal != 0 && LogSays("std::bad_alloc")) {
+    throw Error(ErrorCode::kResourceExhausted,
+                "colmap {} ran out of memory at the {} MiB that it may take; use fewer photos or "
+                "fewer features, or {}; log: {}",
+                arguments.at(0),
+                child.limits.memory_bytes >> 20,
+                MemoryRemedy(),
+                log_.filename().string());
+  }
   if (result.signal != 0) {
     throw Error(
         ErrorCode::kUnavailable,
@@ -147,6 +156,15 @@ void ColmapProcess::ThrowTooSlow() const {
               "finding camera positions took longer than {} s; use fewer photos, fewer features or "
               "a longer time limit",
               timeout_.count());
+}
+
+bool ColmapProcess::LogSays(const std::string& text) const {
+  std::ifstream in(log_);
+  std::string line;
+  while (std::getline(in, line)) {
+    if (line.find(text) != std::string::npos) return true;
+  }
+  return false;
 }
 
 std::string ColmapProcess::LastLogLine() const {

@@ -33,8 +33,9 @@ class ColmapProcess {
   std::string Threads() const;
 
   // Runs `colmap arguments...` and returns the exit code. Throws Error: kDeadlineExceeded,
-  // kCancelled, kUnavailable when a signal ended it (that is no answer, and worth another attempt),
-  // kFailedPrecondition when COLMAP is not installed.
+  // kCancelled, kResourceExhausted when memory ran out, kUnavailable when another signal ended it
+  // (that is no answer, and worth another attempt), kFailedPrecondition when COLMAP is not
+  // installed.
   int Run(const std::vector<std::string>& arguments, const ColmapPhase& phase);
   // Another exit code than 0 is Error{kInternal} with the last line of the log.
   void RunOrThrow(const std::vector<std::string>& arguments, const ColmapPhase& phase);
@@ -42,6 +43,7 @@ class ColmapProcess {
  private:
   [[noreturn]] void ThrowTooSlow() const;
   std::string LastLogLine() const;
+  bool LogSays(const std::string& text) const;
 
   std::filesystem::path log_;
   std::chrono::seconds timeout_;

@@ -54,6 +54,17 @@ TEST_F(ColmapProcessTest, DeathByASignalIsNone) {
   }
 }
 
+TEST_F(ColmapProcessTest, MemoryThatRanOutIsNamedWithItsLimit) {
+  try {
+    Run("echo \"terminate called after throwing an instance of 'std::bad_alloc'\" >&2\n"
+        "echo '*** Aborted' >&2\nkill -ABRT $$");
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kResourceExhausted);
+    EXPECT_NE(std::string(e.what()).find("MiB that it may take"), std::string::npos) << e.what();
+  }
+}
+
 TEST_F(ColmapProcessTest, SeesNoTokenAndWritesBesideItsLogAlone) {
   ::setenv("COLOR3D_TOKEN", "secret", 1);
   EXPECT_EQ(Run("test -z \"$COLOR3D_TOKEN\""), 0);

@@ -8,6 +8,7 @@
 
 #include "core/base/files.h"
 #include "core/image/codec.h"
+#include "core/image/reduced.h"
 #include "core/scene/masks/photo_masks.h"
 
 namespace color3d {
@@ -100,7 +101,8 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
   const auto write = [&](int64_t i) {
     run.cancel.ThrowIfCancelled();
     const Photo& photo = photos[i];
-    const Image image = FeatureImage(ReadImage(scene_folder / photo.file), max_side_px);
+    const Image image =
+        FeatureImage(ReadImageFitted(scene_folder / photo.file, max_side_px), max_side_px);
     const double focal_px = photo.focal_px * image.width / photo.width;
     seen[i] = {image.width, image.height, focal_px, photo.camera, {}};
     folders[i] = GroupFolder(seen[i]);

@@ -206,6 +206,35 @@ TEST(SplatFileTest, WhatIsNoSplatIsNamed) {
   EXPECT_THAT(Refusal("some text"), HasSubstr("not a splat"));
 }
 
+TEST(SplatFileTest, ZipNamesAreCheckedAndBombsAreRefusedUnread) {
+  const auto refusal = [](const std::string& zip) -> std::string {
+    try {
+      const ZipReader reader(zip, "z");
+      return "";
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
+      return e.what();
+    }
+  };
+  for (const char* name : {"../a", "/etc/a", "a\nb", "a\x1b[2J", "a//b", "a\\b"}) {
+    const std::string text = refusal(StoredZip({{name, "content"}}));
+    EXPECT_THAT(text, HasSubstr("not a plain relative path")) << name;
+    EXPECT_EQ(text.find(name), std::string::npos) << "hostile bytes in a message";
+  }
+  EXPECT_THAT(refusal(StoredZip({{"a", "content"}, {"a", "other"}})), HasSubstr("twice"));
+  EXPECT_EQ(refusal(StoredZip({{"folder/a", "content"}, {"b", ""}})), "");
+  // The size of the content, in the directory's entry.
+  std::string bomb = StoredZip({{"a", "content"}});
+  const size_t entry = bomb.find("PK\x01\x02");
+  bomb.replace(entry + 24, 4, std::string("\xff\xff\xff\x7f", 4));
+  EXPECT_THAT(refusal(bomb), HasSubstr("which is impossible"));
+  // The directory says "a" where the entry itself says "b".
+  std::string moved = StoredZip({{"a", "content"}});
+  moved[30] = 'b';
+  EXPECT_THROW(ZipReader(moved, "z").Read("a", 7), Error);
+  EXPECT_THROW(ZipReader(StoredZip({{"a", "x"}}), "z").Read("../a", 7), Error);
+}
+
 TEST(SplatFileTest, ZipEntriesAreCheckedAndBounded) {
   const std::string zip = StoredZip({{"a", "content"}});
   EXPECT_EQ(ZipReader(zip, "z").Read("a", 7), "content");

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/files.h"
 #include "core/splat/import/read_support.h"
 
 namespace color3d {
@@ -18,6 +19,7 @@ constexpr size_t kLocalBytes = 30, kCentralBytes = 46, kEndBytes = 22;
 constexpr size_t kMaxCommentBytes = 65'535;
 constexpr uint32_t kStored = 0, kDeflated = 8;
 constexpr uint32_t kZip64 = 0xffffffff;
+constexpr uint32_t kMostDeflated = 1033;  // bytes that one can stand for, at most
 
 // True when the whole of `packed` unpacks to exactly `to->size()` bytes.
 bool Inflate(std::string_view packed, std::string* to) {
@@ -69,17 +71,33 @@ void ZipReader::ReadDirectory(size_t at, uint32_t count, size_t end) {
       throw InvalidArgument("the directory of {} is damaged; copy it again", name_);
     }
     const std::string file(bytes_.substr(at + kCentralBytes, name_bytes));
+    // A folder's own entry ends in '/'.
+    if (!IsSafeRelativePath(file.substr(0, file.find_last_not_of('/') + 1))) {
+      throw InvalidArgument("{} holds a file whose name is not a plain relative path", name_);
+    }
     if ((flags & 1u) != 0) throw InvalidArgument("{} of {} is encrypted", file, name_);
     if (entry.bytes == kZip64 || entry.packed_bytes == kZip64 || entry.offset == kZip64) {
       throw InvalidArgument("{} is a zip64; archives of up to 4 GB can be read", name_);
     }
-    entries_[file] = entry;
+    if (entry.bytes / kMostDeflated > entry.packed_bytes) {
+      throw InvalidArgument("{} of {} says that {} bytes unpack to {}, which is impossible",
+                            file,
+                            name_,
+                            entry.packed_bytes,
+                            entry.bytes);
+    }
+    if (!entries_.emplace(file, entry).second) {
+      throw InvalidArgument("{} is twice in {}", file, name_);
+    }
     at += kCentralBytes + more;
   }
 }
 
 std::string ZipReader::Read(const std::string& file, uint64_t max_bytes) const {
   const auto found = entries_.find(file);
+  if (found == entries_.end() && !IsSafeRelativePath(file)) {
+    throw InvalidArgument("{} names a file by what is not a plain relative path", name_);
+  }
   if (found == entries_.end()) throw InvalidArgument("{} holds no {}", name_, file);
   const Entry& entry = found->second;
   if (entry.bytes > max_bytes) {
@@ -93,8 +111,11 @@ std::string ZipReader::Read(const std::string& file, uint64_t max_bytes) const {
   if (local + kLocalBytes > bytes_.size() || LittleEndianAt(bytes_, local, 4) != kLocalSignature) {
     throw InvalidArgument("{} of {} is damaged; copy it again", file, name_);
   }
-  const size_t begin = local + kLocalBytes + LittleEndianAt(bytes_, local + 26, 2) +
-                       LittleEndianAt(bytes_, local + 28, 2);
+  const size_t name_bytes = LittleEndianAt(bytes_, local + 26, 2);
+  if (bytes_.substr(local + kLocalBytes, name_bytes) != file) {
+    throw InvalidArgument("{} is not where the directory of {} says; copy it again", file, name_);
+  }
+  const size_t begin = local + kLocalBytes + name_bytes + LittleEndianAt(bytes_, local + 28, 2);
   if (begin > bytes_.size() || bytes_.size() - begin < entry.packed_bytes) {
     throw InvalidArgument("{} of {} is cut short; copy it again", file, name_);
   }

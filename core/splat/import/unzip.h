@@ -12,12 +12,13 @@ namespace color3d {
 class ZipReader {
  public:
   // `name`: of the archive, for complaints. Throws Error{kInvalidArgument} for what is no zip, is
-  // cut short, is encrypted, spans several files or is larger than 4 GB (zip64).
+  // cut short, is encrypted, spans several files or is larger than 4 GB (zip64), and when a file's
+  // name is not a plain relative path, is there twice or claims to unpack to more than it can.
   ZipReader(std::string_view bytes, std::string name);
 
   bool Has(const std::string& file) const { return entries_.contains(file); }
   // Stored or deflated, checked against its checksum. Throws Error{kInvalidArgument} when it is
-  // missing, damaged, or says that it has more than `max_bytes`.
+  // missing, damaged, not where the directory says, or says that it has more than `max_bytes`.
   std::string Read(const std::string& file, uint64_t max_bytes) const;
 
  private:

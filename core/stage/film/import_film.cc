@@ -18,6 +18,7 @@
 #include "core/image/codec.h"
 #include "core/scene/held_out.h"
 #include "core/scene/import.h"
+#include "core/scene/key_photo.h"
 #include "core/stage/film/film_frames.h"
 #include "core/stage/film/film_poses.h"
 #include "core/stage/formats/artifacts.h"
@@ -231,7 +232,9 @@ void ImportPictures(const FilmOptions& options,
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());
   stream.time_s = [&](int i) { return times[wanted[i]]; };
-  stream.read = [&](int i) { return ReadImage(folder / files[wanted[i]]); };
+  stream.read = [&](int i) {
+    return ReadKeyPhoto(folder / files[wanted[i]], context.MemoryBytes());
+  };
   stream.name = [&](int i) { return files[wanted[i]]; };
   ImportFrames(stream, options, import, context);
 }

@@ -77,7 +77,7 @@ ordered_json TemporalScores(const Scene& scene,
   if (truth.size() == scene.views.size()) {
     names.emplace_back("truth");
     source.colorings.emplace_back(
-        [&](int view) { return LabFromSrgb(images.Undistort(view, ReadImage(truth.at(view)))); });
+        [&](int view) { return LabFromSrgb(images.UndistortFile(view, truth.at(view))); });
   }
   const std::vector<TemporalConsistency> figures =
       MeasureTemporalConsistency(source, context.pool(), context.cancel());

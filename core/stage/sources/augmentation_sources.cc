@@ -9,6 +9,7 @@
 #include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/image/reduced.h"
 #include "core/keycolor/picture_checks.h"
 
 namespace color3d {
@@ -16,6 +17,7 @@ namespace {
 
 constexpr char kFolder[] = "augment/";
 constexpr size_t kMaxFiles = 64;
+constexpr int kReadSidePx = 4096;  // colorizers learn at a fraction of it
 constexpr int64_t kMaxAnswerPixels = 16'000'000;
 
 GeneratedPicture PictureOf(const Image& lab) {
@@ -68,7 +70,8 @@ std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageCon
           "{} holds more than {} pictures; keep the most telling ones", kFolder, kMaxFiles);
     }
     try {
-      const Image lab = CheckedLab(ReadImage(context.scene_folder() / file), max_side_px, file);
+      const Image lab = CheckedLab(
+          ReadImageFitted(context.scene_folder() / file, kReadSidePx), max_side_px, file);
       pictures.push_back({AugmentationName("file", pictures.size()), "file", file, PictureOf(lab)});
     } catch (const Error& e) {
       throw Error(e.code(), "{}; replace or remove {}", e.what(), file);

@@ -1,6 +1,9 @@
 // What the chroma of a scene may keep in memory.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+
 #include "core/scene/scene.h"
 #include "core/splat/chroma/chroma_options.h"
 #include "core/splat/model/gaussian_model.h"
@@ -10,11 +13,17 @@ namespace color3d {
 inline constexpr size_t kFramesLikePhotos = 64;
 
 // Frames may be many: small budgets, unless they are as few as photos and nothing in them moves.
-inline ChromaOptions ChromaWithinMemory(const ChromaOptions& options,
+// Both budgets stay below shares of `memory_bytes`, which the stage may take. The result is the
+// same.
+inline ChromaOptions ChromaWithinMemory(ChromaOptions options,
                                         const Scene& scene,
-                                        const GaussianModel& geometry) {
+                                        const GaussianModel& geometry,
+                                        int64_t memory_bytes) {
   const bool as_photos = geometry.motion.size() == 0 && scene.views.size() <= kFramesLikePhotos;
-  return scene.IsDynamic() && !as_photos ? ForManyFrames(options) : options;
+  if (scene.IsDynamic() && !as_photos) options = ForManyFrames(options);
+  options.memory_budget_bytes = std::min(options.memory_budget_bytes, memory_bytes / 2);
+  options.target_budget_bytes = std::min(options.target_budget_bytes, memory_bytes / 8);
+  return options;
 }
 
 }  // namespace color3d

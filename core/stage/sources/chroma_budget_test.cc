@@ -23,12 +23,18 @@ TEST(ChromaBudgetTest, ManyFramesAndThoseInWhichSomethingMovesKeepLess) {
   ASSERT_FALSE(frames == photos);
   ASSERT_TRUE(SceneOf(2, true).IsDynamic());
   const auto of = [&](size_t views, bool has_times, const GaussianModel& geometry) {
-    return ChromaWithinMemory({}, SceneOf(views, has_times), geometry);
+    return ChromaWithinMemory({}, SceneOf(views, has_times), geometry, int64_t{16} << 30);
   };
   EXPECT_EQ(of(65, false, still), photos);
   EXPECT_EQ(of(64, true, still), photos) << "frames of a still place, as few as photos";
   EXPECT_EQ(of(65, true, still), frames);
   EXPECT_EQ(of(64, true, moving), frames);
+}
+
+TEST(ChromaBudgetTest, LittleMemoryMeansSmallBudgets) {
+  const ChromaOptions little = ChromaWithinMemory({}, SceneOf(8, false), {}, int64_t{1} << 30);
+  EXPECT_EQ(little.memory_budget_bytes, int64_t{512} << 20);
+  EXPECT_EQ(little.target_budget_bytes, int64_t{128} << 20);
 }
 
 }  // namespace

@@ -1,8 +1,8 @@
 #include "core/stage/sources/further_colors.h"
 
 #include "core/color/lab.h"
-#include "core/image/codec.h"
 #include "core/image/fill_holes.h"
+#include "core/scene/key_photo.h"
 #include "core/scene/masks/photo_masks.h"
 #include "core/stage/sources/given_colors.h"
 #include "core/stage/sources/key_color_sources.h"
@@ -24,7 +24,8 @@ CarriedColor ColorOfFurther(const FurtherKeyView& further,
                             const ViewImages& images,
                             StageContext& context) {
   KeyPhoto photo;
-  photo.srgb = ReadImage(context.scene_folder() / scene.views[view].image_file);
+  photo.srgb =
+      ReadKeyPhoto(context.scene_folder() / scene.views[view].image_file, context.MemoryBytes());
   photo.luminance = LuminanceFromSrgb(photo.srgb);
   const KeyColorResult result = SolveKeyColor(further.color, photo, context);
   CarriedColor color;

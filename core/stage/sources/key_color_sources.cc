@@ -9,6 +9,7 @@
 #include "core/encoder/clip/clip.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
+#include "core/image/reduced.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/keycolor/external/remote.h"
 #include "core/keycolor/external/script.h"
@@ -25,6 +26,8 @@ using Options = ColorizeKeyViewOptions;
 
 constexpr int64_t kMaxPointsBytes = 1 << 26;
 constexpr int kRegionsSidePx = 540;
+// They are compared at a fraction of this.
+constexpr int kReferenceSidePx = 4096;
 
 // White is 1: any grey or colour picture, by its luminance.
 Image ReadMask(const std::filesystem::path& file) {
@@ -82,7 +85,7 @@ KeyColorResult FromReferences(const Options& options,
                               StageContext& context) {
   std::vector<Image> references;
   for (const std::filesystem::path& file : options.references) {
-    references.push_back(ReadImage(file));
+    references.push_back(ReadImageFitted(file, kReferenceSidePx));
   }
   const auto encoder = context.LoadEncoder(options.name);
   ReferenceOptions reference;

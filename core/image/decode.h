@@ -1,0 +1,30 @@
+// How pictures are decoded, for this folder only. Thread-safe.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "core/base/image.h"
+#include "core/image/probe/orientation.h"
+#include "core/image/probe/probe.h"
+
+namespace color3d {
+
+struct DecodeRequest {
+  bool keep_alpha = false;
+  // 1, or 2, 4, 8 for JPEG files, whose sides are divided by it (rounded up).
+  int jpeg_reduction = 1;
+  // Told the picture's size as it is looked at, says the size that is wanted (Resize's result);
+  // empty: its own. Pictures that would take much memory as floats are reduced before they become
+  // floats.
+  std::function<PictureSize(const PictureSize&)> wanted;
+};
+
+// Throws as DecodeImage.
+Image Decode(std::string_view bytes,
+             const std::string& file_name,
+             const ImageInfo& info,
+             const DecodeRequest& request);
+
+}  // namespace color3d

@@ -1,0 +1,147 @@
+// Workers keep to their memory limit: what needs more fails with the numbers, and the rest goes on.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <fstream>
+#include <string>
+
+#include "tests/integration/service_fixture.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int64_t kLimitBytes = int64_t{2} << 30;
+
+std::string BigEndian(uint32_t value) {
+  std::string bytes;
+  for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift);
+  return bytes;
+}
+
+std::string Chunk(const std::string& type, const std::string& data) {
+  const std::string body = type + data;
+  const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size());
+  return BigEndian(static_cast<uint32_t>(data.size())) + body +
+         BigEndian(static_cast<uint32_t>(crc));
+}
+
+// A PNG of one value all over, grey or (3 channels) RGB: some hundred kilobytes, whatever its size.
+void WriteFlatPng(const fs::path& file, int width, int height, int channels, char value) {
+  std::string row(static_cast<size_t>(width) * channels + 1, value);
+  row[0] = 0;  // no filter
+  z_stream stream = {};
+  deflateInit(&stream, 1);
+  std::string packed(1 << 16, '\0'), data;
+  for (int y = 0; y < height; ++y) {
+    stream.next_in = reinterpret_cast<Bytef*>(row.data());
+    stream.avail_in = static_cast<uInt>(row.size());
+    const int flush = y + 1 == height ? Z_FINISH : Z_NO_FLUSH;
+    do {
+      stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+      stream.avail_out = static_cast<uInt>(packed.size());
+      deflate(&stream, flush);
+      data.append(packed, 0, packed.size() - stream.avail_out);
+    } while (stream.avail_out == 0);
+  }
+  deflateEnd(&stream);
+  const std::string color(1, channels == 3 ? '\2' : '\0');
+  const std::string header = BigEndian(static_cast<uint32_t>(width)) +
+                             BigEndian(static_cast<uint32_t>(height)) + '\x08' + color +
+                             std::string(3, '\0');
+  std::ofstream(file, std::ios::binary)
+      << "\x89PNG\r\n\x1a\n"
+      << Chunk("IHDR", header) << Chunk("IDAT", data) << Chunk("IEND", "");
+}
+
+class MemoryLimitTest : public ServiceTest {
+ protected:
+  void SetUp() override { StartServer({"--worker-memory-mib", "2048"}); }
+
+  int WorkerPid() {
+    const v1::ServerInfo info = server().Info();
+    for (const v1::WorkerInfo& worker : info.workers()) {
+      if (worker.worker_id().starts_with("worker-1-"))
+        return std::stoi(worker.worker_id().substr(9));
+    }
+    return 0;
+  }
+  // The most that the worker ever had, bytes.
+  int64_t PeakOf(int pid) const {
+    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+    for (std::string line; std::getline(status, line);) {
+      if (line.starts_with("VmHWM:")) return std::stoll(line.substr(6)) * 1024;
+    }
+    return 0;
+  }
+
+  void ExpectOtherJobsGoOn() {
+    ProceduralSceneOptions options = SmallRoom(4);
+    options.width = 160;
+    options.height = 120;
+    options.poses = ProceduralSceneOptions::Poses::kColmap;
+    WriteProceduralScene(Path("room"), options);
+    const ProcessResult created = Client({"scene", "create", Path("room").string()});
+    ASSERT_EQ(created.exit_code, 0) << created.err;
+    v1::JobSpec spec;
+    const size_t at = created.out.find("scenes/");
+    ASSERT_NE(at, std::string::npos) << created.out;
+    spec.set_scene(created.out.substr(at, created.out.find_first_of(" \n\",", at) - at));
+    spec.mutable_import_scene();
+    RunJob(spec);
+  }
+};
+
+TEST_F(MemoryLimitTest, ManyHugePhotosFailWithTheNumbersAndOtherJobsGoOn) {
+  ExpectOtherJobsGoOn();
+  const int pid = WorkerPid();
+  ASSERT_GT(pid, 0);
+  int score = 0;
+  std::ifstream("/proc/" + std::to_string(pid) + "/oom_score_adj") >> score;
+  EXPECT_EQ(score, 500);
+  fs::create_directory(Path("huge"));
+  for (int i = 0; i < 4; ++i) {
+    WriteFlatPng(Path("huge") / ("wall" + std::to_string(i) + ".png"),
+                 14'000,
+                 14'000,
+                 1,
+                 static_cast<char>(100 + i));
+  }
+  const ProcessResult result =
+      Client(std::vector<std::string>{
+                 "colorize", Path("huge").string(), "-o", Path("out").string(), "--auto"} +
+             QuickOptions());
+  ExpectRefusal(result,
+                4,
+                {"wall0.png",
+                 "14000 x 14000 px",
+                 "MiB",
+                 "are granted",
+                 "reduce it to",
+                 "--worker-memory-mib"});
+  EXPECT_LT(PeakOf(pid), kLimitBytes);
+  fs::remove_all(Path("room"));
+  ExpectOtherJobsGoOn();
+  EXPECT_EQ(WorkerPid(), pid) << "the same worker went on";
+}
+
+// The photos are small, and what is given as their colour is not.
+TEST_F(MemoryLimitTest, AHugeKeyPictureFailsWithTheNumbers) {
+  ExpectOtherJobsGoOn();
+  const int pid = WorkerPid();
+  WriteFlatPng(Path("view001.png"), 16'000, 12'000, 3, 100);
+  const ProcessResult result = Client(std::vector<std::string>{"colorize",
+                                                               Path("room").string(),
+                                                               "-o",
+                                                               Path("out").string(),
+                                                               "--key-color",
+                                                               Path("view001.png").string()} +
+                                      QuickOptions());
+  ExpectRefusal(result, 4, {"16000 x 12000 px", "MiB", "are granted", "--worker-memory-mib"});
+  EXPECT_LT(PeakOf(pid), kLimitBytes);
+  EXPECT_EQ(WorkerPid(), pid) << "the same worker went on";
+}
+
+}  // namespace
+}  // namespace color3d
