@@ -9,9 +9,9 @@
 #include "client/commands/console.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/names.h"
+#include "client/lib/photos/passed_over_files.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
-#include "core/image/probe/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -23,16 +23,13 @@ void AddFolder(const fs::path& folder, std::vector<LivePicture>* pictures) {
   std::error_code none;
   const bool nested = fs::is_directory(folder / "images", none);
   const fs::path root = nested ? folder / "images" : folder;
-  std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(root)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.') && HasImageExtension(name)) found.push_back(entry.path());
+  PassedOver passed_over;
+  const std::vector<std::string> found =
+      ListPictures(root, /*with_subfolders=*/false, &passed_over);
+  if (found.empty()) {
+    throw InvalidArgument("there are no photos in {}{}", root.string(), passed_over.Clause());
   }
-  std::sort(found.begin(), found.end());
-  if (found.empty()) throw InvalidArgument("there are no photos in {}", root.string());
-  for (const fs::path& file : found) {
-    pictures->push_back({file.filename().string(), file, std::nullopt});
-  }
+  for (const std::string& file : found) pictures->push_back({file, root / file, std::nullopt});
 }
 
 // Distinct names for the answers.
@@ -48,6 +45,18 @@ std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
     names.push_back(name);
   }
   return names;
+}
+
+// The answers have the photos' names: beside them they would be taken for photos, or replace them.
+void RequireOtherFolder(const std::vector<LivePicture>& pictures, const fs::path& out) {
+  for (const LivePicture& picture : pictures) {
+    std::error_code none;
+    if (picture.file.empty() ||
+        !fs::equivalent(fs::absolute(picture.file).parent_path(), out, none))
+      continue;
+    throw InvalidArgument("-o {} is the folder of the photos; name another for the coloured ones",
+                          out.string());
+  }
 }
 
 }  // namespace
@@ -83,6 +92,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
                             const fs::path& out) {
   const auto start = std::chrono::steady_clock::now();
   const std::vector<std::string> names = NamesFor(pictures);
+  RequireOtherFolder(pictures, out);
   std::vector<std::string> written(pictures.size());
   std::vector<std::string> errors(pictures.size());
   LiveSummary summary;

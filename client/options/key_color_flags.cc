@@ -182,7 +182,7 @@ void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
   app.add_flag("--auto", flags->automatic, "Automatic colours: nothing else to do")->group(group);
   text("--key-color,--image",
        &flags->image,
-       "The key view, coloured (JPEG, PNG or TIFF); what is transparent is inferred");
+       "The key view, coloured (" + ReadableImageFormats() + "); what is transparent is inferred");
   text("--hints,--strokes,--points",
        &flags->hints,
        "Colour strokes (PNG of the key view's size, transparent elsewhere), or points, lines and "

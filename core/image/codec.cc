@@ -119,8 +119,11 @@ cv::Mat DecodeStored(std::string_view bytes,
   switch (info.format) {
     case ImageFormat::kJpeg:
     case ImageFormat::kPng:
-    case ImageFormat::kBmp:
       mat = DecodeByOpenCv(bytes, file_name, flags);
+      break;
+    case ImageFormat::kBmp:
+      // OpenCV 4.6 takes the colours of some BMPs for greys, unless it is told.
+      mat = DecodeByOpenCv(bytes, file_name, info.channels == 3 ? cv::IMREAD_COLOR : flags);
       break;
     case ImageFormat::kTiff:
       mat = DecodeByOpenCv(TiffPageAsStored(bytes, info.tiff_directory), file_name, flags);

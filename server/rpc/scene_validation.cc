@@ -158,7 +158,8 @@ void CheckFile(const SceneFileRecord& file,
   }
   if (is_augmentation && !is_photo) {
     violations->push_back(
-        {file.path, "is no picture (JPEG, PNG or TIFF); remove it from augment/"});
+        {file.path,
+         fmt::format("is no picture ({}); remove it from augment/", ReadableImageFormats())});
     return;
   }
   const int64_t max_bytes = is_transforms ? kMaxTransformsBytes : kMaxTimesBytes;
@@ -321,8 +322,9 @@ SceneCheck CheckScene(const SceneRecord& scene,
     }
   } else if (missing == 0 && check.photo_count == 0 && CountFilms(scene.files) == 0) {
     violations.push_back({"",
-                          "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff), no "
-                          "splat (.ply, .sog, .spz) and no film (.mp4, .mov, .mkv, ...)"});
+                          fmt::format("the scene holds no photographs ({}), no splat (.ply, .sog, "
+                                      ".spz) and no film (.mp4, .mov, .mkv, ...)",
+                                      ReadableImageEndings())});
   } else if (missing == 0 && check.photo_count == 1) {
     violations.push_back(
         {"", "the scene holds one photograph; at least 3 that overlap are needed"});

@@ -21,9 +21,9 @@ struct Release {
 
 void Check(const heif_error& error, const std::string& file_name) {
   if (error.code == heif_error_Ok) return;
-  throw InvalidArgument("{} cannot be decoded ({}); convert it to JPEG or PNG",
-                        file_name,
-                        error.message == nullptr ? "HEIC" : error.message);
+  std::string reason = error.message == nullptr ? "" : error.message;
+  reason.resize(std::min(reason.size(), reason.find('\n')));
+  throw InvalidArgument("{} cannot be decoded ({}); convert it to JPEG or PNG", file_name, reason);
 }
 
 // Rows of R, G, B with `bits` a sample become rows of B, G, R with all bits of Sample.

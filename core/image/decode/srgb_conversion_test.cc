@@ -110,11 +110,20 @@ TEST(SrgbConversion, GreyPictureWithAProfileOfColoursFollowsItsGreys) {
   EXPECT_LT(WorstDifference(read, srgb), 2e-4);
 }
 
+// Ours without their profile.
+std::string UntaggedJpeg(const Image& image) {
+  const std::string jpeg = EncodeJpeg(image, 98);
+  const size_t at = jpeg.find("\xFF\xE2");
+  const size_t length =
+      static_cast<unsigned char>(jpeg[at + 2]) * 256u + static_cast<unsigned char>(jpeg[at + 3]);
+  return jpeg.substr(0, at) + jpeg.substr(at + 2 + length);
+}
+
 TEST(SrgbConversion, ProfilesInPartsOfAJpegAreJoined) {
   Image srgb(16, 16, 3, 0.5f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.8f);
   const std::string profile = AdobeRgbProfile();
-  const std::string plain = EncodeJpeg(InSpaceOf(srgb, profile), 98);
+  const std::string plain = UntaggedJpeg(InSpaceOf(srgb, profile));
   const auto at = [&](const std::string& jpeg, int channel) {
     return DecodeImage(jpeg, "a.jpg").At(channel, 8, 8);
   };
@@ -190,12 +199,7 @@ TEST(SrgbConversion, ChunksOfPngsCountInTheirOrder) {
 TEST(SrgbConversion, CamerasSayAdobeRgbInExif) {
   Image srgb(16, 16, 3, 0.5f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.8f);
-  const std::string jpeg = EncodeJpeg(InSpaceOf(srgb, AdobeRgbProfile()), 98);
-  // Our JPEGs carry a profile, which would count: leave it out.
-  const size_t profile = jpeg.find("\xFF\xE2");
-  const size_t length = static_cast<unsigned char>(jpeg[profile + 2]) * 256u +
-                        static_cast<unsigned char>(jpeg[profile + 3]);
-  const std::string silent = jpeg.substr(0, profile) + jpeg.substr(profile + 2 + length);
+  const std::string silent = UntaggedJpeg(InSpaceOf(srgb, AdobeRgbProfile()));
   std::string block = ExifBlock({{40965, 4, 0}});
   const auto place = static_cast<uint32_t>(block.size());
   block.replace(26 + 2 + 8, 4, [&] {
@@ -251,7 +255,7 @@ TEST(SrgbConversion, ProfilesThatAreOfNoUseAreToldAndLeftOut) {
     EXPECT_EQ(DecodeImage(png, "a.png").data, plain.data);
     EXPECT_THAT(PictureNotes(png), ElementsAre(HasSubstr("is read as sRGB: its colour profile")));
   }
-  const std::string jpeg = WithJpegProfile(EncodeJpeg(srgb), adobe, 100);
+  const std::string jpeg = WithJpegProfile(UntaggedJpeg(srgb), adobe, 100);
   const std::string missing = std::string(jpeg).erase(2, 2 + 2 + 14 + 100);
   EXPECT_THAT(PictureNotes(missing), ElementsAre(HasSubstr("part 1 of")));
   EXPECT_NO_THROW(DecodeImage(missing, "a.jpg"));

@@ -44,7 +44,7 @@ ColorTag TagOfJpeg(std::string_view bytes) {
     const std::string_view body = reader.Slice(at + 4, length - 2);
     if (marker == 0xE2 && body.starts_with(kMark) && body.size() > kMark.size() + 2) {
       const ByteReader part(body);
-      count = part.U8(kMark.size() + 1);
+      if (parts.empty()) count = part.U8(kMark.size() + 1);
       parts.emplace(part.U8(kMark.size()), body.substr(kMark.size() + 2));
     }
     at += 2 + length;

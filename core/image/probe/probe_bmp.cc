@@ -33,6 +33,18 @@ void CheckKind(const ProbeContext& context, uint32_t bits, uint32_t compression)
   throw context.Damaged("it claims {} bits a pixel and compression {}", bits, compression);
 }
 
+// Colours that are not there are black.
+bool HasGrayPalette(const ByteReader& reader, uint32_t header, uint32_t bits) {
+  const size_t entry_bytes = header == kOs2HeaderBytes ? 3 : 4;
+  const uint32_t used = header == kOs2HeaderBytes ? 0 : reader.U32(kFileHeaderBytes + 32);
+  const uint32_t count = used == 0 ? 1u << bits : std::min(used, 1u << bits);
+  for (uint32_t i = 0; i < count; ++i) {
+    const size_t at = kFileHeaderBytes + header + i * entry_bytes;
+    if (reader.U8(at) != reader.U8(at + 1) || reader.U8(at) != reader.U8(at + 2)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 // "BM" begins many a text, too: what follows must fit as far as it is there.
@@ -51,10 +63,11 @@ ImageInfo ProbeBmp(const ProbeContext& context) {
   }
   const bool os2 = header == kOs2HeaderBytes;
   const size_t at = kFileHeaderBytes + 4;
-  const int64_t width = os2 ? reader.U16(at) : static_cast<int32_t>(reader.U32(at));
-  // Rows from top to bottom count below zero.
-  const int64_t rows = os2 ? reader.U16(at + 2) : static_cast<int32_t>(reader.U32(at + 4));
-  const int64_t height = std::abs(rows);
+  const auto number = [&](size_t i) -> int64_t {
+    return os2 ? reader.U16(at + 2 * i) : int64_t{static_cast<int32_t>(reader.U32(at + 4 * i))};
+  };
+  const int64_t width = number(0);
+  const int64_t height = std::abs(number(1));  // rows from top to bottom count below zero
   context.CheckSize(width, height);
   const uint32_t bits = reader.U16(at + (os2 ? 6 : 10));
   const uint32_t compression = os2 ? kRgb : reader.U32(at + 12);
@@ -72,7 +85,9 @@ ImageInfo ProbeBmp(const ProbeContext& context) {
   info.format = ImageFormat::kBmp;
   info.width = static_cast<int>(width);
   info.height = static_cast<int>(height);
-  info.channels = bits == 32 && compression == kBitFields ? 4 : 3;
+  info.channels = bits == 32 && compression == kBitFields             ? 4
+                  : bits <= 8 && HasGrayPalette(reader, header, bits) ? 1
+                                                                      : 3;
   return info;
 }
 
