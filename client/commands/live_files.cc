@@ -19,7 +19,7 @@ namespace {
 
 constexpr size_t kShownErrors = 2;
 
-void AddFolder(const fs::path& folder, std::vector<LivePicture>* pictures) {
+void AddFolder(const Context& context, const fs::path& folder, std::vector<LivePicture>* pictures) {
   std::error_code none;
   const bool nested = fs::is_directory(folder / "images", none);
   const fs::path root = nested ? folder / "images" : folder;
@@ -29,6 +29,7 @@ void AddFolder(const fs::path& folder, std::vector<LivePicture>* pictures) {
   if (found.empty()) {
     throw InvalidArgument("there are no photos in {}{}", root.string(), passed_over.Clause());
   }
+  for (const std::string& note : passed_over.Notes()) PrintNote(context, note);
   for (const std::string& file : found) pictures->push_back({file, root / file, std::nullopt});
 }
 
@@ -61,12 +62,13 @@ void RequireOtherFolder(const std::vector<LivePicture>& pictures, const fs::path
 
 }  // namespace
 
-std::vector<LivePicture> CollectPictures(const std::vector<std::string>& arguments) {
+std::vector<LivePicture> CollectPictures(const Context& context,
+                                         const std::vector<std::string>& arguments) {
   std::vector<LivePicture> pictures;
   for (const std::string& argument : arguments) {
     std::error_code none;
     if (fs::is_directory(argument, none)) {
-      AddFolder(argument, &pictures);
+      AddFolder(context, argument, &pictures);
     } else if (fs::is_regular_file(argument, none)) {
       pictures.push_back({fs::path(argument).filename().string(), argument, std::nullopt});
     } else {

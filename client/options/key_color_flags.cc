@@ -176,7 +176,7 @@ void KeyColorFlags::Check() const {
 
 void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
   const char* group = "Colour of the key view (one source)";
-  const auto text = [&](const char* name, std::string* value, const char* help) {
+  const auto text = [&](const char* name, std::string* value, const std::string& help) {
     return app.add_option(name, *value, help)->group(group);
   };
   app.add_flag("--auto", flags->automatic, "Automatic colours: nothing else to do")->group(group);

@@ -84,6 +84,8 @@ constexpr const char* kResultPictures[] = {artifact::kKeyViewGray,
                                            artifact::kKeyColor,
                                            artifact::kKeyColorRegions,
                                            artifact::kAugmentationSheet};
+constexpr const char* kResultFilmsAndSplats[] = {
+    artifact::kMovie, artifact::kFilm, artifact::kPly, artifact::kSog, artifact::kSpz};
 constexpr const char* kResultRecords[] = {artifact::kKeyView,
                                           artifact::kKeyColorFacts,
                                           artifact::kMetrics,
@@ -138,7 +140,7 @@ const Kind* KindOf(std::string_view name) {
 
 bool IsHeic(std::string_view name) {
   const std::string ending = EndingOf(name);
-  return ending == "heic" || ending == "heif";
+  return ending == "heic" || ending == "heif" || ending == "hif";
 }
 
 // Formats that photographs are often kept in beside a copy in another one.
@@ -212,7 +214,7 @@ class Lister {
         pictures.push_back(name);
       }
     }
-    AddWithoutCopies(below, pictures);
+    AddWithoutCopies(below, std::move(pictures));
   }
 
   void LookAtFolder(const fs::directory_entry& entry,
@@ -250,7 +252,7 @@ class Lister {
       PassOver("links that lead nowhere|put the pictures themselves there", path);
     } else if (!entry.is_regular_file(none)) {
       return false;
-    } else if (Holds(kResultPictures, name)) {
+    } else if (IsResultFile(entry.path())) {
       PassOver("results of color3d|name another folder with -o to keep them apart", path);
     } else if (!readable) {
       PassOver(std::string(kind->name) + "|" + kind->remedy, path);
@@ -274,15 +276,16 @@ class Lister {
     }
   }
 
-  // Of "a.heic" beside "a.jpg" the latter.
-  void AddWithoutCopies(const std::string& below, const std::vector<std::string>& pictures) {
+  // Of "a.heic" beside "a.jpg" the latter, of "a.heic" beside "a.webp" one.
+  void AddWithoutCopies(const std::string& below, std::vector<std::string> pictures) {
+    std::sort(pictures.begin(), pictures.end());
     std::set<std::string> stems;
     for (const std::string& name : pictures) {
       if (!IsCopyFormat(name)) stems.insert(Lowered(fs::path(name).stem().string()));
     }
     for (const std::string& name : pictures) {
-      if (IsCopyFormat(name) && stems.contains(Lowered(fs::path(name).stem().string()))) {
-        PassOver("pictures beside a JPEG, PNG or TIFF of the same name", below + name);
+      if (IsCopyFormat(name) && !stems.insert(Lowered(fs::path(name).stem().string())).second) {
+        PassOver("pictures beside another of the same name", below + name);
       } else {
         found_.push_back(below + name);
       }
@@ -360,6 +363,7 @@ void AddUnusedNeighbors(const fs::path& root,
     const std::string name = entry.path().filename().string();
     if (IsSystemFile(name)) continue;
     if (HasFilmExtension(name) && entry.is_regular_file(none)) {
+      if (IsResultFile(entry.path())) continue;
       // Beside a photo of its name it is what a phone keeps with it.
       if (stems.contains(Lowered(fs::path(name).stem().string()))) continue;
       passed_over->Add("films|give the film itself to colour it", name);
@@ -379,6 +383,12 @@ std::vector<std::string> ListPictures(const fs::path& folder,
                                       bool with_subfolders,
                                       PassedOver* passed_over) {
   return Lister(folder, with_subfolders, passed_over).List();
+}
+
+bool IsResultFile(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return Holds(kResultPictures, name) ||
+         (Holds(kResultFilmsAndSplats, name) && HasResultRecord(file.parent_path()));
 }
 
 bool IsSystemFolder(std::string_view name) {

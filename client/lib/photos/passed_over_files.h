@@ -48,6 +48,10 @@ void AddUnusedNeighbors(const std::filesystem::path& root,
                         const std::vector<std::string>& used,
                         PassedOver* passed_over);
 
+// True for what we leave in a folder that is given with -o: key_view.png and the like, and films and
+// splats beside a record of ours.
+bool IsResultFile(const std::filesystem::path& file);
+
 // Folders that programs keep for themselves: thumbnails, previews, waste baskets (@eaDir,
 // .thumbnails, __MACOSX, ...), any case.
 bool IsSystemFolder(std::string_view name);

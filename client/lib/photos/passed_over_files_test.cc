@@ -117,7 +117,7 @@ TEST_F(PassedOverFilesTest, HeicWebpAndBmpAreTakenUnlessACopyIsThere) {
   if (reads_heic) Write("a.heic", heic);
   EXPECT_EQ(Photos().size(), reads_heic ? 5u : 4u);
   EXPECT_THAT(Notes(),
-              ElementsAre(HasSubstr("pictures beside a JPEG, PNG or TIFF of the same name "
+              ElementsAre(HasSubstr("pictures beside another of the same name "
                                     "passed over: " +
                                     std::string(reads_heic ? "3" : "2"))));
 }
@@ -181,6 +181,26 @@ TEST_F(PassedOverFilesTest, ResultsAreNoPhotos) {
     Write(name);
   }
   EXPECT_THAT(Photos(), ElementsAre("images/a.jpg", "images/b.jpg", "images/left/frames/c.jpg"));
+}
+
+TEST_F(PassedOverFilesTest, FilmsAndSplatsThatWeMadeAreNoInput) {
+  for (const char* name : {"walk.mov",
+                           "film.mp4",
+                           "scene.mp4",
+                           "scene.ply",
+                           "scene.sog",
+                           "metrics.json",
+                           "report.html"}) {
+    Write(name);
+  }
+  const PhotoFolder folder = CollectPhotos(root());
+  EXPECT_FALSE(folder.splat.has_value());
+  EXPECT_TRUE(folder.camera_films.empty());
+  ASSERT_TRUE(folder.film.has_value());
+  EXPECT_EQ(folder.film->path, "walk.mov");
+  // Without a record of ours they are the user's.
+  fs::remove(root() / "metrics.json"), fs::remove(root() / "report.html");
+  EXPECT_EQ(CollectPhotos(root()).camera_films.size(), 3u);
 }
 
 TEST_F(PassedOverFilesTest, WhatLiesBesideThePhotosIsTold) {

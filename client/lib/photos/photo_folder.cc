@@ -118,6 +118,7 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
     for (const auto& entry : fs::directory_iterator(root / folder, none)) {
       const std::string name = entry.path().filename().string();
       if (name.starts_with('.') || !HasFilmExtension(name) || !IsFile(entry.path())) continue;
+      if (IsResultFile(entry.path())) continue;
       films.push_back({folder.empty() ? name : folder + "/" + name, entry.path()});
     }
   }
@@ -230,7 +231,8 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(root, none)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.') && is_one(name) && IsFile(entry.path())) found.push_back(name);
+    if (name.starts_with('.') || !is_one(name) || !IsFile(entry.path())) continue;
+    if (!IsResultFile(entry.path())) found.push_back(name);
   }
   if (found.empty()) return std::nullopt;
   if (found.size() > 1) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "core/base/error.h"
@@ -39,7 +40,9 @@ Curve SrgbCurve() {
 
 Profile SrgbGray() { return Profile(cmsCreateGrayProfile(cmsD50_xyY(), SrgbCurve().get())); }
 
-bool IsGray(const Profile& profile) { return cmsGetColorSpace(profile.get()) == cmsSigGrayData; }
+bool IsGray(const ColorTag& tag) {
+  return !tag.profile.empty() && std::string_view(tag.profile).substr(16, 4) == "GRAY";
+}
 
 // Of what a file says by numbers.
 Profile ProfileOfNumbers(const ColorTag& tag) {
@@ -70,11 +73,11 @@ Profile OpenProfile(const ColorTag& tag, std::string* problem) {
     *problem = "its colour profile is damaged";
     return nullptr;
   }
-  const cmsProfileClassSignature kind = cmsGetDeviceClass(profile.get());
-  const bool is_device = kind == cmsSigInputClass || kind == cmsSigDisplayClass ||
-                         kind == cmsSigOutputClass || kind == cmsSigColorSpaceClass;
-  const cmsColorSpaceSignature space = cmsGetColorSpace(profile.get());
-  if (!is_device || (space != cmsSigRgbData && space != cmsSigGrayData)) {
+  // Asked of the bytes: what Little CMS answers is an enum, which a damaged profile is not in.
+  const std::string_view bytes = tag.profile;
+  const std::string_view kind = bytes.substr(12, 4), space = bytes.substr(16, 4);
+  const bool is_device = kind == "scnr" || kind == "mntr" || kind == "prtr" || kind == "spac";
+  if (!is_device || (space != "RGB " && space != "GRAY")) {
     *problem = "its colour profile is not one of RGB or grey";
     return nullptr;
   }
@@ -84,8 +87,7 @@ Profile OpenProfile(const ColorTag& tag, std::string* problem) {
 float Clamped(float v) { return v > 0.0f ? std::min(v, 1.0f) : 0.0f; }  // NaN: 0
 
 // What the grey i / (count - 1) becomes, for all i; empty when the profile cannot be followed.
-std::vector<float> ToneTable(const Profile& profile, size_t count) {
-  const bool gray = IsGray(profile);
+std::vector<float> ToneTable(const Profile& profile, bool gray, size_t count) {
   const Profile target(gray ? SrgbGray() : Profile(cmsCreate_sRGBProfile()));
   const cmsUInt32Number format = gray ? TYPE_GRAY_FLT : TYPE_RGB_FLT;
   const Transform transform(
@@ -268,8 +270,8 @@ bool ConvertColors(const Profile& profile, int bits, Image* image) {
 }
 
 // False when the profile cannot be followed.
-bool ConvertTones(const Profile& profile, int bits, int channels, Image* image) {
-  const std::vector<float> table = ToneTable(profile, bits > 8 ? 65536 : 256);
+bool ConvertTones(const Profile& profile, bool gray, int bits, int channels, Image* image) {
+  const std::vector<float> table = ToneTable(profile, gray, bits > 8 ? 65536 : 256);
   if (table.empty()) return false;
   if (IsIdentity(table)) return true;
   const float top = static_cast<float>(table.size() - 1);
@@ -298,7 +300,8 @@ std::string Saved(const Profile& profile) {
 std::string ColorTagProblem(const ColorTag& tag) {
   std::string problem;
   const Profile profile = OpenProfile(tag, &problem);
-  if (profile && ToneTable(profile, 2).empty()) problem = "its colour profile is damaged";
+  if (profile && ToneTable(profile, IsGray(tag), 2).empty())
+    problem = "its colour profile is damaged";
   return problem;
 }
 
@@ -307,8 +310,8 @@ std::string ConvertToSrgb(const ColorTag& tag, int bits, Image* image) {
   const Profile profile = OpenProfile(tag, &problem);
   if (!profile || image->Empty()) return problem;
   const int channels = image->channels >= 3 ? 3 : 1;
-  const bool followed = IsGray(profile) || channels == 1
-                            ? ConvertTones(profile, bits, channels, image)
+  const bool followed = IsGray(tag) || channels == 1
+                            ? ConvertTones(profile, IsGray(tag), bits, channels, image)
                             : ConvertColors(profile, bits, image);
   return followed ? "" : "its colour profile is damaged";
 }

@@ -58,7 +58,8 @@ constexpr Ending kEndings[] = {{"jpg", ImageFormat::kJpeg},
                                {"webp", ImageFormat::kWebp},
                                {"bmp", ImageFormat::kBmp},
                                {"heic", ImageFormat::kHeif},
-                               {"heif", ImageFormat::kHeif}};
+                               {"heif", ImageFormat::kHeif},
+                               {"hif", ImageFormat::kHeif}};
 
 bool IsReadable(ImageFormat format) { return format != ImageFormat::kHeif || ReadsHeif(); }
 
