@@ -63,7 +63,8 @@ void RequireOtherFolder(const std::vector<LivePicture>& pictures, const fs::path
 }  // namespace
 
 std::vector<LivePicture> CollectPictures(const Context& context,
-                                         const std::vector<std::string>& arguments) {
+                                         const std::vector<std::string>& arguments,
+                                         const fs::path& out) {
   std::vector<LivePicture> pictures;
   for (const std::string& argument : arguments) {
     std::error_code none;
@@ -75,6 +76,7 @@ std::vector<LivePicture> CollectPictures(const Context& context,
       throw Error(ErrorCode::kNotFound, "there is no photo or folder {}", argument);
     }
   }
+  RequireOtherFolder(pictures, out);
   return pictures;
 }
 
@@ -94,7 +96,6 @@ LiveSummary ColorizeToFiles(Connection& connection,
                             const fs::path& out) {
   const auto start = std::chrono::steady_clock::now();
   const std::vector<std::string> names = NamesFor(pictures);
-  RequireOtherFolder(pictures, out);
   std::vector<std::string> written(pictures.size());
   std::vector<std::string> errors(pictures.size());
   LiveSummary summary;

@@ -111,7 +111,7 @@ TEST_F(PhotoFormatsTest, ResultsInTheFolderOfThePhotosAreNoPhotos) {
   ExpectRefusal(Client({"preview",
                         images,
                         "--key-color",
-                        (Path("room") / "truth" / "view000.png").string(),
+                        (Path("room") / "images" / "view000.png").string(),
                         "-o",
                         images}),
                 2,

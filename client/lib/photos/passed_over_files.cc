@@ -335,8 +335,10 @@ std::vector<std::string> PassedOver::Notes() const {
 }
 
 std::string PassedOver::Clause() const {
+  constexpr size_t kShownKinds = 3;
+  const std::vector<std::string> notes = Notes();
   std::string clause;
-  for (const std::string& note : Notes()) clause += "; " + note;
+  for (size_t i = 0; i < std::min(notes.size(), kShownKinds); ++i) clause += "; " + notes[i];
   return clause;
 }
 

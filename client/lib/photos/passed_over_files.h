@@ -19,7 +19,7 @@ class PassedOver {
   // One line for each kind, the most first: "HEIC pictures passed over: 10 (a.heic, b.heic, ...);
   // convert them to JPEG".
   std::vector<std::string> Notes() const;
-  // All of them in one line, to put behind an error; empty when nothing was passed over.
+  // The first three in one line, to put behind an error; empty when nothing was passed over.
   std::string Clause() const;
 
  private:
@@ -48,8 +48,8 @@ void AddUnusedNeighbors(const std::filesystem::path& root,
                         const std::vector<std::string>& used,
                         PassedOver* passed_over);
 
-// True for what we leave in a folder that is given with -o: key_view.png and the like, and films and
-// splats beside a record of ours.
+// True for what we leave in a folder that is given with -o: key_view.png and the like, and films
+// and splats beside a record of ours.
 bool IsResultFile(const std::filesystem::path& file);
 
 // Folders that programs keep for themselves: thumbnails, previews, waste baskets (@eaDir,
