@@ -13,7 +13,7 @@ packages=(
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
   prometheus-cpp-dev libcurl4-openssl-dev
-  libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev libzstd-dev libseccomp-dev
+  libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev liblcms2-dev libzstd-dev libseccomp-dev
   libavcodec-dev libavformat-dev libavutil-dev libswscale-dev # film
 )
 case "${1:-}" in
@@ -30,9 +30,11 @@ if ! command -v apt-get >/dev/null 2>&1; then
   exit 1
 fi
 
-# Wished for only: without npm the build leaves out the page to look at scenes in a browser.
+# Wished for only: without npm the build leaves out the page to look at scenes in a browser, without
+# libheif HEIC photos are refused.
 wished=()
 command -v npm >/dev/null 2>&1 || wished=(npm)
+[ "$(dpkg-query -W -f '${db:Status-Status}' libheif-dev 2>/dev/null || true)" = installed ] || wished+=(libheif-dev)
 
 missing=()
 for package in "${packages[@]}"; do
@@ -62,7 +64,7 @@ install() {
 if [ "${#missing[@]}" -gt 0 ]; then
   install "${missing[@]}"
 fi
-if [ "${#wished[@]}" -gt 0 ]; then
-  install "${wished[@]}" ||
-    echo "install-deps: without ${wished[*]}, which only the page to look at scenes needs" >&2
-fi
+for package in ${wished[@]+"${wished[@]}"}; do
+  install "$package" ||
+    echo "install-deps: without $package (npm: the page to look at scenes; libheif-dev: HEIC photos)" >&2
+done

@@ -75,7 +75,7 @@ ExitCode Show(const Context& context, const ColorizerOptions& options) {
 }
 
 ExitCode Apply(const Context& context, const ColorizerOptions& options) {
-  const std::vector<LivePicture> pictures = CollectPictures(options.photos);
+  const std::vector<LivePicture> pictures = CollectPictures(context, options.photos, options.out);
   PrepareOut(options.out);
   Connection connection(context.server, *context.interrupt);
   LiveSource source;

@@ -25,6 +25,7 @@ ExitCode RunInspect(const Context& context, const std::string& photos) {
         "{} is a film; inspect looks at pictures: give some of its frames as pictures in a folder",
         film.file.string());
   }
+  for (const std::string& note : folder.notes) PrintNote(context, note);
   const ColorCount count = CountColorPhotos(folder, kMaxPhotos, *context.interrupt);
   const std::string kind = count.MostlyColor() ? "colour" : "monochrome";
   if (context.json) {

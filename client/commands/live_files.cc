@@ -10,9 +10,9 @@
 #include "client/lib/blob_transfer.h"
 #include "client/lib/names.h"
 #include "client/lib/out_folder.h"
+#include "client/lib/photos/passed_over_files.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
-#include "core/image/probe/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -20,20 +20,18 @@ namespace {
 
 constexpr size_t kShownErrors = 2;
 
-void AddFolder(const fs::path& folder, std::vector<LivePicture>* pictures) {
+void AddFolder(const Context& context, const fs::path& folder, std::vector<LivePicture>* pictures) {
   std::error_code none;
   const bool nested = fs::is_directory(folder / "images", none);
   const fs::path root = nested ? folder / "images" : folder;
-  std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(root)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.') && HasImageExtension(name)) found.push_back(entry.path());
+  PassedOver passed_over;
+  const std::vector<std::string> found =
+      ListPictures(root, /*with_subfolders=*/false, &passed_over);
+  if (found.empty()) {
+    throw InvalidArgument("there are no photos in {}{}", root.string(), passed_over.Clause());
   }
-  std::sort(found.begin(), found.end());
-  if (found.empty()) throw InvalidArgument("there are no photos in {}", root.string());
-  for (const fs::path& file : found) {
-    pictures->push_back({file.filename().string(), file, std::nullopt});
-  }
+  for (const std::string& note : passed_over.Notes()) PrintNote(context, note);
+  for (const std::string& file : found) pictures->push_back({file, root / file, std::nullopt});
 }
 
 // Distinct names for the answers.
@@ -51,20 +49,35 @@ std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
   return names;
 }
 
+// The answers have the photos' names: beside them they would be taken for photos, or replace them.
+void RequireOtherFolder(const std::vector<LivePicture>& pictures, const fs::path& out) {
+  for (const LivePicture& picture : pictures) {
+    std::error_code none;
+    if (picture.file.empty() ||
+        !fs::equivalent(fs::absolute(picture.file).parent_path(), out, none))
+      continue;
+    throw InvalidArgument("-o {} is the folder of the photos; name another for the coloured ones",
+                          out.string());
+  }
+}
+
 }  // namespace
 
-std::vector<LivePicture> CollectPictures(const std::vector<std::string>& arguments) {
+std::vector<LivePicture> CollectPictures(const Context& context,
+                                         const std::vector<std::string>& arguments,
+                                         const fs::path& out) {
   std::vector<LivePicture> pictures;
   for (const std::string& argument : arguments) {
     std::error_code none;
     if (fs::is_directory(argument, none)) {
-      AddFolder(argument, &pictures);
+      AddFolder(context, argument, &pictures);
     } else if (fs::is_regular_file(argument, none)) {
       pictures.push_back({fs::path(argument).filename().string(), argument, std::nullopt});
     } else {
       throw Error(ErrorCode::kNotFound, "there is no photo or folder {}", argument);
     }
   }
+  RequireOtherFolder(pictures, out);
   return pictures;
 }
 

@@ -12,8 +12,11 @@
 namespace color3d::client {
 
 // Files as they are given, and the photos of folders (in images/ when there is one), by name.
-// Throws Error{kNotFound} or kInvalidArgument naming what is no photo.
-std::vector<LivePicture> CollectPictures(const std::vector<std::string>& arguments);
+// Prints notes on what is passed over. Throws Error{kNotFound} or kInvalidArgument naming what is
+// no photo, or when one of them lies in `out`, where the answers would replace it.
+std::vector<LivePicture> CollectPictures(const Context& context,
+                                         const std::vector<std::string>& arguments,
+                                         const std::filesystem::path& out);
 
 struct LiveSummary {
   std::vector<std::string> files;   // written, relative to OUT

@@ -83,7 +83,7 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
     throw InvalidArgument("--key-color is missing: the coloured key view to take colours from");
   }
   std::vector<LivePicture> pictures;
-  if (!stored) pictures = CollectPictures({options.target});
+  if (!stored) pictures = CollectPictures(context, {options.target}, options.out);
   PrepareOut(options.out);
   Connection connection(context.server, *context.interrupt);
   WarmUpInference(connection);

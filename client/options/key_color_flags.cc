@@ -176,13 +176,13 @@ void KeyColorFlags::Check() const {
 
 void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
   const char* group = "Colour of the key view (one source)";
-  const auto text = [&](const char* name, std::string* value, const char* help) {
+  const auto text = [&](const char* name, std::string* value, const std::string& help) {
     return app.add_option(name, *value, help)->group(group);
   };
   app.add_flag("--auto", flags->automatic, "Automatic colours: nothing else to do")->group(group);
   text("--key-color,--image",
        &flags->image,
-       "The key view, coloured (JPEG, PNG or TIFF); what is transparent is inferred");
+       "The key view, coloured (" + ReadableImageFormats() + "); what is transparent is inferred");
   text("--hints,--strokes,--points",
        &flags->hints,
        "Colour strokes (PNG of the key view's size, transparent elsewhere), or points, lines and "

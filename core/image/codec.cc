@@ -12,8 +12,12 @@
 #include "core/base/range_check.h"
 #include "core/image/area_reducer.h"
 #include "core/image/decode.h"
+#include "core/image/decode/decoders.h"
+#include "core/image/decode/srgb_conversion.h"
 #include "core/image/decode_budget.h"
+#include "core/image/probe/color_tag.h"
 #include "core/image/probe/orientation.h"
+#include "core/image/probe/tiff_pages.h"
 
 namespace color3d {
 namespace {
@@ -115,26 +119,47 @@ Image SelectChannels(Image image, const ImageInfo& info, bool keep_alpha) {
   return out;
 }
 
+// By OpenCV, which chooses a decoder by how the bytes begin: only for formats whose beginning no
+// other decoder of OpenCV's (GDAL's are among them) takes.
+cv::Mat DecodeByOpenCv(std::string_view bytes, const std::string& file_name, int flags) {
+  try {
+    const cv::Mat input(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
+    return cv::imdecode(input, flags);
+  } catch (const cv::Exception& e) {
+    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
+    throw InvalidArgument("{} cannot be decoded ({}); save it again", file_name, e.err);
+  }
+}
+
 // `reduction`: 1, or 2, 4, 8 for JPEG files, whose sides are divided by it (rounded up).
 cv::Mat DecodeStored(std::string_view bytes,
                      const std::string& file_name,
                      const ImageInfo& info,
                      int reduction) {
-  const int flags = reduction == 2   ? cv::IMREAD_REDUCED_COLOR_2
-                    : reduction == 4 ? cv::IMREAD_REDUCED_COLOR_4
-                    : reduction == 8 ? cv::IMREAD_REDUCED_COLOR_8
+  constexpr int kReduced = cv::IMREAD_IGNORE_ORIENTATION;
+  const int flags = reduction == 2   ? kReduced | cv::IMREAD_REDUCED_COLOR_2
+                    : reduction == 4 ? kReduced | cv::IMREAD_REDUCED_COLOR_4
+                    : reduction == 8 ? kReduced | cv::IMREAD_REDUCED_COLOR_8
                                      : cv::IMREAD_UNCHANGED;
-  const std::string tiff = info.format == ImageFormat::kTiff ? TiffAsStored(bytes) : std::string();
-  const std::string_view source = tiff.empty() ? bytes : std::string_view(tiff);
   cv::Mat mat;
-  try {
-    const cv::Mat input(
-        1, static_cast<int>(source.size()), CV_8U, const_cast<char*>(source.data()));
-    mat = cv::imdecode(
-        input, reduction == 1 ? flags : flags | static_cast<int>(cv::IMREAD_IGNORE_ORIENTATION));
-  } catch (const cv::Exception& e) {
-    if (e.code == cv::Error::StsNoMem) throw std::bad_alloc();
-    throw InvalidArgument("{} cannot be decoded ({}); save it again", file_name, e.err);
+  switch (info.format) {
+    case ImageFormat::kJpeg:
+    case ImageFormat::kPng:
+      mat = DecodeByOpenCv(bytes, file_name, flags);
+      break;
+    case ImageFormat::kBmp:
+      // OpenCV 4.6 takes the colours of some BMPs for greys, unless it is told.
+      mat = DecodeByOpenCv(bytes, file_name, info.channels == 3 ? cv::IMREAD_COLOR : flags);
+      break;
+    case ImageFormat::kTiff:
+      mat = DecodeByOpenCv(TiffPageAsStored(bytes, info.tiff_directory), file_name, flags);
+      break;
+    case ImageFormat::kWebp:
+      mat = DecodeWebp(bytes, info);
+      break;
+    case ImageFormat::kHeif:
+      mat = DecodeHeif(bytes, file_name, info);
+      break;
   }
   if (mat.empty()) {
     throw InvalidArgument(
@@ -219,8 +244,10 @@ Image Decode(std::string_view bytes,
   const PictureTurn turn(
       {file_name, info.width, info.height, BytesOfDecoding(decoded, Turned(wanted, swap), copies)});
   Image image;
+  int bits = 8;
   {
     const cv::Mat mat = DecodeStored(bytes, file_name, info, request.jpeg_reduction);
+    bits = mat.depth() == CV_8U ? 8 : 16;
     const PictureSize size = FloatSize(mat, info, Turned(wanted, swap));
     if (mat.depth() == CV_8U) {
       image = FloatsFromMat<uint8_t>(mat, 1.0f / 255.0f, size);
@@ -235,6 +262,8 @@ Image Decode(std::string_view bytes,
     }
   }
   image = SelectChannels(std::move(image), info, request.keep_alpha);
+  // A tag that cannot be followed is told by PictureNotes.
+  if (!request.keep_stored_values) ConvertToSrgb(ReadColorTag(bytes), bits, &image);
   image = Oriented(std::move(image), orientation);
   if (image.width == wanted.width && image.height == wanted.height) return image;
   return Resize(image, wanted.width, wanted.height);
@@ -246,6 +275,21 @@ Image DecodeImage(std::string_view bytes, const std::string& file_name, bool kee
 
 Image ReadImage(const std::filesystem::path& path, bool keep_alpha) {
   return DecodeImage(ReadFile(path), path.filename().string(), keep_alpha);
+}
+
+Image ReadStoredValues(const std::filesystem::path& path) {
+  const std::string bytes = ReadFile(path);
+  const std::string name = path.filename().string();
+  return Decode(bytes, name, ProbeImage(bytes, name), {.keep_stored_values = true});
+}
+
+std::vector<std::string> PictureNotes(std::string_view bytes) {
+  std::vector<std::string> notes;
+  const std::string pages = DescribeTiffPages(ListTiffPages(bytes));
+  if (!pages.empty()) notes.push_back(pages);
+  const std::string problem = ColorTagProblem(ReadColorTag(bytes));
+  if (!problem.empty()) notes.push_back("is read as sRGB: " + problem);
+  return notes;
 }
 
 bool IsGray(const Image& srgb, float tolerance) {
@@ -261,21 +305,45 @@ bool IsGray(const Image& srgb, float tolerance) {
   return static_cast<double>(colored) <= 0.005 * static_cast<double>(n);
 }
 
+namespace {
+
+// Behind the header, which is a PNG's first chunk and 33 bytes long with the signature.
+std::string WithSrgbChunk(const std::string& png) {
+  constexpr size_t kHeaderEnd = 33;
+  // Length 1, type, relative to white as photographs are, checksum.
+  const std::string chunk("\0\0\0\x01sRGB\0\xAE\xCE\x1C\xE9", 13);
+  return std::string(png).insert(kHeaderEnd, chunk);
+}
+
+// Behind the JFIF segment, which has to be the first.
+std::string WithProfile(const std::string& jpeg, const std::string& profile) {
+  const size_t first =
+      4 + static_cast<unsigned char>(jpeg[4]) * 256u + static_cast<unsigned char>(jpeg[5]);
+  const std::string body = std::string("ICC_PROFILE\0\x01\x01", 14) + profile;
+  std::string segment("\xFF\xE2", 2);
+  segment += static_cast<char>((body.size() + 2) / 256);
+  segment += static_cast<char>((body.size() + 2) % 256);
+  return std::string(jpeg).insert(first, segment + body);
+}
+
+}  // namespace
+
 std::string EncodePng8(const Image& image) {
   CheckEncodable(image, true);
-  return Encode(MatFromPlanar<uint8_t>(image, CV_8U, 255.0f), ".png", {});
+  return WithSrgbChunk(Encode(MatFromPlanar<uint8_t>(image, CV_8U, 255.0f), ".png", {}));
 }
 
 std::string EncodePng16(const Image& image) {
   CheckEncodable(image, true);
-  return Encode(MatFromPlanar<uint16_t>(image, CV_16U, 65535.0f), ".png", {});
+  return WithSrgbChunk(Encode(MatFromPlanar<uint16_t>(image, CV_16U, 65535.0f), ".png", {}));
 }
 
 std::string EncodeJpeg(const Image& image, int quality) {
   CheckEncodable(image, false);
   RangeCheck("JPEG")("quality", quality, 1, 100);
-  return Encode(
-      MatFromPlanar<uint8_t>(image, CV_8U, 255.0f), ".jpg", {cv::IMWRITE_JPEG_QUALITY, quality});
+  const cv::Mat mat = MatFromPlanar<uint8_t>(image, CV_8U, 255.0f);
+  return WithProfile(Encode(mat, ".jpg", {cv::IMWRITE_JPEG_QUALITY, quality}),
+                     image.channels == 1 ? SrgbGrayProfile() : SrgbProfile());
 }
 
 }  // namespace color3d

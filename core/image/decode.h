@@ -13,6 +13,7 @@ namespace color3d {
 
 struct DecodeRequest {
   bool keep_alpha = false;
+  bool keep_stored_values = false;  // no conversion to sRGB
   // 1, or 2, 4, 8 for JPEG files, whose sides are divided by it (rounded up).
   int jpeg_reduction = 1;
   // Told the picture's size as it is looked at, says the size that is wanted (Resize's result);

@@ -92,7 +92,10 @@ int64_t DecodingBytes(const ImageInfo& info, bool copies) {
   const int64_t samples = int64_t{info.width} * info.height * CodecChannels(info);
   const int64_t stored = samples * (info.bits_per_channel > 8 ? 2 : 1);
   // JPEG files that come in several scans are held as coefficients of two bytes.
-  const int64_t coefficients = info.format == ImageFormat::kJpeg ? 2 * samples : 0;
+  // WebP and HEIC are held as planes of luma and chroma, too.
+  const bool is_held_twice = info.format == ImageFormat::kJpeg ||
+                             info.format == ImageFormat::kWebp || info.format == ImageFormat::kHeif;
+  const int64_t coefficients = is_held_twice ? 2 * samples : 0;
   const int64_t floats = FloatBytes(info, info.width, info.height);
   return std::max(stored + std::max(coefficients, floats), copies ? 2 * floats : 0);
 }

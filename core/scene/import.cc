@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/catalogue/scene_files.h"
+#include "core/image/probe/probe.h"
 #include "core/scene/formats/colmap_model.h"
 #include "core/scene/formats/nerfies.h"
 #include "core/scene/formats/scene_readers.h"
@@ -19,6 +20,7 @@
 #include "core/scene/masks/photo_masks.h"
 #include "core/scene/normalise.h"
 #include "core/scene/photos.h"
+#include "core/scene/picture_notes.h"
 #include "core/scene/sfm/sfm.h"
 #include "core/scene/sparse_cloud.h"
 
@@ -136,7 +138,8 @@ void ImportPhotos(const fs::path& scene_folder,
   std::vector<Photo> photos = ListPhotos(scene_folder);
   result->photos_found = static_cast<int>(photos.size());
   if (photos.empty()) {
-    throw InvalidArgument("{} contains no photographs (JPEG, PNG, TIFF)", scene_folder.string());
+    throw InvalidArgument(
+        "{} contains no photographs ({})", scene_folder.string(), ReadableImageFormats());
   }
   for (size_t i = 0; i < photos.size(); ++i) {
     run.cancel.ThrowIfCancelled();
@@ -294,6 +297,9 @@ ImportResult ImportScene(const fs::path& scene_folder,
   }
   if (result.layout != SceneLayout::kColmap) WarnOfUnreadTimes(scene_folder, &result);
   FinishPosedScene(options, &result);
+  for (std::string& note : NotesOnPictures(scene_folder, result.scene.views, run.cancel)) {
+    result.warnings.push_back(std::move(note));
+  }
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/image/probe/probe.h"
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/scene_writers.h"
 #include "tests/support/scenes/test_exif.h"
@@ -37,13 +38,13 @@ class Import : public testing::Test {
 };
 
 TEST_F(Import, BadInputsSayWhatIsWrong) {
-  EXPECT_THAT(Said(), HasSubstr("contains no photographs (JPEG, PNG, TIFF)"));
+  EXPECT_THAT(Said(), HasSubstr("contains no photographs (" + ReadableImageFormats() + ")"));
   WriteFileAtomic(folder_.path() / "readme.txt", "hello");
   EXPECT_THAT(Said(), HasSubstr("contains no photographs"));
   WritePhoto("one.png");
   EXPECT_THAT(Said(), HasSubstr("at least 3 photos from different places are needed"));
   WriteFileAtomic(folder_.path() / "notes.jpg", "Buy milk.");
-  EXPECT_EQ(Said(), "notes.jpg is not an image (JPEG, PNG or TIFF)");
+  EXPECT_EQ(Said(), "notes.jpg is not an image (" + ReadableImageFormats() + ")");
   const std::string png = EncodePng8(GradientPhoto(48, 32, 1));
   WriteFileAtomic(folder_.path() / "notes.jpg", png.substr(0, png.size() / 2));
   EXPECT_THAT(Said(), HasSubstr("notes.jpg is truncated"));

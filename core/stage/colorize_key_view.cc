@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/key_photo.h"
@@ -12,6 +13,12 @@ namespace color3d {
 namespace {
 
 constexpr float kLeastConfidence = 1.0f / 255.0f;
+
+std::vector<std::string> NotesOnGivenPicture(const ColorizeKeyViewOptions& options) {
+  using Source = ColorizeKeyViewOptions::Source;
+  if (options.source != Source::kImage && options.source != Source::kEdit) return {};
+  return PictureNotes(ReadFile(options.file));
+}
 
 }  // namespace
 
@@ -29,6 +36,9 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   facts.update(result.facts);
   for (const auto& warning : facts.value("warnings", nlohmann::ordered_json::array())) {
     context.progress().OnWarning(warning.get<std::string>());
+  }
+  for (const std::string& note : NotesOnGivenPicture(options)) {
+    context.progress().OnWarning("the picture given for the key view " + note);
   }
   // Everything after this works on undistorted pictures.
   const ViewImages images(scene, context.scene_folder(), 0, 0);

@@ -191,7 +191,8 @@ void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* ch
   const bool is_augmentation = IsAugmentFile(file.path), is_mask = IsMaskFile(file.path);
   if (is_mask && !is_photo) return refuse("is no picture (PNG); remove it from masks/");
   if (is_augmentation && !is_photo) {
-    return refuse("is no picture (JPEG, PNG or TIFF); remove it from augment/");
+    return refuse(
+        fmt::format("is no picture ({}); remove it from augment/", ReadableImageFormats()));
   }
   const int64_t max_bytes = is_transforms ? kMaxTransformsBytes : kMaxTimesBytes;
   if ((is_transforms || file.path == kTimesFile) && file.digest.size_bytes > max_bytes) {
@@ -361,8 +362,9 @@ SceneCheck CheckScene(const SceneRecord& scene,
     }
   } else if (missing == 0 && check.photo_count == 0 && CountFilms(scene.files) == 0) {
     violations.push_back({"",
-                          "the scene holds no photographs (.jpg, .jpeg, .png, .tif, .tiff), no "
-                          "splat (.ply, .sog, .spz) and no film (.mp4, .mov, .mkv, ...)"});
+                          fmt::format("the scene holds no photographs ({}), no splat (.ply, .sog, "
+                                      ".spz) and no film (.mp4, .mov, .mkv, ...)",
+                                      ReadableImageEndings())});
   } else if (missing == 0 && check.photo_count == 1) {
     violations.push_back(
         {"", "the scene holds one photograph; at least 3 that overlap are needed"});

@@ -6,6 +6,7 @@
 #include "core/image/probe/focal_length.h"
 #include "core/image/probe/orientation.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/support/formats/picture_files.h"
 #include "tests/support/scenes/test_exif.h"
 
 namespace color3d {
@@ -54,12 +55,26 @@ std::vector<std::string> FuzzSeeds() {
     float value = 0.0f;
     for (float& sample : image->data) sample = (value += 0.01f);
   }
-  return {EncodePng8(grey),
-          EncodePng16(color),
-          EncodePng8(transparent),
-          WithExif(EncodeJpeg(color), {{37386, 5, 50, 1}, {41989, 3, 35}}),
-          EncodeJpeg(grey, 30),
-          Tiff()};
+  return {
+      EncodePng8(grey),
+      EncodePng16(color),
+      EncodePng8(transparent),
+      WithExif(EncodeJpeg(color), {{37386, 5, 50, 1}, {41989, 3, 35}}),
+      EncodeJpeg(grey, 30),
+      Tiff(),
+      TiffFile({{.image = grey, .subfile_type = 1}, {.image = color, .photometric = 2}}),
+      TiffFile(
+          {{.image = grey, .profile = GrayGammaProfile(1.8), .sub_directories = {{.image = grey}}}},
+          /*big_endian=*/true),
+      WebpFile(color),
+      WebpFile(color, AdobeRgbProfile()),
+      BmpFile(color),
+      BmpFile(color, AdobeRgbProfile()),
+      HeicFile(Image(16, 16, 3, 0.5f), DisplayP3Profile()),
+      WithPngProfile(EncodePng8(color), ProPhotoProfile()),
+      WithPngProfile(EncodePng16(grey), DotGainProfile(20.0)),
+      WithPngChunk(EncodePng8(grey), "gAMA", std::string("\0\1\x86\xA0", 4)),
+      WithJpegProfile(EncodeJpeg(color), AdobeRgbProfile(), 200)};
 }
 
 }  // namespace color3d
@@ -71,6 +86,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const ImageInfo info = ProbeUnlessHuge(bytes);
     if (info.width == 0) return;
     if (info.height < 1 || info.channels < 1) std::abort();
+    for (const std::string& note : PictureNotes(bytes)) {
+      if (note.empty() || note.find('\n') != std::string::npos) std::abort();
+    }
     if (int64_t{info.width} * info.height > kDecodedPixels) return;
     const Image image = DecodeImage(bytes, "picture", /*keep_alpha=*/true);
     const PictureSize shown = OrientedSize(info, ReadOrientation(bytes));

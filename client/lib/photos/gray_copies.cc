@@ -54,11 +54,12 @@ ColorCount CountColorPhotos(const PhotoFolder& folder,
 
 namespace {
 
-// The transparency of a PNG photo as a mask of the scene.
+// The transparency of a PNG or WebP photo as a mask of the scene.
 std::optional<LocalFile> SaveAlpha(const std::string& bytes,
                                    const LocalFile& photo,
                                    const fs::path& scratch) {
-  if (ProbeImage(bytes, photo.path).format != ImageFormat::kPng) return std::nullopt;
+  const ImageFormat format = ProbeImage(bytes, photo.path).format;
+  if (format != ImageFormat::kPng && format != ImageFormat::kWebp) return std::nullopt;
   const Image image = DecodeImage(bytes, photo.path, /*keep_alpha=*/true);
   if (image.channels != 2 && image.channels != 4) return std::nullopt;
   Image mask(image.width, image.height, 1);

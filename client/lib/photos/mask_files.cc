@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "client/lib/photos/passed_over_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/image/probe/orientation.h"
@@ -48,6 +49,7 @@ void AddMasks(const fs::path& masks, PhotoFolder* folder) {
   }
   std::map<const LocalFile*, std::string> mask_of;
   for (const std::string& file : ListFiles(masks)) {
+    if (IsSystemPath(file)) continue;
     const auto photo = photo_of.find(file);
     if (photo == photo_of.end()) {
       throw InvalidArgument(

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "client/lib/names.h"
+#include "client/lib/photos/passed_over_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/name_order.h"
@@ -18,6 +19,7 @@ namespace {
 
 constexpr size_t kMaxFiles = 10'000;
 constexpr size_t kMaxPathBytes = 1024;
+constexpr char kImages[] = "images";
 constexpr char kAugment[] = "augment";
 constexpr char kTransforms[] = "transforms.json";
 constexpr char kPosesBounds[] = "poses_bounds.npy";
@@ -49,27 +51,14 @@ void RequireFolder(const fs::path& root) {
       root.string());
 }
 
-// Adds `root`/`folder`'s photos, without going into its subfolders.
-void AddDirectPhotos(const fs::path& root, const std::string& folder, PhotoFolder* result) {
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(root / folder, error)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with('.') || !HasImageExtension(name) || !IsFile(entry.path())) continue;
-    result->photos.push_back({folder.empty() ? name : folder + "/" + name, entry.path()});
-  }
-  if (error) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "cannot read the folder {}: {}",
-                (root / folder).string(),
-                error.message());
-  }
-}
-
-void AddPhotosBelow(const fs::path& root, const std::string& folder, PhotoFolder* result) {
-  if (!IsFolder(root / folder)) return;
-  for (const std::string& file : ListFiles(root / folder)) {
-    if (!HasImageExtension(file)) continue;
-    result->photos.push_back({folder + "/" + file, root / folder / file});
+// Adds the photos in `root`/`folder`.
+void AddPhotos(const fs::path& root,
+               const std::string& folder,
+               bool with_subfolders,
+               PhotoFolder* result,
+               PassedOver* passed_over) {
+  for (const std::string& file : ListPictures(root / folder, with_subfolders, passed_over)) {
+    result->photos.push_back({folder.empty() ? file : folder + "/" + file, root / folder / file});
   }
 }
 
@@ -102,9 +91,10 @@ bool IsNerfies(const fs::path& root) {
   return IsFile(root / kNerfiesFiles[0]) && IsFolder(root / "camera") && IsFolder(root / "rgb");
 }
 
-void CollectNerfies(const fs::path& root, PhotoFolder* result) {
+void CollectNerfies(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
   for (const char* folder : kNerfiesPictures) {
-    if (result->photos.empty() && IsFolder(root / folder)) AddDirectPhotos(root, folder, result);
+    if (!result->photos.empty() || !IsFolder(root / folder)) continue;
+    AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
   }
   for (const char* file : kNerfiesFiles) {
     if (IsFile(root / file)) result->model_files.push_back({file, root / file});
@@ -128,6 +118,7 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
     for (const auto& entry : fs::directory_iterator(root / folder, none)) {
       const std::string name = entry.path().filename().string();
       if (name.starts_with('.') || !HasFilmExtension(name) || !IsFile(entry.path())) continue;
+      if (IsResultFile(entry.path())) continue;
       films.push_back({folder.empty() ? name : folder + "/" + name, entry.path()});
     }
   }
@@ -142,29 +133,38 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
 }
 
 // Folders of pictures in `root`, two or more: each camera's frames.
-void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result) {
+void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
   std::error_code none;
   PhotoFolder folders;
   int count = 0;
   for (const auto& entry : fs::directory_iterator(root, none)) {
     const std::string name = entry.path().filename().string();
     if (name.starts_with('.') || name == kAugment || !IsFolder(entry.path())) continue;
+    if (IsSystemFolder(name)) continue;
     const size_t before = folders.photos.size();
-    AddDirectPhotos(root, name, &folders);
+    AddPhotos(root, name, /*with_subfolders=*/false, &folders, passed_over);
     count += folders.photos.size() > before ? 1 : 0;
   }
   if (count > 1) result->photos = std::move(folders.photos);
 }
 
-void CollectImages(const fs::path& root, PhotoFolder* result) {
-  if (IsNerfies(root)) return CollectNerfies(root, result);
-  AddPhotosBelow(root, "images", result);
-  if (!result->photos.empty()) return;
-  AddDirectPhotos(root, "", result);
-  if (!IsFile(root / kTransforms)) return;
-  for (const std::string& folder : NamedFolders(root / kTransforms)) {
-    if (IsFolder(root / folder)) AddDirectPhotos(root, folder, result);
+void CollectImages(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
+  if (IsNerfies(root)) return CollectNerfies(root, result, passed_over);
+  if (IsFolder(root / kImages)) {
+    AddPhotos(root, kImages, /*with_subfolders=*/true, result, passed_over);
   }
+  if (!result->photos.empty()) return;
+  AddPhotos(root, "", /*with_subfolders=*/false, result, passed_over);
+  std::vector<std::string> used;
+  if (IsFile(root / kTransforms)) {
+    for (const std::string& folder : NamedFolders(root / kTransforms)) {
+      used.push_back(folder.substr(0, folder.find('/')));
+      if (IsFolder(root / folder)) {
+        AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
+      }
+    }
+  }
+  if (!result->photos.empty()) AddUnusedNeighbors(root, used, passed_over);
 }
 
 void CollectModel(const fs::path& root, PhotoFolder* result) {
@@ -211,28 +211,16 @@ void CollectAugmentFiles(const fs::path& root, PhotoFolder* result) {
   if (!IsFolder(root / kAugment)) return;
   for (const std::string& file : ListFiles(root / kAugment)) {
     const fs::path path = root / kAugment / file;
+    if (IsSystemPath(file)) continue;
     if (!HasImageExtension(file)) {
       throw InvalidArgument(
-          "{} is no picture (JPEG, PNG or TIFF); augment/ is for pictures in colour that the "
-          "colorizer learns from: move it elsewhere",
-          path.string());
+          "{} is no picture ({}); augment/ is for pictures in colour that the colorizer learns "
+          "from: move it elsewhere",
+          path.string(),
+          ReadableImageFormats());
     }
     result->augment_files.push_back({std::string(kAugment) + "/" + file, path});
   }
-}
-
-// A subfolder with photos, to name it in the error.
-std::string SubfolderWithPhotos(const fs::path& root) {
-  std::error_code none;
-  std::set<std::string> found;
-  for (const auto& entry : fs::directory_iterator(root, none)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with('.') || !IsFolder(entry.path())) continue;
-    for (const auto& file : fs::directory_iterator(entry.path(), none)) {
-      if (HasImageExtension(file.path().filename().string())) found.insert(name);
-    }
-  }
-  return found.empty() ? "" : *found.begin();
 }
 
 // The only splat or film in a folder without photos.
@@ -243,7 +231,8 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(root, none)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.') && is_one(name) && IsFile(entry.path())) found.push_back(name);
+    if (name.starts_with('.') || !is_one(name) || !IsFile(entry.path())) continue;
+    if (!IsResultFile(entry.path())) found.push_back(name);
   }
   if (found.empty()) return std::nullopt;
   if (found.size() > 1) {
@@ -256,32 +245,40 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
   return LocalFile{found[0], root / found[0]};
 }
 
-void CheckCounts(const PhotoFolder& folder, bool as_frames) {
+void CheckCounts(const PhotoFolder& folder, bool as_frames, const PassedOver& passed_over) {
   const std::string root = folder.root.string();
   if (folder.splat || folder.film || !folder.camera_films.empty()) return;
   if (folder.photos.empty()) {
-    const std::string sub = SubfolderWithPhotos(folder.root);
-    throw InvalidArgument(
-        "{} contains no photographs (JPEG, PNG or TIFF){}",
-        root,
-        sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?");
+    const std::string sub = SubfolderWithPictures(folder.root);
+    throw InvalidArgument("{} contains no photographs ({}){}{}",
+                          root,
+                          ReadableImageFormats(),
+                          sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?",
+                          passed_over.Clause());
   }
   if (folder.photos.size() == 1 && as_frames) {
     throw InvalidArgument(
-        "{} contains one picture ({}), and one frame is no film; give the folder of all its frames",
+        "{} contains one picture ({}), and one frame is no film; give the folder of all its "
+        "frames{}",
         root,
-        folder.photos[0].path);
+        folder.photos[0].path,
+        passed_over.Clause());
   }
   if (folder.photos.size() == 1) {
-    throw InvalidArgument("{} contains one photograph ({}); at least 3 that overlap are needed",
+    throw InvalidArgument("{} contains one photograph ({}); at least 3 that overlap are needed{}",
                           root,
-                          folder.photos[0].path);
+                          folder.photos[0].path,
+                          passed_over.Clause());
   }
   const size_t files = folder.AllFiles().size();
   if (files > kMaxFiles) {
     throw InvalidArgument(
         "{} contains {} files; at most {} make up a scene", root, files, kMaxFiles);
   }
+}
+
+void AddNotes(const PassedOver& passed_over, PhotoFolder* folder) {
+  for (std::string& note : passed_over.Notes()) folder->notes.push_back(std::move(note));
 }
 
 void CheckName(const LocalFile& file) {
@@ -331,12 +328,16 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   if (!result.root.has_filename() && result.root.has_relative_path()) {
     result.root = result.root.parent_path();
   }
-  CollectImages(result.root, &result);
-  if (result.photos.empty() && as_frames) CollectFoldersOfFrames(result.root, &result);
+  PassedOver passed_over;
+  CollectImages(result.root, &result, &passed_over);
+  if (result.photos.empty() && as_frames) {
+    CollectFoldersOfFrames(result.root, &result, &passed_over);
+  }
   if (result.photos.empty()) CollectCameraFilms(result.root, &result);
   if (!result.camera_films.empty()) {
     CollectModel(result.root, &result);
     CheckNames(result);
+    AddNotes(passed_over, &result);
     return result;
   }
   if (result.photos.empty()) result.splat = FindOnly(result.root, HasSplatExtension, "splat");
@@ -349,13 +350,14 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   std::sort(result.photos.begin(), result.photos.end(), by_path);
   std::sort(result.model_files.begin(), result.model_files.end(), by_path);
   std::sort(result.augment_files.begin(), result.augment_files.end(), by_path);
-  CheckCounts(result, as_frames);
+  CheckCounts(result, as_frames, passed_over);
   CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
   if (result.model_files.empty() && IsFolder(parent / "sparse")) {
     result.notes.push_back("the poses in " + (parent / "sparse").string() +
                            " are not used; to use them, give " + parent.string());
   }
+  AddNotes(passed_over, &result);
   return result;
 }
 

@@ -47,7 +47,9 @@ TEST_F(PhotoFolderTest, TakesPhotosOfTheFolderAndNothingElse) {
   const PhotoFolder folder = CollectPhotos(root());
   EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.JPG", "c.tiff"));
   EXPECT_THAT(folder.model_files, IsEmpty());
-  EXPECT_THAT(folder.notes, IsEmpty());
+  EXPECT_THAT(folder.notes,
+              ElementsAre(HasSubstr("hidden pictures passed over: 1 (.hidden.jpg)"),
+                          HasSubstr("pictures in subfolders passed over: 1 (sub/)")));
 }
 
 TEST_F(PhotoFolderTest, ImagesFolderWinsAndIsReadAtAnyDepth) {
@@ -242,7 +244,7 @@ TEST_F(PhotoFolderTest, SaysThatPosesBesideThePhotosAreNotUsed) {
 TEST_F(PhotoFolderTest, ErrorsNameTheFolder) {
   EXPECT_THAT(ErrorOf(root()), HasSubstr("there is no folder"));
   Write("deep/a.jpg");
-  EXPECT_THAT(ErrorOf(root()), HasSubstr("contains no photographs (JPEG, PNG or TIFF)"));
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("contains no photographs (JPEG, PNG, TIFF, "));
   EXPECT_THAT(ErrorOf(root()), HasSubstr("did you mean"));
   Write("one.jpg");
   EXPECT_THAT(ErrorOf(root()), HasSubstr("one photograph"));

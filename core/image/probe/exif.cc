@@ -41,12 +41,20 @@ std::string_view ExifOfPng(std::string_view bytes) {
   return {};
 }
 
+std::string_view ExifOfWebp(std::string_view bytes) {
+  constexpr std::string_view kExif("Exif\0\0", 6);  // which some writers put before it
+  const std::string_view block = probe_internal::FindWebpChunk(bytes, "EXIF");
+  return block.starts_with(kExif) ? block.substr(kExif.size()) : block;
+}
+
 }  // namespace
 
 std::string_view FindExifBlock(std::string_view bytes) {
   if (probe_internal::IsJpeg(bytes)) return ExifOfJpeg(bytes);
   if (probe_internal::IsPng(bytes)) return ExifOfPng(bytes);
   if (probe_internal::IsTiff(bytes)) return bytes;
+  if (probe_internal::IsWebp(bytes)) return ExifOfWebp(bytes);
+  if (probe_internal::IsHeif(bytes)) return probe_internal::FindHeifExif(bytes);
   return {};
 }
 
@@ -57,13 +65,17 @@ bool FirstExifDirectory(std::string_view block, ExifDirectory* directory) {
   return true;
 }
 
+bool FurtherExifDirectory(const ExifDirectory& from, unsigned tag, ExifDirectory* directory) {
+  const size_t entry = FindExifEntry(from, tag);
+  if (entry == 0) return false;
+  *directory = from;
+  directory->at = ByteReader(from.block, from.big_endian).U32(entry + 8);
+  return true;
+}
+
 bool PhotoExifDirectory(const ExifDirectory& first, ExifDirectory* directory) {
   constexpr unsigned kPhotoDirectoryTag = 34665;
-  const size_t entry = FindExifEntry(first, kPhotoDirectoryTag);
-  if (entry == 0) return false;
-  *directory = first;
-  directory->at = ByteReader(first.block, first.big_endian).U32(entry + 8);
-  return true;
+  return FurtherExifDirectory(first, kPhotoDirectoryTag, directory);
 }
 
 size_t FindExifEntry(const ExifDirectory& directory, unsigned tag) {

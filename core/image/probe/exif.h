@@ -1,4 +1,4 @@
-// Where EXIF data lies in a JPEG, PNG or TIFF, and its entries. For this folder only. Pure
+// Where EXIF data lies in a picture, and its entries. For this folder only. Pure
 // functions on the caller's bytes, safe on hostile input.
 #pragma once
 
@@ -7,8 +7,8 @@
 
 namespace color3d {
 
-// The block in TIFF form: of a JPEG's APP1, a PNG's eXIf, or the TIFF file itself. Empty when there
-// is none.
+// The block in TIFF form: of a JPEG's APP1, a PNG's eXIf, a WebP's EXIF chunk, a HEIC's Exif item,
+// or the TIFF file itself. Empty when there is none.
 std::string_view FindExifBlock(std::string_view bytes);
 
 // Where one directory of a block lies.
@@ -20,6 +20,8 @@ struct ExifDirectory {
 
 // False when the block does not start as TIFF.
 bool FirstExifDirectory(std::string_view block, ExifDirectory* directory);
+// False when the directory has no entry `tag` that names a further one.
+bool FurtherExifDirectory(const ExifDirectory& from, unsigned tag, ExifDirectory* directory);
 // False when the first directory names no further one for the camera's settings (tag 34665).
 bool PhotoExifDirectory(const ExifDirectory& first, ExifDirectory* directory);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/image/probe/exif.h"
+#include "core/image/probe/tiff_pages.h"
 
 namespace color3d {
 namespace {
@@ -27,7 +28,11 @@ double UnitMm(double unit) {
 double ReadFocalLengthPx(std::string_view bytes, int width, int height) {
   ExifDirectory first, photo;
   if (!FirstExifDirectory(FindExifBlock(bytes), &first)) return 0.0;
-  if (!PhotoExifDirectory(first, &photo)) return 0.0;
+  if (!PhotoExifDirectory(first, &photo)) {
+    // Of a TIFF with a preview before the picture.
+    if (const size_t chosen = ChosenTiffDirectory(bytes); chosen != 0) first.at = chosen;
+    if (!PhotoExifDirectory(first, &photo)) return 0.0;
+  }
   constexpr double kFilmDiagonalMm = 43.2666;  // 36 x 24
   double focal_px =
       ReadExifNumber(photo, kFocalLengthIn35mmFilm) * std::hypot(width, height) / kFilmDiagonalMm;

@@ -1,7 +1,8 @@
 #include "core/image/probe/orientation.h"
 
-#include "core/image/probe/byte_reader.h"
 #include "core/image/probe/exif.h"
+#include "core/image/probe/probe_formats.h"
+#include "core/image/probe/tiff_pages.h"
 
 namespace color3d {
 namespace {
@@ -11,23 +12,14 @@ constexpr unsigned kOrientationTag = 274;
 }  // namespace
 
 int ReadOrientation(std::string_view bytes) {
-  ExifDirectory first;
-  if (!FirstExifDirectory(FindExifBlock(bytes), &first)) return 1;
-  const double value = ReadExifNumber(first, kOrientationTag);  // a SHORT; some writers use LONG
+  // HEIC pictures are turned by properties of their own, which decoders obey.
+  if (probe_internal::IsHeif(bytes)) return 1;
+  ExifDirectory directory;
+  if (!FirstExifDirectory(FindExifBlock(bytes), &directory)) return 1;
+  if (probe_internal::IsTiff(bytes)) directory.at = ChosenTiffDirectory(bytes);
+  // A SHORT; some writers use LONG.
+  const double value = ReadExifNumber(directory, kOrientationTag);
   return value >= 1.0 && value <= 8.0 ? static_cast<int>(value) : 1;
-}
-
-std::string TiffAsStored(std::string_view bytes) {
-  std::string copy(bytes);
-  ExifDirectory first;
-  const size_t entry =
-      FirstExifDirectory(bytes, &first) ? FindExifEntry(first, kOrientationTag) : 0;
-  if (entry == 0) return copy;
-  const bool is_long = ByteReader(bytes, first.big_endian).U16(entry + 2) == 4;
-  const size_t width = is_long ? 4 : 2;
-  for (size_t i = 0; i < 4; ++i) copy[entry + 8 + i] = 0;
-  copy[entry + 8 + (first.big_endian ? width - 1 : 0)] = 1;
-  return copy;
 }
 
 PictureSize OrientedSize(const ImageInfo& info, int orientation) {

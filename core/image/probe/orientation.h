@@ -1,18 +1,15 @@
-// EXIF orientation of a JPEG, PNG or TIFF. Plain C++, no codec. Pure functions, thread-safe.
+// EXIF orientation of a picture. Plain C++, no codec. Pure functions, thread-safe.
 #pragma once
 
-#include <string>
 #include <string_view>
 
 #include "core/image/probe/probe.h"
 
 namespace color3d {
 
-// 1..8 as in EXIF 2.3 tag 274; 1 (as stored) when absent or nonsense. Safe on hostile input.
+// 1..8 as in EXIF 2.3 tag 274; 1 (as stored) when absent or nonsense, and of HEIC, whose size is
+// told as looked at. Of a TIFF's page that is read. Safe on hostile input.
 int ReadOrientation(std::string_view bytes);
-
-// A copy of a TIFF whose orientation tag, if any, says 1: codecs differ in how they apply it.
-std::string TiffAsStored(std::string_view bytes);
 
 // True for the four orientations that swap width and height.
 inline bool OrientationSwapsSides(int orientation) { return orientation >= 5; }

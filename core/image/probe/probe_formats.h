@@ -1,4 +1,4 @@
-// The three formats behind ProbeImage. For this folder only.
+// The formats behind ProbeImage. For this folder only.
 #pragma once
 
 #include <fmt/core.h>
@@ -32,6 +32,8 @@ struct ProbeContext {
   Error Damaged(fmt::format_string<First, Rest...> what, First&& first, Rest&&... rest) const {
     return Damaged(fmt::format(what, std::forward<First>(first), std::forward<Rest>(rest)...));
   }
+  // For pictures made of printing inks, whose colours depend on press and paper.
+  Error InCmyk() const;
   // Refuses sizes of zero or above the limits.
   void CheckSize(int64_t width, int64_t height) const;
 };
@@ -39,10 +41,23 @@ struct ProbeContext {
 ImageInfo ProbeJpeg(const ProbeContext& context);
 ImageInfo ProbePng(const ProbeContext& context);
 ImageInfo ProbeTiff(const ProbeContext& context);
+ImageInfo ProbeWebp(const ProbeContext& context);
+ImageInfo ProbeBmp(const ProbeContext& context);
+ImageInfo ProbeHeif(const ProbeContext& context);
 
 bool IsJpeg(std::string_view bytes);
 bool IsPng(std::string_view bytes);
 bool IsTiff(std::string_view bytes);
+bool IsWebp(std::string_view bytes);
+bool IsBmp(std::string_view bytes);
+// Of the family (ISO 23008-12): HEIC, and AVIF, which ProbeHeif refuses.
+bool IsHeif(std::string_view bytes);
+
+// Body of a WebP's first chunk of this type; empty when there is none.
+std::string_view FindWebpChunk(std::string_view bytes, std::string_view type);
+// The EXIF block of a HEIC picture, and its ICC profile; empty when there is none.
+std::string_view FindHeifExif(std::string_view bytes);
+std::string_view FindHeifProfile(std::string_view bytes);
 
 // A TIFF file or an EXIF block, which has the same form.
 struct TiffHeader {

@@ -34,7 +34,8 @@ void ReadFrameHeader(const ProbeContext& context,
         "PNG or TIFF",
         context.file_name);
   }
-  if (info->channels != 1 && info->channels != 3 && info->channels != 4) {
+  if (info->channels == 4) throw context.InCmyk();
+  if (info->channels != 1 && info->channels != 3) {
     throw context.Damaged("it claims {} colour components", info->channels);
   }
 }

@@ -13,6 +13,7 @@
 #include "core/base/random.h"
 #include "core/image/codec.h"
 #include "core/image/probe/orientation.h"
+#include "tests/support/formats/picture_files.h"
 
 namespace color3d {
 namespace {
@@ -85,7 +86,10 @@ std::vector<Sample> Samples() {
           {"rgb16.png", EncodePng16(rgb), ImageFormat::kPng, 16, 3},
           {"rgba.png", EncodePng8(rgba), ImageFormat::kPng, 8, 4},
           {"gray16.tif", EncodeTiff(gray, true, 1), ImageFormat::kTiff, 16, 1},
-          {"rgb8.tif", EncodeTiff(rgb, false, 5), ImageFormat::kTiff, 8, 3}};
+          {"rgb8.tif", EncodeTiff(rgb, false, 5), ImageFormat::kTiff, 8, 3},
+          {"a.webp", WebpFile(rgb), ImageFormat::kWebp, 8, 3},
+          {"profile.webp", WebpFile(rgb, AdobeRgbProfile()), ImageFormat::kWebp, 8, 3},
+          {"a.bmp", BmpFile(rgb), ImageFormat::kBmp, 8, 3}};
 }
 
 TEST(Probe, ReadsTheHeaderOfEveryFormat) {
@@ -147,9 +151,9 @@ TEST(Probe, ByteFlipsNeverCrashProbeOrDecoder) {
 
 TEST(Probe, OtherFilesAreNotImages) {
   EXPECT_EQ(Refusal([] { ProbeImage("Buy milk.\n", "notes.jpg"); }),
-            "notes.jpg is not an image (JPEG, PNG or TIFF)");
+            "notes.jpg is not an image (" + ReadableImageFormats() + ")");
   EXPECT_EQ(Refusal([] { ProbeImage("", "empty.png"); }),
-            "empty.png is empty, not an image (JPEG, PNG or TIFF)");
+            "empty.png is empty, not an image (" + ReadableImageFormats() + ")");
   EXPECT_THAT(Refusal([] { ProbeImage("\xFF", "one.jpg"); }), HasSubstr("is not an image"));
   EXPECT_THAT(Refusal([] { ProbeImage("\xFF\xD8 DICM \xFF\xD9", "dicom.jpg"); }),
               HasSubstr("is not an image"))
@@ -207,7 +211,11 @@ TEST(Probe, WrongChecksumIsDamage) {
 }
 
 TEST(Probe, Extensions) {
-  for (const char* name : {"a.jpg", "B.JPEG", "dir.x/c.PnG", "d.tif", "e.TIFF"}) {
+  EXPECT_EQ(HasImageExtension("a.HEIC"), ReadsHeif());
+  EXPECT_EQ(ReadableImageFormats().find("HEIC") != std::string::npos, ReadsHeif());
+  EXPECT_THAT(ReadableImageEndings(), HasSubstr(".jpg, .jpeg, "));
+  for (const char* name :
+       {"a.jpg", "B.JPEG", "dir.x/c.PnG", "d.tif", "e.TIFF", "f.WebP", "g.bmp", "h.jfif"}) {
     EXPECT_TRUE(HasImageExtension(name)) << name;
   }
   for (const char* name : {"jpg", "a.jpgx", "a.gif", "a.jpg/b", "", ".", "a.txt"}) {

@@ -2,6 +2,7 @@
 #include <map>
 
 #include "core/image/probe/probe_formats.h"
+#include "core/image/probe/tiff_pages.h"
 
 namespace color3d::probe_internal {
 namespace {
@@ -112,6 +113,16 @@ void CheckSamples(const ProbeContext& context, const ImageInfo& info, uint32_t s
   }
 }
 
+void CheckColors(const ProbeContext& context, uint32_t photometric) {
+  constexpr uint32_t kSeparated = 5, kColorFilterArray = 32803, kLinearRaw = 34892;
+  if (photometric == kSeparated) throw context.InCmyk();
+  if (photometric == kColorFilterArray || photometric == kLinearRaw) {
+    throw InvalidArgument(
+        "{} holds a camera's raw data; develop it (darktable, RawTherapee) into a 16-bit TIFF",
+        context.file_name);
+  }
+}
+
 }  // namespace
 
 bool ReadTiffHeader(std::string_view bytes, TiffHeader* header) {
@@ -142,9 +153,10 @@ ImageInfo ProbeTiff(const ProbeContext& context) {
   TiffHeader header;
   if (!ReadTiffHeader(context.bytes, &header)) throw context.Truncated("it ends inside its header");
   const ByteReader reader(context.bytes, header.big_endian);
-  const Directory directory = ReadDirectory(context, reader, header.first_directory);
   ImageInfo info;
   info.format = ImageFormat::kTiff;
+  info.tiff_directory = ChosenTiffDirectory(context.bytes);
+  const Directory directory = ReadDirectory(context, reader, info.tiff_directory);
   const uint32_t width = ValueOr(reader, directory, kWidth, 0);
   const uint32_t height = ValueOr(reader, directory, kHeight, 0);
   context.CheckSize(width, height);
@@ -153,6 +165,7 @@ ImageInfo ProbeTiff(const ProbeContext& context) {
   info.bits_per_channel = static_cast<int>(ValueOr(reader, directory, kBitsPerSample, 1));
   const uint32_t samples = ValueOr(reader, directory, kSamplesPerPixel, 1);
   const uint32_t photometric = ValueOr(reader, directory, kPhotometric, 1);
+  CheckColors(context, photometric);
   info.channels = photometric == 3 ? 3 : static_cast<int>(std::min(samples, 1000u));
   info.min_is_white = photometric == 0 && samples == 1;
   CheckSamples(context, info, ValueOr(reader, directory, kSampleFormat, 1));

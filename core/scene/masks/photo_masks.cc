@@ -32,7 +32,7 @@ std::vector<std::string> MaskNames(const std::string& photo_file) {
 bool HasTransparency(const fs::path& file, const std::string& name) {
   const std::string bytes = ReadFile(file);
   const ImageInfo info = ProbeImage(bytes, name);
-  if (info.format != ImageFormat::kPng) return false;
+  if (info.format != ImageFormat::kPng && info.format != ImageFormat::kWebp) return false;
   // Colours of a palette, and one colour of other pictures, may be transparent by a chunk of its
   // own; where it is not there, decoding is saved.
   const bool has_alpha = info.channels == 2 || info.channels == 4;

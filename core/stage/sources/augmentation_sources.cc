@@ -63,7 +63,7 @@ std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageCon
     context.cancel().ThrowIfCancelled();
     if (!HasImageExtension(file)) {
       throw InvalidArgument(
-          "{} is no picture (JPEG, PNG or TIFF); remove it from {}", file, kFolder);
+          "{} is no picture ({}); remove it from {}", file, ReadableImageFormats(), kFolder);
     }
     if (pictures.size() >= kMaxFiles) {
       throw InvalidArgument(

@@ -83,7 +83,7 @@ GivenColors FromHints(const ColorizeKeyViewOptions& options,
                       const Image& srgb,
                       StageContext& context) {
   const auto hints = ParseHintsJson(ReadFile(options.file, kMaxHintsBytes));
-  const Image labels = options.labels.empty() ? Image() : ReadImage(options.labels);
+  const Image labels = options.labels.empty() ? Image() : ReadStoredValues(options.labels);
   const bool asks_automatic = std::any_of(hints.begin(), hints.end(), [](const ColorHint& hint) {
     return hint.fill == ColorHint::Fill::kAutomatic;
   });

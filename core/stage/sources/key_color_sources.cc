@@ -67,7 +67,7 @@ KeyColorResult FromStrokes(const Options& options, const KeyPhoto& photo, StageC
 
 KeyColorResult FromPoints(const Options& options, const KeyPhoto& photo, StageContext& context) {
   const auto hints = ParseHintsJson(ReadFile(options.file, kMaxPointsBytes));
-  const Image labels = options.labels.empty() ? Image() : ReadImage(options.labels);
+  const Image labels = options.labels.empty() ? Image() : ReadStoredValues(options.labels);
   const bool asks_automatic = std::any_of(hints.begin(), hints.end(), [](const ColorHint& hint) {
     return hint.fill == ColorHint::Fill::kAutomatic;
   });

@@ -1,0 +1,416 @@
+#include "client/lib/photos/passed_over_files.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
+#include <iterator>
+#include <set>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
+#include "core/catalogue/scene_files.h"
+#include "core/image/probe/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kShownNames = 3;
+
+// Synology, QNAP, macOS, Windows, Linux desktops, Picasa, digiKam, Lightroom, Capture One.
+constexpr std::string_view kSystemFolders[] = {"@eadir",
+                                               "@tmp",
+                                               "@recycle",
+                                               "@recently-snapshot",
+                                               "@__thumb",
+                                               ".@__thumb",
+                                               "#recycle",
+                                               "#snapshot",
+                                               "$recycle.bin",
+                                               "recycler",
+                                               "system volume information",
+                                               "lost+found",
+                                               "__macosx",
+                                               "thumbs",
+                                               "thumbnails",
+                                               "_thumbs",
+                                               "_thumbnails",
+                                               "ipod photo cache",
+                                               "captureone",
+                                               "picasaoriginals",
+                                               "_vti_cnf"};
+constexpr std::string_view kSystemFiles[] = {
+    "thumbs.db", "ehthumbs.db", "desktop.ini", "picasa.ini", "icon\r", "zbthumbnail.info"};
+
+// Kinds of pictures that we do not read, and what to do with them.
+struct Kind {
+  std::string_view endings;  // each between spaces
+  const char* name;
+  const char* remedy;
+};
+constexpr Kind kKinds[] = {
+    {" heic heif hif ", "HEIC pictures", "convert them to JPEG, e.g. `heif-convert a.heic a.jpg`"},
+    {" avif ", "AVIF pictures", "convert them to PNG, e.g. `heif-convert a.avif a.png`"},
+    {" jxl ", "JPEG XL pictures", "convert them to PNG, e.g. `djxl a.jxl a.png`"},
+    {" jp2 j2k jpx jpf jpc j2c ",
+     "JPEG 2000 pictures",
+     "convert them to PNG, e.g. `opj_decompress -i a.jp2 -o a.png`"},
+    {" dng cr2 cr3 crw nef nrw arw srf sr2 raf orf rw2 rwl pef srw x3f 3fr fff iiq mos mrw erf kdc "
+     "dcr raw ",
+     "raw files",
+     "develop them into 16-bit TIFF, e.g. with darktable or RawTherapee"},
+    {" psd psb xcf kra afphoto ora ",
+     "files of paint programs",
+     "export them as PNG or TIFF of one layer"},
+    {" dpx cin ", "DPX pictures", "convert them to PNG, e.g. `ffmpeg -i a.dpx a.png`"},
+    {" exr hdr pfm ", "HDR pictures", "map their tones and save them as 16-bit PNG"},
+    {" gif ",
+     "GIF files",
+     "convert pictures to PNG, and animated ones to a film (`ffmpeg -i a.gif a.mp4`)"},
+    {" pdf eps ps ai svg svgz ",
+     "documents",
+     "take the pictures out as PNG, e.g. `pdfimages -png a.pdf a`"},
+    {" jxr wdp hdp ppm pgm pbm pnm pam tga pcx sgi rgb ras ico icns xpm fits fit jpm jls mpo ",
+     "pictures of other formats",
+     "convert them to PNG, e.g. `mogrify -format png *`"}};
+
+// What we leave in a folder that is given with -o.
+constexpr const char* kResultPictures[] = {artifact::kKeyViewGray,
+                                           artifact::kKeyViewRanking,
+                                           artifact::kKeyViewColored,
+                                           artifact::kKeyColor,
+                                           artifact::kKeyColorRegions,
+                                           artifact::kAugmentationSheet};
+constexpr const char* kResultFilmsAndSplats[] = {
+    artifact::kMovie, artifact::kFilm, artifact::kPly, artifact::kSog, artifact::kSpz};
+constexpr const char* kResultRecords[] = {artifact::kKeyView,
+                                          artifact::kKeyColorFacts,
+                                          artifact::kMetrics,
+                                          artifact::kPlan,
+                                          artifact::kScene,
+                                          artifact::kImportFacts,
+                                          artifact::kReport};
+constexpr const char* kResultFolders[] = {artifact::kGivenViews,
+                                          artifact::kMovingRegions,
+                                          artifact::kCarried,
+                                          artifact::kAugmentations,
+                                          artifact::kViewsAb,
+                                          artifact::kProvenance,
+                                          artifact::kCorrectedAb,
+                                          artifact::kCorrectedProvenance,
+                                          artifact::kPaint,
+                                          artifact::kMoments,
+                                          artifact::kRenders,
+                                          artifact::kFilms,
+                                          artifact::kFilmFrames,
+                                          artifact::kFrames,
+                                          artifact::kTruths,
+                                          artifact::kColored2d,
+                                          artifact::kCurves};
+
+std::string Lowered(std::string_view text) {
+  std::string lowered(text);
+  std::transform(lowered.begin(), lowered.end(), lowered.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return lowered;
+}
+
+template <typename List>
+bool Holds(const List& list, std::string_view text) {
+  return std::find(std::begin(list), std::end(list), text) != std::end(list);
+}
+
+std::string EndingOf(std::string_view name) {
+  const size_t dot = name.rfind('.');
+  return dot == std::string_view::npos ? "" : Lowered(name.substr(dot + 1));
+}
+
+const Kind* KindOf(std::string_view name) {
+  const std::string ending = " " + EndingOf(name) + " ";
+  if (ending == "  ") return nullptr;
+  for (const Kind& kind : kKinds) {
+    if (kind.endings.find(ending) != std::string_view::npos) return &kind;
+  }
+  return nullptr;
+}
+
+bool IsHeic(std::string_view name) {
+  const std::string ending = EndingOf(name);
+  return ending == "heic" || ending == "heif" || ending == "hif";
+}
+
+// Formats that photographs are often kept in beside a copy in another one.
+bool IsCopyFormat(std::string_view name) {
+  const std::string ending = EndingOf(name);
+  return IsHeic(name) || ending == "webp" || ending == "bmp";
+}
+
+bool HasResultRecord(const fs::path& folder) {
+  std::error_code none;
+  return std::any_of(std::begin(kResultRecords), std::end(kResultRecords), [&](const char* name) {
+    return fs::is_regular_file(folder / name, none);
+  });
+}
+
+// In `folder` itself, by their names alone; 0 where it cannot be read.
+size_t CountPictures(const fs::path& folder) {
+  size_t count = 0;
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, none)) {
+    const std::string name = entry.path().filename().string();
+    count += HasImageExtension(name) && !IsSystemFile(name) ? 1 : 0;
+  }
+  return count;
+}
+
+bool HoldsPictures(const fs::path& folder) {
+  std::error_code error;
+  constexpr auto kOptions = fs::directory_options::skip_permission_denied;
+  fs::recursive_directory_iterator entries(folder, kOptions, error);
+  for (; !error && entries != fs::recursive_directory_iterator(); entries.increment(error)) {
+    if (HasImageExtension(entries->path().filename().string())) return true;
+  }
+  return false;
+}
+
+class Lister {
+ public:
+  Lister(fs::path root, bool with_subfolders, PassedOver* passed_over)
+      : root_(std::move(root)), with_subfolders_(with_subfolders), passed_over_(passed_over) {}
+
+  std::vector<std::string> List() {
+    ListFolder("");
+    std::sort(found_.begin(), found_.end());
+    return std::move(found_);
+  }
+
+ private:
+  void PassOver(const std::string& kind, const std::string& path) {
+    if (passed_over_ != nullptr) passed_over_->Add(kind, path);
+  }
+
+  // `below`: empty, or the folder's path below the root with a '/' at the end.
+  void ListFolder(const std::string& below) {
+    std::error_code error;
+    fs::directory_iterator entries(root_ / below, error);
+    if (error) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  "cannot read the folder {}: {}; check its permissions",
+                  (root_ / below).string(),
+                  error.message());
+    }
+    const bool has_results = HasResultRecord(root_ / below);
+    std::vector<std::string> pictures;
+    for (const fs::directory_entry& entry : entries) {
+      const std::string name = entry.path().filename().string();
+      std::error_code none;
+      if (entry.is_directory(none)) {
+        LookAtFolder(entry, below + name, name, has_results);
+      } else if (LookAtFile(entry, below + name, name)) {
+        pictures.push_back(name);
+      }
+    }
+    AddWithoutCopies(below, std::move(pictures));
+  }
+
+  void LookAtFolder(const fs::directory_entry& entry,
+                    const std::string& path,
+                    const std::string& name,
+                    bool beside_results) {
+    if (!with_subfolders_) return;
+    if (IsSystemFolder(name)) {
+      if (!HoldsPictures(entry.path())) return;
+      PassOver("folders that programs keep for thumbnails and the like", path);
+      return;
+    }
+    if (name.starts_with('.')) return;
+    std::error_code none;
+    if (entry.is_symlink(none)) {
+      PassOver("links to folders|put the photographs themselves there", path);
+    } else if (beside_results && Holds(kResultFolders, name + "/")) {
+      PassOver("folders of results", path);
+    } else {
+      ListFolder(path + "/");
+    }
+  }
+
+  // True for what may be a photograph.
+  bool LookAtFile(const fs::directory_entry& entry,
+                  const std::string& path,
+                  const std::string& name) {
+    std::error_code none;
+    const bool readable = HasImageExtension(name);
+    const Kind* kind = KindOf(name);
+    if (!readable && kind == nullptr) return false;
+    if (IsSystemFile(name)) {
+      PassOver("hidden pictures", path);
+    } else if (entry.is_symlink(none) && !fs::exists(entry.status(none))) {
+      PassOver("links that lead nowhere|put the pictures themselves there", path);
+    } else if (!entry.is_regular_file(none)) {
+      return false;
+    } else if (IsResultFile(entry.path())) {
+      PassOver("results of color3d|name another folder with -o to keep them apart", path);
+    } else if (!readable) {
+      PassOver(std::string(kind->name) + "|" + kind->remedy, path);
+    } else if (IsHeic(name)) {
+      return IsGoodHeic(entry.path(), path);
+    } else {
+      return true;
+    }
+    return false;
+  }
+
+  // Phones' exports leave stubs, whose pictures are elsewhere; the others are photographs still.
+  bool IsGoodHeic(const fs::path& file, const std::string& path) {
+    try {
+      ProbeImage(ReadFile(file), path);
+      return true;
+    } catch (const Error& e) {
+      PassOver(fmt::format("HEIC pictures that cannot be read|{} ({})", kKinds[0].remedy, e.what()),
+               path);
+      return false;
+    }
+  }
+
+  // Of "a.heic" beside "a.jpg" the latter, of "a.heic" beside "a.webp" one.
+  void AddWithoutCopies(const std::string& below, std::vector<std::string> pictures) {
+    std::sort(pictures.begin(), pictures.end());
+    std::set<std::string> stems;
+    for (const std::string& name : pictures) {
+      if (!IsCopyFormat(name)) stems.insert(Lowered(fs::path(name).stem().string()));
+    }
+    for (const std::string& name : pictures) {
+      if (IsCopyFormat(name) && !stems.insert(Lowered(fs::path(name).stem().string())).second) {
+        PassOver("pictures beside another of the same name", below + name);
+      } else {
+        found_.push_back(below + name);
+      }
+    }
+  }
+
+  const fs::path root_;
+  const bool with_subfolders_;
+  PassedOver* const passed_over_;
+  std::vector<std::string> found_;
+};
+
+}  // namespace
+
+void PassedOver::Add(const std::string& kind, const std::string& name, size_t count) {
+  const size_t bar = kind.find('|');
+  Files& files = kinds_[kind.substr(0, bar)];
+  // Of remedies that differ by the file the first one's is told.
+  if (files.count == 0 && bar != std::string::npos) files.remedy = kind.substr(bar + 1);
+  files.count += count;
+  files.first.push_back(name);
+  std::sort(files.first.begin(), files.first.end());
+  if (files.first.size() <= kShownNames) return;
+  files.first.pop_back();
+  files.has_more_names = true;
+}
+
+std::vector<std::string> PassedOver::Notes() const {
+  std::vector<std::pair<size_t, std::string>> lines;
+  for (const auto& [kind, files] : kinds_) {
+    std::string names;
+    for (const std::string& name : files.first) names += (names.empty() ? "" : ", ") + name;
+    lines.push_back({files.count,
+                     fmt::format("{} passed over: {} ({}{}){}{}",
+                                 kind,
+                                 files.count,
+                                 names,
+                                 files.has_more_names ? ", ..." : "",
+                                 files.remedy.empty() ? "" : "; ",
+                                 files.remedy)});
+  }
+  std::stable_sort(
+      lines.begin(), lines.end(), [](const auto& x, const auto& y) { return x.first > y.first; });
+  std::vector<std::string> notes;
+  for (auto& [count, line] : lines) notes.push_back(std::move(line));
+  return notes;
+}
+
+std::string PassedOver::Clause() const {
+  constexpr size_t kShownKinds = 3;
+  const std::vector<std::string> notes = Notes();
+  std::string clause;
+  for (size_t i = 0; i < std::min(notes.size(), kShownKinds); ++i) clause += "; " + notes[i];
+  return clause;
+}
+
+std::string SubfolderWithPictures(const fs::path& root) {
+  std::error_code none;
+  std::set<std::string> found;
+  for (const auto& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    if (IsSystemFile(name) || IsSystemFolder(name)) continue;
+    if (CountPictures(entry.path()) > 0) found.insert(name);
+  }
+  return found.empty() ? "" : *found.begin();
+}
+
+void AddUnusedNeighbors(const fs::path& root,
+                        const std::vector<std::string>& used,
+                        PassedOver* passed_over) {
+  constexpr std::string_view kOurs[] = {"augment", "masks", "sparse"};
+  const std::vector<std::string> photos = ListPictures(root, /*with_subfolders=*/false, nullptr);
+  std::set<std::string> stems;
+  for (const std::string& photo : photos) stems.insert(Lowered(fs::path(photo).stem().string()));
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    if (IsSystemFile(name)) continue;
+    if (HasFilmExtension(name) && entry.is_regular_file(none)) {
+      if (IsResultFile(entry.path())) continue;
+      // Beside a photo of its name it is what a phone keeps with it.
+      if (stems.contains(Lowered(fs::path(name).stem().string()))) continue;
+      passed_over->Add("films|give the film itself to colour it", name);
+    } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Holds(kOurs, name) &&
+               !Holds(used, name) && !HasResultRecord(entry.path())) {
+      const size_t count = CountPictures(entry.path());
+      if (count == 0) continue;
+      passed_over->Add(
+          "pictures in subfolders|put all photographs into one folder, or below images/",
+          name + "/",
+          count);
+    }
+  }
+}
+
+std::vector<std::string> ListPictures(const fs::path& folder,
+                                      bool with_subfolders,
+                                      PassedOver* passed_over) {
+  return Lister(folder, with_subfolders, passed_over).List();
+}
+
+bool IsResultFile(const fs::path& file) {
+  const std::string name = file.filename().string();
+  return Holds(kResultPictures, name) ||
+         (Holds(kResultFilmsAndSplats, name) && HasResultRecord(file.parent_path()));
+}
+
+bool IsSystemFolder(std::string_view name) {
+  const std::string lowered = Lowered(name);
+  return Holds(kSystemFolders, lowered) || lowered == ".thumbnails" || lowered == ".thumbs" ||
+         lowered == ".appledouble" || lowered == ".picasaoriginals" || lowered == ".trash" ||
+         lowered.starts_with(".trash-") || lowered.ends_with(".lrdata") ||
+         lowered.ends_with(".photoslibrary");
+}
+
+bool IsSystemFile(std::string_view name) {
+  return name.starts_with('.') || Holds(kSystemFiles, Lowered(name));
+}
+
+bool IsSystemPath(std::string_view path) {
+  for (size_t slash = path.find('/'); slash != std::string_view::npos; slash = path.find('/')) {
+    if (path.starts_with('.') || IsSystemFolder(path.substr(0, slash))) return true;
+    path.remove_prefix(slash + 1);
+  }
+  return IsSystemFile(path);
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,38 @@
+// The pages of a TIFF file: scanners and cameras put previews before, behind or below the picture.
+// Plain C++, no codec. Pure functions on the caller's bytes, safe on hostile input.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace color3d {
+
+struct TiffPage {
+  size_t directory = 0;  // where it lies in the file, bytes
+  int64_t width = 0;     // px
+  int64_t height = 0;
+  bool is_reduced = false;  // says of itself that it is a smaller copy (NewSubfileType)
+};
+
+struct TiffPages {
+  std::vector<TiffPage> pages;  // of the chain and of SubIFDs, at most 1,000, without masks
+  size_t chosen = 0;            // the largest; of equal ones the first that is no reduced copy
+};
+
+// Empty when the bytes do not start as TIFF. Directories that cannot be read end the list.
+TiffPages ListTiffPages(std::string_view bytes);
+
+// The chosen page's directory; the first one where no page can be read. 0: no TIFF.
+size_t ChosenTiffDirectory(std::string_view bytes);
+
+// What a user wants to know of a file with several pages: "has 2 pages; ..."; empty for one page.
+std::string DescribeTiffPages(const TiffPages& pages);
+
+// A copy of a TIFF that begins with the page at `directory` and whose orientation tag, if any, says
+// 1: codecs read the first page, and differ in how they apply orientation.
+std::string TiffPageAsStored(std::string_view bytes, size_t directory);
+
+}  // namespace color3d

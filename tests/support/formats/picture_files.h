@@ -1,0 +1,51 @@
+// Pictures as other programs save them, for tests: formats that we only read, several pages, colour
+// profiles. Pure functions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/image.h"
+
+namespace color3d {
+
+// One page of a TIFF of grey or RGB, 8 or 16 bits, uncompressed.
+struct TiffPageToWrite {
+  Image image;  // 1 or 3 channels, 0..1
+  int bits = 8;
+  uint32_t subfile_type = 0;  // 1: a reduced copy; 4: a mask
+  uint32_t photometric = 1;   // 2 for RGB
+  uint32_t orientation = 1;
+  std::string profile;                           // ICC
+  std::vector<TiffPageToWrite> sub_directories;  // pages that hang below this one
+};
+std::string TiffFile(const std::vector<TiffPageToWrite>& pages, bool big_endian = false);
+
+// 24-bit, rows from bottom to top as usual; with `profile` a BITMAPV5HEADER.
+std::string BmpFile(const Image& srgb, const std::string& profile = "");
+std::string WebpFile(const Image& srgb, const std::string& profile = "");
+// Empty where libheif or its encoder is missing.
+std::string HeicFile(const Image& srgb, const std::string& profile = "", int bits = 8);
+
+// A chunk behind a PNG's header; a segment behind a JPEG's first.
+std::string WithPngChunk(const std::string& png, const std::string& type, const std::string& body);
+std::string WithJpegSegment(const std::string& jpeg, int marker, const std::string& body);
+std::string WithPngProfile(const std::string& png, const std::string& profile);
+// In parts of at most `part_bytes`.
+std::string WithJpegProfile(const std::string& jpeg,
+                            const std::string& profile,
+                            size_t part_bytes = 65000);
+
+// ICC profiles of known spaces.
+std::string AdobeRgbProfile();
+std::string ProPhotoProfile();
+std::string DisplayP3Profile();
+std::string GrayGammaProfile(double gamma);
+std::string DotGainProfile(double percent);  // of dots of 50 %
+std::string CmykProfile();
+// The image in the space of `profile`, 1 or 3 channels.
+Image InSpaceOf(const Image& srgb, const std::string& profile);
+
+}  // namespace color3d
