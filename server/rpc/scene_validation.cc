@@ -6,11 +6,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <vector>
 
 #include "core/base/files.h"
+#include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 #include "server/planning/scene_facts.h"
@@ -68,37 +68,25 @@ std::string Folder(const std::string& path) {
   return slash == std::string::npos ? "" : path.substr(0, slash);
 }
 
-// Folders that hold some file of a COLMAP model, with the stems that are there.
-std::map<std::string, std::set<std::string>> ModelFolders(
-    const std::vector<SceneFileRecord>& files) {
-  static const std::set<std::string> kNames = {
-      "cameras.bin", "cameras.txt", "images.bin", "images.txt", "points3D.bin", "points3D.txt"};
-  std::map<std::string, std::set<std::string>> folders;
-  for (const SceneFileRecord& file : files) {
-    const std::string name = BaseName(file.path);
-    if (kNames.count(name) > 0) folders[Folder(file.path)].insert(name);
-  }
-  return folders;
+std::vector<ColmapPlace> ModelPlaces(const std::vector<SceneFileRecord>& files) {
+  std::vector<std::string> paths;
+  for (const SceneFileRecord& file : files) paths.push_back(file.path);
+  return ColmapPlaces(paths);
 }
 
-bool IsWholeModel(const std::set<std::string>& names) {
-  for (const char* ending : {".bin", ".txt"}) {
-    bool whole = true;
-    for (const char* stem : {"cameras", "images", "points3D"}) {
-      whole = whole && names.count(std::string(stem) + ending) > 0;
-    }
-    if (whole) return true;
-  }
-  return false;
+bool IsTransforms(const std::string& path) {
+  return path == BaseName(path) && IsTransformsFile(path);
 }
 
 void CheckTransforms(const std::string& path,
                      std::string_view bytes,
                      std::vector<FieldViolation>* violations) {
   const TransformsOutline outline = OutlineOfTransforms(bytes);
-  if (!outline.is_object) {
+  if (!outline.error.empty()) {
+    violations->push_back({path, "is not JSON: " + outline.error});
+  } else if (!outline.is_object) {
     violations->push_back({path, "is not a JSON object"});
-  } else if (outline.frames == 0) {
+  } else if (outline.frames == 0 && (path == kTransformsFile || path == kBlenderFiles[0])) {
     violations->push_back({path, "has no \"frames\""});
   }
 }
@@ -150,7 +138,7 @@ void CheckFile(const SceneFileRecord& file,
     return;
   }
   const bool is_photo = HasImageExtension(file.path);
-  const bool is_transforms = BaseName(file.path) == "transforms.json";
+  const bool is_transforms = IsTransforms(file.path);
   const bool is_augmentation = IsAugmentFile(file.path), is_mask = IsMaskFile(file.path);
   if (is_mask && !is_photo) {
     violations->push_back({file.path, "is no picture (PNG); remove it from masks/"});
@@ -267,16 +255,16 @@ StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
   }
   // Several films are several cameras', whose poses a file beside them may tell.
   if (!has_photos && CountFilms(files) > 1) {
-    if (HasFile(files, "transforms.json")) return StoredLayout::kTransforms;
-    if (HasFile(files, "poses_bounds.npy")) return StoredLayout::kPosesBounds;
+    if (HasFile(files, std::string(kTransformsFile))) return StoredLayout::kTransforms;
+    if (HasFile(files, std::string(kPosesBoundsFile))) return StoredLayout::kPosesBounds;
     return StoredLayout::kFilms;
   }
   if (!has_photos && CountFilms(files) > 0) return StoredLayout::kFilm;
   if (!has_photos && CountSplats(files) > 0) return StoredLayout::kSplat;
-  if (!ModelFolders(files).empty()) return StoredLayout::kColmap;
+  if (!ModelPlaces(files).empty()) return StoredLayout::kColmap;
   if (HasNerfiesCameras(files)) return StoredLayout::kNerfies;
   for (const SceneFileRecord& file : files) {
-    if (BaseName(file.path) == "transforms.json") return StoredLayout::kTransforms;
+    if (IsTransforms(file.path)) return StoredLayout::kTransforms;
   }
   return StoredLayout::kPhotos;
 }
@@ -291,13 +279,9 @@ SceneCheck CheckScene(const SceneRecord& scene,
   const std::set<std::string> held = store.HeldBlobs(named);
   std::vector<FieldViolation> violations;
   check.layout = DetectLayout(scene.files);
-  const auto folders = ModelFolders(scene.files);
-  const bool has_model = std::any_of(folders.begin(), folders.end(), [](const auto& folder) {
-    return IsWholeModel(folder.second);
-  });
-  if (!folders.empty() && !has_model) {
-    const auto& [folder, names] = *folders.begin();
-    violations.push_back({folder.empty() ? *names.begin() : folder + "/" + *names.begin(),
+  const std::vector<ColmapPlace> models = ModelPlaces(scene.files);
+  if (!models.empty() && !models[0].whole) {
+    violations.push_back({models[0].files[0],
                           "belongs to a COLMAP model that is not whole: cameras, images and "
                           "points3D are needed, all .bin or all .txt"});
   }

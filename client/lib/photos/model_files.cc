@@ -1,23 +1,161 @@
 #include "client/lib/photos/model_files.h"
 
-#include <iterator>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "client/lib/photos/file_kind.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/json_text.h"
+#include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
+#include "core/image/probe/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr char kTransforms[] = "transforms.json";
-constexpr char kPosesBounds[] = "poses_bounds.npy";
+using nlohmann::json;
+
 constexpr const char* kNerfiesFiles[] = {
     "metadata.json", "dataset.json", "scene.json", "points.npy"};
-constexpr const char* kModelFolders[] = {"sparse/0", "sparse", ""};
-constexpr const char* kModelStems[] = {"cameras", "images", "points3D"};
+constexpr int kDeepestModel = 5;       // folders below the user's
+constexpr int kMostEntries = 200'000;  // that are looked at for models
+
+// Poses that other programs write and that are not read.
+struct UnreadPoses {
+  const char* ending;
+  const char* program;
+};
+constexpr UnreadPoses kUnreadPoses[] = {{"cameras.xml", "Agisoft Metashape"},
+                                        {"bundle.out", "Bundler"},
+                                        {".nvm", "VisualSFM"},
+                                        {"reconstruction.json", "OpenSfM"},
+                                        {"cameras.sfm", "Meshroom"},
+                                        {"sfm.json", "Meshroom"}};
+
+std::string LowerCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return text;
+}
+
+// A path as somebody's file has it, with our separators.
+std::string OurPath(std::string path) {
+  std::replace(path.begin(), path.end(), '\\', '/');
+  while (path.starts_with("./")) path.erase(0, 2);
+  return path;
+}
+
+// Names of folders in `root`, sorted.
+std::vector<std::string> FoldersIn(const fs::path& root) {
+  std::vector<std::string> folders;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.') && IsFolder(entry.path())) folders.push_back(name);
+  }
+  std::sort(folders.begin(), folders.end());
+  return folders;
+}
+
+// transforms.json, else those of Blender's.
+std::vector<std::string> TransformsIn(const fs::path& root) {
+  if (IsFile(root / kTransformsFile)) return {std::string(kTransformsFile)};
+  std::vector<std::string> files;
+  for (const std::string_view file : kBlenderFiles) {
+    if (IsFile(root / file)) files.emplace_back(file);
+  }
+  return files;
+}
+
+json ReadTransforms(const fs::path& file) {
+  json root = ParseJson(ReadFile(file), file.string());
+  if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
+    throw InvalidArgument("{} has no \"frames\"", file.string());
+  }
+  return root;
+}
+
+// Files below `root` whose names are those of a COLMAP model's.
+std::vector<std::string> FilesOfModels(const fs::path& root) {
+  std::vector<std::string> files;
+  std::error_code error;
+  const auto options = fs::directory_options::skip_permission_denied |
+                       fs::directory_options::follow_directory_symlink;
+  int entries = 0;
+  fs::recursive_directory_iterator it(root, options, error);
+  const fs::recursive_directory_iterator end;
+  for (; !error && it != end && entries < kMostEntries; it.increment(error), ++entries) {
+    const std::string name = it->path().filename().string();
+    if (IsFolder(it->path())) {
+      if (name.starts_with('.') || it.depth() >= kDeepestModel) it.disable_recursion_pending();
+      continue;
+    }
+    const std::string stem = it->path().stem().string();
+    if (stem != "cameras" && stem != "images" && stem != "points3D") continue;
+    files.push_back(it->path().lexically_relative(root).generic_string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::vector<std::string> FilesOfColmap(const fs::path& root) {
+  std::vector<std::string> files;
+  for (const ColmapPlace& place : ColmapPlaces(FilesOfModels(root))) {
+    files.insert(files.end(), place.files.begin(), place.files.end());
+  }
+  return files;
+}
+
+// The file of points that goes with transforms; empty where there is none.
+std::string FileOfPoints(const fs::path& root, const std::string& transforms) {
+  const json named = ReadTransforms(root / transforms).value("ply_file_path", json());
+  if (named.is_string()) {
+    const std::string path = OurPath(named.get<std::string>());
+    for (const std::string& file : {path, path.substr(path.rfind('/') + 1)}) {
+      if (IsSafeRelativePath(file) && IsFile(root / file)) return file;
+    }
+  }
+  for (const std::string_view file : kPointFiles) {
+    if (IsFile(root / file)) return std::string(file);
+  }
+  return "";
+}
+
+void NotePosesNotRead(const fs::path& root, PhotoFolder* result) {
+  std::error_code none;
+  std::vector<std::string> found;
+  for (const auto& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    for (const UnreadPoses& poses : kUnreadPoses) {
+      if (!LowerCase(name).ends_with(poses.ending) || !IsFile(entry.path())) continue;
+      found.push_back(fmt::format("{} ({})", name, poses.program));
+      break;
+    }
+  }
+  if (found.empty()) return;
+  std::sort(found.begin(), found.end());
+  result->notes.push_back(
+      fmt::format("the poses in {} are not read, and are found anew; to use them, export them as a "
+                  "COLMAP model into {}",
+                  found[0],
+                  (root / "sparse").string()));
+}
+
+void NoteTimesNotRead(PhotoFolder* result) {
+  result->notes.push_back(
+      std::string(kTimesFile) + " is not read: it goes with a COLMAP model" +
+      (result->model_files.empty()
+           ? "; give one, or colour the frames of one moving camera with --film --poses"
+           : "; transforms.json and metadata.json have times of their own"));
+}
 
 }  // namespace
 
@@ -34,72 +172,80 @@ void AddNerfiesFiles(const fs::path& root, std::vector<LocalFile>* files) {
   }
 }
 
-std::set<std::string> FoldersThatTransformsNames(const fs::path& root_folder) {
+std::set<std::string> FoldersThatTransformsNames(const fs::path& root) {
   std::set<std::string> folders;
-  const fs::path transforms = root_folder / kTransforms;
-  if (!IsFile(transforms)) return folders;
-  nlohmann::json root;
-  try {
-    root = nlohmann::json::parse(ReadFile(transforms));
-  } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument("{} is not JSON: {}", transforms.string(), e.what());
-  }
-  if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
-    throw InvalidArgument("{} has no \"frames\"", transforms.string());
-  }
-  for (const nlohmann::json& frame : root["frames"]) {
-    if (!frame.is_object() || !frame.contains("file_path")) continue;
-    if (!frame["file_path"].is_string()) continue;
-    std::string path = frame["file_path"].get<std::string>();
-    while (path.starts_with("./")) path.erase(0, 2);
-    const size_t slash = path.rfind('/');
-    if (slash == std::string::npos) continue;
-    const std::string folder = path.substr(0, slash);
-    if (IsSafeRelativePath(folder)) folders.insert(folder);
+  for (const std::string& file : TransformsIn(root)) {
+    const json transforms = ReadTransforms(root / file);
+    for (const json& frame : transforms["frames"]) {
+      if (!frame.is_object() || !frame.contains("file_path")) continue;
+      if (!frame["file_path"].is_string()) continue;
+      const std::string path = OurPath(frame["file_path"].get<std::string>());
+      const size_t slash = path.rfind('/');
+      if (slash == std::string::npos) continue;
+      const std::string folder = path.substr(0, slash);
+      if (IsSafeRelativePath(folder)) folders.insert(folder);
+    }
   }
   return folders;
 }
 
-void CollectModelFiles(const fs::path& root, PhotoFolder* folder_of_photos) {
-  PhotoFolder& result = *folder_of_photos;
-  std::vector<LocalFile> model;
-  for (const std::string folder : kModelFolders) {
-    std::vector<std::vector<LocalFile>> kinds;  // .bin, .txt
-    for (const char* ending : {".bin", ".txt"}) {
-      std::vector<LocalFile>& files = kinds.emplace_back();
-      for (const char* stem : kModelStems) {
-        const std::string name = std::string(stem) + ending;
-        const std::string path = folder.empty() ? name : folder + "/" + name;
-        if (IsFile(root / path)) files.push_back({path, root / path});
-      }
-    }
-    // One whole model; parts of one go to the server too, which says what is missing.
-    const bool whole_binary = kinds[0].size() == std::size(kModelStems);
-    const bool whole_text = kinds[1].size() == std::size(kModelStems);
-    if (whole_binary || !whole_text) model = kinds[0];
-    if (!whole_binary) {
-      model.insert(model.end(), kinds[1].begin(), kinds[1].end());
-    }
-    if (whole_text && !whole_binary) model = kinds[1];
-    if (!model.empty()) break;
+std::string ImagesFolder(const fs::path& root) {
+  if (IsFolder(root / "images")) return "images";
+  for (const std::string& folder : FoldersIn(root)) {
+    if (LowerCase(folder) == "images") return folder;
   }
-  result.model_files.insert(result.model_files.end(), model.begin(), model.end());
-  if (IsFile(root / kTransforms)) {
-    result.model_files.push_back({kTransforms, root / kTransforms});
-  } else if (!result.camera_films.empty() && IsFile(root / kPosesBounds)) {
-    result.model_files.push_back({kPosesBounds, root / kPosesBounds});
+  return "";
+}
+
+bool HasPoses(const fs::path& root) {
+  return !TransformsIn(root).empty() || IsFile(root / kPosesBoundsFile) ||
+         !FilesOfColmap(root).empty();
+}
+
+std::string PosesBeside(const fs::path& root) {
+  for (const char* folder : {"sparse", "colmap"}) {
+    if (IsFolder(root / folder)) return (root / folder).string();
   }
+  const std::vector<std::string> transforms = TransformsIn(root);
+  if (!transforms.empty()) return (root / transforms[0]).string();
+  const fs::path poses_bounds = root / kPosesBoundsFile;
+  return IsFile(poses_bounds) ? poses_bounds.string() : "";
+}
+
+std::string OnlyFolderOfPhotos(const fs::path& root) {
+  std::string found;
+  for (const std::string& folder : FoldersIn(root)) {
+    if (IsAugmentFile(folder + "/") || IsMaskFile(folder + "/")) continue;
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(root / folder, none)) {
+      if (!HasImageExtension(entry.path().filename().string()) || !IsFile(entry.path())) continue;
+      if (!found.empty()) return "";
+      found = folder;
+      break;
+    }
+  }
+  return found;
+}
+
+void CollectModelFiles(const fs::path& root, PhotoFolder* folder) {
+  std::vector<LocalFile>& files = folder->model_files;
+  const auto add = [&](const std::string& file) { files.push_back({file, root / file}); };
+  const std::vector<std::string> colmap = FilesOfColmap(root);
+  for (const std::string& file : colmap) add(file);
+  const std::vector<std::string> transforms = TransformsIn(root);
+  for (const std::string& file : transforms) add(file);
+  const bool of_photos = folder->camera_films.empty();
+  if (of_photos && !transforms.empty()) {
+    const std::string points = FileOfPoints(root, transforms[0]);
+    if (!points.empty()) add(points);
+  }
+  if (transforms.empty() && colmap.empty() && IsFile(root / kPosesBoundsFile)) {
+    add(std::string(kPosesBoundsFile));
+  }
+  if (of_photos && files.empty()) NotePosesNotRead(root, folder);
   if (!IsFile(root / kTimesFile)) return;
-  const std::string times(kTimesFile);
-  if (!model.empty()) {
-    result.model_files.push_back({times, root / times});
-  } else {
-    result.notes.push_back(
-        times + " is not read: it goes with a COLMAP model" +
-        (result.model_files.empty()
-             ? "; give one, or colour the frames of one moving camera with --film --poses"
-             : "; transforms.json and metadata.json have times of their own"));
-  }
+  if (colmap.empty()) return NoteTimesNotRead(folder);
+  add(std::string(kTimesFile));
 }
 
 }  // namespace color3d::client

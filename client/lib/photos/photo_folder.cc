@@ -59,6 +59,16 @@ void AddPhotosBelow(const fs::path& root, const std::string& folder, PhotoFolder
   }
 }
 
+// The photos below `root`/`folder`, if there is such a folder, as images/ of the scene.
+void AddPhotosAsImages(const fs::path& root, const std::string& folder, PhotoFolder* result) {
+  if (folder.empty()) return;
+  const size_t before = result->photos.size();
+  AddPhotosBelow(root, folder, result);
+  for (size_t i = before; i < result->photos.size(); ++i) {
+    result->photos[i].path = "images/" + result->photos[i].path.substr(folder.size() + 1);
+  }
+}
+
 void CollectNerfies(const fs::path& root, PhotoFolder* result) {
   for (const char* folder : kNerfiesPictures) {
     if (result->photos.empty() && IsFolder(root / folder)) AddDirectPhotos(root, folder, result);
@@ -104,11 +114,14 @@ void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result) {
 
 void CollectImages(const fs::path& root, PhotoFolder* result) {
   if (IsNerfiesFolder(root)) return CollectNerfies(root, result);
-  AddPhotosBelow(root, "images", result);
+  AddPhotosAsImages(root, ImagesFolder(root), result);
   if (!result->photos.empty()) return;
   AddDirectPhotos(root, "", result);
   for (const std::string& folder : FoldersThatTransformsNames(root)) {
     if (IsFolder(root / folder)) AddDirectPhotos(root, folder, result);
+  }
+  if (result->photos.empty() && HasPoses(root)) {
+    AddPhotosAsImages(root, OnlyFolderOfPhotos(root), result);
   }
 }
 
@@ -167,10 +180,12 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames) {
   if (folder.splat || folder.film || !folder.camera_films.empty()) return;
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPhotos(folder.root);
-    throw InvalidArgument(
-        "{} contains no photographs (JPEG, PNG or TIFF){}",
-        root,
-        sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?");
+    const std::string remedy =
+        sub.empty() ? ""
+        : HasPoses(folder.root)
+            ? "; the photos that its poses are of belong into " + (folder.root / "images").string()
+            : "; did you mean " + (folder.root / sub).string() + "?";
+    throw InvalidArgument("{} contains no photographs (JPEG, PNG or TIFF){}", root, remedy);
   }
   if (folder.photos.size() == 1 && as_frames) {
     throw InvalidArgument(
@@ -258,9 +273,12 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   CheckCounts(result, as_frames);
   CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
-  if (result.model_files.empty() && IsFolder(parent / "sparse")) {
-    result.notes.push_back("the poses in " + (parent / "sparse").string() +
-                           " are not used; to use them, give " + parent.string());
+  if (result.model_files.empty() && !result.splat && !result.film) {
+    const std::string poses = PosesBeside(parent);
+    if (!poses.empty()) {
+      result.notes.push_back("the poses in " + poses + " are not used; to use them, give " +
+                             parent.string());
+    }
   }
   return result;
 }

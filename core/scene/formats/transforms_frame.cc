@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/json_text.h"
 #include "core/scene/formats/within_reach.h"
 
 namespace color3d {
@@ -96,12 +97,7 @@ const json* FrameFields::Find(const char* key) const {
 }
 
 json ParseFrames(std::string_view text, const std::string& file_name) {
-  json root;
-  try {
-    root = json::parse(text);
-  } catch (const json::exception& e) {
-    throw InvalidArgument("{} is not JSON: {}", file_name, e.what());
-  }
+  json root = ParseJson(text, file_name);
   if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
     throw InvalidArgument("{} has no list of frames", file_name);
   }
