@@ -37,7 +37,7 @@ class Import : public testing::Test {
 };
 
 TEST_F(Import, BadInputsSayWhatIsWrong) {
-  EXPECT_THAT(Said(), HasSubstr("contains no photographs (JPEG, PNG, TIFF)"));
+  EXPECT_THAT(Said(), HasSubstr("the scene contains no photographs (JPEG, PNG, TIFF)"));
   WriteFileAtomic(folder_.path() / "readme.txt", "hello");
   EXPECT_THAT(Said(), HasSubstr("contains no photographs"));
   WritePhoto("one.png");
@@ -78,8 +78,7 @@ TEST_F(Import, ColmapWinsOverTransforms) {
     EXPECT_EQ(result.photos_registered, 9);
     EXPECT_FALSE(result.undistorted);
     EXPECT_EQ(result.scene.points.size(), 50u);
-    ASSERT_EQ(result.warnings.size(), 1u);
-    EXPECT_THAT(result.warnings[0], HasSubstr("extra.png"));
+    EXPECT_THAT(result.warnings, testing::Contains(HasSubstr("extra.png")));
   }
 }
 
