@@ -75,6 +75,7 @@ TEST_F(ModelFilesTest, AModelIsFoundWhereverProgramsPutIt) {
     fs::remove_all(root() / place);
   }
   // Also behind a link.
+  fs::remove_all(root() / "sparse");
   WriteModel("elsewhere");
   fs::rename(root() / "elsewhere", root().parent_path() / "elsewhere");
   fs::create_directory_symlink(root().parent_path() / "elsewhere", root() / "sparse");

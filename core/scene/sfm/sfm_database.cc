@@ -24,6 +24,8 @@ SfmDatabase::SfmDatabase(const std::filesystem::path& file)
       SQLITE_OK) {
     throw connection_->Failed("open");
   }
+  // A worker in its sandbox may write beside the database, and in no folder for temporary files.
+  connection_->Run("PRAGMA temp_store = MEMORY");
 }
 
 SfmDatabase::~SfmDatabase() = default;
