@@ -170,20 +170,21 @@ bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
   const bool is_nerfies = IsNerfiesFolder(scene_folder);
   const std::vector<fs::path> transforms = TransformsFiles(scene_folder);
   if (colmap) {
-    result->warnings = colmap->notes;
     const size_t others =
         is_nerfies || transforms.empty() ? 0 : CountTransformsPhotos(transforms, scene_folder);
     if (colmap->photos >= others) {
       result->layout = SceneLayout::kColmap;
+      result->warnings = colmap->notes;
       result->scene = ReadColmapModel(
           scene_folder / colmap->folder, scene_folder, &result->warnings, &result->cameras);
       WarnOfUnposedPhotos(scene_folder, result);
       return true;
     }
     result->warnings.push_back(
-        fmt::format("{} is used: it has the poses of {} photos, the COLMAP model of {}",
+        fmt::format("{} is used: it has the poses of {} photos, the COLMAP model in {} of {}",
                     transforms[0].filename().string(),
                     others,
+                    colmap->folder.empty() ? "the same folder" : colmap->folder,
                     colmap->photos));
   }
   if (is_nerfies) {

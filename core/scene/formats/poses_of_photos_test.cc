@@ -179,8 +179,8 @@ TEST_F(PosesOfPhotos, OfTransformsAreUsedWhereTheyPlaceMore) {
   EXPECT_EQ(result.layout, SceneLayout::kTransforms);
   EXPECT_EQ(result.scene.views.size(), 4u);
   EXPECT_THAT(result.warnings,
-              Contains("transforms.json is used: it has the poses of 4 photos, the COLMAP model of "
-                       "2"));
+              Contains("transforms.json is used: it has the poses of 4 photos, the COLMAP model in "
+                       "sparse/0 of 2"));
 }
 
 TEST_F(PosesOfPhotos, AModelInAnyUsualPlaceIsUsed) {

@@ -147,8 +147,10 @@ Pose ReadTransform(const FrameFields& fields) {
     }
     for (int c = 0; c < 4; ++c) {
       if (!row[c].is_number() || !std::isfinite(row[c].get<double>())) {
-        throw InvalidArgument("{}: transform_matrix has an element that is not a finite number",
-                              fields.place());
+        throw InvalidArgument(
+            "{}: transform_matrix has an element that is not a finite number; correct the frame or "
+            "remove it",
+            fields.place());
       }
       m(r, c) = row[c].get<double>();
     }
