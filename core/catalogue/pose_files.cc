@@ -77,12 +77,13 @@ std::vector<ColmapPlace> ColmapPlaces(const std::vector<std::string>& files) {
       }
     }
   }
-  // By tier: whole and usual, whole, parts. A lonely images.txt is no part of a model.
+  // By tier: whole and usual, whole, parts. A lonely images.txt is a list, no part of a model.
   std::map<int, std::vector<std::pair<int, ColmapPlace>>> tiers;
   for (const auto& [folder, names] : folders) {
     const int rank = RankOf(folder);
     ColmapPlace place = PlaceOf(folder, names);
-    if (!names.contains("cameras.bin") && !names.contains("cameras.txt")) continue;
+    const bool has_cameras = names.contains("cameras.bin") || names.contains("cameras.txt");
+    if (!has_cameras && names.size() < 2) continue;
     const int tier = !place.whole ? 2 : rank == kElsewhere ? 1 : 0;
     tiers[tier].emplace_back(rank, std::move(place));
   }

@@ -55,6 +55,7 @@ TEST(PoseFiles, OneKindOfFilesIsEnough) {
   EXPECT_FALSE(parts[0].whole);
   EXPECT_EQ(parts[0].files.size(), 2u);
   EXPECT_THAT(Folders({"images.txt"}), IsEmpty());
+  EXPECT_THAT(Folders({"sparse/0/images.txt", "sparse/0/points3D.txt"}), ElementsAre("sparse/0"));
 }
 
 TEST(PoseFiles, TransformsHaveSeveralNames) {
