@@ -3,7 +3,8 @@
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
 #           <- {keyview, augment, carry, splat, metrics, report, video, view, matching <- {keycolor, colorizer}} <- stage
 #   server: store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
-# LibTorch is seen only where networks live, protocol buffers and SQL never below the server. What tests
+# LibTorch is seen only where networks live, protocol buffers never below the server, SQL there only for
+# COLMAP's database (core/scene/sfm/sfm_database.cc). What tests
 # (*_test.cc) set up is not held against their folder; the product never includes tests/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -82,7 +83,8 @@ allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
   core/keycolor/hints core/keycolor/words
-forbid 'grpc|google/protobuf|color3d/v1|sqlite3|spdlog' core
+forbid 'grpc|google/protobuf|color3d/v1|spdlog' core
+forbid 'sqlite3' $(find core -name '*.h' -o -name '*.cc' | grep -v '^core/scene/sfm/sfm_database')
 forbid 'libav|libsw' $(ls -d core/*/ | grep -v '^core/video/') server client
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base core/simd core/grid

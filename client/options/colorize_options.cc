@@ -264,12 +264,14 @@ void RequireAugmentFiles(const ColorizeOptions& options, const PhotoFolder& fold
 }
 
 void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
-  app.add_option("PHOTOS",
-                 o->photos,
-                 "Folder of photos, or one with images/ and a COLMAP model (sparse/0; of a scene "
-                 "that moves with times.txt, a line SECONDS NAME for each photo), or with "
-                 "transforms.json and its photos; or a splat (.ply, .sog, .spz); or a film (.mp4, "
-                 ".mov, .mkv, ...), whose frames are coloured");
+  app.add_option(
+      "PHOTOS",
+      o->photos,
+      "Folder of photos, or one with images/ and COLMAP models (sparse/0, ...: the one with "
+      "most photos is used; of a scene that moves with times.txt, a line SECONDS NAME "
+      "for each photo), or with transforms.json (or transforms_train.json, ...) or "
+      "poses_bounds.npy and its photos; or a splat (.ply, .sog, .spz); or a film (.mp4, "
+      ".mov, .mkv, ...), whose frames are coloured");
   app.add_option("--scene",
                  o->scene,
                  "In place of PHOTOS: a scene that the server holds, coloured from the key view "

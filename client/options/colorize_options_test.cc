@@ -180,6 +180,7 @@ TEST_F(ColorizeOptionsTest, APresetIsANameOrAFile) {
   EXPECT_EQ(spec.personalize().iterations(), 80) << "flags win over the file";
   EXPECT_EQ(spec.max_side_px(), 700);
   EXPECT_FALSE(Spec({"--preset", File("max_side_px: 300\n")}).has_preset()) << "the server's";
+  EXPECT_EQ(Spec({"--preset", File("\xef\xbb\xbfmax_side_px: 300\n")}).max_side_px(), 300);
   EXPECT_THAT(Complaint({"--preset=turbo"}),
               AllOf(HasSubstr("fast, best, paper"), HasSubstr("no such file")));
 }

@@ -11,6 +11,7 @@
 #include "client/options/option_fields.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/json_text.h"
 #include "proto/option_text.h"
 
 namespace color3d::client {
@@ -144,7 +145,8 @@ v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
   TextFormat::Parser parser;
   parser.RecordErrorsTo(&complaint);
   parser.WriteLocationsTo(&lines);
-  if (!parser.ParseFromString(ReadFile(name_or_file), &spec)) {
+  const std::string text = ReadFile(name_or_file);
+  if (!parser.ParseFromString(std::string(WithoutMark(text, name_or_file)), &spec)) {
     Complain(name_or_file, complaint.line, WithRemedy(complaint.text));
   }
   CheckValues(spec, lines, name_or_file);

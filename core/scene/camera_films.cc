@@ -10,6 +10,7 @@
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
+#include "core/scene/formats/named_files.h"
 #include "core/scene/formats/poses_bounds.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/photos.h"
@@ -35,16 +36,12 @@ void FitToFilm(const std::pair<int, int>& size, CameraFilm* film) {
 
 CameraFilm ReadFilm(const FrameFields& own,
                     const FrameFields& fields,
-                    const fs::path& scene_folder,
+                    const NamedFiles& given,
                     const FilmSize& size) {
   CameraFilm film;
-  film.file = FileOf(fields);
-  if (!IsSafeRelativePath(film.file)) {
-    throw InvalidArgument("{}: {} is no path below the scene's folder", fields.place(), film.file);
-  }
-  std::error_code error;
-  if (!fs::is_regular_file(scene_folder / film.file, error)) {
-    throw InvalidArgument("{}: there is no film {}", fields.place(), film.file);
+  film.file = given.Find(FileOf(fields));
+  if (film.file.empty()) {
+    throw InvalidArgument("{}: there is no film {} in the scene", fields.place(), FileOf(fields));
   }
   film.camera = own.TextOr("camera", fs::path(film.file).stem().string());
   film.time_offset_s = own.NumberOr("time_offset", 0.0);
@@ -58,6 +55,7 @@ CameraFilm ReadFilm(const FrameFields& own,
 
 std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const FilmSize& size) {
   const json root = ParseFrames(ReadFile(scene_folder / kTransforms), kTransforms);
+  const NamedFiles given = NamedFiles::Films(scene_folder);
   std::vector<CameraFilm> films;
   std::string photo;
   for (size_t i = 0; i < root["frames"].size(); ++i) {
@@ -75,7 +73,7 @@ std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fi
           place,
           FileOf(own));
     }
-    films.push_back(ReadFilm(own, FrameFields(root, frame, place), scene_folder, size));
+    films.push_back(ReadFilm(own, FrameFields(root, frame, place), given, size));
   }
   if (!films.empty() && !photo.empty()) {
     throw InvalidArgument(

@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
-#include "core/scene/formats/colmap_model.h"
+#include "core/scene/formats/named_files.h"
 #include "core/scene/formats/nerfies.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/held_out.h"
@@ -34,25 +36,15 @@ constexpr uint64_t kRandomPointSeed = 1;
 constexpr int kHoldOutEvery = 8;
 constexpr size_t kMinTrainingViews = 2;
 
-// The folder of the COLMAP model, or an empty path.
-fs::path FindColmapFolder(const fs::path& scene_folder) {
-  for (const char* folder : {"sparse/0", "sparse", "colmap/sparse/0", "."}) {
-    const fs::path candidate = (scene_folder / folder).lexically_normal();
-    if (IsColmapFolder(candidate)) return candidate;
-  }
-  return {};
-}
-
-std::string FirstNames(const std::vector<std::string>& names, size_t count) {
-  std::string text;
-  for (size_t i = 0; i < std::min(names.size(), count); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return text + (names.size() > count ? ", ..." : "");
-}
-
+// Where no point would be left, as without most of the photos that saw them, those count into whose
+// picture a point falls.
 void DropWeakPoints(Scene* scene) {
   auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
+  if (std::all_of(scene->points.begin(), scene->points.end(), weak)) {
+    for (SparsePoint& point : scene->points) {
+      if (point.position.allFinite()) point.views = ViewsThatFace(*scene, point.position, 0.0);
+    }
+  }
   scene->points.erase(std::remove_if(scene->points.begin(), scene->points.end(), weak),
                       scene->points.end());
 }
@@ -87,10 +79,11 @@ void Normalise(ImportResult* result) {
 // Finds the photos' masks, for structure-from-motion already, and refuses bad ones.
 void FindPhotoMasks(const fs::path& scene_folder,
                     const CancellationToken& cancel,
-                    std::vector<Photo>* photos) {
+                    std::vector<Photo>* photos,
+                    std::vector<std::string>* warnings) {
   std::vector<std::string> files;
   for (const Photo& photo : *photos) files.push_back(photo.file);
-  const std::vector<std::string> masks = FindMasks(scene_folder, files, {});
+  const std::vector<std::string> masks = FindMasks(scene_folder, files, {}, warnings);
   for (size_t i = 0; i < masks.size(); ++i) {
     cancel.ThrowIfCancelled();
     Photo& photo = (*photos)[i];
@@ -104,11 +97,12 @@ void FindPhotoMasks(const fs::path& scene_folder,
 // The same for a scene with poses.
 void FindViewMasks(const fs::path& scene_folder,
                    const CancellationToken& cancel,
-                   std::vector<View>* views) {
+                   std::vector<View>* views,
+                   std::vector<std::string>* warnings) {
   std::vector<std::string> files, others;
   for (const View& view : *views) files.push_back(view.image_file);
   for (const Photo& photo : ListPhotos(scene_folder)) others.push_back(photo.file);
-  const std::vector<std::string> masks = FindMasks(scene_folder, files, others);
+  const std::vector<std::string> masks = FindMasks(scene_folder, files, others, warnings);
   for (size_t i = 0; i < masks.size(); ++i) {
     cancel.ThrowIfCancelled();
     View& view = (*views)[i];
@@ -138,8 +132,7 @@ void ImportPhotos(const fs::path& scene_folder,
   std::vector<Photo> photos = ListPhotos(scene_folder);
   result->photos_found = static_cast<int>(photos.size());
   if (photos.empty()) {
-    throw InvalidArgument(
-        "{} contains no photographs ({})", scene_folder.string(), ReadableImageFormats());
+    throw InvalidArgument("the scene contains no photographs ({})", ReadableImageFormats());
   }
   for (size_t i = 0; i < photos.size(); ++i) {
     run.cancel.ThrowIfCancelled();
@@ -150,11 +143,11 @@ void ImportPhotos(const fs::path& scene_folder,
   }
   if (photos.size() == 1) {
     throw InvalidArgument(
-        "{} contains one photograph ({}); at least 3 photos from different places are needed",
-        scene_folder.string(),
+        "the scene contains one photograph ({}); at least 3 photos from different places are "
+        "needed",
         photos[0].name);
   }
-  FindPhotoMasks(scene_folder, run.cancel, &photos);
+  FindPhotoMasks(scene_folder, run.cancel, &photos, &result->warnings);
   SfmResult sfm = RunStructureFromMotion(photos, scene_folder, scratch_folder, options, run);
   result->scene = std::move(sfm.scene);
   result->sfm = std::move(sfm.report);
@@ -167,7 +160,7 @@ void ImportPhotos(const fs::path& scene_folder,
                   few ? "only " : "",
                   result->scene.views.size(),
                   photos.size(),
-                  FirstNames(sfm.unplaced, 5)));
+                  SomeOf(sfm.unplaced)));
 }
 
 void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
@@ -181,8 +174,53 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
     if (!std::binary_search(files.begin(), files.end(), photo.file)) unposed.push_back(photo.name);
   }
   if (unposed.empty()) return;
-  result->warnings.push_back(fmt::format(
-      "{} photos have no pose and were left out: {}", unposed.size(), FirstNames(unposed, 5)));
+  result->warnings.push_back(
+      fmt::format("{} photos have no pose and were left out: {}", unposed.size(), SomeOf(unposed)));
+}
+
+// The poses that lie beside the photos: of the kind that places most of them, COLMAP's before
+// others. False where there are none.
+bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
+  const std::optional<ColmapChoice> colmap = ChooseColmapModel(scene_folder);
+  const bool is_nerfies = IsNerfiesFolder(scene_folder);
+  const std::vector<fs::path> transforms = TransformsFiles(scene_folder);
+  if (colmap) {
+    const size_t others =
+        is_nerfies || transforms.empty() ? 0 : CountTransformsPhotos(transforms, scene_folder);
+    if (colmap->photos >= others) {
+      result->layout = SceneLayout::kColmap;
+      result->warnings = colmap->notes;
+      result->scene = ReadColmapModel(
+          scene_folder / colmap->folder, scene_folder, &result->warnings, &result->cameras);
+      WarnOfUnposedPhotos(scene_folder, result);
+      return true;
+    }
+    result->warnings.push_back(
+        fmt::format("{} is used: it has the poses of {} photos, the COLMAP model in {} of {}",
+                    transforms[0].filename().string(),
+                    others,
+                    colmap->folder.empty() ? "the same folder" : colmap->folder,
+                    colmap->photos));
+  }
+  if (is_nerfies) {
+    result->layout = SceneLayout::kNerfies;
+    result->scene = ReadNerfies(scene_folder, &result->warnings, &result->cameras);
+    result->photos_found = static_cast<int>(result->scene.views.size());
+    return true;
+  }
+  if (!transforms.empty()) {
+    result->layout = SceneLayout::kTransforms;
+    result->scene =
+        ReadTransformsJson(transforms, scene_folder, &result->warnings, &result->cameras);
+    WarnOfUnposedPhotos(scene_folder, result);
+    return true;
+  }
+  std::optional<Scene> of_photos = ReadPosesOfPhotos(scene_folder, &result->warnings);
+  if (!of_photos) return false;
+  result->layout = SceneLayout::kPosesBounds;
+  result->scene = std::move(*of_photos);
+  result->photos_found = static_cast<int>(result->scene.views.size());
+  return true;
 }
 
 void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
@@ -223,7 +261,7 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
   if (found == result->cameras.end()) {
     throw InvalidArgument("hold_out_camera: there is no camera '{}'; the scene has {}",
                           camera,
-                          FirstNames(result->cameras, 8));
+                          SomeOf(result->cameras, 8));
   }
   const int shot = static_cast<int>(found - result->cameras.begin());
   for (View& view : result->scene.views) view.held_out |= view.moment && view.moment->shot == shot;
@@ -272,26 +310,9 @@ ImportResult ImportScene(const fs::path& scene_folder,
     throw Error(ErrorCode::kNotFound, "{} is not a folder", scene_folder.string());
   }
   ImportResult result;
-  const fs::path colmap_folder = FindColmapFolder(scene_folder);
-  if (!colmap_folder.empty()) {
-    result.layout = SceneLayout::kColmap;
-    result.scene = ReadColmapModel(colmap_folder, scene_folder, &result.warnings, &result.cameras);
-    WarnOfUnposedPhotos(scene_folder, &result);
+  if (ImportPoses(scene_folder, &result)) {
     RequireMemory(options, result.scene);
-    FindViewMasks(scene_folder, run.cancel, &result.scene.views);
-  } else if (IsNerfiesFolder(scene_folder)) {
-    result.layout = SceneLayout::kNerfies;
-    result.scene = ReadNerfies(scene_folder, &result.warnings, &result.cameras);
-    result.photos_found = static_cast<int>(result.scene.views.size());
-    RequireMemory(options, result.scene);
-    FindViewMasks(scene_folder, run.cancel, &result.scene.views);
-  } else if (fs::is_regular_file(scene_folder / "transforms.json", error)) {
-    result.layout = SceneLayout::kTransforms;
-    result.scene = ReadTransformsJson(
-        scene_folder / "transforms.json", scene_folder, &result.warnings, &result.cameras);
-    WarnOfUnposedPhotos(scene_folder, &result);
-    RequireMemory(options, result.scene);
-    FindViewMasks(scene_folder, run.cancel, &result.scene.views);
+    FindViewMasks(scene_folder, run.cancel, &result.scene.views, &result.warnings);
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }

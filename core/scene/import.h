@@ -12,7 +12,15 @@
 
 namespace color3d {
 
-enum class SceneLayout { kPhotos, kColmap, kTransforms, kNerfies, kPosedFilms, kFilms };
+enum class SceneLayout {
+  kPhotos,
+  kColmap,
+  kTransforms,
+  kNerfies,
+  kPosesBounds,
+  kPosedFilms,
+  kFilms
+};
 
 // Which pairs of photos structure-from-motion matches: a planned few, with all as the way out when
 // those do not hang together, or all from the start.
@@ -64,10 +72,13 @@ struct ImportResult {
   std::vector<std::string> warnings;  // for the report; not sent to the observer
 };
 
-// `scene_folder` holds photos (directly or in images/), or a COLMAP model (sparse/0, sparse or the
-// folder itself; text or binary) with images/ and perhaps times.txt, or transforms.json with the
-// photos that it names, or what Nerfies and HyperNeRF have (metadata.json, camera/, rgb/). With
-// poses of several kinds, COLMAP's wins; a times.txt without a COLMAP model is warned of.
+// `scene_folder` holds photos (directly or in images/), perhaps with COLMAP models
+// (catalogue/pose_files.h says where; text or binary) and times.txt, or with transforms.json (or
+// Blender's transforms_train.json, ...), or with LLFF's poses_bounds.npy; or what Nerfies and
+// HyperNeRF have (metadata.json, camera/, rgb/). Of several models and kinds of poses the one is
+// used that places most photos, COLMAP's where others place no more, and which one is said; a
+// times.txt without a COLMAP model is warned of. Structure-from-motion runs only where none of them
+// can be used.
 // `scratch_folder` receives structure-from-motion's files and sfm.log. Throws Error: an empty
 // folder, one photo, unreadable photos, a model whose images are missing, masks that fit no photo
 // (photo_masks.h), non-finite numbers, photos that do not overlap (how many registered and why it

@@ -38,7 +38,8 @@ class Import : public testing::Test {
 };
 
 TEST_F(Import, BadInputsSayWhatIsWrong) {
-  EXPECT_THAT(Said(), HasSubstr("contains no photographs (" + ReadableImageFormats() + ")"));
+  EXPECT_THAT(Said(),
+              HasSubstr("the scene contains no photographs (" + ReadableImageFormats() + ")"));
   WriteFileAtomic(folder_.path() / "readme.txt", "hello");
   EXPECT_THAT(Said(), HasSubstr("contains no photographs"));
   WritePhoto("one.png");
@@ -79,8 +80,7 @@ TEST_F(Import, ColmapWinsOverTransforms) {
     EXPECT_EQ(result.photos_registered, 9);
     EXPECT_FALSE(result.undistorted);
     EXPECT_EQ(result.scene.points.size(), 50u);
-    ASSERT_EQ(result.warnings.size(), 1u);
-    EXPECT_THAT(result.warnings[0], HasSubstr("extra.png"));
+    EXPECT_THAT(result.warnings, testing::Contains(HasSubstr("extra.png")));
   }
 }
 

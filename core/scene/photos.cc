@@ -16,8 +16,6 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kPhotoFolders[] = {"images/", "input/", ""};
-
 bool StartsWith(const std::string& text, const std::string& prefix) {
   return text.compare(0, prefix.size(), prefix) == 0;
 }
@@ -92,27 +90,6 @@ void ProbePhoto(const fs::path& scene_folder, Photo* photo) {
   const PictureSize size = OrientedSize(info, photo->orientation);
   photo->width = size.width;
   photo->height = size.height;
-}
-
-std::string FindPhotoFile(const fs::path& scene_folder,
-                          const std::string& name,
-                          bool guess_extension) {
-  std::vector<std::string> names;
-  if (IsSafeRelativePath(name)) names.push_back(name);
-  const std::string last = name.substr(name.find_last_of("/\\") + 1);
-  if (last != name && IsSafeRelativePath(last)) names.push_back(last);
-  std::error_code error;
-  for (const std::string& candidate : names) {
-    for (const std::string folder : kPhotoFolders) {
-      const std::string file = folder + candidate;
-      if (HasImageExtension(file) && fs::is_regular_file(scene_folder / file, error)) return file;
-      if (!guess_extension || HasImageExtension(file)) continue;
-      for (const char* extension : {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".PNG", ".JPG"}) {
-        if (fs::is_regular_file(scene_folder / (file + extension), error)) return file + extension;
-      }
-    }
-  }
-  return "";
 }
 
 void FitViewToPhoto(const Photo& photo, View* view) {

@@ -33,13 +33,6 @@ std::vector<Photo> ListPhotos(const std::filesystem::path& scene_folder);
 // large (Error{kInvalidArgument} that names the file).
 void ProbePhoto(const std::filesystem::path& scene_folder, Photo* photo);
 
-// Finds the file for a name in a model: images/, input/, the folder itself, then by file name alone
-// in images/. An empty string when there is none. With `guess_extension`, names without one match
-// .png, .jpg, .jpeg, .tif, .tiff.
-std::string FindPhotoFile(const std::filesystem::path& scene_folder,
-                          const std::string& name,
-                          bool guess_extension);
-
 // Makes the view's captured camera (calibrated at any size, for the pixels as stored) fit the
 // photo: scaled when the photo is another size of the same shape, and turned with its EXIF
 // orientation. Then sets the undistorted camera. Throws Error{kInvalidArgument} naming both sizes

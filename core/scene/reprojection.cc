@@ -6,7 +6,6 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "core/base/error.h"
 #include "core/scene/lens.h"
 
 namespace color3d {
@@ -48,12 +47,7 @@ std::vector<CameraReprojection> MeasureReprojection(const ColmapModel& model) {
     camera.camera_id = image.camera_id;
     camera.photos.push_back(image.name);
     for (const ColmapObservation& observation : image.observations) {
-      if (observation.point_id < 0) continue;
-      if (!observation.pixel.allFinite()) {
-        throw InvalidArgument("image {} has an observation of point {} that is not finite",
-                              image.name,
-                              observation.point_id);
-      }
+      if (observation.point_id < 0 || !observation.pixel.allFinite()) continue;
       const auto found = point_of.find(observation.point_id);
       if (found == point_of.end()) continue;
       const double distance = DistancePx(model.cameras.at(image.camera_id),

@@ -19,8 +19,8 @@ struct CameraReprojection {
   double median_px = 0.0;
 };
 
-// One entry per camera that some image uses, by number. Throws Error{kInvalidArgument} naming the
-// photo for an observation that is not finite.
+// One entry per camera that some image uses, by number. Observations that are not finite do not
+// count.
 std::vector<CameraReprojection> MeasureReprojection(const ColmapModel& model);
 
 // A warning for each camera whose median is above 2 px, or above four times the other cameras'

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/files.h"
+#include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 #include "server/planning/scene_facts.h"
@@ -73,35 +74,23 @@ std::string Folder(const std::string& path) {
   return slash == std::string::npos ? "" : path.substr(0, slash);
 }
 
-// Folders that hold some file of a COLMAP model, with the stems that are there.
-std::map<std::string, std::set<std::string>> ModelFolders(
-    const std::vector<SceneFileRecord>& files) {
-  static const std::set<std::string> kNames = {
-      "cameras.bin", "cameras.txt", "images.bin", "images.txt", "points3D.bin", "points3D.txt"};
-  std::map<std::string, std::set<std::string>> folders;
-  for (const SceneFileRecord& file : files) {
-    const std::string name = BaseName(file.path);
-    if (kNames.count(name) > 0) folders[Folder(file.path)].insert(name);
-  }
-  return folders;
+std::vector<ColmapPlace> ModelPlaces(const std::vector<SceneFileRecord>& files) {
+  std::vector<std::string> paths;
+  for (const SceneFileRecord& file : files) paths.push_back(file.path);
+  return ColmapPlaces(paths);
 }
 
-bool IsWholeModel(const std::set<std::string>& names) {
-  for (const char* ending : {".bin", ".txt"}) {
-    bool whole = true;
-    for (const char* stem : {"cameras", "images", "points3D"}) {
-      whole = whole && names.count(std::string(stem) + ending) > 0;
-    }
-    if (whole) return true;
-  }
-  return false;
+bool IsTransforms(const std::string& path) {
+  return path == BaseName(path) && IsTransformsFile(path);
 }
 
 // Empty: it is one.
-std::string WhyNoTransforms(std::string_view bytes) {
+std::string WhyNoTransforms(const std::string& path, std::string_view bytes) {
   const TransformsOutline outline = OutlineOfTransforms(bytes);
+  if (!outline.error.empty()) return "is not JSON: " + outline.error;
   if (!outline.is_object) return "is not a JSON object";
-  return outline.frames == 0 ? "has no \"frames\"" : "";
+  const bool needs_frames = path == kTransformsFile || path == kBlenderFiles[0];
+  return outline.frames == 0 && needs_frames ? "has no \"frames\"" : "";
 }
 
 // Of a scene without photographs.
@@ -168,7 +157,7 @@ FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, bool is_t
   if (!mapped.is_readable()) {
     return {file.path, "cannot be read from the server's disk; upload it again"};
   }
-  if (is_transforms) return {file.path, WhyNoTransforms(mapped.bytes())};
+  if (is_transforms) return {file.path, WhyNoTransforms(file.path, mapped.bytes())};
   try {
     ImageLimits image_limits;
     image_limits.max_pixels = limits_.max_pixels_per_image;
@@ -187,7 +176,7 @@ void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* ch
     return refuse(fmt::format("was not uploaded (blob {})", file.digest.sha256));
   }
   const bool is_photo = HasImageExtension(file.path);
-  const bool is_transforms = BaseName(file.path) == "transforms.json";
+  const bool is_transforms = IsTransforms(file.path);
   const bool is_augmentation = IsAugmentFile(file.path), is_mask = IsMaskFile(file.path);
   if (is_mask && !is_photo) return refuse("is no picture (PNG); remove it from masks/");
   if (is_augmentation && !is_photo) {
@@ -306,16 +295,16 @@ StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
   }
   // Several films are several cameras', whose poses a file beside them may tell.
   if (!has_photos && CountFilms(files) > 1) {
-    if (HasFile(files, "transforms.json")) return StoredLayout::kTransforms;
-    if (HasFile(files, "poses_bounds.npy")) return StoredLayout::kPosesBounds;
+    if (HasFile(files, std::string(kTransformsFile))) return StoredLayout::kTransforms;
+    if (HasFile(files, std::string(kPosesBoundsFile))) return StoredLayout::kPosesBounds;
     return StoredLayout::kFilms;
   }
   if (!has_photos && CountFilms(files) > 0) return StoredLayout::kFilm;
   if (!has_photos && CountSplats(files) > 0) return StoredLayout::kSplat;
-  if (!ModelFolders(files).empty()) return StoredLayout::kColmap;
+  if (!ModelPlaces(files).empty()) return StoredLayout::kColmap;
   if (HasNerfiesCameras(files)) return StoredLayout::kNerfies;
   for (const SceneFileRecord& file : files) {
-    if (BaseName(file.path) == "transforms.json") return StoredLayout::kTransforms;
+    if (IsTransforms(file.path)) return StoredLayout::kTransforms;
   }
   return StoredLayout::kPhotos;
 }
@@ -332,13 +321,9 @@ SceneCheck CheckScene(const SceneRecord& scene,
   FileChecks checks(blobs, limits, is_cancelled);
   std::vector<FieldViolation>& violations = checks.violations;
   check.layout = DetectLayout(scene.files);
-  const auto folders = ModelFolders(scene.files);
-  const bool has_model = std::any_of(folders.begin(), folders.end(), [](const auto& folder) {
-    return IsWholeModel(folder.second);
-  });
-  if (!folders.empty() && !has_model) {
-    const auto& [folder, names] = *folders.begin();
-    violations.push_back({folder.empty() ? *names.begin() : folder + "/" + *names.begin(),
+  const std::vector<ColmapPlace> models = ModelPlaces(scene.files);
+  if (!models.empty() && !models[0].whole) {
+    violations.push_back({models[0].files[0],
                           "belongs to a COLMAP model that is not whole: cameras, images and "
                           "points3D are needed, all .bin or all .txt"});
   }

@@ -114,6 +114,39 @@ TEST_F(SceneValidationTest, LayoutsAreRecognised) {
               HasSubstr("transforms.json"));
 }
 
+TEST_F(SceneValidationTest, PosesAreRecognisedWhereverTheImportReadsThem) {
+  v1::Scene scene;
+  std::vector<std::pair<std::string, std::string>> photos = {{"images/a.png", TinyPng()},
+                                                             {"images/b.png", TinyPng()}};
+  for (const std::string folder : {"sparse/1/", "colmap/sparse/0/", "mine/"}) {
+    auto files = photos;
+    for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"}) {
+      files.emplace_back(folder + name, "1");
+    }
+    ASSERT_TRUE(Commit(files, &scene).ok()) << folder;
+    EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_COLMAP) << folder;
+  }
+  // A whole model makes up for parts of another.
+  auto files = photos;
+  for (const char* name : {"sparse/0/cameras.bin",
+                           "sparse/1/cameras.bin",
+                           "sparse/1/images.bin",
+                           "sparse/1/points3D.bin"}) {
+    files.emplace_back(name, "1");
+  }
+  EXPECT_TRUE(Commit(files, &scene).ok());
+  files = photos;
+  files.emplace_back("transforms_train.json", R"({"frames": [{"file_path": "a"}, NaN,]})");
+  files.emplace_back("transforms_test.json", R"({"frames": []})");
+  files.emplace_back("points3d.ply", "ply");
+  ASSERT_TRUE(Commit(files, &scene).ok());
+  EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_TRANSFORMS);
+  files = photos;
+  files.emplace_back("transforms.json", "{\n\"frames\": oops}");
+  EXPECT_THAT(Commit(files, &scene).error_message(),
+              HasSubstr("transforms.json is not JSON: parse error at line 2"));
+}
+
 TEST_F(SceneValidationTest, TimesGoWithAColmapModel) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"images/a.png", TinyPng()},

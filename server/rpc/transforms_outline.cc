@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/base/json_text.h"
+
 namespace color3d {
 namespace {
 
@@ -28,9 +30,13 @@ class Outliner : public nlohmann::json_sax<json> {
   bool start_array(std::size_t) override { return Open(true); }
   bool end_object() override { return Close(); }
   bool end_array() override { return Close(); }
-  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
+  bool parse_error(std::size_t,
+                   const std::string&,
+                   const nlohmann::detail::exception& error) override {
+    error_ = JsonErrorText(error.what());
     return false;
   }
+  const std::string& error() const { return error_; }
   const TransformsOutline& outline() const { return outline_; }
 
  private:
@@ -52,6 +58,7 @@ class Outliner : public nlohmann::json_sax<json> {
   }
 
   TransformsOutline outline_;
+  std::string error_;
   int depth_ = 0;
   bool at_frames_ = false;
   bool in_frames_ = false;
@@ -61,8 +68,10 @@ class Outliner : public nlohmann::json_sax<json> {
 
 TransformsOutline OutlineOfTransforms(std::string_view json_text) {
   Outliner outliner;
-  const bool good = json::sax_parse(json_text.begin(), json_text.end(), &outliner);
-  return good ? outliner.outline() : TransformsOutline();
+  if (json::sax_parse(PlainJson(json_text), PlainJson(), &outliner)) return outliner.outline();
+  TransformsOutline none;
+  none.error = outliner.error();
+  return none;
 }
 
 }  // namespace color3d

@@ -26,6 +26,18 @@ TEST(TransformsOutline, WhatIsNoObjectIsSaid) {
   }
 }
 
+TEST(TransformsOutline, WhatIsNotWellFormedIsNamedByLine) {
+  EXPECT_NE(OutlineOfTransforms("{\n\"frames\": [1 2]}").error.find("line 2"), std::string::npos);
+  EXPECT_EQ(OutlineOfTransforms("[1]").error, "");
+}
+
+TEST(TransformsOutline, WhatOtherProgramsWriteIsRead) {
+  const TransformsOutline outline =
+      OutlineOfTransforms("\xef\xbb\xbf{\"frames\": [{\"a\": NaN,}, {\"a\": -Infinity},],}");
+  EXPECT_TRUE(outline.is_object);
+  EXPECT_EQ(outline.frames, 2);
+}
+
 TEST(TransformsOutline, MemoryDoesNotGrowWithTheFile) {
 #ifdef __SANITIZE_THREAD__
   GTEST_SKIP() << "most of the memory is ThreadSanitizer's";

@@ -17,6 +17,7 @@
 #include "server/planning/stage_key.h"
 #include "server/service_error.h"
 #include "server/worker/blob_checkpoints.h"
+#include "server/worker/told_paths.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -96,7 +97,7 @@ class Attempt {
   bool JoinEqual();
   void Compute();
   void Publish(const StageOutput& output);
-  void HandleError(const JobError& error);
+  void HandleError(const JobError& found);
   JobError OutOfMemory(const std::exception& e) const;
   // Writes the end of an attempt that was told to stop; false when there was no such order.
   void Conclude(JobStore& store, StopReason reason, const JobError& error);
@@ -344,7 +345,12 @@ void Attempt::LogEnd(const char* how) {
                ResidentMemoryBytes() >> 20);
 }
 
-void Attempt::HandleError(const JobError& error) {
+void Attempt::HandleError(const JobError& found) {
+  const JobError error{
+      found.code,
+      found.reason,
+      WithoutFolders(found.message, {run_.scene_folder, scratch_, context_.paths.root})};
+  if (error.message != found.message) spdlog::warn("{} {}", tag_, found.message);
   keeper_.Stop();
   // The stage may learn of a lost lease (saving a checkpoint) before the heartbeat does.
   const bool lost = error.reason == "LEASE_LOST";

@@ -84,10 +84,18 @@ std::vector<std::string> FuzzSeeds() {
                                     uint64_t{1},
                                     uint32_t{1},
                                     uint32_t{0});
+  // With a mark, a line a photo, numbers that are not whole, and one beyond a double's.
+  const std::array<std::string, 3> foreign = {
+      "\xef\xbb\xbf# comment\n1.0 PINHOLE 640.0 480.0 500 500 320 240\n",
+      "1 1 0 0 0 0.5 0 1 1 l\\a.jpg\n2 1 0 0 0 0 0 2 1 0002\nnan 20 18446744073709551615\n",
+      "1 0.5 0.25 4 154.0 128.0 1e2 nan 1 0 2 0.0\n2 0 0 1\n"};
   return {Input(false, text),
+          Input(false, foreign),
           Input(true, {cameras, images, points}),
           Input(true, {"", "", ""}),
           Times("# comment\n\n0 l/a b.jpg\r\n0 r/a.jpg\n+0.04 l/c.jpg\n"),
+          Times("\xef\xbb\xbf"
+                "0 l\\a.jpg\n1 b\n"),
           Times("-1e308 a\n1e308 b\nnan c\n")};
 }
 

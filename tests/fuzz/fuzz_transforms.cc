@@ -44,6 +44,10 @@ std::vector<std::string> FuzzSeeds() {
           R"({"camera_angle_x": 0.7, "k1": 0.01, "camera_model": "OPENCV", "frames": [)"
           R"({"file_path": "a", "time": 0.5, "camera": "c", "transform_matrix": )" +
               pose + R"(}, {"fl_x": 1e3, "cx": 3, "cy": 4, "transform_matrix": [[2,0,0,1]]}]})",
+          "\xef\xbb\xbf"
+          R"({"fl_x": 500, "aabb": [NaN, -Infinity, 1e999,], "frames": [)"
+          R"({"file_path": "images\\a.jpg", "transform_matrix": )" +
+              pose + ",},],}",
           R"({"frames": []})",
           R"({"a": {"frames": [1]}, "frames": 7})",
           std::string(2000, '['),

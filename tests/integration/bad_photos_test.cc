@@ -120,10 +120,13 @@ TEST_F(BadPhotosTest, PhotoOfAnotherShapeThanItsCamera) {
   ExpectRefusal(Colorize(room), 2, {"view002.png", "120", "160"});
 }
 
-TEST_F(BadPhotosTest, ModelWhosePhotoIsMissing) {
+TEST_F(BadPhotosTest, ModelWhosePhotosAreMissing) {
   const fs::path room = PosedRoom();
-  fs::rename(room / "images" / "view001.png", room / "images" / "other.png");
-  ExpectRefusal(Colorize(room), 2, {"view001.png"});
+  for (const std::string view : {"1", "2", "3"}) {
+    fs::rename(room / "images" / ("view00" + view + ".png"),
+               room / "images" / ("x" + view + ".png"));
+  }
+  ExpectRefusal(Colorize(room), 2, {"view001.png", "1 are among those given"});
 }
 
 TEST_F(BadPhotosTest, NotANumberInThePoints) {

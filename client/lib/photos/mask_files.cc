@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cctype>
 #include <map>
 
 #include "client/lib/photos/passed_over_files.h"
@@ -18,6 +20,13 @@ namespace {
 std::vector<std::string> MaskNames(std::string photo) {
   if (photo.starts_with("images/")) photo.erase(0, 7);
   return {photo + ".png", fs::path(photo).replace_extension(".png").generic_string()};
+}
+
+std::string LowerCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return text;
 }
 
 std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
@@ -44,32 +53,53 @@ void AddMasks(const fs::path& masks, PhotoFolder* folder) {
     throw InvalidArgument("--masks {}: there is no such folder", masks.string());
   }
   std::map<std::string, const LocalFile*> photo_of;
+  std::multimap<std::string, const LocalFile*> photo_of_lower_case;
   for (const LocalFile& photo : folder->photos) {
-    for (const std::string& name : MaskNames(photo.path)) photo_of.emplace(name, &photo);
+    for (const std::string& name : MaskNames(photo.path)) {
+      photo_of.emplace(name, &photo);
+      photo_of_lower_case.emplace(LowerCase(name), &photo);
+    }
   }
   std::map<const LocalFile*, std::string> mask_of;
+  std::vector<std::string> unused;
   for (const std::string& file : ListFiles(masks)) {
     if (IsSystemPath(file)) continue;
-    const auto photo = photo_of.find(file);
-    if (photo == photo_of.end()) {
-      throw InvalidArgument(
-          "--masks: {} is the mask of no photo; masks are PNG files called like their photos "
-          "(a.png or a.jpg.png for a.jpg)",
-          (masks / file).string());
+    const auto exact = photo_of.find(file);
+    const LocalFile* photo = exact != photo_of.end() ? exact->second : nullptr;
+    if (photo == nullptr && photo_of_lower_case.count(LowerCase(file)) == 1) {
+      photo = photo_of_lower_case.find(LowerCase(file))->second;
     }
-    const auto [other, is_first] = mask_of.emplace(photo->second, file);
+    if (photo == nullptr) {
+      unused.push_back((masks / file).string());
+      continue;
+    }
+    const auto [other, is_first] = mask_of.emplace(photo, file);
     if (!is_first) {
       throw InvalidArgument(
-          "--masks: {} has two masks, {} and {}", photo->second->path, other->second, file);
+          "--masks: {} has two masks, {} and {}", photo->path, other->second, file);
     }
-    RequireSizeOf(masks / file, photo->second->file);
+    RequireSizeOf(masks / file, photo->file);
     folder->mask_files.push_back({"masks/" + file, masks / file});
+  }
+  if (folder->mask_files.empty() && !unused.empty()) {
+    throw InvalidArgument(
+        "--masks: {} is the mask of no photo; masks are PNG files called like their photos "
+        "(a.png or a.jpg.png for a.jpg)",
+        unused[0]);
   }
   if (folder->mask_files.empty()) {
     throw InvalidArgument("--masks {}: there is no mask in it", masks.string());
   }
   folder->notes.push_back(
       fmt::format("{} of {} photos have masks", mask_of.size(), folder->photos.size()));
+  if (!unused.empty()) {
+    folder->notes.push_back(
+        fmt::format("{} of {} masks are of no photo and were left out (e.g. {}); masks are called "
+                    "like their photos (a.png or a.jpg.png for a.jpg)",
+                    unused.size(),
+                    unused.size() + mask_of.size(),
+                    unused[0]));
+  }
   constexpr size_t kMaxFiles = 10'000;
   if (folder->AllFiles().size() > kMaxFiles) {
     throw InvalidArgument("photos and masks are {} files; at most {} make up a scene",

@@ -58,6 +58,16 @@ TEST_F(MaskFilesTest, GoAlongUnderEitherName) {
   EXPECT_THAT(folder.notes, ::testing::Contains("2 of 3 photos have masks"));
 }
 
+TEST_F(MaskFilesTest, MasksOfPhotosThatWereThrownAwayAreLeftOutWithANote) {
+  WriteMask("A.PNG");
+  WriteMask("gone.png");
+  PhotoFolder folder = CollectPhotos(root());
+  AddMasks(masks(), &folder);
+  ASSERT_EQ(folder.mask_files.size(), 1u);
+  EXPECT_EQ(folder.mask_files[0].path, "masks/A.PNG");
+  EXPECT_THAT(folder.notes, ::testing::Contains(HasSubstr("1 of 2 masks are of no photo")));
+}
+
 TEST_F(MaskFilesTest, WhatIsNoMaskOfAPhotoIsRefusedByName) {
   EXPECT_THAT(ErrorOf(), HasSubstr("no such folder"));
   fs::create_directories(masks());

@@ -1,10 +1,11 @@
 #include "client/lib/photos/photo_folder.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "client/lib/names.h"
+#include "client/lib/photos/file_kind.h"
+#include "client/lib/photos/model_files.h"
 #include "client/lib/photos/passed_over_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
@@ -19,24 +20,8 @@ namespace {
 
 constexpr size_t kMaxFiles = 10'000;
 constexpr size_t kMaxPathBytes = 1024;
-constexpr char kImages[] = "images";
 constexpr char kAugment[] = "augment";
-constexpr char kTransforms[] = "transforms.json";
-constexpr char kPosesBounds[] = "poses_bounds.npy";
-constexpr const char* kNerfiesFiles[] = {
-    "metadata.json", "dataset.json", "scene.json", "points.npy"};
 constexpr const char* kNerfiesPictures[] = {"rgb/2x", "rgb/1x", "rgb/4x", "rgb/8x"};
-constexpr const char* kModelFolders[] = {"sparse/0", "sparse", ""};
-constexpr const char* kModelStems[] = {"cameras", "images", "points3D"};
-
-bool IsFile(const fs::path& path) {
-  std::error_code none;
-  return fs::is_regular_file(path, none);
-}
-bool IsFolder(const fs::path& path) {
-  std::error_code none;
-  return fs::is_directory(path, none);
-}
 
 void RequireFolder(const fs::path& root) {
   if (IsFolder(root)) return;
@@ -62,33 +47,17 @@ void AddPhotos(const fs::path& root,
   }
 }
 
-// Subfolders of `root` that hold photos which transforms.json names.
-std::set<std::string> NamedFolders(const fs::path& transforms) {
-  nlohmann::json root;
-  try {
-    root = nlohmann::json::parse(ReadFile(transforms));
-  } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument("{} is not JSON: {}", transforms.string(), e.what());
+// The photos below `root`/`folder`, if there is such a folder, as images/ of the scene.
+void AddPhotosAsImages(const fs::path& root,
+                       const std::string& folder,
+                       PhotoFolder* result,
+                       PassedOver* passed_over) {
+  if (folder.empty()) return;
+  const size_t before = result->photos.size();
+  AddPhotos(root, folder, /*with_subfolders=*/true, result, passed_over);
+  for (size_t i = before; i < result->photos.size(); ++i) {
+    result->photos[i].path = "images/" + result->photos[i].path.substr(folder.size() + 1);
   }
-  std::set<std::string> folders;
-  if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
-    throw InvalidArgument("{} has no \"frames\"", transforms.string());
-  }
-  for (const nlohmann::json& frame : root["frames"]) {
-    if (!frame.is_object() || !frame.contains("file_path")) continue;
-    if (!frame["file_path"].is_string()) continue;
-    std::string path = frame["file_path"].get<std::string>();
-    while (path.starts_with("./")) path.erase(0, 2);
-    const size_t slash = path.rfind('/');
-    if (slash == std::string::npos) continue;
-    const std::string folder = path.substr(0, slash);
-    if (IsSafeRelativePath(folder)) folders.insert(folder);
-  }
-  return folders;
-}
-
-bool IsNerfies(const fs::path& root) {
-  return IsFile(root / kNerfiesFiles[0]) && IsFolder(root / "camera") && IsFolder(root / "rgb");
 }
 
 void CollectNerfies(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
@@ -96,22 +65,14 @@ void CollectNerfies(const fs::path& root, PhotoFolder* result, PassedOver* passe
     if (!result->photos.empty() || !IsFolder(root / folder)) continue;
     AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
   }
-  for (const char* file : kNerfiesFiles) {
-    if (IsFile(root / file)) result->model_files.push_back({file, root / file});
-  }
-  for (const std::string& file : ListFiles(root / "camera")) {
-    if (file.ends_with(".json")) {
-      result->model_files.push_back({"camera/" + file, root / "camera" / file});
-    }
-  }
+  AddNerfiesFiles(root, &result->model_files);
 }
 
 // Films directly in `root` and in the folders that transforms.json names, and the file that tells
 // where their cameras stand, if there is one. Nothing when there is only one film.
 void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
-  const bool has_transforms = IsFile(root / kTransforms);
   std::set<std::string> folders = {""};
-  if (has_transforms) folders.merge(NamedFolders(root / kTransforms));
+  folders.merge(FoldersThatTransformsNames(root));
   std::vector<LocalFile> films;
   std::error_code none;
   for (const std::string& folder : folders) {
@@ -127,9 +88,6 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
     return x.path < y.path;
   });
   result->camera_films = std::move(films);
-  if (!has_transforms && IsFile(root / kPosesBounds)) {
-    result->model_files.push_back({kPosesBounds, root / kPosesBounds});
-  }
 }
 
 // Folders of pictures in `root`, two or more: each camera's frames.
@@ -149,60 +107,20 @@ void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result, PassedOve
 }
 
 void CollectImages(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
-  if (IsNerfies(root)) return CollectNerfies(root, result, passed_over);
-  if (IsFolder(root / kImages)) {
-    AddPhotos(root, kImages, /*with_subfolders=*/true, result, passed_over);
-  }
+  if (IsNerfiesFolder(root)) return CollectNerfies(root, result, passed_over);
+  AddPhotosAsImages(root, ImagesFolder(root), result, passed_over);
   if (!result->photos.empty()) return;
   AddPhotos(root, "", /*with_subfolders=*/false, result, passed_over);
   std::vector<std::string> used;
-  if (IsFile(root / kTransforms)) {
-    for (const std::string& folder : NamedFolders(root / kTransforms)) {
-      used.push_back(folder.substr(0, folder.find('/')));
-      if (IsFolder(root / folder)) {
-        AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
-      }
+  for (const std::string& folder : FoldersThatTransformsNames(root)) {
+    used.push_back(folder.substr(0, folder.find('/')));
+    if (IsFolder(root / folder)) {
+      AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
     }
   }
-  if (!result->photos.empty()) AddUnusedNeighbors(root, used, passed_over);
+  if (!result->photos.empty()) return AddUnusedNeighbors(root, used, passed_over);
+  if (HasPoses(root)) AddPhotosAsImages(root, OnlyFolderOfPhotos(root), result, passed_over);
 }
-
-void CollectModel(const fs::path& root, PhotoFolder* result) {
-  std::vector<LocalFile> model;
-  for (const std::string folder : kModelFolders) {
-    std::vector<std::vector<LocalFile>> kinds;  // .bin, .txt
-    for (const char* ending : {".bin", ".txt"}) {
-      std::vector<LocalFile>& files = kinds.emplace_back();
-      for (const char* stem : kModelStems) {
-        const std::string name = std::string(stem) + ending;
-        const std::string path = folder.empty() ? name : folder + "/" + name;
-        if (IsFile(root / path)) files.push_back({path, root / path});
-      }
-    }
-    // One whole model; parts of one go to the server too, which says what is missing.
-    const bool whole_binary = kinds[0].size() == std::size(kModelStems);
-    const bool whole_text = kinds[1].size() == std::size(kModelStems);
-    if (whole_binary || !whole_text) model = kinds[0];
-    if (!whole_binary) {
-      model.insert(model.end(), kinds[1].begin(), kinds[1].end());
-    }
-    if (whole_text && !whole_binary) model = kinds[1];
-    if (!model.empty()) break;
-  }
-  result->model_files.insert(result->model_files.end(), model.begin(), model.end());
-  if (IsFile(root / kTransforms)) {
-    result->model_files.push_back({kTransforms, root / kTransforms});
-  }
-  if (!IsFile(root / kTimesFile)) return;
-  const std::string times(kTimesFile);
-  if (!model.empty()) {
-    result->model_files.push_back({times, root / times});
-  } else {
-    result->notes.push_back(
-        times + " is not read: it goes with a COLMAP model" +
-        (result->model_files.empty()
-             ? "; give one, or colour the frames of one moving camera with --film --poses"
-             : "; transforms.json and metadata.json have times of their own"));
   }
 }
 
@@ -250,10 +168,15 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames, const PassedOver& pa
   if (folder.splat || folder.film || !folder.camera_films.empty()) return;
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPictures(folder.root);
+    const std::string remedy =
+        sub.empty() ? ""
+        : HasPoses(folder.root)
+            ? "; the photos that its poses are of belong into " + (folder.root / "images").string()
+            : "; did you mean " + (folder.root / sub).string() + "?";
     throw InvalidArgument("{} contains no photographs ({}){}{}",
                           root,
                           ReadableImageFormats(),
-                          sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?",
+                          remedy,
                           passed_over.Clause());
   }
   if (folder.photos.size() == 1 && as_frames) {
@@ -335,7 +258,7 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   }
   if (result.photos.empty()) CollectCameraFilms(result.root, &result);
   if (!result.camera_films.empty()) {
-    CollectModel(result.root, &result);
+    CollectModelFiles(result.root, &result);
     CheckNames(result);
     AddNotes(passed_over, &result);
     return result;
@@ -344,7 +267,7 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   if (result.photos.empty() && !result.splat) {
     result.film = FindOnly(result.root, HasFilmExtension, "film");
   }
-  if (!result.splat && !result.film) CollectModel(result.root, &result);
+  if (!result.splat && !result.film) CollectModelFiles(result.root, &result);
   CollectAugmentFiles(result.root, &result);
   const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
   std::sort(result.photos.begin(), result.photos.end(), by_path);
@@ -353,9 +276,12 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   CheckCounts(result, as_frames, passed_over);
   CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
-  if (result.model_files.empty() && IsFolder(parent / "sparse")) {
-    result.notes.push_back("the poses in " + (parent / "sparse").string() +
-                           " are not used; to use them, give " + parent.string());
+  if (result.model_files.empty() && !result.splat && !result.film) {
+    const std::string poses = PosesBeside(parent);
+    if (!poses.empty()) {
+      result.notes.push_back("the poses in " + poses + " are not used; to use them, give " +
+                             parent.string());
+    }
   }
   AddNotes(passed_over, &result);
   return result;

@@ -31,18 +31,19 @@ struct PhotoFolder {
   std::string Name() const;
 };
 
-// Photos (endings of HasImageExtension) are taken from images/, at any depth, when there is one
-// with photos; else from `root` itself and from the subfolders that transforms.json names. Also
-// taken: a COLMAP model in sparse/0, sparse or `root` with the times.txt in `root`,
-// transforms.json, and everything in augment/ (any depth). Of a folder of Nerfies or HyperNeRF:
+// Photos (endings of HasImageExtension) are taken from images/ (in any case of letters), at any
+// depth, when there is one with photos; else from `root` itself and from the subfolders that
+// transforms.json names; else, beside files that tell poses, from the only subfolder with photos.
+// Also taken: the COLMAP models that catalogue/pose_files.h lists with the times.txt in `root`,
+// transforms.json (or Blender's transforms_train.json and its like) with its file of points,
+// poses_bounds.npy, and everything in augment/ (any depth). Of a folder of Nerfies or HyperNeRF:
 // metadata.json, camera/, points.npy and the pictures of one size, rgb/2x/, else 1x, 4x, 8x.
-// Nothing else, but for a splat
-// (.ply .sog .spz) or a film (.mp4 .mov ...): `root` itself, or the only one in a folder without
-// photos; or several films, with a transforms.json that names them or a poses_bounds.npy, if there
-// is one. Notes say what was passed over (passed_over_files.h). `as_frames`: TakeAsFrames follows;
-// folders of pictures directly in `root` are taken, too, and what is wrong is told of frames.
-// Throws Error: no such folder, another file instead of a folder, no photos, one photo, more than
-// 10,000 files, names that are not safe or not UTF-8.
+// Nothing else, but for a splat (.ply .sog .spz) or a film (.mp4 .mov ...): `root` itself, or the
+// only one in a folder without photos; or several films, with a transforms.json that names them or
+// a poses_bounds.npy, if there is one. Notes say what was passed over (passed_over_files.h).
+// `as_frames`: TakeAsFrames follows; folders of pictures directly in `root` are taken, too, and
+// what is wrong is told of frames. Throws Error: no such folder, another file instead of a folder,
+// no photos, one photo, more than 10,000 files, names that are not safe or not UTF-8.
 PhotoFolder CollectPhotos(const std::filesystem::path& root, bool as_frames = false);
 
 // The photos as frames of a film, in the order of their names (numbers count as numbers), or of

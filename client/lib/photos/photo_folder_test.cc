@@ -127,7 +127,6 @@ TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {
   for (const char* stem : {"cameras", "images", "points3D"}) {
     Write(std::string("sparse/0/") + stem + ".txt");
     Write(std::string("sparse/0/") + stem + ".bin");
-    Write(std::string("sparse/") + stem + ".txt");
   }
   Write("sparse/0/project.ini");
   EXPECT_THAT(Paths(CollectPhotos(root()).model_files),

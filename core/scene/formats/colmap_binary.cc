@@ -131,7 +131,7 @@ std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
     point.position = Eigen::Vector3d(xyz[0], xyz[1], xyz[2]);
     uint8_t rgb[3];
     cursor.ReadInto(rgb);
-    point.error_px = cursor.Read<double>();
+    point.error_px = KnownError(cursor.Read<double>());
     CheckColmapPoint(point, fmt::format("{}: point {}", cursor.name(), id));
     const uint64_t track = cursor.ReadCount(8, "track elements");
     point.image_ids.reserve(track);

@@ -130,10 +130,9 @@ void CheckColmapPoint(const ColmapPoint& point, const std::string& place) {
     if (std::isnan(v)) throw InvalidArgument("{} has a NaN coordinate", place);
     if (std::isinf(v)) throw InvalidArgument("{} has an infinite coordinate", place);
   }
-  if (!std::isfinite(point.error_px)) {
-    throw InvalidArgument("{} has an error that is not finite", place);
-  }
 }
+
+double KnownError(double error_px) { return std::isfinite(error_px) ? error_px : -1.0; }
 
 bool IsColmapFolder(const fs::path& folder) {
   std::error_code error;
@@ -143,19 +142,21 @@ bool IsColmapFolder(const fs::path& folder) {
 
 ColmapModel LoadColmapModel(const fs::path& folder) {
   std::error_code error;
-  const bool binary = fs::is_regular_file(folder / "cameras.bin", error);
-  if (!binary && !fs::is_regular_file(folder / "cameras.txt", error)) {
-    throw Error(ErrorCode::kNotFound,
-                "{} holds no COLMAP model (cameras.bin or cameras.txt)",
-                folder.string());
-  }
-  for (const char* part : {"images", "points3D"}) {
-    const std::string file = std::string(part) + (binary ? ".bin" : ".txt");
-    if (!fs::is_regular_file(folder / file, error)) {
-      throw InvalidArgument("the COLMAP model in {} has no {}", folder.string(), file);
+  const auto missing = [&](const std::string& ending) -> std::string {
+    for (const char* part : {"cameras", "images", "points3D"}) {
+      if (!fs::is_regular_file(folder / (part + ending), error)) return part + ending;
     }
+    return "";
+  };
+  const std::string of_binary = missing(".bin"), of_text = missing(".txt");
+  const bool binary = of_binary.empty() || fs::is_regular_file(folder / "cameras.bin", error);
+  if (!binary && !fs::is_regular_file(folder / "cameras.txt", error)) {
+    throw Error(ErrorCode::kNotFound, "there is no COLMAP model (cameras.bin or cameras.txt)");
   }
-  ColmapModel model = binary ? LoadColmapBinary(folder) : LoadColmapText(folder);
+  if (!of_binary.empty() && !of_text.empty()) {
+    throw InvalidArgument("the COLMAP model has no {}", binary ? of_binary : of_text);
+  }
+  ColmapModel model = of_binary.empty() ? LoadColmapBinary(folder) : LoadColmapText(folder);
   for (const auto& [id, image] : model.images) {
     if (model.cameras.count(image.camera_id) == 0) {
       throw InvalidArgument("image {} refers to camera {}, which the model does not have",

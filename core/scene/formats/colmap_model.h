@@ -47,7 +47,7 @@ struct ColmapModel {
 // True when the folder has a cameras.bin or cameras.txt.
 bool IsColmapFolder(const std::filesystem::path& folder);
 
-// Binary when there is a cameras.bin, else text. Throws Error{kInvalidArgument} naming file and
+// Binary where all three files are, else text. Throws Error{kInvalidArgument} naming file and
 // place for anything that is cut short, inconsistent or not finite.
 ColmapModel LoadColmapModel(const std::filesystem::path& folder);
 
@@ -66,6 +66,8 @@ Pose MakeColmapPose(const double (&qvec_wxyz)[4],
 // Refuses control characters, which would break lines of messages and logs.
 void CheckColmapName(const std::string& name, const std::string& place);
 void CheckColmapPoint(const ColmapPoint& point, const std::string& place);
+// -1, unknown, for a reprojection error that is not finite.
+double KnownError(double error_px);
 
 ColmapModel LoadColmapBinary(const std::filesystem::path& folder);
 ColmapModel LoadColmapText(const std::filesystem::path& folder);

@@ -1,52 +1,66 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/scene/formats/colmap_model.h"
+#include "core/scene/formats/named_files.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/frame_times.h"
 #include "core/scene/photos.h"
 #include "core/scene/reprojection.h"
+#include "core/scene/sparse_cloud.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-std::string FirstThree(const std::vector<std::string>& names) {
-  std::string text;
-  for (size_t i = 0; i < std::min<size_t>(names.size(), 3); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return text + (names.size() > 3 ? ", ..." : "");
-}
-
-void ThrowMissing(const std::vector<std::string>& missing, size_t total, const fs::path& folder) {
-  throw InvalidArgument(
-      "{} of the {} photos that the COLMAP model names are not in {} ({}); put them there",
-      missing.size(),
-      total,
-      (folder / "images").string(),
-      FirstThree(missing));
-}
+// A model's views before their photos are looked at; image numbers by view.
+struct NamedViews {
+  std::vector<uint32_t> images;
+  std::vector<std::string> files;    // relative to the scene's folder, one for each image
+  std::vector<std::string> missing;  // names of photos that are not there
+};
 
 // The views' moments, where a file tells times.
-FrameMoments ReadMoments(const fs::path& scene_folder, const std::vector<View>& views) {
+FrameMoments ReadMoments(const fs::path& scene_folder,
+                         const NamedFiles& photos,
+                         const std::vector<View>& views) {
   FrameMoments none;
   none.moments.resize(views.size());
   std::error_code error;
   if (!fs::is_regular_file(scene_folder / kTimesFile, error)) return none;
-  const std::map<std::string, FrameTime> times = LoadColmapTimes(scene_folder / kTimesFile);
+  std::map<std::string, FrameTime> time_of_file;
+  {
+    const std::map<std::string, FrameTime> times = LoadColmapTimes(scene_folder / kTimesFile);
+    std::vector<std::string> names;
+    for (const auto& [name, time] : times) names.push_back(name);
+    const std::vector<std::string> files = photos.Find(names);
+    for (size_t i = 0; i < names.size(); ++i) {
+      const FrameTime& time = times.at(names[i]);
+      const auto [other, fresh] = time_of_file.emplace(files[i], time);
+      if (fresh || files[i].empty()) continue;
+      throw InvalidArgument("{}: {} has a time already ({}); remove one of the two lines",
+                            time.place,
+                            names[i],
+                            other->second.place);
+    }
+    time_of_file.erase("");
+  }
   std::vector<FrameTime> frames;
   std::vector<std::string> without;
   for (const View& view : views) {
-    const auto time = times.find(view.name);
-    if (time != times.end()) {
+    const auto time = time_of_file.find(view.image_file);
+    if (time != time_of_file.end()) {
       frames.push_back(time->second);
+      frames.back().file = view.name;
     } else {
       without.push_back(view.name);
     }
@@ -55,7 +69,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder, const std::vector<View>& 
     none.note = fmt::format(
         "{} names no photo as the COLMAP model does ({}): the scene is taken to stand still",
         kTimesFile,
-        FirstThree(without));
+        SomeOf(without, 3));
     return none;
   }
   if (!without.empty()) {
@@ -65,10 +79,148 @@ FrameMoments ReadMoments(const fs::path& scene_folder, const std::vector<View>& 
         kTimesFile,
         without.size(),
         views.size(),
-        FirstThree(without),
+        SomeOf(without, 3),
         frames[0].file);
   }
   return MomentsOf(frames);
+}
+
+// In the order of their photos' names, so that it does not depend on the numbers that COLMAP gave.
+NamedViews NamesOf(const ColmapModel& model, const NamedFiles& photos) {
+  std::vector<std::pair<std::string, uint32_t>> order;
+  for (const auto& [id, image] : model.images) order.emplace_back(image.name, id);
+  std::sort(order.begin(), order.end());
+  std::vector<std::string> names;
+  for (size_t i = 0; i < order.size(); ++i) {
+    std::string name = order[i].first;
+    std::replace(name.begin(), name.end(), '\\', '/');
+    while (name.starts_with("./")) name.erase(0, 2);
+    if (!IsSafeRelativePath(name)) {
+      throw InvalidArgument(
+          "the COLMAP model names a photo \"{}\"; names must be relative paths without '..'",
+          order[i].first);
+    }
+    if (i > 0 && order[i].first == order[i - 1].first) {
+      throw InvalidArgument("the COLMAP model names the photo {} twice", name);
+    }
+    names.push_back(std::move(name));
+  }
+  NamedViews named;
+  const std::vector<std::string> files = photos.Find(names);
+  std::map<std::string, std::string> name_of_file;
+  for (size_t i = 0; i < order.size(); ++i) {
+    if (files[i].empty()) {
+      named.missing.push_back(order[i].first);
+      continue;
+    }
+    const auto [other, fresh] = name_of_file.emplace(files[i], order[i].first);
+    if (!fresh) {
+      throw InvalidArgument("the COLMAP model's {} and {} both fit the photo {}; rename the photos",
+                            other->second,
+                            order[i].first,
+                            files[i]);
+    }
+    named.images.push_back(order[i].second);
+    named.files.push_back(files[i]);
+  }
+  return named;
+}
+
+// What is left out, or an error where too little is left.
+void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>* warnings) {
+  constexpr size_t kFewest = 2;
+  if (named.images.size() < std::min(kFewest, total)) {
+    throw InvalidArgument(
+        "the COLMAP model names {} photos, of which {} are among those given (missing: {}); give "
+        "the photos that the poses were computed from",
+        total,
+        named.images.size(),
+        SomeOf(named.missing));
+  }
+  if (named.missing.empty() || warnings == nullptr) return;
+  warnings->push_back(
+      fmt::format("{} of the {} photos that the COLMAP model names are not among those given and "
+                  "were left out: {}",
+                  named.missing.size(),
+                  total,
+                  SomeOf(named.missing)));
+}
+
+// Of points that no photo is said to see, those into whose picture they fall count.
+std::vector<SparsePoint> PointsOf(const ColmapModel& model,
+                                  const std::map<uint32_t, int>& view_of_image,
+                                  const Scene& scene) {
+  std::vector<SparsePoint> points;
+  points.reserve(model.points.size());
+  for (const ColmapPoint& from : model.points) {
+    SparsePoint point;
+    point.position = from.position;
+    point.reprojection_error_px = from.error_px;
+    std::set<int> views;
+    for (const uint32_t image_id : from.image_ids) {
+      if (!model.images.contains(image_id)) {
+        throw InvalidArgument("points3D refers to image {}, which the model does not have",
+                              image_id);
+      }
+      const auto view = view_of_image.find(image_id);
+      if (view != view_of_image.end()) views.insert(view->second);
+    }
+    point.views.assign(views.begin(), views.end());
+    if (from.image_ids.empty()) {
+      point.reprojection_error_px = -1.0;
+      point.views = ViewsThatFace(scene, point.position, 0.0);
+    }
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
+Scene SceneOf(const ColmapModel& model,
+              const NamedViews& named,
+              const NamedFiles& photos,
+              const fs::path& scene_folder,
+              std::vector<std::string>* warnings,
+              std::vector<std::string>* cameras) {
+  if (model.images.empty()) throw InvalidArgument("the COLMAP model has no images");
+  NoteMissing(named, model.images.size(), warnings);
+  if (warnings != nullptr) {
+    const std::vector<std::string> said = ReprojectionWarnings(MeasureReprojection(model));
+    warnings->insert(warnings->end(), said.begin(), said.end());
+  }
+  std::vector<std::pair<View, uint32_t>> views;
+  for (size_t i = 0; i < named.images.size(); ++i) {
+    const ColmapImage& image = model.images.at(named.images[i]);
+    const ColmapCamera& camera = model.cameras.at(image.camera_id);
+    View view;
+    view.image_file = named.files[i];
+    view.name = ViewNameOf(view.image_file);
+    view.captured_camera = camera.camera;
+    view.distortion = camera.distortion;
+    view.cam_from_world = image.cam_from_world;
+    Photo photo{view.name, view.image_file};
+    ProbePhoto(scene_folder, &photo);
+    FitViewToPhoto(photo, &view);
+    views.emplace_back(std::move(view), named.images[i]);
+  }
+  std::sort(views.begin(), views.end(), [](const auto& x, const auto& y) {
+    return x.first.name < y.first.name;
+  });
+  Scene scene;
+  std::map<uint32_t, int> view_of_image;
+  for (auto& [view, image] : views) {
+    view_of_image[image] = static_cast<int>(scene.views.size());
+    scene.views.push_back(std::move(view));
+  }
+  FrameMoments moments = ReadMoments(scene_folder, photos, scene.views);
+  for (size_t i = 0; i < scene.views.size(); ++i) scene.views[i].moment = moments.moments[i];
+  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
+  if (cameras != nullptr) *cameras = std::move(moments.cameras);
+  scene.points = PointsOf(model, view_of_image, scene);
+  return scene;
+}
+
+std::string Shown(const std::string& folder) {
+  return folder.empty() ? "the scene's own folder" : folder;
 }
 
 }  // namespace
@@ -78,72 +230,40 @@ Scene ReadColmapModel(const fs::path& model_folder,
                       std::vector<std::string>* warnings,
                       std::vector<std::string>* cameras) {
   const ColmapModel model = LoadColmapModel(model_folder);
-  const std::vector<CameraReprojection> reprojection = MeasureReprojection(model);
-  if (warnings != nullptr) {
-    const std::vector<std::string> said = ReprojectionWarnings(reprojection);
-    warnings->insert(warnings->end(), said.begin(), said.end());
-  }
-  if (model.images.empty()) {
-    throw InvalidArgument("the COLMAP model in {} has no images", model_folder.string());
-  }
-  // By name, so that view order does not depend on the numbers that COLMAP gave.
-  std::vector<std::pair<std::string, uint32_t>> order;
-  for (const auto& [id, image] : model.images) order.emplace_back(image.name, id);
-  std::sort(order.begin(), order.end());
+  const NamedFiles photos = NamedFiles::Photos(scene_folder);
+  return SceneOf(model, NamesOf(model, photos), photos, scene_folder, warnings, cameras);
+}
 
-  Scene scene;
-  std::map<uint32_t, int> view_of_image;
-  std::vector<std::string> missing;
-  for (const auto& [name, id] : order) {
-    if (!IsSafeRelativePath(name)) {
-      throw InvalidArgument(
-          "the COLMAP model names a photo \"{}\"; names must be relative paths without '..'", name);
+std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
+  const std::vector<ColmapPlace> places = ColmapPlaces(ListFiles(scene_folder));
+  if (places.empty()) return std::nullopt;
+  const NamedFiles photos = NamedFiles::Photos(scene_folder);
+  std::optional<ColmapChoice> choice;
+  std::optional<Error> refusal;
+  std::vector<std::string> counts;
+  std::vector<std::string> notes;
+  for (const ColmapPlace& place : places) {
+    try {
+      const ColmapModel model = LoadColmapModel(scene_folder / place.folder);
+      const size_t found = NamesOf(model, photos).images.size();
+      counts.push_back(fmt::format("{} has {} of {}", Shown(place.folder), found, photos.size()));
+      if (!choice || found > choice->photos) choice = ColmapChoice{place.folder, found, {}};
+    } catch (const Error& e) {
+      if (!refusal) refusal = e;
+      notes.push_back(
+          fmt::format("the COLMAP model in {} is not used: {}", Shown(place.folder), e.what()));
     }
-    if (!scene.views.empty() && scene.views.back().name == name) {
-      throw InvalidArgument("the COLMAP model names the photo {} twice", name);
-    }
-    const ColmapImage& image = model.images.at(id);
-    const ColmapCamera& camera = model.cameras.at(image.camera_id);
-    View view;
-    view.name = name;
-    view.image_file = FindPhotoFile(scene_folder, name, false);
-    if (view.image_file.empty()) {
-      missing.push_back(name);
-      continue;
-    }
-    view.captured_camera = camera.camera;
-    view.distortion = camera.distortion;
-    view.cam_from_world = image.cam_from_world;
-    Photo photo{name, view.image_file};
-    ProbePhoto(scene_folder, &photo);
-    FitViewToPhoto(photo, &view);
-    view_of_image[id] = static_cast<int>(scene.views.size());
-    scene.views.push_back(std::move(view));
   }
-  if (!missing.empty()) ThrowMissing(missing, order.size(), scene_folder);
-  FrameMoments moments = ReadMoments(scene_folder, scene.views);
-  for (size_t i = 0; i < scene.views.size(); ++i) scene.views[i].moment = moments.moments[i];
-  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
-  if (cameras != nullptr) *cameras = std::move(moments.cameras);
-
-  scene.points.reserve(model.points.size());
-  for (const ColmapPoint& from : model.points) {
-    SparsePoint point;
-    point.position = from.position;
-    point.reprojection_error_px = from.error_px;
-    std::set<int> views;
-    for (uint32_t image_id : from.image_ids) {
-      const auto it = view_of_image.find(image_id);
-      if (it == view_of_image.end()) {
-        throw InvalidArgument("points3D refers to image {}, which the model does not have",
-                              image_id);
-      }
-      views.insert(it->second);
-    }
-    point.views.assign(views.begin(), views.end());
-    scene.points.push_back(std::move(point));
+  if (!choice) throw *refusal;
+  choice->notes = std::move(notes);
+  if (counts.size() > 1) {
+    choice->notes.push_back(fmt::format(
+        "there are {} COLMAP models; the one in {} is used, since it has most photos ({})",
+        counts.size(),
+        Shown(choice->folder),
+        SomeOf(counts, 8)));
   }
-  return scene;
+  return choice;
 }
 
 }  // namespace color3d

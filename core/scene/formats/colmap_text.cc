@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/json_text.h"
 #include "core/scene/formats/colmap_model.h"
 
 namespace color3d {
@@ -17,7 +21,9 @@ constexpr std::string_view kBlanks = " \t\r";
 // The lines of a file, and the words of the current line.
 class Lines {
  public:
-  explicit Lines(const fs::path& path) : name_(path.filename().string()), text_(ReadFile(path)) {}
+  explicit Lines(const fs::path& path) : name_(path.filename().string()), text_(ReadFile(path)) {
+    at_ = text_.size() - WithoutMark(text_, name_).size();
+  }
 
   // False at the end of the file.
   bool NextLine() {
@@ -25,6 +31,7 @@ class Lines {
     size_t end = text_.find('\n', at_);
     if (end == std::string::npos) end = text_.size();
     line_ = std::string_view(text_).substr(at_, end - at_);
+    begin_ = at_;
     at_ = end + 1;
     ++number_;
     SkipBlanks();
@@ -62,6 +69,33 @@ class Lines {
     }
     return value;
   }
+  // As Number, for whole numbers: 154.0 is one, as tables of floating point numbers are saved.
+  template <typename T>
+  T Whole() {
+    const std::string_view word = Peek();
+    const size_t dot = word.find('.');
+    if (dot == word.npos || dot == 0) return Number<T>();
+    const double value = Number<double>();
+    if (value != std::floor(value) || !(std::abs(value) < 9e15)) {
+      throw InvalidArgument("{}: \"{}\" is not a whole number", Place(), word.substr(0, 40));
+    }
+    if (!std::in_range<T>(static_cast<int64_t>(value))) {
+      throw InvalidArgument(
+          "{}: \"{}\" is not a number that fits here", Place(), word.substr(0, 40));
+    }
+    return static_cast<T>(value);
+  }
+  // The next word, which stays; empty at the end of the line.
+  std::string_view Peek() const {
+    return line_.substr(0, std::min(line_.find_first_of(kBlanks), line_.size()));
+  }
+  std::string_view Line() const { return line_; }
+  // Goes back to before the current line.
+  void PutBack() {
+    at_ = begin_;
+    --number_;
+    line_ = {};
+  }
   // The rest of the line: file names may hold blanks.
   std::string Rest() {
     std::string rest(line_);
@@ -79,18 +113,53 @@ class Lines {
   std::string text_;
   std::string_view line_;
   size_t at_ = 0;
+  size_t begin_ = 0;  // of the current line
   int number_ = 0;
 };
+
+bool IsNumber(std::string_view word) {
+  if (word.size() > 1 && word[0] == '+') word.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error != std::errc::invalid_argument && end == word.data() + word.size();
+}
+
+// Whether a line is one of a photo (number, pose, camera, name), and not of observations (three
+// numbers each): some programs write no second line for a photo without observations.
+bool IsLineOfPhoto(std::string_view line) {
+  constexpr size_t kWordsBeforeName = 9;
+  size_t count = 0;
+  while (!line.empty() && count < kWordsBeforeName + 2) {
+    const size_t end = std::min(line.find_first_of(kBlanks), line.size());
+    const std::string_view word = line.substr(0, end);
+    const bool is_number = IsNumber(word);
+    if (count < kWordsBeforeName && !is_number) return false;
+    if (count >= kWordsBeforeName && !is_number) return true;
+    ++count;
+    line.remove_prefix(end);
+    line.remove_prefix(std::min(line.find_first_not_of(kBlanks), line.size()));
+  }
+  return count == kWordsBeforeName + 1;  // a name like 0001
+}
+
+// COLMAP's number of no point, which some programs write without its sign.
+constexpr uint64_t kNoPoint = std::numeric_limits<uint64_t>::max();
+
+int64_t PointId(Lines& lines) {
+  if (lines.Peek().starts_with('-')) return lines.Whole<int64_t>();
+  const uint64_t id = lines.Whole<uint64_t>();
+  return id == kNoPoint ? -1 : static_cast<int64_t>(id);
+}
 
 std::map<uint32_t, ColmapCamera> ReadCameras(const fs::path& path) {
   Lines lines(path);
   std::map<uint32_t, ColmapCamera> cameras;
   while (lines.NextRecord()) {
-    const uint32_t id = lines.Number<uint32_t>();
+    const uint32_t id = lines.Whole<uint32_t>();
     const std::string place = fmt::format("{}: camera {}", lines.Place(), id);
     const std::string model(lines.Word());
-    const uint64_t width = lines.Number<uint64_t>();
-    const uint64_t height = lines.Number<uint64_t>();
+    const uint64_t width = lines.Whole<uint64_t>();
+    const uint64_t height = lines.Whole<uint64_t>();
     std::vector<double> parameters;
     while (!lines.AtEndOfLine()) parameters.push_back(lines.Number<double>());
     if (!cameras.emplace(id, MakeColmapCamera(model, width, height, parameters, place)).second) {
@@ -104,24 +173,27 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
   Lines lines(path);
   std::map<uint32_t, ColmapImage> images;
   while (lines.NextRecord()) {
-    const uint32_t id = lines.Number<uint32_t>();
+    const uint32_t id = lines.Whole<uint32_t>();
     double qvec[4];
     double tvec[3];
     for (double& v : qvec) v = lines.Number<double>();
     for (double& v : tvec) v = lines.Number<double>();
     ColmapImage image;
-    image.camera_id = lines.Number<uint32_t>();
+    image.camera_id = lines.Whole<uint32_t>();
     image.name = lines.Rest();
     CheckColmapName(image.name, lines.Place());
     const std::string place = lines.Place() + ": image " + image.name;
     image.cam_from_world = MakeColmapPose(qvec, tvec, place);
-    // The second line of an image may be empty, and missing at the end of the file.
-    if (lines.NextLine()) {
+    // The second line of an image may be empty, or missing.
+    bool more = lines.NextLine();
+    while (more && lines.Line().starts_with('#')) more = lines.NextLine();
+    if (more) {
+      if (IsLineOfPhoto(lines.Line())) lines.PutBack();
       while (!lines.AtEndOfLine()) {
         ColmapObservation observation;
         observation.pixel.x() = lines.Number<double>();
         observation.pixel.y() = lines.Number<double>();
-        observation.point_id = lines.Number<int64_t>();
+        observation.point_id = PointId(lines);
         image.observations.push_back(observation);
       }
     }
@@ -136,16 +208,17 @@ std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
   Lines lines(path);
   std::vector<ColmapPoint> points;
   while (lines.NextRecord()) {
-    const uint64_t id = lines.Number<uint64_t>();
+    const uint64_t id = lines.Whole<uint64_t>();
     ColmapPoint point;
     point.id = id;
     for (int i = 0; i < 3; ++i) point.position[i] = lines.Number<double>();
-    for (int i = 0; i < 3; ++i) lines.Number<int>();  // colour
-    point.error_px = lines.Number<double>();
+    // The colour is not used; neither it nor the error need be there.
+    for (int i = 0; i < 3 && !lines.AtEndOfLine(); ++i) lines.Word();
+    if (!lines.AtEndOfLine()) point.error_px = KnownError(lines.Number<double>());
     CheckColmapPoint(point, fmt::format("{}: point {}", lines.Place(), id));
     while (!lines.AtEndOfLine()) {
-      point.image_ids.push_back(lines.Number<uint32_t>());
-      lines.Number<uint32_t>();  // index of the observation
+      point.image_ids.push_back(lines.Whole<uint32_t>());
+      lines.Word();  // index of the observation
     }
     points.push_back(std::move(point));
   }

@@ -9,7 +9,8 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/image/probe/probe.h"
+#include "core/base/json_text.h"
+#include "core/scene/formats/named_files.h"
 #include "core/scene/formats/npy.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/formats/within_reach.h"
@@ -31,7 +32,7 @@ constexpr size_t kMaxPoints = 500'000;
 json ParseObject(const fs::path& folder, const std::string& file) {
   std::error_code error;
   if (!fs::is_regular_file(folder / file, error)) throw InvalidArgument("{} is missing", file);
-  json root = json::parse(ReadFile(folder / file), nullptr, /*allow_exceptions=*/false);
+  json root = ParseJson(ReadFile(folder / file), file);
   if (!root.is_object()) throw InvalidArgument("{} is not a JSON object", file);
   return root;
 }
@@ -114,13 +115,10 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
 }
 
 // The frame's picture, relative to the scene's folder; empty when there is none.
-std::string PictureOf(const fs::path& scene_folder, const std::string& name) {
-  std::error_code error;
+std::string PictureOf(const NamedFiles& photos, const std::string& name) {
   for (const char* scale : {"2x", "1x", "4x", "8x"}) {
-    for (const char* ending : {".png", ".jpg"}) {
-      const std::string file = fmt::format("rgb/{}/{}{}", scale, name, ending);
-      if (fs::is_regular_file(scene_folder / file, error)) return file;
-    }
+    const std::string file = photos.Find(fmt::format("rgb/{}/{}", scale, name));
+    if (file.starts_with("rgb/")) return file;
   }
   return "";
 }
@@ -166,6 +164,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
                   std::vector<std::string>* warnings,
                   std::vector<std::string>* cameras) {
   const json frames = ParseObject(scene_folder, kMetadata);
+  const NamedFiles photos = NamedFiles::Photos(scene_folder);
   Scene scene;
   std::vector<FrameTime> times;
   std::vector<std::string> missing;
@@ -174,7 +173,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
       throw InvalidArgument("{}: '{}' is no name of a frame", kMetadata, name);
     }
     View view;
-    view.image_file = PictureOf(scene_folder, name);
+    view.image_file = PictureOf(photos, name);
     if (view.image_file.empty()) {
       missing.push_back(name);
       continue;
@@ -201,11 +200,11 @@ Scene ReadNerfies(const fs::path& scene_folder,
   if (warnings != nullptr && !moments.note.empty()) warnings->push_back(moments.note);
   if (warnings != nullptr && !missing.empty()) {
     warnings->push_back(
-        fmt::format("{} of the {} frames of {} have no picture in rgb/ ({}, ...) and were left out",
+        fmt::format("{} of the {} frames of {} have no picture in rgb/ and were left out: {}",
                     missing.size(),
                     frames.size(),
                     kMetadata,
-                    missing[0]));
+                    SomeOf(missing)));
   }
   if (cameras != nullptr) *cameras = std::move(moments.cameras);
   std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {

@@ -146,7 +146,7 @@ TEST_F(Nerfies, BrokenFilesAreRefusedByName) {
   WriteCamera("000001", views_[1], ",\"orientation\":[[1,0,0],[0,1,0],[0,0,-1]]");
   EXPECT_THAT(Said(), HasSubstr("orientation is not a rotation"));
   Write("camera/000001.json", "{");
-  EXPECT_EQ(Said(), "camera/000001.json is not a JSON object");
+  EXPECT_THAT(Said(), HasSubstr("camera/000001.json is not JSON: parse error at line 1"));
   WriteCamera("000001", views_[1]);
   Write("points.npy", NpyOf({2, 2}, {1, 2, 3, 4}));
   EXPECT_EQ(Said(), "points.npy must have three columns");

@@ -5,12 +5,17 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
+#include "core/scene/formats/given_points.h"
 #include "core/scene/formats/npy.h"
+#include "core/scene/formats/scene_readers.h"
 #include "core/scene/formats/within_reach.h"
+#include "core/scene/photos.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -56,7 +61,47 @@ View ViewOf(const double* row, const std::string& place) {
   return view;
 }
 
+NpyArray ReadRows(const fs::path& scene_folder) {
+  NpyArray poses = ReadNpy(ReadFile(scene_folder / kPosesBounds), kPosesBounds, kMaxValues);
+  if (poses.shape.size() != 2 || poses.shape[1] != kColumns) {
+    throw InvalidArgument("{} must have {} columns (LLFF)", kPosesBounds, kColumns);
+  }
+  return poses;
+}
+
 }  // namespace
+
+std::optional<Scene> ReadPosesOfPhotos(const fs::path& scene_folder,
+                                       std::vector<std::string>* warnings) {
+  std::error_code error;
+  if (!fs::is_regular_file(scene_folder / kPosesBounds, error)) return std::nullopt;
+  const NpyArray poses = ReadRows(scene_folder);
+  const std::vector<Photo> photos = ListPhotos(scene_folder);
+  if (poses.shape[0] != photos.size()) {
+    if (warnings != nullptr) {
+      warnings->push_back(
+          fmt::format("{} has the poses of {} photos and names none, but there are {}, so that its "
+                      "poses are not used; give all the photos that it was made from to use them",
+                      kPosesBounds,
+                      poses.shape[0],
+                      photos.size()));
+    }
+    return std::nullopt;
+  }
+  Scene scene;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    View view = ViewOf(&poses.values[i * kColumns], fmt::format("{}: row {}", kPosesBounds, i));
+    Photo photo = photos[i];
+    view.name = photo.name;
+    view.image_file = photo.file;
+    ProbePhoto(scene_folder, &photo);
+    FitViewToPhoto(photo, &view);
+    scene.views.push_back(std::move(view));
+  }
+  scene.points =
+      ReadGivenPoints(nlohmann::json::object(), kPosesBounds, scene_folder, scene, warnings);
+  return scene;
+}
 
 std::vector<CameraFilm> ReadPosesBounds(const fs::path& scene_folder) {
   std::vector<std::string> files;
@@ -65,10 +110,7 @@ std::vector<CameraFilm> ReadPosesBounds(const fs::path& scene_folder) {
   }
   if (files.empty()) return {};
   std::sort(files.begin(), files.end());
-  const NpyArray poses = ReadNpy(ReadFile(scene_folder / kPosesBounds), kPosesBounds, kMaxValues);
-  if (poses.shape.size() != 2 || poses.shape[1] != kColumns) {
-    throw InvalidArgument("{} must have {} columns (LLFF)", kPosesBounds, kColumns);
-  }
+  const NpyArray poses = ReadRows(scene_folder);
   if (poses.shape[0] != files.size()) {
     throw InvalidArgument(
         "{} has the poses of {} cameras, but there are {} films ({} to {}); give one film for each "

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/json_text.h"
 #include "core/scene/formats/within_reach.h"
 
 namespace color3d {
@@ -96,12 +97,7 @@ const json* FrameFields::Find(const char* key) const {
 }
 
 json ParseFrames(std::string_view text, const std::string& file_name) {
-  json root;
-  try {
-    root = json::parse(text);
-  } catch (const json::exception& e) {
-    throw InvalidArgument("{} is not JSON: {}", file_name, e.what());
-  }
+  json root = ParseJson(text, file_name);
   if (!root.is_object() || !root.contains("frames") || !root["frames"].is_array()) {
     throw InvalidArgument("{} has no list of frames", file_name);
   }
@@ -151,8 +147,10 @@ Pose ReadTransform(const FrameFields& fields) {
     }
     for (int c = 0; c < 4; ++c) {
       if (!row[c].is_number() || !std::isfinite(row[c].get<double>())) {
-        throw InvalidArgument("{}: transform_matrix has an element that is not a finite number",
-                              fields.place());
+        throw InvalidArgument(
+            "{}: transform_matrix has an element that is not a finite number; correct the frame or "
+            "remove it",
+            fields.place());
       }
       m(r, c) = row[c].get<double>();
     }

@@ -1,14 +1,19 @@
 #include <fmt/core.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/catalogue/pose_files.h"
+#include "core/scene/formats/given_points.h"
+#include "core/scene/formats/named_files.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/frame_times.h"
-#include "core/scene/import.h"
 #include "core/scene/photos.h"
 
 namespace color3d {
@@ -17,23 +22,65 @@ namespace {
 
 using nlohmann::json;
 
-std::string WithoutPrefix(std::string text, const std::string& prefix) {
-  while (text.compare(0, prefix.size(), prefix) == 0) text.erase(0, prefix.size());
-  return text;
+struct Source {
+  std::string name;
+  json root;
+};
+
+std::vector<Source> ReadSources(const std::vector<fs::path>& files) {
+  std::vector<Source> sources;
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string();
+    sources.push_back({name, ParseFrames(ReadFile(file), name)});
+  }
+  return sources;
 }
 
-// False when the frame's photo does not exist.
-bool ReadFrame(const FrameFields& fields, const fs::path& scene_folder, View* view) {
-  const std::string path = WithoutPrefix(fields.TextOr("file_path", ""), "./");
-  if (path.empty()) throw InvalidArgument("{}: file_path is missing", fields.place());
-  view->image_file = FindPhotoFile(scene_folder, WithoutPrefix(path, "images/"), true);
-  if (view->image_file.empty()) return false;
-  view->name = WithoutPrefix(view->image_file, "images/");
-  Photo photo{view->name, view->image_file};
+std::string NamesOf(const std::vector<Source>& sources) {
+  std::string names;
+  for (const Source& source : sources) names += (names.empty() ? "" : " and ") + source.name;
+  return names;
+}
+
+// A frame and what its file names, before its photo is looked at.
+struct Frame {
+  const json* root = nullptr;
+  const json* frame = nullptr;
+  std::string place;
+  std::string photo;
+};
+
+std::vector<Frame> FramesOf(const std::vector<Source>& sources) {
+  std::vector<Frame> frames;
+  for (const Source& source : sources) {
+    for (size_t i = 0; i < source.root["frames"].size(); ++i) {
+      const json& frame = source.root["frames"][i];
+      const std::string place = fmt::format("{}: frame {}", source.name, i);
+      if (!frame.is_object()) throw InvalidArgument("{} must be an object", place);
+      std::string photo = FrameFields(frame, frame, place).TextOr("file_path", "");
+      if (photo.empty()) throw InvalidArgument("{}: file_path is missing", place);
+      frames.push_back({&source.root, &frame, place, std::move(photo)});
+    }
+  }
+  return frames;
+}
+
+// The photo of each frame; empty where there is none.
+std::vector<std::string> FilesOf(const std::vector<Frame>& frames, const fs::path& scene_folder) {
+  std::vector<std::string> names;
+  for (const Frame& frame : frames) names.push_back(frame.photo);
+  return NamedFiles::Photos(scene_folder).Find(names);
+}
+
+View ReadView(const FrameFields& fields, const std::string& file, const fs::path& scene_folder) {
+  View view;
+  view.image_file = file;
+  view.name = ViewNameOf(file);
+  Photo photo{view.name, view.image_file};
   ProbePhoto(scene_folder, &photo);
-  ReadFrameCamera(fields, photo.stored_width, photo.stored_height, view);
-  FitViewToPhoto(photo, view);
-  return true;
+  ReadFrameCamera(fields, photo.stored_width, photo.stored_height, &view);
+  FitViewToPhoto(photo, &view);
+  return view;
 }
 
 // When and by which camera, of the frame itself: no file says that of all its frames.
@@ -46,58 +93,108 @@ FrameTime ReadTime(const json& frame, const std::string& place, const std::strin
   return time;
 }
 
+void NoteMissing(const std::vector<std::string>& missing,
+                 size_t total,
+                 size_t found,
+                 const std::string& file_name,
+                 std::vector<std::string>* warnings) {
+  if (found < 2) {
+    throw InvalidArgument(
+        "{} names {} photos, of which {} are among those given; at least 2 are needed{}",
+        file_name,
+        total,
+        found,
+        missing.empty() ? "" : fmt::format(" (missing: {})", SomeOf(missing)));
+  }
+  if (missing.empty() || warnings == nullptr) return;
+  warnings->push_back(
+      fmt::format("{} of the {} photos that {} names are not among those given and were left out: "
+                  "{}",
+                  missing.size(),
+                  total,
+                  file_name,
+                  SomeOf(missing)));
+}
+
+void RefuseTwice(const std::vector<Frame>& frames,
+                 const std::vector<std::string>& files,
+                 const std::string& file_name) {
+  std::map<std::string, size_t> frame_of_file;
+  for (size_t i = 0; i < files.size(); ++i) {
+    if (files[i].empty()) continue;
+    const auto [other, fresh] = frame_of_file.emplace(files[i], i);
+    if (fresh) continue;
+    throw InvalidArgument("{} names the photo {} twice ({} and {})",
+                          file_name,
+                          ViewNameOf(files[i]),
+                          frames[other->second].place,
+                          frames[i].place);
+  }
+}
+
+void AddMoments(const std::vector<FrameTime>& times,
+                Scene* scene,
+                std::vector<std::string>* warnings,
+                std::vector<std::string>* cameras) {
+  FrameMoments moments = MomentsOf(times);
+  for (size_t i = 0; i < times.size(); ++i) scene->views[i].moment = moments.moments[i];
+  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
+  if (cameras != nullptr) *cameras = std::move(moments.cameras);
+}
+
 }  // namespace
 
-Scene ReadTransformsJson(const fs::path& json_file,
+std::vector<fs::path> TransformsFiles(const fs::path& scene_folder) {
+  std::error_code error;
+  if (const fs::path file = scene_folder / kTransformsFile; fs::is_regular_file(file, error)) {
+    return {file};
+  }
+  std::vector<fs::path> files;
+  for (const std::string_view name : kBlenderFiles) {
+    if (fs::is_regular_file(scene_folder / name, error)) files.push_back(scene_folder / name);
+  }
+  return files;
+}
+
+size_t CountTransformsPhotos(const std::vector<fs::path>& json_files,
+                             const fs::path& scene_folder) {
+  const std::vector<Source> sources = ReadSources(json_files);
+  const std::vector<std::string> files = FilesOf(FramesOf(sources), scene_folder);
+  return files.size() - static_cast<size_t>(std::count(files.begin(), files.end(), ""));
+}
+
+Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
                          const fs::path& scene_folder,
                          std::vector<std::string>* warnings,
                          std::vector<std::string>* cameras) {
-  const std::string file_name = json_file.filename().string();
-  const json root = ParseFrames(ReadFile(json_file), file_name);
+  const std::vector<Source> sources = ReadSources(json_files);
+  const std::string file_name = NamesOf(sources);
+  const std::vector<Frame> frames = FramesOf(sources);
+  const std::vector<std::string> files = FilesOf(frames, scene_folder);
+  RefuseTwice(frames, files, file_name);
   Scene scene;
   std::vector<std::string> missing;
   std::vector<FrameTime> times;
-  for (size_t i = 0; i < root["frames"].size(); ++i) {
-    const json& frame = root["frames"][i];
-    const std::string place = fmt::format("{}: frame {}", file_name, i);
-    if (!frame.is_object()) throw InvalidArgument("{} must be an object", place);
-    const FrameFields fields(root, frame, place);
-    View view;
-    if (ReadFrame(fields, scene_folder, &view)) {
-      times.push_back(ReadTime(frame, place, view.image_file));
-      scene.views.push_back(std::move(view));
-    } else {
-      missing.push_back(fields.TextOr("file_path", ""));
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const Frame& frame = frames[i];
+    if (files[i].empty()) {
+      missing.push_back(frame.photo);
+      continue;
     }
+    const FrameFields fields(*frame.root, *frame.frame, frame.place);
+    times.push_back(ReadTime(*frame.frame, frame.place, files[i]));
+    scene.views.push_back(ReadView(fields, files[i], scene_folder));
   }
-  FrameMoments moments = MomentsOf(times);
-  for (size_t i = 0; i < times.size(); ++i) scene.views[i].moment = moments.moments[i];
-  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
-  if (cameras != nullptr) *cameras = std::move(moments.cameras);
+  NoteMissing(missing, frames.size(), scene.views.size(), file_name, warnings);
+  AddMoments(times, &scene, warnings, cameras);
   std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {
     return x.name < y.name;
   });
-  for (size_t i = 1; i < scene.views.size(); ++i) {
-    if (scene.views[i].name == scene.views[i - 1].name) {
-      throw InvalidArgument("{} names the photo {} twice", file_name, scene.views[i].name);
-    }
+  if (sources.size() > 1 && warnings != nullptr) {
+    warnings->push_back(fmt::format("the frames of {} are taken together", file_name));
   }
-  if (scene.views.size() < 2) {
-    throw InvalidArgument("{} names {} photos, of which {} exist in {}; at least 2 are needed{}",
-                          file_name,
-                          root["frames"].size(),
-                          scene.views.size(),
-                          scene_folder.string(),
-                          missing.empty() ? "" : fmt::format(" (missing: {}, ...)", missing[0]));
-  }
-  if (!missing.empty() && warnings != nullptr) {
-    warnings->push_back(
-        fmt::format("{} of the {} photos that {} names do not exist ({}, ...) and were left out",
-                    missing.size(),
-                    root["frames"].size(),
-                    file_name,
-                    missing[0]));
-  }
+  scene.points =
+      ReadGivenPoints(sources.front().root, sources.front().name, scene_folder, scene, warnings);
   return scene;
 }
 

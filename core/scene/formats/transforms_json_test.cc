@@ -126,7 +126,8 @@ TEST_F(TransformsFile, MissingPhotosAreLeftOutWithAWarning) {
   EXPECT_THAT(warnings[0], HasSubstr("1 of the 3 photos"));
   EXPECT_THAT(warnings[0], HasSubstr("images/gone.png"));
   fs::remove(folder_.path() / "images/a.png");
-  EXPECT_THAT(Said(text), HasSubstr("names 3 photos, of which 1 exist"));
+  EXPECT_THAT(Said(text), HasSubstr("names 3 photos, of which 1 are among those given"));
+  EXPECT_THAT(Said(text), testing::Not(HasSubstr(folder_.path().string())));
 }
 
 // Json() with the fields that each of the two frames has on its own.
@@ -162,9 +163,42 @@ TEST_F(TransformsFile, BadTimesAreRefusedByFrame) {
   EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":null,")), HasSubstr("has no time"));
   EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":\"1\",")),
               HasSubstr("frame 1: time must be a finite number"));
-  EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":NaN,")), HasSubstr("is not JSON"));
+  EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":NaN,")),
+              HasSubstr("frame 1: time must be a finite number"));
   EXPECT_THAT(Said(TimedJson("\"time\":0,\"camera\":3,", "\"time\":1,")),
               HasSubstr("frame 0: camera must be a text"));
+}
+
+TEST_F(TransformsFile, WhatOtherProgramsWriteIsRead) {
+  std::string text = "\xef\xbb\xbf" + Json("\"fl_x\":50,\"aabb_scale\":NaN,\"offset\":[1e999,],");
+  text.replace(text.find(",,"), 2, ",");
+  EXPECT_EQ(Read(text).views.size(), 2u);
+  EXPECT_THAT(Said(Json("\"fl_x\":NaN")), HasSubstr("frame 0: fl_x must be a finite number"));
+  EXPECT_THAT(Said(Json("\"fl_x\":50", "", "[1,0,0,NaN]")),
+              HasSubstr("frame 0: transform_matrix has an element that is not a finite number"));
+}
+
+TEST_F(TransformsFile, NamesMayDifferInCaseEndingAndSeparators) {
+  for (const char* name :
+       {"images\\\\b.png", "IMAGES/B.PNG", "b.jpg", "C:\\\\x\\\\images\\\\b", "../images/b"}) {
+    std::string text = Json("\"fl_x\":50");
+    text.replace(text.find("images/b.png"), 12, name);
+    const Scene scene = Read(text);
+    ASSERT_EQ(scene.views.size(), 2u) << name;
+    EXPECT_EQ(scene.views[1].image_file, "images/b.png");
+  }
+}
+
+TEST_F(TransformsFile, FilesOutsideOfTheSceneAreNotRead) {
+  const ScratchFolder other;
+  const fs::path secret = other.path() / "secret.png";
+  WriteFileAtomic(secret, EncodePng8(GradientPhoto(48, 32, 1)));
+  const std::string relative = secret.lexically_relative(folder_.path()).string();
+  for (const std::string& name : {secret.string(), relative, "images/../" + relative}) {
+    std::string text = Json("\"fl_x\":50");
+    text.replace(text.find("images/b.png"), 12, name);
+    EXPECT_THAT(Said(text), HasSubstr("of which 1 are among those given")) << name;
+  }
 }
 
 TEST_F(TransformsFile, BrokenFilesAreRefusedByPlace) {

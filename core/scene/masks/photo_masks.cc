@@ -3,11 +3,14 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cctype>
+#include <map>
 #include <set>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/image/codec.h"
+#include "core/scene/formats/named_files.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -43,41 +46,82 @@ bool HasTransparency(const fs::path& file, const std::string& name) {
   return std::any_of(alpha, alpha + image.PlaneSize(), [](float a) { return a <= 0.5f; });
 }
 
+std::string LowerCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
+    return static_cast<char>(std::tolower(c));
+  });
+  return text;
+}
+
+// The files in masks/, relative to the scene's folder.
+class MaskFiles {
+ public:
+  explicit MaskFiles(const fs::path& scene_folder) {
+    std::error_code none;
+    if (!fs::is_directory(scene_folder / kFolder, none)) return;
+    for (const std::string& file : ListFiles(scene_folder / kFolder)) {
+      all_.insert(kFolder + file);
+      by_lower_case_.emplace(LowerCase(kFolder + file), kFolder + file);
+    }
+  }
+  const std::set<std::string>& all() const { return all_; }
+  // The file of this name, or the only one that differs by the case of letters; else empty.
+  std::string Find(const std::string& name) const {
+    if (all_.contains(name)) return name;
+    const std::string key = LowerCase(name);
+    return by_lower_case_.count(key) == 1 ? by_lower_case_.find(key)->second : "";
+  }
+
+ private:
+  std::set<std::string> all_;
+  std::multimap<std::string, std::string> by_lower_case_;
+};
+
 std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
 
 }  // namespace
 
 std::vector<std::string> FindMasks(const fs::path& scene_folder,
                                    const std::vector<std::string>& photo_files,
-                                   const std::vector<std::string>& other_photo_files) {
-  std::set<std::string> files;
-  std::error_code none;
-  if (fs::is_directory(scene_folder / kFolder, none)) {
-    for (const std::string& file : ListFiles(scene_folder / kFolder)) files.insert(kFolder + file);
-  }
+                                   const std::vector<std::string>& other_photo_files,
+                                   std::vector<std::string>* warnings) {
+  const MaskFiles files(scene_folder);
   std::set<std::string> fitting;
   std::vector<std::string> masks;
   for (const std::string& photo : photo_files) {
     std::string& mask = masks.emplace_back();
     for (const std::string& name : MaskNames(photo)) {
-      fitting.insert(name);
-      if (mask.empty() && files.contains(name)) mask = name;
+      const std::string file = files.Find(name);
+      if (file.empty()) continue;
+      fitting.insert(file);
+      if (mask.empty()) mask = file;
     }
     if (mask.empty() && HasTransparency(scene_folder / photo, photo)) mask = photo;
   }
   for (const std::string& photo : other_photo_files) {
-    for (const std::string& name : MaskNames(photo)) fitting.insert(name);
+    for (const std::string& name : MaskNames(photo)) fitting.insert(files.Find(name));
   }
-  for (const std::string& file : files) {
+  std::vector<std::string> unused;
+  for (const std::string& file : files.all()) {
     if (!HasImageExtension(file)) {
       throw InvalidArgument("{} is no picture; masks are PNG files called like their photos", file);
     }
-    if (!fitting.contains(file)) {
-      throw InvalidArgument(
-          "{} is the mask of no photo; masks are called like their photos (a.png or a.jpg.png for "
-          "a.jpg)",
-          file);
-    }
+    if (!fitting.contains(file)) unused.push_back(file);
+  }
+  if (unused.empty()) return masks;
+  if (unused.size() == files.all().size()) {
+    throw InvalidArgument(
+        "{} is the mask of no photo; masks are called like their photos (a.png or a.jpg.png for "
+        "a.jpg)",
+        unused[0]);
+  }
+  if (warnings != nullptr) {
+    warnings->push_back(fmt::format(
+        "{} of {} masks are of no photo and were left out: {}; masks are called like their photos "
+        "(a.png or a.jpg.png for a.jpg)",
+        unused.size(),
+        files.all().size(),
+        SomeOf(unused)));
   }
   return masks;
 }

@@ -13,12 +13,15 @@ namespace color3d {
 
 // The mask of each photo: a path relative to the scene's folder, which is the photo's own where its
 // alpha is the mask, or empty where there is none. images/a/b.jpg has the mask masks/a/b.jpg.png
-// (as COLMAP has it) or masks/a/b.png, which wins over its alpha; an opaque photo has none.
-// `photo_files`: relative to the scene's folder. Throws Error{kInvalidArgument} that names a file
-// in masks/ that is no picture or the mask of none of `photo_files` and `other_photo_files`.
+// (as COLMAP has it) or masks/a/b.png, which wins over its alpha; an opaque photo has none. The
+// case of letters does not matter where one mask fits. `photo_files`: relative to the scene's
+// folder. `warnings` (may be null) receives which masks are of none of `photo_files` and
+// `other_photo_files`: they are left out. Throws Error{kInvalidArgument} that names a file in
+// masks/ that is no picture, and where no mask is of any photo.
 std::vector<std::string> FindMasks(const std::filesystem::path& scene_folder,
                                    const std::vector<std::string>& photo_files,
-                                   const std::vector<std::string>& other_photo_files);
+                                   const std::vector<std::string>& other_photo_files,
+                                   std::vector<std::string>* warnings = nullptr);
 
 // 1 channel: 1 where the photo counts (the mask is brighter than half, or more opaque), else 0.
 // Throws Error{kInvalidArgument} that names the file when it cannot be read, or is not width x

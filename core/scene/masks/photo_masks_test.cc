@@ -81,11 +81,11 @@ TEST_F(PhotoMasksTest, AreFoundUnderEitherNameAndInAlpha) {
 TEST_F(PhotoMasksTest, BadOnesAreRefusedByName) {
   Write("images/a.jpg", EncodeJpeg(Image(8, 6, 3, 0.5f)));
   const auto find = [&] { FindMasks(root(), {"images/a.jpg"}, {"images/unposed.jpg"}); };
-  Write("masks/unposed.png", "");
-  EXPECT_EQ(ErrorOf(find), "") << "photos without a pose may have masks";
   Write("masks/b.png", "");
   EXPECT_THAT(ErrorOf(find), AllOf(HasSubstr("masks/b.png"), HasSubstr("of no photo")));
   fs::remove(root() / "masks/b.png");
+  Write("masks/unposed.png", "");
+  EXPECT_EQ(ErrorOf(find), "") << "photos without a pose may have masks";
   Write("masks/notes.txt", "");
   EXPECT_THAT(ErrorOf(find), AllOf(HasSubstr("masks/notes.txt"), HasSubstr("no picture")));
 
@@ -97,6 +97,18 @@ TEST_F(PhotoMasksTest, BadOnesAreRefusedByName) {
   EXPECT_THAT(ErrorOf(read), AllOf(HasSubstr("masks/a.png"), HasSubstr("leaves nothing")));
   Write("masks/a.png", "garbage");
   EXPECT_THAT(ErrorOf(read), HasSubstr("masks/a.png"));
+}
+
+TEST_F(PhotoMasksTest, MasksOfPhotosThatWereThrownAwayAreLeftOutWithANote) {
+  Write("images/a.jpg", EncodeJpeg(Image(8, 6, 3, 0.5f)));
+  Write("masks/A.PNG", EncodePng8(Stripe(8, 6, 0, 3)));
+  Write("masks/gone.jpg.png", EncodePng8(Stripe(8, 6, 0, 3)));
+  std::vector<std::string> warnings;
+  EXPECT_THAT(FindMasks(root(), {"images/a.jpg"}, {}, &warnings), ElementsAre("masks/A.PNG"));
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_THAT(warnings[0],
+              HasSubstr("1 of 2 masks are of no photo and were left out: "
+                        "masks/gone.jpg.png"));
 }
 
 TEST_F(PhotoMasksTest, AReducedPixelCountsOnlyAsAWhole) {

@@ -171,9 +171,14 @@ std::string ColmapProcess::LastLogLine() const {
   std::ifstream in(log_);
   std::string line, last;
   while (std::getline(in, line)) {
-    if (!line.empty()) last = line.substr(0, 200);
+    if (!line.empty()) last = line;
   }
-  return last;
+  // Where our files lie is nobody's business.
+  const std::string folder = fs::absolute(log_).parent_path().string() + "/";
+  for (size_t at = last.find(folder); at != last.npos; at = last.find(folder, at)) {
+    last.erase(at, folder.size());
+  }
+  return last.substr(0, 200);
 }
 
 }  // namespace color3d

@@ -57,14 +57,14 @@ class Solver {
          const FeatureImages& copies,
          const ImportOptions& options,
          PhotoOrder order,
-         ProgressObserver& progress,
+         const RunControl& run,
          SfmReport* report)
       : colmap_(colmap),
         work_(work),
         copies_(copies),
         options_(options),
         order_(order),
-        progress_(progress),
+        run_(run),
         report_(report) {}
 
   // An empty model when nothing was placed.
@@ -114,7 +114,7 @@ class Solver {
 
   void Say(const std::string& warning) {
     colmap_.Note(warning);
-    progress_.OnWarning(warning);
+    run_.progress.OnWarning(warning);
   }
 
   void Extract(FeatureDetail detail) {
@@ -124,7 +124,7 @@ class Solver {
 
   void Match(const std::vector<PhotoPair>& pairs) {
     const Stopwatch watch(&report_->matching_seconds);
-    MatchPairs(colmap_, work_, copies_, pairs);
+    MatchPairs(colmap_, work_, copies_, pairs, run_);
     report_->pairs_tried += static_cast<int64_t>(pairs.size());
   }
 
@@ -163,11 +163,8 @@ class Solver {
   void SolveExhaustively(bool has_features) {
     if (!has_features || has_coarse_features_) Extract(FeatureDetail::kFine);
     report_->exhaustive = true;
-    report_->pairs_tried = static_cast<int64_t>(AllPairs(Count()).size());
-    {
-      const Stopwatch watch(&report_->matching_seconds);
-      MatchAllPairs(colmap_, work_, copies_.names.size());
-    }
+    report_->pairs_tried = 0;
+    Match(AllPairs(Count()));
     Attempt("exhaustive", Strictness::kDefault);
     if (!AreNearlyAllPlaced()) Attempt("exhaustive_straight", Strictness::kStraight);
     if (!IsHalfPlaced()) Attempt("exhaustive_loose", Strictness::kLoose);
@@ -189,7 +186,7 @@ class Solver {
   const FeatureImages& copies_;
   const ImportOptions& options_;
   PhotoOrder order_;
-  ProgressObserver& progress_;
+  const RunControl& run_;
   SfmReport* report_;
   std::optional<ColmapModel> best_;
   bool has_coarse_features_ = false;
@@ -349,8 +346,7 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
   }
   report.plan = plan.reason;
   colmap.Note("planned " + plan.reason);
-  const ColmapModel model =
-      Solver(colmap, work, copies, options, order, run.progress, &report).Solve(plan);
+  const ColmapModel model = Solver(colmap, work, copies, options, order, run, &report).Solve(plan);
   RequirePlaced(model.images.size(), photos.size(), order, colmap.log());
   SfmResult result = SceneOfModel(model, photos, copies.names);
   result.report = std::move(report);

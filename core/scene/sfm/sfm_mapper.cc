@@ -74,6 +74,8 @@ std::optional<ColmapModel> MapPhotos(ColmapProcess& colmap,
   const fs::path output = work.folder / ("models_" + attempt);
   fs::create_directories(output);
   std::vector<std::string> arguments = {"mapper",
+                                        "--random_seed",
+                                        "0",
                                         "--database_path",
                                         work.database().string(),
                                         "--image_path",

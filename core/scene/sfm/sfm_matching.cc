@@ -3,9 +3,13 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <map>
+#include <utility>
 
 #include "core/base/files.h"
+#include "core/scene/sfm/descriptor_matches.h"
+#include "core/scene/sfm/sfm_database.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -15,7 +19,6 @@ namespace {
 constexpr int kCoarseFromSidePx = 900;
 // Pairs per call: what happens between two reports of progress.
 constexpr size_t kPairsPerCall = 100;
-constexpr int kMatchingBlock = 10;
 
 // COLMAP's parameters f, cx, cy, k of a camera with a known focal length.
 std::string CameraParameters(const FeatureImages::Group& group) {
@@ -37,16 +40,31 @@ void RemoveDatabase(const SfmWorkspace& work) {
   }
 }
 
-std::vector<std::string> MatchingArguments(const ColmapProcess& colmap,
-                                           const SfmWorkspace& work,
-                                           const char* program) {
-  return {program,
-          "--database_path",
-          work.database().string(),
-          "--SiftMatching.use_gpu",
-          "0",
-          "--SiftMatching.num_threads",
-          colmap.Threads()};
+// The descriptors of photos that some pairs name, by number of the photo; of the others none.
+std::map<int, SiftDescriptors> DescriptorsFor(const SfmWorkspace& work,
+                                              const FeatureImages& photos,
+                                              const std::vector<PhotoPair>& pairs) {
+  SfmDatabase database(work.database());
+  std::map<int, SiftDescriptors> descriptors;
+  for (const PhotoPair& pair : pairs) {
+    for (const int photo : {pair.first, pair.second}) {
+      if (descriptors.contains(photo)) continue;
+      descriptors.emplace(photo, SiftDescriptors(database.DescriptorsOf(photos.names[photo])));
+    }
+  }
+  return descriptors;
+}
+
+// A pair's matches as COLMAP imports them: the names, a line for each match, an empty line. Nothing
+// where there are too few to say anything.
+std::string TextOfMatches(const FeatureImages& photos,
+                          const PhotoPair& pair,
+                          const std::vector<std::pair<int, int>>& matches) {
+  constexpr size_t kFewest = 15;  // as the mapper's
+  if (matches.size() < kFewest) return "";
+  std::string text = photos.names[pair.first] + " " + photos.names[pair.second] + "\n";
+  for (const auto& [x, y] : matches) text += fmt::format("{} {}\n", x, y);
+  return text + "\n";
 }
 
 }  // namespace
@@ -95,38 +113,51 @@ bool ExtractFeatures(ColmapProcess& colmap,
         arguments,
         {"finding features in photos", "Processed file", static_cast<int64_t>(group.names.size())});
   }
+  SfmDatabase(work.database()).NumberPhotosByName();
   return any_coarse;
 }
 
 void MatchPairs(ColmapProcess& colmap,
                 const SfmWorkspace& work,
                 const FeatureImages& photos,
-                const std::vector<PhotoPair>& pairs) {
+                const std::vector<PhotoPair>& pairs,
+                const RunControl& run) {
   for (size_t begin = 0; begin < pairs.size(); begin += kPairsPerCall) {
     const size_t end = std::min(begin + kPairsPerCall, pairs.size());
-    std::vector<std::string> lines;
-    for (size_t i = begin; i < end; ++i) {
-      lines.push_back(photos.names[pairs[i].first] + " " + photos.names[pairs[i].second]);
-    }
-    const fs::path list = work.folder / "pairs.txt";
-    WriteLines(list, lines);
-    std::vector<std::string> arguments = MatchingArguments(colmap, work, "matches_importer");
-    arguments.insert(arguments.end(),
-                     {"--match_list_path", list.string(), "--match_type", "pairs"});
-    colmap.RunOrThrow(
-        arguments,
-        {fmt::format("matching pairs of photos {}..{} of {}", begin, end, pairs.size()),
-         "Matching block",
-         1});
+    const std::vector<PhotoPair> some(pairs.begin() + static_cast<std::ptrdiff_t>(begin),
+                                      pairs.begin() + static_cast<std::ptrdiff_t>(end));
+    const std::string what =
+        fmt::format("matching pairs of photos {}..{} of {}", begin, end, pairs.size());
+    run.progress.OnProgress(static_cast<int64_t>(begin), static_cast<int64_t>(pairs.size()), what);
+    const std::map<int, SiftDescriptors> descriptors = DescriptorsFor(work, photos, some);
+    std::vector<std::string> texts(some.size());
+    run.pool.ForEach(static_cast<int64_t>(some.size()), [&](int64_t i, int) {
+      run.cancel.ThrowIfCancelled();
+      const PhotoPair& pair = some[static_cast<size_t>(i)];
+      texts[static_cast<size_t>(i)] = TextOfMatches(
+          photos, pair, MatchDescriptors(descriptors.at(pair.first), descriptors.at(pair.second)));
+    });
+    std::string text;
+    for (const std::string& of_pair : texts) text += of_pair;
+    if (text.empty()) continue;
+    const fs::path list = work.folder / "matches.txt";
+    WriteFileAtomic(list, text);
+    // It verifies one pair after the other, on one thread: what is random follows from the seed.
+    colmap.RunOrThrow({"matches_importer",
+                       "--random_seed",
+                       "0",
+                       "--database_path",
+                       work.database().string(),
+                       "--SiftMatching.use_gpu",
+                       "0",
+                       "--SiftMatching.num_threads",
+                       "1",
+                       "--match_list_path",
+                       list.string(),
+                       "--match_type",
+                       "raw"},
+                      {what, ".png - ", static_cast<int64_t>(some.size())});
   }
-}
-
-void MatchAllPairs(ColmapProcess& colmap, const SfmWorkspace& work, size_t count) {
-  const int64_t blocks = static_cast<int64_t>(count + kMatchingBlock - 1) / kMatchingBlock;
-  std::vector<std::string> arguments = MatchingArguments(colmap, work, "exhaustive_matcher");
-  arguments.insert(arguments.end(),
-                   {"--ExhaustiveMatching.block_size", std::to_string(kMatchingBlock)});
-  colmap.RunOrThrow(arguments, {"matching blocks of photos", "Matching block", blocks * blocks});
 }
 
 }  // namespace color3d

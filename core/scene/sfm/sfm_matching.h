@@ -25,19 +25,21 @@ struct SfmWorkspace {
 // features repeat less well. Small photos need it, so they are always fine.
 enum class FeatureDetail { kCoarse, kFine };
 
-// SIFT of all photos into a new database. Photos of one folder share a camera. True when some got
-// coarse features.
+// SIFT of all photos into a new database, which numbers them by name. Photos of one folder share a
+// camera. True when some got coarse features.
 bool ExtractFeatures(ColmapProcess& colmap,
                      const SfmWorkspace& work,
                      const FeatureImages& photos,
                      const ImportOptions& options,
                      FeatureDetail detail);
 
-// Matches and verifies what the database does not hold yet.
+// Matches and verifies what the database does not hold yet. The same photos and pairs always give
+// the same matches, whatever the number of threads: COLMAP's own matcher does not (its trees of
+// features are random).
 void MatchPairs(ColmapProcess& colmap,
                 const SfmWorkspace& work,
                 const FeatureImages& photos,
-                const std::vector<PhotoPair>& pairs);
-void MatchAllPairs(ColmapProcess& colmap, const SfmWorkspace& work, size_t count);
+                const std::vector<PhotoPair>& pairs,
+                const RunControl& run);
 
 }  // namespace color3d

@@ -102,6 +102,22 @@ TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
 }
 
 // Something that goes along with the camera, as a bonnet does, would tell that it stands still.
+// Whatever the number of threads, and whichever of them is ready first.
+TEST_F(Sfm, TheSamePhotosAlwaysGiveTheSameCameras) {
+  const std::vector<Pose> poses = RoomPoses(6);
+  for (int i = 0; i < 6; ++i) {
+    WriteFileAtomic(folder_.path() / PhotoName(i),
+                    EncodePng8(RenderCorner(kRoomCamera, poses[static_cast<size_t>(i)])));
+  }
+  const std::string first = SceneToJson(Run().scene);
+  for (const int threads : {1, 3, 2}) {
+    QuietRun run(threads);
+    const ScratchFolder scratch;
+    const ImportResult again = ImportScene(folder_.path(), scratch.path(), options_, run.control());
+    EXPECT_EQ(SceneToJson(again.scene), first) << threads << " threads";
+  }
+}
+
 TEST_F(Sfm, WhatIsMaskedOutDoesNotPlaceCameras) {
   const std::vector<Pose> truth = RoomPoses(7);
   Random random(5);

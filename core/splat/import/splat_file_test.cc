@@ -5,9 +5,11 @@
 #include <zlib.h>
 
 #include <cmath>
+#include <filesystem>
 #include <functional>
 
 #include "core/base/error.h"
+#include "core/base/files.h"
 #include "core/splat/export/sog/sog.h"
 #include "core/splat/export/sog/zip.h"
 #include "core/splat/export/spz/spz.h"
@@ -171,6 +173,22 @@ TEST(SplatFileTest, OtherVersionsAreNamed) {
   EXPECT_THAT(Refusal(Gzip(std::string("NGSP\x01\0\0\0\x01\0\0\0\0\0\0\0", 16))),
               HasSubstr("SPZ of version 1"));
   EXPECT_THAT(Refusal(Gzip("a text, packed, of more than 16 bytes")), HasSubstr("no SPZ"));
+}
+
+// A file is read from its archive or not at all.
+TEST(SplatFileTest, FilesOutsideOfTheArchiveAreNotRead) {
+  const ScratchFolder folder;
+  const std::filesystem::path outside = folder.path() / "means.webp";
+  WriteFileAtomic(outside, "RIFF");
+  for (const std::string& name : {outside.string(), std::string("../means.webp"), std::string()}) {
+    const std::string files = "[\"" + name + "\",\"" + name + "\"]";
+    const std::string meta = R"({"version":2,"count":1,"means":{"mins":[0,0,0],"maxs":[1,1,1],)"
+                             R"("files":)" +
+                             files + R"(},"scales":{"codebook":[0],"files":)" + files +
+                             R"(},"quats":{"files":)" + files +
+                             R"(},"sh0":{"codebook":[0],"files":)" + files + "}}";
+    EXPECT_THAT(Refusal(StoredZip({{"meta.json", meta}})), HasSubstr("holds no " + name));
+  }
 }
 
 TEST(SplatFileTest, SpzOfVersion3HasTheRotationsOf4) {

@@ -16,6 +16,8 @@ const char* LayoutName(SceneLayout layout) {
       return "transforms";
     case SceneLayout::kNerfies:
       return "nerfies";
+    case SceneLayout::kPosesBounds:
+      return "poses_bounds";
     case SceneLayout::kPosedFilms:
       return "posed_films";
     case SceneLayout::kFilms:
