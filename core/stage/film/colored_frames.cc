@@ -114,7 +114,8 @@ void WriteColoredFilm(const Scene& scene,
        .ticks_per_second = clock.ticks_per_second,
        .threads = context.pool().thread_count(),
        .sound =
-           SoundFrom(scene, frames.front(), scene.views[frames.front()].time_s(), clock, context)});
+           SoundFrom(scene, frames.front(), scene.views[frames.front()].time_s(), clock, context),
+       .cancel = &context.cancel()});
   if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
   const auto count = static_cast<int>(frames.size());
   const int batch = context.pool().thread_count();
