@@ -94,7 +94,7 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
     Footage footage{std::move(film), {}, {}, {}};
     if (footage.film.is_pictures) {
       footage.pictures = PicturesIn(context.scene_folder() / footage.film.file);
-      footage.times = TimesOfPictures(footage.pictures.size(), options);
+      footage.times = TimesOfPictures(footage.pictures, options, context);
     } else {
       if (!films.contains(footage.film.file)) size_of(footage.film.file);
       footage.times = films.at(footage.film.file).times;

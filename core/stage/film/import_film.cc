@@ -229,7 +229,7 @@ void ImportPictures(const FilmOptions& options,
                     StageContext& context) {
   const fs::path folder = context.scene_folder() / kFramesFolder;
   const std::vector<std::string> files = PicturesIn(folder);
-  const std::vector<double> times = TimesOfPictures(files.size(), options);
+  const std::vector<double> times = TimesOfPictures(files, options, context);
   const std::vector<int> wanted = Wanted(times, options);
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());
