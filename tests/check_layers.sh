@@ -75,7 +75,7 @@ allow server/metrics 'core/base|server/(store|storage|metrics)'
 allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(access|store|planning|storage|ops|rpc)'
-allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
+allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \

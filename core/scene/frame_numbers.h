@@ -13,9 +13,9 @@ struct FrameNumbers {
 };
 
 // `names` in their order (base/name_order.h). Names that differ in one number only, which grows by
-// the same step nearly always, tell which frames are missing: a gap keeps its frames' time. Pictures
-// follow each other without gaps where names tell no such number, and where more frames would be
-// missing than there are; the note says so.
+// the same step nearly always, tell which frames are missing: a gap keeps its frames' time.
+// Pictures follow each other without gaps where names tell no such number, and where more frames
+// would be missing than there are; the note says so.
 FrameNumbers PlacesOfFrames(const std::vector<std::string>& names);
 
 }  // namespace color3d

@@ -30,8 +30,9 @@ TEST(FrameNumbers, EveryTenthFrameLeavesNoGap) {
 }
 
 TEST(FrameNumbers, TheNumberMayStandAnywhere) {
-  EXPECT_THAT(PlacesOfFrames({"r2/a1_v3.png", "r2/a2_v3.png", "r2/a3_v3.png", "r2/a5_v3.png"}).places,
-              ElementsAre(0, 1, 2, 4));
+  EXPECT_THAT(
+      PlacesOfFrames({"r2/a1_v3.png", "r2/a2_v3.png", "r2/a3_v3.png", "r2/a5_v3.png"}).places,
+      ElementsAre(0, 1, 2, 4));
   EXPECT_THAT(PlacesOfFrames({"9.jp2", "10.jp2", "11.jp2", "13.jp2"}).places,
               ElementsAre(0, 1, 2, 4));
 }
@@ -55,7 +56,8 @@ TEST(FrameNumbers, NamesWithoutOneNumberFollowEachOther) {
 TEST(FrameNumbers, ALeapIsNoGap) {
   const FrameNumbers numbers = PlacesOfFrames({"0001.png", "0002.png", "0003.png", "9001.png"});
   EXPECT_THAT(numbers.places, ElementsAre(0, 1, 2, 3));
-  EXPECT_THAT(numbers.note, AllOf(HasSubstr("8997 frames are missing"), HasSubstr("without a gap")));
+  EXPECT_THAT(numbers.note,
+              AllOf(HasSubstr("8997 frames are missing"), HasSubstr("without a gap")));
 }
 
 }  // namespace

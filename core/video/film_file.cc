@@ -43,8 +43,7 @@ bool IsOneOf(const std::string_view (&names)[N], std::string_view name) {
   return std::find(std::begin(names), std::end(names), name) != std::end(names);
 }
 
-int RefuseSecondFile(
-    AVFormatContext*, AVIOContext** opened, const char*, int, AVDictionary**) {
+int RefuseSecondFile(AVFormatContext*, AVIOContext** opened, const char*, int, AVDictionary**) {
   *opened = nullptr;
   return AVERROR(EACCES);
 }
@@ -145,8 +144,7 @@ FilmFile::FilmFile(const fs::path& file, const CancellationToken* cancel)
   container->format_whitelist = av_strdup(kind->name);
   container->protocol_whitelist = av_strdup("file");
   // Of a failure it is freed.
-  if (const int result = avformat_open_input(&container, name.c_str(), kind, nullptr);
-      result < 0) {
+  if (const int result = avformat_open_input(&container, name.c_str(), kind, nullptr); result < 0) {
     RefuseContainer(result);
   }
   container_.reset(container);

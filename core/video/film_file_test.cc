@@ -114,16 +114,14 @@ std::string Element(uint32_t id, const std::string& body) {
 // A segment without pictures that names the one that goes on, by its identity and its file.
 std::string LinkedMatroska(const std::string& next) {
   const std::string header = Element(0x1A45DFA3, Element(0x4282, "matroska"));
-  const std::string info = Element(0x1549A966,
-                                   Element(0x73A4, std::string(16, '\1')) +
-                                       Element(0x3EB923, std::string(16, '\2')) +
-                                       Element(0x3E83BB, next) + Element(0x4D80, "a") +
-                                       Element(0x5741, "a"));
+  const std::string info =
+      Element(0x1549A966,
+              Element(0x73A4, std::string(16, '\1')) + Element(0x3EB923, std::string(16, '\2')) +
+                  Element(0x3E83BB, next) + Element(0x4D80, "a") + Element(0x5741, "a"));
   const std::string picture = Element(0xE0, Element(0xB0, "\x60") + Element(0xBA, "\x40"));
-  const std::string track =
-      Element(0xAE,
-              Element(0xD7, "\1") + Element(0x73C5, "\1") + Element(0x83, "\1") +
-                  Element(0x86, "V_MPEG2") + picture);
+  const std::string track = Element(0xAE,
+                                    Element(0xD7, "\1") + Element(0x73C5, "\1") +
+                                        Element(0x83, "\1") + Element(0x86, "V_MPEG2") + picture);
   return header + Element(0x18538067, info + Element(0x1654AE6B, track));
 }
 
@@ -171,7 +169,8 @@ TEST_F(FilmFileTest, TheFilmThatOthersNameIsOne) {
 TEST_F(FilmFileTest, ListsOfOtherFilesAreRefusedUnderEveryEnding) {
   const std::string path = secret_.string();
   const std::vector<std::string> lists = {
-      "#EXTM3U\n#EXT-X-VERSION:3\n#EXT-X-TARGETDURATION:2\n#EXTINF:1.2,\nsecret.ts\n#EXT-X-ENDLIST\n",
+      "#EXTM3U\n#EXT-X-VERSION:3\n#EXT-X-TARGETDURATION:2\n#EXTINF:1.2,\nsecret.ts\n#EXT-X-"
+      "ENDLIST\n",
       "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:1.2,\nfile://" + path + "\n#EXT-X-ENDLIST\n",
       // One without an end, which is asked for again and again.
       "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXT-X-MEDIA-SEQUENCE:0\n#EXTINF:1.2,\nsecret.ts\n",
@@ -222,7 +221,8 @@ TEST_F(FilmFileTest, SegmentsThatAMatroskaFileNamesStayClosed) {
 
 // A name in which FFmpeg's libraries would see a pattern, a protocol or a list is one of a file.
 TEST_F(FilmFileTest, NamesAreNamesOfFiles) {
-  for (const char* name : {"f%01d.mp4", "concat:a|b.ts", "http:a.ts", "*.ts", "-i.ts", "a b#?.ts"}) {
+  for (const char* name :
+       {"f%01d.mp4", "concat:a|b.ts", "http:a.ts", "*.ts", "-i.ts", "a b#?.ts"}) {
     SCOPED_TRACE(name);
     fs::copy_file(secret_, folder_.path() / name);
     EXPECT_EQ(FilmReader(folder_.path() / name).times().size(), 30u);
@@ -268,18 +268,17 @@ TEST_F(FilmFileTest, CancellationEndsEveryCall) {
   EXPECT_EQ(code_of([&] { film.Read(25); }), ErrorCode::kCancelled);
   EXPECT_EQ(code_of([&] { FilmReader again(secret_, &cancel); }), ErrorCode::kCancelled);
   EXPECT_EQ(code_of([&] { SoundLevels({secret_, 0.0, 1.0}, cancel); }), ErrorCode::kCancelled);
-  EXPECT_EQ(code_of([&] {
-              Mp4Writer movie(folder_.path() / "movie.mp4",
-                              {.width = 32,
-                               .height = 32,
-                               .sound = SoundPart{secret_, 0.0, 1.0},
-                               .cancel = &cancel});
-            }),
-            ErrorCode::kCancelled);
+  EXPECT_EQ(
+      code_of([&] {
+        Mp4Writer movie(
+            folder_.path() / "movie.mp4",
+            {.width = 32, .height = 32, .sound = SoundPart{secret_, 0.0, 1.0}, .cancel = &cancel});
+      }),
+      ErrorCode::kCancelled);
 }
 
-// A terabyte of nothing behind the film's beginning: FFmpeg's libraries look for a picture in it for
-// a quarter of an hour, in one call.
+// A terabyte of nothing behind the film's beginning: FFmpeg's libraries look for a picture in it
+// for a quarter of an hour, in one call.
 TEST_F(FilmFileTest, CancellationEndsWhatTheLibrariesDo) {
   const fs::path file = folder_.path() / "film.mpg";
   ASSERT_TRUE(WriteNumberedFilm(file, {.encoder = "mpeg2video", .frames = 30}));

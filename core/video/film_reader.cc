@@ -86,10 +86,8 @@ const Facts* DataBeside(const AVFrame& frame,
 // The brightest light of a PQ film, cd/m2: as the film says, else as its grading display shows it.
 double PeakNits(const AVFrame& frame, const AVStream& stream) {
   double peak = 0.0;
-  if (const auto* light = DataBeside<AVContentLightMetadata>(frame,
-                                                             AV_FRAME_DATA_CONTENT_LIGHT_LEVEL,
-                                                             stream,
-                                                             AV_PKT_DATA_CONTENT_LIGHT_LEVEL)) {
+  if (const auto* light = DataBeside<AVContentLightMetadata>(
+          frame, AV_FRAME_DATA_CONTENT_LIGHT_LEVEL, stream, AV_PKT_DATA_CONTENT_LIGHT_LEVEL)) {
     peak = light->MaxCLL;
   }
   const auto* display =

@@ -18,11 +18,11 @@ bool CanConvert(AVPixelFormat format);
 // Not thread-safe.
 class FrameConverter {
  public:
-  // R'G'B' in 0..1 of `width` x `height` px, as the frame codes it; of an interlaced frame the lines
-  // that come first. The matrix and the range of values are those that the frame states. Where it
-  // states no range, greys are of full range, as RGB is, and Y'CbCr is of limited range, but for the
-  // formats of JPEG (yuvj): so do FFmpeg's programs. Throws Error{kDataLoss} where it cannot be
-  // converted.
+  // R'G'B' in 0..1 of `width` x `height` px, as the frame codes it; of an interlaced frame the
+  // lines that come first. The matrix and the range of values are those that the frame states.
+  // Where it states no range, greys are of full range, as RGB is, and Y'CbCr is of limited range,
+  // but for the formats of JPEG (yuvj): so do FFmpeg's programs. Throws Error{kDataLoss} where it
+  // cannot be converted.
   Image Convert(const AVFrame& frame, int width, int height);
 
  private:

@@ -148,16 +148,15 @@ class FrameConverterTest : public testing::TestWithParam<AVPixelFormat> {
       const bool is_chroma = facts().nb_components > 2 && (c == 1 || c == 2);
       const int depth = facts().comp[c].depth;
       const double most = (1 << depth) - 1, unit = 1 << (depth - 8);
-      const double value = is_chroma               ? 128 * unit
-                           : c > 0                 ? most
-                           : is_full               ? share * most
-                                                   : (16 + 219 * share) * unit;
+      const double value = is_chroma ? 128 * unit
+                           : c > 0   ? most
+                           : is_full ? share * most
+                                     : (16 + 219 * share) * unit;
       const int width = is_chroma ? AV_CEIL_RSHIFT(kWidth, facts().log2_chroma_w) : kWidth;
       const int height = is_chroma ? AV_CEIL_RSHIFT(kHeight, facts().log2_chroma_h) : kHeight;
       const std::vector<uint16_t> line(width, static_cast<uint16_t>(std::lround(value)));
       for (int y = 0; y < height; ++y) {
-        av_write_image_line(
-            line.data(), frame->data, frame->linesize, &facts(), 0, y, c, width);
+        av_write_image_line(line.data(), frame->data, frame->linesize, &facts(), 0, y, c, width);
       }
     }
     return frame;

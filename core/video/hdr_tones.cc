@@ -66,11 +66,7 @@ double ToneMappedNits(double nits, double peak_nits) {
 }
 
 HdrTones::HdrTones(FilmTransfer transfer, bool is_wide, double peak_nits)
-    : transfer_(transfer),
-      is_wide_(is_wide),
-      light_(kCodes),
-      gain_(kSteps + 1),
-      srgb_(kSteps + 1) {
+    : transfer_(transfer), is_wide_(is_wide), light_(kCodes), gain_(kSteps + 1), srgb_(kSteps + 1) {
   for (int i = 0; i < kCodes; ++i) {
     const double value = i / (kCodes - 1.0);
     light_[i] = static_cast<float>(transfer == FilmTransfer::kPq    ? PqNits(value)

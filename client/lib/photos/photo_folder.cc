@@ -5,6 +5,8 @@
 #include <set>
 
 #include "client/lib/names.h"
+#include "client/lib/photos/film_advice.h"
+#include "client/lib/photos/film_copies.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/name_order.h"
@@ -43,6 +45,7 @@ void RequireFolder(const fs::path& root) {
                 "there is no folder {}; give the folder of the photographs",
                 root.string());
   }
+  if (const std::string advice = FilmAdvice(root); !advice.empty()) throw InvalidArgument(advice);
   throw InvalidArgument(
       "{} is not a folder; give the folder of the photographs, a splat (.ply, .sog or .spz) or a "
       "film (.mp4, .mov, .mkv, ...)",
@@ -135,6 +138,12 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   std::sort(films.begin(), films.end(), [](const LocalFile& x, const LocalFile& y) {
     return x.path < y.path;
   });
+  // What names the films or counts them decides itself: the server says which are copies.
+  if (!has_transforms && !IsFile(root / kPosesBounds)) LeaveOutCopies(&films, &result->notes);
+  if (films.size() == 1) {
+    result->film = films[0];
+    return;
+  }
   result->camera_films = std::move(films);
   if (!has_transforms && IsFile(root / kPosesBounds)) {
     result->model_files.push_back({kPosesBounds, root / kPosesBounds});
@@ -261,10 +270,10 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames) {
   if (folder.splat || folder.film || !folder.camera_films.empty()) return;
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPhotos(folder.root);
-    throw InvalidArgument(
-        "{} contains no photographs (JPEG, PNG or TIFF){}",
-        root,
-        sub.empty() ? "" : "; did you mean " + (folder.root / sub).string() + "?");
+    throw InvalidArgument("{} contains no photographs (JPEG, PNG or TIFF){}",
+                          root,
+                          sub.empty() ? FolderAdvice(folder.root)
+                                      : "; did you mean " + (folder.root / sub).string() + "?");
   }
   if (folder.photos.size() == 1 && as_frames) {
     throw InvalidArgument(
@@ -339,8 +348,10 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
     CheckNames(result);
     return result;
   }
-  if (result.photos.empty()) result.splat = FindOnly(result.root, HasSplatExtension, "splat");
-  if (result.photos.empty() && !result.splat) {
+  if (result.photos.empty() && !result.film) {
+    result.splat = FindOnly(result.root, HasSplatExtension, "splat");
+  }
+  if (result.photos.empty() && !result.splat && !result.film) {
     result.film = FindOnly(result.root, HasFilmExtension, "film");
   }
   if (!result.splat && !result.film) CollectModel(result.root, &result);

@@ -58,8 +58,7 @@ AVFrame* Picture(const ToneStream& stream, AVPixelFormat format) {
   if (!stream.range.empty()) to_full = stream.range == "pc" ? 1 : 0;
   sws_setColorspaceDetails(
       converter, from, from_full, to, to_full, brightness, contrast, saturation);
-  sws_scale(
-      converter, rgb->data, rgb->linesize, 0, stream.height, frame->data, frame->linesize);
+  sws_scale(converter, rgb->data, rgb->linesize, 0, stream.height, frame->data, frame->linesize);
   sws_freeContext(converter);
   av_frame_free(&rgb);
   return frame;
