@@ -53,6 +53,7 @@ FilmDecoder::FilmDecoder(fs::path file, const CancellationToken* cancel)
                    avcodec_get_name(parameters.codec_id));
   }
   codec_.reset(avcodec_alloc_context3(decoder));
+  if (codec_) codec_->max_pixels = kMaxFilmPixels;
   if (!codec_ || avcodec_parameters_to_context(codec_.get(), &parameters) < 0 ||
       avcodec_open2(codec_.get(), decoder, nullptr) < 0) {
     RefuseFilm(file_, std::string("its decoder ") + decoder->name + " does not open");

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <iterator>
 #include <string_view>
+#include <vector>
 
 #include "core/base/error.h"
 
@@ -148,10 +149,38 @@ FilmFile::FilmFile(const fs::path& file, const CancellationToken* cancel)
     RefuseContainer(result);
   }
   container_.reset(container);
-  if (const int result = avformat_find_stream_info(container, nullptr); result < 0) {
-    RefuseContainer(result);
-  }
+  CheckSizes();
+  FindStreams();
   ThrowIfCancelled();
+}
+
+void FilmFile::CheckSizes() const {
+  for (unsigned i = 0; i < container_->nb_streams; ++i) {
+    const AVStream& stream = *container_->streams[i];
+    const AVCodecParameters& codec = *stream.codecpar;
+    if (codec.codec_type != AVMEDIA_TYPE_VIDEO ||
+        (stream.disposition & AV_DISPOSITION_ATTACHED_PIC) != 0 ||
+        std::max(codec.width, codec.height) <= kMaxFilmSidePx) {
+      continue;
+    }
+    RefuseFilm(file_,
+               fmt::format("its frames are {} x {} px; up to {} px are taken",
+                           codec.width,
+                           codec.height,
+                           kMaxFilmSidePx));
+  }
+}
+
+// Frames that are decoded on the way are no larger than others.
+void FilmFile::FindStreams() {
+  std::vector<AVDictionary*> options(container_->nb_streams, nullptr);
+  for (AVDictionary*& of_stream : options) {
+    av_dict_set_int(&of_stream, "max_pixels", kMaxFilmPixels, 0);
+  }
+  const int result = avformat_find_stream_info(container_.get(), options.data());
+  for (AVDictionary*& of_stream : options) av_dict_free(&of_stream);
+  if (result < 0) RefuseContainer(result);
+  CheckSizes();
 }
 
 FilmFile::~FilmFile() = default;

@@ -2,6 +2,7 @@
 // support. Whatever other file, address or device it names stays closed. For this folder only.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -14,13 +15,18 @@ namespace color3d {
 // `why` it is no film: throws Error{kInvalidArgument} that names the file.
 [[noreturn]] void RefuseFilm(const std::filesystem::path& file, const std::string& why);
 
+// Of a film's frames; larger ones are never decoded.
+inline constexpr int kMaxFilmSidePx = 8192;
+inline constexpr int64_t kMaxFilmPixels = int64_t{kMaxFilmSidePx} * kMaxFilmSidePx;
+
 // Not thread-safe.
 class FilmFile {
  public:
   // Opens the file and finds its streams. FFmpeg's libraries get its bytes from us and can open
   // nothing else. `cancel` may be null; it outlives this object, and ends what the libraries do.
   // Throws Error{kNotFound} when there is no such regular file; Error{kInvalidArgument} that names
-  // the file and says what it is when it is no container of films; Error{kCancelled}.
+  // the file and says what it is when it is no container of films, or when its frames are larger
+  // than kMaxFilmSidePx; Error{kCancelled}.
   FilmFile(const std::filesystem::path& file, const CancellationToken* cancel);
   ~FilmFile();
 
@@ -36,6 +42,8 @@ class FilmFile {
   class Bytes;
 
   void CheckKind(const AVInputFormat* kind) const;
+  void CheckSizes() const;
+  void FindStreams();
   [[noreturn]] void RefuseContainer(int libav_result) const;
   void ThrowIfCancelled() const;
 

@@ -22,7 +22,6 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kMaxSidePx = 8192;
 // Times of frames that differ by less than this share of their mean distance are one rate.
 constexpr double kRateTolerance = 0.2;
 // First frames that are asked what kind of pictures the film has, until one is whole.
@@ -160,11 +159,11 @@ class FilmReader::Impl {
     const double stretch = aspect.num > 0 && aspect.den > 0 ? av_q2d(aspect) : 1.0;
     width_ = static_cast<int>(std::lround(film_.codec().width * stretch));
     height_ = film_.codec().height;
-    if (width_ < 1 || height_ < 1 || width_ > kMaxSidePx || height_ > kMaxSidePx) {
+    if (width_ < 1 || height_ < 1 || width_ > kMaxFilmSidePx || height_ > kMaxFilmSidePx) {
       RefuseFilm(
           file_,
           fmt::format(
-              "its frames are {} x {} px; up to {} px are taken", width_, height_, kMaxSidePx));
+              "its frames are {} x {} px; up to {} px are taken", width_, height_, kMaxFilmSidePx));
     }
     facts_.width = facts_.quarter_turns % 2 == 1 ? height_ : width_;
     facts_.height = facts_.quarter_turns % 2 == 1 ? width_ : height_;

@@ -1,6 +1,7 @@
 // Tones of films in every codec and pixel format that archives, cameras and programs give them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/video/film_reader.h"
 #include "tests/support/formats/tone_film.h"
@@ -17,6 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::AllOf;
+using testing::AnyOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -178,6 +181,41 @@ TEST_F(FilmTonesTest, OfSeveralStreamsTheDefaultOneIsTaken) {
     EXPECT_EQ(image.width, tone < 0.5 ? 32 : 64);
     EXPECT_THAT(film.facts().notes, ElementsAre(AllOf(HasSubstr("2 streams"), HasSubstr(said))));
   }
+}
+
+std::string Complaint(const fs::path& file) {
+  try {
+    FilmReader(file).Read(0);
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST_F(FilmTonesTest, FramesThatAreTooLargeAreRefusedBeforeTheyAreDecoded) {
+  const fs::path file = folder_.path() / "a.mov";
+  ASSERT_TRUE(WriteToneFilm(file, {{.encoder = "png", .width = 9000, .height = 16}}));
+  EXPECT_THAT(Complaint(file), HasSubstr("its frames are 9000 x 16 px; up to 8192 px are taken"));
+  // Pictures that claim 30,000 x 30,000 px, in a film that says 64 x 48.
+  ASSERT_TRUE(WriteToneFilm(file, {{.encoder = "png"}}));
+  std::string bytes = ReadFile(file);
+  const std::string side("\0\0\x75\x30", 4);
+  for (size_t at = bytes.find("IHDR"); at != std::string::npos; at = bytes.find("IHDR", at + 4)) {
+    bytes.replace(at + 4, 8, side + side);
+    // The check sum: PNG's own (ISO 15948, 5.5).
+    uint32_t sum = 0xffffffff;
+    for (size_t i = at; i < at + 17; ++i) {
+      sum ^= static_cast<uint8_t>(bytes[i]);
+      for (int bit = 0; bit < 8; ++bit) sum = sum & 1 ? sum >> 1 ^ 0xedb88320 : sum >> 1;
+    }
+    for (int i = 0; i < 4; ++i) bytes[at + 17 + i] = static_cast<char>(~sum >> (24 - 8 * i));
+  }
+  WriteFileAtomic(file, bytes);
+  rusage before{}, after{};
+  getrusage(RUSAGE_SELF, &before);
+  EXPECT_THAT(Complaint(file), AnyOf(HasSubstr("damaged"), HasSubstr("px are taken")));
+  getrusage(RUSAGE_SELF, &after);
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 300 * 1024) << "KiB";
 }
 
 }  // namespace

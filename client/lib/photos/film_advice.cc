@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/name_order.h"
+#include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 
 namespace color3d::client {
@@ -203,11 +204,13 @@ std::string FolderAdvice(const fs::path& folder) {
                        count > 1 ? fmt::format(", as {} more are", count - 1) : "",
                        Remedy(*first, ending->kind));
   }
-  const auto picture = std::find_if(files.begin(), files.end(), [&](const fs::path& file) {
-    return HasImageExtension(file.string());
+  const auto below = std::find_if(files.begin(), files.end(), [&](const fs::path& file) {
+    return HasImageExtension(file.string()) || HasFilmExtension(file.string());
   });
-  if (picture == files.end()) return "";
-  return fmt::format("; pictures lie in {}: give that folder", picture->parent_path().string());
+  if (below == files.end()) return "";
+  return fmt::format("; {} lie in {}: give that folder",
+                     HasFilmExtension(below->string()) ? "films" : "pictures",
+                     below->parent_path().string());
 }
 
 }  // namespace color3d::client

@@ -12,7 +12,8 @@ namespace color3d::client {
 std::string FilmAdvice(const std::filesystem::path& file);
 
 // The same of the first such file in `folder` or below it, and how many there are of its kind; else
-// of pictures that lie in a folder deeper down. Begins with "; ", empty where there is neither.
+// of pictures or films that lie in a folder deeper down. Begins with "; ", empty where there is
+// neither.
 std::string FolderAdvice(const std::filesystem::path& folder);
 
 }  // namespace color3d::client

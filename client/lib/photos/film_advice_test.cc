@@ -70,6 +70,9 @@ TEST_F(FilmAdviceTest, PicturesDeeperDownAreNamed) {
   Write("film/reel 1/frames/0002.png");
   EXPECT_THAT(Complaint("film"),
               HasSubstr("pictures lie in " + (folder_.path() / "film/reel 1/frames").string()));
+  Write("reels/1/a.mp4");
+  EXPECT_THAT(Complaint("reels"),
+              HasSubstr("films lie in " + (folder_.path() / "reels/1").string()));
   Write("nothing/.hidden/1.gif");
   EXPECT_THAT(Complaint("nothing"), testing::EndsWith("(JPEG, PNG or TIFF)"));
 }
