@@ -173,6 +173,9 @@ void FilmFile::CheckSizes() const {
 
 // Frames that are decoded on the way are no larger than others.
 void FilmFile::FindStreams() {
+  for (unsigned i = 0; i < container_->nb_streams; ++i) {
+    ranges_.push_back(container_->streams[i]->codecpar->color_range);
+  }
   std::vector<AVDictionary*> options(container_->nb_streams, nullptr);
   for (AVDictionary*& of_stream : options) {
     av_dict_set_int(&of_stream, "max_pixels", kMaxFilmPixels, 0);
@@ -180,6 +183,8 @@ void FilmFile::FindStreams() {
   const int result = avformat_find_stream_info(container_.get(), options.data());
   for (AVDictionary*& of_stream : options) av_dict_free(&of_stream);
   if (result < 0) RefuseContainer(result);
+  // Of those that are only found now the container states nothing.
+  ranges_.resize(container_->nb_streams, AVCOL_RANGE_UNSPECIFIED);
   CheckSizes();
 }
 

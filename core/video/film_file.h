@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/base/cancellation.h"
 #include "core/video/libav.h"
@@ -32,6 +33,9 @@ class FilmFile {
 
   AVFormatContext* container() const { return container_.get(); }
 
+  // The range of values that the container states of a stream, whatever its decoder says.
+  AVColorRange StatedRange(const AVStream* stream) const { return ranges_[stream->index]; }
+
   // Only this stream is read; it is one of the container's.
   void ReadOnly(const AVStream* stream);
   // The next packet of the file; false at its end, or where it cannot be read on. Throws
@@ -51,6 +55,7 @@ class FilmFile {
   const CancellationToken* const cancel_;
   std::unique_ptr<Bytes> bytes_;  // outlives container_
   std::unique_ptr<AVFormatContext, CloseFilm> container_;
+  std::vector<AVColorRange> ranges_;  // by stream
 };
 
 }  // namespace color3d

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -56,15 +57,41 @@ void FilmPackets::UnpackPictures() {
   }
 }
 
+// Containers give a palette once, with the packet that it begins with, and not again after a seek.
+void FilmPackets::KeepPalette(AVPacket* packet) {
+  size_t size = 0;
+  const uint8_t* palette = av_packet_get_side_data(packet, AV_PKT_DATA_PALETTE, &size);
+  if (palette != nullptr) {
+    palettes_[packet->pos].assign(reinterpret_cast<const char*>(palette), size);
+    return;
+  }
+  auto last = palettes_.upper_bound(packet->pos);
+  if (last == palettes_.begin()) return;
+  const std::string& bytes = (--last)->second;
+  if (uint8_t* copy = av_packet_new_side_data(packet, AV_PKT_DATA_PALETTE, bytes.size())) {
+    std::memcpy(copy, bytes.data(), bytes.size());
+  }
+}
+
+// The next packet of the pictures; false at the end.
+bool FilmPackets::ReadFile(AVPacket* packet) {
+  while (file_.ReadPacket(packet)) {
+    if (packet->stream_index == stream_->index && packet->size > 0) {
+      KeepPalette(packet);
+      return true;
+    }
+    av_packet_unref(packet);
+  }
+  return false;
+}
+
 bool FilmPackets::Read(AVPacket* packet) {
   while (true) {
     if (filter_ && av_bsf_receive_packet(filter_.get(), packet) >= 0) return true;
     if (has_ended_) return false;
-    if (!file_.ReadPacket(packet)) {
+    if (!ReadFile(packet)) {
       has_ended_ = true;
       if (filter_) av_bsf_send_packet(filter_.get(), nullptr);
-    } else if (packet->stream_index != stream_->index || packet->size == 0) {
-      av_packet_unref(packet);
     } else if (!filter_) {
       return true;
     } else if (av_bsf_send_packet(filter_.get(), packet) < 0) {

@@ -7,7 +7,9 @@ extern "C" {
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <string>
 
 #include "core/video/film_file.h"
 #include "core/video/libav.h"
@@ -23,6 +25,8 @@ class FilmPackets {
   AVStream* stream() const { return stream_; }
   // Streams of pictures in the file; stream() is the one that players show.
   int stream_count() const { return stream_count_; }
+  // The range of values that the container states, whatever the decoder says.
+  AVColorRange stated_range() const { return file_.StatedRange(stream_); }
   const AVCodecParameters& codec() const {
     return filter_ ? *filter_->par_out : *stream_->codecpar;
   }
@@ -39,11 +43,14 @@ class FilmPackets {
   };
 
   void UnpackPictures();
+  bool ReadFile(AVPacket* packet);
+  void KeepPalette(AVPacket* packet);
 
   FilmFile file_;
   AVStream* stream_ = nullptr;
   int stream_count_ = 0;
   std::unique_ptr<AVBSFContext, FreeFilter> filter_;  // may be none
+  std::map<int64_t, std::string> palettes_;           // that packets brought, by their place
   bool has_ended_ = false;                            // the file; filter_ may still hold some
 };
 

@@ -217,8 +217,21 @@ class FilmReader::Impl {
                     peak_nits));
   }
 
+  // Decoders say of greys that their range is limited where their file says nothing (MagicYUV, HEVC,
+  // AV1), and who writes them seldom means it: the container is believed, and H.264, whose decoder
+  // says only what is stated.
+  AVColorRange RangeOf(const AVFrame& picture) const {
+    const bool is_stated = film_.packets().stated_range() == AVCOL_RANGE_MPEG ||
+                           film_.codec().codec_id == AV_CODEC_ID_H264;
+    return picture.color_range == AVCOL_RANGE_MPEG && !is_stated &&
+                   IsGray(static_cast<AVPixelFormat>(picture.format))
+               ? AVCOL_RANGE_UNSPECIFIED
+               : picture.color_range;
+  }
+
   Image Converted() {
-    Image image = converter_.Convert(film_.picture(), width_, height_);
+    const AVFrame& picture = film_.picture();
+    Image image = converter_.Convert(picture, RangeOf(picture), width_, height_);
     if (tones_) tones_->Apply(&image);
     return image;
   }

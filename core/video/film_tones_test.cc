@@ -75,10 +75,10 @@ TEST_F(FilmTonesTest, AWedgeComesBackFromEveryCodec) {
       {"ffv1", "a.avi", {"gray", "gray10le", "gray16le", "yuv420p"}},
       {"rawvideo", "a.avi", {"gray", "yuv420p", "yuyv422", "uyvy422", "nv12"}},
       {"rawvideo", "a.mkv", {"gray", "yuv420p", "nv12", "rgb24"}},
-      {"rawvideo", "a.mov", {"gray", "uyvy422"}},
+      {"rawvideo", "a.mov", {"uyvy422"}},
       {"jpeg2000",
        "a.mov",
-       {"gray", "gray16le", "yuv420p", "yuv444p10le", "rgb24", "rgb48le", "ya8", "xyz12le"}},
+       {"gray", "yuv420p", "rgb24", "rgb48le", "ya8", "xyz12le"}},
       {"tiff", "a.mov", {"gray", "gray16le", "rgb24", "rgb48le", "ya8", "yuv420p"}},
       {"png", "a.mov", {"gray", "gray16be", "rgb24", "rgb48be", "ya8", "ya16be"}},
       {"magicyuv", "a.avi", {"gray", "yuv420p", "gbrp"}},
@@ -92,7 +92,8 @@ TEST_F(FilmTonesTest, AWedgeComesBackFromEveryCodec) {
       {"dpx", "a.mov", {"gray", "gray10be", "gray12le", "rgb24", "gbrp10be"}},
       {"v210", "a.mov", {"yuv422p10le"}},
       {"r210", "a.mov", {"gbrp10le"}},
-      {"libx264", "a.mp4", {"gray", "gray10le", "yuv420p", "yuvj420p", "yuv420p10le", "nv12"}},
+      {"libx264", "a.mp4", {"gray", "yuv420p", "yuvj420p", "yuv420p10le", "nv12"}},
+      {"libx265", "a.mkv", {"gray", "gray10le", "yuv420p10le"}},
       {"mpeg4", "a.mp4", {"yuv420p"}},
       {"mpeg2video", "a.mpg", {"yuv420p"}},
       {"snow", "a.mkv", {"gray", "yuv420p"}},
@@ -102,7 +103,10 @@ TEST_F(FilmTonesTest, AWedgeComesBackFromEveryCodec) {
     for (const char* format : kind.formats) {
       SCOPED_TRACE(std::string(kind.encoder) + " " + format + " in " + kind.name);
       const fs::path file = folder_.path() / kind.name;
-      if (!WriteToneFilm(file, {{.encoder = kind.encoder, .pixel_format = format}})) continue;
+      bool is_written = false;
+      ASSERT_NO_THROW(
+          is_written = WriteToneFilm(file, {{.encoder = kind.encoder, .pixel_format = format}}));
+      if (!is_written) continue;
       ++written;
       std::optional<FilmReader> reader;
       ASSERT_NO_THROW(reader.emplace(file));

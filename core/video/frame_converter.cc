@@ -12,15 +12,14 @@ namespace {
 
 constexpr int kFlags = SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT;
 
-// Grey, perhaps with transparency, in whole numbers or floating point.
+}  // namespace
+
 bool IsGray(AVPixelFormat format) {
   const AVPixFmtDescriptor* facts = av_pix_fmt_desc_get(format);
   return facts != nullptr && facts->nb_components <= 2 &&
          (facts->flags & (AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_BITSTREAM |
                           AV_PIX_FMT_FLAG_HWACCEL)) == 0;
 }
-
-}  // namespace
 
 bool CanConvert(AVPixelFormat format) { return sws_isSupportedInput(format) > 0; }
 
@@ -62,14 +61,13 @@ void FrameConverter::Prepare(const Shape& shape) {
   is_full_ = is_full != 0 || IsGray(format);
 }
 
-Image FrameConverter::Convert(const AVFrame& frame, int width, int height) {
+Image FrameConverter::Convert(const AVFrame& frame, AVColorRange range, int width, int height) {
   // Of interlaced film the lines of one moment count: every second.
   const int step = frame.interlaced_frame != 0 && frame.height > 1 ? 2 : 1;
   const int lines = frame.height / step;
   Prepare({frame.width, lines, frame.format, width, height});
-  const bool is_full = frame.color_range == AVCOL_RANGE_UNSPECIFIED
-                           ? is_full_
-                           : frame.color_range == AVCOL_RANGE_JPEG;
+  const bool is_full =
+      range == AVCOL_RANGE_UNSPECIFIED ? is_full_ : range == AVCOL_RANGE_JPEG;
   constexpr int kOne = 1 << 16;
   // Both count matrices as the standards do; a frame of Y'CbCr that claims to be RGB does not know.
   const int matrix = frame.colorspace == AVCOL_SPC_RGB ? SWS_CS_DEFAULT : frame.colorspace;

@@ -34,11 +34,6 @@ Frame EmptyFrame(AVPixelFormat format) {
 
 bool IsFloat(const AVPixFmtDescriptor& facts) { return (facts.flags & AV_PIX_FMT_FLAG_FLOAT) != 0; }
 
-bool IsGray(const AVPixFmtDescriptor& facts) {
-  return facts.nb_components <= 2 &&
-         (facts.flags & (AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_BITSTREAM)) == 0;
-}
-
 // Colours that change along both sides, as FFmpeg's libraries put them into the format; where they
 // only read it, any bytes.
 Frame Pattern(AVPixelFormat format) {
@@ -98,7 +93,7 @@ Image Expected(const AVFrame& frame) {
   sws_getColorspaceDetails(
       reader, &from, &from_full, &to, &to_full, &brightness, &contrast, &saturation);
   // Of greys in floating point FFmpeg's libraries forget that they are of full range.
-  if (IsGray(facts) && IsFloat(facts)) from_full = 1;
+  if (IsGray(format) && IsFloat(facts)) from_full = 1;
   if (frame.color_range != AVCOL_RANGE_UNSPECIFIED) {
     from_full = frame.color_range == AVCOL_RANGE_JPEG ? 1 : 0;
   }
@@ -185,7 +180,7 @@ TEST_P(FrameConverterTest, AsFfmpegConvertsIt) {
   for (const AVColorRange range :
        {AVCOL_RANGE_UNSPECIFIED, AVCOL_RANGE_MPEG, AVCOL_RANGE_JPEG, AVCOL_RANGE_UNSPECIFIED}) {
     frame->color_range = range;
-    EXPECT_LT(Difference(converter.Convert(*frame, kWidth, kHeight), Expected(*frame)), 1e-4)
+    EXPECT_LT(Difference(converter.Convert(*frame, frame->color_range, kWidth, kHeight), Expected(*frame)), 1e-4)
         << av_color_range_name(range);
   }
 }
@@ -197,14 +192,14 @@ TEST_P(LumaFormatTest, TonesAreThoseOfTheFormat) {
   const struct {
     AVColorRange range;
     bool is_full;
-  } ranges[] = {{AVCOL_RANGE_UNSPECIFIED, IsGray(facts()) || is_jpeg},
+  } ranges[] = {{AVCOL_RANGE_UNSPECIFIED, IsGray(GetParam()) || is_jpeg},
                 {AVCOL_RANGE_MPEG, false},
                 {AVCOL_RANGE_JPEG, true}};
   for (const auto& range : ranges) {
     for (const double share : {0.0, 0.25, 0.5, 1.0}) {
       const Frame frame = Plain(share, range.is_full);
       frame->color_range = range.range;
-      const Image image = converter.Convert(*frame, kWidth, kHeight);
+      const Image image = converter.Convert(*frame, frame->color_range, kWidth, kHeight);
       for (int c = 0; c < 3; ++c) {
         EXPECT_NEAR(image.At(c, kHeight / 2, kWidth / 2), share, 0.007)
             << av_color_range_name(range.range) << " channel " << c;
