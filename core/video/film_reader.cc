@@ -217,9 +217,9 @@ class FilmReader::Impl {
                     peak_nits));
   }
 
-  // Decoders say of greys that their range is limited where their file says nothing (MagicYUV, HEVC,
-  // AV1), and who writes them seldom means it: the container is believed, and H.264, whose decoder
-  // says only what is stated.
+  // Decoders say of greys that their range is limited where their file says nothing (MagicYUV,
+  // HEVC, AV1), and who writes them seldom means it: the container is believed, and H.264, whose
+  // decoder says only what is stated.
   AVColorRange RangeOf(const AVFrame& picture) const {
     const bool is_stated = film_.packets().stated_range() == AVCOL_RANGE_MPEG ||
                            film_.codec().codec_id == AV_CODEC_ID_H264;

@@ -66,8 +66,7 @@ Image FrameConverter::Convert(const AVFrame& frame, AVColorRange range, int widt
   const int step = frame.interlaced_frame != 0 && frame.height > 1 ? 2 : 1;
   const int lines = frame.height / step;
   Prepare({frame.width, lines, frame.format, width, height});
-  const bool is_full =
-      range == AVCOL_RANGE_UNSPECIFIED ? is_full_ : range == AVCOL_RANGE_JPEG;
+  const bool is_full = range == AVCOL_RANGE_UNSPECIFIED ? is_full_ : range == AVCOL_RANGE_JPEG;
   constexpr int kOne = 1 << 16;
   // Both count matrices as the standards do; a frame of Y'CbCr that claims to be RGB does not know.
   const int matrix = frame.colorspace == AVCOL_SPC_RGB ? SWS_CS_DEFAULT : frame.colorspace;

@@ -20,11 +20,11 @@ bool IsGray(AVPixelFormat format);
 // Not thread-safe.
 class FrameConverter {
  public:
-  // R'G'B' in 0..1 of `width` x `height` px, as the frame codes it; of an interlaced frame the lines
-  // that come first. The matrix is the one that the frame states; `range` of values: as stated,
-  // too. Where none is, greys are of full range, as RGB is, and Y'CbCr is of limited range, but for
-  // the formats of JPEG (yuvj): so do FFmpeg's programs. Throws Error{kDataLoss} where it cannot be
-  // converted.
+  // R'G'B' in 0..1 of `width` x `height` px, as the frame codes it; of an interlaced frame the
+  // lines that come first. The matrix is the one that the frame states; `range` of values: as
+  // stated, too. Where none is, greys are of full range, as RGB is, and Y'CbCr is of limited range,
+  // but for the formats of JPEG (yuvj): so do FFmpeg's programs. Throws Error{kDataLoss} where it
+  // cannot be converted.
   Image Convert(const AVFrame& frame, AVColorRange range, int width, int height);
 
  private:

@@ -180,7 +180,9 @@ TEST_P(FrameConverterTest, AsFfmpegConvertsIt) {
   for (const AVColorRange range :
        {AVCOL_RANGE_UNSPECIFIED, AVCOL_RANGE_MPEG, AVCOL_RANGE_JPEG, AVCOL_RANGE_UNSPECIFIED}) {
     frame->color_range = range;
-    EXPECT_LT(Difference(converter.Convert(*frame, frame->color_range, kWidth, kHeight), Expected(*frame)), 1e-4)
+    EXPECT_LT(Difference(converter.Convert(*frame, frame->color_range, kWidth, kHeight),
+                         Expected(*frame)),
+              1e-4)
         << av_color_range_name(range);
   }
 }

@@ -4,6 +4,7 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/log.h>
+#include <libavutil/opt.h>
 #include <libavutil/pixdesc.h>
 #include <libswscale/swscale.h>
 }
@@ -91,6 +92,7 @@ AVCodecContext* OpenEncoder(const ToneStream& stream, const AVOutputFormat& cont
   codec->color_primaries = static_cast<AVColorPrimaries>(
       number(stream.primaries, &av_color_primaries_from_name, AVCOL_PRI_UNSPECIFIED));
   if (container.flags & AVFMT_GLOBALHEADER) codec->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  if (stream.encoder == "libx265") av_opt_set(codec->priv_data, "x265-params", "log-level=0", 0);
   Require(avcodec_open2(codec, encoder, nullptr) == 0, "the encoder does not open");
   return codec;
 }
