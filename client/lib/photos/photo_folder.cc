@@ -135,16 +135,11 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
     }
   }
   if (films.size() < 2) return;
-  std::sort(films.begin(), films.end(), [](const LocalFile& x, const LocalFile& y) {
-    return x.path < y.path;
-  });
-  // What names the films or counts them decides itself: the server says which are copies.
+  std::ranges::sort(films, {}, &LocalFile::path);
+  // What names or counts the films decides itself: of those the server says which are copies.
   if (!has_transforms && !IsFile(root / kPosesBounds)) LeaveOutCopies(&films, &result->notes);
-  if (films.size() == 1) {
-    result->film = films[0];
-    return;
-  }
-  result->camera_films = std::move(films);
+  if (films.size() == 1) result->film = films[0];
+  if (films.size() > 1) result->camera_films = std::move(films);
   if (!has_transforms && IsFile(root / kPosesBounds)) {
     result->model_files.push_back({kPosesBounds, root / kPosesBounds});
   }
@@ -350,9 +345,7 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   }
   if (result.photos.empty() && !result.film) {
     result.splat = FindOnly(result.root, HasSplatExtension, "splat");
-  }
-  if (result.photos.empty() && !result.splat && !result.film) {
-    result.film = FindOnly(result.root, HasFilmExtension, "film");
+    if (!result.splat) result.film = FindOnly(result.root, HasFilmExtension, "film");
   }
   if (!result.splat && !result.film) CollectModel(result.root, &result);
   CollectAugmentFiles(result.root, &result);
