@@ -78,7 +78,7 @@ allow server/storage 'core/base|server/(store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/net 'core/base|server/net'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(access|net|store|planning|storage|ops|rpc)'
-allow client 'core/(base|catalogue|color|image(/probe)?)|client(/[a-z]+)?'
+allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
@@ -116,7 +116,7 @@ public core/film anchor_frames film_carry moving_regions returning_shots shots s
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
-public core/scene camera camera_films frame_times held_out import key_photo scene view_images formats/camera_file masks/masked_points masks/photo_masks masks/still_regions relief
+public core/scene camera camera_films frame_numbers frame_times held_out import key_photo scene view_images formats/camera_file masks/masked_points masks/photo_masks masks/still_regions relief
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/motion raster/render \
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "client/commands/benchmark.h"
 #include "client/commands/command.h"
@@ -13,9 +15,11 @@
 #include "client/commands/scene_target.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
+#include "client/lib/photos/film_as_frames.h"
 #include "client/lib/photos/mask_files.h"
 #include "client/lib/text.h"
 #include "client/options/colorize_options.h"
+#include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
@@ -24,8 +28,11 @@ namespace {
 
 class Colorize {
  public:
-  Colorize(const Context& context, const ColorizeOptions& options)
-      : context_(context), options_(options), out_(options.out), display_(context.json) {}
+  Colorize(const Context& context, ColorizeOptions options)
+      : context_(context),
+        options_(std::move(options)),
+        out_(options_.out),
+        display_(context.json) {}
 
   ExitCode Run() {
     options_.Check();
@@ -68,11 +75,6 @@ class Colorize {
       throw InvalidArgument("--benchmark compares with photos in colour; {} is a splat",
                             folder_.splat->file.string());
     }
-    if (options_.benchmark && folder_.film) {
-      throw InvalidArgument(
-          "--benchmark needs the frames of {} as pictures in a folder; give that with --film",
-          folder_.film->file.string());
-    }
     if (options_.benchmark && !folder_.camera_films.empty()) {
       throw InvalidArgument("--benchmark needs the frames of {} as pictures{}",
                             folder_.camera_films[0].file.string(),
@@ -80,6 +82,7 @@ class Colorize {
                                 ? ", each camera's in a folder of its own, with --film"
                                 : ", named in transforms.json with their times");
     }
+    if (options_.benchmark && folder_.film) TakeFilmForBenchmark();
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);
     Connect();
@@ -94,6 +97,22 @@ class Colorize {
   void Connect() {
     PrepareOut(out_);
     connection_ = std::make_unique<Connection>(context_.server, *context_.interrupt);
+  }
+
+  // The film's frames in place of the film: as pictures they can lose their colour.
+  void TakeFilmForBenchmark() {
+    frames_.emplace();
+    const v1::ImportSceneSpec import = ImportSpec(options_, "").import_scene();
+    FilmAsFrames film = TakeFramesOfFilm(
+        folder_,
+        import.has_film_end_s() ? std::optional(import.film_end_s()) : std::nullopt,
+        frames_->path(),
+        *context_.interrupt,
+        [&](int done, int total) { display_.OnCount("reading frame", done, total); });
+    folder_ = std::move(film.folder);
+    if (import.has_film_frames_per_second()) return;
+    options_.settings.push_back(
+        fmt::format("import_scene.film_frames_per_second={}", film.frames_per_second));
   }
 
   // A scene of the server's: by the colour given here, else by the accepted one.
@@ -230,10 +249,11 @@ class Colorize {
   }
 
   const Context& context_;
-  const ColorizeOptions& options_;
+  ColorizeOptions options_;
   const fs::path out_;
   ProgressDisplay display_;
   PhotoFolder folder_;
+  std::optional<ScratchFolder> frames_;  // of a film, for the benchmark
   std::unique_ptr<Connection> connection_;
 };
 

@@ -86,6 +86,10 @@ void ProgressDisplay::OnTransfer(const std::string& what, int64_t done, int64_t 
   if (total > 0) Draw(fmt::format("{} {} of {}", what, HumanBytes(done), HumanBytes(total)));
 }
 
+void ProgressDisplay::OnCount(const std::string& what, int64_t done, int64_t total) {
+  if (total > 0) Draw(fmt::format("{} {} of {}", what, done, total));
+}
+
 void ProgressDisplay::Say(const std::string& line) {
   if (quiet_) return;
   Clear();

@@ -24,8 +24,10 @@ class ProgressDisplay {
   // Now and then while jobs are followed: says what they wait for when nothing runs for a while.
   // `look` gets the followed job as it is now, or throws; called at most every 5 s.
   void OnTick(const std::function<v1::Job()>& look);
-  // A transfer or another loop of ours, in bytes.
+  // A transfer, in bytes.
   void OnTransfer(const std::string& what, int64_t done_bytes, int64_t total_bytes);
+  // Another loop of ours, in things of that name.
+  void OnCount(const std::string& what, int64_t done, int64_t total);
   // A line of its own.
   void Say(const std::string& line);
   // Takes the redrawn line away.

@@ -300,8 +300,9 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
                  "Shorten the preset's schedules to end in about this time: 90s, 5m, 1h")
       ->transform(CLI::AsNumberWithUnit(
           std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}}));
-  app.add_flag(
-      "--benchmark", o->benchmark, "Photos in colour: drop their colour and score against it");
+  app.add_flag("--benchmark",
+               o->benchmark,
+               "Photos or a film in colour: drop the colour and score against it");
   app.add_option("--keys",
                  o->keys,
                  "With --benchmark: so many key views, chosen together, each in its true colours")

@@ -3,9 +3,12 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/base/equal_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
@@ -123,6 +126,41 @@ void CheckFilms(const std::vector<CameraFilm>& films, const std::string& from) {
   }
 }
 
+// The files that hold the film's pictures, in their order.
+std::vector<fs::path> FilesOf(const CameraFilm& film, const fs::path& scene_folder) {
+  if (!film.is_pictures) return {scene_folder / film.file};
+  std::vector<fs::path> files;
+  for (const std::string& file : ListFiles(scene_folder / film.file)) {
+    if (HasImageExtension(file)) files.push_back(scene_folder / film.file / file);
+  }
+  return files;
+}
+
+// A copy shows nothing from a second place.
+void RefuseCopies(const std::vector<CameraFilm>& films, const fs::path& scene_folder) {
+  std::map<std::vector<uintmax_t>, std::vector<const CameraFilm*>> by_sizes;
+  for (const CameraFilm& film : films) {
+    std::vector<uintmax_t> sizes;
+    std::error_code error;
+    for (const fs::path& file : FilesOf(film, scene_folder)) {
+      sizes.push_back(fs::file_size(file, error));
+    }
+    std::vector<const CameraFilm*>& alike = by_sizes[sizes];
+    const std::vector<fs::path> files = FilesOf(film, scene_folder);
+    for (const CameraFilm* other : alike) {
+      const std::vector<fs::path> of_other = FilesOf(*other, scene_folder);
+      if (std::equal(files.begin(), files.end(), of_other.begin(), &HaveEqualBytes)) {
+        throw InvalidArgument(
+            "{} and {} are the same film, byte for byte; films of several cameras are each taken "
+            "from another place: leave one of them out",
+            other->file,
+            film.file);
+      }
+    }
+    alike.push_back(&film);
+  }
+}
+
 // The folders in frames/, each a camera's; nothing where there is one, or none.
 std::vector<CameraFilm> FoldersOfPictures(const std::vector<std::string>& files) {
   std::set<std::string> folders;
@@ -190,6 +228,7 @@ std::vector<CameraFilm> ReadCameraFilms(const fs::path& scene_folder, const Film
   }
   if (films.empty()) return films;
   CheckFilms(films, from);
+  RefuseCopies(films, scene_folder);
   std::sort(films.begin(), films.end(), [](const CameraFilm& x, const CameraFilm& y) {
     return x.camera < y.camera;
   });

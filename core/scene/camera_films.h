@@ -36,7 +36,7 @@ using FilmSize = std::function<std::pair<int, int>(const std::string& file)>;
 // Throws Error{kInvalidArgument}: films and photos in one file, some films with a pose and some
 // without, a film that is missing or named twice, two cameras of one name, numbers of films and
 // poses that differ, cameras that do not fit the film's shape, a file that names one film, pictures
-// beside folders of pictures.
+// beside folders of pictures, two films that are copies of each other.
 std::vector<CameraFilm> ReadCameraFilms(const std::filesystem::path& scene_folder,
                                         const FilmSize& size_of);
 

@@ -32,7 +32,7 @@ class CameraFilms : public testing::Test {
  protected:
   void Touch(const std::string& name) {
     fs::create_directories((folder_.path() / name).parent_path());
-    WriteFileAtomic(folder_.path() / name, "film");
+    WriteFileAtomic(folder_.path() / name, "film " + name);
   }
   std::vector<CameraFilm> Read() {
     return ReadCameraFilms(folder_.path(), [](const std::string&) { return std::pair(48, 32); });
@@ -192,6 +192,30 @@ TEST_F(CameraFilms, FoldersOfPicturesAreCameras) {
   EXPECT_TRUE(films[1].is_pictures && !films[1].has_pose);
   Touch("frames/2.png");
   EXPECT_THAT(Refusal([&] { Read(); }), HasSubstr("frames/2.png lies beside the folder frames/"));
+}
+
+TEST_F(CameraFilms, CopiesOfAFilmAreNamed) {
+  Touch("a.mp4");
+  Touch("b.mp4");
+  fs::copy_file(folder_.path() / "a.mp4", folder_.path() / "c (1).mp4");
+  EXPECT_THAT(Refusal([&] { Read(); }),
+              HasSubstr("a.mp4 and c (1).mp4 are the same film, byte for byte"));
+  EXPECT_THAT(Said(Frame("c (1).mp4") + "," + Frame("a.mp4")), HasSubstr("are the same film"));
+  fs::remove(folder_.path() / "c (1).mp4");
+  fs::remove(folder_.path() / "transforms.json");
+  EXPECT_EQ(Read().size(), 2u);
+}
+
+TEST_F(CameraFilms, CopiesOfAFoldersFramesAreNamed) {
+  for (const char* frame : {"1.png", "2.png"}) {
+    Touch(std::string("frames/left/") + frame);
+    fs::create_directories(folder_.path() / "frames/right");
+    fs::copy_file(folder_.path() / "frames/left" / frame, folder_.path() / "frames/right" / frame);
+  }
+  EXPECT_THAT(Refusal([&] { Read(); }),
+              HasSubstr("frames/left and frames/right are the same film"));
+  WriteFileAtomic(folder_.path() / "frames/right/2.png", std::string("film frames/left/3.png"));
+  EXPECT_EQ(Read().size(), 2u);
 }
 
 }  // namespace

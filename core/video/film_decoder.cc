@@ -29,14 +29,19 @@ bool EveryPacketIsAPicture(AVCodecID codec) {
 
 }  // namespace
 
-FilmDecoder::FilmDecoder(fs::path file)
+FilmDecoder::FilmDecoder(fs::path file, const CancellationToken* cancel)
     : file_(std::move(file)),
-      packets_(std::make_unique<FilmPackets>(file_)),
+      cancel_(cancel),
+      packets_(std::make_unique<FilmPackets>(file_, cancel)),
       packet_(av_packet_alloc()),
       picture_(av_frame_alloc()),
       index_(IndexFilm(packets_.get())),
       is_damaged_(index_.stamps.size()) {
-  if (index_.packets.empty()) RefuseFilm(file_, "it holds no frame");
+  if (index_.packets.empty()) {
+    RefuseFilm(file_,
+               "it holds no frame; a movie that refers to frames in other files must be saved as "
+               "one that has them itself");
+  }
   if (index_.stamps.empty()) {
     RefuseFilm(file_, "its frames have no times; put it into a container, e.g. .mp4");
   }
@@ -48,6 +53,7 @@ FilmDecoder::FilmDecoder(fs::path file)
                    avcodec_get_name(parameters.codec_id));
   }
   codec_.reset(avcodec_alloc_context3(decoder));
+  if (codec_) codec_->max_pixels = kMaxFilmPixels;
   if (!codec_ || avcodec_parameters_to_context(codec_.get(), &parameters) < 0 ||
       avcodec_open2(codec_.get(), decoder, nullptr) < 0) {
     RefuseFilm(file_, std::string("its decoder ") + decoder->name + " does not open");
@@ -149,7 +155,7 @@ void FilmDecoder::StartAt(int packet) {
   const int before = FirstPacketOf(std::max(-1, GroupOf(placed) - 1));
   if (!SeekTo(placed, packet) && !SeekTo(before, packet)) {
     av_packet_unref(packet_.get());
-    packets_ = std::make_unique<FilmPackets>(file_);
+    packets_ = std::make_unique<FilmPackets>(file_, cancel_);
     ReadUpTo(packet, /*to_the_end=*/true);
   }
   has_ended_ = !has_packet_;

@@ -17,15 +17,16 @@ namespace color3d {
 // Not thread-safe.
 class FilmDecoder {
  public:
-  // Reads the file once through. Throws as FilmReader does.
-  explicit FilmDecoder(std::filesystem::path file);
+  // Reads the file once through. Throws as FilmReader does. `cancel` may be null and outlives this
+  // object.
+  FilmDecoder(std::filesystem::path file, const CancellationToken* cancel);
 
   const FilmPackets& packets() const { return *packets_; }
   const AVCodecContext& codec() const { return *codec_; }
   const FilmIndex& index() const { return index_; }
 
   // Decodes up to `frame`; false when it does not come out whole. The one after the last costs the
-  // least.
+  // least. Throws Error{kCancelled}.
   bool Decode(int frame);
   // The frame that was decoded last, whole or not.
   const AVFrame& picture() const { return *picture_; }
@@ -57,6 +58,7 @@ class FilmDecoder {
   bool IsBroken(int packet) const;
 
   const std::filesystem::path file_;
+  const CancellationToken* const cancel_;
   std::unique_ptr<FilmPackets> packets_;
   std::unique_ptr<AVPacket, FreePacket> packet_;
   std::unique_ptr<AVFrame, FreeFrame> picture_;

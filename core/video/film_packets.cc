@@ -1,55 +1,48 @@
 #include "core/video/film_packets.h"
 
-#include "core/base/error.h"
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+#include <vector>
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// A picture in a sound file, its cover, is no film.
-AVStream* FindFilm(AVFormatContext* container) {
+// Streams of pictures; a picture in a sound file, its cover, and thumbnails are none.
+std::vector<AVStream*> FilmStreams(AVFormatContext* container) {
+  std::vector<AVStream*> streams;
   for (unsigned i = 0; i < container->nb_streams; ++i) {
     AVStream* stream = container->streams[i];
     if (stream->codecpar->codec_type == AVMEDIA_TYPE_VIDEO &&
-        (stream->disposition & AV_DISPOSITION_ATTACHED_PIC) == 0) {
-      return stream;
+        (stream->disposition & (AV_DISPOSITION_ATTACHED_PIC | AV_DISPOSITION_TIMED_THUMBNAILS)) ==
+            0) {
+      streams.push_back(stream);
     }
   }
-  return nullptr;
+  return streams;
 }
 
-[[noreturn]] void RefuseContainer(const fs::path& file, int libav_result) {
-  RefuseFilm(file,
-             LibavError(libav_result) +
-                 "; it may be damaged or cut short: try another copy, or save it as .mp4 with a "
-                 "program that plays it");
+// Players take the one that is marked as the default; of several, or of none, the largest one, and
+// of those the first one.
+bool IsPreferred(const AVStream* one, const AVStream* other) {
+  const auto rank = [](const AVStream* stream) {
+    return std::pair((stream->disposition & AV_DISPOSITION_DEFAULT) != 0,
+                     int64_t{stream->codecpar->width} * stream->codecpar->height);
+  };
+  return rank(one) > rank(other);
 }
 
 }  // namespace
 
-void RefuseFilm(const fs::path& file, const std::string& why) {
-  throw InvalidArgument("{} is no film that can be read: {}", file.filename().string(), why);
-}
-
-FilmPackets::FilmPackets(const fs::path& file) {
-  av_log_set_level(AV_LOG_FATAL);
-  if (!fs::is_regular_file(file)) {
-    throw Error(ErrorCode::kNotFound, "there is no film {}", file.string());
-  }
-  AVFormatContext* container = nullptr;
-  if (const int result = avformat_open_input(&container, file.c_str(), nullptr, nullptr);
-      result < 0) {
-    RefuseContainer(file, result);
-  }
-  container_.reset(container);
-  if (const int result = avformat_find_stream_info(container, nullptr); result < 0) {
-    RefuseContainer(file, result);
-  }
-  stream_ = FindFilm(container);
-  if (stream_ == nullptr) RefuseFilm(file, "it has no pictures, perhaps only sound");
-  for (unsigned i = 0; i < container->nb_streams; ++i) {
-    if (container->streams[i] != stream_) container->streams[i]->discard = AVDISCARD_ALL;
-  }
+FilmPackets::FilmPackets(const fs::path& file, const CancellationToken* cancel)
+    : file_(file, cancel) {
+  const std::vector<AVStream*> streams = FilmStreams(container());
+  if (streams.empty()) RefuseFilm(file, "it has no pictures, perhaps only sound");
+  stream_count_ = static_cast<int>(streams.size());
+  stream_ = *std::min_element(streams.begin(), streams.end(), IsPreferred);
+  file_.ReadOnly(stream_);
   if (stream_->codecpar->codec_id == AV_CODEC_ID_MPEG4) UnpackPictures();
 }
 
@@ -64,15 +57,41 @@ void FilmPackets::UnpackPictures() {
   }
 }
 
+// Containers give a palette once, with the packet that it begins with, and not again after a seek.
+void FilmPackets::KeepPalette(AVPacket* packet) {
+  size_t size = 0;
+  const uint8_t* palette = av_packet_get_side_data(packet, AV_PKT_DATA_PALETTE, &size);
+  if (palette != nullptr) {
+    palettes_[packet->pos].assign(reinterpret_cast<const char*>(palette), size);
+    return;
+  }
+  auto last = palettes_.upper_bound(packet->pos);
+  if (last == palettes_.begin()) return;
+  const std::string& bytes = (--last)->second;
+  if (uint8_t* copy = av_packet_new_side_data(packet, AV_PKT_DATA_PALETTE, bytes.size())) {
+    std::memcpy(copy, bytes.data(), bytes.size());
+  }
+}
+
+// The next packet of the pictures; false at the end.
+bool FilmPackets::ReadFile(AVPacket* packet) {
+  while (file_.ReadPacket(packet)) {
+    if (packet->stream_index == stream_->index && packet->size > 0) {
+      KeepPalette(packet);
+      return true;
+    }
+    av_packet_unref(packet);
+  }
+  return false;
+}
+
 bool FilmPackets::Read(AVPacket* packet) {
   while (true) {
     if (filter_ && av_bsf_receive_packet(filter_.get(), packet) >= 0) return true;
     if (has_ended_) return false;
-    if (av_read_frame(container_.get(), packet) < 0) {
+    if (!ReadFile(packet)) {
       has_ended_ = true;
       if (filter_) av_bsf_send_packet(filter_.get(), nullptr);
-    } else if (packet->stream_index != stream_->index || packet->size == 0) {
-      av_packet_unref(packet);
     } else if (!filter_) {
       return true;
     } else if (av_bsf_send_packet(filter_.get(), packet) < 0) {
@@ -84,7 +103,7 @@ bool FilmPackets::Read(AVPacket* packet) {
 bool FilmPackets::Seek(int64_t stamp) {
   if (filter_) av_bsf_flush(filter_.get());
   has_ended_ = false;
-  return av_seek_frame(container_.get(), stream_->index, stamp, AVSEEK_FLAG_BACKWARD) >= 0;
+  return av_seek_frame(container(), stream_->index, stamp, AVSEEK_FLAG_BACKWARD) >= 0;
 }
 
 }  // namespace color3d

@@ -2,31 +2,30 @@
 
 extern "C" {
 #include <libavutil/display.h>
-#include <libswscale/swscale.h>
+#include <libavutil/mastering_display_metadata.h>
+#include <libavutil/pixdesc.h>
 }
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/video/film_decoder.h"
+#include "core/video/frame_converter.h"
+#include "core/video/hdr_tones.h"
 #include "core/video/libav.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kMaxSidePx = 8192;
 // Times of frames that differ by less than this share of their mean distance are one rate.
 constexpr double kRateTolerance = 0.2;
-// First frames that are asked whether the film is interlaced, until one is whole.
-constexpr int kInterlaceTries = 250;
-
-struct FreeConverter {
-  void operator()(SwsContext* converter) const { sws_freeContext(converter); }
-};
+// First frames that are asked what kind of pictures the film has, until one is whole.
+constexpr int kFirstTries = 250;
 
 int QuarterTurns(const AVStream& stream) {
   const uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
@@ -62,13 +61,54 @@ Image Turned(const Image& image, int quarter_turns) {
   return out;
 }
 
+FilmTransfer TransferOf(const AVFrame& frame) {
+  if (frame.color_trc == AVCOL_TRC_SMPTE2084) return FilmTransfer::kPq;
+  if (frame.color_trc == AVCOL_TRC_ARIB_STD_B67) return FilmTransfer::kHlg;
+  return FilmTransfer::kUsual;
+}
+
+// Data beside the frame, else beside its stream; null: there is none, or less than a `Facts`.
+template <typename Facts>
+const Facts* DataBeside(const AVFrame& frame,
+                        AVFrameSideDataType of_frame,
+                        const AVStream& stream,
+                        AVPacketSideDataType of_stream) {
+  if (const AVFrameSideData* data = av_frame_get_side_data(&frame, of_frame);
+      data != nullptr && data->size >= sizeof(Facts)) {
+    return reinterpret_cast<const Facts*>(data->data);
+  }
+  size_t size = 0;
+  const uint8_t* data = av_stream_get_side_data(&stream, of_stream, &size);
+  return data != nullptr && size >= sizeof(Facts) ? reinterpret_cast<const Facts*>(data) : nullptr;
+}
+
+// The brightest light of a PQ film, cd/m2: as the film says, else as its grading display shows it.
+double PeakNits(const AVFrame& frame, const AVStream& stream) {
+  double peak = 0.0;
+  if (const auto* light = DataBeside<AVContentLightMetadata>(
+          frame, AV_FRAME_DATA_CONTENT_LIGHT_LEVEL, stream, AV_PKT_DATA_CONTENT_LIGHT_LEVEL)) {
+    peak = light->MaxCLL;
+  }
+  const auto* display =
+      DataBeside<AVMasteringDisplayMetadata>(frame,
+                                             AV_FRAME_DATA_MASTERING_DISPLAY_METADATA,
+                                             stream,
+                                             AV_PKT_DATA_MASTERING_DISPLAY_METADATA);
+  if (peak <= 0.0 && display != nullptr && display->has_luminance != 0 &&
+      display->max_luminance.den != 0) {
+    peak = av_q2d(display->max_luminance);
+  }
+  return peak > 0.0 ? std::clamp(peak, kHdrWhiteNits, 10000.0) : kUsualPeakNits;
+}
+
 }  // namespace
 
 class FilmReader::Impl {
  public:
-  explicit Impl(const fs::path& file) : file_(file), film_(file) {
+  Impl(const fs::path& file, const CancellationToken* cancel) : file_(file), film_(file, cancel) {
     TakeTimes();
     TakeFacts();
+    TakeFirstFrame();
   }
 
   const FilmFacts& facts() const { return facts_; }
@@ -119,81 +159,94 @@ class FilmReader::Impl {
     const double stretch = aspect.num > 0 && aspect.den > 0 ? av_q2d(aspect) : 1.0;
     width_ = static_cast<int>(std::lround(film_.codec().width * stretch));
     height_ = film_.codec().height;
-    if (width_ < 1 || height_ < 1 || width_ > kMaxSidePx || height_ > kMaxSidePx) {
+    if (width_ < 1 || height_ < 1 || width_ > kMaxFilmSidePx || height_ > kMaxFilmSidePx) {
       RefuseFilm(
           file_,
           fmt::format(
-              "its frames are {} x {} px; up to {} px are taken", width_, height_, kMaxSidePx));
+              "its frames are {} x {} px; up to {} px are taken", width_, height_, kMaxFilmSidePx));
     }
     facts_.width = facts_.quarter_turns % 2 == 1 ? height_ : width_;
     facts_.height = facts_.quarter_turns % 2 == 1 ? width_ : height_;
-    // A frame that is damaged says nothing; recordings begin with some.
-    const int tries = std::min(kInterlaceTries, static_cast<int>(times_.size()));
-    for (int frame = 0; frame < tries; ++frame) {
-      if (!film_.Decode(frame)) continue;
-      facts_.interlaced = film_.picture().interlaced_frame != 0;
-      break;
+    const int streams = film_.packets().stream_count();
+    if (streams < 2) return;
+    const AVStream& stream = *film_.packets().stream();
+    facts_.notes.push_back(fmt::format(
+        "has {} streams of pictures; the one of {} x {} px (stream {}) is taken: it is {}",
+        streams,
+        film_.codec().width,
+        film_.codec().height,
+        stream.index,
+        (stream.disposition & AV_DISPOSITION_DEFAULT) != 0 ? "marked as the default"
+                                                           : "the largest"));
+  }
+
+  // What only decoded frames tell. One that is damaged says nothing; recordings begin with some.
+  void TakeFirstFrame() {
+    const int tries = std::min(kFirstTries, static_cast<int>(times_.size()));
+    int frame = 0;
+    while (frame < tries && !film_.Decode(frame)) ++frame;
+    if (frame == tries) return;
+    const AVFrame& picture = film_.picture();
+    if (const auto format = static_cast<AVPixelFormat>(picture.format); !CanConvert(format)) {
+      const char* name = av_get_pix_fmt_name(format);
+      RefuseFilm(file_,
+                 fmt::format("its pixels ({}) cannot be converted; save it in another format, e.g. "
+                             "`ffmpeg -i {} -c:v ffv1 film.mkv`",
+                             name != nullptr ? name : "unknown",
+                             Name()));
     }
+    facts_.interlaced = picture.interlaced_frame != 0;
+    TakeTones(picture);
+  }
+
+  void TakeTones(const AVFrame& picture) {
+    const FilmTransfer transfer = TransferOf(picture);
+    const bool is_wide = picture.color_primaries == AVCOL_PRI_BT2020;
+    if (transfer == FilmTransfer::kUsual && !is_wide) return;
+    const double peak_nits = transfer == FilmTransfer::kPq
+                                 ? PeakNits(picture, *film_.packets().stream())
+                                 : kUsualPeakNits;
+    tones_.emplace(transfer, is_wide, peak_nits);
+    if (transfer == FilmTransfer::kUsual) return;
+    facts_.hdr = transfer == FilmTransfer::kPq ? "PQ" : "HLG";
+    facts_.peak_nits = peak_nits;
+    facts_.notes.push_back(
+        fmt::format("is HDR ({}): its tones are mapped to the usual range, up to {:.0f} cd/m2 that "
+                    "become white (BT.2390); for another look give a film that is graded for it",
+                    facts_.hdr,
+                    peak_nits));
+  }
+
+  // Decoders say of greys that their range is limited where their file says nothing (MagicYUV,
+  // HEVC, AV1), and who writes them seldom means it: the container is believed, and H.264, whose
+  // decoder says only what is stated.
+  AVColorRange RangeOf(const AVFrame& picture) const {
+    const bool is_stated = film_.packets().stated_range() == AVCOL_RANGE_MPEG ||
+                           film_.codec().codec_id == AV_CODEC_ID_H264;
+    return picture.color_range == AVCOL_RANGE_MPEG && !is_stated &&
+                   IsGray(static_cast<AVPixelFormat>(picture.format))
+               ? AVCOL_RANGE_UNSPECIFIED
+               : picture.color_range;
   }
 
   Image Converted() {
-    const AVFrame& frame = film_.picture();
-    // Of interlaced film the lines of one moment count: every second.
-    const int step = frame.interlaced_frame != 0 ? 2 : 1;
-    const int lines = frame.height / step;
-    const uint8_t* data[4];
-    int strides[4];
-    for (int i = 0; i < 4; ++i) {
-      data[i] = frame.data[i];
-      strides[i] = step * frame.linesize[i];
-    }
-    converter_.reset(sws_getCachedContext(converter_.release(),
-                                          frame.width,
-                                          lines,
-                                          static_cast<AVPixelFormat>(frame.format),
-                                          width_,
-                                          height_,
-                                          AV_PIX_FMT_RGB48,
-                                          SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT,
-                                          nullptr,
-                                          nullptr,
-                                          nullptr));
-    if (!converter_) {
-      throw Error(ErrorCode::kDataLoss, "the pixels of {} cannot be converted", Name());
-    }
-    const int* matrix =
-        sws_getCoefficients(frame.colorspace == AVCOL_SPC_BT709        ? SWS_CS_ITU709
-                            : frame.colorspace == AVCOL_SPC_BT2020_NCL ? SWS_CS_BT2020
-                                                                       : SWS_CS_ITU601);
-    sws_setColorspaceDetails(converter_.get(),
-                             matrix,
-                             frame.color_range == AVCOL_RANGE_JPEG,
-                             sws_getCoefficients(SWS_CS_DEFAULT),
-                             1,
-                             0,
-                             1 << 16,
-                             1 << 16);
-    rgb_.resize(static_cast<size_t>(width_) * height_ * 3);
-    uint8_t* rows[] = {reinterpret_cast<uint8_t*>(rgb_.data())};
-    const int row_bytes[] = {6 * width_};
-    sws_scale(converter_.get(), data, strides, 0, lines, rows, row_bytes);
-    Image image(width_, height_, 3);
-    for (size_t i = 0; i < image.PlaneSize(); ++i) {
-      for (int c = 0; c < 3; ++c) image.Plane(c)[i] = rgb_[3 * i + c] / 65535.0f;
-    }
+    const AVFrame& picture = film_.picture();
+    Image image = converter_.Convert(picture, RangeOf(picture), width_, height_);
+    if (tones_) tones_->Apply(&image);
     return image;
   }
 
   const fs::path file_;
   FilmDecoder film_;
-  std::unique_ptr<SwsContext, FreeConverter> converter_;
+  FrameConverter converter_;
+  std::optional<HdrTones> tones_;  // none: they stay
   FilmFacts facts_;
   std::vector<double> times_;
   int width_ = 0, height_ = 0;  // of square pixels, before turning
-  std::vector<uint16_t> rgb_;
 };
 
-FilmReader::FilmReader(fs::path file) : impl_(std::make_unique<Impl>(file)) {}
+FilmReader::FilmReader(fs::path file, const CancellationToken* cancel)
+    : impl_(std::make_unique<Impl>(file, cancel)) {}
 FilmReader::~FilmReader() = default;
 FilmReader::FilmReader(FilmReader&&) noexcept = default;
 FilmReader& FilmReader::operator=(FilmReader&&) noexcept = default;

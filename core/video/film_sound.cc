@@ -11,6 +11,8 @@ extern "C" {
 #include <cstdint>
 #include <vector>
 
+#include "core/base/error.h"
+#include "core/video/film_file.h"
 #include "core/video/sound_stream.h"
 
 namespace color3d {
@@ -26,16 +28,16 @@ constexpr double kGapS = 0.02;  // times that differ by less are rounded, not ga
 
 class FilmSound::Impl {
  public:
-  explicit Impl(const SoundPart& part) : part_(part) {
-    AVFormatContext* container = nullptr;
-    if (avformat_open_input(&container, part.film.c_str(), nullptr, nullptr) < 0) return;
-    container_.reset(container);
-    if (avformat_find_stream_info(container, nullptr) < 0) return;
-    stream_ = FirstSound(container);
-    if (stream_ == nullptr) return;
-    for (unsigned i = 0; i < container->nb_streams; ++i) {
-      if (container->streams[i] != stream_) container->streams[i]->discard = AVDISCARD_ALL;
+  Impl(const SoundPart& part, const CancellationToken* cancel) : part_(part) {
+    try {
+      file_ = std::make_unique<FilmFile>(part.film, cancel);
+    } catch (const Error& e) {
+      if (e.code() == ErrorCode::kCancelled) throw;
+      return;
     }
+    stream_ = MainSound(file_->container());
+    if (stream_ == nullptr) return;
+    file_->ReadOnly(stream_);
     packet_.reset(av_packet_alloc());
     const AVCodecID codec = stream_->codecpar->codec_id;
     if (std::find(std::begin(kCopied), std::end(kCopied), codec) != std::end(kCopied)) {
@@ -70,12 +72,12 @@ class FilmSound::Impl {
     constexpr double kBeforeS = 1.0;
     const auto stamp = static_cast<int64_t>((begin_s - kBeforeS) / Tick());
     if (stream_->start_time != AV_NOPTS_VALUE && stamp <= stream_->start_time) return;
-    av_seek_frame(container_.get(), stream_->index, stamp, AVSEEK_FLAG_BACKWARD);
+    av_seek_frame(file_->container(), stream_->index, stamp, AVSEEK_FLAG_BACKWARD);
   }
 
   // The next packet of the file that has a time.
   bool ReadPacket() {
-    while (av_read_frame(container_.get(), packet_.get()) >= 0) {
+    while (file_->ReadPacket(packet_.get())) {
       if (packet_->stream_index == stream_->index && packet_->size > 0) {
         if (packet_->pts == AV_NOPTS_VALUE) packet_->pts = packet_->dts;
         if (packet_->pts != AV_NOPTS_VALUE) return true;
@@ -239,7 +241,7 @@ class FilmSound::Impl {
   }
 
   const SoundPart part_;
-  std::unique_ptr<AVFormatContext, CloseFilm> container_;
+  std::unique_ptr<FilmFile> file_;  // none: it cannot be had
   AVStream* stream_ = nullptr;
   std::unique_ptr<AVPacket, FreePacket> packet_;
   const AVCodecParameters* parameters_ = nullptr;
@@ -260,7 +262,8 @@ class FilmSound::Impl {
   bool decoded_all_ = false;
 };
 
-FilmSound::FilmSound(const SoundPart& part) : impl_(std::make_unique<Impl>(part)) {}
+FilmSound::FilmSound(const SoundPart& part, const CancellationToken* cancel)
+    : impl_(std::make_unique<Impl>(part, cancel)) {}
 FilmSound::~FilmSound() = default;
 const AVCodecParameters* FilmSound::parameters() const { return impl_->parameters(); }
 AVRational FilmSound::time_base() const { return impl_->time_base(); }

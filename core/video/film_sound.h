@@ -5,16 +5,18 @@
 #include <memory>
 #include <string>
 
+#include "core/base/cancellation.h"
 #include "core/video/libav.h"
 #include "core/video/mp4_writer.h"
 
 namespace color3d {
 
-// Of the first stream of sound. Not thread-safe.
+// Of the stream of sound that players play. Not thread-safe.
 class FilmSound {
  public:
-  // Throws nothing for a file without sound or with one that cannot be had.
-  explicit FilmSound(const SoundPart& part);
+  // Throws nothing for a file without sound or with one that cannot be had. `cancel` may be null
+  // and outlives this object; throws Error{kCancelled}.
+  FilmSound(const SoundPart& part, const CancellationToken* cancel);
   ~FilmSound();
 
   // None: there is no sound.
@@ -24,7 +26,7 @@ class FilmSound {
   const std::string& warning() const;
 
   // The next packet; its time counts from the part's beginning and may lie up to two packets before
-  // it, for the decoder to begin with. False behind the last one.
+  // it, for the decoder to begin with. False behind the last one. Throws Error{kCancelled}.
   bool Next(AVPacket* packet);
 
  private:

@@ -65,7 +65,7 @@ class Mp4Writer::Impl {
     CheckOptions();
     av_log_set_level(AV_LOG_ERROR);
     OpenEncoder();
-    if (options_.sound) sound_ = std::make_unique<FilmSound>(*options_.sound);
+    if (options_.sound) sound_ = std::make_unique<FilmSound>(*options_.sound, options_.cancel);
     OpenMovie();
     frame_.reset(av_frame_alloc());
     packet_.reset(av_packet_alloc());

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "core/base/cancellation.h"
 #include "core/base/image.h"
 #include "core/base/parallel.h"
 
@@ -34,6 +35,7 @@ struct Mp4Options {
   int ticks_per_second = 0;
   int threads = 1;  // of the encoder
   std::optional<SoundPart> sound;
+  const CancellationToken* cancel = nullptr;  // of reading the sound; outlives the writer
   bool operator==(const Mp4Options&) const = default;
 };
 
@@ -56,7 +58,7 @@ class Mp4Writer {
   const std::string& sound_warning() const;
 
   // The next picture: sRGB in 0..1, 3 channels, of the size of the movie. Throws
-  // Error{kResourceExhausted} when the disk is full.
+  // Error{kResourceExhausted} when the disk is full, Error{kCancelled}.
   void Add(const Image& srgb, ThreadPool& pool);
   // The same for pictures with times, s from the first one's, which must ascend by a tick at least;
   // shown for `seconds` > 0 if it is the last. Throws Error{kInvalidArgument} for other times.

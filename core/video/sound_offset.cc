@@ -5,6 +5,8 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
+#include "core/base/error.h"
+#include "core/video/film_file.h"
 #include "core/video/libav.h"
 #include "core/video/sound_stream.h"
 
@@ -25,15 +27,10 @@ constexpr int kPeakReach = 25;      // levels about the best lag that are still 
 // Decoded sound, frame by frame.
 class SoundDecoder {
  public:
-  explicit SoundDecoder(const SoundPart& part) {
-    AVFormatContext* container = nullptr;
-    if (avformat_open_input(&container, part.film.c_str(), nullptr, nullptr) < 0) return;
-    container_.reset(container);
-    if (avformat_find_stream_info(container, nullptr) < 0) return;
-    stream_ = FirstSound(container);
-    for (unsigned i = 0; i < container->nb_streams; ++i) {
-      if (container->streams[i] != stream_) container->streams[i]->discard = AVDISCARD_ALL;
-    }
+  // Throws Error as FilmFile does.
+  SoundDecoder(const SoundPart& part, const CancellationToken& cancel) : file_(part.film, &cancel) {
+    stream_ = MainSound(file_.container());
+    file_.ReadOnly(stream_);
     const AVCodec* codec =
         stream_ == nullptr ? nullptr : avcodec_find_decoder(stream_->codecpar->codec_id);
     if (codec == nullptr) return;
@@ -66,20 +63,30 @@ class SoundDecoder {
 
  private:
   bool ReadPacket() {
-    while (av_read_frame(container_.get(), packet_.get()) >= 0) {
+    while (file_.ReadPacket(packet_.get())) {
       if (packet_->stream_index == stream_->index) return true;
       av_packet_unref(packet_.get());
     }
     return false;
   }
 
-  std::unique_ptr<AVFormatContext, CloseFilm> container_;
+  FilmFile file_;
   AVStream* stream_ = nullptr;
   std::unique_ptr<AVCodecContext, FreeCodec> decoder_;
   std::unique_ptr<AVPacket, FreePacket> packet_;
   std::unique_ptr<AVFrame, FreeFrame> frame_;
   bool is_open_ = false;
 };
+
+// None where the file is none that can be read.
+std::unique_ptr<SoundDecoder> OpenSound(const SoundPart& part, const CancellationToken& cancel) {
+  try {
+    return std::make_unique<SoundDecoder>(part, cancel);
+  } catch (const Error& e) {
+    if (e.code() == ErrorCode::kCancelled) throw;
+    return nullptr;
+  }
+}
 
 // Levels less their mean over the time around.
 std::vector<double> WithoutTrend(const std::vector<float>& levels) {
@@ -121,11 +128,12 @@ std::vector<float> SoundLevels(const SoundPart& part, const CancellationToken& c
       static_cast<int64_t>(std::ceil((part.end_s - part.begin_s) * kSoundLevelsPerSecond));
   if (count < 1) return {};
   std::vector<double> squares(count, 0.0), samples(count, 0.0);
-  SoundDecoder decoder(part);
-  while (const AVFrame* frame = decoder.Next()) {
+  const std::unique_ptr<SoundDecoder> decoder = OpenSound(part, cancel);
+  if (!decoder) return {};
+  while (const AVFrame* frame = decoder->Next()) {
     cancel.ThrowIfCancelled();
     if (frame->best_effort_timestamp == AV_NOPTS_VALUE || frame->sample_rate < 1) continue;
-    const double begin_s = decoder.TimeOf(*frame) - part.begin_s;
+    const double begin_s = decoder->TimeOf(*frame) - part.begin_s;
     if (begin_s * kSoundLevelsPerSecond >= static_cast<double>(count)) break;
     const int channels = frame->ch_layout.nb_channels;
     for (int i = 0; i < frame->nb_samples; ++i) {

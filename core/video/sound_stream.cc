@@ -4,12 +4,15 @@
 
 namespace color3d {
 
-AVStream* FirstSound(AVFormatContext* container) {
+AVStream* MainSound(AVFormatContext* container) {
+  AVStream* first = nullptr;
   for (unsigned i = 0; i < container->nb_streams; ++i) {
-    const AVCodecParameters* codec = container->streams[i]->codecpar;
-    if (codec->codec_type == AVMEDIA_TYPE_AUDIO) return container->streams[i];
+    AVStream* stream = container->streams[i];
+    if (stream->codecpar->codec_type != AVMEDIA_TYPE_AUDIO) continue;
+    if ((stream->disposition & AV_DISPOSITION_DEFAULT) != 0) return stream;
+    if (first == nullptr) first = stream;
   }
-  return nullptr;
+  return first;
 }
 
 float SampleOf(const AVFrame& frame, int channel, int channels, int i) {

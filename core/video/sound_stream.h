@@ -5,8 +5,9 @@
 
 namespace color3d {
 
-// The first one; null: there is none.
-AVStream* FirstSound(AVFormatContext* container);
+// The one that players play: the first that is marked as the default, else the first; null: there
+// is none.
+AVStream* MainSound(AVFormatContext* container);
 
 // Sample i of a channel of decoded sound, -1..1; 0 in a format that no decoder of sound hands out.
 float SampleOf(const AVFrame& frame, int channel, int channels, int i);

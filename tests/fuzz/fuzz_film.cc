@@ -4,11 +4,13 @@
 #include <fstream>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/base/files.h"
 #include "core/video/film_reader.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/support/formats/numbered_film.h"
+#include "tests/support/formats/tone_film.h"
 #include "tests/support/memory_folder.h"
 
 namespace color3d {
@@ -57,6 +59,22 @@ std::vector<std::string> FuzzSeeds() {
   }
   WriteFieldFilm(folder.path() / "b.ts", 3, /*one_packet=*/false);
   add(folder.path() / "b.ts");
+  const std::pair<const char*, std::vector<ToneStream>> toned[] = {
+      {"c.mkv", {{.pixel_format = "gray", .width = 32, .height = 16}}},
+      {"c.mov", {{.encoder = "png", .pixel_format = "ya8", .width = 32, .height = 16}}},
+      {"d.mkv",
+       {{.pixel_format = "yuv420p10le",
+         .width = 32,
+         .height = 16,
+         .transfer = "smpte2084",
+         .primaries = "bt2020"}}},
+      {"e.mkv", {{.width = 32, .height = 16}, {.width = 16, .height = 16, .is_default = true}}}};
+  for (const auto& [name, streams] : toned) {
+    if (WriteToneFilm(folder.path() / name, streams)) add(folder.path() / name);
+  }
+  // Films that name others: refused, whatever becomes of them.
+  seeds.push_back("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nfilm\n#EXT-X-ENDLIST\n");
+  seeds.push_back("ffconcat version 1.0\nfile film\n");
   return seeds;
 }
 

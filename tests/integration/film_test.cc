@@ -110,6 +110,30 @@ TEST_F(FilmTest, FramesComeBackInColor) {
   EXPECT_THAT(turned.err, HasSubstr("coloured without poses, and no camera can move through it"));
 }
 
+TEST_F(FilmTest, ABenchmarkTakesAFilm) {
+  const ProcessResult result =
+      Colorize(WriteVideo(),
+               {"--benchmark", "--key-view", "f000009", "--set", "import_scene.film_end_s=1.2"});
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  const auto metrics = nlohmann::json::parse(ReadFile(Path("out") / "metrics.json"));
+  const double error = metrics.at("delta_e00_chroma"), gray = metrics.at("delta_e00_gray");
+  std::printf("chroma error %.2f, grey %.2f\n", error, gray);
+  EXPECT_LT(error, 0.5 * gray);
+  const FilmReader movie(Path("out") / "scene.mp4");
+  ASSERT_EQ(movie.times().size(), 15u);
+  EXPECT_NEAR(movie.times()[12], 1.0, 1e-3) << "at the film's own rate, 12 a second";
+}
+
+TEST_F(FilmTest, CopiesOfAFilmAreNamed) {
+  fs::create_directories(Path("films"));
+  fs::rename(WriteVideo(), Path("films") / "walk.mp4");
+  fs::copy_file(Path("films") / "walk.mp4", Path("films") / "walk (1).mp4");
+  const ProcessResult result =
+      Client({"key", "select", Path("films").string(), "-o", Path("key").string()});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("walk (1).mp4 is the same film as walk.mp4"));
+}
+
 TEST_F(FilmTest, PosesAreLookedForOnRequestOnly) {
   WriteFramesOfAStillCamera();
   const ProcessResult refused = Colorize(Path("frames"), {"--poses"});
@@ -361,9 +385,10 @@ TEST_F(FilmTest, WhatIsNoFilmIsRefused) {
   EXPECT_EQ(inspected.exit_code, 2);
   EXPECT_THAT(inspected.err, HasSubstr("text.mp4 is a film; inspect looks at pictures"));
   const fs::path film = WriteVideo();
-  const ProcessResult benchmark = Colorize(film, {"--benchmark"});
-  EXPECT_EQ(benchmark.exit_code, 2);
-  EXPECT_THAT(benchmark.err, HasSubstr("--film"));
+  const ProcessResult none =
+      Colorize(film, {"--benchmark", "--set", "import_scene.film_end_s=0.1"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("2 frames before 0.1 s"));
   const ProcessResult late = Colorize(film, {"--auto", "--set", "import_scene.film_begin_s=60"});
   EXPECT_NE(late.exit_code, 0);
   EXPECT_THAT(late.err, HasSubstr("it lasts"));

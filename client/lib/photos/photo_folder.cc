@@ -5,6 +5,8 @@
 
 #include "client/lib/names.h"
 #include "client/lib/photos/file_kind.h"
+#include "client/lib/photos/film_advice.h"
+#include "client/lib/photos/film_copies.h"
 #include "client/lib/photos/model_files.h"
 #include "client/lib/photos/passed_over_files.h"
 #include "core/base/error.h"
@@ -30,6 +32,7 @@ void RequireFolder(const fs::path& root) {
                 "there is no folder {}; give the folder of the photographs",
                 root.string());
   }
+  if (const std::string advice = FilmAdvice(root); !advice.empty()) throw InvalidArgument(advice);
   throw InvalidArgument(
       "{} is not a folder; give the folder of the photographs, a splat (.ply, .sog or .spz) or a "
       "film (.mp4, .mov, .mkv, ...)",
@@ -84,10 +87,11 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
     }
   }
   if (films.size() < 2) return;
-  std::sort(films.begin(), films.end(), [](const LocalFile& x, const LocalFile& y) {
-    return x.path < y.path;
-  });
-  result->camera_films = std::move(films);
+  std::ranges::sort(films, {}, &LocalFile::path);
+  // What names or counts the films decides itself: of those the server says which are copies.
+  if (!has_transforms && !IsFile(root / kPosesBoundsFile)) LeaveOutCopies(&films, &result->notes);
+  if (films.size() == 1) result->film = films[0];
+  if (films.size() > 1) result->camera_films = std::move(films);
 }
 
 // Folders of pictures in `root`, two or more: each camera's frames.
@@ -169,7 +173,7 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames, const PassedOver& pa
   if (folder.photos.empty()) {
     const std::string sub = SubfolderWithPictures(folder.root);
     const std::string remedy =
-        sub.empty() ? ""
+        sub.empty() ? FolderAdvice(folder.root)
         : HasPoses(folder.root)
             ? "; the photos that its poses are of belong into " + (folder.root / "images").string()
             : "; did you mean " + (folder.root / sub).string() + "?";
@@ -263,9 +267,9 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
     AddNotes(passed_over, &result);
     return result;
   }
-  if (result.photos.empty()) result.splat = FindOnly(result.root, HasSplatExtension, "splat");
-  if (result.photos.empty() && !result.splat) {
-    result.film = FindOnly(result.root, HasFilmExtension, "film");
+  if (result.photos.empty() && !result.film) {
+    result.splat = FindOnly(result.root, HasSplatExtension, "splat");
+    if (!result.splat) result.film = FindOnly(result.root, HasFilmExtension, "film");
   }
   if (!result.splat && !result.film) CollectModelFiles(result.root, &result);
   CollectAugmentFiles(result.root, &result);

@@ -101,7 +101,7 @@ TEST_F(PhotoFolderTest, AFilmStandsForPhotosAndPhotosForAFilm) {
     TakeAsFrames(&folder);
     EXPECT_TRUE(folder.film.has_value());
   }
-  Write("second.mp4");
+  Write("second.mp4", "y");
   PhotoFolder cameras = CollectPhotos(root());
   EXPECT_THAT(Paths(cameras.AllFiles()), ElementsAre("second.mp4", "walk.MOV"));
   EXPECT_FALSE(cameras.film.has_value());

@@ -106,15 +106,15 @@ void WriteColoredFilm(const Scene& scene,
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
   const fs::path file = context.scratch_folder() / "colored_film.mp4";
   const FilmClock clock = ClockOfFilm(scene, frames, context);
-  Mp4Writer movie(
-      file,
-      {.width = width,
-       .height = height,
-       .frames_per_second = clock.frames_per_second,
-       .ticks_per_second = clock.ticks_per_second,
-       .threads = context.pool().thread_count(),
-       .sound =
-           SoundFrom(scene, frames.front(), scene.views[frames.front()].time_s(), clock, context)});
+  Mp4Writer movie(file,
+                  {.width = width,
+                   .height = height,
+                   .frames_per_second = clock.frames_per_second,
+                   .ticks_per_second = clock.ticks_per_second,
+                   .threads = context.pool().thread_count(),
+                   .sound = SoundFrom(
+                       scene, frames.front(), scene.views[frames.front()].time_s(), clock, context),
+                   .cancel = &context.cancel()});
   if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
   const auto count = static_cast<int>(frames.size());
   const int batch = context.pool().thread_count();

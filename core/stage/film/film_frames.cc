@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <set>
 #include <utility>
 
@@ -15,6 +16,7 @@
 #include "core/image/codec.h"
 #include "core/image/probe/probe.h"
 #include "core/scene/camera.h"
+#include "core/scene/frame_numbers.h"
 #include "core/video/mp4_writer.h"
 
 namespace color3d {
@@ -55,11 +57,16 @@ std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
   return files;
 }
 
-std::vector<double> TimesOfPictures(size_t count, const FilmOptions& options) {
+std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
+                                    const FilmOptions& options,
+                                    StageContext& context) {
   constexpr double kFramesPerSecond = 25.0;  // where nobody tells
+  const FrameNumbers numbers = PlacesOfFrames(files);
+  if (!numbers.note.empty()) context.progress().OnWarning(numbers.note);
   std::vector<double> times;
-  for (size_t i = 0; i < count; ++i) {
-    times.push_back(static_cast<double>(i) / options.frames_per_second.value_or(kFramesPerSecond));
+  for (const int64_t place : numbers.places) {
+    times.push_back(static_cast<double>(place) /
+                    options.frames_per_second.value_or(kFramesPerSecond));
   }
   return times;
 }

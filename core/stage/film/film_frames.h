@@ -18,8 +18,11 @@ Camera UnknownCamera(int width, int height);
 
 // Frames that come as pictures below `folder`: their names, in the order of their numbers ...
 std::vector<std::string> PicturesIn(const std::filesystem::path& folder);
-// ... and when so many of them are shown, s.
-std::vector<double> TimesOfPictures(size_t count, const FilmOptions& options);
+// ... and when each is shown, s; frames that are missing by their numbers leave gaps, of which it
+// warns (scene/frame_numbers.h).
+std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
+                                    const FilmOptions& options,
+                                    StageContext& context);
 
 // Indices of the frames that are asked for, of a film whose frames are shown at `times`. Throws
 // Error{kInvalidArgument} when there is none.

@@ -83,7 +83,7 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
   IndexedFilms films;
   const auto size_of = [&](const std::string& file) {
     context.cancel().ThrowIfCancelled();
-    const FilmReader reader(context.scene_folder() / file);
+    const FilmReader reader(context.scene_folder() / file, &context.cancel());
     const FilmFacts& facts = reader.facts();
     CheckMovieSize(file, facts.width, facts.height);
     films[file] = {facts, reader.times()};
@@ -94,7 +94,7 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
     Footage footage{std::move(film), {}, {}, {}};
     if (footage.film.is_pictures) {
       footage.pictures = PicturesIn(context.scene_folder() / footage.film.file);
-      footage.times = TimesOfPictures(footage.pictures.size(), options);
+      footage.times = TimesOfPictures(footage.pictures, options, context);
     } else {
       if (!films.contains(footage.film.file)) size_of(footage.film.file);
       footage.times = films.at(footage.film.file).times;
@@ -216,12 +216,16 @@ std::vector<Footage> ReadFootage(const FilmOptions& options, StageContext& conte
 
 FootageReader::FootageReader(const Footage& footage, const StageContext& context)
     : footage_(footage), file_(context.scene_folder() / footage.film.file) {
-  if (!footage.film.is_pictures) video_ = std::make_unique<FilmReader>(file_);
+  if (!footage.film.is_pictures) video_ = std::make_unique<FilmReader>(file_, &context.cancel());
 }
 
 FootageReader::~FootageReader() = default;
 
 bool FootageReader::interlaced() const { return video_ && video_->facts().interlaced; }
+
+std::vector<std::string> FootageReader::notes() const {
+  return video_ ? video_->facts().notes : std::vector<std::string>();
+}
 
 std::string FootageReader::NameOf(int frame) const {
   return video_ ? fmt::format("f{:06}.png", frame) : footage_.pictures[frame];

@@ -40,6 +40,8 @@ class FootageReader {
   FootageReader(const Footage& footage, const StageContext& context);
   ~FootageReader();
   bool interlaced() const;
+  // What a user should know of how a video is read (FilmFacts::notes).
+  std::vector<std::string> notes() const;
   // Below the camera's folder: f000012.png, or as the picture is called.
   std::string NameOf(int frame) const;
   // sRGB or grey, as people see it. Throws Error{kDataLoss} for a damaged frame of a video.

@@ -84,6 +84,9 @@ class CameraFilmsImport {
       context_.progress().OnWarning(footage.film.file +
                                     " is interlaced: one field of each frame is taken");
     }
+    for (const std::string& note : reader.notes()) {
+      context_.progress().OnWarning(footage.film.file + " " + note);
+    }
     FramesOfCamera camera{footage.film.file, {}};
     std::vector<Image> thumbnails;
     for (const int frame : footage.frames) {

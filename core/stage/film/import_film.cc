@@ -208,10 +208,13 @@ void ImportVideo(const std::string& file,
         "film_frames_per_second is for frames that come as pictures; {} has times of its own",
         file);
   }
-  FilmReader film(context.scene_folder() / file);
+  FilmReader film(context.scene_folder() / file, &context.cancel());
   const std::vector<int> wanted = Wanted(film.times(), options);
   if (film.facts().interlaced) {
     context.progress().OnWarning("the film is interlaced: one field of each frame is taken");
+  }
+  for (const std::string& note : film.facts().notes) {
+    context.progress().OnWarning("the film " + note);
   }
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());
@@ -227,7 +230,7 @@ void ImportPictures(const FilmOptions& options,
                     StageContext& context) {
   const fs::path folder = context.scene_folder() / kFramesFolder;
   const std::vector<std::string> files = PicturesIn(folder);
-  const std::vector<double> times = TimesOfPictures(files.size(), options);
+  const std::vector<double> times = TimesOfPictures(files, options, context);
   const std::vector<int> wanted = Wanted(times, options);
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());

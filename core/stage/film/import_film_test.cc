@@ -11,6 +11,7 @@
 #include "core/stage/stages.h"
 #include "core/video/mp4_writer.h"
 #include "tests/support/formats/interlaced_film.h"
+#include "tests/support/formats/tone_film.h"
 #include "tests/support/scenes/test_scenes.h"
 #include "tests/support/stages/stage_fixture.h"
 
@@ -139,6 +140,28 @@ TEST_F(ImportFilmTest, PicturesWhoseNumbersHaveNoZerosComeInTheirOrder) {
     EXPECT_EQ(scene.views[i].name, "n" + std::to_string(i + 1) + ".png");
     EXPECT_NEAR(scene.views[i].moment->time_s, i / 25.0, 1e-12);
   }
+}
+
+TEST_F(ImportFilmTest, FramesThatAreMissingLeaveTheirTime) {
+  for (const int i : {0, 1, 2, 3, 7, 8}) {
+    WriteFrame(fmt::format("shot_{:04}.png", i), FrameOf(1, i));
+  }
+  const Scene scene = Import({.frames_per_second = 10});
+  ASSERT_EQ(scene.views.size(), 6u);
+  EXPECT_NEAR(scene.views[3].moment->time_s, 0.3, 1e-9);
+  EXPECT_NEAR(scene.views[4].moment->time_s, 0.7, 1e-9);
+  EXPECT_THAT(observer_.text,
+              HasSubstr("3 frames are missing between shot_0003.png and shot_0007.png"));
+}
+
+TEST_F(ImportFilmTest, HdrIsTold) {
+  ASSERT_TRUE(WriteToneFilm(scratch_.path() / "film.mkv",
+                            {{.pixel_format = "yuv420p10le",
+                              .range = "tv",
+                              .transfer = "smpte2084",
+                              .primaries = "bt2020"}}));
+  EXPECT_EQ(Import().views.size(), 3u);
+  EXPECT_THAT(observer_.text, HasSubstr("the film is HDR (PQ): its tones are mapped"));
 }
 
 TEST_F(ImportFilmTest, PicturesHaveTheRateThatIsGiven) {

@@ -89,7 +89,7 @@ std::optional<SoundPart> SoundFrom(const Scene& scene,
   const int number = FrameNumber(frame);
   if (file.empty() || number < 0) return std::nullopt;
   const std::filesystem::path path = context.scene_folder() / file;
-  const FilmReader film(path);
+  const FilmReader film(path, &context.cancel());
   if (!film.facts().has_sound || number >= static_cast<int>(film.times().size())) {
     return std::nullopt;
   }
