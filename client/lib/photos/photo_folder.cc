@@ -89,7 +89,8 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   if (films.size() < 2) return;
   std::ranges::sort(films, {}, &LocalFile::path);
   // What names or counts the films decides itself: of those the server says which are copies.
-  if (!has_transforms && !IsFile(root / kPosesBoundsFile)) LeaveOutCopies(&films, &result->notes);
+  if (folders.size() == 1 && !IsFile(root / kPosesBoundsFile))
+    LeaveOutCopies(&films, &result->notes);
   if (films.size() == 1) result->film = films[0];
   if (films.size() > 1) result->camera_films = std::move(films);
 }
@@ -124,8 +125,6 @@ void CollectImages(const fs::path& root, PhotoFolder* result, PassedOver* passed
   }
   if (!result->photos.empty()) return AddUnusedNeighbors(root, used, passed_over);
   if (HasPoses(root)) AddPhotosAsImages(root, OnlyFolderOfPhotos(root), result, passed_over);
-}
-  }
 }
 
 // All files, so that one of the wrong kind is refused by name instead of being passed over.
