@@ -13,6 +13,7 @@
 #include "core/base/files.h"
 #include "core/base/name_order.h"
 #include "core/base/utf8.h"
+#include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 
@@ -89,8 +90,8 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   if (films.size() < 2) return;
   std::ranges::sort(films, {}, &LocalFile::path);
   // What names or counts the films decides itself: of those the server says which are copies.
-  if (folders.size() == 1 && !IsFile(root / kPosesBoundsFile))
-    LeaveOutCopies(&films, &result->notes);
+  const bool are_named = IsFile(root / kTransformsFile) || IsFile(root / kPosesBoundsFile);
+  if (!are_named) LeaveOutCopies(&films, &result->notes);
   if (films.size() == 1) result->film = films[0];
   if (films.size() > 1) result->camera_films = std::move(films);
 }
