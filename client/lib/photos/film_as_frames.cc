@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "client/lib/photos/gray_copies.h"
+#include "client/lib/photos/photo_color.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
