@@ -6,6 +6,7 @@
 #include "client/lib/photos/photo_folder.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/image/probe/probe.h"
 
 namespace color3d::client {
 namespace {
@@ -74,7 +75,7 @@ TEST_F(FilmAdviceTest, PicturesDeeperDownAreNamed) {
   EXPECT_THAT(Complaint("reels"),
               HasSubstr("films lie in " + (folder_.path() / "reels/1").string()));
   Write("nothing/.hidden/1.gif");
-  EXPECT_THAT(Complaint("nothing"), testing::EndsWith("(JPEG, PNG or TIFF)"));
+  EXPECT_THAT(Complaint("nothing"), testing::EndsWith("(" + ReadableImageFormats() + ")"));
 }
 
 }  // namespace
