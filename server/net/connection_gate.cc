@@ -55,6 +55,7 @@ GateLimits GateLimitsFor(int64_t descriptors, int64_t reserve, int max_connectio
   GateLimits limits;
   const int64_t room = std::max(descriptors - reserve, descriptors / 4);
   limits.max_connections = static_cast<int>(std::clamp<int64_t>(room, 1, max_connections));
+  limits.handed_on_at_once = limits.max_connections / 2;
   limits.highest_descriptor =
       static_cast<int>(descriptors - std::clamp<int64_t>(descriptors / 8, 8, 128));
   return limits;
@@ -181,6 +182,10 @@ bool ConnectionGate::Accept(int listener) {
         ++counts_.refused;
       }
       ::close(fd);
+      continue;
+    }
+    if (open_.size() + silent_.size() < static_cast<size_t>(limits_.handed_on_at_once)) {
+      HandOn({listener, fd, SteadyClock::now()});
       continue;
     }
     epoll_event event{};

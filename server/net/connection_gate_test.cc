@@ -84,6 +84,17 @@ TEST_F(GateTest, WhoSaysNothingMakesRoomForWhoDoes) {
   EXPECT_LE(gate_->counts().silent + gate_->counts().open, 16);
 }
 
+TEST_F(GateTest, WhileFewAreOpenConnectionsAreHandedOnBeforeTheirFirstBytes) {
+  GateLimits limits;
+  limits.handed_on_at_once = 2;
+  Open(limits);
+  Connect(""), Connect("");
+  EXPECT_TRUE(AreHandedOn(2));
+  Connect("");
+  EXPECT_FALSE(IsEnded(Connect("x"), milliseconds(0)));
+  EXPECT_TRUE(AreHandedOn(3)) << "the one that spoke, not the one that is silent";
+}
+
 TEST_F(GateTest, SilenceEnds) {
   GateLimits limits;
   limits.silence = milliseconds(100);
