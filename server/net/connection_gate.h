@@ -25,9 +25,9 @@ namespace color3d {
 
 struct GateLimits {
   int max_connections = 4096;
-  // While fewer connections are open, a new one is handed on before its first bytes: gRPC then sends
-  // its settings at once, which clients that poll seldom (gRPC's own, between two calls) need in
-  // order to connect in time.
+  // While fewer connections are open, a new one is handed on before its first bytes: gRPC then
+  // sends its settings at once, which clients that poll seldom (gRPC's own, between two calls) need
+  // in order to connect in time.
   int handed_on_at_once = 0;
   // An accepted socket has the lowest free number, so that this many descriptors below it are in
   // use; from here on room is made, whatever uses them.

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client/lib/photos/passed_over_files.h"
 #include "core/base/name_order.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
@@ -160,10 +161,10 @@ std::vector<fs::path> FilesBelow(const fs::path& folder, int depth) {
   std::vector<fs::path> files, folders;
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(folder, none)) {
-    if (IsHidden(entry.path())) continue;
+    if (IsHidden(entry.path()) || IsSystemFolder(entry.path().filename().string())) continue;
     if (entry.is_directory(none) && !entry.is_symlink(none)) {
       folders.push_back(entry.path());
-    } else if (files.size() < kMostFiles) {
+    } else if (files.size() < kMostFiles && entry.is_regular_file(none)) {
       files.push_back(entry.path());
     }
   }
@@ -204,7 +205,9 @@ std::string FolderAdvice(const fs::path& folder) {
                        count > 1 ? fmt::format(", as {} more are", count - 1) : "",
                        Remedy(*first, ending->kind));
   }
+  // What lies in the folder itself was looked at: to name that folder again would be no advice.
   const auto below = std::find_if(files.begin(), files.end(), [&](const fs::path& file) {
+    if (file.parent_path() == folder) return false;
     return HasImageExtension(file.string()) || HasFilmExtension(file.string());
   });
   if (below == files.end()) return "";

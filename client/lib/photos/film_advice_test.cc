@@ -75,7 +75,14 @@ TEST_F(FilmAdviceTest, PicturesDeeperDownAreNamed) {
   EXPECT_THAT(Complaint("reels"),
               HasSubstr("films lie in " + (folder_.path() / "reels/1").string()));
   Write("nothing/.hidden/1.gif");
+  Write("nothing/@eaDir/thumbnail.jpg");
   EXPECT_THAT(Complaint("nothing"), testing::EndsWith("(" + ReadableImageFormats() + ")"));
+}
+
+TEST_F(FilmAdviceTest, TheFolderItselfIsNotNamedAgain) {
+  Write("given/x.avif");
+  fs::create_symlink("/nowhere", folder_.path() / "given/y.jpg");
+  EXPECT_THAT(Complaint("given"), testing::Not(HasSubstr("give that folder")));
 }
 
 }  // namespace
