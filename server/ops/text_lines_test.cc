@@ -13,7 +13,6 @@
 namespace color3d {
 namespace {
 using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 using ::testing::Not;
 
 std::string Logged(const std::string& message, std::unique_ptr<spdlog::formatter> formatter) {

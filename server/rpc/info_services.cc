@@ -71,11 +71,7 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::GetColorizer(grpc::CallbackServe
                                                              const v1::GetColorizerRequest* request,
                                                              v1::Colorizer* response) {
   return AnswerRead(
-      parts_,
-      context,
-      request,
-      response,
-      [this](const Call& call, const auto& in, v1::Colorizer* out) {
+      parts_, context, request, response, [](const Call& call, const auto& in, v1::Colorizer* out) {
         CheckName(in.name(), "colorizers");
         *out = ToProto(call.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
       });
@@ -89,7 +85,7 @@ grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
                     context,
                     request,
                     response,
-                    [this](const Call& call, const auto& in, v1::ListColorizersResponse* out) {
+                    [](const Call& call, const auto& in, v1::ListColorizersResponse* out) {
                       if (!in.scene().empty()) CheckName(in.scene(), "scenes");
                       AnswerPage(
                           in,

@@ -24,7 +24,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::GetScene(grpc::CallbackServerContext
                                                      const v1::GetSceneRequest* request,
                                                      v1::Scene* response) {
   return AnswerRead(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
+      parts_, context, request, response, [](const Call& call, const auto& in, v1::Scene* out) {
         CheckName(in.name(), "scenes");
         *out = ToProto(call.store.GetScene(in.name()));
       });
@@ -38,7 +38,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::ListScenes(grpc::CallbackServerConte
       context,
       request,
       response,
-      [this](const Call& call, const auto& in, v1::ListScenesResponse* out) {
+      [](const Call& call, const auto& in, v1::ListScenesResponse* out) {
         AnswerPage(
             in,
             "scenes",
