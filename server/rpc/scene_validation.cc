@@ -85,11 +85,10 @@ bool IsTransforms(const std::string& path) {
 }
 
 // Empty: it is one.
-std::string WhyNoTransforms(const std::string& path, std::string_view bytes) {
+std::string WhyNoTransforms(std::string_view bytes, bool needs_frames) {
   const TransformsOutline outline = OutlineOfTransforms(bytes);
   if (!outline.error.empty()) return "is not JSON: " + outline.error;
   if (!outline.is_object) return "is not a JSON object";
-  const bool needs_frames = path == kTransformsFile || path == kBlenderFiles[0];
   return outline.frames == 0 && needs_frames ? "has no \"frames\"" : "";
 }
 
@@ -144,20 +143,31 @@ class FileChecks {
   struct Problem {
     std::string path, text;
   };
-  Problem ProblemOf(const SceneFileRecord& file, bool is_transforms) const;
+  enum class Part { kPicture, kTransforms, kTransformsWithFrames };
+  static Part PartOf(const std::string& path);
+  Problem ProblemOf(const SceneFileRecord& file, Part part) const;
 
   const BlobStore& blobs_;
   const ServiceLimits& limits_;
   const std::function<bool()>& is_cancelled_;
-  std::map<std::pair<std::string, bool>, Problem> known_;  // by digest, and whether transforms.json
+  // By digest, and the part that the file plays.
+  std::map<std::pair<std::string, Part>, Problem> known_;
 };
 
-FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, bool is_transforms) const {
+FileChecks::Part FileChecks::PartOf(const std::string& path) {
+  if (!IsTransforms(path)) return Part::kPicture;
+  const bool needs_frames = path == kTransformsFile || path == kBlenderFiles[0];
+  return needs_frames ? Part::kTransformsWithFrames : Part::kTransforms;
+}
+
+FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, Part part) const {
   const MappedFile mapped(blobs_.Fetch(file.digest.sha256), file.digest.size_bytes, is_cancelled_);
   if (!mapped.is_readable()) {
     return {file.path, "cannot be read from the server's disk; upload it again"};
   }
-  if (is_transforms) return {file.path, WhyNoTransforms(file.path, mapped.bytes())};
+  if (part != Part::kPicture) {
+    return {file.path, WhyNoTransforms(mapped.bytes(), part == Part::kTransformsWithFrames)};
+  }
   try {
     ImageLimits image_limits;
     image_limits.max_pixels = limits_.max_pixels_per_image;
@@ -189,9 +199,9 @@ void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* ch
         fmt::format("has {} bytes; at most {} are allowed", file.digest.size_bytes, max_bytes));
   }
   if (!is_photo && !is_transforms) return;
-  const std::pair<std::string, bool> key(file.digest.sha256, is_transforms);
+  const std::pair<std::string, Part> key(file.digest.sha256, PartOf(file.path));
   auto known = known_.find(key);
-  if (known == known_.end()) known = known_.emplace(key, ProblemOf(file, is_transforms)).first;
+  if (known == known_.end()) known = known_.emplace(key, ProblemOf(file, key.second)).first;
   Problem problem = known->second;
   if (problem.text.empty()) {
     if (is_photo && !is_augmentation && !is_mask) ++check->photo_count;

@@ -145,6 +145,12 @@ TEST_F(SceneValidationTest, PosesAreRecognisedWhereverTheImportReadsThem) {
   files.emplace_back("transforms.json", "{\n\"frames\": oops}");
   EXPECT_THAT(Commit(files, &scene).error_message(),
               HasSubstr("transforms.json is not JSON: parse error at line 2"));
+  // Of files with equal bytes only the one that needs frames is refused for want of them.
+  files = photos;
+  files.emplace_back("transforms_test.json", R"({"frames": []})");
+  files.emplace_back("transforms_train.json", R"({"frames": []})");
+  EXPECT_THAT(Commit(files, &scene).error_message(),
+              HasSubstr("transforms_train.json has no \"frames\""));
 }
 
 TEST_F(SceneValidationTest, TimesGoWithAColmapModel) {
