@@ -29,12 +29,7 @@ std::vector<CertificateRecord> ParseCertificateRoles(std::string_view text,
           file,
           number);
     }
-    try {
-      record.role = RoleFromName(role);
-      CheckProject(record.project);
-    } catch (const Error& e) {
-      throw InvalidArgument("{}, line {}: {}", file, number, e.what());
-    }
+    record.role = RoleOfLine(role, record.project, file, number);
     records.push_back(record);
   }
   return records;

@@ -63,6 +63,19 @@ void CheckProject(const std::string& project) {
   }
 }
 
+Role RoleOfLine(const std::string& role,
+                const std::string& project,
+                const std::string& file,
+                int line) {
+  try {
+    const Role named = RoleFromName(role);
+    CheckProject(project);
+    return named;
+  } catch (const Error& e) {
+    throw InvalidArgument("{}, line {}: {}", file, line, e.what());
+  }
+}
+
 std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file) {
   std::vector<TokenRecord> records;
   std::istringstream lines{std::string(text)};
@@ -80,12 +93,7 @@ std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& f
           file,
           number);
     }
-    try {
-      record.role = RoleFromName(role);
-      CheckProject(record.project);
-    } catch (const Error& e) {
-      throw InvalidArgument("{}, line {}: {}", file, number, e.what());
-    }
+    record.role = RoleOfLine(role, record.project, file, number);
     records.push_back(record);
   }
   return records;

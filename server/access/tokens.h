@@ -32,6 +32,12 @@ struct TokenRecord {
 // Throws Error{kInvalidArgument} unless it is empty or 1 to 40 of a-z, 0-9 and '-', the first a
 // letter.
 void CheckProject(const std::string& project);
+// The role that line `line` of `file` gives, in `project`. Throws as RoleFromName and CheckProject,
+// with the file and the line before the message.
+Role RoleOfLine(const std::string& role,
+                const std::string& project,
+                const std::string& file,
+                int line);
 
 // Lines "NAME ROLE SHA256 [PROJECT]"; empty ones and those that begin with '#' are skipped. Throws
 // Error{kInvalidArgument} naming file and line.
