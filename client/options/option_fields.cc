@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/base/error.h"
+#include "core/base/lower_case.h"
 #include "proto/option_text.h"
 
 namespace color3d::client {
@@ -130,8 +131,8 @@ std::string Takes(const FieldDescriptor* field) {
       std::string names;
       const EnumDescriptor* values = field->enum_type();
       for (int i = 1; i < values->value_count(); ++i) {
-        std::string name = values->value(i)->name().substr(PrefixOf(values).size());
-        for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        const std::string name =
+            LowerCase(values->value(i)->name().substr(PrefixOf(values).size()));
         names += (i > 1 ? ", " : "") + name;
       }
       return names;

@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/json_text.h"
+#include "core/base/lower_case.h"
 #include "proto/option_text.h"
 
 namespace color3d::client {
@@ -24,11 +25,6 @@ using google::protobuf::Message;
 using google::protobuf::TextFormat;
 
 const std::string kPrefix = "PRESET_";
-
-std::string LowerCase(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
 
 v1::Preset PresetNamed(const std::string& name) {
   const auto* presets = v1::Preset_descriptor();

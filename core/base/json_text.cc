@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/lower_case.h"
 
 namespace color3d {
 namespace {
@@ -20,10 +21,7 @@ bool IsOfToken(char c) {
 // A word that stands for a number, but that JSON does not have.
 bool IsNoJsonNumber(std::string_view token) {
   if (token.front() == '-' || token.front() == '+') token.remove_prefix(1);
-  std::string word(token.substr(0, 16));
-  std::transform(word.begin(), word.end(), word.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
+  const std::string word = LowerCase(token.substr(0, 16));
   if (word == "nan" || word == "inf" || word == "infinity") return true;
   if (word.empty() || std::isdigit(static_cast<unsigned char>(word[0])) == 0) return false;
   double value = 0.0;

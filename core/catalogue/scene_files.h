@@ -7,15 +7,14 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/lower_case.h"
+
 namespace color3d {
 
 // True for the file name endings of splats that we read: .ply .sog .spz, any case.
 inline bool HasSplatExtension(std::string_view path) {
   if (path.size() < 4) return false;
-  std::string ending(path.substr(path.size() - 4));
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
+  const std::string ending = LowerCase(path.substr(path.size() - 4));
   return ending == ".ply" || ending == ".sog" || ending == ".spz";
 }
 
@@ -40,10 +39,7 @@ inline constexpr std::string_view kFilmEndings[] = {".mp4",
 
 // True for the file name endings of films that we read, any case.
 inline bool HasFilmExtension(std::string_view path) {
-  std::string ending(path.substr(std::min(path.size(), path.find_last_of('.'))));
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
+  const std::string ending = LowerCase(path.substr(std::min(path.size(), path.find_last_of('.'))));
   return std::find(std::begin(kFilmEndings), std::end(kFilmEndings), ending) !=
          std::end(kFilmEndings);
 }

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "core/base/error.h"
+#include "core/base/lower_case.h"
 
 namespace color3d {
 namespace {
@@ -15,8 +16,7 @@ constexpr size_t kMaxUrlBytes = 1000;
 bool IsPlainUrl(const std::string& url) {
   const size_t scheme = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
   if (scheme == 0 || url.size() == scheme || url.size() > kMaxUrlBytes) return false;
-  std::string low = url;
-  std::ranges::transform(low, low.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string low = LowerCase(url);
   if (low.find("..") != std::string::npos || low.find("%2e") != std::string::npos) return false;
   if (!std::isalnum(static_cast<unsigned char>(url[scheme])) && url[scheme] != '[') return false;
   return std::ranges::all_of(url, [](unsigned char c) {

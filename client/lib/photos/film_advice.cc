@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/lib/photos/passed_over_files.h"
+#include "core/base/lower_case.h"
 #include "core/base/name_order.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
@@ -76,10 +77,7 @@ constexpr Ending kEndings[] = {{".gif", Kind::kAnimation, "GIF"},
                                {".ivf", Kind::kContainer, "IVF"}};
 
 const Ending* EndingOf(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
+  const std::string ending = LowerCase(file.extension().string());
   const auto* found = std::find_if(std::begin(kEndings), std::end(kEndings), [&](const Ending& e) {
     return ending == e.ending;
   });

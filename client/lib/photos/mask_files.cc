@@ -9,6 +9,7 @@
 #include "client/lib/photos/passed_over_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/lower_case.h"
 #include "core/image/probe/orientation.h"
 #include "core/image/probe/probe.h"
 
@@ -20,13 +21,6 @@ namespace {
 std::vector<std::string> MaskNames(std::string photo) {
   if (photo.starts_with("images/")) photo.erase(0, 7);
   return {photo + ".png", fs::path(photo).replace_extension(".png").generic_string()};
-}
-
-std::string LowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return text;
 }
 
 std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }

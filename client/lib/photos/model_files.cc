@@ -9,9 +9,11 @@
 #include <utility>
 
 #include "client/lib/photos/file_kind.h"
+#include "client/lib/photos/passed_over_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/json_text.h"
+#include "core/base/lower_case.h"
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
@@ -39,13 +41,6 @@ constexpr UnreadPoses kUnreadPoses[] = {{"cameras.xml", "Agisoft Metashape"},
                                         {"cameras.sfm", "Meshroom"},
                                         {"sfm.json", "Meshroom"}};
 
-std::string LowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return text;
-}
-
 // A path as somebody's file has it, with our separators.
 std::string OurPath(std::string path) {
   std::replace(path.begin(), path.end(), '\\', '/');
@@ -59,7 +54,8 @@ std::vector<std::string> FoldersIn(const fs::path& root) {
   std::error_code none;
   for (const auto& entry : fs::directory_iterator(root, none)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with('.') && IsFolder(entry.path())) folders.push_back(name);
+    if (name.starts_with('.') || IsSystemFolder(name)) continue;
+    if (IsFolder(entry.path())) folders.push_back(name);
   }
   std::sort(folders.begin(), folders.end());
   return folders;
@@ -216,13 +212,9 @@ std::string OnlyFolderOfPhotos(const fs::path& root) {
   std::string found;
   for (const std::string& folder : FoldersIn(root)) {
     if (IsAugmentFile(folder + "/") || IsMaskFile(folder + "/")) continue;
-    std::error_code none;
-    for (const auto& entry : fs::directory_iterator(root / folder, none)) {
-      if (!HasImageExtension(entry.path().filename().string()) || !IsFile(entry.path())) continue;
-      if (!found.empty()) return "";
-      found = folder;
-      break;
-    }
+    if (ListPictures(root / folder, /*with_subfolders=*/false, nullptr).empty()) continue;
+    if (!found.empty()) return "";
+    found = folder;
   }
   return found;
 }

@@ -152,6 +152,9 @@ TEST_F(ModelFilesTest, AdviceDoesNotLeadAwayFromPoses) {
   folder = CollectPhotos(root());
   EXPECT_THAT(Paths(folder.photos), ElementsAre("images/a.jpg", "images/b.jpg"));
   EXPECT_EQ(folder.model_files.size(), 3u);
+  // Thumbnails make no second folder of photos.
+  WritePhotos("@eaDir/");
+  EXPECT_EQ(CollectPhotos(root()).photos.size(), 2u);
   WritePhotos("other/");
   EXPECT_THAT(ErrorOf(),
               AllOf(HasSubstr("belong into " + (root() / "images").string()),

@@ -10,6 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/lower_case.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
@@ -111,14 +112,6 @@ constexpr const char* kResultFolders[] = {artifact::kGivenViews,
                                           artifact::kColored2d,
                                           artifact::kCurves};
 
-std::string Lowered(std::string_view text) {
-  std::string lowered(text);
-  std::transform(lowered.begin(), lowered.end(), lowered.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return lowered;
-}
-
 template <typename List>
 bool Holds(const List& list, std::string_view text) {
   return std::find(std::begin(list), std::end(list), text) != std::end(list);
@@ -126,7 +119,7 @@ bool Holds(const List& list, std::string_view text) {
 
 std::string EndingOf(std::string_view name) {
   const size_t dot = name.rfind('.');
-  return dot == std::string_view::npos ? "" : Lowered(name.substr(dot + 1));
+  return dot == std::string_view::npos ? "" : LowerCase(name.substr(dot + 1));
 }
 
 const Kind* KindOf(std::string_view name) {
@@ -281,10 +274,10 @@ class Lister {
     std::sort(pictures.begin(), pictures.end());
     std::set<std::string> stems;
     for (const std::string& name : pictures) {
-      if (!IsCopyFormat(name)) stems.insert(Lowered(fs::path(name).stem().string()));
+      if (!IsCopyFormat(name)) stems.insert(LowerCase(fs::path(name).stem().string()));
     }
     for (const std::string& name : pictures) {
-      if (IsCopyFormat(name) && !stems.insert(Lowered(fs::path(name).stem().string())).second) {
+      if (IsCopyFormat(name) && !stems.insert(LowerCase(fs::path(name).stem().string())).second) {
         PassOver("pictures beside another of the same name", below + name);
       } else {
         found_.push_back(below + name);
@@ -359,7 +352,7 @@ void AddUnusedNeighbors(const fs::path& root,
   constexpr std::string_view kOurs[] = {"augment", "masks", "sparse"};
   const std::vector<std::string> photos = ListPictures(root, /*with_subfolders=*/false, nullptr);
   std::set<std::string> stems;
-  for (const std::string& photo : photos) stems.insert(Lowered(fs::path(photo).stem().string()));
+  for (const std::string& photo : photos) stems.insert(LowerCase(fs::path(photo).stem().string()));
   std::error_code none;
   for (const fs::directory_entry& entry : fs::directory_iterator(root, none)) {
     const std::string name = entry.path().filename().string();
@@ -367,7 +360,7 @@ void AddUnusedNeighbors(const fs::path& root,
     if (HasFilmExtension(name) && entry.is_regular_file(none)) {
       if (IsResultFile(entry.path())) continue;
       // Beside a photo of its name it is what a phone keeps with it.
-      if (stems.contains(Lowered(fs::path(name).stem().string()))) continue;
+      if (stems.contains(LowerCase(fs::path(name).stem().string()))) continue;
       passed_over->Add("films|give the film itself to colour it", name);
     } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Holds(kOurs, name) &&
                !Holds(used, name) && !HasResultRecord(entry.path())) {
@@ -394,7 +387,7 @@ bool IsResultFile(const fs::path& file) {
 }
 
 bool IsSystemFolder(std::string_view name) {
-  const std::string lowered = Lowered(name);
+  const std::string lowered = LowerCase(name);
   return Holds(kSystemFolders, lowered) || lowered == ".thumbnails" || lowered == ".thumbs" ||
          lowered == ".appledouble" || lowered == ".picasaoriginals" || lowered == ".trash" ||
          lowered.starts_with(".trash-") || lowered.ends_with(".lrdata") ||
@@ -402,7 +395,7 @@ bool IsSystemFolder(std::string_view name) {
 }
 
 bool IsSystemFile(std::string_view name) {
-  return name.starts_with('.') || Holds(kSystemFiles, Lowered(name));
+  return name.starts_with('.') || Holds(kSystemFiles, LowerCase(name));
 }
 
 bool IsSystemPath(std::string_view path) {

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <iterator>
 
+#include "core/base/lower_case.h"
 #include "core/image/probe/probe_formats.h"
 
 namespace color3d {
@@ -111,10 +112,7 @@ ImageInfo ProbeImage(std::string_view bytes,
 bool HasImageExtension(std::string_view path) {
   const size_t dot = path.rfind('.');
   if (dot == std::string_view::npos || path.size() - dot > 5) return false;
-  std::string ending(path.substr(dot + 1));
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
+  const std::string ending = LowerCase(path.substr(dot + 1));
   return std::any_of(std::begin(kEndings), std::end(kEndings), [&](const Ending& known) {
     return known.text == ending && IsReadable(known.format);
   });

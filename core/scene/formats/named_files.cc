@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/files.h"
+#include "core/base/lower_case.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 
@@ -17,13 +18,6 @@ namespace {
 constexpr const char* kFolders[] = {"images/", "input/", ""};
 // So much worse is a name whose first folder was left out than one that differs otherwise.
 constexpr int kFolderLeftOut = 10;
-
-std::string Lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return text;
-}
 
 // Without what follows the last dot of the last part.
 std::string WithoutEnding(const std::string& path) {
@@ -64,9 +58,9 @@ std::vector<std::string> FilesOf(const fs::path& scene_folder, bool (*is_one)(st
 NamedFiles::NamedFiles(std::vector<std::string> files) : files_(std::move(files)) {
   for (const std::string& file : files_) {
     by_path_.emplace(file, &file);
-    by_lower_.emplace(Lower(file), &file);
+    by_lower_.emplace(LowerCase(file), &file);
     by_stem_.emplace(WithoutEnding(file), &file);
-    by_lower_stem_.emplace(Lower(WithoutEnding(file)), &file);
+    by_lower_stem_.emplace(LowerCase(WithoutEnding(file)), &file);
   }
 }
 
@@ -88,12 +82,13 @@ const std::string* NamedFiles::Only(const Index& index, const std::string& key) 
 NamedFiles::Match NamedFiles::LookUp(const std::string& path) const {
   const std::string stem = WithoutEnding(path);
   // A path without an ending, or with a dot in its name, is a stem as it is.
-  const std::vector<std::pair<const Index*, std::string>> ways = {{&by_path_, path},
-                                                                  {&by_stem_, path},
-                                                                  {&by_lower_, Lower(path)},
-                                                                  {&by_lower_stem_, Lower(path)},
-                                                                  {&by_stem_, stem},
-                                                                  {&by_lower_stem_, Lower(stem)}};
+  const std::vector<std::pair<const Index*, std::string>> ways = {
+      {&by_path_, path},
+      {&by_stem_, path},
+      {&by_lower_, LowerCase(path)},
+      {&by_lower_stem_, LowerCase(path)},
+      {&by_stem_, stem},
+      {&by_lower_stem_, LowerCase(stem)}};
   for (size_t way = 0; way < ways.size(); ++way) {
     const auto& [index, key] = ways[way];
     for (const std::string folder : kFolders) {

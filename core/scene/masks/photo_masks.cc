@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/lower_case.h"
 #include "core/image/codec.h"
 #include "core/scene/formats/named_files.h"
 
@@ -44,13 +45,6 @@ bool HasTransparency(const fs::path& file, const std::string& name) {
   if (image.channels != 2 && image.channels != 4) return false;
   const float* alpha = image.Plane(image.channels - 1);
   return std::any_of(alpha, alpha + image.PlaneSize(), [](float a) { return a <= 0.5f; });
-}
-
-std::string LowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
-    return static_cast<char>(std::tolower(c));
-  });
-  return text;
 }
 
 // The files in masks/, relative to the scene's folder.
