@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace {
@@ -56,8 +56,7 @@ Caller Access::Require(Role role, const grpc::CallbackServerContext& context) co
   const Caller caller = by_token ? ByToken(token, context) : ByCertificate(context);
   if (caller.role < role) {
     LogRefusal(caller.name + " may only " + RoleName(caller.role), context);
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "ROLE_TOO_LOW",
+    throw ServiceError(ErrorReason::kRoleTooLow,
                        "the {} of '{}' has the role {}; this call needs {}",
                        by_token ? "token" : "certificate",
                        caller.name,
@@ -70,15 +69,13 @@ Caller Access::Require(Role role, const grpc::CallbackServerContext& context) co
 Caller Access::ByToken(std::string_view token, const grpc::CallbackServerContext& context) const {
   if (token.empty()) {
     LogRefusal("it brings no token", context);
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "TOKEN_MISSING",
+    throw ServiceError(ErrorReason::kTokenMissing,
                        "this server wants a token: `color3d --token-file FILE`, or COLOR3D_TOKEN");
   }
   const std::optional<TokenRecord> record = tokens_->Find(token);
   if (!record) {
     LogRefusal("its token is unknown", context);
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "TOKEN_UNKNOWN",
+    throw ServiceError(ErrorReason::kTokenUnknown,
                        "this server does not know the token; ask who runs it for a fresh one");
   }
   return {record->name, record->role, record->project};
@@ -90,8 +87,7 @@ Caller Access::ByCertificate(const grpc::CallbackServerContext& context) const {
   if (!record) {
     const std::string name = names.empty() ? "" : names.front();
     LogRefusal("the certificate of '" + name + "' has no role", context);
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "CERTIFICATE_UNKNOWN",
+    throw ServiceError(ErrorReason::kCertificateUnknown,
                        "this server gives the certificate of '{}' no role; ask who runs it to name "
                        "it in --certificate-roles",
                        name);

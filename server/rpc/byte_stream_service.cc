@@ -8,8 +8,8 @@
 #include <memory>
 #include <optional>
 
+#include "server/base/service_error.h"
 #include "server/rpc/blob_service.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
@@ -72,15 +72,13 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     place_ = parts_.streams.reads.Take(call.caller.project);
     const FileDigest digest = ParseBlobName(request_.resource_name());
     if (!HasBlob(parts_, call.store, digest)) {
-      throw ServiceError(
-          ErrorCode::kNotFound, "BLOB_MISSING", "'{}' is not stored", request_.resource_name());
+      throw ServiceError(ErrorReason::kBlobMissing, "'{}' is not stored", request_.resource_name());
     }
     if (request_.read_offset() < 0 || request_.read_limit() < 0) {
       throw InvalidArgument("read_offset and read_limit must not be negative");
     }
     if (request_.read_offset() > digest.size_bytes) {
-      throw ServiceError(ErrorCode::kInvalidArgument,
-                         "OFFSET_BEYOND_END",
+      throw ServiceError(ErrorReason::kOffsetBeyondEnd,
                          "read_offset is {}, the blob has {} bytes",
                          request_.read_offset(),
                          digest.size_bytes);
@@ -117,14 +115,12 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     if (!is_whole_ || sent_.FinishHex() == sha256_) return;
     if (parts_.blobs.SetAside(sha256_)) {
       throw ServiceError(
-          ErrorCode::kDataLoss,
-          "BLOB_DAMAGED",
+          ErrorReason::kBlobDamaged,
           "'{}' was damaged on the server's disk and is set aside; upload it again, or "
           "run the job anew with skip_cache",
           request_.resource_name());
     }
-    throw ServiceError(ErrorCode::kUnavailable,
-                       "BLOB_MENDED",
+    throw ServiceError(ErrorReason::kBlobMended,
                        "'{}' was damaged on the server's disk while it was sent, and is whole now; "
                        "download it again",
                        request_.resource_name());
@@ -190,8 +186,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     End(Guard([&] {
       if (writer_) writer_->Sync();
       throw ServiceError(
-          ErrorCode::kUnavailable,
-          "UPLOAD_SILENT",
+          ErrorReason::kUploadSilent,
           "nothing came for {} s; what came before is kept: ask QueryWriteStatus and go "
           "on from there",
           parts_.silence.limit().count() / 1000);

@@ -1,6 +1,6 @@
 #include "server/rpc/call_memory.h"
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 
@@ -19,8 +19,7 @@ void CallMemory::RequireShare(const std::string& client, int64_t own) const {
   if (held == held_.end()) return;
   const int64_t others = held->second - own;
   if (others < budget_bytes_ / static_cast<int64_t>(held_.size())) return;
-  throw ServiceError(ErrorCode::kUnavailable,
-                     "OVERLOADED",
+  throw ServiceError(ErrorReason::kOverloaded,
                      "calls of this connection hold {} MiB of the server's memory, requests that "
                      "wait and answers that were not read; let them end, then try again",
                      others >> 20);

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d::testing {
 namespace {
@@ -27,7 +27,7 @@ TEST(CallMemory, WhoHoldsHisShareWaitsAndTheOthersGoOn) {
     FAIL() << "100 of 100";
   } catch (const ServiceError& e) {
     EXPECT_EQ(e.code(), ErrorCode::kUnavailable) << "clients try such calls again";
-    EXPECT_EQ(e.reason(), "OVERLOADED");
+    EXPECT_EQ(e.reason(), ErrorReason::kOverloaded);
   }
   memory.Add("one", -100);
   EXPECT_NO_THROW(memory.RequireShare("one"));

@@ -5,9 +5,9 @@
 #include <charconv>
 
 #include "core/base/utf8.h"
+#include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
 #include "server/rpc/error_mapping.h"
-#include "server/service_error.h"
 
 namespace color3d {
 

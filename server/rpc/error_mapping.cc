@@ -6,7 +6,7 @@
 
 #include "core/base/utf8.h"
 #include "google/rpc/error_details.pb.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace {
@@ -15,15 +15,7 @@ namespace {
 constexpr size_t kMaxViolationBytes = 2500;
 constexpr size_t kMaxMessageBytes = 700;
 
-grpc::StatusCode CodeOf(const std::string& reason, ErrorCode code) {
-  if (reason == "REVISION_COMPACTED" || reason == "OFFSET_BEYOND_END") {
-    return grpc::StatusCode::OUT_OF_RANGE;
-  }
-  if (reason == "TOKEN_MISSING" || reason == "TOKEN_UNKNOWN") {
-    return grpc::StatusCode::UNAUTHENTICATED;
-  }
-  if (reason == "ROLE_TOO_LOW" || reason == "CERTIFICATE_UNKNOWN")
-    return grpc::StatusCode::PERMISSION_DENIED;
+grpc::StatusCode GrpcCode(ErrorCode code) {
   switch (code) {
     case ErrorCode::kCancelled:
       return grpc::StatusCode::CANCELLED;
@@ -49,6 +41,12 @@ grpc::StatusCode CodeOf(const std::string& reason, ErrorCode code) {
       return grpc::StatusCode::UNAVAILABLE;
     case ErrorCode::kDataLoss:
       return grpc::StatusCode::DATA_LOSS;
+    case ErrorCode::kOutOfRange:
+      return grpc::StatusCode::OUT_OF_RANGE;
+    case ErrorCode::kUnauthenticated:
+      return grpc::StatusCode::UNAUTHENTICATED;
+    case ErrorCode::kPermissionDenied:
+      return grpc::StatusCode::PERMISSION_DENIED;
   }
   return grpc::StatusCode::INTERNAL;
 }
@@ -58,7 +56,7 @@ google::rpc::Status Build(ErrorCode code,
                           const std::string& message,
                           const std::vector<FieldViolation>& violations) {
   google::rpc::Status status;
-  status.set_code(CodeOf(reason, code));
+  status.set_code(GrpcCode(code));
   // Trailers are text: paths of users may hold anything.
   std::string text = CleanUtf8(message, kMaxMessageBytes);
   std::replace_if(
@@ -68,7 +66,7 @@ google::rpc::Status Build(ErrorCode code,
   info.set_reason(reason);
   info.set_domain("color3d");
   status.add_details()->PackFrom(info);
-  if (reason == "QUOTA_EXCEEDED") {
+  if (reason == ErrorReasonName(ErrorReason::kQuotaExceeded)) {
     google::rpc::QuotaFailure failure;
     for (const FieldViolation& violation : violations) {
       auto* entry = failure.add_violations();
@@ -135,14 +133,13 @@ grpc::Status Guard(const std::function<void()>& body) {
 }
 
 grpc::Status DrainingStatus() {
-  return ToGrpcStatus(ServiceError(ErrorCode::kUnavailable,
-                                   "DRAINING",
+  return ToGrpcStatus(ServiceError(ErrorReason::kDraining,
                                    "the server is shutting down; try again when it is back"));
 }
 
 grpc::Status OverloadedStatus() {
-  return ToGrpcStatus(ServiceError(
-      ErrorCode::kUnavailable, "OVERLOADED", "too many requests wait; try again shortly"));
+  return ToGrpcStatus(
+      ServiceError(ErrorReason::kOverloaded, "too many requests wait; try again shortly"));
 }
 
 }  // namespace color3d

@@ -9,13 +9,13 @@
 #include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
 #include "server/access/notify_targets.h"
+#include "server/base/service_error.h"
 #include "server/planning/plan_scenes.h"
 #include "server/planning/planner.h"
 #include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/job_log_stream.h"
-#include "server/service_error.h"
 #include "server/storage/ballast.h"
 
 namespace color3d {
@@ -45,7 +45,7 @@ void CheckBlobs(const RpcParts& parts, const ProjectStore& store, const v1::JobS
   if (missing.empty()) return;
   throw ServiceError(
       ErrorCode::kFailedPrecondition,
-      "BLOB_MISSING",
+      ErrorReason::kBlobMissing,
       fmt::format(
           "the spec names {} blobs that are not uploaded, first {}; upload them and try again",
           missing.size(),
@@ -94,8 +94,7 @@ SceneRouteInputs LoadRoute(const ProjectStore& store,
       route.key_color_job().empty() ? scene.key_color_job : route.key_color_job();
   if (name.empty()) {
     throw ServiceError(
-        ErrorCode::kFailedPrecondition,
-        "INPUT_MISSING",
+        ErrorReason::kInputMissing,
         "the scene {} has no accepted key view; accept one, or name its {} job in the "
         "route's key_color_job",
         scene.name,

@@ -6,9 +6,9 @@
 #include <set>
 
 #include "core/base/digest.h"
+#include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
 #include "server/rpc/call_watch.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
@@ -45,8 +45,7 @@ Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& 
 void RequireNotDraining(const RpcParts& parts) {
   if (!parts.draining.load()) return;
   throw ServiceError(
-      ErrorCode::kUnavailable,
-      "DRAINING",
+      ErrorReason::kDraining,
       "the server is shutting down and takes no new jobs; try again when it is back");
 }
 
@@ -61,8 +60,7 @@ void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more
   const int64_t stored = usage.stored_bytes + usage.row_bytes;
   if (stored + more_bytes <= most) return;
   throw ServiceError(
-      ErrorCode::kResourceExhausted,
-      "QUOTA_EXCEEDED",
+      ErrorReason::kQuotaExceeded,
       fmt::format(
           "your project has {:.1f} MiB on the server, files and rows of its scenes and jobs, "
           "and {:.1f} MiB would come, at most {:.1f} MiB are allowed; delete jobs and scenes "
@@ -79,8 +77,7 @@ void RequireRoomForRows(const RpcParts& parts, const ProjectStore& store, int64_
   // The store says what was found some seconds ago, and until when.
   if (free - more_bytes < parts.limits.low_space_bytes ||
       parts.store.Holds().contains(Hold::kStorage)) {
-    throw ServiceError(ErrorCode::kResourceExhausted,
-                       "STORAGE_FULL",
+    throw ServiceError(ErrorReason::kStorageFull,
                        "the server's disk is nearly full ({} MiB are free) and nothing is created; "
                        "free some space there, or try again later",
                        free >> 20);

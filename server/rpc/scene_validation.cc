@@ -16,10 +16,10 @@
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
+#include "server/base/service_error.h"
 #include "server/planning/scene_facts.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/transforms_outline.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -227,7 +227,7 @@ void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* ch
   if (violations.size() > 3) {
     message += fmt::format("; and {} more files", violations.size() - 3);
   }
-  throw ServiceError(ErrorCode::kInvalidArgument, "SCENE_INVALID", message, violations);
+  throw ServiceError(ErrorReason::kSceneInvalid, message, violations);
 }
 
 void CheckSceneId(const std::string& id) {
@@ -273,8 +273,7 @@ SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLim
   for (const v1::SceneFile& file : request.files()) {
     if (!IsSafeRelativePath(file.path())) {
       throw ServiceError(
-          ErrorCode::kInvalidArgument,
-          "UNSAFE_PATH",
+          ErrorReason::kUnsafePath,
           fmt::format("the path '{}' must be relative, with '/' separators and without '..'",
                       file.path().substr(0, 200)),
           {{"files.path", file.path().substr(0, 200)}});

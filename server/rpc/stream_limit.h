@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 
@@ -51,16 +51,14 @@ class StreamLimit {
     const int own = of_project == open_.end() ? 0 : of_project->second;
     if (max_of_project_ > 0 && own >= max_of_project_) {
       throw ServiceError(
-          ErrorCode::kResourceExhausted,
-          "QUOTA_EXCEEDED",
+          ErrorReason::kQuotaExceeded,
           fmt::format("{} {} of your project are open, which is as many as it may have; close some",
                       own,
                       what_),
           {{"project:" + project + " " + what_, fmt::format("{} of {}", own, max_of_project_)}});
     }
     if (all_ >= max_) {
-      throw ServiceError(ErrorCode::kResourceExhausted,
-                         "TOO_MANY_STREAMS",
+      throw ServiceError(ErrorReason::kTooManyStreams,
                          "{} {} are open, which is as many as this server allows; close some, or "
                          "try again later",
                          max_,
@@ -68,8 +66,7 @@ class StreamLimit {
     }
     if (shared_ && own > 0 && own >= max_ - all_) {
       throw ServiceError(
-          ErrorCode::kResourceExhausted,
-          "QUOTA_EXCEEDED",
+          ErrorReason::kQuotaExceeded,
           fmt::format(
               "{} {} of your project are open, which is its share of the {} that this server "
               "allows; close some, or try again later",

@@ -13,7 +13,7 @@ std::vector<StreamLimit::Place> TakeAll(StreamLimit& limit, const std::string& p
   try {
     while (places.size() < 1000) places.push_back(limit.Take(project));
   } catch (const ServiceError& e) {
-    EXPECT_EQ(e.reason(), "QUOTA_EXCEEDED");
+    EXPECT_EQ(e.reason(), ErrorReason::kQuotaExceeded);
   }
   return places;
 }
@@ -37,7 +37,7 @@ TEST(StreamLimitTest, WithoutProjectsOneMayHaveAll) {
     limit.Take("");
     FAIL();
   } catch (const ServiceError& e) {
-    EXPECT_EQ(e.reason(), "TOO_MANY_STREAMS");
+    EXPECT_EQ(e.reason(), ErrorReason::kTooManyStreams);
   }
 }
 

@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
+#include "server/base/service_error.h"
 #include "server/rpc/convert.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
