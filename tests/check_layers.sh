@@ -79,6 +79,11 @@ allow server/storage 'core/base|server/(base|store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/net 'core/base|server/net'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc)'
+for folder in blobs jobs live scenes; do
+  allow "server/rpc/$folder" \
+    "core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|$folder))"
+done
+allow server/rpc/calls 'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/calls)'
 allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
@@ -131,7 +136,7 @@ public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
 public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
-public server/rpc error_mapping rpc_server
+public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store job job_store project_store sqlite_job_store store_file user_models
 public server/worker supervisor

@@ -7,7 +7,7 @@
 
 #include "core/base/memory.h"
 #include "server/base/service_error.h"
-#include "server/rpc/error_mapping.h"
+#include "server/rpc/calls/error_mapping.h"
 
 namespace color3d {
 namespace {

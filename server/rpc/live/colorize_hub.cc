@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/base/service_error.h"
-#include "server/rpc/convert.h"
+#include "server/rpc/calls/convert.h"
 #include "server/rpc/live/colorize_request.h"
 
 namespace color3d {

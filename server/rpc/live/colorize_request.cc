@@ -4,7 +4,7 @@
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
-#include "server/rpc/convert.h"
+#include "server/rpc/calls/convert.h"
 
 namespace color3d {
 namespace {

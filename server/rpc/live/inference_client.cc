@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "server/base/service_error.h"
-#include "server/rpc/error_mapping.h"
-#include "server/rpc/rpc_parts.h"
+#include "server/rpc/calls/error_mapping.h"
+#include "server/rpc/calls/rpc_parts.h"
 
 namespace color3d {
 namespace {
