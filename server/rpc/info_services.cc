@@ -5,7 +5,7 @@
 #include "core/catalogue/stages.h"
 #include "server/ops/process.h"
 #include "server/planning/presets.h"
-#include "server/rpc/convert.h"
+#include "server/rpc/calls/convert.h"
 
 namespace color3d {
 namespace {
