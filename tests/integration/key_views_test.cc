@@ -45,9 +45,9 @@ TEST_F(KeyViewsTest, ThreeKeyViewsGoThrough) {
                                        Path("out").string(),
                                        "--key-color",
                                        Truth("view002.png"),
-                                       "--more-key",
+                                       "--add-key-view",
                                        "view000.png=" + Truth("view000.png"),
-                                       "--more-key",
+                                       "--add-key-view",
                                        "view005=" + Truth("view005.png"),
                                        "--max-side",
                                        "500",
@@ -82,15 +82,15 @@ TEST_F(KeyViewsTest, ABenchmarkChoosesSeveralAndTheGeometryIsMadeOnce) {
   EXPECT_EQ(made, 1);
   ExpectRefusal(benchmark("many", {"--keys", "8"}), 2, {"8 key views", "7 training views"});
   ExpectRefusal(benchmark("both", {"--keys", "2", "--auto"}), 2, {"--keys", "true colours"});
-  ExpectRefusal(benchmark("more", {"--keys", "2", "--more-key", "view001=auto"}),
+  ExpectRefusal(benchmark("more", {"--keys", "2", "--add-key-view", "view001=auto"}),
                 2,
-                {"leave out --more-key"});
-  ExpectRefusal(benchmark("none", {"--more-key", "view099=auto"}), 2, {"view099"});
-  ExpectRefusal(benchmark("same", {"--key-view", "view004", "--more-key", "view004.png=auto"}),
+                {"leave out --add-key-view"});
+  ExpectRefusal(benchmark("none", {"--add-key-view", "view099=auto"}), 2, {"view099"});
+  ExpectRefusal(benchmark("same", {"--key-view", "view004", "--add-key-view", "view004.png=auto"}),
                 2,
                 {"the key view already"});
   ExpectRefusal(benchmark("held", {"--key-view", "view000"}), 2, {"view000", "held out"});
-  ExpectRefusal(benchmark("held2", {"--key-view", "view004", "--more-key", "view000=auto"}),
+  ExpectRefusal(benchmark("held2", {"--key-view", "view004", "--add-key-view", "view000=auto"}),
                 2,
                 {"view000", "held out"});
 
