@@ -4,7 +4,7 @@
 
 #include "core/carry/stereo_views.h"
 #include "core/image/codec.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 
 namespace color3d {
 namespace {

@@ -9,16 +9,16 @@
 #include "core/film/film_carry.h"
 #include "core/film/returning_shots.h"
 #include "core/image/codec.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/film/between_anchors.h"
-#include "core/stage/film/frames_in_color.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/film/carried_frames.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/carry_facts.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/further_colors.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {

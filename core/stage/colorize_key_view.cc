@@ -5,9 +5,9 @@
 #include "core/image/codec.h"
 #include "core/scene/key_photo.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/key_color_sources.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {

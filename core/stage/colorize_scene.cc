@@ -12,12 +12,12 @@
 #include "core/report/report_page.h"
 #include "core/report/scene_plan.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
 #include "core/stage/report/repeat_section.h"
 #include "core/stage/report/report_views.h"
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 namespace {

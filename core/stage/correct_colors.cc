@@ -12,13 +12,13 @@
 #include "core/colorizer/corrector.h"
 #include "core/image/codec.h"
 #include "core/scene/key_photo.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/recolor/recolor_ranges.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/given_colors.h"
 #include "core/stage/sources/view_positions.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {

@@ -8,12 +8,12 @@
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/training_pictures.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/view_positions.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "color3d/v1/stage.pb.h"
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 

@@ -17,7 +17,7 @@
 #include "core/metrics/temporal_consistency.h"
 #include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 

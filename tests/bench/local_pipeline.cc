@@ -5,7 +5,7 @@
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
 #include "core/report/curves.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 namespace {

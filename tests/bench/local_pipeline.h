@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 

@@ -15,7 +15,7 @@
 #include "core/film/steady_colors.h"
 #include "core/image/optical_flow.h"
 #include "core/stage/film/between_anchors.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/colorizer/colorizer.h"
 #include "core/colorizer/corrector.h"
 #include "core/film/film_carry.h"
 #include "core/film/steady_colors.h"
@@ -19,7 +20,7 @@
 #include "core/image/optical_flow.h"
 #include "core/scene/view_images.h"
 #include "core/stage/film/between_anchors.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/recolor/time_ranges.h"
 #include "core/stage/sources/further_colors.h"
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/scene/scene.h"
-#include "core/stage/stage.h"
-#include "core/stage/stages.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/options/key_color_options.h"
 
 namespace color3d {
 

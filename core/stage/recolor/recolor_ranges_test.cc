@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/color/lab.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/recolor/time_ranges.h"
 #include "tests/support/stages/stage_fixture.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
-#include "core/stage/stages.h"
+#include "core/stage/options/key_color_options.h"
 
 namespace color3d {
 

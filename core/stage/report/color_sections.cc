@@ -9,7 +9,7 @@
 
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/report/source_overlay.h"
 
 namespace color3d {

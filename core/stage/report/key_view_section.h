@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/report/report_page.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 

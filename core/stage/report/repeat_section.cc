@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/digest.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 namespace {

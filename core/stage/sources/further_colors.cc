@@ -3,7 +3,8 @@
 #include "core/color/lab.h"
 #include "core/image/fill_holes.h"
 #include "core/scene/key_photo.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
+#include "core/stage/context/stage_context.h"
 #include "core/stage/sources/given_colors.h"
 #include "core/stage/sources/key_color_sources.h"
 

@@ -13,6 +13,7 @@
 #include "core/keycolor/from_image.h"
 #include "core/keycolor/hints/hint_map.h"
 #include "core/keycolor/picture_checks.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 namespace {

@@ -4,7 +4,8 @@
 #include "core/base/image.h"
 #include "core/carry/carry.h"
 #include "core/scene/view_images.h"
-#include "core/stage/stages.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/options/key_color_options.h"
 
 namespace color3d {
 

@@ -5,6 +5,7 @@
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/stage/context/stage_context.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {

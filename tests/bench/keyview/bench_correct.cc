@@ -10,7 +10,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 #include "tests/bench/training_scores.h"

@@ -16,7 +16,7 @@
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/commands.h"
 
 namespace color3d {

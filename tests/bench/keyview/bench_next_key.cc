@@ -14,7 +14,7 @@
 #include "core/image/codec.h"
 #include "core/keyview/collect_features.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/sources/seen_samples.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"

@@ -12,7 +12,7 @@
 #include "core/base/files.h"
 #include "core/image/codec.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 
