@@ -65,7 +65,7 @@ struct ColoredKeyView {
   CarriedColor color;
 };
 
-// Of a later key view's colours only those count that the ones before it have not given.
+// Carries from all key views; each gives only the colours that those before it do not give.
 CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
                           const ViewSurfaces& target,
                           const CarryOptions& options);
