@@ -84,7 +84,8 @@ void LocalPipeline::Run(const std::string& kind,
   if (!recorder.points().empty()) {
     context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(recorder.points()));
   }
-  for (const std::string& name : context.outputs()) artifacts_[folder + name] = out_folder_ / folder / name;
+  for (const std::string& name : context.outputs())
+    artifacts_[folder + name] = out_folder_ / folder / name;
   summaries_.push_back(
       {.kind = kind, .state = "SUCCEEDED", .seconds = seconds, .warnings = observer.warnings});
   if (say_) say_(fmt::format("{} took {:.1f} s", kind, seconds));
