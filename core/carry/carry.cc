@@ -14,15 +14,15 @@ namespace color3d {
 namespace {
 
 constexpr int kWindowRadius = 2;  // of the luminance comparison
-constexpr double kNoise = 4.0;    // L units: weaker structure than this is grain
+constexpr double kNoise = 4.0;    // L units; weaker structure is grain
 
-// Where each target pixel lies in the source picture, in px; and how well its depth agrees.
+// The place of each target pixel in the source picture, px, and the agreement of its depth.
 struct Correspondence {
   Image position;  // 2 channels (x, y), continuous; meaningless where visible is 0
   Image visible;   // 1 channel, 0..1
 };
 
-// Between pixel centres, so that nothing needs to be extrapolated.
+// Whether the place lies between pixel centres, so that sampling does not extrapolate.
 bool Inside(const Eigen::Vector2d& pixel, const Image& image) {
   return pixel.x() >= 0.5 && pixel.y() >= 0.5 && pixel.x() <= image.width - 0.5 &&
          pixel.y() <= image.height - 0.5;
@@ -75,9 +75,9 @@ Correspondence Correspond(const SurfaceView& source, const SurfaceView& target, 
   return out;
 }
 
-constexpr float kSeen = 0.05f;  // less visible than this is not compared
+constexpr float kSeen = 0.05f;  // least visibility that is compared
 
-// The source's L at the target's pixels; the target's own where the source does not see.
+// The source's L at the target's pixels; the target's own L where the source does not see them.
 Image WarpedLuminance(const SurfaceView& source,
                       const SurfaceView& target,
                       const Correspondence& map) {
@@ -117,9 +117,9 @@ Correspondence Register(const Correspondence& map, const Image& flow, double tol
   return out;
 }
 
-// How far two pictures differ in a window, clipped at the borders.
+// Difference of two pictures in a window, which is clipped at the borders.
 struct WindowDifference {
-  double offset;     // of the means: another exposure, or another thing
+  double offset;     // difference of the means
   double structure;  // root mean square of what is left, over 1 + that of the pictures themselves
 };
 
@@ -218,7 +218,7 @@ void FillFrom(const CarriedColor& other, CarriedColor* color) {
       float& ab = color->ab.Plane(c)[i];
       ab = (first * ab + second * other.ab.Plane(c)[i]) / sum;
     }
-    color->confidence.data[i] = std::min(1.0f, sum);  // rounding may take it a hair above
+    color->confidence.data[i] = std::min(1.0f, sum);  // rounding may exceed 1
   }
 }
 

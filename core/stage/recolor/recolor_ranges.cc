@@ -21,8 +21,8 @@
 #include "core/scene/view_images.h"
 #include "core/stage/film/between_anchors.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_views.h"
 #include "core/stage/recolor/time_ranges.h"
-#include "core/stage/sources/further_colors.h"
 
 namespace color3d {
 namespace {
@@ -146,7 +146,7 @@ class RangeColorer {
     std::vector<Correction> corrections;
     for (const RecoloredRange::Key& key : range_.keys) {
       CarriedColor color =
-          ColorOfFurther(*key.given, key.view, film_.scene, film_.images, film_.context);
+          ReadAdditionalKeyColor(film_.context, film_.scene, key.view, film_.images);
       const std::vector<float>& painted = color.confidence.data;
       if (std::none_of(painted.begin(), painted.end(), [](float p) { return p > 0.0f; })) {
         throw InvalidArgument("nothing is painted on the key view {} that would recolour its range",
@@ -325,7 +325,7 @@ nlohmann::ordered_json FactsOf(const std::vector<RecoloredRange>& ranges, const 
 
 }  // namespace
 
-void RecolorRanges(const std::vector<FurtherKeyView>& keys,
+void RecolorRanges(const std::vector<RangeKeyView>& keys,
                    const Scene& scene,
                    const std::string& encoder,
                    StageContext& context) {
