@@ -136,7 +136,7 @@ public() {
 }
 
 public core/augment augment outpaint surrogates
-public core/carry carry carry_views dense_points plane_sweep view_color
+public core/carry carry carry_views confidence dense_points plane_sweep view_color
 public core/colorizer colorizer corrector scene_batch scene_colorizers
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
