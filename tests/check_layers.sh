@@ -43,7 +43,7 @@ forbid() {
   [ -z "$bad" ] || complain "not allowed here:" "$bad"
 }
 allow core/base 'core/base'
-allow core/catalogue 'core/(base|catalogue)'
+allow core/catalogue 'core/(base|catalogue|image/probe)'
 allow core/simd 'core/(base|simd)'
 allow core/grid 'core/(base|simd|grid)'
 allow core/color 'core/(base|color)'

@@ -8,31 +8,17 @@
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
 #include "core/base/error.h"
+#include "core/catalogue/captures.h"
 
 namespace color3d::client {
 namespace {
 
 std::string LayoutName(v1::Scene::Layout layout) {
-  switch (layout) {
-    case v1::Scene::LAYOUT_PHOTOS:
-      return "photos";
-    case v1::Scene::LAYOUT_COLMAP:
-      return "colmap";
-    case v1::Scene::LAYOUT_TRANSFORMS:
-      return "transforms";
-    case v1::Scene::LAYOUT_SPLAT:
-      return "splat";
-    case v1::Scene::LAYOUT_FILM:
-      return "film";
-    case v1::Scene::LAYOUT_NERFIES:
-      return "nerfies";
-    case v1::Scene::LAYOUT_POSES_BOUNDS:
-      return "poses_bounds";
-    case v1::Scene::LAYOUT_FILMS:
-      return "films";
-    default:
-      return "-";
+  const auto known = static_cast<CaptureLayout>(layout);
+  for (const CaptureLayoutInfo& info : CaptureLayouts()) {
+    if (info.layout == known) return info.name;
   }
+  return std::to_string(layout);  // of a newer server
 }
 
 std::string SceneState(const v1::Scene& scene) {

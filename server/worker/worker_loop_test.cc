@@ -71,7 +71,7 @@ class WorkerLoopTest : public testing::Test {
     SceneRecord scene;
     scene.name = "scenes/test";
     store_.CreateScene(scene, {}, {});
-    store_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+    store_.ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
     options_.data_folder = folder_.path();
     options_.code_version = "test";
     options_.poll = std::chrono::milliseconds(20);

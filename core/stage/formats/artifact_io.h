@@ -10,6 +10,7 @@
 #include "core/base/image.h"
 #include "core/carry/carry.h"
 #include "core/catalogue/artifacts.h"
+#include "core/catalogue/captures.h"
 #include "core/scene/scene.h"
 
 namespace color3d {
@@ -43,8 +44,7 @@ struct FilmingCamera {
 
 // What the import stage found out, for the plan and the report.
 struct ImportFacts {
-  // "photos", "colmap", "transforms", "nerfies", "posed_films", "films", "splat", "film"
-  std::string layout;
+  CaptureLayout layout = CaptureLayout::kUnknown;
   bool ran_structure_from_motion = false;
   std::string sfm_plan;  // which pairs were matched and why; empty when it did not run
   bool undistorted = false;

@@ -73,9 +73,7 @@ std::optional<ImportFacts> FindImportFacts(const StageContext& context) {
 }
 
 bool TimesAreSeconds(const Scene& scene, const std::optional<ImportFacts>& facts) {
-  for (const char* layout : {"film", "posed_films", "films", "colmap"}) {
-    if (facts && facts->layout == layout) return true;
-  }
+  if (facts && InfoOf(facts->layout).times_are_seconds) return true;
   return scene.IsFilm() || scene.Times().back() > kLongestWhole;
 }
 
