@@ -19,10 +19,11 @@ void CallMemory::RequireShare(const std::string& client, int64_t own) const {
   if (held == held_.end()) return;
   const int64_t others = held->second - own;
   if (others < budget_bytes_ / static_cast<int64_t>(held_.size())) return;
-  throw ServiceError(ErrorReason::kOverloaded,
-                     "calls of this connection hold {} MiB of the server's memory, requests that "
-                     "wait and answers that were not read; let them end, then try again",
-                     others >> 20);
+  throw ServiceError(
+      ErrorReason::kOverloaded,
+      "calls of this connection hold {} MiB of the server's memory, in pending requests "
+      "and unread answers; let them end, then try again",
+      others >> 20);
 }
 
 int64_t CallMemory::held_bytes() const {

@@ -69,7 +69,7 @@ void Executor::Loop() {
     lock.lock();
     const auto done = lines_.find(owner);
     if (--done->second.running == 0 && done->second.waiting.empty()) lines_.erase(done);
-    // A task of the same owner may have waited for this one, and whoever stops for the last.
+    // Another task of this owner may wait for this one, and the destructor for the last.
     wake_.notify_all();
   }
 }

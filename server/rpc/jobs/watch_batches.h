@@ -1,4 +1,4 @@
-// What happened to watched jobs, read once for all who watch the same and have seen as much.
+// Cache of events of watched jobs, shared by watchers of the same jobs at the same revision.
 // Thread-safe.
 #pragma once
 
@@ -16,7 +16,7 @@
 namespace color3d {
 
 struct WatchBatch {
-  bool all_finished = false;  // `events` are then the last ones, unless they are kMaxEvents
+  bool all_finished = false;  // `events` are then the last ones, unless there are kMaxEvents
   std::vector<EventRecord> events;
   std::map<int64_t, JobRecord> progressed;  // by id
 };
@@ -27,11 +27,11 @@ class WatchBatches {
 
   explicit WatchBatches(JobStore& store) : store_(store) {}
 
-  // The events of these jobs after that revision.
+  // Returns the events of these jobs after `revision`.
   std::shared_ptr<const WatchBatch> After(int64_t revision,
                                           const std::vector<int64_t>& ids,
                                           const ProjectStore& seen_by);
-  // Something has happened since.
+  // Clears the cache: there are new events.
   void Forget();
 
  private:

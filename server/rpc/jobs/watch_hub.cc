@@ -14,21 +14,21 @@
 namespace color3d {
 namespace {
 using SteadyClock = std::chrono::steady_clock;
-// Whole jobs that wait to be written: so many, and fewer where they are long.
+// Maximum number of whole jobs that wait to be written; fewer if they are large.
 constexpr size_t kJobsAtOnce = 8;
 constexpr ListBudget kBudgetAtOnce = {128 << 10, kMaxSpecBytes};
 }  // namespace
 
-// One stream. gRPC calls (StartWrite, Finish) are decided under the mutex and made outside it: they
-// may call back into this object on the same thread. `writing_` or `finished_` marks them as
-// decided.
+// One stream. gRPC calls (StartWrite, Finish) are decided under the mutex but made outside of it,
+// because they may call back into this object on the same thread. `writing_` or `finished_` marks
+// them as decided.
 class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
  public:
   JobWatcher(WatchHub& hub, const v1::WatchJobsRequest& request)
       : hub_(hub), parts_(hub.parts_), request_(request) {}
 
-  // Keeps itself alive until OnDone; the executor and the hub hold references too.
-  // `store`: what the caller sees, where he is `allowed` to begin.
+  // Keeps itself alive until OnDone; the executor and the hub hold references, too. `store`: store
+  // of the caller's project. The stream fails unless `allowed` is OK.
   void Start(const std::shared_ptr<JobWatcher>& self,
              const grpc::Status& allowed,
              std::optional<ProjectStore> store) {
@@ -39,7 +39,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     parts_.quick.Post([self] { self->Begin(); });
   }
 
-  // From the poller: something happened to these jobs.
+  // Called by the poller when these jobs have new events.
   void Poke(const std::set<int64_t>& changed_jobs) {
     {
       std::lock_guard lock(mutex_);
@@ -51,7 +51,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     Pump();
   }
 
-  // From the poller, every round: deferred progress and keepalive.
+  // Called by the poller in every round: sends deferred progress and keepalives.
   void Tick() {
     {
       std::lock_guard lock(mutex_);
@@ -100,7 +100,8 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   }
 
  private:
-  // On the executor: checks the request, then sends the present state or goes on from a revision.
+  // Runs on the executor: checks the request, then sends the present state or continues from a
+  // revision.
   void Begin() {
     const grpc::Status status = Guard([&] {
       place_ = parts_.streams.watches.Take(store_->project());
@@ -134,13 +135,13 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       begun_ = true;
       dirty_ = true;
       last_write_ = SteadyClock::now();
-      // Whoever goes on is told at once that he is heard, though nothing may happen for long.
+      // A continued watch gets a keepalive at once, because the next event may be far away.
       if (request_.after_revision() > 0) last_write_ -= hub_.timing_.keepalive;
     });
     status.ok() ? Pump() : End(status);
   }
 
-  // On the executor: the next events of the watched jobs.
+  // Runs on the executor: reads the next events of the watched jobs.
   void Fetch() {
     const grpc::Status status = Guard([&] {
       const std::shared_ptr<const WatchBatch> batch = hub_.batches_.After(cursor_, ids_, *store_);
@@ -168,8 +169,8 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     status.ok() ? Pump() : End(status);
   }
 
-  // On the executor: the jobs of the states that are to be written next. Those behind them wait as
-  // what they are in the table of events, so that a reader who is slow holds few whole jobs.
+  // Runs on the executor: loads the jobs of the next states to be written. Later entries keep only
+  // their event records, so that a slow reader holds few whole jobs.
   void Load() {
     const grpc::Status status = Guard([&] {
       std::vector<int64_t> wanted;
@@ -189,14 +190,14 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
         jobs.emplace(id, std::move(job));
       }
       std::lock_guard lock(mutex_);
-      // What was queued meanwhile is behind; nothing with a state in front was taken.
+      // Events queued meanwhile are behind; no entry with a state was removed from the front.
       for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size());) {
         Item& item = queue_[i];
         const auto job = item.state ? jobs.find(item.state->job_id) : jobs.end();
         if (job != jobs.end()) {
           item = {StateEvent(Then(job->second, *item.state), *item.state), std::nullopt};
         } else if (item.state && std::ranges::find(wanted, item.state->job_id) !=
-                                     wanted.end()) {  // it was deleted
+                                     wanted.end()) {  // the job was deleted
           queue_.erase(queue_.begin() + static_cast<std::ptrdiff_t>(i));
           continue;
         }
@@ -210,10 +211,10 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     status.ok() ? Pump() : End(status);
   }
 
-  // The job at the time of the event, as far as it is known.
+  // Returns the job at the time of the event, as far as it is known.
   static JobRecord Then(const JobRecord& job, const EventRecord& event) {
     JobRecord then = job;
-    if (then.state != event.state) {  // it has moved on since; what came later is not shown yet
+    if (then.state != event.state) {  // the job has changed since; later facts are not shown yet
       then.state = event.state;
       then.artifacts.clear();
       then.error.reset();
@@ -223,7 +224,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     return then;
   }
 
-  // With the mutex held.
+  // Requires: mutex_ is held.
   void TakeProgress(const EventRecord& event, const JobRecord& job) {
     v1::JobEvent progress;
     progress.set_revision(event.revision);
@@ -250,7 +251,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     return event;
   }
 
-  // With the mutex held. Revisions never go back: deferred progress takes the newest one sent.
+  // Requires: mutex_ is held. Revisions never decrease: deferred progress gets the newest one sent.
   void Queue(v1::JobEvent event) {
     sent_revision_ = std::max(sent_revision_, event.revision());
     event.set_revision(sent_revision_);
@@ -261,14 +262,14 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     queue_.push_back({{}, event});
   }
 
-  // Does the one thing that can be done next.
+  // Starts the next possible operation.
   void Pump() {
     enum class Next { kNothing, kWrite, kLoad, kFetch, kFinish } next = Next::kNothing;
     grpc::Status status;
     std::shared_ptr<JobWatcher> self;
     {
       std::lock_guard lock(mutex_);
-      if (finished_ || writing_) return;  // self_ may be gone once finished
+      if (finished_ || writing_) return;  // self_ may be gone after finished_ is set
       self = self_;
       if (!queue_.empty() && queue_.front().state) {
         if (loading_) return;
@@ -302,16 +303,16 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   StreamLimit::Place place_;
 
   std::mutex mutex_;
-  std::vector<int64_t> ids_;  // fixed once begun_
+  std::vector<int64_t> ids_;  // constant once begun_ is set
   std::chrono::milliseconds interval_{500};
-  int64_t cursor_ = 0;         // events up to here were taken
-  int64_t sent_revision_ = 0;  // newest that was queued for the client
+  int64_t cursor_ = 0;         // last event that was read
+  int64_t sent_revision_ = 0;  // newest revision queued for the client
   struct Item {
     v1::JobEvent event;
-    std::optional<EventRecord> state;  // its job is not loaded yet: `event` is empty
+    std::optional<EventRecord> state;  // the job is not loaded yet and `event` is empty
   };
   std::deque<Item> queue_;
-  v1::JobEvent current_;  // being written
+  v1::JobEvent current_;  // message being written
   std::map<int64_t, v1::JobEvent> deferred_;
   std::map<int64_t, SteadyClock::time_point> progress_sent_;
   SteadyClock::time_point last_write_;

@@ -1,5 +1,6 @@
-// WatchJobs streams. One thread polls the store's event table for all of them; a stream keeps only
-// its position in that table, so a slow reader costs bounded memory and loses no state change.
+// WatchJobs streams. One thread polls the event table of the store for all of them. A stream keeps
+// only its position in that table, so a slow reader costs bounded memory and misses no state
+// change.
 #pragma once
 
 #include <chrono>
@@ -26,7 +27,7 @@ struct WatchTiming {
 class WatchHub {
  public:
   WatchHub(const RpcParts& parts, WatchTiming timing);
-  // Ends all streams (UNAVAILABLE) and stops polling. Before the executor is destroyed.
+  // Ends all streams (UNAVAILABLE) and stops polling. Must run before the executor is destroyed.
   ~WatchHub();
   WatchHub(const WatchHub&) = delete;
   WatchHub& operator=(const WatchHub&) = delete;
@@ -51,7 +52,7 @@ class WatchHub {
   bool stopping_ = false;
   bool draining_ = false;
   std::map<JobWatcher*, std::shared_ptr<JobWatcher>> watchers_;
-  int64_t revision_ = 0;  // poller only
+  int64_t revision_ = 0;  // used by the poller only
   std::thread thread_;
 };
 
