@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kMaxInfoBytes = 64 << 10;
 
-// One question that is under way.
+// A pending GetInfo call.
 struct Question {
   std::string name;
   std::unique_ptr<backend::v1::ColorBackend::Stub> stub;

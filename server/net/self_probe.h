@@ -1,4 +1,4 @@
-// The server's own client: looks again and again whether the server still answers. One thread.
+// Checks periodically whether the own server still answers. Runs one thread.
 #pragma once
 
 #include <atomic>
@@ -12,24 +12,24 @@
 namespace color3d {
 
 struct SelfProbeTiming {
-  std::chrono::milliseconds pause{10'000};  // between two looks
-  std::chrono::milliseconds limit{10'000};  // for one
-  int failures = 3;                         // in a row: it is deaf
+  std::chrono::milliseconds pause{10'000};  // between two probes
+  std::chrono::milliseconds limit{10'000};  // time limit of a probe
+  int failures = 3;                         // consecutive failures until on_deaf is called
 };
 
 class SelfProbe {
  public:
-  // `probe` is given the limit and says why nobody answered, or nothing, as ProbePort. `on_deaf` is
-  // told that reason, once. Both are called on the thread of this object.
+  // `probe` gets the time limit and returns an empty string or the reason of failure, like
+  // ProbePort. `on_deaf` gets that reason, once. Both are called on the thread of this object.
   SelfProbe(const SelfProbeTiming& timing,
             std::function<std::string(std::chrono::milliseconds limit)> probe,
             std::function<void(const std::string& why)> on_deaf);
-  // Waits for the look that is under way.
+  // Waits for the probe under way.
   ~SelfProbe();
   SelfProbe(const SelfProbe&) = delete;
   SelfProbe& operator=(const SelfProbe&) = delete;
 
-  // Whether the last look found an answer. Thread-safe.
+  // Returns whether the last probe succeeded. Thread-safe.
   bool IsAnswering() const { return failures_.load() == 0; }
 
  private:

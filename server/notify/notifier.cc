@@ -17,19 +17,19 @@
 namespace color3d {
 namespace {
 
-constexpr int kGone = 410;  // the receiver wants to hear no more
+constexpr int kGone = 410;  // HTTP 410: the receiver wants no more notifications
 constexpr int kOfEachReceiver = 50;
 
 std::string TimeText(int64_t ms) {
   return LogTime(std::chrono::system_clock::time_point(std::chrono::milliseconds(ms)));
 }
 
-// Scheme, host and port.
+// Returns scheme, host and port.
 std::string ReceiverOf(const std::string& url) { return url.substr(0, url.find('/', 8)); }
 
 std::pair<int64_t, int64_t> KeyOf(const Notification& due) { return {due.job_id, due.first_ms}; }
 
-// What a query holds may be a secret.
+// A query may hold a secret.
 std::string ForLog(const std::string& url) { return url.substr(0, url.find('?')); }
 
 }  // namespace
@@ -79,7 +79,7 @@ void Notifier::Loop() {
       }
       if (due) Deliver(*due);
     } catch (const std::exception& e) {
-      spdlog::warn("cannot look after notifications: {}", e.what());
+      spdlog::warn("cannot process notifications: {}", e.what());
     }
     std::unique_lock lock(mutex_);
     if (due) {
@@ -92,7 +92,8 @@ void Notifier::Loop() {
   }
 }
 
-// One that may be sent now: the store is asked when what it said is used up, at each poll.
+// Returns a notification that may be sent now. Reads the store when its last list is used up, at
+// each poll.
 std::optional<Notification> Notifier::TakeDue() {
   if (auto next = NextOf(due_)) return next;
   const auto now = Steady::now();
@@ -101,7 +102,7 @@ std::optional<Notification> Notifier::TakeDue() {
   due_ = store_.DueNotifications(kOfEachReceiver);
   std::set<Key> owed;
   for (const Notification& due : due_) owed.insert(KeyOf(due));
-  // What is owed no more by the store is forgotten, unless it was not told that yet.
+  // Forgets notifications that the store no longer owes, unless their outcome is not stored yet.
   std::erase_if(remembered_, [&](const auto& entry) {
     return !owed.contains(entry.first) && (entry.second.written || !entry.second.ended);
   });
@@ -150,20 +151,20 @@ void Notifier::Deliver(const Notification& due) {
       answer.status != 0 ? fmt::format("HTTP status {}", answer.status) : answer.problem;
   if (delivered || answer.status == kGone || due.tries + 1 >= options_.max_tries) {
     spdlog::log(delivered ? spdlog::level::info : spdlog::level::warn,
-                "[job={}] word of its end {} {} ({})",
+                "[job={}] notification {} {} ({})",
                 due.job,
-                delivered ? "was sent to" : "is not sent any more to",
+                delivered ? "was sent to" : "is given up for",
                 ForLog(due.url),
                 how);
-    return Conclude(due, {true, due.tries + 1, {}});
+    return RecordOutcome(due, {true, due.tries + 1, {}});
   }
   const std::chrono::milliseconds pause = PauseAfter(due.tries);
-  spdlog::warn("[job={}] word of its end was not taken by {} ({}); again in {} s",
+  spdlog::warn("[job={}] notification was not accepted by {} ({}); retry in {} s",
                due.job,
                ForLog(due.url),
                how,
                pause.count() / 1000);
-  Conclude(due, {false, due.tries + 1, Steady::now() + pause});
+  RecordOutcome(due, {false, due.tries + 1, Steady::now() + pause});
 }
 
 std::chrono::milliseconds Notifier::PauseAfter(int tries) const {
@@ -181,9 +182,9 @@ void Notifier::NoteAnswer(const std::string& url, bool answered) {
   ++receiver.silences;
 }
 
-void Notifier::Conclude(const Notification& due, const Outcome& outcome) {
+void Notifier::RecordOutcome(const Notification& due, const Outcome& outcome) {
   {
-    // Before the store is told: whatever becomes of that, it is not sent again.
+    // Before the store is told, so that it is not sent again if that fails.
     std::lock_guard lock(mutex_);
     remembered_[KeyOf(due)] = outcome;
   }
@@ -206,13 +207,13 @@ bool Notifier::Write(const Key& key, const Outcome& outcome) {
   } catch (const Error& e) {
     std::lock_guard lock(mutex_);
     next_write_ = Steady::now() + options_.store_pause;
-    spdlog::warn("what became of word of an end cannot be written down and is remembered: {}",
+    spdlog::warn("the outcome of a notification cannot be stored and is kept in memory: {}",
                  e.what());
     return false;
   }
 }
 
-// What is tried again is written down after its next try.
+// Failed attempts are stored after their next try.
 void Notifier::WriteRemembered() {
   std::vector<std::pair<Key, Outcome>> unwritten;
   {
