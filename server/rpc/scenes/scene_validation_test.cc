@@ -29,9 +29,9 @@ TEST_F(SceneValidationTest, CommitChecksAllFiles) {
   EXPECT_THAT(status.error_message(), HasSubstr("b.jpg"));
   EXPECT_THAT(status.error_message(), HasSubstr("was not uploaded"));
   status = Commit({{"a.png", TinyPng()}}, &scene);
-  EXPECT_THAT(status.error_message(), HasSubstr("one photograph"));
+  EXPECT_THAT(status.error_message(), HasSubstr("one photo;"));
   status = Commit({{"notes.txt", "hello"}}, &scene);
-  EXPECT_THAT(status.error_message(), HasSubstr("no photographs"));
+  EXPECT_THAT(status.error_message(), HasSubstr("no photos"));
   EXPECT_EQ(Commit({{"../a.png", TinyPng()}}, &scene).error_code(),
             grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(Commit({{"a", "1"}, {"a/b", "2"}}, &scene).error_code(),
@@ -101,7 +101,7 @@ TEST_F(SceneValidationTest, DetectsLayouts) {
                                                             {"sparse/0/cameras.bin", "1"},
                                                             {"sparse/0/images.bin", "2"}};
   const grpc::Status status = Commit(files, &scene);
-  EXPECT_THAT(status.error_message(), HasSubstr("not whole"));
+  EXPECT_THAT(status.error_message(), HasSubstr("incomplete COLMAP model"));
   files.push_back({"sparse/0/points3D.bin", "3"});
   ASSERT_TRUE(Commit(files, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_COLMAP);
