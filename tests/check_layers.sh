@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
-#           <- {keyview, augment, carry, splat, metrics, report, video, view, matching <- {keycolor, colorizer}} <- stage
+#           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
+#           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- {recolor, report} <- stages
+#   scene:  scene <- {masks, formats} <- sfm <- import
 #   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers never below the server, SQL there only for
 # COLMAP's database (core/scene/sfm/sfm_database.cc). What tests
@@ -16,12 +18,20 @@ complain() {
   failed=1
 }
 
-# allow FOLDER REGEX: every include of our own by FOLDER's sources matches REGEX.
+# allow FOLDER REGEX: every include of our own by FOLDER's sources matches REGEX (or is core/base's).
 # What its tests set up is not held against them.
 allow() {
   local bad
   bad=$(grep -rnE '#include "(core|server|client|tests)/' "$1" --include='*.h' --include='*.cc' |
-    grep -vE "#include \"($2)/" |
+    grep -vE "#include \"(core/base/(text|process)|$2)/" |
+    grep -v '^[^:]*_test\.cc:' || true)
+  [ -z "$bad" ] || complain "$1 may not include:" "$bad"
+}
+# allow_own FOLDER REGEX: the same for the files that lie in FOLDER itself.
+allow_own() {
+  local bad
+  bad=$(grep -nE '#include "(core|server|client|tests)/' "$1"/*.h "$1"/*.cc |
+    grep -vE "#include \"(core/base/(text|process)|$2)/" |
     grep -v '^[^:]*_test\.cc:' || true)
   [ -z "$bad" ] || complain "$1 may not include:" "$bad"
 }
@@ -42,6 +52,12 @@ allow core/image/decode 'core/(base|image/(probe|decode))'
 allow core/image/probe 'core/(base|image/probe)'
 allow core/weights 'core/(base|weights)'
 allow core/scene 'core/(base|catalogue|color|image(/probe)?|scene(/[a-z]+)?)'
+scene='base|catalogue|color|image(/probe)?'
+allow_own core/scene "core/($scene|scene)"
+allow core/scene/masks "core/($scene|scene(/masks)?)"
+allow core/scene/formats "core/($scene|scene(/formats)?)"
+allow core/scene/sfm "core/($scene|scene(/(formats|sfm))?)"
+allow core/scene/import "core/($scene|scene(/(masks|formats|sfm|import))?)"
 allow core/encoder 'core/(base|color|image|weights|encoder(/[a-z]+)?)'
 for folder in keyview augment metrics; do
   allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
@@ -66,7 +82,19 @@ allow core/video 'core/(base|video)'
 allow core/film 'core/(base|image|carry|film)'
 allow core/view 'core/(base|scene|view(/path)?)'
 allow core/view/path 'core/(base|scene|view(/path)?)'
-allow core/stage 'core/[a-z]+(/[a-z]+)?'
+# Below the stages: what they are given, their options, the formats of artifacts; then what several
+# stages share. Other folders of core know nothing of stages.
+below='core/([a-rt-z][a-z]*|scene|simd|splat)(/[a-z]+)?'
+parts=
+for part in context options formats sources movie film_import film recolor report; do
+  parts="$parts${parts:+|}$part"
+  case "$part" in
+    context) allow core/stage/context "$below|core/stage/context" ;;
+    options) allow core/stage/options "$below|core/stage/options" ;;
+    *) allow "core/stage/$part" "$below|core/stage/($parts)" ;;
+  esac
+done
+allow_own core/stage "$below|core/stage(/($parts))?"
 allow proto 'proto'
 allow server/base 'core/(base|catalogue)|server/base'
 allow server/store 'core/(base|catalogue)|server/(base|store)'
@@ -108,7 +136,7 @@ public() {
 }
 
 public core/augment augment outpaint surrogates
-public core/carry carry carry_views dense_points plane_sweep view_color
+public core/carry carry carry_views confidence dense_points plane_sweep view_color
 public core/colorizer colorizer corrector scene_batch scene_colorizers
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
@@ -122,11 +150,13 @@ public core/film anchor_frames film_carry moving_regions returning_shots shots s
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page scene_plan
-public core/scene camera camera_films frame_numbers frame_times held_out import key_photo scene view_images formats/camera_file masks/masked_points masks/photo_masks masks/still_regions relief
+public core/scene camera frame_numbers frame_times import_options key_photo photo_masks relief scene \
+  view_images formats/camera_file formats/camera_films import/hold_out import/import \
+  masks/masked_points masks/still_regions
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/motion raster/render \
   geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
   export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene
-public core/stage stages film/import_film formats/artifacts
+public core/stage run_stages film_import/import_film formats/artifact_io options/[a-z_]+
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
 public core/weights byte_source safetensors weight_file weight_map weight_reader
@@ -135,7 +165,7 @@ public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
-public server/planning job_spec plan_scenes planner presets scene_facts spec_check spec_names stage_key
+public server/planning job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store job job_store project_store sqlite_job_store store_file user_models

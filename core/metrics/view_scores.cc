@@ -6,7 +6,7 @@
 #include "core/image/codec.h"
 #include "core/metrics/quality.h"
 #include "core/metrics/rank_correlation.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 
 namespace color3d {
 namespace {

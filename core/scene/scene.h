@@ -25,7 +25,7 @@ struct Moment {
 struct View {
   std::string name;        // unique in the scene: the photo's path relative to the images folder
   std::string image_file;  // path of the photo relative to the scene's folder
-  // What counts of the photo (masks/photo_masks.h), relative to the scene's folder: the photo
+  // What counts of the photo (photo_masks.h), relative to the scene's folder: the photo
   // itself when its alpha tells; empty: all of it.
   std::string mask_file;
   // Camera of the *undistorted* picture at full size, and of the photo as captured.
@@ -51,8 +51,9 @@ struct SparsePoint {
 struct Scene {
   std::vector<View> views;  // sorted by name
   std::vector<SparsePoint> points;
-  // What import did to coordinates that float32 or the near plane could not bear (normalise.h), and
-  // every writer and export undoes: world = world_from_scene_scale * scene + world_offset.
+  // What import did to coordinates that float32 or the near plane could not bear
+  // (import/normalise.h), and every writer and export undoes: world = world_from_scene_scale *
+  // scene + world_offset.
   double world_from_scene_scale = 1.0;  // > 0
   Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
   // Frames of one camera that stands still, at the origin: no depth is known, this is assumed.

@@ -20,7 +20,7 @@
 #include "core/image/decode_budget.h"
 #include "core/image/reduced.h"
 #include "core/scene/lens.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 
 namespace color3d {
 namespace {

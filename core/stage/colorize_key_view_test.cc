@@ -4,9 +4,9 @@
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/key_color_sources.h"
-#include "core/stage/stages.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {

@@ -3,11 +3,11 @@
 #include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
 #include "core/stage/film/color_frames.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_facts.h"
 #include "core/stage/formats/views_checkpoint.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/view_positions.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {

@@ -12,16 +12,16 @@
 #include "core/image/codec.h"
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/view_scores.h"
-#include "core/scene/held_out.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/import/hold_out.h"
+#include "core/scene/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/film/colored_frames.h"
+#include "core/stage/film/film_writer.h"
 #include "core/stage/film/temporal_scores.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/chroma_budget.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {

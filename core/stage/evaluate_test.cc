@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/stages/evaluated_scene.h"
 
 namespace color3d {

@@ -12,9 +12,9 @@
 #include "core/splat/export/splat4d/splat4d.h"
 #include "core/splat/export/spz/spz.h"
 #include "core/splat/motion/motion.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
-#include "core/stage/view_page.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
+#include "core/stage/write_view_page.h"
 
 namespace color3d {
 namespace {

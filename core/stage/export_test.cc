@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/formats/splat4d_reader.h"
 #include "tests/support/formats/viewer_files.h"
 #include "tests/support/stages/stage_fixture.h"

@@ -12,10 +12,10 @@
 #include "core/report/contact_sheet.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_facts.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/augmentation_sources.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {
@@ -27,7 +27,7 @@ constexpr int kMaxSamples = 64;
 constexpr int kRemoteSidePx = 1024;  // what a model server is given
 constexpr int kThumbnailPx = 320;
 // The key view shows so much of the scene that there is nothing to invent around it.
-constexpr double kCovered = 0.9;
+constexpr double kNothingToOutpaint = 0.9;
 // The paper's eight in the order in which fewer are taken.
 constexpr Kind kOrder[] = {Kind::kNovelView,
                            Kind::kOutpaint,
@@ -165,7 +165,7 @@ void LeaveOutNeedless(const AugmentationOptions& options,
     }
   }
   const std::optional<double> coverage = ReadCarryFacts(context).coverage;
-  if (coverage && *coverage >= kCovered && counts->erase(Kind::kOutpaint) > 0) {
+  if (coverage && *coverage >= kNothingToOutpaint && counts->erase(Kind::kOutpaint) > 0) {
     outcome->LeaveOut(
         AugmentationKindName(Kind::kOutpaint),
         fmt::format("the key view covers {} % of the scene: there is nothing to invent "

@@ -6,14 +6,14 @@
 #include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/scene/held_out.h"
+#include "core/scene/import/hold_out.h"
 #include "core/splat/import/splat_scene.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/film/film_frames.h"
-#include "core/stage/film/import_camera_films.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/film_import/film_frames.h"
+#include "core/stage/film_import/import_camera_films.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/import_output.h"
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "core/splat/export/export.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/formats/viewer_files.h"
 #include "tests/support/scenes/splat_files.h"
 #include "tests/support/stages/stage_fixture.h"

@@ -11,8 +11,8 @@
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/memory_plan.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/scenes/scene_writers.h"
 #include "tests/support/stages/stage_fixture.h"
 

@@ -7,10 +7,10 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/stage/film/colored_frames.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/film/film_writer.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/movie/movie.h"
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 namespace {

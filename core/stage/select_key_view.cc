@@ -11,10 +11,10 @@
 #include "core/keyview/tracks.h"
 #include "core/scene/key_photo.h"
 #include "core/stage/film/film_keys.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/key_view_ranking.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/seen_samples.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 namespace {

@@ -1,9 +1,9 @@
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "core/stage/sources/chroma_budget.h"
-#include "core/stage/stages.h"
 
 namespace color3d {
 void RunSolveChroma(const ChromaOptions& options, StageContext& context) {

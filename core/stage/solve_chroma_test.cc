@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "core/splat/raster/render.h"
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/stages/evaluated_scene.h"
 
 namespace color3d {

@@ -6,7 +6,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 #include "tests/bench/training_scores.h"

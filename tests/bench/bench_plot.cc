@@ -9,7 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/report/plot.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/colorizer/choice_results.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/suite_results.h"

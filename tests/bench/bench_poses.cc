@@ -13,7 +13,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/scene/formats/scene_readers.h"
-#include "core/scene/import.h"
+#include "core/scene/import/import.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
 #include "tests/support/quiet_run.h"

@@ -8,7 +8,7 @@
 #include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 

@@ -9,9 +9,9 @@
 #include "core/base/random.h"
 #include "core/image/codec.h"
 #include "core/image/reduced.h"
-#include "core/scene/import.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/scene/import/import.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/procedural_scene.h"
 

@@ -11,11 +11,11 @@
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/scene/formats/colmap_model.h"
-#include "core/scene/formats/named_files.h"
+#include "core/scene/formats/reprojection.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/frame_times.h"
+#include "core/scene/named_files.h"
 #include "core/scene/photos.h"
-#include "core/scene/reprojection.h"
 #include "core/scene/sparse_cloud.h"
 
 namespace color3d {

@@ -15,8 +15,8 @@
 #include "core/base/files.h"
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
-#include "core/scene/formats/named_files.h"
 #include "core/scene/formats/point_ply.h"
+#include "core/scene/named_files.h"
 #include "core/scene/sparse_cloud.h"
 
 namespace color3d {

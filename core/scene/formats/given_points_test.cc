@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/scene/formats/point_ply.h"
-#include "core/scene/import.h"
+#include "core/scene/import/import.h"
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/scene_writers.h"
 #include "tests/support/scenes/test_scenes.h"

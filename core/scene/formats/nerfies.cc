@@ -9,12 +9,12 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/json_text.h"
-#include "core/scene/formats/named_files.h"
+#include "core/base/text/json_text.h"
 #include "core/scene/formats/npy.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/formats/within_reach.h"
 #include "core/scene/frame_times.h"
+#include "core/scene/named_files.h"
 #include "core/scene/photos.h"
 #include "core/scene/sparse_cloud.h"
 

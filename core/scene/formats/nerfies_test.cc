@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/scene/import.h"
+#include "core/scene/import/import.h"
 #include "tests/support/formats/npy_writer.h"
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/test_scenes.h"

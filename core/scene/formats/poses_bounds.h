@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/scene/camera_films.h"
+#include "core/scene/formats/camera_films.h"
 
 namespace color3d {
 

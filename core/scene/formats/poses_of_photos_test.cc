@@ -7,7 +7,7 @@
 
 #include "core/scene/formats/colmap_model.h"
 #include "core/scene/formats/scene_readers.h"
-#include "core/scene/import.h"
+#include "core/scene/import/import.h"
 #include "tests/support/formats/npy_writer.h"
 #include "tests/support/quiet_run.h"
 #include "tests/support/scenes/scene_writers.h"

@@ -10,10 +10,10 @@
 #include "core/base/files.h"
 #include "core/catalogue/pose_files.h"
 #include "core/scene/formats/given_points.h"
-#include "core/scene/formats/named_files.h"
 #include "core/scene/formats/scene_readers.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/frame_times.h"
+#include "core/scene/named_files.h"
 #include "core/scene/photos.h"
 
 namespace color3d {

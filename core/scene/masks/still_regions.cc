@@ -1,6 +1,6 @@
 #include "core/scene/masks/still_regions.h"
 
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 
 namespace color3d {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/run_control.h"
-#include "core/scene/import.h"
+#include "core/scene/import_options.h"
 #include "core/scene/photos.h"
 
 namespace color3d {

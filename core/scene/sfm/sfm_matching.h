@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/scene/import.h"
+#include "core/scene/import_options.h"
 #include "core/scene/sfm/colmap_process.h"
 #include "core/scene/sfm/pair_planner.h"
 #include "core/scene/sfm/sfm_photos.h"

@@ -9,7 +9,7 @@
 #include "core/base/files.h"
 #include "core/image/codec.h"
 #include "core/image/reduced.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

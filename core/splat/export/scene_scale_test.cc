@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "core/scene/normalise.h"
+#include "core/scene/import/normalise.h"
 #include "core/splat/export/export.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "tests/support/scenes/splat_scene.h"

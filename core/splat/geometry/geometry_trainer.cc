@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 #include "core/splat/geometry/first_parameters.h"
 #include "core/splat/geometry/geometry_state.h"
 #include "core/splat/geometry/held_out.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 #include "core/splat/geometry/motion_survey.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/model/spherical_harmonics.h"

@@ -7,7 +7,7 @@
 
 #include "core/carry/view_color.h"
 #include "core/scene/view_images.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 

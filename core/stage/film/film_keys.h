@@ -11,7 +11,7 @@
 #include "core/keyview/select.h"
 #include "core/keyview/view_features.h"
 #include "core/scene/scene.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 

@@ -9,8 +9,8 @@
 #include <set>
 
 #include "core/base/error.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/scenes/noise_place.h"
 #include "tests/support/stages/stage_fixture.h"
 

@@ -12,8 +12,8 @@
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/temporal_consistency.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/film/colored_frames.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/film/film_writer.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 namespace {

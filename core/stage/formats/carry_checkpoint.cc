@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/catalogue/stages.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 

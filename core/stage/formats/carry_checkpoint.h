@@ -12,8 +12,8 @@
 
 #include "core/film/film_carry.h"
 #include "core/scene/scene.h"
+#include "core/stage/context/stage_context.h"
 #include "core/stage/formats/record_checkpoint.h"
-#include "core/stage/stage.h"
 
 namespace color3d {
 

@@ -1,7 +1,7 @@
 #include "core/stage/formats/import_output.h"
 
 #include "core/base/files.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 namespace {

@@ -5,9 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "core/scene/import.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stage.h"
+#include "core/scene/import/import.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 

@@ -4,7 +4,7 @@
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 

@@ -4,7 +4,7 @@
 
 #include "core/catalogue/stages.h"
 #include "core/image/codec.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 

@@ -10,8 +10,8 @@
 
 #include "core/carry/view_color.h"
 #include "core/scene/scene.h"
+#include "core/stage/context/stage_context.h"
 #include "core/stage/formats/record_checkpoint.h"
-#include "core/stage/stage.h"
 
 namespace color3d {
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/image/codec.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {

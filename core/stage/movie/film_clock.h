@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/scene/scene.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/video/mp4_writer.h"
 
 namespace color3d {

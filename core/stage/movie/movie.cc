@@ -14,7 +14,7 @@
 #include "core/image/codec.h"
 #include "core/scene/formats/camera_file.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/movie/film_clock.h"
 #include "core/stage/sources/focus.h"
 #include "core/video/mp4_writer.h"

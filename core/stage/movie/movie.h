@@ -3,7 +3,8 @@
 
 #include "core/scene/scene.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/stages.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/options/render_options.h"
 
 namespace color3d {
 

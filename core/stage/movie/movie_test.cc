@@ -6,8 +6,8 @@
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/splat/motion/motion.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 #include "tests/support/formats/movie_reader.h"
 #include "tests/support/stages/evaluated_scene.h"
 

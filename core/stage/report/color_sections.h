@@ -11,9 +11,9 @@
 
 #include "core/report/report_page.h"
 #include "core/scene/scene.h"
+#include "core/stage/context/stage_context.h"
 #include "core/stage/formats/carry_facts.h"
 #include "core/stage/report/next_key_view.h"
-#include "core/stage/stage.h"
 
 namespace color3d {
 

@@ -7,7 +7,7 @@
 #include "core/keyview/collect_features.h"
 #include "core/keyview/expected_error.h"
 #include "core/stage/film/film_keys.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_facts.h"
 #include "core/stage/sources/seen_samples.h"
 

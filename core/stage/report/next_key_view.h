@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 

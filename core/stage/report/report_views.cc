@@ -10,7 +10,7 @@
 #include "core/scene/view_images.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "core/report/report_page.h"
 #include "core/scene/scene.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 

@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "core/augment/surrogates.h"
-#include "core/stage/stages.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/options/augmentation_options.h"
 
 namespace color3d {
 

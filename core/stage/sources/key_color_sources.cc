@@ -17,6 +17,7 @@
 #include "core/keycolor/recolor.h"
 #include "core/keycolor/references/reference.h"
 #include "core/keycolor/words/prompt.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 namespace {
@@ -205,25 +206,25 @@ KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageCo
   return result;
 }
 
-struct Source {
+struct SourceRow {
   Options::Source source;
   const char* name;
   KeyColorResult (*solve)(const Options&, const KeyPhoto&, StageContext&);
 };
-constexpr Source kSources[] = {{Options::Source::kImage, "image", FromImage},
-                               {Options::Source::kStrokes, "strokes", FromStrokes},
-                               {Options::Source::kPoints, "points", FromPoints},
-                               {Options::Source::kReferences, "references", FromReferences},
-                               {Options::Source::kPrompt, "prompt", FromPrompt},
-                               {Options::Source::kAutomatic, "automatic", FromAutomatic},
-                               {Options::Source::kBackend, "backend", FromBackend},
-                               {Options::Source::kScript, "script", FromScript},
-                               {Options::Source::kEdit, "edit", FromEdit}};
+constexpr SourceRow kSources[] = {{Options::Source::kImage, "image", FromImage},
+                                  {Options::Source::kStrokes, "strokes", FromStrokes},
+                                  {Options::Source::kPoints, "points", FromPoints},
+                                  {Options::Source::kReferences, "references", FromReferences},
+                                  {Options::Source::kPrompt, "prompt", FromPrompt},
+                                  {Options::Source::kAutomatic, "automatic", FromAutomatic},
+                                  {Options::Source::kBackend, "backend", FromBackend},
+                                  {Options::Source::kScript, "script", FromScript},
+                                  {Options::Source::kEdit, "edit", FromEdit}};
 
-const Source& Find(Options::Source source) {
+const SourceRow& Find(Options::Source source) {
   const auto* found = std::find_if(std::begin(kSources),
                                    std::end(kSources),
-                                   [&](const Source& entry) { return entry.source == source; });
+                                   [&](const SourceRow& entry) { return entry.source == source; });
   if (found == std::end(kSources)) {
     throw Error(ErrorCode::kInternal, "a source of key colour is missing in the table");
   }

@@ -4,7 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/image.h"
-#include "core/stage/stages.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/options/key_color_options.h"
 
 namespace color3d {
 

@@ -9,7 +9,7 @@
 #include "core/keyview/expected_error.h"
 #include "core/scene/scene.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/stage.h"
+#include "core/stage/context/stage_context.h"
 
 namespace color3d {
 

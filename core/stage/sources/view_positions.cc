@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "core/base/median.h"
-#include "core/scene/masks/photo_masks.h"
+#include "core/scene/photo_masks.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "core/base/files.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/local_pipeline.h"
 

@@ -16,7 +16,7 @@
 #include "core/colorizer/scene_batch.h"
 #include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/colorizer/bench_encoder.h"
 #include "tests/bench/colorizer/choice_results.h"
 #include "tests/bench/commands.h"

@@ -16,7 +16,7 @@
 #include "core/image/codec.h"
 #include "core/image/probe/probe.h"
 #include "core/report/curves.h"
-#include "core/stage/formats/artifacts.h"
+#include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/training_pictures.h"
 #include "tests/bench/colorizer/bench_encoder.h"
 #include "tests/bench/colorizer/colorizer_memory.h"

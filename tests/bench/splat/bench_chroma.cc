@@ -17,7 +17,7 @@
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/raster/render.h"
-#include "core/stage/stages.h"
+#include "core/stage/run_stages.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
 #include "tests/support/quiet_run.h"

@@ -13,7 +13,7 @@
 #include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
-#include "core/scene/import.h"
+#include "core/scene/import/import.h"
 #include "tests/support/quiet_run.h"
 
 namespace color3d {

@@ -16,8 +16,8 @@
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/formats/artifacts.h"
-#include "core/stage/stages.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 

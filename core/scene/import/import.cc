@@ -1,0 +1,368 @@
+#include "core/scene/import/import.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/catalogue/scene_files.h"
+#include "core/image/probe/probe.h"
+#include "core/scene/formats/nerfies.h"
+#include "core/scene/formats/scene_readers.h"
+#include "core/scene/import/hold_out.h"
+#include "core/scene/import/normalise.h"
+#include "core/scene/import/picture_notes.h"
+#include "core/scene/key_photo.h"
+#include "core/scene/lens.h"
+#include "core/scene/named_files.h"
+#include "core/scene/photo_masks.h"
+#include "core/scene/photos.h"
+#include "core/scene/sfm/sfm.h"
+#include "core/scene/sparse_cloud.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kSuspiciousShareBehind = 0.2;
+constexpr int kRandomPoints = 20'000;
+constexpr uint64_t kRandomPointSeed = 1;
+constexpr int kHoldOutEvery = 8;
+constexpr size_t kMinTrainingViews = 2;
+
+// Where no point would be left, as without most of the photos that saw them, those count into whose
+// picture a point falls.
+void DropWeakPoints(Scene* scene) {
+  auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
+  if (std::all_of(scene->points.begin(), scene->points.end(), weak)) {
+    for (SparsePoint& point : scene->points) {
+      if (point.position.allFinite()) point.views = ViewsThatFace(*scene, point.position, 0.0);
+    }
+  }
+  scene->points.erase(std::remove_if(scene->points.begin(), scene->points.end(), weak),
+                      scene->points.end());
+}
+
+void AddRandomPointsWhenEmpty(ImportResult* result) {
+  Scene& scene = result->scene;
+  if (!scene.points.empty()) return;
+  scene.points = RandomPoints(scene, kRandomPoints, kRandomPointSeed);
+  if (scene.points.empty()) {
+    throw InvalidArgument(
+        "the scene has no sparse points, and its cameras look at nothing in "
+        "common; check the poses");
+  }
+  result->random_points = true;
+  result->warnings.push_back(fmt::format(
+      "the scene has poses but no sparse points; reconstruction starts from {} random ones",
+      scene.points.size()));
+}
+
+void Normalise(ImportResult* result) {
+  for (std::string& note : NormaliseScene(&result->scene)) {
+    result->warnings.push_back(std::move(note));
+  }
+  const double behind = ShareBehindCameras(result->scene);
+  if (behind > kSuspiciousShareBehind) {
+    result->warnings.push_back(fmt::format(
+        "{} % of the observations of sparse points lie behind their camera; check the poses",
+        std::lround(100.0 * behind)));
+  }
+}
+
+// Finds the photos' masks, for structure-from-motion already, and refuses bad ones.
+void FindPhotoMasks(const fs::path& scene_folder,
+                    const CancellationToken& cancel,
+                    std::vector<Photo>* photos,
+                    std::vector<std::string>* warnings) {
+  std::vector<std::string> files;
+  for (const Photo& photo : *photos) files.push_back(photo.file);
+  const std::vector<std::string> masks = FindMasks(scene_folder, files, {}, warnings);
+  for (size_t i = 0; i < masks.size(); ++i) {
+    cancel.ThrowIfCancelled();
+    Photo& photo = (*photos)[i];
+    photo.mask_file = masks[i];
+    if (!masks[i].empty()) {
+      ReadMask(scene_folder, masks[i], photo.file, photo.width, photo.height);
+    }
+  }
+}
+
+// The same for a scene with poses.
+void FindViewMasks(const fs::path& scene_folder,
+                   const CancellationToken& cancel,
+                   std::vector<View>* views,
+                   std::vector<std::string>* warnings) {
+  std::vector<std::string> files, others;
+  for (const View& view : *views) files.push_back(view.image_file);
+  for (const Photo& photo : ListPhotos(scene_folder)) others.push_back(photo.file);
+  const std::vector<std::string> masks = FindMasks(scene_folder, files, others, warnings);
+  for (size_t i = 0; i < masks.size(); ++i) {
+    cancel.ThrowIfCancelled();
+    View& view = (*views)[i];
+    view.mask_file = masks[i];
+    if (masks[i].empty()) continue;
+    const Camera& camera = view.captured_camera;
+    ReadMask(scene_folder, masks[i], view.image_file, camera.width, camera.height);
+  }
+}
+
+void RequireMemory(const ImportOptions& options, const std::string& file, int width, int height) {
+  if (options.memory_bytes > 0) RequireKeyViewMemory(file, width, height, options.memory_bytes);
+}
+
+void RequireMemory(const ImportOptions& options, const Scene& scene) {
+  for (const View& view : scene.views) {
+    const Camera& camera = view.captured_camera;
+    RequireMemory(options, view.image_file, camera.width, camera.height);
+  }
+}
+
+void ImportPhotos(const fs::path& scene_folder,
+                  const fs::path& scratch_folder,
+                  const ImportOptions& options,
+                  const RunControl& run,
+                  ImportResult* result) {
+  std::vector<Photo> photos = ListPhotos(scene_folder);
+  result->photos_found = static_cast<int>(photos.size());
+  if (photos.empty()) {
+    throw InvalidArgument("the scene contains no photographs ({})", ReadableImageFormats());
+  }
+  for (size_t i = 0; i < photos.size(); ++i) {
+    run.cancel.ThrowIfCancelled();
+    run.progress.OnProgress(
+        static_cast<int64_t>(i), static_cast<int64_t>(photos.size()), "checking photos");
+    ProbePhoto(scene_folder, &photos[i]);
+    RequireMemory(options, photos[i].file, photos[i].width, photos[i].height);
+  }
+  if (photos.size() == 1) {
+    throw InvalidArgument(
+        "the scene contains one photograph ({}); at least 3 photos from different places are "
+        "needed",
+        photos[0].name);
+  }
+  FindPhotoMasks(scene_folder, run.cancel, &photos, &result->warnings);
+  SfmResult sfm = RunStructureFromMotion(photos, scene_folder, scratch_folder, options, run);
+  result->scene = std::move(sfm.scene);
+  result->sfm = std::move(sfm.report);
+  result->ran_structure_from_motion = true;
+  if (sfm.unplaced.empty()) return;
+  const bool few = 2 * result->scene.views.size() < photos.size();
+  result->warnings.push_back(
+      fmt::format("{}{} of {} photos could be placed; the others share too few features with them "
+                  "and were left out: {}",
+                  few ? "only " : "",
+                  result->scene.views.size(),
+                  photos.size(),
+                  SomeOf(sfm.unplaced)));
+}
+
+void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
+  const std::vector<Photo> photos = ListPhotos(scene_folder);
+  result->photos_found = static_cast<int>(std::max(photos.size(), result->scene.views.size()));
+  std::vector<std::string> files;
+  for (const View& view : result->scene.views) files.push_back(view.image_file);
+  std::sort(files.begin(), files.end());
+  std::vector<std::string> unposed;
+  for (const Photo& photo : photos) {
+    if (!std::binary_search(files.begin(), files.end(), photo.file)) unposed.push_back(photo.name);
+  }
+  if (unposed.empty()) return;
+  result->warnings.push_back(
+      fmt::format("{} photos have no pose and were left out: {}", unposed.size(), SomeOf(unposed)));
+}
+
+// The poses that lie beside the photos: of the kind that places most of them, COLMAP's before
+// others. False where there are none.
+bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
+  const std::optional<ColmapChoice> colmap = ChooseColmapModel(scene_folder);
+  const bool is_nerfies = IsNerfiesFolder(scene_folder);
+  const std::vector<fs::path> transforms = TransformsFiles(scene_folder);
+  if (colmap) {
+    const size_t others =
+        is_nerfies || transforms.empty() ? 0 : CountTransformsPhotos(transforms, scene_folder);
+    if (colmap->photos >= others) {
+      result->layout = SceneLayout::kColmap;
+      result->warnings = colmap->notes;
+      result->scene = ReadColmapModel(
+          scene_folder / colmap->folder, scene_folder, &result->warnings, &result->cameras);
+      WarnOfUnposedPhotos(scene_folder, result);
+      return true;
+    }
+    result->warnings.push_back(
+        fmt::format("{} is used: it has the poses of {} photos, the COLMAP model in {} of {}",
+                    transforms[0].filename().string(),
+                    others,
+                    colmap->folder.empty() ? "the same folder" : colmap->folder,
+                    colmap->photos));
+  }
+  if (is_nerfies) {
+    result->layout = SceneLayout::kNerfies;
+    result->scene = ReadNerfies(scene_folder, &result->warnings, &result->cameras);
+    result->photos_found = static_cast<int>(result->scene.views.size());
+    return true;
+  }
+  if (!transforms.empty()) {
+    result->layout = SceneLayout::kTransforms;
+    result->scene =
+        ReadTransformsJson(transforms, scene_folder, &result->warnings, &result->cameras);
+    WarnOfUnposedPhotos(scene_folder, result);
+    return true;
+  }
+  std::optional<Scene> of_photos = ReadPosesOfPhotos(scene_folder, &result->warnings);
+  if (!of_photos) return false;
+  result->layout = SceneLayout::kPosesBounds;
+  result->scene = std::move(*of_photos);
+  result->photos_found = static_cast<int>(result->scene.views.size());
+  return true;
+}
+
+void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
+  std::error_code error;
+  if (!fs::is_regular_file(scene_folder / kTimesFile, error)) return;
+  result->warnings.push_back(
+      fmt::format("{} is not read: it goes with a COLMAP model{}",
+                  kTimesFile,
+                  result->layout == SceneLayout::kPhotos
+                      ? "; give one, or colour the frames of one moving camera with --film --poses"
+                      : "; transforms.json and metadata.json have times of their own"));
+}
+
+// Of a scene that may move, what all cameras took at every eighth moment from the fifth on: each
+// has moments before and after it.
+void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
+  std::set<double> times;
+  for (const View& view : scene->views) times.insert(view.time_s());
+  if (times.size() < kHoldOutEvery) {
+    warnings->push_back(fmt::format(
+        "no view is held out for evaluation: the scene has only {} moments", times.size()));
+    return;
+  }
+  for (View& view : scene->views) {
+    const auto step = std::distance(times.begin(), times.find(view.time_s()));
+    view.held_out = step % kHoldOutEvery == kHoldOutEvery / 2;
+  }
+}
+
+void HoldOutCamera(const std::string& camera, ImportResult* result) {
+  const auto found = std::find(result->cameras.begin(), result->cameras.end(), camera);
+  if (result->cameras.size() < 2) {
+    throw InvalidArgument(
+        "hold_out_camera is '{}', but the scene is not one of several cameras with "
+        "times; leave it out",
+        camera);
+  }
+  if (found == result->cameras.end()) {
+    throw InvalidArgument("hold_out_camera: there is no camera '{}'; the scene has {}",
+                          camera,
+                          SomeOf(result->cameras, 8));
+  }
+  const int shot = static_cast<int>(found - result->cameras.begin());
+  for (View& view : result->scene.views) view.held_out |= view.moment && view.moment->shot == shot;
+}
+
+// Throws unless a scene whose frames have times shows what it is from several places.
+void CheckMoves(const Scene& scene) {
+  if (!scene.IsFilm()) return;
+  throw InvalidArgument(
+      "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
+      "Colour them as a film: leave the poses out and give --film, with --poses as a relief "
+      "(2.5D)");
+}
+
+}  // namespace
+
+void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings) {
+  if (scene->IsDynamic()) return HoldOutMoments(scene, warnings);
+  std::vector<View>& views = scene->views;
+  const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
+  if (views.size() < held_out + kMinTrainingViews) {
+    warnings->push_back(
+        fmt::format("no view is held out for evaluation: the scene has only {}", views.size()));
+    return;
+  }
+  for (size_t i = 0; i < views.size(); i += kHoldOutEvery) views[i].held_out = true;
+}
+
+ImportResult ImportScene(const fs::path& scene_folder,
+                         const fs::path& scratch_folder,
+                         const ImportOptions& options,
+                         const RunControl& run) {
+  options.Validate();
+  run.cancel.ThrowIfCancelled();
+  std::error_code error;
+  if (!fs::is_directory(scene_folder, error)) {
+    throw Error(ErrorCode::kNotFound, "{} is not a folder", scene_folder.string());
+  }
+  ImportResult result;
+  if (ImportPoses(scene_folder, &result)) {
+    RequireMemory(options, result.scene);
+    FindViewMasks(scene_folder, run.cancel, &result.scene.views, &result.warnings);
+  } else {
+    ImportPhotos(scene_folder, scratch_folder, options, run, &result);
+  }
+  if (result.layout != SceneLayout::kColmap) WarnOfUnreadTimes(scene_folder, &result);
+  FinishPosedScene(options, &result);
+  for (std::string& note : NotesOnPictures(scene_folder, result.scene.views, run.cancel)) {
+    result.warnings.push_back(std::move(note));
+  }
+  return result;
+}
+
+ImportResult PlaceSequence(const std::vector<SequenceFrame>& frames,
+                           const fs::path& scratch_folder,
+                           const ImportOptions& options,
+                           const RunControl& run) {
+  options.Validate();
+  std::vector<Photo> photos;
+  for (const SequenceFrame& frame : frames) {
+    run.cancel.ThrowIfCancelled();
+    Photo photo;
+    photo.name = frame.name;
+    photo.file = frame.file.string();
+    photo.mask_file = frame.mask_file.string();
+    photo.camera = frame.camera;
+    ProbePhoto({}, &photo);
+    photos.push_back(std::move(photo));
+  }
+  ImportResult result;
+  result.photos_found = static_cast<int>(photos.size());
+  SfmResult sfm =
+      RunStructureFromMotion(photos, {}, scratch_folder, options, run, PhotoOrder::kSequence);
+  result.scene = std::move(sfm.scene);
+  result.sfm = std::move(sfm.report);
+  result.ran_structure_from_motion = true;
+  return result;
+}
+
+void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
+  Scene& scene = result->scene;
+  if (scene.views.size() < kMinTrainingViews) {
+    throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
+                          scene.views.size());
+  }
+  CheckMoves(scene);
+  result->photos_registered = static_cast<int>(scene.views.size());
+  result->masked_views = static_cast<int>(std::count_if(
+      scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));
+  result->undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
+    return !IsUndistorted(v.distortion);
+  });
+  DropWeakPoints(&scene);
+  Normalise(result);
+  AddRandomPointsWhenEmpty(result);
+  if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result->warnings);
+  if (!options.hold_out_camera.empty()) HoldOutCamera(options.hold_out_camera, result);
+  if (options.hold_out_block > 0.0) HoldOutBlock(options.hold_out_block, &scene);
+  if (scene.TrainingViews().size() < kMinTrainingViews) {
+    throw InvalidArgument("only {} view is left to learn from when the others are held out",
+                          scene.TrainingViews().size());
+  }
+}
+
+}  // namespace color3d

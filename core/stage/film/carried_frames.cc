@@ -1,0 +1,81 @@
+#include "core/stage/film/carried_frames.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/base/files.h"
+#include "core/image/codec.h"
+#include "core/stage/film/between_anchors.h"
+
+namespace color3d {
+FramesInColor::FramesInColor(const Scene& scene,
+                             const ViewImages& images,
+                             const std::vector<ColoredKeyView>& keys,
+                             const FilmCarryOptions& options,
+                             StageContext& context)
+    : scene_(scene),
+      folder_(context.scratch_folder() / "frames_in_color"),
+      has_(scene.views.size(), 0) {
+  std::filesystem::create_directories(folder_);
+  const std::vector<int> order = scene.ViewsInOrderOfTime();
+  FilmFrames frames;
+  for (const int view : order) {
+    frames.shot.push_back(scene.views[view].moment->shot);
+    frames.time_s.push_back(scene.views[view].time_s());
+  }
+  frames.luminance = [&](int frame) { return images.Luminance(order[frame]); };
+  std::vector<FilmKey> film_keys;
+  for (const ColoredKeyView& key : keys) {
+    const auto frame = std::find(order.begin(), order.end(), key.view) - order.begin();
+    film_keys.push_back({static_cast<int>(frame), key.color});
+  }
+  CarryAlongFilm(
+      frames,
+      film_keys,
+      options,
+      context.pool(),
+      context.cancel(),
+      [&](int frame, const CarriedColor& color) {
+        const int view = order[frame];
+        WriteFileAtomic(FileOf(view), EncodeAbPng(color.ab, color.confidence));
+        has_[view] = 1;
+      },
+      {},
+      [&](int frame, const CarriedColor& second) {
+        const int view = order[frame];
+        CarriedColor color = Of(view);
+        if (FillOpen(second, &color) == 0) return;
+        WriteFileAtomic(FileOf(view), EncodeAbPng(color.ab, color.confidence));
+      });
+}
+
+std::vector<int> FramesInColor::NearestTo(int view) const {
+  std::map<int, int> nearest;  // by camera
+  const auto distance = [&](int other) {
+    return std::abs(scene_.views[other].time_s() - scene_.views[view].time_s());
+  };
+  for (size_t i = 0; i < scene_.views.size(); ++i) {
+    if (has_[i] == 0) continue;
+    const int other = static_cast<int>(i);
+    const auto [it, is_new] = nearest.emplace(scene_.views[i].moment->shot, other);
+    if (!is_new && distance(other) < distance(it->second)) it->second = other;
+  }
+  std::vector<int> frames;
+  for (const auto& [camera, frame] : nearest) frames.push_back(frame);
+  return frames;
+}
+
+CarriedColor FramesInColor::Of(int view) const {
+  const std::filesystem::path file = FileOf(view);
+  AbMap map = DecodeAbPng(ReadFile(file), file.filename().string());
+  return {std::move(map.ab), std::move(map.confidence)};
+}
+
+std::filesystem::path FramesInColor::FileOf(int view) const {
+  return folder_ / fmt::format("{}.png", view);
+}
+
+}  // namespace color3d

@@ -1,0 +1,181 @@
+#include "core/stage/film_import/film_frames.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/text/name_order.h"
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/image/probe/probe.h"
+#include "core/scene/camera.h"
+#include "core/scene/frame_numbers.h"
+#include "core/video/mp4_writer.h"
+
+namespace color3d {
+namespace {
+
+constexpr size_t kNamed = 5;  // frames in a warning
+
+const char* WhyUnused(NoFilm scene) {
+  switch (scene) {
+    case NoFilm::kPosedFilms:
+      return "films whose poses are given have times and places of their own, and are taken as "
+             "exposed";
+    case NoFilm::kCameraFilms:
+    case NoFilm::kCameraPictures:
+      return "films of several cameras are taken as exposed, at their own times";
+    case NoFilm::kTimedPictures:
+      return "pictures whose times and poses are given are all taken, as exposed";
+    case NoFilm::kPhotos:
+      break;
+  }
+  return "the scene is no film";
+}
+
+}  // namespace
+
+Camera UnknownCamera(int width, int height) {
+  constexpr double kFocalOfLongerSide = 1.2;
+  const double focal = kFocalOfLongerSide * std::max(width, height);
+  return {width, height, focal, focal, 0.5 * width, 0.5 * height};
+}
+
+std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
+  std::vector<std::string> files;
+  for (const std::string& file : ListFiles(folder)) {
+    if (HasImageExtension(file)) files.push_back(file);
+  }
+  std::sort(files.begin(), files.end(), ComesBefore);
+  return files;
+}
+
+std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
+                                    const FilmOptions& options,
+                                    StageContext& context) {
+  constexpr double kFramesPerSecond = 25.0;  // where nobody tells
+  const FrameNumbers numbers = PlacesOfFrames(files);
+  if (!numbers.note.empty()) context.progress().OnWarning(numbers.note);
+  std::vector<double> times;
+  for (const int64_t place : numbers.places) {
+    times.push_back(static_cast<double>(place) /
+                    options.frames_per_second.value_or(kFramesPerSecond));
+  }
+  return times;
+}
+
+std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options) {
+  std::vector<int> wanted;
+  int64_t inside = 0;
+  for (size_t i = 0; i < times.size(); ++i) {
+    if (times[i] < options.begin_s || (options.end_s && times[i] >= *options.end_s)) continue;
+    if (inside++ % options.stride == 0) wanted.push_back(static_cast<int>(i));
+  }
+  if (wanted.empty()) {
+    throw InvalidArgument(
+        "the film has no frame between the times that are asked for; it lasts {:.2f} s",
+        times.back());
+  }
+  return wanted;
+}
+
+void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext& context) {
+  const FilmOptions usual;
+  std::vector<std::string> unused;
+  const auto add = [&](bool given, const char* name) {
+    if (given) unused.emplace_back(name);
+  };
+  const bool pictures = scene == NoFilm::kCameraPictures;
+  const bool cameras = pictures || scene == NoFilm::kCameraFilms;
+  if (!cameras && scene != NoFilm::kPosedFilms) {
+    add(options.stride != usual.stride, "film_stride");
+    add(options.begin_s != usual.begin_s, "film_begin_s");
+    add(options.end_s != usual.end_s, "film_end_s");
+  }
+  add(!pictures && options.frames_per_second != usual.frames_per_second, "film_frames_per_second");
+  add(options.deflicker != usual.deflicker, "film_deflicker");
+  add(!cameras && options.poses != usual.poses, "film_poses");
+  if (unused.empty()) return;
+  context.progress().OnWarning(fmt::format("{} {} left aside: {}",
+                                           fmt::join(unused, ", "),
+                                           unused.size() == 1 ? "is" : "are",
+                                           WhyUnused(scene)));
+}
+
+void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {
+  if (frames <= kMaxFilmFrames) return;
+  throw InvalidArgument(
+      "{} frames ({:.0f} s) are more than a job takes ({}); take every {}th (film_stride), or a "
+      "part "
+      "of {:.0f} s at most (film_begin_s, film_end_s)",
+      frames,
+      seconds,
+      kMaxFilmFrames,
+      (frames * options.stride + kMaxFilmFrames - 1) / kMaxFilmFrames,
+      std::floor(seconds * kMaxFilmFrames / static_cast<double>(frames)));
+}
+
+std::pair<int, int> MovieSize(int width, int height) {
+  const Camera movie = Camera{width, height}.FitWithin(kMaxMovieSidePx);
+  return {movie.width - movie.width % 2, movie.height - movie.height % 2};
+}
+
+void CheckMovieSize(const std::string& frames, int width, int height) {
+  const auto [movie_width, movie_height] = MovieSize(width, height);
+  if (std::min(movie_width, movie_height) >= kMinMovieSidePx) return;
+  throw InvalidArgument(
+      "{} has {} x {} px, which makes a movie of {} x {} px; the shorter side of a movie must be "
+      "at "
+      "least {} px: give larger frames, or frames of another shape",
+      frames,
+      width,
+      height,
+      movie_width,
+      movie_height,
+      kMinMovieSidePx);
+}
+
+std::string EncodeGrayFrame(Image luminance) {
+  for (float& v : luminance.data) v = static_cast<float>(GrayFromLuminance(v));
+  return EncodePng8(luminance);
+}
+
+std::string NamesOfFrames(const std::vector<std::string>& names) {
+  std::string text;
+  for (size_t i = 0; i < std::min(kNamed, names.size()); ++i) {
+    text += (i == 0 ? "" : ", ") + names[i];
+  }
+  return names.size() > kNamed ? text + fmt::format(" and {} more", names.size() - kNamed) : text;
+}
+
+void WarnOfFrames(const std::vector<std::string>& names, const char* what, StageContext& context) {
+  if (names.empty()) return;
+  context.progress().OnWarning(fmt::format("{} {} {}: {}",
+                                           names.size(),
+                                           names.size() == 1 ? "frame" : "frames",
+                                           what,
+                                           NamesOfFrames(names)));
+}
+
+void WarnOfFramesWithoutPlace(const Scene& film,
+                              const std::vector<int>& views,
+                              const Scene& placed,
+                              StageContext& context) {
+  std::set<std::string> has_place;
+  for (const View& view : placed.views) has_place.insert(view.name);
+  std::vector<std::string> without;
+  for (const int view : views) {
+    if (!has_place.contains(film.views[view].name)) without.push_back(film.views[view].name);
+  }
+  WarnOfFrames(
+      without, fmt::format("of {} found no place, left out", views.size()).c_str(), context);
+}
+
+}  // namespace color3d

@@ -1,0 +1,205 @@
+#include "core/stage/film_import/film_poses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/median.h"
+#include "core/film/moving_regions.h"
+#include "core/image/codec.h"
+#include "core/scene/relief.h"
+#include "core/stage/film_import/film_frames.h"
+#include "core/stage/film_import/moving_region_files.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+bool AreEnough(size_t some, size_t all) {
+  return static_cast<double>(some) >= kLeastShareWithPoses * static_cast<double>(all);
+}
+
+// The frames of the shot that has most of them.
+std::vector<int> LongestShot(const Scene& scene) {
+  std::map<int, std::vector<int>> shots;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    shots[scene.views[i].moment->shot].push_back(static_cast<int>(i));
+  }
+  const auto longest =
+      std::max_element(shots.begin(), shots.end(), [](const auto& a, const auto& b) {
+        return a.second.size() < b.second.size();
+      });
+  return longest->second;
+}
+
+// Throws what PlaceSequence and FinishPosedScene throw.
+ImportResult Place(const fs::path& frames_root,
+                   const Scene& scene,
+                   const std::vector<int>& shot,
+                   const MovingRegionFiles& files,
+                   ImportOptions options,
+                   StageContext& context) {
+  options.hold_out_every_eighth = false;  // whoever imports the film does that
+  options.hold_out_block = 0.0;
+  std::vector<SequenceFrame> frames;
+  for (const int view : shot) {
+    frames.push_back({scene.views[view].name,
+                      frames_root / scene.views[view].image_file,
+                      files.StillFile(view)});
+  }
+  ImportResult result =
+      PlaceSequence(frames, context.scratch_folder() / "poses", options, context.control());
+  FinishPosedScene(options, &result);
+  return result;
+}
+
+// The placed frames as views of the film: their own files and moments.
+Scene DynamicScene(Scene placed, const Scene& film) {
+  for (View& view : placed.views) {
+    const View& frame = film.views[film.FindView(view.name)];
+    view.image_file = frame.image_file;
+    view.mask_file = frame.mask_file;
+    view.moment = frame.moment;
+  }
+  return placed;
+}
+
+// The frames of the shot as one camera that stands still took them.
+Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingRegionFiles& files) {
+  constexpr int kPoints = 20'000;
+  Scene scene;
+  std::vector<double> feet;
+  for (const int frame : shot) {
+    scene.views.push_back(film.views[frame]);
+    const std::string file = files.MovingFile(frame).string();
+    const double foot = FootRow(DecodeImage(ReadFile(file), file));
+    if (foot >= 0.0) feet.push_back(foot);
+  }
+  scene.relief = ReliefBehind(std::move(feet));
+  const int last = static_cast<int>(scene.views.size()) - 1;
+  const Camera& camera = scene.views[0].camera;
+  for (const Eigen::Vector3d& position : PointsOn(*scene.relief, camera, kPoints)) {
+    scene.points.push_back({position, -1.0, {0, last}});
+  }
+  return scene;
+}
+
+// How much the camera's steps differ from one frame to the next, in steps: near 0 for a camera that
+// is carried or driven.
+double Unevenness(const Scene& scene) {
+  std::vector<double> steps, changes;
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+  for (size_t i = 1; i < scene.views.size(); ++i) {
+    const Eigen::Vector3d step =
+        scene.views[i].cam_from_world.Center() - scene.views[i - 1].cam_from_world.Center();
+    steps.push_back(step.norm());
+    if (i > 1) changes.push_back((step - last).norm());
+    last = step;
+  }
+  if (changes.empty()) return 0.0;
+  const double step = Median(std::move(steps));
+  return step > 0.0 ? Median(std::move(changes)) / step : 0.0;
+}
+
+// What fills most of the picture counts as the place, even where it is a person.
+void WarnOfUnevenPath(double unevenness, StageContext& context) {
+  constexpr double kUneven = 0.4;
+  if (unevenness < kUneven) return;
+  context.progress().OnWarning(fmt::format(
+      "the camera's path is uneven (its steps change by {:.0f} % from frame to frame): what was "
+      "taken for the place may move itself; look at the poses, or leave them out (film_poses: off)",
+      100.0 * unevenness));
+}
+
+// Whether a film may go on without poses after it.
+bool IsAboutPoses(const Error& error) {
+  return error.code() == ErrorCode::kInvalidArgument ||
+         error.code() == ErrorCode::kDeadlineExceeded ||
+         error.code() == ErrorCode::kFailedPrecondition;
+}
+
+}  // namespace
+
+void FindFilmPoses(const fs::path& frames_root,
+                   const ImportOptions& options,
+                   StageContext& context,
+                   Scene* scene,
+                   ImportFacts* facts) {
+  const auto stays = [&](const std::string& why) {
+    context.progress().OnWarning("the film stays without poses: " + why);
+  };
+  facts->film.emplace();
+  std::vector<int> all(scene->views.size());
+  std::iota(all.begin(), all.end(), 0);
+  const std::vector<int> shot = LongestShot(*scene);
+  if (!AreEnough(shot.size(), scene->views.size())) {
+    return stays(fmt::format(
+        "its longest shot has {} of {} frames; take one shot (film_begin_s, film_end_s)",
+        shot.size(),
+        scene->views.size()));
+  }
+  const MovingRegionFiles files(*scene, context.scratch_folder() / "regions");
+  const ShotMotion motion = WriteMovingRegions(frames_root, *scene, shot, files, context);
+  facts->film->motion_energy = motion.moving_share;
+  facts->film->background_px = motion.background_px;
+  facts->film->camera_stands_still = motion.camera_stands_still;
+  if (motion.camera_stands_still) {
+    context.progress().OnWarning(fmt::format(
+        "the camera stands still (what does not move of its own shifts by {:.2f} px at {} px), "
+        "which tells no depth: the scene is a relief (2.5D), its depth is assumed. Ground in front "
+        "of an upright backdrop, and what moves stands on it; good for a look from nearby only",
+        motion.background_px,
+        kMotionSidePx));
+    Scene relief = ReliefScene(*scene, shot, files);
+    facts->film->poses_found = true;
+    facts->photos_registered = static_cast<int>(relief.views.size());
+    WarnOfFramesWithoutPlace(*scene, all, relief, context);
+    files.Leave(relief, context);
+    *scene = std::move(relief);
+    return;
+  }
+  const fs::path log = context.scratch_folder() / "poses" / "sfm.log";
+  const auto keep_log = [&] {
+    if (fs::exists(log)) context.WriteOutput(artifact::kSfmLog, ReadFile(log));
+  };
+  ImportResult result;
+  try {
+    result = Place(frames_root, *scene, shot, files, options, context);
+  } catch (const Error& e) {
+    if (!IsAboutPoses(e)) throw;
+    keep_log();
+    return stays(e.what());
+  }
+  keep_log();
+  facts->ran_structure_from_motion = true;
+  facts->sfm_plan = result.sfm.plan;
+  facts->film->frames_placed = result.photos_registered;
+  if (!AreEnough(result.scene.views.size(), scene->views.size())) {
+    return stays(
+        fmt::format("only {} of {} frames found a place, {:.0f} % of the picture moves on its own; "
+                    "the others share too little that stands still with them",
+                    result.scene.views.size(),
+                    scene->views.size(),
+                    100.0 * motion.moving_share));
+  }
+  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
+  facts->film->poses_found = true;
+  facts->undistorted = result.undistorted;
+  facts->random_points = result.random_points;
+  facts->photos_registered = result.photos_registered;
+  const Scene placed = DynamicScene(std::move(result.scene), *scene);
+  WarnOfFramesWithoutPlace(*scene, all, placed, context);
+  facts->film->path_unevenness = Unevenness(placed);
+  WarnOfUnevenPath(facts->film->path_unevenness, context);
+  files.Leave(placed, context);
+  *scene = placed;
+}
+
+}  // namespace color3d

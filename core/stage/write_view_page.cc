@@ -1,0 +1,100 @@
+#include "core/stage/write_view_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/color/lab.h"
+#include "core/image/codec.h"
+#include "core/scene/view_images.h"
+#include "core/splat/export/export.h"
+#include "core/splat/export/sog/sog.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/splat/raster/render.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/focus.h"
+#include "core/view/view_page.h"
+
+namespace color3d {
+namespace {
+
+constexpr int kPosterPx = 900;       // longer side of the picture that is there first
+constexpr int kPhotoPx = 480;        // longer side of the photos
+constexpr int kPhotoQuality = 80;    // of their JPEG
+constexpr size_t kMaxPictures = 48;  // with more photos, the others are a name and a camera
+
+// The exported file, and the sureness of its Gaussians in its order.
+void TakeScene(const GaussianModel& model,
+               const ExportFrame& frame,
+               const ExportedFile& file,
+               StageContext& context,
+               ViewPage* page) {
+  page->file_scale = frame.scale;
+  page->file_offset = frame.offset;
+  page->file_is_compressed = file.name == artifact::kSog;
+  page->file_name = file.name;
+  page->file_bytes = file.bytes;
+  page->confidence = model.confidence;
+  if (!page->file_is_compressed || model.confidence.empty()) return;
+  const RgbHarmonics no_colors{.degree = 0, .sh = std::vector<float>(3 * model.size())};
+  const std::vector<uint32_t> order =
+      SogOrder(ForViewers(model, no_colors, frame, context.pool()).position);
+  for (size_t i = 0; i < order.size(); ++i) page->confidence[i] = model.confidence[order[i]];
+}
+
+// Of a scene that moves those of the key view's moment: the page shows it as it was then.
+std::vector<ViewPagePhoto> PhotosOf(const Scene& scene,
+                                    int key_view,
+                                    bool moves,
+                                    StageContext& context) {
+  std::vector<ViewPagePhoto> photos;
+  for (size_t i = 0; i < scene.views.size(); ++i) {
+    if (moves && scene.views[i].time_s() != scene.views[key_view].time_s()) continue;
+    photos.push_back({static_cast<int>(i), {}});
+  }
+  const size_t count = photos.size();
+  std::vector<size_t> pictured;
+  for (size_t i = 0; i < count; ++i) {
+    const size_t evenly = i * kMaxPictures / count, next = (i + 1) * kMaxPictures / count;
+    if (count <= kMaxPictures || next > evenly || photos[i].view == key_view) pictured.push_back(i);
+  }
+  const ViewImages images(scene, context.scene_folder(), kPhotoPx, 0);
+  context.pool().ForEach(static_cast<int64_t>(pictured.size()), [&](int64_t i, int) {
+    context.cancel().ThrowIfCancelled();
+    ViewPagePhoto& photo = photos[pictured[i]];
+    photo.jpeg = EncodeJpeg(images.Srgb(photo.view), kPhotoQuality);
+  });
+  return photos;
+}
+
+}  // namespace
+
+bool WriteViewPage(const Scene& scene,
+                   int key_view,
+                   const GaussianModel& model,
+                   bool moves,
+                   const ExportedFile& file,
+                   StageContext& context) {
+  if (file.name.empty()) return false;
+  if (!HasViewer()) {
+    context.progress().OnWarning(fmt::format(
+        "this build has no viewer, so there is no {}: build again where npm reaches its registry",
+        artifact::kViewPage));
+    return false;
+  }
+  const View& key = scene.views.at(key_view);
+  const Camera camera = key.camera.FitWithin(kPosterPx);
+  const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
+
+  ViewPage page;
+  TakeScene(model, ExportFrameOf(scene), file, context, &page);
+  page.key_view = key_view;
+  page.focus = FocusOf(key, camera, rendered.median_depth);
+  page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);
+  page.photos = PhotosOf(scene, key_view, moves, context);
+  context.WriteOutput(artifact::kViewPage, RenderViewPage(scene, page));
+  return true;
+}
+
+}  // namespace color3d
