@@ -10,15 +10,15 @@
 
 namespace color3d {
 
-class CAPABILITY("mutex") Mutex {
+class COLOR3D_CAPABILITY("mutex") Mutex {
  public:
   Mutex() = default;
   Mutex(const Mutex&) = delete;
   Mutex& operator=(const Mutex&) = delete;
 
-  void Lock() ACQUIRE() { mutex_.lock(); }
-  bool TryLock() TRY_ACQUIRE(true) { return mutex_.try_lock(); }
-  void Unlock() RELEASE() { mutex_.unlock(); }
+  void Lock() COLOR3D_ACQUIRE() { mutex_.lock(); }
+  bool TryLock() COLOR3D_TRY_ACQUIRE(true) { return mutex_.try_lock(); }
+  void Unlock() COLOR3D_RELEASE() { mutex_.unlock(); }
 
  private:
   friend class CondVar;
@@ -26,20 +26,20 @@ class CAPABILITY("mutex") Mutex {
 };
 
 // Holds a mutex while it lives, except between Unlock() and Lock(). Not thread-safe.
-class SCOPED_CAPABILITY MutexLock {
+class COLOR3D_SCOPED_CAPABILITY MutexLock {
  public:
-  explicit MutexLock(Mutex& mutex) ACQUIRE(mutex) : mutex_(mutex) { mutex_.Lock(); }
-  ~MutexLock() RELEASE() {
+  explicit MutexLock(Mutex& mutex) COLOR3D_ACQUIRE(mutex) : mutex_(mutex) { mutex_.Lock(); }
+  ~MutexLock() COLOR3D_RELEASE() {
     if (held_) mutex_.Unlock();
   }
   MutexLock(const MutexLock&) = delete;
   MutexLock& operator=(const MutexLock&) = delete;
 
-  void Unlock() RELEASE() {
+  void Unlock() COLOR3D_RELEASE() {
     mutex_.Unlock();
     held_ = false;
   }
-  void Lock() ACQUIRE() {
+  void Lock() COLOR3D_ACQUIRE() {
     mutex_.Lock();
     held_ = true;
   }
@@ -53,7 +53,7 @@ class SCOPED_CAPABILITY MutexLock {
 // which the analysis does not know that the mutex is held. Wait in a loop.
 class CondVar {
  public:
-  void Wait(Mutex& mutex) REQUIRES(mutex) {
+  void Wait(Mutex& mutex) COLOR3D_REQUIRES(mutex) {
     std::unique_lock lock(mutex.mutex_, std::adopt_lock);
     condition_.wait(lock);
     lock.release();
@@ -61,14 +61,15 @@ class CondVar {
   // Returns false once the time has passed.
   template <typename Clock, typename Duration>
   bool WaitUntil(Mutex& mutex, const std::chrono::time_point<Clock, Duration>& time)
-      REQUIRES(mutex) {
+      COLOR3D_REQUIRES(mutex) {
     std::unique_lock lock(mutex.mutex_, std::adopt_lock);
     const std::cv_status status = condition_.wait_until(lock, time);
     lock.release();
     return status == std::cv_status::no_timeout;
   }
   template <typename Rep, typename Period>
-  bool WaitFor(Mutex& mutex, const std::chrono::duration<Rep, Period>& time) REQUIRES(mutex) {
+  bool WaitFor(Mutex& mutex, const std::chrono::duration<Rep, Period>& time)
+      COLOR3D_REQUIRES(mutex) {
     return WaitUntil(mutex, std::chrono::steady_clock::now() + time);
   }
   void NotifyOne() { condition_.notify_one(); }
