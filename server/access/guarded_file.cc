@@ -65,7 +65,7 @@ void GuardedFile::ReadAgain() {
 }
 
 void GuardedFile::WithLatest(const std::function<void()>& use) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ReadAgain();
   use();
 }

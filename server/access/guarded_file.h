@@ -4,8 +4,9 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
-#include <mutex>
 #include <string>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -25,14 +26,14 @@ class GuardedFile {
 
  private:
   std::string Read() const;
-  void ReadAgain();
+  void ReadAgain() COLOR3D_REQUIRES(mutex_);
 
   const std::filesystem::path file_;
   const char* const what_;
   const std::function<void(const std::string&)> take_;
-  std::mutex mutex_;
-  std::string identity_;  // of the loaded file
-  std::chrono::steady_clock::time_point next_look_;
+  Mutex mutex_;
+  std::string identity_ COLOR3D_GUARDED_BY(mutex_);  // of the loaded file
+  std::chrono::steady_clock::time_point next_look_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

@@ -22,18 +22,18 @@ std::string Quoted(const std::string& message) {
 
 CancelWatch::CancelWatch(grpc::ClientContext& context, const CancellationToken& cancel) {
   thread_ = std::thread([this, &context, &cancel] {
-    std::unique_lock lock(mutex_);
-    while (!done_ && !cancel.IsCancelled()) wake_.wait_for(lock, kLook);
+    MutexLock lock(mutex_);
+    while (!done_ && !cancel.IsCancelled()) wake_.WaitFor(mutex_, kLook);
     if (!done_) context.TryCancel();
   });
 }
 
 CancelWatch::~CancelWatch() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     done_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   thread_.join();
 }
 

@@ -6,14 +6,13 @@
 #include <grpcpp/support/status.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 
 #include "core/base/cancellation.h"
 #include "core/base/error.h"
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -26,9 +25,9 @@ class CancelWatch {
   CancelWatch& operator=(const CancelWatch&) = delete;
 
  private:
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool done_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  bool done_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -53,7 +53,7 @@ BackendProber::BackendProber(const std::map<std::string, std::string>& backends,
 BackendProber::~BackendProber() = default;
 
 std::map<std::string, ProbeAnswer> BackendProber::Probe() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
   if (!answers_.empty() && now - asked_ < keep_) return answers_;
   grpc::CompletionQueue queue;

@@ -3,9 +3,9 @@
 
 #include <chrono>
 #include <map>
-#include <mutex>
 #include <string>
 
+#include "core/base/mutex.h"
 #include "core/keycolor/external/remote.h"
 
 namespace grpc {
@@ -37,9 +37,9 @@ class BackendProber {
   const std::chrono::milliseconds deadline_;
   const std::chrono::milliseconds keep_;
   std::map<std::string, std::shared_ptr<grpc::Channel>> channels_;
-  std::mutex mutex_;
-  std::chrono::steady_clock::time_point asked_;
-  std::map<std::string, ProbeAnswer> answers_;
+  Mutex mutex_;
+  std::chrono::steady_clock::time_point asked_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<std::string, ProbeAnswer> answers_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

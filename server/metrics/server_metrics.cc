@@ -9,13 +9,13 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <mutex>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/memory.h"
+#include "core/base/mutex.h"
 #include "server/net/descriptors.h"
 
 namespace color3d {
@@ -71,7 +71,7 @@ class Sampled : public prometheus::Collectable {
  private:
   // Counts the jobs that have ended since the last scrape.
   void CountEnded() const {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     while (true) {
       const auto events = store_.EventsSince(revision_, kEventsAtOnce);
       std::vector<int64_t> ended;
@@ -221,8 +221,8 @@ class Sampled : public prometheus::Collectable {
   const std::function<ServerSample()> sample_;
   prometheus::Family<prometheus::Counter>& jobs_ended_;
   prometheus::Family<prometheus::Counter>& job_seconds_;
-  mutable std::mutex mutex_;
-  mutable int64_t revision_;
+  mutable Mutex mutex_;
+  mutable int64_t revision_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace

@@ -117,12 +117,12 @@ void ConnectionGate::Stop() {
 }
 
 void ConnectionGate::BeginCall(const std::string& peer) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++calls_[peer].open;
 }
 
 void ConnectionGate::EndCall(const std::string& peer) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto calls = calls_.find(peer);
   if (calls == calls_.end()) return;
   calls->second.open = std::max(0, calls->second.open - 1);
@@ -130,12 +130,12 @@ void ConnectionGate::EndCall(const std::string& peer) {
 }
 
 ConnectionGate::Counts ConnectionGate::counts() const {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 
 void ConnectionGate::Publish() {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   counts_.open = static_cast<int64_t>(open_.size());
   counts_.silent = static_cast<int64_t>(silent_.size());
 }
@@ -178,7 +178,7 @@ bool ConnectionGate::Accept(int listener) {
     if (!MakeRoom(fd)) {
       LogRefusal("all open connections have calls");
       {
-        std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         ++counts_.refused;
       }
       ::close(fd);
@@ -237,7 +237,7 @@ void ConnectionGate::ForgetClosed() {
   std::erase_if(open_, [](const Connection& one) { return InodeOf(one.fd) != one.inode; });
   std::unordered_set<std::string> peers;
   for (const Connection& one : open_) peers.insert(one.peer);
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(calls_, [&](const auto& entry) {
     return entry.second.open == 0 && !peers.contains(entry.first);
   });
@@ -256,7 +256,7 @@ bool ConnectionGate::MakeRoom(int fd) {
 bool ConnectionGate::CloseSomething() {
   if (silent_.empty()) return CloseIdle();
   CloseSilent(silent_.begin());
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++counts_.closed;
   return true;
 }
@@ -269,7 +269,7 @@ bool ConnectionGate::CloseIdle() {
     size_t index;
   };
   std::vector<Idle> idle;
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   for (size_t i = 0; i < open_.size(); ++i) {
     const auto calls = calls_.find(open_[i].peer);
     if (calls == calls_.end()) {
@@ -283,7 +283,7 @@ bool ConnectionGate::CloseIdle() {
   });
   idle.resize(std::min(idle.size(), open_.size() / kCloseShare + 1));
   counts_.closed += static_cast<int64_t>(idle.size());
-  lock.unlock();
+  lock.Unlock();
   std::ranges::sort(idle, std::ranges::greater(), &Idle::index);
   for (const Idle& one : idle) {
     EndSocket(open_[one.index].fd, open_[one.index].inode);
@@ -298,9 +298,7 @@ void ConnectionGate::LogRefusal(const char* why) {
   last_refusal_ = now;
   spdlog::warn(
       "connections are refused: {}; {} of at most {} are open: raise --max-connections, or the "
-      "limit "
-      "of "
-      "open files (ulimit -n, LimitNOFILE)",
+      "limit of open files (ulimit -n, LimitNOFILE)",
       why,
       open_.size(),
       limits_.max_connections);

@@ -12,12 +12,12 @@
 #include <cstdint>
 #include <functional>
 #include <list>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <unordered_map>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/net/listen_sockets.h"
 
 namespace color3d {
@@ -64,11 +64,12 @@ class ConnectionGate {
   void EndCall(const std::string& peer);
 
   struct Counts {
-    int64_t open = 0,
-            silent = 0;  // connections handed on, and connections that have sent nothing yet
+    int64_t open = 0;    // connections handed on
+    int64_t silent = 0;  // connections that have sent nothing yet
     int64_t max = 0;     // limit of both together
-    int64_t closed = 0,
-            refused = 0;  // since the start: closed to make room; refused for lack of it
+    // Since the start.
+    int64_t closed = 0;   // to make room
+    int64_t refused = 0;  // for lack of room
   };
   Counts counts() const;
 
@@ -118,9 +119,9 @@ class ConnectionGate {
   std::vector<Connection> open_;
   SteadyClock::time_point next_look_, last_refusal_;
 
-  mutable std::mutex mutex_;
-  std::unordered_map<std::string, Calls> calls_;  // by peer
-  Counts counts_;
+  mutable Mutex mutex_;
+  std::unordered_map<std::string, Calls> calls_ COLOR3D_GUARDED_BY(mutex_);  // by peer
+  Counts counts_ COLOR3D_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

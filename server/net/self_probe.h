@@ -3,11 +3,11 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -39,9 +39,9 @@ class SelfProbe {
   const std::function<std::string(std::chrono::milliseconds)> probe_;
   const std::function<void(const std::string&)> on_deaf_;
   std::atomic<int> failures_{0};
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -61,10 +61,10 @@ Notifier::Notifier(JobStore& store, const Clock& clock, NotifierOptions options)
 
 Notifier::~Notifier() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -74,21 +74,23 @@ void Notifier::Loop() {
     try {
       WriteRemembered();
       {
-        std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         due = TakeDue();
       }
       if (due) Deliver(*due);
     } catch (const std::exception& e) {
       spdlog::warn("cannot process notifications: {}", e.what());
     }
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     if (due) {
       under_way_.erase(KeyOf(*due));
       --receivers_[ReceiverOf(due->url)].sending;
     }
     if (stopping_) return;
     if (due) continue;
-    if (wake_.wait_for(lock, options_.poll, [this] { return stopping_.load(); })) return;
+    const auto end = Steady::now() + options_.poll;
+    while (!stopping_ && wake_.WaitUntil(mutex_, end)) continue;
+    if (stopping_) return;
   }
 }
 
@@ -172,7 +174,7 @@ std::chrono::milliseconds Notifier::PauseAfter(int tries) const {
 }
 
 void Notifier::NoteAnswer(const std::string& url, bool answered) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Receiver& receiver = receivers_[ReceiverOf(url)];
   if (answered) {
     receiver.silences = 0;
@@ -185,7 +187,7 @@ void Notifier::NoteAnswer(const std::string& url, bool answered) {
 void Notifier::RecordOutcome(const Notification& due, const Outcome& outcome) {
   {
     // Before the store is told, so that it is not sent again if that fails.
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     remembered_[KeyOf(due)] = outcome;
   }
   Write(KeyOf(due), outcome);
@@ -199,13 +201,13 @@ bool Notifier::Write(const Key& key, const Outcome& outcome) {
     } else {
       store_.DelayNotification(job_id, first_ms, PauseAfter(outcome.tries - 1).count());
     }
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (const auto known = remembered_.find(key); known != remembered_.end()) {
       known->second.written = true;
     }
     return true;
   } catch (const Error& e) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     next_write_ = Steady::now() + options_.store_pause;
     spdlog::warn("the outcome of a notification cannot be stored and is kept in memory: {}",
                  e.what());
@@ -217,7 +219,7 @@ bool Notifier::Write(const Key& key, const Outcome& outcome) {
 void Notifier::WriteRemembered() {
   std::vector<std::pair<Key, Outcome>> unwritten;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (Steady::now() < next_write_) return;
     for (const auto& [key, outcome] : remembered_) {
       if (outcome.ended && !outcome.written && !under_way_.contains(key)) {

@@ -6,9 +6,7 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,13 +14,14 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/store/job_store.h"
 
 namespace color3d {
 
 struct NotifierOptions {
-  std::vector<std::string>
-      allowed;         // see CheckNotifyUrl; may have changed since the job was accepted
+  // See CheckNotifyUrl; may have changed since the job was accepted.
+  std::vector<std::string> allowed;
   std::string secret;  // bytes
   std::chrono::milliseconds poll{1'000};
   // Pauses before each further try; the last one repeats.
@@ -71,9 +70,8 @@ class Notifier {
   };
 
   void Loop();
-  // Requires: mutex_ is held.
-  std::optional<Notification> TakeDue();
-  std::optional<Notification> NextOf(const std::vector<Notification>& due);
+  std::optional<Notification> TakeDue() COLOR3D_REQUIRES(mutex_);
+  std::optional<Notification> NextOf(const std::vector<Notification>& due) COLOR3D_REQUIRES(mutex_);
   void Deliver(const Notification& due);
   std::chrono::milliseconds PauseAfter(int tries) const;
   void NoteAnswer(const std::string& url, bool answered);
@@ -85,14 +83,15 @@ class Notifier {
   JobStore& store_;
   const Clock clock_;
   const NotifierOptions options_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
+  Mutex mutex_;
+  CondVar wake_;
   std::atomic<bool> stopping_{false};
-  std::vector<Notification> due_;  // from the store, at the last poll
-  Steady::time_point next_poll_{}, next_write_{};
-  std::set<Key> under_way_;
-  std::map<Key, Outcome> remembered_;
-  std::map<std::string, Receiver> receivers_;
+  std::vector<Notification> due_ COLOR3D_GUARDED_BY(mutex_);  // from the store, at the last poll
+  Steady::time_point next_poll_ COLOR3D_GUARDED_BY(mutex_){};
+  Steady::time_point next_write_ COLOR3D_GUARDED_BY(mutex_){};
+  std::set<Key> under_way_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<Key, Outcome> remembered_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<std::string, Receiver> receivers_ COLOR3D_GUARDED_BY(mutex_);
   std::vector<std::thread> threads_;
 };
 

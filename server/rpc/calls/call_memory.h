@@ -8,8 +8,9 @@
 
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <string>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -30,9 +31,9 @@ class CallMemory {
 
  private:
   const int64_t budget_bytes_;
-  mutable std::mutex mutex_;
-  int64_t all_ = 0;
-  std::map<std::string, int64_t> held_;  // by client
+  mutable Mutex mutex_;
+  int64_t all_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, int64_t> held_ COLOR3D_GUARDED_BY(mutex_);  // by client
 };
 
 // Ends one unary call. Lives until the client has received the answer or is gone.

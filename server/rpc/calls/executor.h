@@ -2,15 +2,15 @@
 // block. Fair: each owner has its own queue, and the queues take turns. Thread-safe.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -35,20 +35,19 @@ class Executor {
   };
 
   void Loop();
-  // Requires: mutex_ is held.
-  void Add(std::function<void()> task, const std::string& owner);
+  void Add(std::function<void()> task, const std::string& owner) COLOR3D_REQUIRES(mutex_);
   // Returns the index in `turns_` of the next owner that may run a task, or its size if there is
   // none.
-  size_t NextTurn() const;
+  size_t NextTurn() const COLOR3D_REQUIRES(mutex_);
 
   const size_t max_waiting_;
   const int max_of_owner_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::map<std::string, Line> lines_;  // by owner
-  std::deque<std::string> turns_;      // owners with waiting tasks
-  size_t waiting_ = 0;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  std::map<std::string, Line> lines_ COLOR3D_GUARDED_BY(mutex_);  // by owner
+  std::deque<std::string> turns_ COLOR3D_GUARDED_BY(mutex_);      // owners with waiting tasks
+  size_t waiting_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> threads_;
 };
 

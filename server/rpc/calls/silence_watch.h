@@ -3,11 +3,11 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
-#include <set>
+#include <map>
 #include <thread>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -44,18 +44,20 @@ class SilenceWatch {
     SilenceWatch& watch_;
     const std::function<void()> on_silence_;
     const std::chrono::milliseconds limit_;
-    bool waiting_ = false, silent_ = false;
-    std::chrono::steady_clock::time_point since_;
   };
 
  private:
+  struct State {
+    bool waiting = false, silent = false;
+    std::chrono::steady_clock::time_point since;
+  };
   void Loop();
 
   const std::chrono::milliseconds limit_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::set<Stream*> streams_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  std::map<Stream*, State> streams_ COLOR3D_GUARDED_BY(mutex_);
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

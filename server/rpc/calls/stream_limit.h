@@ -2,10 +2,10 @@
 #pragma once
 
 #include <map>
-#include <mutex>
 #include <string>
 #include <utility>
 
+#include "core/base/mutex.h"
 #include "server/base/service_error.h"
 
 namespace color3d {
@@ -40,13 +40,13 @@ class StreamLimit {
   };
 
   int open() {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return all_;
   }
 
   // Throws Error{kResourceExhausted}: TOO_MANY_STREAMS, or QUOTA_EXCEEDED for the project's share.
   Place Take(const std::string& project) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto of_project = open_.find(project);
     const int own = of_project == open_.end() ? 0 : of_project->second;
     if (max_of_project_ > 0 && own >= max_of_project_) {
@@ -81,7 +81,7 @@ class StreamLimit {
 
  private:
   void Free(const std::string& project) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     --all_;
     if (--open_[project] == 0) open_.erase(project);
   }
@@ -89,9 +89,9 @@ class StreamLimit {
   const char* what_;
   const int max_, max_of_project_;
   const bool shared_;
-  std::mutex mutex_;
-  int all_ = 0;
-  std::map<std::string, int> open_;  // by project
+  Mutex mutex_;
+  int all_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, int> open_ COLOR3D_GUARDED_BY(mutex_);  // by project
 };
 
 }  // namespace color3d

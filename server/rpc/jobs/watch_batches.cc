@@ -17,7 +17,7 @@ std::shared_ptr<const WatchBatch> WatchBatches::After(int64_t revision,
   std::shared_future<Batch> batch;
   bool is_ours = false;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (batches_.size() >= kMaxBatches) batches_.clear();
     std::shared_future<Batch>& known = batches_[{seen_by.project(), ids, revision}];
     is_ours = !known.valid();
@@ -36,7 +36,7 @@ std::shared_ptr<const WatchBatch> WatchBatches::After(int64_t revision,
 }
 
 void WatchBatches::Forget() {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   batches_.clear();
 }
 

@@ -5,11 +5,11 @@
 #include <future>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <tuple>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/store/job_store.h"
 #include "server/store/project_store.h"
 
@@ -43,8 +43,8 @@ class WatchBatches {
                   const ProjectStore& seen_by) const;
 
   JobStore& store_;
-  std::mutex mutex_;
-  std::map<Key, std::shared_future<Batch>> batches_;
+  Mutex mutex_;
+  std::map<Key, std::shared_future<Batch>> batches_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

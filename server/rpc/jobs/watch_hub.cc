@@ -42,7 +42,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   // Called by the poller when these jobs have new events.
   void Poke(const std::set<int64_t>& changed_jobs) {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       bool mine = false;
       for (const int64_t id : ids_) mine = mine || changed_jobs.count(id) > 0;
       if (!mine) return;
@@ -54,7 +54,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   // Called by the poller in every round: sends deferred progress and keepalives.
   void Tick() {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!begun_ || finished_) return;
       const auto now = SteadyClock::now();
       for (auto it = deferred_.begin(); it != deferred_.end();) {
@@ -78,7 +78,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
 
   void End(const grpc::Status& status) {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!end_) end_ = status;
       queue_.clear();
     }
@@ -87,7 +87,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
 
   void OnWriteDone(bool ok) override {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       writing_ = false;
       last_write_ = SteadyClock::now();
     }
@@ -119,7 +119,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
           store_->ResolveWatch({request_.names().begin(), request_.names().end()});
       JobsSnapshot snapshot;
       if (request_.after_revision() == 0) snapshot = store_->Snapshot(ids);
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       interval_ = std::chrono::milliseconds(interval);
       ids_ = ids;
       cursor_ = request_.after_revision() == 0 ? snapshot.revision : request_.after_revision();
@@ -145,7 +145,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   void Fetch() {
     const grpc::Status status = Guard([&] {
       const std::shared_ptr<const WatchBatch> batch = hub_.batches_.After(cursor_, ids_, *store_);
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       for (const EventRecord& event : batch->events) {
         cursor_ = event.revision;
         if (event.kind == EventKind::kState) {
@@ -163,7 +163,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       }
     });
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       fetching_ = false;
     }
     status.ok() ? Pump() : End(status);
@@ -175,7 +175,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     const grpc::Status status = Guard([&] {
       std::vector<int64_t> wanted;
       {
-        std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size()); ++i) {
           if (!queue_[i].state) continue;
           const int64_t id = queue_[i].state->job_id;
@@ -189,7 +189,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
         const int64_t id = job.id;
         jobs.emplace(id, std::move(job));
       }
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       // Events queued meanwhile are behind; no entry with a state was removed from the front.
       for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size());) {
         Item& item = queue_[i];
@@ -205,7 +205,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       }
     });
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       loading_ = false;
     }
     status.ok() ? Pump() : End(status);
@@ -224,8 +224,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     return then;
   }
 
-  // Requires: mutex_ is held.
-  void TakeProgress(const EventRecord& event, const JobRecord& job) {
+  void TakeProgress(const EventRecord& event, const JobRecord& job) COLOR3D_REQUIRES(mutex_) {
     v1::JobEvent progress;
     progress.set_revision(event.revision);
     progress.set_kind(v1::JobEvent::KIND_PROGRESS);
@@ -251,13 +250,13 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     return event;
   }
 
-  // Requires: mutex_ is held. Revisions never decrease: deferred progress gets the newest one sent.
-  void Queue(v1::JobEvent event) {
+  // Revisions never decrease: deferred progress gets the newest one sent.
+  void Queue(v1::JobEvent event) COLOR3D_REQUIRES(mutex_) {
     sent_revision_ = std::max(sent_revision_, event.revision());
     event.set_revision(sent_revision_);
     queue_.push_back({std::move(event), std::nullopt});
   }
-  void QueueState(const EventRecord& event) {
+  void QueueState(const EventRecord& event) COLOR3D_REQUIRES(mutex_) {
     sent_revision_ = std::max(sent_revision_, event.revision);
     queue_.push_back({{}, event});
   }
@@ -268,7 +267,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     grpc::Status status;
     std::shared_ptr<JobWatcher> self;
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (finished_ || writing_) return;  // self_ may be gone after finished_ is set
       self = self_;
       if (!queue_.empty() && queue_.front().state) {
@@ -301,29 +300,29 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   const v1::WatchJobsRequest request_;
   std::shared_ptr<JobWatcher> self_;
   StreamLimit::Place place_;
+  std::optional<ProjectStore> store_;  // set by Start, if the caller is allowed
 
-  std::mutex mutex_;
+  Mutex mutex_;
   std::vector<int64_t> ids_;  // constant once begun_ is set
-  std::chrono::milliseconds interval_{500};
-  int64_t cursor_ = 0;         // last event that was read
-  int64_t sent_revision_ = 0;  // newest revision queued for the client
+  std::chrono::milliseconds interval_ COLOR3D_GUARDED_BY(mutex_){500};
+  int64_t cursor_ = 0;                                    // last event that was read
+  int64_t sent_revision_ COLOR3D_GUARDED_BY(mutex_) = 0;  // newest revision queued for the client
   struct Item {
     v1::JobEvent event;
     std::optional<EventRecord> state;  // the job is not loaded yet and `event` is empty
   };
-  std::deque<Item> queue_;
+  std::deque<Item> queue_ COLOR3D_GUARDED_BY(mutex_);
   v1::JobEvent current_;  // message being written
-  std::map<int64_t, v1::JobEvent> deferred_;
-  std::map<int64_t, SteadyClock::time_point> progress_sent_;
-  SteadyClock::time_point last_write_;
-  std::optional<grpc::Status> end_;
-  std::optional<ProjectStore> store_;
-  bool begun_ = false;
-  bool dirty_ = false;
-  bool fetching_ = false;
-  bool loading_ = false;
-  bool writing_ = false;
-  bool finished_ = false;
+  std::map<int64_t, v1::JobEvent> deferred_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<int64_t, SteadyClock::time_point> progress_sent_ COLOR3D_GUARDED_BY(mutex_);
+  SteadyClock::time_point last_write_ COLOR3D_GUARDED_BY(mutex_);
+  std::optional<grpc::Status> end_ COLOR3D_GUARDED_BY(mutex_);
+  bool begun_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool dirty_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool fetching_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool loading_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool writing_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool finished_ COLOR3D_GUARDED_BY(mutex_) = false;
 };
 
 WatchHub::WatchHub(const RpcParts& parts, WatchTiming timing)
@@ -335,10 +334,10 @@ WatchHub::WatchHub(const RpcParts& parts, WatchTiming timing)
 WatchHub::~WatchHub() {
   Drain();
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   thread_.join();
 }
 
@@ -350,7 +349,7 @@ grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const grpc::CallbackServ
   watcher->Start(watcher, allowed, store);
   bool draining = false;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining = draining_;
   }
   if (draining) watcher->End(DrainingStatus());
@@ -360,7 +359,7 @@ grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const grpc::CallbackServ
 void WatchHub::Drain() {
   std::vector<std::shared_ptr<JobWatcher>> all;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
     for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
   }
@@ -368,25 +367,28 @@ void WatchHub::Drain() {
 }
 
 void WatchHub::Register(const std::shared_ptr<JobWatcher>& watcher) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watchers_[watcher.get()] = watcher;
 }
 
 void WatchHub::Unregister(JobWatcher* watcher) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watchers_.erase(watcher);
 }
 
 void WatchHub::Loop() {
-  std::unique_lock lock(mutex_);
-  while (!wake_.wait_for(lock, timing_.poll, [this] { return stopping_; })) {
-    lock.unlock();
+  MutexLock lock(mutex_);
+  while (true) {
+    const auto end = SteadyClock::now() + timing_.poll;
+    while (!stopping_ && wake_.WaitUntil(mutex_, end)) continue;
+    if (stopping_) return;
+    lock.Unlock();
     try {
       Poll();
     } catch (const std::exception& e) {
       spdlog::warn("cannot read job events: {}", e.what());
     }
-    lock.lock();
+    lock.Lock();
   }
 }
 
@@ -401,7 +403,7 @@ void WatchHub::Poll() {
   if (!changed.empty()) batches_.Forget();
   std::vector<std::shared_ptr<JobWatcher>> all;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
   }
   for (const auto& watcher : all) {

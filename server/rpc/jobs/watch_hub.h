@@ -4,14 +4,13 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <vector>
 
 #include "color3d/v1/job.grpc.pb.h"
+#include "core/base/mutex.h"
 #include "server/rpc/calls/rpc_parts.h"
 #include "server/rpc/jobs/watch_batches.h"
 
@@ -47,11 +46,11 @@ class WatchHub {
   const RpcParts& parts_;
   const WatchTiming timing_;
   WatchBatches batches_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
-  bool draining_ = false;
-  std::map<JobWatcher*, std::shared_ptr<JobWatcher>> watchers_;
+  Mutex mutex_;
+  CondVar wake_;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool draining_ COLOR3D_GUARDED_BY(mutex_) = false;
+  std::map<JobWatcher*, std::shared_ptr<JobWatcher>> watchers_ COLOR3D_GUARDED_BY(mutex_);
   int64_t revision_ = 0;  // used by the poller only
   std::thread thread_;
 };

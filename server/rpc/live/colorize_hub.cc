@@ -31,7 +31,7 @@ class ColorizeStream final
   // Reads no more pictures, answers the pending ones, then ends with `status`.
   void End(const grpc::Status& status) {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!end_) end_ = status;
     }
     Pump();
@@ -55,7 +55,7 @@ class ColorizeStream final
           return NoteTurn();
         case Step::kRead: {
           StartRead(&incoming_);
-          std::lock_guard lock(mutex_);
+          const MutexLock lock(mutex_);
           starting_read_ = false;
           break;
         }
@@ -71,7 +71,7 @@ class ColorizeStream final
   void OnReadDone(bool ok) override {
     std::shared_ptr<Picture> picture;
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       reading_ = false;
       if (!ok) {
         if (!end_) end_ = grpc::Status::OK;  // the client has sent all pictures
@@ -91,7 +91,7 @@ class ColorizeStream final
 
   void OnWriteDone(bool ok) override {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       writing_ = false;
       --hub_.pictures_;
     }
@@ -110,7 +110,7 @@ class ColorizeStream final
   };
 
   Step Decide() {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (finished_) return Step::kNothing;
     if (!writing_ && !replies_.empty()) {
       outgoing_ = std::move(replies_.front());
@@ -141,7 +141,7 @@ class ColorizeStream final
 
   // Silence counts only while no picture is pending.
   void NoteTurn() {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const bool waits = reading_ && !writing_ && !end_ && pictures_.empty() && replies_.empty();
     if (waits == waits_for_client_) return;
     waits_for_client_ = waits;
@@ -177,7 +177,7 @@ class ColorizeStream final
       response.mutable_error()->set_message(status.error_message());
     }
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       pictures_.erase(picture);
       if (abandoned_) {
         --hub_.pictures_;
@@ -208,7 +208,7 @@ class ColorizeStream final
   void Abandon() {
     std::vector<std::shared_ptr<Picture>> under_way;
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       abandoned_ = true;
       end_ = grpc::Status::CANCELLED;
       hub_.pictures_ -= static_cast<int>(replies_.size());
@@ -227,18 +227,19 @@ class ColorizeStream final
   v1::ColorizeImagesRequest incoming_;
   v1::ColorizeImagesResponse outgoing_;
 
-  std::mutex mutex_;
-  bool reading_ = false;
-  bool starting_read_ = false;
-  bool writing_ = false;
-  bool abandoned_ = false;
-  bool finished_ = false;
-  bool waits_for_client_ = false;
+  Mutex mutex_;
+  bool reading_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool starting_read_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool writing_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool abandoned_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool finished_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool waits_for_client_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::optional<SilenceWatch::Stream> silence_;
-  grpc::Status last_status_;         // set once, together with finished_
-  std::optional<grpc::Status> end_;  // how the stream will end; set: no more pictures are read
-  std::set<std::shared_ptr<Picture>> pictures_;  // pending pictures
-  std::deque<v1::ColorizeImagesResponse> replies_;
+  grpc::Status last_status_;  // set once, together with finished_
+  std::optional<grpc::Status> end_
+      COLOR3D_GUARDED_BY(mutex_);  // how the stream will end; set: no more pictures are read
+  std::set<std::shared_ptr<Picture>> pictures_ COLOR3D_GUARDED_BY(mutex_);  // pending pictures
+  std::deque<v1::ColorizeImagesResponse> replies_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 namespace {
@@ -277,7 +278,7 @@ grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* 
       std::make_shared<ColorizeStream>(*this, context, call->store, std::move(place));
   stream->WatchSilence();
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (draining_) return new RefusedStream(DrainingStatus());
     streams_.insert(stream);
   }
@@ -288,7 +289,7 @@ grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* 
 void ColorizeHub::Drain() {
   std::set<std::shared_ptr<ColorizeStream>> streams;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
     streams = streams_;
   }
@@ -296,7 +297,7 @@ void ColorizeHub::Drain() {
 }
 
 void ColorizeHub::Unregister(ColorizeStream* stream) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   streams_.erase(stream->shared_from_this());
 }
 

@@ -6,10 +6,10 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <set>
 
 #include "color3d/v1/colorizer.grpc.pb.h"
+#include "core/base/mutex.h"
 #include "server/rpc/calls/rpc_parts.h"
 #include "server/rpc/live/inference_client.h"
 
@@ -46,9 +46,9 @@ class ColorizeHub {
   InferenceClient client_;
   const ColorizeLimits limits_;
   std::atomic<int> pictures_{0};
-  std::mutex mutex_;
-  bool draining_ = false;
-  std::set<std::shared_ptr<ColorizeStream>> streams_;
+  Mutex mutex_;
+  bool draining_ COLOR3D_GUARDED_BY(mutex_) = false;
+  std::set<std::shared_ptr<ColorizeStream>> streams_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

@@ -78,7 +78,7 @@ void InferenceClient::Start(const std::shared_ptr<Call>& call,
   Order order{call, deadline, std::move(done), {}};
   bool is_poison = false;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     // Digests are computed only after a worker has died; before there is nothing to compare with.
     if (!watch_.IsEmpty()) order.picture = DigestOfMessage(call->request);
     is_poison = watch_.IsPoison(order.picture);
@@ -90,7 +90,7 @@ void InferenceClient::Start(const std::shared_ptr<Call>& call,
 void InferenceClient::Pump() {
   std::vector<Order> sent;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     // In order of arrival: a suspect delays those behind it until it has been sent.
     while (!waiting_.empty() && watch_.MaySend(waiting_.front().picture)) {
       watch_.OnSent(waiting_.front().picture);
@@ -109,7 +109,7 @@ void InferenceClient::Send(const Order& order) {
   call.context.set_wait_for_ready(true);
   std::shared_ptr<Stub> stub;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stub = stub_;
   }
   stub->async()->ColorizeImage(&call.context,
@@ -129,7 +129,7 @@ void InferenceClient::OnEnd(const Order& order,
   const PoisonWatch::End end = EndOf(status);
   const bool died = end == PoisonWatch::End::kWorkerDied;
   const LivePicture picture = died ? DigestOfMessage(order.call->request) : order.picture;
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watch_.OnEnd(picture, end);
   // A new connection, so that the next picture does not fail with the dead worker's one and is not
   // mistaken for its cause.

@@ -9,10 +9,10 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "color3d/internal/v1/inference.grpc.pb.h"
+#include "core/base/mutex.h"
 #include "server/rpc/live/poison_watch.h"
 
 namespace color3d {
@@ -68,10 +68,10 @@ class InferenceClient {
   void OnEnd(const Order& order, const std::shared_ptr<Stub>& stub, const grpc::Status& status);
 
   InferenceLink link_;
-  std::mutex mutex_;
-  std::shared_ptr<Stub> stub_;  // to the present worker; null: none
-  PoisonWatch watch_;
-  std::deque<Order> waiting_;
+  Mutex mutex_;
+  std::shared_ptr<Stub> stub_ COLOR3D_GUARDED_BY(mutex_);  // to the present worker; null: none
+  PoisonWatch watch_ COLOR3D_GUARDED_BY(mutex_);
+  std::deque<Order> waiting_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d
