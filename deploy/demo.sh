@@ -18,7 +18,7 @@ while [ "$#" -gt 0 ] && [ "$1" != "--" ]; do
   case "$1" in
     -h | --help) sed -n '2,11p' "$0" | cut -c3-; exit 0 ;;
     --benchmark | --no-benchmark) benchmark=$1 ;;
-    -*) echo "demo: there is no option $1; see deploy/demo.sh --help (options of color3d colorize come after --)" >&2; exit 2 ;;
+    -*) echo "demo: unknown option $1; see deploy/demo.sh --help (put options of color3d colorize after --)" >&2; exit 2 ;;
     *) positional+=("$1") ;;
   esac
   shift
@@ -28,7 +28,7 @@ options=("$@")
 photos=${positional[0]:-}
 out=${positional[1]:-$here/color3d-demo}
 if [ -n "$photos" ] && [ ! -e "$photos" ]; then
-  echo "demo: $photos is not there; name a folder of photos or a film" >&2
+  echo "demo: $photos does not exist; give a folder of photos or a film" >&2
   exit 2
 fi
 
@@ -69,7 +69,7 @@ for _ in $(seq 150); do
 done
 COLOR3D_SERVER=$(cat "$store/address")
 export COLOR3D_SERVER
-echo "demo: the server listens on $COLOR3D_SERVER, its store is $store"
+echo "demo: the server listens on $COLOR3D_SERVER; its data folder is $store"
 
 if [ -z "$benchmark" ] && [ -d "$photos" ]; then
   seen=$("$bin/color3d" inspect "$photos") || seen=
@@ -77,32 +77,32 @@ if [ -z "$benchmark" ] && [ -d "$photos" ]; then
   if [[ "$seen" == *unsure* ]]; then
     echo "demo: $seen"
     if [ -t 0 ] && [ -t 2 ]; then
-      read -r -p "demo: are the photos in colour, to be dropped and scored against? [y/n] " answer || answer=
+      read -r -p "demo: are the photos in colour, so that the result can be scored against them? [y/n] " answer || answer=
       case "$answer" in
         [yY]*) benchmark=--benchmark ;;
         [nN]*) benchmark=--no-benchmark ;;
       esac
     fi
-    echo "demo: goes on with $benchmark; say --benchmark or --no-benchmark to decide"
+    echo "demo: continuing with $benchmark; give --benchmark or --no-benchmark to choose"
   fi
 fi
 mode=()
 if [ "$benchmark" = --benchmark ]; then
   mode=(--benchmark)
-  echo "demo: the photos are in colour: their colour is dropped and the result scored against it"
+  echo "demo: the photos are in colour: removing their colour and scoring the result against it"
 fi
 "$bin/color3d" colorize "$photos" -o "$out" "${mode[@]}" "${options[@]}"
 
 if [ -f "$out/report.html" ]; then
   echo "demo: the report is $out/report.html"
   if [ -f "$out/view.html" ]; then
-    echo "demo: turn the scene in a browser: $bin/color3d view $out"
-    echo "demo: mend a colour: $bin/color3d-server serve --data-dir $store & sleep 2; $bin/color3d correct $out"
+    echo "demo: to view the scene in a browser: $bin/color3d view $out"
+    echo "demo: to correct a colour: $bin/color3d-server serve --data-dir $store & sleep 2; $bin/color3d correct $out"
   elif [ -f "$out/scene.mp4" ]; then
     echo "demo: the coloured film is $out/scene.mp4"
   fi
 else
-  echo "demo: colour $out/key_view.png by any means, then:"
+  echo "demo: colour $out/key_view.png by any means, then run:"
   echo "  deploy/demo.sh $photos $out -- --key-color COLOURED.png"
-  echo "or leave the colours to the server: deploy/demo.sh $photos $out -- --auto"
+  echo "or colour it automatically: deploy/demo.sh $photos $out -- --auto"
 fi

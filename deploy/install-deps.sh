@@ -21,11 +21,11 @@ case "${1:-}" in
   --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus systemd
     python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
   --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;
-  *) echo "install-deps: unknown option $1; there are --tests and --fuzz" >&2; exit 2 ;;
+  *) echo "install-deps: unknown option $1; use --tests or --fuzz" >&2; exit 2 ;;
 esac
 
 if ! command -v apt-get >/dev/null 2>&1; then
-  echo "install-deps: this is not a Debian-like system (no apt-get); install the equivalents of:" >&2
+  echo "install-deps: no apt-get on this system; install the equivalents of:" >&2
   echo "  ${packages[*]}" >&2
   exit 1
 fi
@@ -49,7 +49,7 @@ as_root=()
 if [ "$(id -u)" -ne 0 ]; then
   if ! command -v sudo >/dev/null 2>&1; then
     [ "${#missing[@]}" -gt 0 ] || exit 0
-    echo "install-deps: these packages are missing, and installing them needs root or sudo:" >&2
+    echo "install-deps: missing packages, whose installation needs root or sudo:" >&2
     echo "  ${missing[*]}" >&2
     exit 1
   fi
@@ -66,5 +66,5 @@ if [ "${#missing[@]}" -gt 0 ]; then
 fi
 for package in ${wished[@]+"${wished[@]}"}; do
   install "$package" ||
-    echo "install-deps: without $package (npm: the page to look at scenes; libheif-dev: HEIC photos)" >&2
+    echo "install-deps: cannot install $package; building without it (npm: no scene viewer page; libheif-dev: no HEIC photos)" >&2
 done

@@ -2,7 +2,7 @@
 # The Debian packages that installed programs need to run, one a line, on the machine that built them.
 #   deploy/runtime-packages.sh PREFIX    as given to cmake --install
 set -euo pipefail
-prefix=${1:?say where the programs are installed}
+prefix=${1:?usage: deploy/runtime-packages.sh PREFIX}
 libraries=$(ldd "$prefix"/bin/* | awk '$2 == "=>" && $3 ~ /^\// {print $3}' | sort -u)
 {
   # What dpkg lists under /usr/lib may be found under /lib, and the other way round.

@@ -1,7 +1,7 @@
-// color3d-api-reference: writes the generated part of proto/README.md, from the comments and
-// options of the protos and the files of the presets.
+// color3d-api-reference: writes the generated part of proto/README.md from the comments and options
+// of the protos and the preset files.
 //   color3d-api-reference DESCRIPTOR_SET PRESETS_FOLDER README [--check]
-// With --check it changes nothing and exits with 1 when the README is not what it would write.
+// With --check it changes nothing and exits with 1 if the README is out of date.
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -46,7 +46,7 @@ std::string ReadText(const std::string& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// The comment above something, in one line that a table can hold.
+// Leading comment of a descriptor as one line of a Markdown table.
 template <typename T>
 std::string Comment(const T* described) {
   SourceLocation location;
@@ -70,10 +70,10 @@ class Reference {
   Reference(const std::string& descriptor_set, const std::string& presets_folder) {
     google::protobuf::FileDescriptorSet files;
     if (!files.ParseFromString(ReadText(descriptor_set))) {
-      throw std::runtime_error(descriptor_set + " is no set of descriptors");
+      throw std::runtime_error(descriptor_set + " is not a descriptor set");
     }
     for (const auto& file : files.file()) {
-      if (pool_.BuildFile(file) == nullptr) throw std::runtime_error(file.name() + " is wrong");
+      if (pool_.BuildFile(file) == nullptr) throw std::runtime_error(file.name() + " is invalid");
     }
     for (const std::string& name : kPresets) {
       presets_.emplace_back();
@@ -91,8 +91,9 @@ class Reference {
       for (int i = 0; i < descriptor->service_count(); ++i) text += Service(descriptor->service(i));
     }
     text +=
-        "\n## Options\n\nBoth ends belong to a range. Where the presets differ, the default of "
-        "each is named; an option without a default is left out unless it is set.\n";
+        "\n## Options\n\nRanges are inclusive. If the presets differ, the default of each is "
+        "listed. An "
+        "option without a default is omitted unless it is set.\n";
     text += Section("colorize_scene",
                     File(kOptionFiles[0])->FindMessageTypeByName("ColorizeSceneSpec"));
     const Descriptor* job = pool_.FindMessageTypeByName("color3d.v1.JobSpec");
@@ -100,7 +101,7 @@ class Reference {
     for (int i = 1; i < stages->field_count(); ++i) {  // the first is colorize_scene
       text += Section(stages->field(i)->name(), stages->field(i)->message_type());
     }
-    text += "\n## What options are made of\n";
+    text += "\n## Types of options\n";
     for (const std::string& file : kOptionFiles) {
       const FileDescriptor* descriptor = File(file);
       for (int i = 0; i < descriptor->message_type_count(); ++i) {
@@ -165,7 +166,7 @@ class Reference {
     return RangeText(field) + (info.unit().empty() ? "" : " " + info.unit());
   }
 
-  // What a preset sets the field of the stage to; empty: nothing. `stage` is empty for the scene's.
+  // Value of a stage's field in a preset; empty: not set. `stage` is empty for fields of the scene.
   static std::string ValueIn(const v1::ColorizeSceneSpec& preset,
                              const std::string& stage,
                              const FieldDescriptor* field) {
@@ -203,7 +204,7 @@ class Reference {
     return fmt::format("{}", fmt::join(by_preset, ", "));
   }
 
-  // A table of the message's fields, once; `kind` is empty for what is no stage.
+  // Table of the fields of a message, once; `kind` is empty for messages that are not stages.
   std::string Section(const std::string& kind, const Descriptor* message) {
     if (!done_.insert(message->full_name()).second) return "";
     std::string text =
@@ -235,8 +236,8 @@ class Reference {
   }
 
   DescriptorPool pool_;
-  std::vector<v1::ColorizeSceneSpec> presets_;  // as kPresets
-  std::set<std::string> done_;                  // messages that have their table
+  std::vector<v1::ColorizeSceneSpec> presets_;  // in the order of kPresets
+  std::set<std::string> done_;                  // messages already written
 };
 
 int Main(const std::vector<std::string>& arguments) {
@@ -253,7 +254,7 @@ int Main(const std::vector<std::string>& arguments) {
       before.substr(0, marker) + kMarker + Reference(arguments[0], arguments[1]).Text();
   if (after == before) return 0;
   if (arguments.size() > 3 && arguments[3] == "--check") {
-    std::cerr << arguments[2] << " is not what the protos say; build the target api-reference\n";
+    std::cerr << arguments[2] << " is out of date; build the target api-reference\n";
     return 1;
   }
   std::ofstream(arguments[2], std::ios::binary) << after;

@@ -1,5 +1,5 @@
-// What an option takes (color3d/v1/option.proto), for checks and in the words of messages, --help
-// and the reference. Pure functions.
+// Texts about the options of the API (color3d/v1/option.proto), for checks, messages, --help and
+// the reference. Pure functions.
 #pragma once
 
 #include <google/protobuf/descriptor.h>
@@ -12,14 +12,16 @@ namespace color3d {
 
 const v1::OptionInfo& InfoOf(const google::protobuf::FieldDescriptor* field);
 
-// As people write it: "0.05", "100000".
+// Returns the number in its shortest form: "0.05", "100000".
 std::string NumberText(double value);
-// "64 to 4096"; empty for a field without a range.
+// Returns "64 to 4096", or an empty string for a field without a range.
 std::string RangeText(const google::protobuf::FieldDescriptor* field);
-// The values of an enum that mean something: "PRESET_FAST, PRESET_BEST, PRESET_PAPER".
+// Returns the values of an enum except the unspecified one: "PRESET_FAST, PRESET_BEST,
+// PRESET_PAPER".
 std::string ValuesText(const google::protobuf::FieldDescriptor* field);
 
-// Why the field does not take the number: " is -5; the range is 64 to 4096"; empty when it does.
+// Returns why the field refuses the number: " is -5; the range is 64 to 4096"; empty if it accepts
+// it.
 std::string WhyRefused(const google::protobuf::FieldDescriptor* field, double value);
 
 }  // namespace color3d

@@ -1,11 +1,11 @@
 #include "client/lib/job_watch.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
 #include <optional>
 #include <thread>
+
+#include "core/base/mutex.h"
 
 namespace color3d::client {
 namespace {
@@ -28,10 +28,10 @@ class Stream {
   ~Stream() {
     context_.TryCancel();
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       stopping_ = true;
     }
-    changed_.notify_all();
+    changed_.NotifyAll();
     thread_.join();
   }
   Stream(const Stream&) = delete;
@@ -39,17 +39,18 @@ class Stream {
 
   // The next event; nullopt after `limit` or at the end.
   std::optional<v1::JobEvent> Next(milliseconds limit) {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, limit, [this] { return !events_.empty() || ended_; });
+    MutexLock lock(mutex_);
+    const auto end = steady_clock::now() + limit;
+    while (events_.empty() && !ended_ && changed_.WaitUntil(mutex_, end)) continue;
     if (events_.empty()) return std::nullopt;
     v1::JobEvent event = std::move(events_.front());
     events_.pop_front();
-    changed_.notify_all();
+    changed_.NotifyAll();
     return event;
   }
   // Set when the stream has ended and all its events were taken.
   std::optional<grpc::Status> End() {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!ended_ || !events_.empty()) return std::nullopt;
     return status_;
   }
@@ -60,27 +61,27 @@ class Stream {
   void Loop() {
     v1::JobEvent event;
     while (reader_->Read(&event)) {
-      std::unique_lock lock(mutex_);
+      MutexLock lock(mutex_);
       events_.push_back(event);
-      changed_.notify_all();
+      changed_.NotifyAll();
       // Whoever takes events slowly slows the stream down.
-      changed_.wait(lock, [this] { return events_.size() < kMaxWaiting || stopping_; });
+      while (events_.size() >= kMaxWaiting && !stopping_) changed_.Wait(mutex_);
     }
     const grpc::Status status = reader_->Finish();
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     status_ = status;
     ended_ = true;
-    changed_.notify_all();
+    changed_.NotifyAll();
   }
 
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReader<v1::JobEvent>> reader_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<v1::JobEvent> events_;
-  bool stopping_ = false;
-  bool ended_ = false;
-  grpc::Status status_;
+  Mutex mutex_;
+  CondVar changed_;
+  std::deque<v1::JobEvent> events_ COLOR3D_GUARDED_BY(mutex_);
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool ended_ COLOR3D_GUARDED_BY(mutex_) = false;
+  grpc::Status status_ COLOR3D_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

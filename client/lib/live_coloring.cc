@@ -1,13 +1,12 @@
 #include "client/lib/live_coloring.h"
 
-#include <condition_variable>
-#include <mutex>
 #include <set>
 #include <thread>
 
 #include "client/lib/blob_transfer.h"
 #include "client/lib/scene_upload.h"
 #include "core/base/files.h"
+#include "core/base/mutex.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -33,21 +32,21 @@ class LiveRound {
  private:
   v1::ColorizeImagesRequest RequestFor(const LivePicture& picture, size_t number);
   void CountAnswer(bool over) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     over_ = over;
     --in_flight_;
-    answered_.notify_all();
+    answered_.NotifyAll();
   }
   void Write(Stream& stream, const std::vector<LivePicture>& pictures, std::set<size_t> pending);
 
   Connection& connection_;
   const LiveSource& source_;
   const LiveOptions& options_;
-  std::mutex mutex_;
-  std::condition_variable answered_;
-  int in_flight_ = 0;
-  bool over_ = false;               // nobody reads any more
-  std::exception_ptr write_error_;  // the writer's, read after it has ended
+  Mutex mutex_;
+  CondVar answered_;
+  int in_flight_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  bool over_ COLOR3D_GUARDED_BY(mutex_) = false;  // the answers are no longer read
+  std::exception_ptr write_error_;                // the writer's, read after it has ended
 };
 
 v1::ColorizeImagesRequest LiveRound::RequestFor(const LivePicture& picture, size_t number) {
@@ -75,10 +74,10 @@ void LiveRound::Write(Stream& stream,
   try {
     for (const size_t i : pending) {
       {
-        std::unique_lock lock(mutex_);
-        answered_.wait(lock, [this] {
-          return over_ || options_.in_flight == 0 || in_flight_ < options_.in_flight;
-        });
+        MutexLock lock(mutex_);
+        while (!over_ && options_.in_flight != 0 && in_flight_ >= options_.in_flight) {
+          answered_.Wait(mutex_);
+        }
         if (over_) break;
         ++in_flight_;
       }

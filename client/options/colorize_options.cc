@@ -18,7 +18,7 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-// Options with a flag of their own; the rest is reached by --set.
+// Options with a flag of their own; all others are set by --set.
 struct OptionFlag {
   const char* flag;
   const char* option;
@@ -26,17 +26,25 @@ struct OptionFlag {
 };
 constexpr OptionFlag kOptionFlags[] = {
     {"--max-side", "max_side_px", "Longer side of the working pictures"},
-    {"--geometry-iterations", "reconstruct_geometry.iterations", "Of luminance Gaussians"},
-    {"--max-gaussians", "reconstruct_geometry.max_gaussians", "Hard cap"},
-    {"--colorizer-iterations", "personalize.iterations", "Of the scene's colorizer"},
+    {"--geometry-iterations",
+     "reconstruct_geometry.iterations",
+     "Training iterations of the luminance Gaussians"},
+    {"--max-gaussians", "reconstruct_geometry.max_gaussians", "Maximum number of Gaussians"},
+    {"--colorizer-iterations",
+     "personalize.iterations",
+     "Training iterations of the scene's colorizer"},
     {"--augment",
      "generate_augmentations.samples",
-     "Pictures made from the key view that the colorizer learns from, too (the paper: 8)"},
-    {"--augment-backend", "generate_augmentations.backend", "Model server that makes them"},
-    {"--chroma-iterations", "solve_chroma.iterations", "After the closed-form start"},
+     "Number of pictures generated from the key view as additional training data (paper: 8)"},
+    {"--augment-backend",
+     "generate_augmentations.backend",
+     "Model server that generates these pictures"},
+    {"--chroma-iterations",
+     "solve_chroma.iterations",
+     "Iterations of the chroma solver after its closed-form start"},
 };
 
-// Why a setting cannot be made; empty: it can.
+// Returns why a setting is refused, or an empty string.
 std::string Complaint(const std::string& setting) {
   v1::ColorizeSceneSpec spec;
   try {
@@ -59,48 +67,45 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
   app.add_flag_callback(
       "--augment-files",
       [o] { o->settings.push_back("generate_augmentations.files=true"); },
-      "The colorizer learns from the coloured pictures in PHOTOS/augment/, too");
+      "Also train the colorizer on the coloured pictures in PHOTOS/augment/");
   app.add_flag_callback(
       "--png",
       [o] { o->settings.push_back("render.pictures=true"); },
-      "Of a film, and of cameras that filmed a scene: every frame in colour as a picture, too, at "
-      "its full size and under its name (OUT/film_frames/)");
+      "Films and dynamic scenes only: also write each frame in colour and full size to "
+      "OUT/film_frames/");
   app.add_option_function<std::vector<std::string>>(
          "--set",
          [o](const std::vector<std::string>& settings) {
            o->settings.insert(o->settings.end(), settings.begin(), settings.end());
          },
-         "STAGE.OPTION=VALUE: any option of a stage, e.g. carry_color.depth_tolerance=0.05; `--set "
-         "STAGE` names its options. May be repeated")
+         "STAGE.OPTION=VALUE: set an option of a stage, e.g. carry_color.depth_tolerance=0.05; "
+         "`--set STAGE` lists its options. May be repeated")
       ->allow_extra_args(false)
       ->check(Complaint);
 }
 
-// What the import of the photos is asked for.
+// Flags of the import.
 void DeclareImportFlags(CLI::App& app, ColorizeOptions* o) {
-  app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view");
-  app.add_flag("--deflicker",
-               o->deflicker,
-               "Take flicker of exposure out of a film; the coloured frames get steady luminance");
+  app.add_flag("--hold-out", o->hold_out, "Hold out every eighth view for evaluation");
+  app.add_flag("--deflicker", o->deflicker, "Films only: remove flicker of exposure");
   app.add_flag(
       "--poses",
       o->poses,
-      "Of a film by one moving camera: find the frames' poses by what stands still; of one that "
-      "stands, assume depth (2.5D) (those of "
-      "several are found anyway)");
+      "Films of one camera only: estimate the poses of a moving camera from the static "
+      "background, or assume the depth before a standing one (2.5D). Poses of several cameras are "
+      "always estimated");
 }
 
 std::string ComplaintOfImport(const std::string& setting) {
   if (!setting.starts_with(kind::kImportScene)) {
     return "'" + setting +
-           "' is no option of the import (import_scene.OPTION=VALUE); other stages have theirs "
-           "from "
-           "`color3d colorize`";
+           "' is not an option of the import (import_scene.OPTION=VALUE); options of other stages "
+           "belong to `color3d colorize`";
   }
   return Complaint(setting);
 }
 
-// What preset, file and settings say, and --poses, before the other flags of this command.
+// Options from preset, file, settings and --poses, without the other flags of this command.
 v1::ColorizeSceneSpec Chosen(const ColorizeOptions& options) {
   v1::ColorizeSceneSpec spec = ReadPreset(options.preset);
   for (const std::string& setting : options.settings) SetOption(setting, &spec);
@@ -116,7 +121,7 @@ fs::path Canonical(const fs::path& path) {
   return error ? fs::absolute(path) : canonical;
 }
 
-// "a/b/" and "a/b" are one folder.
+// "a/b/" and "a/b" are the same folder.
 bool IsWithin(const fs::path& path, const fs::path& folder) {
   const fs::path relative = path.lexically_relative(folder);
   return !relative.empty() && *relative.begin() != "..";
@@ -126,27 +131,28 @@ bool IsWithin(const fs::path& path, const fs::path& folder) {
 
 void ColorizeOptions::Check() const {
   if (!masks.empty() && film) {
-    throw InvalidArgument("--masks is for photos of a place; --film takes frames as they are");
+    throw InvalidArgument(
+        "--masks is for photos of a static scene; --film takes frames as they are");
   }
   if (!masks.empty() && photos.empty()) {
-    throw InvalidArgument("--masks belongs to PHOTOS; a stored scene has its masks already");
+    throw InvalidArgument("--masks needs PHOTOS; a stored scene has its masks already");
   }
   if (photos.empty() == scene.empty()) {
     throw InvalidArgument(photos.empty() ? "give a folder of photos, or --scene scenes/ID"
-                                         : "PHOTOS and --scene do not go together: the scene has "
+                                         : "PHOTOS and --scene exclude each other: the scene has "
                                            "its photos already");
   }
   if (benchmark && photos.empty()) {
     throw InvalidArgument("--benchmark needs the folder of the photos in colour, not --scene");
   }
   if (bound && !benchmark) {
-    throw InvalidArgument("--bound is a part of the score; it needs --benchmark");
+    throw InvalidArgument("--bound needs --benchmark");
   }
-  Chosen(*this);  // the preset's file can be read
+  Chosen(*this);  // throws if the file of the preset cannot be read
   color.Check();
   if (keys > 1 && !benchmark) {
     throw InvalidArgument(
-        "--keys is a part of the score, where photos have true colours; it needs --benchmark. To "
+        "--keys needs --benchmark, where photos have true colours. To "
         "colour several photos, see `color3d key select --count` and --add-key-view");
   }
   if (keys > 1 && (!additional_key_views.empty() || color.Given())) {
@@ -160,7 +166,7 @@ void ColorizeOptions::Check() const {
                           kMaxAdditionalKeyViews);
   }
   for (const std::string& text : additional_key_views) ParseAdditionalKeyView(text);
-  // What is drawn for a view that is known beforehand cannot be scored against that view.
+  // A picture of a certain view cannot be scored against that view.
   const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
   if (benchmark && for_one_view) {
     throw InvalidArgument(
@@ -260,8 +266,8 @@ bool WantsAugmentFiles(const ColorizeOptions& options) {
 void RequireAugmentFiles(const ColorizeOptions& options, const PhotoFolder& folder) {
   if (!WantsAugmentFiles(options) || !folder.augment_files.empty()) return;
   throw InvalidArgument(
-      "--augment-files: there is no picture in {}; put coloured pictures of the scene there, or "
-      "leave the flag out",
+      "--augment-files: there are no pictures in {}; put coloured pictures of the scene there, or "
+      "omit the flag",
       (folder.root / "augment").string());
 }
 
@@ -269,22 +275,23 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option(
       "PHOTOS",
       o->photos,
-      "Folder of photos, or one with images/ and COLMAP models (sparse/0, ...: the one with "
-      "most photos is used; of a scene that moves with times.txt, a line SECONDS NAME "
-      "for each photo), or with transforms.json (or transforms_train.json, ...) or "
-      "poses_bounds.npy and its photos; or a splat (.ply, .sog, .spz); or a film (.mp4, "
-      ".mov, .mkv, ...), whose frames are coloured");
-  app.add_option("--scene",
-                 o->scene,
-                 "In place of PHOTOS: a scene that the server holds, coloured from the key view "
-                 "that `color3d key accept` has accepted");
+      "Folder of photos; or folder with images/ and COLMAP models (sparse/0, ...; the model with "
+      "most photos is used; dynamic scenes with times.txt, a line SECONDS NAME for each photo); "
+      "or folder with photos and transforms.json (or transforms_train.json, ...) or "
+      "poses_bounds.npy; or a splat (.ply, .sog, .spz); or a film (.mp4, .mov, .mkv, ...)");
+  app.add_option(
+      "--scene",
+      o->scene,
+      "In place of PHOTOS: name of a scene on the server, to be coloured from its accepted key "
+      "view (`color3d key accept`)");
   app.add_option("--masks",
                  o->masks,
-                 "Folder of masks, PNG, called like the photos (a.png or a.jpg.png): white counts, "
-                 "black is ignored. PNG photos with alpha need none");
+                 "Folder of PNG masks named like the photos (a.png or a.jpg.png): white is used, "
+                 "black is ignored. PNG photos with alpha need no masks");
   app.add_option("-o,--out", o->out, "Folder for the results")->required();
   DeclareKeyColorFlags(app, &o->color);
-  app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");
+  app.add_option(
+      "--key-view", o->key_view, "Name of the key view's photo; default: selected automatically");
   const auto add_key_views = [o](const std::vector<std::string>& views) {
     o->additional_key_views.insert(o->additional_key_views.end(), views.begin(), views.end());
   };
@@ -298,39 +305,42 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
       ->group("");  // the former name
   app.add_option("--preset",
                  o->preset,
-                 fmt::format("How much time quality is worth: {}; or a file of your own (`color3d "
+                 fmt::format("Trade-off between time and quality: {}; or a preset file (`color3d "
                              "server presets NAME` prints one to start from)",
                              PresetNames()))
       ->capture_default_str();
   app.add_option("--time-budget",
                  o->time_budget_seconds,
-                 "Shorten the preset's schedules to end in about this time: 90s, 5m, 1h")
+                 "Shorten the schedules of the preset to end in about this time, e.g. 90s, 5m, 1h")
       ->transform(CLI::AsNumberWithUnit(
           std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}}));
-  app.add_flag("--benchmark",
-               o->benchmark,
-               "Photos or a film in colour: drop the colour and score against it");
-  app.add_option("--keys",
-                 o->keys,
-                 "With --benchmark: so many key views, chosen together, each in its true colours")
+  app.add_flag(
+      "--benchmark",
+      o->benchmark,
+      "Remove the colour of coloured photos or a coloured film, and score the result against it");
+  app.add_option(
+         "--keys",
+         o->keys,
+         "With --benchmark: number of key views, chosen together, each with its true colours")
       ->check(CLI::Range(1, kMaxAdditionalKeyViews + 1))
       ->capture_default_str();
+  app.add_flag("--bound",
+               o->bound,
+               "With --benchmark: also score the same geometry with the true colours of all views");
+  app.add_option(
+      "--encoder", o->encoder, "Name of the weights of the frozen encoder on the server");
   app.add_flag(
-      "--bound",
-      o->bound,
-      "With --benchmark: also score the same geometry under the true colours of all views");
-  app.add_option("--encoder", o->encoder, "Weights of the frozen encoder that this server knows");
-  app.add_flag("--film",
-               o->film,
-               "The photos are frames of a film: coloured one by one, not reconstructed; folders "
-               "of them are "
-               "of several cameras: one scene that moves");
+      "--film",
+      o->film,
+      "Treat the photos as frames of a film, coloured one by one; folders of frames are films "
+      "of several cameras, reconstructed as one dynamic scene");
   DeclareImportFlags(app, o);
-  app.add_flag("--detach", o->detach, "Return when the job is submitted");
+  app.add_flag("--detach", o->detach, "Return once the job is submitted");
   app.add_option("--notify",
                  o->notify,
-                 "Address that is told when the job has ended; the server's operator allows which");
-  app.add_option("--seed", o->seed, "Same seed, same machine: same result");
+                 "URL to notify when the job has ended; must be allowed by the server's operator");
+  app.add_option(
+      "--seed", o->seed, "Seed; the same seed gives the same result on the same machine");
   DeclareOptionFlags(app, o);
 }
 
@@ -338,8 +348,8 @@ void DeclareImportOptions(CLI::App& app, ColorizeOptions* o) {
   DeclareImportFlags(app, o);
   app.add_option("--set",
                  o->settings,
-                 "import_scene.OPTION=VALUE: any option of the import, e.g. "
-                 "import_scene.film_stride=2; `--set import_scene` names them. May be repeated")
+                 "import_scene.OPTION=VALUE: set an option of the import, e.g. "
+                 "import_scene.film_stride=2; `--set import_scene` lists them. May be repeated")
       ->allow_extra_args(false)
       ->check(ComplaintOfImport);
 }
@@ -392,7 +402,7 @@ v1::JobSpec SelectSpec(Connection& connection,
   const v1::ColorizeSceneSpec chosen = Chosen(options);
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
-  // A job of one stage takes the default preset by itself.
+  // A job of one stage uses the default preset anyway.
   *select = chosen.preset() > v1::PRESET_FAST ? OverItsPreset(connection, options).select_key_view()
                                               : chosen.select_key_view();
   if (!options.encoder.empty()) select->set_encoder(options.encoder);
@@ -427,14 +437,14 @@ void RequireOutBesidePhotos(const fs::path& out, const PhotoFolder& folder) {
   bool inside = false;
   for (const LocalFile& photo : folder.photos) {
     inside = inside || Canonical(photo.file.parent_path()) == folder_out;
-    // images/ is read at any depth.
+    // images/ is searched recursively.
     inside = inside || (photo.path.starts_with("images/") &&
                         IsWithin(folder_out, Canonical(folder.root / "images")));
     if (inside) break;
   }
   if (!inside) return;
   throw InvalidArgument(
-      "-o {} is where the photographs are: the results would be taken for photos the next time; "
+      "-o {} is the folder of the photos: the next run would take the results for photos; "
       "name another folder",
       out.string());
 }

@@ -1,4 +1,4 @@
-// Options of `color3d colorize`, their checks, and the job specs that they mean.
+// Options of `color3d colorize`, their validation, and conversion to job specs.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -16,29 +16,28 @@ namespace color3d::client {
 
 struct ColorizeOptions {
   std::string photos;  // folder; empty: `scene` is set
-  std::string scene;   // "scenes/ID", whose accepted key view is used
+  std::string scene;   // "scenes/ID"; its accepted key view is used
   std::string out;
   KeyColorFlags color;
   std::string masks;                              // folder; empty: none
   std::vector<std::string> additional_key_views;  // ParseAdditionalKeyView; in order of importance
   std::string key_view;                           // view name or stem; empty: selected
-  std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
-  std::string preset = "fast";  // of the server's, or a file of the user's own
+  std::string encoder;          // name of weights on the server; empty: the embedded encoder
+  std::string preset = "fast";  // name of a preset, or a preset file
   bool film = false;            // the photos are frames of a film
-  bool deflicker = false;       // its exposure is made steady
-  bool poses = false;           // of a film: its frames' poses are looked for
+  bool deflicker = false;       // films only: remove flicker of exposure
+  bool poses = false;           // films only: estimate poses
   bool benchmark = false;
-  int keys = 1;        // of the benchmark: key views in their true colours, chosen together
-  bool bound = false;  // of the benchmark: upload all true colours, and score what they would give
+  int keys = 1;        // benchmark only: number of key views, chosen together
+  bool bound = false;  // benchmark only: also score the geometry with all true colours
   bool detach = false;
-  std::string notify;  // address that is told when the job has ended; empty: none
+  std::string notify;  // URL to notify when the job has ended; empty: none
   bool hold_out = false;
   uint64_t seed = 0;                  // 0: the server's default
   double time_budget_seconds = 0.0;   // 0: none
-  std::vector<std::string> settings;  // "stage.field=value", over what the preset says
+  std::vector<std::string> settings;  // "stage.field=value", override the preset
 
-  // What can be said without the server: throws Error when options do not go together or files
-  // cannot be read.
+  // Checks that need no server. Throws Error if options exclude each other or files cannot be read.
   void Check() const;
 };
 
@@ -60,30 +59,31 @@ void AddKeyViews(Connection& connection,
                  const ColorizeOptions& options,
                  v1::ColorizeSceneSpec* spec);
 
-// Whether the pictures in PHOTOS/augment/ are asked for, by flag, setting or preset file.
+// Returns whether flags, settings or preset file request the pictures in PHOTOS/augment/.
 bool WantsAugmentFiles(const ColorizeOptions& options);
-// Throws Error{kInvalidArgument} when they are and there are none.
+// Throws Error{kInvalidArgument} if they are requested but missing.
 void RequireAugmentFiles(const ColorizeOptions& options, const PhotoFolder& folder);
 
 void DeclareOptions(CLI::App& app, ColorizeOptions* options);
-// Those that ImportSpec reads, for commands that come before the scene is coloured.
+// Declares the options that ImportSpec reads, for commands that only import a scene.
 void DeclareImportOptions(CLI::App& app, ColorizeOptions* options);
 
-// A spec with scene and seed, and no stage yet.
+// Returns a spec with scene and seed but no stage.
 v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene);
 v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene);
-// The geometry that the scene's own job will make, so that it finds it made.
+// Returns the spec of the geometry job that the colorize job of the scene will need, so that the
+// result can be reused.
 v1::JobSpec GeometrySpec(Connection& connection,
                          const ColorizeOptions& options,
                          const std::string& scene);
-// The key view by the preset's strategy, or `options.key_view`; `options.keys` of them.
+// Selects the key view by the strategy of the preset, or `options.key_view`; `options.keys` views.
 v1::JobSpec SelectSpec(Connection& connection,
                        const ColorizeOptions& options,
                        const std::string& scene);
-// Everything but key view, key colour and truth. Throws what reading the preset's file throws.
+// Returns everything except key view, key colour and truth. Throws if the preset file is invalid.
 v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene);
 
-// Throws Error{kInvalidArgument} when results in `out` would be taken for photos by the next run.
+// Throws Error{kInvalidArgument} if the next run would take results in `out` for photos.
 void RequireOutBesidePhotos(const std::filesystem::path& out, const PhotoFolder& folder);
 
 }  // namespace color3d::client

@@ -26,7 +26,7 @@ class ColorizeOptionsTest : public ::testing::Test {
     return file.string();
   }
 
-  // What `color3d colorize --scene scenes/s -o out ARGUMENTS` asks the server for.
+  // Returns the spec of `color3d colorize --scene scenes/s -o out ARGUMENTS`.
   v1::ColorizeSceneSpec Spec(std::vector<std::string> arguments) {
     ColorizeOptions options;
     CLI::App app;
@@ -37,7 +37,7 @@ class ColorizeOptionsTest : public ::testing::Test {
     options.Check();
     return ColorizeSpec(options, "scenes/s").colorize_scene();
   }
-  // The complaint about them; "" when there is none.
+  // Returns the error message, or an empty string.
   std::string Complaint(const std::vector<std::string>& arguments) {
     try {
       Spec(arguments);
@@ -51,7 +51,7 @@ class ColorizeOptionsTest : public ::testing::Test {
   const ScratchFolder folder_;
 };
 
-TEST_F(ColorizeOptionsTest, FlagsAndSettingsReachTheirFields) {
+TEST_F(ColorizeOptionsTest, FlagsAndSettingsSetFields) {
   const v1::ColorizeSceneSpec spec = Spec({"--max-side=640",
                                            "--colorizer-iterations=7",
                                            "--augment-backend=mine",
@@ -74,12 +74,12 @@ TEST_F(ColorizeOptionsTest, FlagsAndSettingsReachTheirFields) {
   EXPECT_TRUE(spec.select_key_view().exclude_self());
 }
 
-TEST_F(ColorizeOptionsTest, FramesAreKeptAsPicturesOnRequest) {
+TEST_F(ColorizeOptionsTest, PngRequestsFrames) {
   EXPECT_TRUE(Spec({"--png"}).render().pictures());
   EXPECT_FALSE(Spec({}).render().pictures());
 }
 
-TEST_F(ColorizeOptionsTest, PicturesInAugmentCountWhenTheyAreAskedFor) {
+TEST_F(ColorizeOptionsTest, UsesAugmentFilesOnRequest) {
   EXPECT_FALSE(Spec({"--augment=4"}).generate_augmentations().files());
   const v1::ColorizeSceneSpec spec = Spec({"--augment-files"});
   EXPECT_TRUE(spec.generate_augmentations().files());
@@ -99,7 +99,7 @@ TEST_F(ColorizeOptionsTest, PicturesInAugmentCountWhenTheyAreAskedFor) {
   EXPECT_NO_THROW(RequireAugmentFiles(options, folder));
 }
 
-TEST_F(ColorizeOptionsTest, AWrongValueIsToldWithTheRange) {
+TEST_F(ColorizeOptionsTest, NamesRangeOfWrongValue) {
   EXPECT_THAT(Complaint({"--max-side=12"}),
               AllOf(HasSubstr("max_side_px is '12'"), HasSubstr("64 to 4096 px")));
   EXPECT_THAT(Complaint({"--set=personalize.iterations=many"}), HasSubstr("0 to 100000"));
@@ -111,12 +111,12 @@ TEST_F(ColorizeOptionsTest, AWrongValueIsToldWithTheRange) {
   EXPECT_THAT(Complaint({"--set=personalize.iterations"}), HasSubstr("has no value"));
 }
 
-TEST_F(ColorizeOptionsTest, MasksComeWithPhotosOfAPlace) {
+TEST_F(ColorizeOptionsTest, MasksNeedPhotos) {
   EXPECT_THAT(Complaint({"--masks=m"}), HasSubstr("has its masks already"));
   EXPECT_THAT(Complaint({"--masks=m", "--film"}), HasSubstr("--film takes frames as they are"));
 }
 
-TEST_F(ColorizeOptionsTest, PosesOfAFilmAreAskedForByFlag) {
+TEST_F(ColorizeOptionsTest, PosesFlagRequestsPoses) {
   ColorizeOptions options;
   EXPECT_FALSE(ImportSpec(options, "scenes/s").import_scene().has_film_poses());
   options.poses = true;
@@ -127,7 +127,7 @@ TEST_F(ColorizeOptionsTest, PosesOfAFilmAreAskedForByFlag) {
   }
 }
 
-TEST_F(ColorizeOptionsTest, ASelectionAsksForPosesPartAndStrideOfAFilm) {
+TEST_F(ColorizeOptionsTest, SelectionImportsFilmWithItsOptions) {
   const auto import = [](std::vector<std::string> arguments) {
     ColorizeOptions options;
     CLI::App app;
@@ -150,7 +150,7 @@ TEST_F(ColorizeOptionsTest, ASelectionAsksForPosesPartAndStrideOfAFilm) {
   EXPECT_THROW(import({"--set=import_scene.film_stride=0"}), CLI::ValidationError);
 }
 
-TEST_F(ColorizeOptionsTest, AnUnknownOptionIsToldWithTheNearest) {
+TEST_F(ColorizeOptionsTest, SuggestsSimilarOption) {
   EXPECT_THAT(Complaint({"--set=personalise.iterations=3"}),
               HasSubstr("did you mean personalize.iterations?"));
   EXPECT_THAT(Complaint({"--set=iterations=3"}),
@@ -160,7 +160,7 @@ TEST_F(ColorizeOptionsTest, AnUnknownOptionIsToldWithTheNearest) {
   EXPECT_THAT(Complaint({"--set=key_color.prompt=red"}), HasSubstr("there is no option"));
 }
 
-TEST_F(ColorizeOptionsTest, HelpReadsTheProto) {
+TEST_F(ColorizeOptionsTest, HelpShowsRangesOfProto) {
   EXPECT_EQ(DescribeOption("personalize.crop_px"), "64 to 1024 px, default 256");
   EXPECT_EQ(DescribeOption("max_side_px"), "64 to 4096 px, default by preset");
   EXPECT_EQ(DescribeOption("solve_chroma.solver"), "conjugate_gradients, adam, default by preset");
@@ -170,7 +170,7 @@ TEST_F(ColorizeOptionsTest, HelpReadsTheProto) {
   EXPECT_THAT(app.help(), AllOf(HasSubstr("1 to 10000000"), HasSubstr("fast, best, paper")));
 }
 
-TEST_F(ColorizeOptionsTest, APresetIsANameOrAFile) {
+TEST_F(ColorizeOptionsTest, PresetIsNameOrFile) {
   EXPECT_EQ(Spec({"--preset=best"}).preset(), v1::PRESET_BEST);
   const std::string file = File(
       "preset: PRESET_BEST  # the rest is best's\n"
@@ -217,7 +217,7 @@ TEST_F(ColorizeOptionsTest, TakesKeyViewsByFormerFlagToo) {
   EXPECT_THAT(Complaint(arguments), HasSubstr("--add-key-view is given 17 times; at most 16"));
 }
 
-TEST_F(ColorizeOptionsTest, WhatIsWrongInAPresetFileIsToldWithItsLine) {
+TEST_F(ColorizeOptionsTest, NamesLineOfErrorInPresetFile) {
   EXPECT_THAT(Complaint({"--preset", File("max_side_px: 300\npersonalize {\n  iteration: 3\n}\n")}),
               AllOf(HasSubstr("mine.textproto, line 3: there is no field 'iteration'"),
                     HasSubstr("did you mean iterations?")));

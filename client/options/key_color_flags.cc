@@ -50,7 +50,7 @@ void CheckFiles(const KeyColorFlags& flags) {
   }
 }
 
-// The flags that are sources by themselves; a backend takes some of them as its input.
+// Returns the given flags that are sources of their own; with a backend some of them are its input.
 std::vector<std::string> Sources(const KeyColorFlags& flags) {
   std::vector<std::string> sources;
   const auto add = [&](bool given, const char* flag) {
@@ -71,23 +71,21 @@ std::vector<std::string> Sources(const KeyColorFlags& flags) {
 void CheckCombination(const KeyColorFlags& flags) {
   const std::vector<std::string> sources = Sources(flags);
   if (sources.size() > 1) {
-    throw InvalidArgument(
-        "{} and {} do not go together: the key view takes its colour from one source",
-        sources[0],
-        sources[1]);
+    throw InvalidArgument("{} and {} exclude each other: the colour of the key view has one source",
+                          sources[0],
+                          sources[1]);
   }
   const bool backend = !flags.backend.empty();
   if (!flags.mask.empty() && flags.edit.empty() && !backend) {
-    throw InvalidArgument(
-        "--mask says where --edit or --backend may change colour; give one of them");
+    throw InvalidArgument("--mask needs --edit or --backend");
   }
   if (!flags.labels.empty() && (backend || flags.hints.empty() || !IsJson(flags.hints))) {
     throw InvalidArgument(
-        "--labels goes with --hints points in a .json file, whose \"label\" entries "
-        "name its values; leave it out");
+        "--labels needs --hints POINTS.json, whose \"label\" entries refer to its values; "
+        "omit it");
   }
   if (backend && !flags.hints.empty() && !IsJson(flags.hints)) {
-    throw InvalidArgument("--hints for a backend must be points (a .json file), not {}",
+    throw InvalidArgument("--hints of a backend must be points (a .json file), not {}",
                           flags.hints);
   }
   if (backend && flags.references.size() > 1) {
@@ -96,16 +94,16 @@ void CheckCombination(const KeyColorFlags& flags) {
   const bool takes_model =
       !backend && (flags.automatic || !flags.prompt.empty() || !flags.references.empty());
   if (!flags.model.empty() && !takes_model) {
-    throw InvalidArgument("--model goes with --auto, --prompt or --reference; leave it out");
+    throw InvalidArgument("--model needs --auto, --prompt or --reference; omit it");
   }
   if (!backend && !flags.prompt.empty() && flags.model.empty()) {
     throw InvalidArgument(
-        "--prompt needs --model NAME: CLIP weights that the server was started with (`color3d "
+        "--prompt needs --model NAME: CLIP weights configured on the server (`color3d "
         "server info` lists them)");
   }
 }
 
-// Collects what has to be sent, and the digests that stand for it.
+// Collects files to upload and their digests.
 class Uploads {
  public:
   v1::Digest Add(const std::string& file) {
@@ -179,30 +177,33 @@ void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
   const auto text = [&](const char* name, std::string* value, const std::string& help) {
     return app.add_option(name, *value, help)->group(group);
   };
-  app.add_flag("--auto", flags->automatic, "Automatic colours: nothing else to do")->group(group);
+  app.add_flag("--auto", flags->automatic, "Colour the key view automatically")->group(group);
   text("--key-color,--image",
        &flags->image,
-       "The key view, coloured (" + ReadableImageFormats() + "); what is transparent is inferred");
+       "The coloured key view (" + ReadableImageFormats() + "); transparent parts are inferred");
   text("--hints,--strokes,--points",
        &flags->hints,
        "Colour strokes (PNG of the key view's size, transparent elsewhere), or points, lines and "
        "regions (JSON)");
-  text("--labels", &flags->labels, "Grey PNG whose values the \"label\" entries of points name");
+  text("--labels", &flags->labels, "Grey PNG with the values of the \"label\" entries of points");
   app.add_option("--reference",
                  flags->references,
-                 "Coloured picture of something similar; repeatable: the best match wins")
+                 "Coloured picture of a similar scene; if repeated, the best match is used")
       ->allow_extra_args(false)
       ->group(group);
-  text("--prompt", &flags->prompt, "Colours in words: \"red brick, green lawn\" (with --model)");
-  text("--edit", &flags->edit, "The key photo is in colour: an edited version of it");
-  text("--mask", &flags->mask, "White where --edit or --backend may change colour");
+  text("--prompt",
+       &flags->prompt,
+       "Description of the colours, e.g. \"red brick, green lawn\" (needs --model)");
+  text("--edit", &flags->edit, "Edited version of a key photo in colour");
+  text("--mask", &flags->mask, "Mask for --edit or --backend, white where colour may change");
   text("--backend",
        &flags->backend,
-       "A model server that this server knows; takes --prompt, --points, --reference and --mask");
-  text("--script", &flags->script, "A TorchScript model that this server knows");
+       "Name of a model server configured on the server; accepts --prompt, --points, --reference "
+       "and --mask");
+  text("--script", &flags->script, "Name of a TorchScript model configured on the server");
   text("--model",
        &flags->model,
-       "Weights that this server knows, for --auto, --prompt or --reference");
+       "Name of weights configured on the server, for --auto, --prompt or --reference");
 }
 
 v1::KeyColorSource UploadKeyColor(Connection& connection, const KeyColorFlags& flags) {

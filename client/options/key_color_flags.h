@@ -1,4 +1,4 @@
-// Where the key view's colour comes from, as flags: shared by all commands that colour it.
+// Flags for the source of the key view's colour, shared by all commands that colour a key view.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -13,28 +13,29 @@ namespace color3d::client {
 struct KeyColorFlags {
   std::string image;   // the key view, coloured
   std::string hints;   // strokes, or points as .json
-  std::string labels;  // picture that the points' labels refer to
+  std::string labels;  // label picture of the points
   std::string edit;    // the key view in colour, edited
-  std::string mask;    // of edit and backend
-  std::string prompt;  // of its own, or for the backend
+  std::string mask;    // for edit and backend
+  std::string prompt;  // a source, or input of the backend
   std::vector<std::string> references;
   bool automatic = false;
-  std::string backend;  // by name in the server's configuration
+  std::string backend;  // name on the server
   std::string script;
   std::string model;
 
-  // Any source at all.
+  // Returns whether a source is given.
   bool Given() const;
-  // Drawn for one certain view, so that its file's name may tell which; empty: for any view.
+  // Returns the file of a source that is drawn for a certain view, whose name may give the view;
+  // empty for other sources.
   std::string FileOfView() const;
-  // What can be said without the server. Throws Error{kInvalidArgument} when flags do not go
-  // together, in one line, and what reading the files throws.
+  // Checks that need no server. Throws Error{kInvalidArgument} if flags exclude each other, and the
+  // errors of reading the files.
   void Check() const;
 };
 
 void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags);
 
-// Sends the files that the server lacks and says what was given. `flags` has been checked.
+// Uploads missing files and returns the source. Requires: flags.Check() has passed.
 v1::KeyColorSource UploadKeyColor(Connection& connection, const KeyColorFlags& flags);
 
 }  // namespace color3d::client

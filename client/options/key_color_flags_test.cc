@@ -22,7 +22,7 @@ class KeyColorFlagsTest : public ::testing::Test {
   }
   std::string Path(const std::string& name) const { return (folder_.path() / name).string(); }
 
-  // The complaint about this command line, "" when it is good.
+  // Returns the error message of a command line, or an empty string.
   std::string Complaint(std::vector<std::string> arguments) {
     for (std::string& argument : arguments) {
       if (argument == "PNG") argument = Path("a.png");
@@ -45,7 +45,7 @@ class KeyColorFlagsTest : public ::testing::Test {
   KeyColorFlags flags_;
 };
 
-TEST_F(KeyColorFlagsTest, EverySourceStandsAlone) {
+TEST_F(KeyColorFlagsTest, AcceptsEachSource) {
   for (const std::vector<std::string>& line : {std::vector<std::string>{"--auto"},
                                                {"--auto", "--model", "ddcolor"},
                                                {"--key-color", "PNG"},
@@ -73,7 +73,7 @@ TEST_F(KeyColorFlagsTest, EverySourceStandsAlone) {
   EXPECT_FALSE(flags_.Given());
 }
 
-TEST_F(KeyColorFlagsTest, TwoSourcesAreRefusedByName) {
+TEST_F(KeyColorFlagsTest, RefusesTwoSources) {
   EXPECT_THAT(Complaint({"--auto", "--hints", "JSON"}),
               AllOf(HasSubstr("--auto and --hints"), HasSubstr("one source")));
   EXPECT_THAT(Complaint({"--backend", "b", "--auto"}), HasSubstr("--backend and --auto"));
@@ -81,10 +81,10 @@ TEST_F(KeyColorFlagsTest, TwoSourcesAreRefusedByName) {
               HasSubstr("--reference and --prompt"));
 }
 
-TEST_F(KeyColorFlagsTest, WhatNeedsAnotherFlagSaysWhich) {
+TEST_F(KeyColorFlagsTest, NamesRequiredFlag) {
   EXPECT_THAT(Complaint({"--prompt", "red"}), HasSubstr("--model NAME"));
-  EXPECT_THAT(Complaint({"--key-color", "PNG", "--model", "x"}), HasSubstr("leave it out"));
-  EXPECT_THAT(Complaint({"--backend", "b", "--model", "x"}), HasSubstr("leave it out"));
+  EXPECT_THAT(Complaint({"--key-color", "PNG", "--model", "x"}), HasSubstr("omit it"));
+  EXPECT_THAT(Complaint({"--backend", "b", "--model", "x"}), HasSubstr("omit it"));
   EXPECT_THAT(Complaint({"--auto", "--mask", "PNG"}), HasSubstr("--edit or --backend"));
   EXPECT_THAT(Complaint({"--hints", "PNG", "--labels", "PNG"}), HasSubstr(".json"));
   EXPECT_THAT(Complaint({"--mask", "PNG"}), HasSubstr("--edit or --backend"));
@@ -93,7 +93,7 @@ TEST_F(KeyColorFlagsTest, WhatNeedsAnotherFlagSaysWhich) {
               HasSubstr("one --reference, not 2"));
 }
 
-TEST_F(KeyColorFlagsTest, FilesThatCannotBeReadAreNamed) {
+TEST_F(KeyColorFlagsTest, NamesUnreadableFiles) {
   EXPECT_THAT(Complaint({"--edit", Path("none.png")}),
               AllOf(HasSubstr("--edit"), HasSubstr("none.png")));
   EXPECT_THAT(Complaint({"--reference", "JSON"}), HasSubstr("is not an image"));

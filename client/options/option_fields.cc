@@ -20,7 +20,7 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
 struct Option {
-  const FieldDescriptor* stage = nullptr;  // null: the field is the scene's own
+  const FieldDescriptor* stage = nullptr;  // null: option of the whole scene
   const FieldDescriptor* field = nullptr;
 };
 
@@ -28,7 +28,7 @@ bool IsMessage(const FieldDescriptor* field) {
   return field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE;
 }
 
-// What belongs to the whole scene and is a number. The rest of its fields have flags of their own.
+// Numeric options of the whole scene. Its other fields have flags of their own.
 bool IsOptionOfScene(const FieldDescriptor* field) { return InfoOf(field).has_min(); }
 
 std::string NameOf(const Option& option) {
@@ -44,7 +44,7 @@ std::vector<Option> AllOptions() {
     if (!IsMessage(stage) || stage->is_repeated()) continue;
     for (int f = 0; f < stage->message_type()->field_count(); ++f) {
       const FieldDescriptor* field = stage->message_type()->field(f);
-      // A source of colour is no stage, lists and pictures have no one value.
+      // Sources of colour are not stages; lists and pictures have no single value.
       const bool is_value = !IsMessage(field) && !field->is_repeated();
       if (is_value && field->real_containing_oneof() == nullptr &&
           stage->message_type() != v1::KeyColorSource::descriptor()) {
@@ -96,7 +96,7 @@ Option FindOption(const std::string& name) {
                                         : "; did you mean " + nearest + "?");
 }
 
-// "STRATEGY_" of STRATEGY_UNSPECIFIED.
+// Returns the common prefix of the values, e.g. "STRATEGY_".
 std::string PrefixOf(const EnumDescriptor* values) {
   const std::string unspecified = "UNSPECIFIED";
   const std::string& first = values->value(0)->name();
@@ -119,7 +119,7 @@ bool Parse(const std::string& text, T* value) {
   return result.ec == std::errc() && result.ptr == end;
 }
 
-// What the field takes, for messages and --help.
+// Accepted values of the field, for messages and --help.
 std::string Takes(const FieldDescriptor* field) {
   const std::string range = RangeText(field);
   const std::string& unit = InfoOf(field).unit();
@@ -141,13 +141,13 @@ std::string Takes(const FieldDescriptor* field) {
       return "true or false";
     default:
       return InfoOf(field).names() == v1::OptionInfo::NAMES_UNSPECIFIED
-                 ? "a text"
-                 : "a name that the server knows";
+                 ? "text"
+                 : "a name configured on the server";
   }
 }
 
 [[noreturn]] void Refuse(const Option& option, const std::string& value) {
-  throw InvalidArgument("{} is '{}'; it takes {}", NameOf(option), value, Takes(option.field));
+  throw InvalidArgument("{} is '{}'; it must be {}", NameOf(option), value, Takes(option.field));
 }
 
 void SetNumber(const Option& option, const std::string& text, Message* message) {
@@ -170,7 +170,7 @@ void SetNumber(const Option& option, const std::string& text, Message* message) 
 
 std::string Nearest(const std::string& name, const std::vector<std::string>& names) {
   std::string nearest;
-  int least = static_cast<int>(name.size()) / 2 + 1;  // beyond, nothing is alike
+  int least = static_cast<int>(name.size()) / 2 + 1;  // beyond, names are not similar
   for (const std::string& known : names) {
     const int distance = EditDistance(name, known);
     if (distance < least) {

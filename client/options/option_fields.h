@@ -1,5 +1,5 @@
-// The options of a scene by name, "personalize.iterations", as --set and the flags for single
-// options give them. What there is, and what each takes, comes from the API itself. Pure functions.
+// Options of a scene by name, e.g. "personalize.iterations", for --set and the flags of single
+// options. Names and ranges come from the API. Pure functions.
 #pragma once
 
 #include <google/protobuf/descriptor.h>
@@ -11,15 +11,15 @@
 
 namespace color3d::client {
 
-// "stage.field=value", or "field=value" for what belongs to the whole scene (max_side_px). Enums by
-// their names or the part that tells them apart: "solve_chroma.solver=adam". Throws
-// Error{kInvalidArgument} naming the option, what it takes, or the option that was probably meant.
+// Applies "stage.field=value", or "field=value" for options of the whole scene (max_side_px). Enum
+// values may omit their prefix: "solve_chroma.solver=adam". Throws Error{kInvalidArgument} with the
+// option and its range, or with the most similar option.
 void SetOption(const std::string& setting, v1::ColorizeSceneSpec* spec);
 
-// For --help: "64 to 4096 px, default by preset".
+// Returns range and default for --help: "64 to 4096 px, default by preset".
 std::string DescribeOption(const std::string& name);
 
-// Of `names`, the one that differs from `name` in the fewest letters; empty when none is alike.
+// Returns the entry of `names` with the smallest edit distance to `name`; empty if none is similar.
 std::string Nearest(const std::string& name, const std::vector<std::string>& names);
 
 }  // namespace color3d::client

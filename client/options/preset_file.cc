@@ -41,8 +41,7 @@ v1::Preset PresetNamed(const std::string& name) {
   throw InvalidArgument("--preset {}, line {}: {}", file, line + 1, what);
 }
 
-// The parser's words, and what to do: it says `has no field named "x"` without saying which there
-// are.
+// Message of the parser with a remedy. Adds the known fields to `has no field named "x"`.
 std::string WithRemedy(const std::string& complaint) {
   static const std::regex unknown("Message type \"([\\w.]+)\" has no field named \"(\\w+)\"\\.?");
   std::smatch match;
@@ -58,7 +57,7 @@ std::string WithRemedy(const std::string& complaint) {
                        nearest.empty() ? fmt::format("there are {}", fmt::join(names, ", "))
                                        : "did you mean " + nearest + "?");
   }
-  return complaint + "; `color3d server presets fast` prints a preset that is right";
+  return complaint + "; `color3d server presets fast` prints a valid preset";
 }
 
 struct FirstComplaint : public google::protobuf::io::ErrorCollector {
@@ -71,7 +70,7 @@ struct FirstComplaint : public google::protobuf::io::ErrorCollector {
   std::string text;
 };
 
-// Ranges and unspecified enums, with the line where the value stands.
+// Checks ranges. Errors name the line of the value.
 void CheckValues(const Message& message,
                  const TextFormat::ParseInfoTree& lines,
                  const std::string& file) {
@@ -106,8 +105,8 @@ void RequireNothingOfOneScene(const v1::ColorizeSceneSpec& spec, const std::stri
                          !spec.training_truth().empty();
   if (!one_scene) return;
   throw InvalidArgument(
-      "--preset {}: a preset is for any scene; leave key_view, key_color, source, truth and "
-      "training_truth out and give the key view and its colour by flags",
+      "--preset {}: a preset is for any scene; remove key_view, key_color, source, truth and "
+      "training_truth, and give the key view and its colour by flags",
       file);
 }
 

@@ -1,4 +1,4 @@
-// What --preset names: a preset of the server's, or a file of the user's own.
+// The argument of --preset: a preset of the server, or a preset file.
 #pragma once
 
 #include <string>
@@ -7,14 +7,14 @@
 
 namespace color3d::client {
 
-// "fast", "best", "paper".
+// Returns "fast, best, paper".
 std::string PresetNames();
 
-// A preset's name gives a spec that names it and leaves the rest to the server. Other text is a
-// file that holds a ColorizeSceneSpec in protobuf's text form (`color3d server presets NAME` prints
-// one); the server puts it over the preset that its field `preset` names, fast when it names none.
-// Throws Error: kNotFound when there is neither, kInvalidArgument with file and line for what is
-// wrong in the file.
+// Returns a spec that names the preset, or the ColorizeSceneSpec in a file in protobuf's text
+// format
+// (`color3d server presets NAME` prints one). The server fills unset fields from the preset in its
+// field `preset`, by default fast. Throws Error: kNotFound if there is neither preset nor file,
+// kInvalidArgument with file and line for errors in the file.
 v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file);
 
 }  // namespace color3d::client

@@ -25,7 +25,7 @@ std::vector<CertificateRecord> ParseCertificateRoles(std::string_view text,
     words >> role >> record.project;
     if (record.name.empty() || role.empty() || words >> rest) {
       throw InvalidArgument(
-          "{}, line {}: it must be NAME ROLE [PROJECT], a name with spaces in double quotes",
+          "{}, line {}: expected NAME ROLE [PROJECT], a name with spaces in double quotes",
           file,
           number);
     }
@@ -36,11 +36,11 @@ std::vector<CertificateRecord> ParseCertificateRoles(std::string_view text,
 }
 
 CertificateRoles::CertificateRoles(const fs::path& file)
-    : file_(file, "file of certificates' roles", [this, file](const std::string& bytes) {
+    : file_(file, "file of certificate roles", [this, file](const std::string& bytes) {
         records_ = ParseCertificateRoles(bytes, file.string());
       }) {
   if (records_.empty()) {
-    spdlog::warn("{} names nobody: every certificate will be refused", file.string());
+    spdlog::warn("{} has no entries: every certificate will be refused", file.string());
   }
 }
 

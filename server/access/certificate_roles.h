@@ -1,4 +1,4 @@
-// What clients may do by the certificate that they show: a file of names and roles.
+// Roles of clients that authenticate by certificate, from a file of names and roles.
 #pragma once
 
 #include <filesystem>
@@ -13,28 +13,28 @@
 namespace color3d {
 
 struct CertificateRecord {
-  std::string name;  // common or alternative name; "*": any
+  std::string name;  // common or alternative name; "*": any name
   Role role = Role::kRead;
-  std::string project;  // empty: the one of all without a project
+  std::string project;  // empty: the default project
 };
 
-// Lines "NAME ROLE [PROJECT]"; a name with spaces stands in double quotes; empty lines and those
-// that begin with '#' are skipped. Throws Error{kInvalidArgument} naming file and line.
+// Parses lines "NAME ROLE [PROJECT]"; a name with spaces stands in double quotes; empty lines and
+// lines that begin with '#' are skipped. Throws Error{kInvalidArgument} with file and line.
 std::vector<CertificateRecord> ParseCertificateRoles(std::string_view text,
                                                      const std::string& file);
 
-// The file as it is now, as TokenBook. Thread-safe.
+// The present contents of the file, like TokenBook. Thread-safe.
 class CertificateRoles {
  public:
   explicit CertificateRoles(const std::filesystem::path& file);
 
-  // Of the first line that has one of these names, or "*"; its name is then the certificate's
-  // first.
+  // Returns the first line that has one of these names, or "*"; its name is then the first of
+  // `names`.
   std::optional<CertificateRecord> Find(const std::vector<std::string>& names);
 
  private:
   std::vector<CertificateRecord> records_;
-  GuardedFile file_;  // the last: it fills the records
+  GuardedFile file_;  // last, because it fills records_
 };
 
 }  // namespace color3d

@@ -9,11 +9,11 @@
 namespace color3d {
 namespace {
 
-TEST(CertificateRolesTest, TheFirstLineThatFitsDecides) {
+TEST(CertificateRolesTest, FirstMatchingLineDecides) {
   ScratchFolder scratch;
   const auto file = scratch.path() / "roles";
   WriteFileAtomic(file,
-                  "# who may what\n\nanna admin\n\"Bert Smith\" submit lab\n"
+                  "# roles\n\nanna admin\n\"Bert Smith\" submit lab\n"
                   "guest.example.org read\nanna read\n");
   CertificateRoles roles(file);
   EXPECT_EQ(roles.Find({"anna"})->role, Role::kAdmin);
@@ -24,7 +24,7 @@ TEST(CertificateRolesTest, TheFirstLineThatFitsDecides) {
   EXPECT_FALSE(roles.Find({}));
 }
 
-TEST(CertificateRolesTest, AStarStandsForAnyAndKeepsTheName) {
+TEST(CertificateRolesTest, StarMatchesAnyName) {
   ScratchFolder scratch;
   const auto file = scratch.path() / "roles";
   WriteFileAtomic(file, "anna admin\n* read\n");
@@ -34,7 +34,7 @@ TEST(CertificateRolesTest, AStarStandsForAnyAndKeepsTheName) {
   EXPECT_EQ(roles.Find({"guest"})->name, "guest");
 }
 
-TEST(CertificateRolesTest, MistakesAreNamed) {
+TEST(CertificateRolesTest, NamesLineOfMistake) {
   const auto complaint = [](const std::string& text) -> std::string {
     try {
       ParseCertificateRoles(text, "roles");
@@ -43,15 +43,15 @@ TEST(CertificateRolesTest, MistakesAreNamed) {
     }
     return "";
   };
-  EXPECT_NE(complaint("anna").find("line 1: it must be NAME ROLE [PROJECT]"), std::string::npos);
+  EXPECT_NE(complaint("anna").find("line 1: expected NAME ROLE [PROJECT]"), std::string::npos);
   EXPECT_NE(complaint("\nanna king").find("line 2: there is no role 'king'"), std::string::npos);
   EXPECT_NE(complaint("Bert Smith read").find("line 1"), std::string::npos);
-  EXPECT_NE(complaint("anna read LAB").find("is no project"), std::string::npos);
+  EXPECT_NE(complaint("anna read LAB").find("is not a project name"), std::string::npos);
   ScratchFolder scratch;
   const auto file = scratch.path() / "roles";
   WriteFileAtomic(file, "* admin\n");
   ::chmod(file.c_str(), 0666);
-  EXPECT_THROW(CertificateRoles{file}, Error) << "anybody may write himself in";
+  EXPECT_THROW(CertificateRoles{file}, Error) << "writable by others";
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace {
 
 constexpr auto kLook = std::chrono::seconds(1);
 
-// Of its bytes and rights, as far as the disk tells.
+// Identity of the file's contents and permissions, from its metadata.
 std::string IdentityOf(const fs::path& file) {
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) return "";
@@ -39,11 +39,12 @@ GuardedFile::GuardedFile(const fs::path& file,
 std::string GuardedFile::Read() const {
   struct stat status {};
   if (::stat(file_.c_str(), &status) == 0 && (status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
-    throw Error(ErrorCode::kFailedPrecondition,
-                "others may write to the {} {}, and so let themselves in; chmod 600 {}",
-                what_,
-                file_.string(),
-                file_.string());
+    throw Error(
+        ErrorCode::kFailedPrecondition,
+        "the {} {} is writable by others, who could grant themselves access; run chmod 600 {}",
+        what_,
+        file_.string(),
+        file_.string());
   }
   return ReadFile(file_);
 }
@@ -57,14 +58,14 @@ void GuardedFile::ReadAgain() {
   identity_ = identity;
   try {
     take_(Read());
-    spdlog::info("{} was read again", file_.string());
+    spdlog::info("reloaded {}", file_.string());
   } catch (const Error& e) {
-    spdlog::error("the {} stays as it was: {}", what_, e.what());
+    spdlog::error("cannot reload the {}, keeping its previous contents: {}", what_, e.what());
   }
 }
 
 void GuardedFile::WithLatest(const std::function<void()>& use) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ReadAgain();
   use();
 }

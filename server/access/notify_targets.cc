@@ -12,7 +12,7 @@ namespace {
 
 constexpr size_t kMaxUrlBytes = 1000;
 
-// Nothing that one program reads as another's host or folder.
+// Returns whether all programs would read the same host and path from the URL.
 bool IsPlainUrl(const std::string& url) {
   const size_t scheme = url.starts_with("https://") ? 8 : url.starts_with("http://") ? 7 : 0;
   if (scheme == 0 || url.size() == scheme || url.size() > kMaxUrlBytes) return false;
@@ -50,7 +50,7 @@ void CheckNotifyUrl(const std::string& url, const std::vector<std::string>& allo
   }
   if (std::ranges::any_of(allowed, [&](const auto& one) { return Allows(one, url); })) return;
   throw Error(ErrorCode::kFailedPrecondition,
-              "this server may not send word to {}; who runs it allows addresses with "
+              "this server may not send notifications to {}; its operator allows addresses with "
               "serve --notify-allow",
               url.substr(0, 200));
 }

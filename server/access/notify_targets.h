@@ -1,4 +1,4 @@
-// Where the server may be told to send word that a job has ended.
+// Addresses to which the server may send notifications about finished jobs.
 #pragma once
 
 #include <string>
@@ -9,9 +9,9 @@ namespace color3d {
 // Throws Error{kInvalidArgument} unless it is "http[s]://HOST[:PORT][/PATH]" without a user.
 void CheckNotifyTarget(const std::string& allowed);
 
-// Throws Error{kInvalidArgument}, or kFailedPrecondition where none of `allowed` is the beginning
-// of the address, up to the end of a part of its path: whoever asks for a job must not choose whom
-// this machine talks to.
+// Throws Error{kInvalidArgument} for a bad URL, or kFailedPrecondition if none of `allowed` is a
+// prefix of it that ends at a path component. Submitters must not choose the hosts that this
+// machine connects to.
 void CheckNotifyUrl(const std::string& url, const std::vector<std::string>& allowed);
 
 }  // namespace color3d

@@ -16,7 +16,7 @@ bool IsAllowed(const std::string& url) {
   }
 }
 
-TEST(NotifyTargetsTest, OnlyWhereTheOperatorAllows) {
+TEST(NotifyTargetsTest, AllowsOnlyConfiguredTargets) {
   EXPECT_TRUE(IsAllowed("https://hooks.example.org"));
   EXPECT_TRUE(IsAllowed("https://hooks.example.org/a/b?c=d"));
   EXPECT_TRUE(IsAllowed("https://hooks.example.org?c=d"));
@@ -40,7 +40,7 @@ TEST(NotifyTargetsTest, OnlyWhereTheOperatorAllows) {
   EXPECT_FALSE(IsAllowed("https://hooks.example.org/" + std::string(1000, 'a')));
 }
 
-TEST(NotifyTargetsTest, WhatIsAllowedIsAnAddress) {
+TEST(NotifyTargetsTest, RejectsBadTargets) {
   EXPECT_NO_THROW(CheckNotifyTarget("https://[::1]:8443/hooks"));
   for (const char* target : {"", "*", "https://", "hooks.example.org", "https://a@b"}) {
     EXPECT_THROW(CheckNotifyTarget(target), Error) << target;

@@ -56,17 +56,17 @@ void Check(const TlsFiles& files) {
   }
   const Certificate certificate = ReadCertificate(files.certificate, "--tls-cert");
   if (X509_cmp_current_time(X509_get0_notBefore(certificate.get())) > 0) {
-    throw Unusable(files.certificate, "the certificate is not valid yet; look at the clock");
+    throw Unusable(files.certificate, "the certificate is not valid yet; check the clock");
   }
   if (X509_cmp_current_time(X509_get0_notAfter(certificate.get())) < 0) {
     throw Unusable(files.certificate, "the certificate has expired; renew it");
   }
   const std::string bytes = Read(files.key, "--tls-key");
   const Memory memory(bytes);
-  // Asks nobody for a passphrase.
+  // No prompt for a passphrase.
   const Key key(PEM_read_bio_PrivateKey(
       memory.bio, nullptr, [](char*, int, int, void*) { return 0; }, nullptr));
-  if (!key) throw Unusable(files.key, "holds no private key in PEM without a passphrase");
+  if (!key) throw Unusable(files.key, "is not an unencrypted private key in PEM");
   if (X509_check_private_key(certificate.get(), key.get()) != 1) {
     throw Unusable(files.key, "is not the key of --tls-cert");
   }
@@ -79,7 +79,7 @@ int64_t CertificateEnd(const fs::path& file) {
   const Certificate certificate = ReadCertificate(file, "--tls-cert");
   std::tm end{};
   if (ASN1_TIME_to_tm(X509_get0_notAfter(certificate.get()), &end) != 1) {
-    throw Unusable(file, "the certificate's end is no time");
+    throw Unusable(file, "the expiry time of the certificate is malformed");
   }
   return ::timegm(&end);
 }

@@ -1,4 +1,4 @@
-// The server's end of TLS.
+// TLS credentials of the server.
 #pragma once
 
 #include <grpcpp/security/server_credentials.h>
@@ -11,21 +11,21 @@
 namespace color3d {
 
 struct TlsFiles {
-  std::filesystem::path certificate;  // PEM, with the certificates between it and the root
-  std::filesystem::path key;          // PEM, without a passphrase
-  // PEM: clients must show a certificate that one of these signed. Empty: none is asked for.
+  std::filesystem::path certificate;  // PEM, including intermediate certificates
+  std::filesystem::path key;          // PEM, unencrypted
+  // PEM: clients must present a certificate signed by one of these. Empty: no client certificates.
   std::filesystem::path client_ca;
 
   bool empty() const { return certificate.empty() && key.empty() && client_ca.empty(); }
 };
 
-// The files are looked at again every `refresh`, a second at least: certificates are renewed
-// without a restart. Throws Error{kFailedPrecondition} that names the file and what is wrong with
-// it: not there, no PEM, a key of another certificate, or a certificate that is not valid now.
+// Reloads the files every `refresh` (at least 1 s), so that certificates can be renewed without a
+// restart. Throws Error{kFailedPrecondition} naming the file and the problem: missing, not PEM, key
+// of another certificate, certificate not valid now.
 std::shared_ptr<grpc::ServerCredentials> MakeServerCredentials(
     const TlsFiles& files, std::chrono::seconds refresh = std::chrono::seconds(10));
 
-// When the certificate in this file ends, seconds since the epoch. Throws as above.
+// Returns the expiry time of the certificate, seconds since the epoch. Throws as above.
 int64_t CertificateEnd(const std::filesystem::path& certificate);
 
 }  // namespace color3d

@@ -19,7 +19,7 @@ std::string Complaint(const TlsFiles& files) {
   return "";
 }
 
-TEST(Tls, FilesThatCannotWorkAreNamedAtOnce) {
+TEST(TlsTest, NamesBadFiles) {
   ScratchFolder scratch;
   testing::TestAuthority authority(scratch.path(), "authority");
   const auto good = authority.Issue("good"), other = authority.Issue("other");
@@ -37,7 +37,7 @@ TEST(Tls, FilesThatCannotWorkAreNamedAtOnce) {
   EXPECT_TRUE(has(Complaint({expired.certificate, expired.key, {}}), "has expired"));
   EXPECT_TRUE(has(Complaint({early.certificate, early.key, {}}), "not valid yet"));
   EXPECT_TRUE(has(Complaint({text, good.key, {}}), "no certificate"));
-  EXPECT_TRUE(has(Complaint({good.certificate, text, {}}), "no private key"));
+  EXPECT_TRUE(has(Complaint({good.certificate, text, {}}), "not an unencrypted private key"));
   EXPECT_TRUE(has(Complaint({good.certificate, good.key, text}), "no certificate"));
   EXPECT_TRUE(has(Complaint({scratch.path() / "none", good.key, {}}), "--tls-cert"));
 }

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::array<const char*, 3> kRoleNames = {"read", "submit", "admin"};
 constexpr size_t kTokenBytes = 32;
-constexpr char kPrefix[] = "c3d_";  // by which leak scanners know one
+constexpr char kPrefix[] = "c3d_";  // lets leak scanners detect tokens
 
 bool IsName(const std::string& name) {
   return !name.empty() && name.size() <= 64 &&
@@ -49,7 +49,7 @@ Role RoleFromName(std::string_view name) {
   for (size_t i = 0; i < kRoleNames.size(); ++i) {
     if (name == kRoleNames[i]) return static_cast<Role>(i);
   }
-  throw InvalidArgument("there is no role '{}'; say read, submit or admin", name);
+  throw InvalidArgument("there is no role '{}'; use read, submit or admin", name);
 }
 
 void CheckProject(const std::string& project) {
@@ -58,8 +58,9 @@ void CheckProject(const std::string& project) {
       (project.size() <= 40 && project[0] >= 'a' && project[0] <= 'z' &&
        project.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos);
   if (!good) {
-    throw InvalidArgument("'{}' is no project: 1 to 40 of a-z, 0-9 and '-', the first a letter",
-                          project.substr(0, 80));
+    throw InvalidArgument(
+        "'{}' is not a project name: 1 to 40 of a-z, 0-9 and '-', the first a letter",
+        project.substr(0, 80));
   }
 }
 
@@ -89,7 +90,7 @@ std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& f
     words >> role >> record.sha256 >> record.project;
     if (!IsName(record.name) || !IsSha256Hex(record.sha256) || words >> rest) {
       throw InvalidArgument(
-          "{}, line {}: it must be NAME ROLE SHA256 [PROJECT], as `color3d-server token` writes it",
+          "{}, line {}: expected NAME ROLE SHA256 [PROJECT], as `color3d-server token` writes it",
           file,
           number);
     }
@@ -105,10 +106,12 @@ std::string AddToken(const fs::path& file,
                      const std::string& project) {
   CheckProject(project);
   if (!IsName(name)) {
-    throw InvalidArgument("'{}' is no name: 1 to 64 of letters, digits, '.', '-', '_' and '@'",
-                          name.substr(0, 80));
+    throw InvalidArgument(
+        "'{}' is not a valid name: 1 to 64 of letters, digits, '.', '-', '_' and '@'",
+        name.substr(0, 80));
   }
-  // Through a link, so that the link stays; alone, so that two at once do not lose one.
+  // Follows a link, so that the link stays; under a lock, so that concurrent additions are all
+  // kept.
   std::error_code error;
   const fs::path real = fs::weakly_canonical(file, error);
   const fs::path& target = error ? file : real;
@@ -148,7 +151,7 @@ TokenBook::TokenBook(const fs::path& file)
         records_ = ParseTokens(bytes, file.string());
       }) {
   if (records_.empty()) {
-    spdlog::warn("{} names nobody: every call will be refused", file.string());
+    spdlog::warn("{} has no entries: every call will be refused", file.string());
   }
 }
 

@@ -1,5 +1,5 @@
-// Who may call the server: a file of names, roles and digests of tokens. The tokens themselves are
-// nowhere on the server. Functions are pure but for the files that they name.
+// Tokens of callers: a file of names, roles and digests. The server does not store the tokens
+// themselves. Functions are pure except for access to the named files.
 #pragma once
 
 #include <filesystem>
@@ -12,59 +12,58 @@
 
 namespace color3d {
 
-// Each may do what those before it may.
+// Each role includes the ones before it.
 enum class Role {
-  kRead,    // look at everything, download, watch
+  kRead,    // read, download, watch
   kSubmit,  // upload, create, change, cancel and delete
-  kAdmin,   // how the server runs
+  kAdmin,   // operate the server
 };
 const char* RoleName(Role role);
-// Throws Error{kInvalidArgument} that names the roles that there are.
+// Throws Error{kInvalidArgument} with the list of roles.
 Role RoleFromName(std::string_view name);
 
 struct TokenRecord {
-  std::string name;  // of who has it, for logs: 1 to 64 of letters, digits, '.', '-', '_', '@'
+  std::string name;  // of the holder, for logs: 1 to 64 of letters, digits, '.', '-', '_', '@'
   Role role = Role::kRead;
   std::string sha256;   // of the token
-  std::string project;  // that it belongs to; empty: the one of all without a project
+  std::string project;  // empty: the default project
 };
 
 // Throws Error{kInvalidArgument} unless it is empty or 1 to 40 of a-z, 0-9 and '-', the first a
 // letter.
 void CheckProject(const std::string& project);
-// The role that line `line` of `file` gives, in `project`. Throws as RoleFromName and CheckProject,
-// with the file and the line before the message.
+// Returns the role in line `line` of `file`. Throws as RoleFromName and CheckProject, with file and
+// line before the message.
 Role RoleOfLine(const std::string& role,
                 const std::string& project,
                 const std::string& file,
                 int line);
 
-// Lines "NAME ROLE SHA256 [PROJECT]"; empty ones and those that begin with '#' are skipped. Throws
-// Error{kInvalidArgument} naming file and line.
+// Parses lines "NAME ROLE SHA256 [PROJECT]"; empty lines and lines that begin with '#' are skipped.
+// Throws Error{kInvalidArgument} with file and line.
 std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& file);
 
-// A fresh token of 256 random bits, of which the record is added to the file, which keeps its owner
-// and rights; a new file can be read by its owner alone. Processes that add at the same time wait
-// for each other. Throws Error{kAlreadyExists} when the name is there.
+// Creates a token of 256 random bits and adds its record to the file, which keeps its owner and
+// permissions; a new file is readable by its owner only. Safe for concurrent processes. Throws
+// Error{kAlreadyExists} if the name exists.
 std::string AddToken(const std::filesystem::path& file,
                      const std::string& name,
                      Role role,
                      const std::string& project = "");
 
-// The file as it is now: read again when it has changed, at most once a second. A file that has
-// become unreadable or wrong changes nothing, and is said in the log. Thread-safe.
+// The present contents of the file: reloaded after changes, at most once a second. If the changed
+// file is unreadable or wrong, keeps the previous contents and logs an error. Thread-safe.
 class TokenBook {
  public:
-  // Throws Error for a file that cannot be read, is wrong, or that others than its owner may
-  // change.
+  // Throws Error if the file cannot be read, is wrong, or is writable by others than its owner.
   explicit TokenBook(const std::filesystem::path& file);
 
-  // Takes the same time whichever token it is.
+  // Takes constant time.
   std::optional<TokenRecord> Find(std::string_view token);
 
  private:
   std::vector<TokenRecord> records_;
-  GuardedFile file_;  // the last: it fills the records
+  GuardedFile file_;  // last, because it fills the records
 };
 
 }  // namespace color3d

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 class TokensTest : public testing::Test {
  protected:
   fs::path File() const { return scratch_.path() / "tokens"; }
-  // After more than the second for which a book trusts what it has read.
+  // Waits until a book checks the file again, after 1 s.
   static std::optional<TokenRecord> FindLater(TokenBook& book, const std::string& token) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1100));
     return book.Find(token);
@@ -26,12 +26,13 @@ class TokensTest : public testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(TokensTest, OneThatWasAddedIsFoundWithItsRole) {
+TEST_F(TokensTest, FindsAddedTokenWithRole) {
   const std::string anna = AddToken(File(), "anna", Role::kSubmit);
   const std::string bert = AddToken(File(), "bert@lab.org", Role::kRead);
   EXPECT_NE(anna, bert);
   EXPECT_EQ(anna.size(), 4u + 64u);
-  EXPECT_EQ(ReadFile(File()).find(anna.substr(4)), std::string::npos) << "only its digest is kept";
+  EXPECT_EQ(ReadFile(File()).find(anna.substr(4)), std::string::npos)
+      << "only its digest is stored";
   struct stat status {};
   ASSERT_EQ(::stat(File().c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777u, 0600u);
@@ -42,10 +43,10 @@ TEST_F(TokensTest, OneThatWasAddedIsFoundWithItsRole) {
   EXPECT_EQ(book.Find(bert)->role, Role::kRead);
   EXPECT_FALSE(book.Find(anna.substr(1)));
   EXPECT_FALSE(book.Find(""));
-  EXPECT_FALSE(book.Find(Sha256Hex(anna))) << "who reads the file has no token";
+  EXPECT_FALSE(book.Find(Sha256Hex(anna))) << "the digest is not a token";
 }
 
-TEST_F(TokensTest, ChangesAreHeededAndMistakesChangeNothing) {
+TEST_F(TokensTest, ReloadsChangesAndIgnoresMistakes) {
   const std::string anna = AddToken(File(), "anna", Role::kSubmit);
   TokenBook book(File());
   const std::string bert = AddToken(File(), "bert", Role::kAdmin);
@@ -57,11 +58,11 @@ TEST_F(TokensTest, ChangesAreHeededAndMistakesChangeNothing) {
   EXPECT_TRUE(FindLater(book, anna));
   WriteFileAtomic(File(), "bert admin " + Sha256Hex(bert) + "\n");
   ::chmod(File().c_str(), 0600);
-  EXPECT_FALSE(FindLater(book, anna)) << "her line was taken out";
+  EXPECT_FALSE(FindLater(book, anna)) << "the line was removed";
   EXPECT_TRUE(book.Find(bert));
 }
 
-TEST_F(TokensTest, WrongFilesAreNamed) {
+TEST_F(TokensTest, NamesMistakesInFile) {
   const auto message = [](const std::string& text) {
     try {
       ParseTokens(text, "tokens");
@@ -71,24 +72,25 @@ TEST_F(TokensTest, WrongFilesAreNamed) {
     return std::string();
   };
   const std::string digest = Sha256Hex("x");
-  EXPECT_EQ(ParseTokens("# who\n\nanna read " + digest + "\n", "tokens").size(), 1u);
+  EXPECT_EQ(ParseTokens("# users\n\nanna read " + digest + "\n", "tokens").size(), 1u);
   EXPECT_NE(message("anna read " + digest + "\nbert read 12\n").find("tokens, line 2"),
             std::string::npos);
   EXPECT_NE(message("anna king " + digest).find("read, submit or admin"), std::string::npos);
   EXPECT_EQ(ParseTokens("anna read " + digest + " attic", "tokens").at(0).project, "attic");
   EXPECT_NE(message("anna read " + digest + " attic more").find("line 1"), std::string::npos);
-  EXPECT_NE(message("anna read " + digest + " At@tic").find("is no project"), std::string::npos);
+  EXPECT_NE(message("anna read " + digest + " At@tic").find("is not a project name"),
+            std::string::npos);
   EXPECT_NE(message("an/na read " + digest).find("line 1"), std::string::npos);
   const std::string token = AddToken(File(), "anna", Role::kRead, "cellar");
   EXPECT_EQ(TokenBook{File()}.Find(token)->project, "cellar");
   EXPECT_THROW(AddToken(File(), "anna", Role::kAdmin), Error);
   EXPECT_THROW(AddToken(File(), "a b", Role::kAdmin), Error);
   ::chmod(File().c_str(), 0620);
-  EXPECT_THROW(TokenBook{File()}, Error) << "others may write to it";
+  EXPECT_THROW(TokenBook{File()}, Error) << "writable by others";
   EXPECT_THROW(TokenBook{scratch_.path() / "none"}, Error);
 }
 
-TEST_F(TokensTest, TheFileKeepsItsOwnerRightsAndPlace) {
+TEST_F(TokensTest, FileKeepsOwnerPermissionsAndLink) {
   const fs::path real = scratch_.path() / "real", link = scratch_.path() / "link";
   AddToken(real, "anna", Role::kSubmit);
   ::chmod(real.c_str(), 0640);
@@ -100,14 +102,14 @@ TEST_F(TokensTest, TheFileKeepsItsOwnerRightsAndPlace) {
   ASSERT_EQ(::lstat(real.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777u, 0640u);
   if (is_root) {
-    EXPECT_EQ(status.st_uid, 1234u) << "the service could not read its tokens any more";
+    EXPECT_EQ(status.st_uid, 1234u) << "the service must be able to read its tokens";
     EXPECT_EQ(status.st_gid, 1235u);
   }
   EXPECT_TRUE(fs::is_symlink(link)) << "the link was replaced by a file";
   EXPECT_EQ(ParseTokens(ReadFile(real), "real").size(), 2u);
 }
 
-TEST_F(TokensTest, AddedAtOnceNoneIsLost) {
+TEST_F(TokensTest, ConcurrentAdditionsAreKept) {
   constexpr int kThreads = 8, kEach = 8;
   std::vector<std::thread> threads;
   for (int i = 0; i < kThreads; ++i) {

@@ -47,7 +47,7 @@ BackendAddress ParseBackendAddress(const std::string& name, const std::string& a
   RequireHostPort(flag, result.target);
   if (!http && !result.tls && !IsLoopback(result.target)) {
     throw InvalidArgument(
-        "{} is another machine, and photos would travel in the clear; write {}{} (TLS), or {}{} in "
+        "{} is another machine, and photos would be sent unencrypted; use {}{} (TLS), or {}{} in "
         "a network you trust",
         flag,
         kHttps,

@@ -1,4 +1,4 @@
-// Where a model server of the user's listens, and how it is spoken to.
+// Addresses of model servers, and channels to them.
 #pragma once
 
 #include <grpcpp/channel.h>
@@ -13,13 +13,13 @@ struct BackendAddress {
   bool tls = false;
 };
 
-// HOST:PORT and unix:PATH are spoken to in the clear, and must be on this machine;
-// https://HOST:PORT with TLS, checked against the roots of the system (or those in the file that
-// GRPC_DEFAULT_SSL_ROOTS_FILE_PATH names); http://HOST:PORT in the clear anywhere: photos then
-// travel as they are. Throws Error{kInvalidArgument} naming the backend and what is wrong.
+// HOST:PORT and unix:PATH are unencrypted and must be on this machine. https://HOST:PORT uses TLS,
+// checked against the root certificates of the system (or of the file named by
+// GRPC_DEFAULT_SSL_ROOTS_FILE_PATH). http://HOST:PORT is unencrypted on any machine. Throws
+// Error{kInvalidArgument} naming the backend and the problem.
 BackendAddress ParseBackendAddress(const std::string& name, const std::string& address);
 
-// Does not connect yet. Messages beyond `max_message_bytes` are refused in both directions.
+// Does not connect yet. Messages above `max_message_bytes` are refused in both directions.
 std::shared_ptr<grpc::Channel> OpenBackend(const BackendAddress& address, int max_message_bytes);
 
 }  // namespace color3d

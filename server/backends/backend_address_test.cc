@@ -20,7 +20,7 @@ std::string Complaint(const std::string& address) {
   return "";
 }
 
-TEST(BackendAddress, SchemesSayHowItIsSpokenTo) {
+TEST(BackendAddressTest, ParsesSchemes) {
   EXPECT_EQ(ParseBackendAddress("b", "127.0.0.1:7").target, "127.0.0.1:7");
   EXPECT_FALSE(ParseBackendAddress("b", "unix:/run/x").tls);
   EXPECT_THAT(Complaint("unix:/" + std::string(107, 'x')), HasSubstr("108 bytes"));
@@ -30,12 +30,12 @@ TEST(BackendAddress, SchemesSayHowItIsSpokenTo) {
   EXPECT_EQ(ParseBackendAddress("b", "http://[2001:db8::1]:80").target, "[2001:db8::1]:80");
 }
 
-TEST(BackendAddress, OtherMachinesAreNotSpokenToInTheClearUnasked) {
+TEST(BackendAddressTest, OtherMachinesNeedScheme) {
   EXPECT_THAT(Complaint("gpu.example:443"),
               AllOf(HasSubstr("--backend b="), HasSubstr("https://gpu.example:443")));
 }
 
-TEST(BackendAddress, NonsenseIsNamed) {
+TEST(BackendAddressTest, RejectsBadAddresses) {
   for (const char* bad : {"",
                           "localhost",
                           "localhost:",

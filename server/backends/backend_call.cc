@@ -10,30 +10,30 @@ namespace {
 constexpr std::chrono::milliseconds kLook{50};
 constexpr size_t kMaxMessageBytes = 300;
 
-// What the backend says, as one line of plain text.
+// The backend's message as one line of plain text.
 std::string Quoted(const std::string& message) {
   std::string text = message.substr(0, kMaxMessageBytes);
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 32 || c > 126; }, ' ');
-  return text.empty() ? "it gives no reason" : "\"" + text + "\"";
+  return text.empty() ? "no reason given" : "\"" + text + "\"";
 }
 
 }  // namespace
 
 CancelWatch::CancelWatch(grpc::ClientContext& context, const CancellationToken& cancel) {
   thread_ = std::thread([this, &context, &cancel] {
-    std::unique_lock lock(mutex_);
-    while (!done_ && !cancel.IsCancelled()) wake_.wait_for(lock, kLook);
+    MutexLock lock(mutex_);
+    while (!done_ && !cancel.IsCancelled()) wake_.WaitFor(mutex_, kLook);
     if (!done_) context.TryCancel();
   });
 }
 
 CancelWatch::~CancelWatch() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     done_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   thread_.join();
 }
 
@@ -62,15 +62,17 @@ Error BackendError(const std::string& name, const std::string& target, const grp
                    "{} did not answer in time; retry with a smaller photo or a faster backend",
                    who);
     case grpc::StatusCode::CANCELLED:
-      return Error(ErrorCode::kUnavailable, "{} broke off: {}; retry the job", who, said);
+      return Error(ErrorCode::kUnavailable, "{} aborted the call: {}; retry the job", who, said);
     case grpc::StatusCode::UNIMPLEMENTED:
       return Error(ErrorCode::kFailedPrecondition,
                    "{} does not speak color3d.backend.v1.ColorBackend: {}",
                    who,
                    said);
     case grpc::StatusCode::RESOURCE_EXHAUSTED:
-      return Error(
-          ErrorCode::kFailedPrecondition, "{} sent or was sent too much at once: {}", who, said);
+      return Error(ErrorCode::kFailedPrecondition,
+                   "{} sent or received a message that is too large: {}",
+                   who,
+                   said);
     default:
       return Error(ErrorCode::kFailedPrecondition, "{} failed: {}", who, said);
   }

@@ -1,4 +1,4 @@
-// BackendInfo in the words of core. Internal to this folder.
+// Converts BackendInfo to types of core. Internal to this folder.
 #pragma once
 
 #include <string>

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kMaxInfoBytes = 64 << 10;
 
-// One question that is under way.
+// A pending GetInfo call.
 struct Question {
   std::string name;
   std::unique_ptr<backend::v1::ColorBackend::Stub> stub;
@@ -53,7 +53,7 @@ BackendProber::BackendProber(const std::map<std::string, std::string>& backends,
 BackendProber::~BackendProber() = default;
 
 std::map<std::string, ProbeAnswer> BackendProber::Probe() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
   if (!answers_.empty() && now - asked_ < keep_) return answers_;
   grpc::CompletionQueue queue;

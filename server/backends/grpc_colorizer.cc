@@ -19,7 +19,7 @@ using std::chrono::milliseconds;
 constexpr int64_t kProgressSteps = 1000;
 constexpr size_t kMaxTextBytes = 200;
 
-// Text that a backend chose, fit for a line of ours.
+// Text of a backend, made safe for a line of the log.
 std::string Plain(const std::string& text) {
   std::string plain = text.substr(0, kMaxTextBytes);
   std::replace_if(
@@ -97,7 +97,7 @@ class GrpcColorizer : public RemoteColorizer {
                                     const CancellationToken& cancel) override;
 
  private:
-  // Repeats `call` while the backend is unavailable. Throws what BackendError makes of its end.
+  // Repeats `call` while the backend is unavailable. Throws the error of its last status.
   void Retry(milliseconds deadline,
              const CancellationToken& cancel,
              const std::function<grpc::Status(grpc::ClientContext*)>& call);
@@ -168,7 +168,7 @@ RemoteInfo GrpcColorizer::GetInfo(ProgressObserver& progress, const Cancellation
 
 void GrpcColorizer::ReportShare(double share, int64_t* step, ProgressObserver& progress) const {
   if (!std::isfinite(share)) return;
-  // Only upwards: a bar that jumps tells nobody anything.
+  // Never decreases.
   *step = std::max<int64_t>(*step, std::llround(std::clamp(share, 0.0, 1.0) * kProgressSteps));
   progress.OnProgress(*step, kProgressSteps, "backend " + name_);
 }
@@ -176,7 +176,7 @@ void GrpcColorizer::ReportShare(double share, int64_t* step, ProgressObserver& p
 void GrpcColorizer::RequireSendable(const google::protobuf::Message& request) const {
   if (request.ByteSizeLong() <= static_cast<size_t>(options_.max_message_bytes)) return;
   throw InvalidArgument(
-      "the photo and what belongs to it take {} bytes; at most {} are sent to a backend: use "
+      "the photo and its references take {} bytes; at most {} are sent to a backend: use "
       "smaller photos",
       request.ByteSizeLong(),
       options_.max_message_bytes);
@@ -193,7 +193,7 @@ grpc::Status GrpcColorizer::ColorizeOnce(const backend::v1::ColorizeRequest& req
   std::string fault;
   while (fault.empty() && reader->Read(&update)) {
     if (!image->empty()) {
-      fault = "sent more after its picture";
+      fault = "sent more data after its picture";
     } else if (update.has_image()) {
       *image = std::move(*update.mutable_image());
       if (image->empty()) fault = "answered with an empty picture";

@@ -1,4 +1,4 @@
-// The client of model servers against servers that misbehave.
+// Client of model servers, against servers that misbehave.
 #include "server/backends/grpc_colorizer.h"
 
 #include <gmock/gmock.h>
@@ -143,7 +143,7 @@ class GrpcColorizerTest : public ::testing::Test {
   ErrorCode code_ = ErrorCode::kInternal;
 };
 
-TEST_F(GrpcColorizerTest, AskedAndAnswered) {
+TEST_F(GrpcColorizerTest, SendsRequestAndReturnsAnswer) {
   Start();
   const RemoteInfo info = Remote()->GetInfo(progress_, cancel_);
   EXPECT_EQ(info.description, "fake?backend 2 (MIT)");
@@ -154,7 +154,7 @@ TEST_F(GrpcColorizerTest, AskedAndAnswered) {
   EXPECT_EQ(progress_.steps, (std::vector<int64_t>{250, 500}));
 }
 
-TEST_F(GrpcColorizerTest, ADeadBackendIsTriedAFewTimesThenNamedWithTheRemedy) {
+TEST_F(GrpcColorizerTest, RetriesDeadBackendThenNamesRemedy) {
   Start();
   server_->Shutdown();
   server_.reset();
@@ -163,7 +163,7 @@ TEST_F(GrpcColorizerTest, ADeadBackendIsTriedAFewTimesThenNamedWithTheRemedy) {
   EXPECT_THAT(complaint, AllOf(HasSubstr("'fake'"), HasSubstr(Address()), HasSubstr("start it")));
 }
 
-TEST_F(GrpcColorizerTest, AShortOutageIsSurvivedWithTheSameKey) {
+TEST_F(GrpcColorizerTest, RetriesShortOutageWithSameKey) {
   backend_.behave = [this](grpc::ServerContext*, Writer* writer) {
     if (backend_.calls < 3) return grpc::Status(grpc::StatusCode::UNAVAILABLE, "restarting");
     writer->Write(Picture("late"));
@@ -175,7 +175,7 @@ TEST_F(GrpcColorizerTest, AShortOutageIsSurvivedWithTheSameKey) {
   EXPECT_EQ(backend_.key, "jobs/1/1");
 }
 
-TEST_F(GrpcColorizerTest, ASlowBackendMeetsTheDeadline) {
+TEST_F(GrpcColorizerTest, SlowBackendExceedsDeadline) {
   backend_.behave = [](grpc::ServerContext* context, Writer*) {
     while (!context->IsCancelled()) std::this_thread::sleep_for(milliseconds(10));
     return grpc::Status::CANCELLED;
@@ -188,7 +188,7 @@ TEST_F(GrpcColorizerTest, ASlowBackendMeetsTheDeadline) {
   EXPECT_LT(SteadyClock::now() - start, milliseconds(2'000));
 }
 
-TEST_F(GrpcColorizerTest, CancellingTheJobCancelsTheCall) {
+TEST_F(GrpcColorizerTest, CancelledJobCancelsCall) {
   std::atomic<bool> ended{false};
   backend_.behave = [&](grpc::ServerContext* context, Writer* writer) {
     while (!context->IsCancelled()) {
@@ -210,7 +210,7 @@ TEST_F(GrpcColorizerTest, CancellingTheJobCancelsTheCall) {
   EXPECT_TRUE(ended) << "the backend still works";
 }
 
-TEST_F(GrpcColorizerTest, OneThatLoadsItsModelIsWaitedForButNotForEver) {
+TEST_F(GrpcColorizerTest, WaitsForLoadingBackendWithLimit) {
   backend_.ready_after = 4;
   Start();
   EXPECT_EQ(Remote()->GetInfo(progress_, cancel_).max_pixels, 1'000'000);
@@ -222,17 +222,17 @@ TEST_F(GrpcColorizerTest, OneThatLoadsItsModelIsWaitedForButNotForEver) {
   EXPECT_EQ(code_, ErrorCode::kUnavailable);
 }
 
-TEST_F(GrpcColorizerTest, AHugeAnswerIsCutOff) {
+TEST_F(GrpcColorizerTest, RefusesHugeAnswer) {
   backend_.behave = [](grpc::ServerContext*, Writer* writer) {
     writer->Write(Picture(std::string(2 << 20, 'x')));
     return grpc::Status::OK;
   };
   Start();
-  EXPECT_THAT(Complaint([&] { Colorize(); }), HasSubstr("too much at once"));
+  EXPECT_THAT(Complaint([&] { Colorize(); }), HasSubstr("too large"));
   EXPECT_EQ(code_, ErrorCode::kFailedPrecondition);
 }
 
-TEST_F(GrpcColorizerTest, StreamsThatBreakTheRulesAreRefused) {
+TEST_F(GrpcColorizerTest, RefusesInvalidStreams) {
   Start();
   const auto complaint = [&](std::vector<backend::v1::ColorizeUpdate> updates) {
     backend_.behave = [updates](grpc::ServerContext*, Writer* writer) {
@@ -246,10 +246,10 @@ TEST_F(GrpcColorizerTest, StreamsThatBreakTheRulesAreRefused) {
   EXPECT_THAT(complaint({}), HasSubstr("without a picture"));
   EXPECT_THAT(complaint({Share(0.5)}), HasSubstr("without a picture"));
   EXPECT_THAT(complaint({Picture("")}), HasSubstr("empty picture"));
-  EXPECT_THAT(complaint({Picture("a"), Picture("b")}), HasSubstr("more after its picture"));
+  EXPECT_THAT(complaint({Picture("a"), Picture("b")}), HasSubstr("more data after its picture"));
 }
 
-TEST_F(GrpcColorizerTest, ProgressIsFiniteAndOnlyGrows) {
+TEST_F(GrpcColorizerTest, ProgressIsFiniteAndNeverDecreases) {
   backend_.behave = [](grpc::ServerContext*, Writer* writer) {
     for (const double share : {0.5, std::nan(""), 0.2, 1e300}) writer->Write(Share(share));
     writer->Write(Picture("png"));
@@ -260,7 +260,7 @@ TEST_F(GrpcColorizerTest, ProgressIsFiniteAndOnlyGrows) {
   EXPECT_EQ(progress_.steps, (std::vector<int64_t>{500, 500, 1000}));
 }
 
-TEST_F(GrpcColorizerTest, GeneratedPicturesAreCountedAndBounded) {
+TEST_F(GrpcColorizerTest, LimitsGeneratedPictures) {
   Start();
   RemoteGenerateRequest request;
   request.kind = capability::kNovelView;
@@ -281,7 +281,7 @@ TEST_F(GrpcColorizerTest, GeneratedPicturesAreCountedAndBounded) {
   EXPECT_THAT(Complaint(generate), HasSubstr("'film'"));
 }
 
-TEST_F(GrpcColorizerTest, ItsOwnErrorIsQuotedInOneLine) {
+TEST_F(GrpcColorizerTest, QuotesErrorOfBackendInOneLine) {
   backend_.behave = [](grpc::ServerContext*, Writer*) {
     return grpc::Status(grpc::StatusCode::INTERNAL, "CUDA out of\nmemory");
   };
@@ -289,7 +289,7 @@ TEST_F(GrpcColorizerTest, ItsOwnErrorIsQuotedInOneLine) {
   EXPECT_THAT(Complaint([&] { Colorize(); }), HasSubstr("\"CUDA out of memory\""));
 }
 
-TEST_F(GrpcColorizerTest, CallsArePartOfTheJobsTrace) {
+TEST_F(GrpcColorizerTest, CallsCarryTraceOfJob) {
   Start();
   Colorize();
   EXPECT_EQ(backend_.traceparent, "");
@@ -298,14 +298,14 @@ TEST_F(GrpcColorizerTest, CallsArePartOfTheJobsTrace) {
   EXPECT_EQ(backend_.traceparent, options_.traceparent);
 }
 
-TEST_F(GrpcColorizerTest, AnUnknownNameListsTheKnownOnes) {
+TEST_F(GrpcColorizerTest, UnknownNameListsKnownNames) {
   EXPECT_THAT(Complaint([] {
                 MakeGrpcColorizer({{"a", "127.0.0.1:1"}}, "b");
               }),
               AllOf(HasSubstr("no backend 'b'"), HasSubstr("it has: a")));
 }
 
-TEST_F(GrpcColorizerTest, TheProbeTellsReadyFromLoadingFromDead) {
+TEST_F(GrpcColorizerTest, ProbeDistinguishesReadyLoadingAndDead) {
   Start();
   BackendProber prober({{"up", Address()}, {"down", "127.0.0.1:1"}}, milliseconds(500));
   std::map<std::string, ProbeAnswer> answers = prober.Probe();
@@ -315,7 +315,7 @@ TEST_F(GrpcColorizerTest, TheProbeTellsReadyFromLoadingFromDead) {
   EXPECT_NE(answers["down"].problem, "");
   const int calls = backend_.info_calls;
   prober.Probe();
-  EXPECT_EQ(backend_.info_calls, calls) << "answers are kept a moment";
+  EXPECT_EQ(backend_.info_calls, calls) << "answers are cached for a moment";
   backend_.ready_after = 1 << 30;
   BackendProber fresh({{"up", Address()}});
   EXPECT_TRUE(fresh.Probe()["up"].reachable);

@@ -9,13 +9,13 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <mutex>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/memory.h"
+#include "core/base/mutex.h"
 #include "server/net/descriptors.h"
 
 namespace color3d {
@@ -36,12 +36,12 @@ ClientMetric Value(MetricType type, double value, const Labels& labels = {}) {
   return metric;
 }
 
-// Claims no jobs.
+// Such workers claim no jobs.
 bool IsForLivePictures(const WorkerRecord& worker) {
   return worker.worker_id.starts_with("inference-");
 }
 
-// Read when somebody asks.
+// Metrics that are read from the store at each scrape.
 class Sampled : public prometheus::Collectable {
  public:
   Sampled(JobStore& store,
@@ -63,15 +63,15 @@ class Sampled : public prometheus::Collectable {
       AddQueue(&families);
       AddServer(&families);
     } catch (const std::exception& e) {
-      spdlog::warn("the metrics cannot be read: {}", e.what());
+      spdlog::warn("cannot read the metrics: {}", e.what());
     }
     return families;
   }
 
  private:
-  // The jobs that ended since somebody asked last.
+  // Counts the jobs that have ended since the last scrape.
   void CountEnded() const {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     while (true) {
       const auto events = store_.EventsSince(revision_, kEventsAtOnce);
       std::vector<int64_t> ended;
@@ -100,7 +100,7 @@ class Sampled : public prometheus::Collectable {
 
   void AddQueue(std::vector<MetricFamily>* families) const {
     const JobCounts counts = store_.CountJobs();
-    MetricFamily jobs{"color3d_jobs", "Jobs that are not finished.", MetricType::Gauge, {}};
+    MetricFamily jobs{"color3d_jobs", "Number of unfinished jobs.", MetricType::Gauge, {}};
     for (const auto& [state, count] :
          std::vector<std::pair<std::string, int64_t>>{{"blocked", counts.blocked},
                                                       {"queued", counts.queued - counts.blocked},
@@ -113,16 +113,17 @@ class Sampled : public prometheus::Collectable {
     const int64_t oldest = counts.oldest_queued_ms;
     Add(families,
         "color3d_oldest_queued_seconds",
-        "How long the first of those jobs has waited for a worker.",
+        "Waiting time of the job at the front of the queue.",
         MetricType::Gauge,
         oldest > 0 ? static_cast<double>(std::max<int64_t>(now - oldest, 0)) / 1000.0 : 0.0);
     Add(families,
         "color3d_notifications",
-        "Ends of jobs of which word could not be delivered yet.",
+        "Number of notifications not delivered yet.",
         MetricType::Gauge,
         static_cast<double>(counts.notifications));
     const std::set<Hold> holds = store_.Holds();
-    MetricFamily held{"color3d_queue_held", "1: no job is begun.", MetricType::Gauge, {}};
+    MetricFamily held{
+        "color3d_queue_held", "1 if no job is started, by reason.", MetricType::Gauge, {}};
     held.metric.push_back(
         Value(MetricType::Gauge, holds.contains(Hold::kPaused), {{"reason", "paused"}}));
     held.metric.push_back(
@@ -141,14 +142,14 @@ class Sampled : public prometheus::Collectable {
     families->push_back(std::move(workers));
     Add(families,
         "color3d_worker_silence_seconds",
-        "Since the last sign of life of the worker that has been silent for longest.",
+        "Longest time since the last heartbeat of a worker.",
         MetricType::Gauge,
         silent);
   }
 
   void AddServer(std::vector<MetricFamily>* families) const {
     const ServerSample sample = sample_();
-    MetricFamily open{"color3d_open_streams", "Streams that are open.", MetricType::Gauge, {}};
+    MetricFamily open{"color3d_open_streams", "Number of open streams.", MetricType::Gauge, {}};
     open.metric.push_back(Value(MetricType::Gauge, sample.watches, {{"kind", "watch"}}));
     open.metric.push_back(Value(MetricType::Gauge, sample.downloads, {{"kind", "download"}}));
     open.metric.push_back(Value(MetricType::Gauge, sample.uploads, {{"kind", "upload"}}));
@@ -159,25 +160,26 @@ class Sampled : public prometheus::Collectable {
     const auto counter = [&](const char* name, const char* help, int64_t value) {
       Add(families, name, help, MetricType::Counter, static_cast<double>(value));
     };
-    gauge("color3d_live_pictures", "Live pictures not answered yet.", sample.live_pictures);
-    gauge("color3d_draining", "1: the server ends.", sample.draining);
+    gauge(
+        "color3d_live_pictures", "Number of live pictures not answered yet.", sample.live_pictures);
+    gauge("color3d_draining", "1 while the server drains.", sample.draining);
     gauge("color3d_disk_free_bytes",
-          "Free where the data folder is, less what uploads are promised.",
+          "Free space of the data folder, less the space reserved by uploads.",
           static_cast<double>(blobs_.FreeBytes()));
     gauge("color3d_disk_reserve_bytes",
-          "Below it uploads and jobs fail.",
+          "Free space below which uploads and jobs fail.",
           static_cast<double>(sample.reserve_bytes));
     gauge("color3d_memory_bytes",
-          "Resident, of the server without its workers.",
+          "Resident memory of the server process without its workers.",
           static_cast<double>(ResidentMemoryBytes()));
     gauge("color3d_open_descriptors",
-          "Of the server's process.",
+          "Number of open descriptors of the server process.",
           static_cast<double>(OpenDescriptors()));
     gauge("color3d_max_descriptors",
-          "That the server's process may have open.",
+          "Maximum number of open descriptors of the server process.",
           static_cast<double>(DescriptorLimit()));
     MetricFamily connections{
-        "color3d_connections", "Connections that are open.", MetricType::Gauge, {}};
+        "color3d_connections", "Number of open connections.", MetricType::Gauge, {}};
     const auto connection = [&](const char* state, int64_t count) {
       connections.metric.push_back(
           Value(MetricType::Gauge, static_cast<double>(count), {{"state", state}}));
@@ -186,29 +188,32 @@ class Sampled : public prometheus::Collectable {
     connection("silent", sample.silent_connections);
     families->push_back(std::move(connections));
     gauge("color3d_max_connections",
-          "That may be open.",
+          "Maximum number of open connections.",
           static_cast<double>(sample.max_connections));
     counter("color3d_connections_closed_total",
-            "Closed without a call to make room.",
+            "Connections without calls that were closed to make room.",
             sample.connections_closed);
     counter("color3d_connections_refused_total",
-            "Refused for want of room.",
+            "Connections refused for lack of room.",
             sample.connections_refused);
-    gauge("color3d_answering", "1: the server's own calls are answered.", sample.answering);
+    gauge("color3d_answering", "1 if the server answers its own calls.", sample.answering);
     if (sample.certificate_end_s > 0) {
       gauge("color3d_certificate_end_seconds",
-            "When the TLS certificate ends, since the epoch.",
+            "Expiry time of the TLS certificate, since the epoch.",
             static_cast<double>(sample.certificate_end_s));
     }
-    counter("color3d_attempts_lost_total",
-            "Attempts that ended with their worker.",
-            sample.attempts_lost);
-    counter("color3d_blobs_removed_total", "Blobs that nothing named.", sample.blobs_removed);
+    counter(
+        "color3d_attempts_lost_total", "Attempts lost with their worker.", sample.attempts_lost);
+    counter("color3d_blobs_removed_total",
+            "Unreferenced blobs removed by the garbage collector.",
+            sample.blobs_removed);
     counter("color3d_blobs_damaged_total",
-            "Blobs that the disk had damaged, as sweeps, downloads and uploads found.",
+            "Damaged blobs found by sweeps, downloads and uploads.",
             sample.blobs_damaged);
-    counter("color3d_jobs_expired_total", "Jobs deleted for their age.", sample.jobs_expired);
-    counter("color3d_sweeps_failed_total", "Sweeps that did not end well.", sample.sweeps_failed);
+    counter("color3d_jobs_expired_total",
+            "Jobs deleted after their retention period.",
+            sample.jobs_expired);
+    counter("color3d_sweeps_failed_total", "Failed sweeps.", sample.sweeps_failed);
   }
 
   JobStore& store_;
@@ -216,34 +221,36 @@ class Sampled : public prometheus::Collectable {
   const std::function<ServerSample()> sample_;
   prometheus::Family<prometheus::Counter>& jobs_ended_;
   prometheus::Family<prometheus::Counter>& job_seconds_;
-  mutable std::mutex mutex_;
-  mutable int64_t revision_;
+  mutable Mutex mutex_;
+  mutable int64_t revision_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace
 
 struct ServerMetrics::Parts {
   std::shared_ptr<prometheus::Registry> registry = std::make_shared<prometheus::Registry>();
-  prometheus::Family<prometheus::Counter>& calls = prometheus::BuildCounter()
-                                                       .Name("color3d_rpc_calls_total")
-                                                       .Help("Calls that have ended, by how.")
-                                                       .Register(*registry);
+  prometheus::Family<prometheus::Counter>& calls =
+      prometheus::BuildCounter()
+          .Name("color3d_rpc_calls_total")
+          .Help("Finished calls, by method and status code.")
+          .Register(*registry);
   prometheus::Family<prometheus::Histogram>& seconds =
       prometheus::BuildHistogram()
           .Name("color3d_rpc_seconds")
-          .Help("From a call's beginning to its end; streams as long as they were open.")
+          .Help("Duration of calls; of streams, the time they were open.")
           .Register(*registry);
-  prometheus::Family<prometheus::Counter>& jobs_ended = prometheus::BuildCounter()
-                                                            .Name("color3d_jobs_ended_total")
-                                                            .Help("Jobs that have ended.")
-                                                            .Register(*registry);
+  prometheus::Family<prometheus::Counter>& jobs_ended =
+      prometheus::BuildCounter()
+          .Name("color3d_jobs_ended_total")
+          .Help("Finished jobs, by kind and state.")
+          .Register(*registry);
   prometheus::Family<prometheus::Counter>& job_seconds =
       prometheus::BuildCounter()
           .Name("color3d_job_seconds_total")
-          .Help("Seconds of computing of jobs that have ended, over all their attempts.")
+          .Help("Computing time of finished jobs over all attempts, seconds.")
           .Register(*registry);
   std::shared_ptr<Sampled> sampled;
-  std::unique_ptr<prometheus::Exposer> exposer;  // the first to go: it reads the others
+  std::unique_ptr<prometheus::Exposer> exposer;  // destroyed first, because it reads the others
 };
 
 ServerMetrics::ServerMetrics(const std::string& version) : parts_(std::make_unique<Parts>()) {
@@ -268,7 +275,7 @@ int ServerMetrics::Listen(const std::string& address,
                           const BlobStore& blobs,
                           std::function<ServerSample()> sample) {
   try {
-    // Who says nothing is given up soon, and takes one of several threads meanwhile.
+    // Silent connections end soon, because each occupies one of few threads.
     parts_->exposer =
         std::make_unique<prometheus::Exposer>(std::vector<std::string>{"listening_ports",
                                                                        address,
@@ -278,7 +285,7 @@ int ServerMetrics::Listen(const std::string& address,
                                                                        "500",
                                                                        "enable_keep_alive",
                                                                        "no"});
-  } catch (const std::runtime_error&) {  // it does not say why
+  } catch (const std::runtime_error&) {  // the exception has no reason
     throw Error(
         ErrorCode::kFailedPrecondition,
         "cannot listen for --metrics-listen on {}: it must be HOST:PORT of this machine, and "
@@ -287,7 +294,7 @@ int ServerMetrics::Listen(const std::string& address,
   }
   parts_->sampled = std::make_shared<Sampled>(
       store, blobs, std::move(sample), parts_->jobs_ended, parts_->job_seconds);
-  // In this order: what is sampled counts the jobs that have ended.
+  // In this order, because Sampled counts ended jobs.
   parts_->exposer->RegisterCollectable(parts_->sampled);
   parts_->exposer->RegisterCollectable(parts_->registry);
   return parts_->exposer->GetListeningPorts().at(0);

@@ -1,5 +1,6 @@
-// What Prometheus reads of the server: https://prometheus.io/docs/instrumenting/exposition_formats/
-// Names begin with "color3d_"; labels are of our own making, never what users chose.
+// Metrics of the server for Prometheus:
+// https://prometheus.io/docs/instrumenting/exposition_formats/ Names begin with "color3d_"; label
+// values are never chosen by users.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +13,17 @@
 
 namespace color3d {
 
-// What the parts of the server say of themselves at a moment.
+// State of the server's parts at one time.
 struct ServerSample {
-  int watches = 0, downloads = 0, uploads = 0, live_pictures = 0;  // open
+  // Numbers of open streams and of pending pictures.
+  int watches = 0, downloads = 0, uploads = 0, live_pictures = 0;
   bool draining = false;
-  bool answering = true;  // its own calls, as a client's
+  bool answering = true;  // the server answers its own calls
   int64_t connections = 0, silent_connections = 0, max_connections = 0;
-  // Since the start.
+  // Counts since the start.
   int64_t attempts_lost = 0, blobs_removed = 0, blobs_damaged = 0, jobs_expired = 0,
           sweeps_failed = 0, connections_closed = 0, connections_refused = 0;
-  int64_t reserve_bytes = 0;      // of the disk, that is kept free
+  int64_t reserve_bytes = 0;      // free space to be kept
   int64_t certificate_end_s = 0;  // since the epoch; 0: no TLS
 };
 
@@ -36,13 +38,13 @@ class ServerMetrics {
   // `method`: "/color3d.v1.JobService/GetJob"; `code`: "OK", "NOT_FOUND", ...
   void CountCall(const std::string& method, const std::string& code, double seconds);
 
-  // Answers GET /metrics on HOST:PORT (port 0: any free one), from stores that outlive this object.
-  // Returns the port. Throws Error{kFailedPrecondition} when the address cannot be used.
+  // Serves GET /metrics on HOST:PORT (port 0: any free port), from stores that outlive this object.
+  // Returns the port. Throws Error{kFailedPrecondition} if the address cannot be used.
   int Listen(const std::string& address,
              JobStore& store,
              const BlobStore& blobs,
              std::function<ServerSample()> sample);
-  // Before what `sample` looks at is gone.
+  // Must be called before objects used by `sample` are destroyed.
   void StopListening();
 
  private:

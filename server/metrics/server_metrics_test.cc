@@ -16,7 +16,7 @@ namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 
-// The answer to one GET, with its headers.
+// Returns the answer to one GET, including its headers.
 std::string Get(int port, const std::string& path) {
   const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
@@ -41,7 +41,7 @@ class ServerMetricsTest : public JobStoreTest {
   int Listen() {
     return metrics_.Listen("127.0.0.1:0", *store_, blobs_, [this] { return sample_; });
   }
-  // Value of a line "NAME{LABELS} VALUE"; -1: there is none.
+  // Returns the value of a line "NAME{LABELS} VALUE", or -1 if there is none.
   static double ValueOf(const std::string& text, const std::string& series) {
     const size_t at = text.find("\n" + series + " ");
     return at == std::string::npos ? -1.0 : std::stod(text.substr(at + series.size() + 2));
@@ -52,7 +52,7 @@ class ServerMetricsTest : public JobStoreTest {
   ServerMetrics metrics_{"1.2.3"};
 };
 
-TEST_F(ServerMetricsTest, TellsOfQueueCallsAndEnds) {
+TEST_F(ServerMetricsTest, ReportsQueueCallsAndFinishedJobs) {
   const int port = Listen();
   CreateSingle();
   Succeed(ClaimOne());
@@ -65,7 +65,7 @@ TEST_F(ServerMetricsTest, TellsOfQueueCallsAndEnds) {
   metrics_.CountCall("/color3d.v1.JobService/GetJob", "NOT_FOUND", 0.2);
   sample_.blobs_damaged = 7;
   sample_.certificate_end_s = 1'900'000'000;
-  for (int look = 0; look < 2; ++look) {  // to look twice counts nothing twice
+  for (int look = 0; look < 2; ++look) {  // a second scrape counts nothing twice
     const std::string text = Get(port, "/metrics");
     EXPECT_EQ(ValueOf(text, "color3d_jobs{state=\"queued\"}"), 1) << text;
     EXPECT_EQ(ValueOf(text, "color3d_jobs{state=\"blocked\"}"), 3);
@@ -73,7 +73,8 @@ TEST_F(ServerMetricsTest, TellsOfQueueCallsAndEnds) {
     EXPECT_EQ(ValueOf(text, "color3d_jobs_ended_total{kind=\"single\",state=\"FAILED\"}"), 1);
     EXPECT_EQ(ValueOf(text, "color3d_queue_held{reason=\"paused\"}"), 1);
     EXPECT_EQ(ValueOf(text, "color3d_workers{state=\"idle\"}"), 1);
-    EXPECT_EQ(ValueOf(text, "color3d_workers{state=\"live\"}"), 1) << "it claims no jobs";
+    EXPECT_EQ(ValueOf(text, "color3d_workers{state=\"live\"}"), 1)
+        << "inference workers claim no jobs";
     EXPECT_EQ(ValueOf(text, "color3d_blobs_damaged_total"), 7);
     EXPECT_EQ(ValueOf(text, "color3d_build_info{version=\"1.2.3\"}"), 1);
     EXPECT_EQ(ValueOf(text,
@@ -88,8 +89,8 @@ TEST_F(ServerMetricsTest, TellsOfQueueCallsAndEnds) {
   EXPECT_EQ(Get(port, "/metrics"), "");
 }
 
-// Connections that say nothing are given up one after the other, and the next who asks is answered.
-TEST_F(ServerMetricsTest, ConnectionsThatSayNothingDoNotShutItOut) {
+// Silent connections are closed one after the other, and the next scrape is answered.
+TEST_F(ServerMetricsTest, SilentConnectionsDoNotBlockScrapes) {
   const int port = Listen();
   std::vector<int> silent;
   for (int i = 0; i < 100; ++i) {
@@ -107,7 +108,7 @@ TEST_F(ServerMetricsTest, ConnectionsThatSayNothingDoNotShutItOut) {
   EXPECT_NE(Get(port, "/metrics").find("color3d_jobs"), std::string::npos);
 }
 
-TEST_F(ServerMetricsTest, AnAddressThatIsTakenIsNamed) {
+TEST_F(ServerMetricsTest, NamesAddressInUse) {
   const int port = Listen();
   ServerMetrics other("1");
   const std::string address = "127.0.0.1:" + std::to_string(port);
@@ -119,8 +120,8 @@ TEST_F(ServerMetricsTest, AnAddressThatIsTakenIsNamed) {
   }
 }
 
-// What dashboard and alerts ask for is there under these names.
-TEST_F(ServerMetricsTest, DashboardAndAlertsNameWhatThereIs) {
+// All metrics used by dashboard and alerts exist.
+TEST_F(ServerMetricsTest, MetricsOfDashboardAndAlertsExist) {
   CreateSingle();
   const int port = Listen();
   Succeed(ClaimOne());

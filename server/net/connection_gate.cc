@@ -23,18 +23,18 @@ namespace {
 
 constexpr int kLookMs = 1'000;
 constexpr auto kRefusalLog = std::chrono::seconds(10);
-constexpr auto kPause = std::chrono::milliseconds(20);  // when the machine has no descriptors left
-constexpr int kAtOnce = 64;      // connections that are accepted before others are looked at
-constexpr int kCloseShare = 16;  // this part of all is closed at once to make room
+constexpr auto kPause = std::chrono::milliseconds(20);  // when the machine has no free descriptor
+constexpr int kAtOnce = 64;      // connections accepted before others are served
+constexpr int kCloseShare = 16;  // 1/kCloseShare of all connections are closed at once
 
-// 0 when the number is free.
+// Returns 0 if the descriptor is not in use.
 ino_t InodeOf(int fd) {
   struct stat status {};
   return ::fstat(fd, &status) == 0 && S_ISSOCK(status.st_mode) ? status.st_ino : 0;
 }
 
-// The socket that had this number and inode ends for both sides; nothing happens to anything else
-// that may have the number by now.
+// Shuts down the socket with this descriptor and inode, if it still exists. Other uses of the
+// descriptor are not affected.
 void EndSocket(int fd, ino_t inode) {
   const int own = ::fcntl(fd, F_DUPFD_CLOEXEC, 0);
   if (own < 0) return;
@@ -117,12 +117,12 @@ void ConnectionGate::Stop() {
 }
 
 void ConnectionGate::BeginCall(const std::string& peer) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++calls_[peer].open;
 }
 
 void ConnectionGate::EndCall(const std::string& peer) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto calls = calls_.find(peer);
   if (calls == calls_.end()) return;
   calls->second.open = std::max(0, calls->second.open - 1);
@@ -130,12 +130,12 @@ void ConnectionGate::EndCall(const std::string& peer) {
 }
 
 ConnectionGate::Counts ConnectionGate::counts() const {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 
 void ConnectionGate::Publish() {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   counts_.open = static_cast<int64_t>(open_.size());
   counts_.silent = static_cast<int64_t>(silent_.size());
 }
@@ -156,7 +156,7 @@ void ConnectionGate::Loop() {
       CloseLongSilent();
       ForgetClosed();
     }
-    // After those that said something: whoever waits for long goes before whoever comes.
+    // Connections that have sent bytes come first, so that long waiting ones precede new ones.
     bool is_short = false;
     for (const int fd : listeners_) is_short = !Accept(fd) || is_short;
     Publish();
@@ -169,16 +169,16 @@ bool ConnectionGate::Accept(int listener) {
     const int fd = ::accept4(listener, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0 && (errno == ECONNABORTED || errno == EINTR)) continue;
     if (fd < 0 && (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)) {
-      // Not for ever, as gRPC would: until something is closed.
+      // A pause only, whereas gRPC would stop listening for good.
       LogRefusal(std::strerror(errno));
       CloseSomething();
       return false;
     }
-    if (fd < 0) return true;  // EAGAIN: nobody waits
+    if (fd < 0) return true;  // EAGAIN: no pending connection
     if (!MakeRoom(fd)) {
-      LogRefusal("all that may be open have calls");
+      LogRefusal("all open connections have calls");
       {
-        std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         ++counts_.refused;
       }
       ::close(fd);
@@ -201,7 +201,7 @@ bool ConnectionGate::Accept(int listener) {
   return true;
 }
 
-// Most clients speak at once, be it HTTP/2 or TLS.
+// Most clients send bytes at once, with HTTP/2 and with TLS.
 void ConnectionGate::OnBytes(int fd) {
   const auto found = silent_of_.find(fd);
   if (found == silent_of_.end()) return;
@@ -237,7 +237,7 @@ void ConnectionGate::ForgetClosed() {
   std::erase_if(open_, [](const Connection& one) { return InodeOf(one.fd) != one.inode; });
   std::unordered_set<std::string> peers;
   for (const Connection& one : open_) peers.insert(one.peer);
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(calls_, [&](const auto& entry) {
     return entry.second.open == 0 && !peers.contains(entry.first);
   });
@@ -256,12 +256,12 @@ bool ConnectionGate::MakeRoom(int fd) {
 bool ConnectionGate::CloseSomething() {
   if (silent_.empty()) return CloseIdle();
   CloseSilent(silent_.begin());
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   ++counts_.closed;
   return true;
 }
 
-// Those that never had a call first, then those that have had none for longest.
+// Closes connections that never had a call first, then those idle for longest.
 bool ConnectionGate::CloseIdle() {
   struct Idle {
     bool had_calls;
@@ -269,7 +269,7 @@ bool ConnectionGate::CloseIdle() {
     size_t index;
   };
   std::vector<Idle> idle;
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   for (size_t i = 0; i < open_.size(); ++i) {
     const auto calls = calls_.find(open_[i].peer);
     if (calls == calls_.end()) {
@@ -283,7 +283,7 @@ bool ConnectionGate::CloseIdle() {
   });
   idle.resize(std::min(idle.size(), open_.size() / kCloseShare + 1));
   counts_.closed += static_cast<int64_t>(idle.size());
-  lock.unlock();
+  lock.Unlock();
   std::ranges::sort(idle, std::ranges::greater(), &Idle::index);
   for (const Idle& one : idle) {
     EndSocket(open_[one.index].fd, open_[one.index].inode);
@@ -297,9 +297,8 @@ void ConnectionGate::LogRefusal(const char* why) {
   if (last_refusal_ != SteadyClock::time_point() && now - last_refusal_ < kRefusalLog) return;
   last_refusal_ = now;
   spdlog::warn(
-      "connections are refused: {}; {} are open, {} may be: raise --max-connections, or the limit "
-      "of "
-      "open files (ulimit -n, LimitNOFILE)",
+      "connections are refused: {}; {} of at most {} are open: raise --max-connections, or the "
+      "limit of open files (ulimit -n, LimitNOFILE)",
       why,
       open_.size(),
       limits_.max_connections);

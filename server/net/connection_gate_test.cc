@@ -17,7 +17,7 @@ namespace color3d {
 namespace {
 using std::chrono::milliseconds;
 
-constexpr milliseconds kSoon{5'000};  // much longer than anything here takes
+constexpr milliseconds kSoon{5'000};  // much longer than any step here takes
 
 class GateTest : public ::testing::Test {
  protected:
@@ -34,7 +34,7 @@ class GateTest : public ::testing::Test {
     });
     gate_->Open();
   }
-  // A connected socket, which says `text`.
+  // Returns a connected socket that has sent `text`.
   int Connect(const std::string& text) {
     const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     sockaddr_in address{};
@@ -52,7 +52,7 @@ class GateTest : public ::testing::Test {
     std::unique_lock lock(mutex_);
     return wake_.wait_for(lock, kSoon, [&] { return handed_on_.size() >= count; });
   }
-  // Whether the server's side ends it within that time.
+  // Returns whether the server closes the connection within this time.
   static bool IsEnded(int client, milliseconds within) {
     pollfd look{client, POLLRDHUP, 0};
     return ::poll(&look, 1, static_cast<int>(within.count())) == 1;
@@ -71,7 +71,7 @@ class GateTest : public ::testing::Test {
   std::unique_ptr<ConnectionGate> gate_;
 };
 
-TEST_F(GateTest, WhoSaysNothingMakesRoomForWhoDoes) {
+TEST_F(GateTest, ClosesSilentConnectionsToMakeRoom) {
   GateLimits limits;
   limits.max_connections = 16;
   Open(limits);
@@ -84,7 +84,7 @@ TEST_F(GateTest, WhoSaysNothingMakesRoomForWhoDoes) {
   EXPECT_LE(gate_->counts().silent + gate_->counts().open, 16);
 }
 
-TEST_F(GateTest, WhileFewAreOpenConnectionsAreHandedOnBeforeTheirFirstBytes) {
+TEST_F(GateTest, HandsOnBeforeFirstBytesWhileFewAreOpen) {
   GateLimits limits;
   limits.handed_on_at_once = 2;
   Open(limits);
@@ -92,10 +92,10 @@ TEST_F(GateTest, WhileFewAreOpenConnectionsAreHandedOnBeforeTheirFirstBytes) {
   EXPECT_TRUE(AreHandedOn(2));
   Connect("");
   EXPECT_FALSE(IsEnded(Connect("x"), milliseconds(0)));
-  EXPECT_TRUE(AreHandedOn(3)) << "the one that spoke, not the one that is silent";
+  EXPECT_TRUE(AreHandedOn(3)) << "the connection that sent bytes, not the silent one";
 }
 
-TEST_F(GateTest, SilenceEnds) {
+TEST_F(GateTest, ClosesSilentConnections) {
   GateLimits limits;
   limits.silence = milliseconds(100);
   Open(limits);
@@ -103,7 +103,7 @@ TEST_F(GateTest, SilenceEnds) {
   EXPECT_TRUE(IsEnded(silent, kSoon));
 }
 
-TEST_F(GateTest, ConnectionsWithoutACallMakeRoomAndThoseWithOneStay) {
+TEST_F(GateTest, ClosesOnlyConnectionsWithoutCall) {
   GateLimits limits;
   limits.max_connections = 8;
   Open(limits);
@@ -118,7 +118,7 @@ TEST_F(GateTest, ConnectionsWithoutACallMakeRoomAndThoseWithOneStay) {
   EXPECT_TRUE(IsEnded(idle, kSoon));
   EXPECT_FALSE(IsEnded(busy, milliseconds(0)));
   EXPECT_EQ(gate_->counts().refused, 0);
-  // Its call is over: it goes like the others, once it has been idle for longest.
+  // Its call has ended: it is closed like the others, once it has been idle for longest.
   gate_->EndCall(NameOf(busy));
   for (size_t i = 0; i < 40 && !IsEnded(busy, milliseconds(1)); ++i) {
     Connect("x");
@@ -129,7 +129,7 @@ TEST_F(GateTest, ConnectionsWithoutACallMakeRoomAndThoseWithOneStay) {
   EXPECT_TRUE(IsEnded(busy, kSoon));
 }
 
-TEST_F(GateTest, WhenAllHaveCallsTheNextIsRefusedUntilOneEnds) {
+TEST_F(GateTest, RefusesWhenAllConnectionsHaveCalls) {
   GateLimits limits;
   limits.max_connections = 4;
   Open(limits);
@@ -144,10 +144,10 @@ TEST_F(GateTest, WhenAllHaveCallsTheNextIsRefusedUntilOneEnds) {
   handed_on_.erase(handed_on_.begin());
   gate_->EndCall(NameOf(clients_.front()));
   Connect("x");
-  EXPECT_TRUE(AreHandedOn(4)) << "what was closed is not counted any more";
+  EXPECT_TRUE(AreHandedOn(4)) << "closed connections are not counted";
 }
 
-TEST(PeerNameTest, IsWhatGrpcSays) {
+TEST(PeerNameTest, EqualsNameOfGrpc) {
   sockaddr_storage address{};
   auto& v4 = reinterpret_cast<sockaddr_in&>(address);
   v4.sin_family = AF_INET;
@@ -166,7 +166,7 @@ TEST(PeerNameTest, IsWhatGrpcSays) {
   EXPECT_EQ(PeerName(address), "unix:");
 }
 
-TEST(GateLimitsTest, KeepAReserveOfDescriptors) {
+TEST(GateLimitsTest, KeepsReserveOfDescriptors) {
   const GateLimits few = GateLimitsFor(1024, 512, 4096);
   EXPECT_EQ(few.max_connections, 512);
   EXPECT_LT(few.highest_descriptor, 1000);

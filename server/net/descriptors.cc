@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-// "Unlimited" and what no machine has.
+// Also stands for "unlimited".
 constexpr rlim_t kMost = std::numeric_limits<int32_t>::max();
 
 }  // namespace

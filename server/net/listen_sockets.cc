@@ -22,9 +22,9 @@
 namespace color3d {
 namespace {
 
-constexpr int kBacklog = 4096;  // the kernel takes as many as net.core.somaxconn says
+constexpr int kBacklog = 4096;  // capped by the kernel at net.core.somaxconn
 constexpr int kType = SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC;
-constexpr unsigned kUserTimeoutMs = 20'000;  // of bytes that the other side does not acknowledge
+constexpr unsigned kUserTimeoutMs = 20'000;  // for unacknowledged bytes
 constexpr int kPortTries = 8;
 
 Error CannotListen(const std::string& address, const std::string& why) {
@@ -53,7 +53,7 @@ void SetPort(addrinfo* where, int port) {
       htons(static_cast<uint16_t>(port));
 }
 
-// What a socket sets, those that it accepts have, too. -1 with errno.
+// Accepted sockets inherit the options. Returns -1 and sets errno on failure.
 int Listen(const addrinfo& where, bool both_families) {
   const int fd = ::socket(where.ai_family, kType, 0);
   if (fd < 0) return -1;
@@ -72,7 +72,7 @@ int Listen(const addrinfo& where, bool both_families) {
   return -1;
 }
 
-// Whether somebody answers there; throws nothing.
+// Returns whether a server accepts connections there; does not throw.
 bool IsAlive(const sockaddr_un& address) {
   const int fd = ::socket(AF_UNIX, kType, 0);
   if (fd < 0) return true;
@@ -98,13 +98,13 @@ ListenSockets::~ListenSockets() { Close(); }
 
 void ListenSockets::Close() {
   struct stat status {};
-  // Not one that somebody put there since.
+  // Keeps a socket that another server has created since.
   if (inode_ != 0 && ::stat(path_.c_str(), &status) == 0 && status.st_ino == inode_) {
     ::unlink(path_.c_str());
   }
   for (const int fd : descriptors_) ::close(fd);
   descriptors_.clear();
-  // The lock's file stays: who waits for it must not hold one that has no name any more.
+  // The lock file stays, so that a waiting server does not lock a deleted file.
   if (lock_ >= 0) ::close(lock_);
   lock_ = -1;
 }
@@ -117,12 +117,12 @@ void ListenSockets::ListenOnUnix() {
   if (path_.empty()) throw CannotListen(address_, "the path is empty");
   if (path_.size() >= sizeof(address.sun_path)) {
     throw CannotListen(address_,
-                       fmt::format("the path of a socket may have {} bytes, this one has {}",
+                       fmt::format("the path has {1} bytes; at most {0} are allowed",
                                    sizeof(address.sun_path) - 1,
                                    path_.size()));
   }
   std::memcpy(address.sun_path, path_.data(), path_.size());
-  // One of two that start at once: to look whether the other lives is not enough.
+  // Of two servers that start at once, one gets the lock; probing the socket would not suffice.
   lock_ = ::open((path_ + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) throw CannotListen(address_, std::strerror(errno));
   struct stat status {};
@@ -132,10 +132,11 @@ void ListenSockets::ListenOnUnix() {
     throw CannotListen(address_, "another server listens there");
   }
   if (is_there && !S_ISSOCK(status.st_mode)) {
-    throw CannotListen(address_, "there is a file that is no socket");
+    throw CannotListen(address_, "the path is a file but not a socket");
   }
   if (is_there && ::unlink(path_.c_str()) != 0) {
-    throw CannotListen(address_, fmt::format("the old socket stays: {}", std::strerror(errno)));
+    throw CannotListen(address_,
+                       fmt::format("the old socket cannot be removed: {}", std::strerror(errno)));
   }
   const int fd = ::socket(AF_UNIX, kType, 0);
   if (fd < 0) throw CannotListen(address_, std::strerror(errno));
@@ -153,7 +154,7 @@ void ListenSockets::ListenOnTcp() {
   int port = 0, error = 0;
   for (int tries = 0; port == 0 && tries < kPortTries; ++tries) {
     port = BindAll(everywhere ? "::" : parts.host, parts.port, everywhere, &error);
-    // A machine without IPv6.
+    // The machine has no IPv6.
     if (port == 0 && everywhere) port = BindAll("0.0.0.0", parts.port, false, &error);
     if (error != EADDRINUSE || parts.port != "0") break;
   }
@@ -175,7 +176,7 @@ int ListenSockets::BindAll(const std::string& host,
   int bound_port = 0;
   *error = 0;
   for (addrinfo* where = first; where != nullptr; where = where->ai_next) {
-    if (bound_port != 0) SetPort(where, bound_port);  // the same one on each address
+    if (bound_port != 0) SetPort(where, bound_port);  // same port on each address
     const int fd = Listen(*where, both_families);
     if (fd >= 0) {
       descriptors_.push_back(fd);
@@ -183,7 +184,7 @@ int ListenSockets::BindAll(const std::string& host,
       continue;
     }
     *error = errno;
-    if (*error != EADDRINUSE) continue;  // a family that this machine does not have
+    if (*error != EADDRINUSE) continue;  // address family not available on this machine
     for (const int other : descriptors_) ::close(other);
     descriptors_.clear();
     return 0;

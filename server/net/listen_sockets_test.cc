@@ -51,7 +51,7 @@ bool ConnectsLoopback(const std::string& listening) {
   return Connects(reinterpret_cast<const sockaddr*>(&address), sizeof(address));
 }
 
-TEST(ListenSocketsTest, TcpAddressesAreBoundOnce) {
+TEST(ListenSocketsTest, BindsTcpAddressOnce) {
   for (const char* address : {"127.0.0.1:0", "localhost:0", "0.0.0.0:0"}) {
     SCOPED_TRACE(address);
     const ListenSockets sockets(address);
@@ -63,20 +63,20 @@ TEST(ListenSocketsTest, TcpAddressesAreBoundOnce) {
   EXPECT_THAT(Complaint("no.such.host.invalid:1"), HasSubstr("choose another with --listen"));
 }
 
-TEST(ListenSocketsTest, AUnixSocketOfALivingServerIsNotTakenOver) {
+TEST(ListenSocketsTest, KeepsUnixSocketOfRunningServer) {
   const ScratchFolder scratch;
   const fs::path path = scratch.path() / "s";
   {
     const ListenSockets first("unix:" + path.string());
     EXPECT_THAT(Complaint("unix:" + path.string()), HasSubstr("another server listens there"));
-    EXPECT_TRUE(ConnectsUnix(path)) << "the first lost its socket";
+    EXPECT_TRUE(ConnectsUnix(path)) << "the first server lost its socket";
   }
-  EXPECT_FALSE(fs::exists(path)) << "it is removed at the end";
+  EXPECT_FALSE(fs::exists(path)) << "removed by the destructor";
   EXPECT_EQ(Complaint("unix:" + path.string()), "");
 }
 
-// Of another program, or of an older release, which know nothing of the lock.
-TEST(ListenSocketsTest, AStaleUnixSocketIsReplacedAndALivingOneIsNot) {
+// Sockets of other programs or older releases, which do not use the lock.
+TEST(ListenSocketsTest, ReplacesOnlyStaleUnixSocket) {
   const ScratchFolder scratch;
   const fs::path path = scratch.path() / "s";
   sockaddr_un address{};
@@ -87,19 +87,19 @@ TEST(ListenSocketsTest, AStaleUnixSocketIsReplacedAndALivingOneIsNot) {
   ASSERT_EQ(::listen(fd, 1), 0);
   EXPECT_THAT(Complaint("unix:" + path.string()), HasSubstr("another server listens there"));
   EXPECT_TRUE(ConnectsUnix(path));
-  ::close(fd);  // as if it was killed
+  ::close(fd);  // as if the server was killed
   const ListenSockets sockets("unix:" + path.string());
   EXPECT_TRUE(ConnectsUnix(path));
 }
 
-TEST(ListenSocketsTest, FilesAndLongPathsAreNamed) {
+TEST(ListenSocketsTest, RefusesFilesAndLongPaths) {
   const ScratchFolder scratch;
   const fs::path file = scratch.path() / "file";
   WriteFileAtomic(file, "mine");
-  EXPECT_THAT(Complaint("unix:" + file.string()), HasSubstr("no socket"));
+  EXPECT_THAT(Complaint("unix:" + file.string()), HasSubstr("not a socket"));
   EXPECT_EQ(ReadFile(file), "mine");
   EXPECT_THAT(Complaint("unix:" + (scratch.path() / std::string(120, 'x')).string()),
-              HasSubstr("may have 107 bytes"));
+              HasSubstr("at most 107 are allowed"));
   EXPECT_THAT(Complaint("unix:" + (scratch.path() / "none" / "s").string()),
               HasSubstr("No such file"));
   EXPECT_THAT(Complaint("unix:"), HasSubstr("empty"));

@@ -19,7 +19,7 @@ struct CurlDeleter {
 
 size_t Discard(char*, size_t size, size_t count, void*) { return size * count; }
 
-// Where a socket that listens everywhere is reached.
+// Host under which a socket that listens on all interfaces is reached.
 std::string HostOf(const std::string& address) {
   const HostPort parts = SplitHostPort(address);
   const bool everywhere = parts.host == "0.0.0.0" || parts.host == "::";
@@ -34,7 +34,7 @@ std::string ProbePort(const ProbeTarget& target, std::chrono::milliseconds limit
   constexpr std::string_view kUnix = "unix:";
   const std::unique_ptr<CURL, CurlDeleter> handle(curl_easy_init());
   CURL* curl = handle.get();
-  if (curl == nullptr) return "libcurl cannot begin";
+  if (curl == nullptr) return "libcurl cannot be initialized";
   const bool is_unix = target.address.starts_with(kUnix);
   const std::string url = fmt::format("{}://{}/grpc.health.v1.Health/Check",
                                       target.tls ? "https" : "http",
@@ -45,7 +45,7 @@ std::string ProbePort(const ProbeTarget& target, std::chrono::milliseconds limit
   for (const char* header : {"Content-Type: application/grpc", "TE: trailers", "Expect:"}) {
     headers.reset(curl_slist_append(headers.release(), header));
   }
-  static constexpr std::array<char, 5> kEmptyMessage{};  // no compression, no bytes
+  static constexpr std::array<char, 5> kEmptyMessage{};  // uncompressed, empty
   if (is_unix) curl_easy_setopt(curl, CURLOPT_UNIX_SOCKET_PATH, path.c_str());
   curl_easy_setopt(curl, CURLOPT_URL, url.c_str());
   curl_easy_setopt(
@@ -69,7 +69,8 @@ std::string ProbePort(const ProbeTarget& target, std::chrono::milliseconds limit
   curl_off_t handshake_us = 0;
   curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
   curl_easy_getinfo(curl, CURLINFO_APPCONNECT_TIME_T, &handshake_us);
-  // A handshake of TLS is the server's work; it refuses us afterwards where it wants a certificate.
+  // A completed TLS handshake proves that the server answers, even if it then demands a
+  // certificate.
   if (status != 0 || (code != CURLE_OPERATION_TIMEDOUT && handshake_us > 0)) return "";
   return why[0] != '\0' ? why.data() : curl_easy_strerror(code);
 }

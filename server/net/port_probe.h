@@ -1,5 +1,5 @@
-// Whether a server answers at its address: what its clients would see. No gRPC of this process is
-// used, so that the answer is not its own opinion.
+// Checks whether a server answers at its address, as its clients see it. Does not use gRPC, so that
+// the state of this process does not affect the result.
 #pragma once
 
 #include <chrono>
@@ -9,11 +9,11 @@ namespace color3d {
 
 struct ProbeTarget {
   std::string address;  // HOST:PORT of this machine, or unix:PATH
-  bool tls = false;     // whose certificate it is, is not asked
+  bool tls = false;     // the certificate is not verified
 };
 
-// Makes a call of grpc.health.v1 there; any answer to it will do. A server that wants a certificate
-// answers by asking for it. Empty when it answered; else why not: "Connection refused", ...
+// Calls grpc.health.v1 there; any answer counts, also the demand for a client certificate. Returns
+// an empty string if the server answered, else the reason: "Connection refused", ...
 std::string ProbePort(const ProbeTarget& target, std::chrono::milliseconds limit);
 
 }  // namespace color3d

@@ -15,18 +15,20 @@ SelfProbe::SelfProbe(const SelfProbeTiming& timing,
 
 SelfProbe::~SelfProbe() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   thread_.join();
 }
 
 void SelfProbe::Loop() {
   while (true) {
     {
-      std::unique_lock lock(mutex_);
-      if (wake_.wait_for(lock, timing_.pause, [this] { return stopping_; })) return;
+      MutexLock lock(mutex_);
+      const auto end = std::chrono::steady_clock::now() + timing_.pause;
+      while (!stopping_ && wake_.WaitUntil(mutex_, end)) continue;
+      if (stopping_) return;
     }
     const std::string why = probe_(timing_.limit);
     if (why.empty()) {

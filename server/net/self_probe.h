@@ -1,35 +1,35 @@
-// The server's own client: looks again and again whether the server still answers. One thread.
+// Checks periodically whether the own server still answers. Runs one thread.
 #pragma once
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
 struct SelfProbeTiming {
-  std::chrono::milliseconds pause{10'000};  // between two looks
-  std::chrono::milliseconds limit{10'000};  // for one
-  int failures = 3;                         // in a row: it is deaf
+  std::chrono::milliseconds pause{10'000};  // between two probes
+  std::chrono::milliseconds limit{10'000};  // time limit of a probe
+  int failures = 3;                         // consecutive failures until on_deaf is called
 };
 
 class SelfProbe {
  public:
-  // `probe` is given the limit and says why nobody answered, or nothing, as ProbePort. `on_deaf` is
-  // told that reason, once. Both are called on the thread of this object.
+  // `probe` gets the time limit and returns an empty string or the reason of failure, like
+  // ProbePort. `on_deaf` gets that reason, once. Both are called on the thread of this object.
   SelfProbe(const SelfProbeTiming& timing,
             std::function<std::string(std::chrono::milliseconds limit)> probe,
             std::function<void(const std::string& why)> on_deaf);
-  // Waits for the look that is under way.
+  // Waits for the probe under way.
   ~SelfProbe();
   SelfProbe(const SelfProbe&) = delete;
   SelfProbe& operator=(const SelfProbe&) = delete;
 
-  // Whether the last look found an answer. Thread-safe.
+  // Returns whether the last probe succeeded. Thread-safe.
   bool IsAnswering() const { return failures_.load() == 0; }
 
  private:
@@ -39,9 +39,9 @@ class SelfProbe {
   const std::function<std::string(std::chrono::milliseconds)> probe_;
   const std::function<void(const std::string&)> on_deaf_;
   std::atomic<int> failures_{0};
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

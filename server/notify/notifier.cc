@@ -17,19 +17,19 @@
 namespace color3d {
 namespace {
 
-constexpr int kGone = 410;  // the receiver wants to hear no more
+constexpr int kGone = 410;  // HTTP 410: the receiver wants no more notifications
 constexpr int kOfEachReceiver = 50;
 
 std::string TimeText(int64_t ms) {
   return LogTime(std::chrono::system_clock::time_point(std::chrono::milliseconds(ms)));
 }
 
-// Scheme, host and port.
+// Returns scheme, host and port.
 std::string ReceiverOf(const std::string& url) { return url.substr(0, url.find('/', 8)); }
 
 std::pair<int64_t, int64_t> KeyOf(const Notification& due) { return {due.job_id, due.first_ms}; }
 
-// What a query holds may be a secret.
+// A query may hold a secret.
 std::string ForLog(const std::string& url) { return url.substr(0, url.find('?')); }
 
 }  // namespace
@@ -61,10 +61,10 @@ Notifier::Notifier(JobStore& store, const Clock& clock, NotifierOptions options)
 
 Notifier::~Notifier() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -74,25 +74,28 @@ void Notifier::Loop() {
     try {
       WriteRemembered();
       {
-        std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         due = TakeDue();
       }
       if (due) Deliver(*due);
     } catch (const std::exception& e) {
-      spdlog::warn("cannot look after notifications: {}", e.what());
+      spdlog::warn("cannot process notifications: {}", e.what());
     }
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     if (due) {
       under_way_.erase(KeyOf(*due));
       --receivers_[ReceiverOf(due->url)].sending;
     }
     if (stopping_) return;
     if (due) continue;
-    if (wake_.wait_for(lock, options_.poll, [this] { return stopping_.load(); })) return;
+    const auto end = Steady::now() + options_.poll;
+    while (!stopping_ && wake_.WaitUntil(mutex_, end)) continue;
+    if (stopping_) return;
   }
 }
 
-// One that may be sent now: the store is asked when what it said is used up, at each poll.
+// Returns a notification that may be sent now. Reads the store when its last list is used up, at
+// each poll.
 std::optional<Notification> Notifier::TakeDue() {
   if (auto next = NextOf(due_)) return next;
   const auto now = Steady::now();
@@ -101,7 +104,7 @@ std::optional<Notification> Notifier::TakeDue() {
   due_ = store_.DueNotifications(kOfEachReceiver);
   std::set<Key> owed;
   for (const Notification& due : due_) owed.insert(KeyOf(due));
-  // What is owed no more by the store is forgotten, unless it was not told that yet.
+  // Forgets notifications that the store no longer owes, unless their outcome is not stored yet.
   std::erase_if(remembered_, [&](const auto& entry) {
     return !owed.contains(entry.first) && (entry.second.written || !entry.second.ended);
   });
@@ -150,20 +153,20 @@ void Notifier::Deliver(const Notification& due) {
       answer.status != 0 ? fmt::format("HTTP status {}", answer.status) : answer.problem;
   if (delivered || answer.status == kGone || due.tries + 1 >= options_.max_tries) {
     spdlog::log(delivered ? spdlog::level::info : spdlog::level::warn,
-                "[job={}] word of its end {} {} ({})",
+                "[job={}] notification {} {} ({})",
                 due.job,
-                delivered ? "was sent to" : "is not sent any more to",
+                delivered ? "was sent to" : "is given up for",
                 ForLog(due.url),
                 how);
-    return Conclude(due, {true, due.tries + 1, {}});
+    return RecordOutcome(due, {true, due.tries + 1, {}});
   }
   const std::chrono::milliseconds pause = PauseAfter(due.tries);
-  spdlog::warn("[job={}] word of its end was not taken by {} ({}); again in {} s",
+  spdlog::warn("[job={}] notification was not accepted by {} ({}); retry in {} s",
                due.job,
                ForLog(due.url),
                how,
                pause.count() / 1000);
-  Conclude(due, {false, due.tries + 1, Steady::now() + pause});
+  RecordOutcome(due, {false, due.tries + 1, Steady::now() + pause});
 }
 
 std::chrono::milliseconds Notifier::PauseAfter(int tries) const {
@@ -171,7 +174,7 @@ std::chrono::milliseconds Notifier::PauseAfter(int tries) const {
 }
 
 void Notifier::NoteAnswer(const std::string& url, bool answered) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Receiver& receiver = receivers_[ReceiverOf(url)];
   if (answered) {
     receiver.silences = 0;
@@ -181,10 +184,10 @@ void Notifier::NoteAnswer(const std::string& url, bool answered) {
   ++receiver.silences;
 }
 
-void Notifier::Conclude(const Notification& due, const Outcome& outcome) {
+void Notifier::RecordOutcome(const Notification& due, const Outcome& outcome) {
   {
-    // Before the store is told: whatever becomes of that, it is not sent again.
-    std::lock_guard lock(mutex_);
+    // Before the store is told, so that it is not sent again if that fails.
+    const MutexLock lock(mutex_);
     remembered_[KeyOf(due)] = outcome;
   }
   Write(KeyOf(due), outcome);
@@ -198,25 +201,25 @@ bool Notifier::Write(const Key& key, const Outcome& outcome) {
     } else {
       store_.DelayNotification(job_id, first_ms, PauseAfter(outcome.tries - 1).count());
     }
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (const auto known = remembered_.find(key); known != remembered_.end()) {
       known->second.written = true;
     }
     return true;
   } catch (const Error& e) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     next_write_ = Steady::now() + options_.store_pause;
-    spdlog::warn("what became of word of an end cannot be written down and is remembered: {}",
+    spdlog::warn("the outcome of a notification cannot be stored and is kept in memory: {}",
                  e.what());
     return false;
   }
 }
 
-// What is tried again is written down after its next try.
+// Failed attempts are stored after their next try.
 void Notifier::WriteRemembered() {
   std::vector<std::pair<Key, Outcome>> unwritten;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (Steady::now() < next_write_) return;
     for (const auto& [key, outcome] : remembered_) {
       if (outcome.ended && !outcome.written && !under_way_.contains(key)) {

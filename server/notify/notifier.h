@@ -1,14 +1,12 @@
-// Sends word of jobs that have ended to whom their submitters named. What is owed stands in the
-// store, so that it outlives the server; what was done about it is remembered until the store has
-// taken it, so that a full disk sends nothing twice. A receiver that is slow or gone keeps no other
-// one waiting.
+// Sends notifications about finished jobs to the addresses given by their submitters. Pending
+// notifications are in the store, so that they survive a restart; outcomes are kept in memory until
+// the store accepts them, so that a full disk causes no duplicates. A slow or absent receiver does
+// not delay others.
 #pragma once
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,26 +14,29 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/store/job_store.h"
 
 namespace color3d {
 
 struct NotifierOptions {
-  std::vector<std::string> allowed;  // as CheckNotifyUrl; may have changed since the job came
-  std::string secret;                // bytes
+  // See CheckNotifyUrl; may have changed since the job was accepted.
+  std::vector<std::string> allowed;
+  std::string secret;  // bytes
   std::chrono::milliseconds poll{1'000};
-  // Before each further try; the last one repeats.
+  // Pauses before each further try; the last one repeats.
   std::vector<std::chrono::milliseconds> pauses = {std::chrono::seconds(5),
                                                    std::chrono::seconds(30),
                                                    std::chrono::minutes(2),
                                                    std::chrono::minutes(10),
                                                    std::chrono::minutes(30)};
-  int max_tries = 52;  // with these pauses, a day
-  int at_once = 8;     // of all receivers
+  int max_tries = 52;  // one day with these pauses
+  int at_once = 8;     // of all receivers together
   int at_once_to_one = 2;
-  // Of all to a receiver that did not answer; doubles with each further time, up to 16 times.
+  // Pause of all notifications to a receiver that did not answer; doubles each time, up to 16
+  // times.
   std::chrono::milliseconds silence{10'000};
-  // Before the store is asked again to take what it did not.
+  // Pause before the store is asked again to accept outcomes.
   std::chrono::milliseconds store_pause{5'000};
 };
 
@@ -46,51 +47,51 @@ class Notifier {
  public:
   // The store must outlive this object.
   Notifier(JobStore& store, const Clock& clock, NotifierOptions options);
-  // Cuts off what is being sent; it is sent again by the next one.
+  // Aborts deliveries under way; they are repeated after a restart.
   ~Notifier();
   Notifier(const Notifier&) = delete;
   Notifier& operator=(const Notifier&) = delete;
 
  private:
   using Steady = std::chrono::steady_clock;
-  // One end of a job: a job that is retried has another.
-  using Key = std::pair<int64_t, int64_t>;  // job, when it ended
-  // What the store has not taken yet.
+  // One end of a job: a retried job has another.
+  using Key = std::pair<int64_t, int64_t>;  // job, time of its end
+  // Outcome of a delivery that the store has not accepted yet.
   struct Outcome {
-    bool ended = false;  // delivered or given up; else it is tried again
-    int tries = 0;       // with those that the store knows of
+    bool ended = false;  // delivered or given up; false: to be retried
+    int tries = 0;       // including those that the store knows of
     Steady::time_point again;
     bool written = false;
   };
   struct Receiver {
     int sending = 0;
-    int silences = 0;  // one after the other
+    int silences = 0;  // consecutive
     Steady::time_point again;
   };
 
   void Loop();
-  // With the mutex held.
-  std::optional<Notification> TakeDue();
-  std::optional<Notification> NextOf(const std::vector<Notification>& due);
+  std::optional<Notification> TakeDue() COLOR3D_REQUIRES(mutex_);
+  std::optional<Notification> NextOf(const std::vector<Notification>& due) COLOR3D_REQUIRES(mutex_);
   void Deliver(const Notification& due);
   std::chrono::milliseconds PauseAfter(int tries) const;
   void NoteAnswer(const std::string& url, bool answered);
-  void Conclude(const Notification& due, const Outcome& outcome);
-  // Tells the store; false where it does not take it.
+  void RecordOutcome(const Notification& due, const Outcome& outcome);
+  // Stores the outcome. Returns false if the store does not accept it.
   bool Write(const Key& key, const Outcome& outcome);
   void WriteRemembered();
 
   JobStore& store_;
   const Clock clock_;
   const NotifierOptions options_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
+  Mutex mutex_;
+  CondVar wake_;
   std::atomic<bool> stopping_{false};
-  std::vector<Notification> due_;  // as the store said at the last poll
-  Steady::time_point next_poll_{}, next_write_{};
-  std::set<Key> under_way_;
-  std::map<Key, Outcome> remembered_;
-  std::map<std::string, Receiver> receivers_;
+  std::vector<Notification> due_ COLOR3D_GUARDED_BY(mutex_);  // from the store, at the last poll
+  Steady::time_point next_poll_ COLOR3D_GUARDED_BY(mutex_){};
+  Steady::time_point next_write_ COLOR3D_GUARDED_BY(mutex_){};
+  std::set<Key> under_way_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<Key, Outcome> remembered_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<std::string, Receiver> receivers_ COLOR3D_GUARDED_BY(mutex_);
   std::vector<std::thread> threads_;
 };
 

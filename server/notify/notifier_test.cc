@@ -18,13 +18,13 @@ namespace color3d {
 namespace {
 using std::chrono::milliseconds;
 
-// Takes requests one after the other, and answers each with the next of `answers`, the last one for
-// ever. "hang" answers nothing.
+// Accepts requests one after the other and answers each with the next of `answers`; the last one
+// repeats. "hang" does not answer.
 class Receiver {
  public:
   struct Request {
     std::string line;
-    std::map<std::string, std::string> headers;  // names in small letters
+    std::map<std::string, std::string> headers;  // names in lower case
     std::string body;
   };
 
@@ -113,7 +113,7 @@ class Receiver {
 
 class NotifierTest : public JobStoreTest {
  protected:
-  // A job that has failed and owes word of it.
+  // A failed job with a pending notification.
   JobRecord EndedJob(const std::string& url) {
     NewGraph graph;
     graph.scene = "scenes/test";
@@ -141,7 +141,7 @@ class NotifierTest : public JobStoreTest {
         *store_, [this] { return wall_.load(); }, options);
   }
   bool NothingIsOwed() {
-    wall_ += int64_t{3600} * 1000;  // whatever pause there is
+    wall_ += int64_t{3600} * 1000;  // longer than any pause
     for (int i = 0; i < 1000 && store_->CountJobs().notifications > 0; ++i) {
       std::this_thread::sleep_for(milliseconds(5));
     }
@@ -151,14 +151,14 @@ class NotifierTest : public JobStoreTest {
   const std::string secret_ = "secret of twenty-four by";
 };
 
-TEST_F(NotifierTest, SentAgainUntilItIsTakenAndSigned) {
+TEST_F(NotifierTest, RetriesUntilAcceptedAndSigns) {
   Receiver receiver({"500 Oops", "302 Found\r\nLocation: http://127.0.0.1:1/", "200 OK"});
   const JobRecord job = EndedJob(receiver.url());
   const auto notifier = Start({receiver.url()});
   ASSERT_TRUE(receiver.WaitFor(3));
   EXPECT_TRUE(NothingIsOwed());
   const auto requests = receiver.requests();
-  EXPECT_EQ(requests.size(), 3u) << "once it is taken it is not sent again";
+  EXPECT_EQ(requests.size(), 3u) << "not sent again once accepted";
   for (const Receiver::Request& request : requests) {
     EXPECT_EQ(request.line, "POST /hook HTTP/1.1\r");
     const std::string id = request.headers.at("webhook-id");
@@ -174,22 +174,22 @@ TEST_F(NotifierTest, SentAgainUntilItIsTakenAndSigned) {
   }
 }
 
-TEST_F(NotifierTest, ARestartForgetsNothingAndWaitsForNobody) {
+TEST_F(NotifierTest, RestartKeepsPendingNotifications) {
   Receiver hanging({"hang"}), good({"204 No Content"});
   EndedJob(hanging.url());
   {
     const auto notifier = Start({hanging.url()});
     ASSERT_TRUE(hanging.WaitFor(1));
     EndedJob(good.url());
-  }  // ends at once, though an answer is awaited
+  }  // returns at once, though an answer is pending
   EXPECT_EQ(store_->CountJobs().notifications, 2);
   Open();
   const auto notifier = Start({hanging.url(), good.url()});
-  EXPECT_TRUE(good.WaitFor(1)) << "though another does not answer";
+  EXPECT_TRUE(good.WaitFor(1)) << "while another receiver hangs";
   EXPECT_TRUE(hanging.WaitFor(2));
 }
 
-TEST_F(NotifierTest, WhoWantsToHearNoMoreIsLeftAlone) {
+TEST_F(NotifierTest, StopsAfterHttpGone) {
   Receiver receiver({"410 Gone"});
   EndedJob(receiver.url());
   const auto notifier = Start({receiver.url()});
@@ -197,17 +197,17 @@ TEST_F(NotifierTest, WhoWantsToHearNoMoreIsLeftAlone) {
   EXPECT_TRUE(NothingIsOwed());
 }
 
-TEST_F(NotifierTest, AfterItsTriesItIsGivenUpWhateverTheClockSays) {
+TEST_F(NotifierTest, GivesUpAfterMaxTries) {
   Receiver receiver(std::vector<std::string>(10, "500 Oops"));
   EndedJob(receiver.url());
   wall_ += int64_t{100} * 24 * 3600 * 1000;
   const auto notifier = Start({receiver.url()}, /*max_tries=*/3);
-  EXPECT_TRUE(receiver.WaitFor(3)) << "a clock that jumped is no reason to give up";
+  EXPECT_TRUE(receiver.WaitFor(3)) << "a jump of the clock must not end the retries";
   EXPECT_TRUE(NothingIsOwed());
   EXPECT_EQ(receiver.requests().size(), 3u);
 }
 
-TEST_F(NotifierTest, OnlyWhoIsStillAllowed) {
+TEST_F(NotifierTest, SendsOnlyToAllowedTargets) {
   Receiver receiver({"200 OK"});
   EndedJob(receiver.url());
   const auto notifier = Start({"https://elsewhere.example.org"});
@@ -215,7 +215,7 @@ TEST_F(NotifierTest, OnlyWhoIsStillAllowed) {
   EXPECT_TRUE(receiver.requests().empty());
 }
 
-// On a full disk nothing can be written down.
+// A store that accepts no outcomes, like one on a full disk.
 class FullStore : public SqliteJobStore {
  public:
   using SqliteJobStore::SqliteJobStore;
@@ -242,7 +242,7 @@ class FullStore : public SqliteJobStore {
   }
 };
 
-TEST_F(NotifierTest, OnAFullDiskEachWordIsSentOnce) {
+TEST_F(NotifierTest, FullDiskCausesNoDuplicates) {
   Receiver receiver({"200 OK"});
   StoreOptions store_options;
   store_options.boot_id = boot_id_;
@@ -253,20 +253,20 @@ TEST_F(NotifierTest, OnAFullDiskEachWordIsSentOnce) {
     const Notifier notifier(
         full, [this] { return wall_.load(); }, Options({receiver.url()}));
     ASSERT_TRUE(receiver.WaitFor(2));
-    ASSERT_TRUE(full.WaitForTries(10)) << "it goes on trying to write down what was delivered";
+    ASSERT_TRUE(full.WaitForTries(10)) << "retries to store the outcome";
     EXPECT_EQ(receiver.requests().size(), 2u);
-    // Another end of the same job is another word.
+    // Another end of the same job is another notification.
     wall_ += 1000;
     store_->Retry(job.name, false, {}, kNoLimit);
     FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
     ASSERT_TRUE(receiver.WaitFor(3));
     full.is_full = false;
-    EXPECT_TRUE(NothingIsOwed()) << "there is room again";
+    EXPECT_TRUE(NothingIsOwed()) << "the disk has room again";
   }
   EXPECT_EQ(receiver.requests().size(), 3u);
 }
 
-TEST_F(NotifierTest, OnAFullDiskTriesHavePausesAndAnEndAllTheSame) {
+TEST_F(NotifierTest, FullDiskKeepsPausesAndMaxTries) {
   Receiver receiver({"500 Oops"});
   StoreOptions store_options;
   store_options.boot_id = boot_id_;
@@ -281,10 +281,10 @@ TEST_F(NotifierTest, OnAFullDiskTriesHavePausesAndAnEndAllTheSame) {
   ASSERT_TRUE(receiver.WaitFor(3));
   EXPECT_GE(std::chrono::steady_clock::now() - begin, milliseconds(200));
   ASSERT_TRUE(full.WaitForTries(10));
-  EXPECT_EQ(receiver.requests().size(), 3u) << "given up, and remembered";
+  EXPECT_EQ(receiver.requests().size(), 3u) << "given up, and kept in memory";
 }
 
-TEST_F(NotifierTest, ReceiversThatDoNotAnswerKeepNoOtherWaiting) {
+TEST_F(NotifierTest, HangingReceiversDoNotDelayOthers) {
   std::vector<std::unique_ptr<Receiver>> hanging;
   std::vector<std::string> allowed;
   for (int i = 0; i < 3; ++i) {
@@ -297,12 +297,12 @@ TEST_F(NotifierTest, ReceiversThatDoNotAnswerKeepNoOtherWaiting) {
   const auto notifier = Start(allowed);
   for (const auto& receiver : hanging) ASSERT_TRUE(receiver->WaitFor(2));
   for (int i = 0; i < 5; ++i) EndedJob(good.url());
-  EXPECT_TRUE(good.WaitFor(5)) << "eighteen words wait for those that hang";
+  EXPECT_TRUE(good.WaitFor(5)) << "eighteen notifications wait for hanging receivers";
   for (const auto& receiver : hanging) EXPECT_EQ(receiver->requests().size(), 2u);
 }
 
-// The example of the specification's own libraries.
-TEST(WebhookTest, SignsAsOthersDo) {
+// Example of the specification's own libraries.
+TEST(WebhookTest, SignatureMatchesSpecification) {
   ScratchFolder scratch;
   const auto file = scratch.path() / "secret";
   std::ofstream(file) << "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw\n";
@@ -314,7 +314,7 @@ TEST(WebhookTest, SignsAsOthersDo) {
             "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=");
 }
 
-TEST(WebhookTest, SecretsThatAreNoneAreNamed) {
+TEST(WebhookTest, RejectsBadSecrets) {
   ScratchFolder scratch;
   const auto file = scratch.path() / "secret";
   EXPECT_THROW(ReadWebhookSecret(file), Error);
@@ -326,7 +326,7 @@ TEST(WebhookTest, SecretsThatAreNoneAreNamed) {
   }
   std::ofstream(file) << "MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
   ::chmod(file.c_str(), 0640);
-  EXPECT_THROW(ReadWebhookSecret(file), Error) << "others may read it";
+  EXPECT_THROW(ReadWebhookSecret(file), Error) << "readable by others";
 }
 
 }  // namespace

@@ -51,7 +51,7 @@ std::string ReadWebhookSecret(const fs::path& file) {
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) throw BadSecret(file, "there is no such file");
   if ((status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    throw BadSecret(file, "others than its owner may read or change it (chmod 600)");
+    throw BadSecret(file, "it is accessible by others than its owner (run chmod 600)");
   }
   std::string text = ReadFile(file, 4096);
   text.erase(text.find_last_not_of(" \t\r\n") + 1);
@@ -62,11 +62,11 @@ std::string ReadWebhookSecret(const fs::path& file) {
                                             reinterpret_cast<const unsigned char*>(text.data()),
                                             static_cast<int>(text.size()))
                           : -1;
-  if (decoded < 0) throw BadSecret(file, "it is not base64");
+  if (decoded < 0) throw BadSecret(file, "it is not valid base64");
   const size_t padding = text.ends_with("==") ? 2 : text.ends_with('=') ? 1 : 0;
   bytes.resize(static_cast<size_t>(decoded) - padding);
   if (bytes.size() < 24 || bytes.size() > 64) {
-    throw BadSecret(file, fmt::format("it has {} bytes, 24 to 64 are needed", bytes.size()));
+    throw BadSecret(file, fmt::format("it has {} bytes; 24 to 64 are required", bytes.size()));
   }
   return bytes;
 }
@@ -93,7 +93,7 @@ WebhookAnswer SendWebhook(const WebhookMessage& message,
                           const std::atomic<bool>& stop) {
   const std::unique_ptr<CURL, CurlDeleter> handle(curl_easy_init());
   CURL* curl = handle.get();
-  if (curl == nullptr) return {0, "libcurl cannot begin"};
+  if (curl == nullptr) return {0, "libcurl cannot be initialized"};
   std::unique_ptr<curl_slist, CurlDeleter> headers;
   for (const std::string& header :
        {std::string("Content-Type: application/json"),
@@ -124,7 +124,7 @@ WebhookAnswer SendWebhook(const WebhookMessage& message,
   const CURLcode code = curl_easy_perform(curl);
   long status = 0;
   curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
-  // A long answer is cut off, and counts by its status.
+  // A long answer is truncated; only its status counts.
   if (code != CURLE_OK && code != CURLE_WRITE_ERROR) return {0, curl_easy_strerror(code)};
   return {static_cast<int>(status), ""};
 }

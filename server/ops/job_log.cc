@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::string_view kTag = "[job=jobs/";
 constexpr int64_t kMaxBytes = 1 << 20;
-constexpr std::string_view kFull = "the log is full; what follows is in the worker's own\n";
+constexpr std::string_view kFull = "the log is full; further lines are in the log of the worker\n";
 
 std::string LineOf(const spdlog::details::log_msg& message, std::string_view text) {
   const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);

@@ -1,5 +1,5 @@
-// The log of single jobs: lines that begin with "[job=jobs/ID ...]" go to FOLDER/ID.log, too, of
-// about 1 MiB at most.
+// Logs of single jobs: lines that begin with "[job=jobs/ID ...]" also go to FOLDER/ID.log, up to
+// about 1 MiB.
 #pragma once
 
 #include <spdlog/common.h>
@@ -9,10 +9,10 @@
 
 namespace color3d {
 
-// Of the job "jobs/ID".
+// Returns the log file of the job "jobs/ID".
 std::filesystem::path JobLogFile(const std::filesystem::path& folder, const std::string& job);
 
-// A sink for spdlog. A line that cannot be written is lost: a full disk must not end a job.
+// A sink for spdlog. Lines that cannot be written are dropped: a full disk must not end a job.
 spdlog::sink_ptr MakeJobLogSink(const std::filesystem::path& folder);
 
 }  // namespace color3d

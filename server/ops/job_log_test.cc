@@ -8,7 +8,7 @@
 namespace color3d {
 namespace {
 
-TEST(JobLogTest, LinesOfAJobGoToItsFile) {
+TEST(JobLogTest, LinesOfJobGoToItsFile) {
   ScratchFolder scratch;
   spdlog::logger logger("test", MakeJobLogSink(scratch.path()));
   logger.info("[job=jobs/ab12 attempt=1] begins\nwith two \x1b[2Jlines");
@@ -22,14 +22,14 @@ TEST(JobLogTest, LinesOfAJobGoToItsFile) {
   EXPECT_EQ(ListFiles(scratch.path()).size(), 2u);
 }
 
-TEST(JobLogTest, AFileDoesNotGrowWithoutEnd) {
+TEST(JobLogTest, LimitsSizeOfFile) {
   ScratchFolder scratch;
   spdlog::logger logger("test", MakeJobLogSink(scratch.path()));
   const std::string line(1000, 'x');
   for (int i = 0; i < 1100; ++i) logger.info("[job=jobs/ab12 attempt=1] {}", line);
   const std::string text = ReadFile(JobLogFile(scratch.path(), "jobs/ab12"));
   EXPECT_NEAR(static_cast<double>(text.size()), 1 << 20, 2000.0);
-  EXPECT_TRUE(text.ends_with("the log is full; what follows is in the worker's own\n"));
+  EXPECT_TRUE(text.ends_with("the log is full; further lines are in the log of the worker\n"));
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-// Takes the tag off the message; false when it is no tag of ours.
+// Removes the tag from the message and adds its fields. Returns false if there is no tag.
 bool TakeTag(std::string_view* message, nlohmann::ordered_json* line) {
   const size_t end = message->find("] ");
   if (!message->starts_with('[') || end == std::string_view::npos) return false;
@@ -40,7 +40,7 @@ class JsonLines : public spdlog::formatter {
         {"from", std::string(message.logger_name.data(), message.logger_name.size())}};
     TakeTag(&text, &line);
     line["message"] = std::string(text);
-    // ASCII alone: a terminal that shows the log finds no control character in it.
+    // ASCII only, so that no control character reaches a terminal that shows the log.
     const std::string bytes =
         line.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
     into.append(bytes.data(), bytes.data() + bytes.size());

@@ -29,7 +29,7 @@ TEST(JsonLinesTest, TagsBecomeFields) {
   EXPECT_EQ(line.at("time").get<std::string>().size(), 24u);
 }
 
-TEST(JsonLinesTest, WhateverIsSaidStaysInItsLine) {
+TEST(JsonLinesTest, KeepsMessageInOneLine) {
   EXPECT_EQ(Logged("a \"b\"\n\t{\"job\": 1}").at("message"), "a \"b\"\n\t{\"job\": 1}");
   EXPECT_EQ(Logged("[not a tag] x").at("message"), "[not a tag] x");
   EXPECT_EQ(Logged("[=] x").at("message"), "[=] x");

@@ -1,4 +1,4 @@
-// When a line was logged, for people and machines elsewhere.
+// Time stamps of log lines.
 #pragma once
 
 #include <fmt/chrono.h>

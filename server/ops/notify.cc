@@ -19,7 +19,7 @@ bool NotifyServiceManager(const std::string& state) {
   address.sun_family = AF_UNIX;
   const size_t length = std::strlen(path);
   std::memcpy(address.sun_path, path, length);
-  if (path[0] == '@') address.sun_path[0] = '\0';  // an abstract one
+  if (path[0] == '@') address.sun_path[0] = '\0';  // abstract socket
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return false;
   const ssize_t sent = ::sendto(fd,

@@ -1,13 +1,12 @@
-// The protocol by which a service tells systemd how it is (sd_notify(3)). Without systemd nothing
-// happens.
+// Notifies systemd of the state of the service (sd_notify(3)). Does nothing without systemd.
 #pragma once
 
 #include <string>
 
 namespace color3d {
 
-// "READY=1", "STOPPING=1", "WATCHDOG=1", ... to the socket in NOTIFY_SOCKET. False when there is
-// none, or when it cannot be reached.
+// Sends "READY=1", "STOPPING=1", "WATCHDOG=1", ... to the socket in NOTIFY_SOCKET. Returns false if
+// there is none or it cannot be reached.
 bool NotifyServiceManager(const std::string& state);
 
 }  // namespace color3d

@@ -13,13 +13,13 @@
 namespace color3d {
 namespace {
 
-TEST(Notify, TellsWhoListensAndNobodyElse) {
+TEST(NotifyTest, SendsOnlyToListeningSocket) {
   ::unsetenv("NOTIFY_SOCKET");
   EXPECT_FALSE(NotifyServiceManager("READY=1"));
   ScratchFolder scratch;
   const std::string path = (scratch.path() / "notify").string();
   ::setenv("NOTIFY_SOCKET", path.c_str(), 1);
-  EXPECT_FALSE(NotifyServiceManager("READY=1")) << "nobody listens";
+  EXPECT_FALSE(NotifyServiceManager("READY=1")) << "no listening socket";
   const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

@@ -1,4 +1,4 @@
-// Facts about this process from /proc, and its log.
+// Process facts from /proc, and set-up of the log.
 #pragma once
 
 #include <cstdint>
@@ -7,18 +7,19 @@
 
 namespace color3d {
 
-// The folder that holds the running program.
+// Returns the folder of the running program.
 std::filesystem::path ProgramFolder();
 
-// Log lines to stderr, and to `file` too unless empty. `format`: "text", or "json" (json_lines.h).
-// Throws Error{kInvalidArgument} for a level that is none of trace, debug, info, warn, error, off.
+// Logs to stderr, and also to `file` unless it is empty. `format`: "text", or "json"
+// (json_lines.h). Throws Error{kInvalidArgument} unless the level is trace, debug, info, warn,
+// error or off.
 void SetUpLog(const std::string& name,
               const std::string& level,
               const std::string& format,
               const std::filesystem::path& file);
 
-// From now on what is said of single jobs goes to files of their own, too (job_log.h), progress
-// included.
+// From now on lines about single jobs, including progress, also go to files of their own
+// (job_log.h).
 void LogJobsTo(const std::filesystem::path& folder);
 
 }  // namespace color3d

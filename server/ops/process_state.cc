@@ -9,7 +9,7 @@ char ProcessState(pid_t pid) {
   std::ifstream stream("/proc/" + std::to_string(pid) + "/stat");
   std::string line;
   std::getline(stream, line);
-  // Behind the program's name, which stands in parentheses and may hold some.
+  // After the program's name, which is in parentheses and may contain some.
   const size_t name_end = line.rfind(')');
   return name_end != std::string::npos && name_end + 2 < line.size() ? line[name_end + 2] : '\0';
 }

@@ -1,16 +1,17 @@
-// Other processes, as /proc tells. Pure but for that; thread-safe.
+// States of other processes, from /proc. Thread-safe.
 #pragma once
 
 #include <sys/types.h>
 
 namespace color3d {
 
-// 'R', 'S', 'T' (stopped), 'Z' (ended and not waited for), ... as in proc(5); 0: there is none.
+// Returns 'R', 'S', 'T' (stopped), 'Z' (zombie), ... as in proc(5), or 0 if there is no such
+// process.
 char ProcessState(pid_t pid);
 
-// Neither gone nor ended.
+// Returns whether the process exists and is not a zombie.
 bool IsRunning(pid_t pid);
-// By a signal or a debugger.
+// Returns whether the process is stopped by a signal or a debugger.
 bool IsStopped(pid_t pid);
 
 }  // namespace color3d

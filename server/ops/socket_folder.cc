@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 SocketFolder::SocketFolder(const fs::path& folder) : folder_(folder) {
   const auto fail = [&](const std::string& why) {
     return Error(ErrorCode::kFailedPrecondition,
-                 "cannot use the folder of sockets {}: {}; remove it, or choose another --data-dir",
+                 "cannot use the socket folder {}: {}; remove it, or choose another --data-dir",
                  folder_.string(),
                  why);
   };
@@ -26,7 +26,7 @@ SocketFolder::SocketFolder(const fs::path& folder) : folder_(folder) {
   const bool known = ::fstat(fd_, &status) == 0;
   if (known && status.st_uid == ::geteuid() && ::fchmod(fd_, 0700) == 0) return;
   ::close(fd_);
-  throw fail("it belongs to somebody else");
+  throw fail("it belongs to another user");
 }
 
 SocketFolder::~SocketFolder() { ::close(fd_); }

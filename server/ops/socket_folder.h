@@ -1,6 +1,6 @@
-// A private folder of Unix sockets between our own processes, and addresses in it that are short
-// however long the folder's path is: a socket's path has at most 107 bytes, so it is reached
-// through this process's own descriptor of the folder. Immutable; thread-safe.
+// A private folder of Unix sockets between processes of the server. A socket path has at most 107
+// bytes, so addresses go through this process's descriptor of the folder, which keeps them short.
+// Immutable; thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -10,16 +10,16 @@ namespace color3d {
 
 class SocketFolder {
  public:
-  // Creates the folder when it is missing; nobody but its owner may enter it. Throws
-  // Error{kFailedPrecondition} when that cannot be had.
+  // Creates the folder if it is missing, accessible by its owner only. Throws
+  // Error{kFailedPrecondition} on failure.
   explicit SocketFolder(const std::filesystem::path& folder);
   ~SocketFolder();
   SocketFolder(const SocketFolder&) = delete;
   SocketFolder& operator=(const SocketFolder&) = delete;
 
-  // gRPC address of the socket `name`, for this process and while this object lives.
+  // Returns the gRPC address of the socket `name`, valid in this process while this object lives.
   std::string Address(const std::string& name) const;
-  // Removes what processes that were killed have left.
+  // Removes sockets left by killed processes.
   void RemoveAll() const;
 
  private:

@@ -15,7 +15,7 @@ StopSignals::StopSignals() {
   for (const int signal : {SIGTERM, SIGINT, SIGQUIT, SIGPWR, SIGXCPU}) {
     ::sigaddset(&signals_, signal);
   }
-  // nohup(1) has it ignored, which stays so.
+  // Stays ignored under nohup(1).
   struct sigaction hangup {};
   ::sigaction(SIGHUP, nullptr, &hangup);
   if (hangup.sa_handler != SIG_IGN) ::sigaddset(&signals_, SIGHUP);
@@ -35,7 +35,7 @@ void StopSignals::Wait(const std::function<void()>& on_reload) const {
 void StopSignals::ExitOnNext() const {
   std::thread([signals = signals_] {
     int signal = 0;
-    // A terminal that closes says so more than once.
+    // A closing terminal may send it more than once.
     do {
       ::sigwait(&signals, &signal);
     } while (signal != SIGTERM && signal != SIGINT && signal != SIGQUIT);

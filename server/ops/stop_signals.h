@@ -1,4 +1,4 @@
-// What signals mean to the server. One object a process, made before other threads are.
+// Signal handling of the server. One object per process, created before other threads.
 #pragma once
 
 #include <signal.h>
@@ -7,17 +7,17 @@
 
 namespace color3d {
 
+// Signals and their actions:
 //   TERM, INT, QUIT, PWR, XCPU   drain
-//   HUP                          drain where the program was started at a terminal, which is gone
-//                                then; else it is somebody who asks to read settings again;
-//                                nothing under nohup(1)
-//   USR1, USR2, ALRM, VTALRM, PROF, IO, STKFLT, PIPE, XFSZ   nothing
-// The same for all threads that are made later; programs that we start have the defaults.
+//   HUP                          drain if the program was started from a terminal, which has
+//                                closed; else reload settings; ignored under nohup(1)
+//   USR1, USR2, ALRM, VTALRM, PROF, IO, STKFLT, PIPE, XFSZ   ignored
+// Holds for all threads created later; started programs get the default actions.
 class StopSignals {
  public:
   StopSignals();
 
-  // Until one says to drain; `on_reload` is called at each that asks to read settings again.
+  // Returns at a signal to drain; calls `on_reload` at each signal to reload settings.
   void Wait(const std::function<void()>& on_reload) const;
   // The next TERM, INT or QUIT ends the process at once.
   void ExitOnNext() const;
@@ -27,7 +27,7 @@ class StopSignals {
   sigset_t signals_;
 };
 
-// Those that end a program which does not look after them, and that ours let pass.
+// Ignores signals that would end a program by default and have no meaning here.
 void IgnoreStraySignals();
 
 }  // namespace color3d

@@ -1,6 +1,5 @@
-// A log for people: "2026-01-31T12:00:00.000Z info worker-1 MESSAGE", times in UTC. A message is
-// one line whatever it says: what would end the line or reach the terminal is escaped
-// (EscapeControls).
+// Log format for people: "2026-01-31T12:00:00.000Z info worker-1 MESSAGE", times in UTC. Each
+// message is one line: line ends and control characters are escaped (EscapeControls).
 #pragma once
 
 #include <spdlog/formatter.h>

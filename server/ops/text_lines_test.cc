@@ -23,12 +23,12 @@ std::string Logged(const std::string& message, std::unique_ptr<spdlog::formatter
   return text.str();
 }
 
-// What a caller names must not look like a line of the server's own.
+// A name given by a caller must not look like a line of the log.
 constexpr char kForged[] =
     "x\n2026-01-01T00:00:00.000Z info server anna may do everything\r\x1b[2J\x1b]0;owned\a\xc2\x9b"
     "31m";
 
-TEST(TextLinesTest, AMessageIsOneLineAndReachesNoTerminal) {
+TEST(TextLinesTest, EscapesLineEndsAndControls) {
   const std::string line = Logged(kForged, MakeTextLines());
   EXPECT_EQ(line.find('\n'), line.size() - 1) << line;
   EXPECT_THAT(line, HasSubstr("x\\n2026-01-01"));
@@ -37,14 +37,14 @@ TEST(TextLinesTest, AMessageIsOneLineAndReachesNoTerminal) {
   EXPECT_THAT(line, Not(HasSubstr("\xc2\x9b")));
 }
 
-TEST(TextLinesTest, JsonLinesReachNoTerminalEither) {
+TEST(TextLinesTest, JsonLinesEscapeControls) {
   const std::string line = Logged(kForged, MakeJsonLines());
   EXPECT_EQ(line.find('\n'), line.size() - 1) << line;
   EXPECT_THAT(line, Not(HasSubstr("\x1b")));
   EXPECT_THAT(line, Not(HasSubstr("\xc2\x9b")));
 }
 
-TEST(TextLinesTest, TimesAreUtcAndSaySo) {
+TEST(TextLinesTest, TimesAreUtc) {
   ::setenv("TZ", "Asia/Kathmandu", 1);
   ::tzset();
   std::ostringstream text;

@@ -31,20 +31,20 @@ void CollectNow(const RpcParts& parts,
                 v1::CollectResponse* response) {
   const int64_t grace = request.has_grace_seconds() ? request.grace_seconds() : kGraceSeconds;
   if (grace < kLeastGraceSeconds) {
-    throw InvalidArgument("grace_seconds is {}; at least {} are needed, for uploads under way",
-                          grace,
-                          kLeastGraceSeconds);
+    throw InvalidArgument(
+        "grace_seconds is {}; at least {} are needed, so that uploads under way keep their blobs",
+        grace,
+        kLeastGraceSeconds);
   }
   const auto stop = [&parts] { return parts.draining.load(); };
   const auto [blobs, unreadable] = ListBlobs(parts.blobs, stop);
   RequireNotDraining(parts);
   if (!unreadable.empty()) {
-    throw Error(
-        ErrorCode::kFailedPrecondition,
-        "nothing is collected: {} places of the blobs cannot be looked at, first {}; change "
-        "their owner or rights, or look after the disk",
-        unreadable.size(),
-        unreadable.front());
+    throw Error(ErrorCode::kFailedPrecondition,
+                "nothing is collected: {} folders of blobs cannot be read, the first is {}; change "
+                "their owner or permissions, or check the disk",
+                unreadable.size(),
+                unreadable.front());
   }
   std::vector<FileDigest> gone;
   if (request.dry_run()) {

@@ -1,4 +1,4 @@
-// What is refused on a disk that is nearly full, and what is done on a full one all the same.
+// Requests on a nearly full disk are refused; deletions on a full disk succeed.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -9,7 +9,7 @@
 namespace color3d::testing {
 namespace {
 
-TEST_F(RpcTest, JobsAndScenesAreNotAcceptedOnADiskThatIsNearlyFull) {
+TEST_F(RpcTest, RefusesJobsAndScenesWhenDiskIsNearlyFull) {
   const std::string scene = client_->MakeScene().name();
   store_.SetHold(Hold::kStorage, true);
   v1::Scene made;
@@ -21,8 +21,8 @@ TEST_F(RpcTest, JobsAndScenesAreNotAcceptedOnADiskThatIsNearlyFull) {
   EXPECT_TRUE(CreateStatus(ScriptedSpec(scene, "a")).ok());
 }
 
-// What was found some seconds ago is not believed: a few large calls fill a disk in less.
-TEST_F(RpcTest, BelowLowSpaceNothingIsCreatedFromTheFirstCallOn) {
+// The free space is checked anew for each call, because a few large calls fill a disk quickly.
+TEST_F(RpcTest, RefusesFirstCallBelowLowSpace) {
   const std::string scene = client_->MakeScene().name();
   RpcServerOptions options;
   options.listen = "127.0.0.1:0";
@@ -46,7 +46,7 @@ TEST_F(RpcTest, BelowLowSpaceNothingIsCreatedFromTheFirstCallOn) {
   EXPECT_TRUE(client.scenes->DeleteScene(&third, remove, &removed).ok());
 }
 
-// A store on a disk without a last byte, until something is given up.
+// A store on a full disk, until the ballast is released.
 class FullStore : public SqliteJobStore {
  public:
   using SqliteJobStore::SqliteJobStore;
@@ -75,7 +75,7 @@ class FullStore : public SqliteJobStore {
   }
 };
 
-TEST_F(RpcTest, DeletingGivesUpTheBallastOfAFullDisk) {
+TEST_F(RpcTest, DeletionReleasesBallastOfFullDisk) {
   FullStore full(scratch_.path() / "jobs.db", StoreRole::kServer, SystemClocks());
   const std::string scene = client_->MakeScene().name();
   const std::string job = client_->Create(ScriptedSpec(scene, "a")).name();

@@ -53,7 +53,7 @@ void ListBackends(const RpcParts& parts, v1::ServerInfo* info) {
   }
 }
 
-// What others do is nobody's business but the operator's.
+// Workers and their jobs of other projects are shown to operators only.
 bool IsOf(const Call& call, const std::string& job) {
   if (call.caller.role == Role::kAdmin || job.empty()) return true;
   try {

@@ -6,13 +6,13 @@ namespace color3d::testing {
 namespace {
 using InfoServicesTest = RpcTest;
 
-TEST_F(InfoServicesTest, ColorizersAndServerInfo) {
+TEST_F(InfoServicesTest, ListsColorizersAndServerInfo) {
   const std::string scene = client_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
   *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = client_->Upload("key");
   const v1::Job root = client_->Create(spec);
-  EXPECT_EQ(Work(), 12) << "all but the augmentations";
+  EXPECT_EQ(Work(), 12) << "all jobs except the augmentations";
   EXPECT_EQ(client_->Get(root.name()).state(), v1::Job::STATE_SUCCEEDED);
   v1::ListColorizersRequest list;
   list.set_scene(scene);

@@ -1,4 +1,4 @@
-// How much each of two projects may have.
+// Quotas of two projects.
 #include <gtest/gtest.h>
 
 #include <deque>
@@ -11,7 +11,7 @@ namespace color3d::testing {
 namespace {
 using grpc::StatusCode;
 
-TEST_F(ProjectsTest, QuotasSayWhatIsFullAndWhenToTryAgain) {
+TEST_F(ProjectsTest, QuotaErrorNamesQuotaAndRetryDelay) {
   attic_->Upload(std::string(180'000, 'a'));
   grpc::ClientContext context;
   google::bytestream::WriteResponse response;
@@ -34,13 +34,13 @@ TEST_F(ProjectsTest, QuotasSayWhatIsFullAndWhenToTryAgain) {
   for (const auto& any : details.details()) found = found || any.UnpackTo(&failure);
   ASSERT_TRUE(found);
   EXPECT_EQ(failure.violations(0).subject(), "project:attic stored_bytes");
-  cellar_->Upload(more);  // another's quota is his
+  cellar_->Upload(more);  // the quota of the other project
 
   v1::ServerInfo info;
   Call(*attic_->server, &v1::ServerService::Stub::GetServerInfo, v1::GetServerInfoRequest(), &info);
   EXPECT_EQ(info.project(), "attic");
   EXPECT_EQ(info.role(), "submit");
-  EXPECT_EQ(info.usage().stored_bytes(), 180'000 + 4096) << "with what the file takes besides";
+  EXPECT_EQ(info.usage().stored_bytes(), 180'000 + 4096) << "the file and its overhead";
   EXPECT_EQ(info.usage().max_stored_bytes(), 200'000);
   v1::ListProjectsResponse projects;
   ASSERT_TRUE(Call(*admin_->admin,
@@ -51,7 +51,7 @@ TEST_F(ProjectsTest, QuotasSayWhatIsFullAndWhenToTryAgain) {
   EXPECT_EQ(projects.projects_size(), 2);
 }
 
-TEST_F(ProjectsTest, UploadsSideBySideShareTheQuota) {
+TEST_F(ProjectsTest, ParallelUploadsShareQuota) {
   std::deque<grpc::ClientContext> contexts;
   google::bytestream::WriteResponse responses[2];
   const auto write = [&](const char* uuid) {
@@ -72,12 +72,12 @@ TEST_F(ProjectsTest, UploadsSideBySideShareTheQuota) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   EXPECT_EQ(ReasonOfStatus(write("b")->Finish()), "QUOTA_EXCEEDED");
-  cellar_->Upload(std::string(120'000, 'c'));  // its quota is its own
+  cellar_->Upload(std::string(120'000, 'c'));  // its own quota
   contexts[0].TryCancel();
   first->Finish();
 }
 
-TEST_F(ProjectsTest, NothingIsRetriedBeyondTheQuotaOrOnAFullDisk) {
+TEST_F(ProjectsTest, RetryIsRefusedBeyondQuotaOrOnFullDisk) {
   const v1::Job job = attic_->Create(ScriptedSpec(attic_->MakeScene().name(), "a"));
   v1::RetryJobRequest retry = Named<v1::RetryJobRequest>(job.name());
   Call(*attic_->jobs, &v1::JobService::Stub::CancelJob, Named<v1::CancelJobRequest>(job.name()));
@@ -93,11 +93,11 @@ TEST_F(ProjectsTest, NothingIsRetriedBeyondTheQuotaOrOnAFullDisk) {
   retry.set_request_id(kUuid);
   EXPECT_EQ(reason(), "");
   store_.SetHold(Hold::kStorage, true);
-  EXPECT_EQ(reason(), "") << "the same call, made before";
+  EXPECT_EQ(reason(), "") << "repeated call with the same request_id";
 }
 
-// A scene of long paths and a job of a long spec take space in the database.
-TEST_F(ProjectsTest, RowsCountInTheQuota) {
+// The paths of a scene and the spec of a job take space in the database.
+TEST_F(ProjectsTest, RowsCountTowardsQuota) {
   v1::CreateSceneRequest create;
   for (int i = 0; i < 130; ++i) {
     v1::SceneFile* file = create.add_files();
@@ -110,9 +110,9 @@ TEST_F(ProjectsTest, RowsCountInTheQuota) {
   EXPECT_EQ(reason(*attic_), "");
   EXPECT_EQ(reason(*attic_), "");
   const grpc::Status refused = Call(*attic_->scenes, &v1::SceneService::Stub::CreateScene, create);
-  EXPECT_EQ(ReasonOfStatus(refused), "QUOTA_EXCEEDED") << "twice 90 kB are there";
+  EXPECT_EQ(ReasonOfStatus(refused), "QUOTA_EXCEEDED") << "two scenes of 90 kB are stored";
   EXPECT_NE(refused.error_message().find("rows"), std::string::npos);
-  EXPECT_EQ(reason(*cellar_), "") << "another's quota is his";
+  EXPECT_EQ(reason(*cellar_), "") << "quota of the other project";
 
   const std::string scene = cellar_->MakeScene().name();
   v1::CreateJobRequest job;
@@ -132,7 +132,7 @@ TEST_F(ProjectsTest, RowsCountInTheQuota) {
   EXPECT_LT(made, 20);
 }
 
-TEST_F(ProjectsTest, ScenesOfAProjectAreCounted) {
+TEST_F(ProjectsTest, LimitsScenesOfProject) {
   v1::CreateSceneRequest create;
   v1::SceneFile* file = create.add_files();
   file->set_path("a.png");
@@ -145,7 +145,7 @@ TEST_F(ProjectsTest, ScenesOfAProjectAreCounted) {
   EXPECT_EQ(reason(*cellar_), "");
 }
 
-TEST_F(ProjectsTest, StreamsOfAProjectAreCounted) {
+TEST_F(ProjectsTest, LimitsStreamsOfProject) {
   const std::string scene = attic_->MakeScene().name();
   const v1::Job job = attic_->Create(ScriptedSpec(scene, "a"));
   v1::WatchJobsRequest watch;
@@ -164,10 +164,10 @@ TEST_F(ProjectsTest, StreamsOfAProjectAreCounted) {
   Work();
 }
 
-TEST_F(ProjectsTest, LiveStreamsOfAProjectAreCounted) {
+TEST_F(ProjectsTest, LimitsLiveStreamsOfProject) {
   std::deque<grpc::ClientContext> contexts;
   v1::ColorizeImagesResponse response;
-  // Whether the stream is open: a picture that is none gets an answer.
+  // Returns whether the stream is open: an open one answers a request that is not a picture.
   const auto open = [&](TestClient& client) {
     grpc::ClientContext& context = contexts.emplace_back();
     context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));

@@ -1,4 +1,4 @@
-// Two projects on one server: no call of the one tells or touches what the other has.
+// Two projects on one server: no call reveals or changes data of the other project.
 #include <gtest/gtest.h>
 
 #include <deque>
@@ -11,7 +11,7 @@ namespace color3d::testing {
 namespace {
 using grpc::StatusCode;
 
-TEST_F(ProjectsTest, WhatOneHasIsNotThereForTheOther) {
+TEST_F(ProjectsTest, HidesDataOfOtherProject) {
   const std::string scene = attic_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
@@ -71,7 +71,7 @@ TEST_F(ProjectsTest, WhatOneHasIsNotThereForTheOther) {
   *find.add_digests() = DigestOf("key");
   v1::FindMissingBlobsResponse missing;
   Call(*other.blobs, &v1::BlobService::Stub::FindMissingBlobs, find, &missing);
-  EXPECT_EQ(missing.missing_size(), 2) << "it must not tell that somebody has them";
+  EXPECT_EQ(missing.missing_size(), 2) << "must not reveal that another project has them";
   google::bytestream::QueryWriteStatusRequest query;
   query.set_resource_name("uploads/u1/blobs/" + DigestOf("key").sha256() + "/3");
   google::bytestream::QueryWriteStatusResponse written;
@@ -88,11 +88,12 @@ TEST_F(ProjectsTest, WhatOneHasIsNotThereForTheOther) {
     Call(*other.jobs, &Jobs::ListJobs, list, &jobs);
     EXPECT_EQ(jobs.jobs_size(), 0) << parent;
   }
-  EXPECT_EQ(other.Download(other.Upload("key")), "key") << "whoever shows the bytes has them";
+  EXPECT_EQ(other.Download(other.Upload("key")), "key")
+      << "a project that uploads the bytes has them";
 }
 
-// Jobs, scenes and files of others in what a request names, not in what it asks for.
-TEST_F(ProjectsTest, WhatOneHasCannotBeNamedByTheOther) {
+// Requests cannot name jobs, scenes or files of the other project as inputs either.
+TEST_F(ProjectsTest, RefusesInputsOfOtherProject) {
   const std::string scene = attic_->MakeScene().name(), own = cellar_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
@@ -152,8 +153,8 @@ TEST_F(ProjectsTest, WhatOneHasCannotBeNamedByTheOther) {
   EXPECT_TRUE(stream->Finish().ok());
 }
 
-// Of whoever may not write nothing is read; he hears so before he has sent a byte.
-TEST_F(ProjectsTest, UploadsAreRefusedBeforeTheyBegin) {
+// Callers without the right to write are refused before their first byte is read.
+TEST_F(ProjectsTest, RefusesUploadsBeforeFirstByte) {
   std::deque<grpc::ClientContext> contexts;
   google::bytestream::WriteResponse response;
   const auto write = [&](TestClient& client) {
@@ -172,7 +173,7 @@ TEST_F(ProjectsTest, UploadsAreRefusedBeforeTheyBegin) {
   second->Finish();
 }
 
-TEST_F(ProjectsTest, WhoRunsTheServerPausesKillsAndCollects) {
+TEST_F(ProjectsTest, AdminPausesKillsAndCollects) {
   using Admin = v1::AdminService::Stub;
   const v1::Job job = attic_->Create(ScriptedSpec(attic_->MakeScene().name(), "a"));
   ASSERT_TRUE(Call(*admin_->admin, &Admin::PauseQueue, v1::PauseQueueRequest()).ok());

@@ -19,9 +19,9 @@ namespace {
 
 constexpr size_t kMaxChecksWaiting = 500;
 constexpr int kHandshakeLimitMs = 10'000;
-// Without a call for so long a connection is closed; clients open another when they need one.
+// A connection without calls for this long is closed; clients reconnect when needed.
 constexpr int kIdleLimitMs = 5 * 60'000;
-// Besides streams: the job store, logs, metrics, gRPC itself, and room to spare.
+// Descriptors besides streams: job store, logs, metrics, gRPC itself, and a margin.
 constexpr int kOtherDescriptors = 128;
 
 }  // namespace
@@ -57,7 +57,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   checks_ = std::make_unique<Executor>(
       options.check_threads, kMaxChecksWaiting, std::max(1, options.check_threads / 2));
   const int of_project = options.limits.project_max_streams;
-  // Without tokens and roles there is one project alone.
+  // Without tokens and certificate roles there is only one project.
   const bool shared = options.tokens != nullptr || options.certificates != nullptr;
   streams_.reset(new StreamLimits{{"watches", options.limits.max_watches, of_project, shared},
                                   {"downloads", options.limits.max_reads, of_project, shared},
@@ -94,8 +94,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
-  // gRPC is given connections and does not listen itself: it would stop to for ever once it has run
-  // out of descriptors.
+  // gRPC gets accepted connections and does not listen itself: it would stop listening for good
+  // once the process has run out of descriptors.
   acceptor_ = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
       options.credentials ? options.credentials : grpc::InsecureServerCredentials());
@@ -106,7 +106,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, 5'000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 60'000);
   builder.SetMaxReceiveMessageSize(16 << 20);
-  // What gRPC itself keeps of connections and calls: beyond it no connection is accepted.
+  // Memory of gRPC for connections and calls; beyond it no connection is accepted.
   grpc::ResourceQuota quota("rpc");
   quota.Resize(static_cast<size_t>(options.limits.transport_memory_bytes));
   builder.SetResourceQuota(quota);
@@ -175,7 +175,7 @@ void RpcServer::Shutdown(std::chrono::milliseconds grace) {
   server_->Shutdown(std::chrono::system_clock::now() + grace);
   server_->Wait();
   server_.reset();
-  hub_.reset();  // its streams are all done now
+  hub_.reset();  // all its streams have ended
   quick_.reset();
   slow_.reset();
   bulk_.reset();

@@ -23,25 +23,25 @@ class ExternalConnectionAcceptor;
 namespace color3d {
 
 struct RpcServerOptions {
-  std::string listen = "127.0.0.1:50551";  // port 0: any free one
+  std::string listen = "127.0.0.1:50551";  // port 0: any free port
   int quick_threads = 4;
   int slow_threads = 6;
   int bulk_threads = 6;
-  int check_threads = 4;                                 // of which one project has half at most
-  std::shared_ptr<grpc::ServerCredentials> credentials;  // null: in the clear
-  // Both null: nobody is asked.
+  int check_threads = 4;                                 // one project uses at most half of them
+  std::shared_ptr<grpc::ServerCredentials> credentials;  // null: no TLS
+  // Both null: no authentication.
   std::shared_ptr<TokenBook> tokens;
   std::shared_ptr<CertificateRoles> certificates;
   ServiceLimits limits;
-  int max_connections = 4096;  // fewer where the process may not have so many descriptors
+  int max_connections = 4096;  // fewer if the process may not open as many descriptors
   WatchTiming watch;
   std::string version = "0";
   UserModels models;
-  BackendProbe probe_backends;              // may be empty: then backends are listed unprobed
-  std::filesystem::path job_logs;           // folder of DataPaths::JobLogs; empty: there are none
-  std::vector<std::string> notify_allowed;  // as CheckNotifyUrl
-  std::function<void()> drain = [] {};      // what AdminService.Drain does
-  std::function<bool()> make_room;          // gives disk space up for a deletion; may be empty
+  BackendProbe probe_backends;              // empty: backends are listed without probing
+  std::filesystem::path job_logs;           // folder of DataPaths::JobLogs; empty: no logs
+  std::vector<std::string> notify_allowed;  // see CheckNotifyUrl
+  std::function<void()> drain = [] {};      // called by AdminService.Drain
+  std::function<bool()> make_room;          // frees disk space for a deletion; may be empty
   CallObserver on_call;                     // may be empty
   InferenceLink inference;
   ColorizeLimits live;
@@ -49,8 +49,8 @@ struct RpcServerOptions {
 
 class RpcServer {
  public:
-  // Starts to answer. Throws Error{kFailedPrecondition} when the address is in use or no address of
-  // this machine, in one line with the remedy. The stores outlive the server.
+  // Starts to serve. Throws Error{kFailedPrecondition} with the remedy if the address is in use or
+  // does not belong to this machine. The stores must outlive the server.
   RpcServer(const RpcServerOptions& options,
             JobStore& store,
             BlobStore& blobs,
@@ -60,17 +60,17 @@ class RpcServer {
   RpcServer(const RpcServer&) = delete;
   RpcServer& operator=(const RpcServer&) = delete;
 
-  // "127.0.0.1:50551" with the port that was bound.
+  // Address with the bound port, e.g. "127.0.0.1:50551".
   const std::string& address() const;
-  // Streams that are open, and pictures that are not answered yet.
+  // Numbers of open streams and of pictures not answered yet.
   struct Open {
     int watches = 0, downloads = 0, uploads = 0, live_pictures = 0;
   };
   Open open() const;
   ConnectionGate::Counts connections() const;
-  // Health turns NOT_SERVING, new jobs are refused, streams end with UNAVAILABLE.
+  // Sets health to NOT_SERVING, refuses new jobs and ends streams with UNAVAILABLE.
   void StartDraining();
-  // Waits for open RPCs at most this long, then cancels them.
+  // Waits at most `grace` for open RPCs, then cancels them.
   void Shutdown(std::chrono::milliseconds grace);
 
  private:
@@ -90,7 +90,7 @@ class RpcServer {
   std::unique_ptr<ColorizeHub> colorize_hub_;
   std::unique_ptr<Services> services_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
-  std::unique_ptr<ConnectionGate> gate_;  // calls of the server tell it
+  std::unique_ptr<ConnectionGate> gate_;  // notified of calls by the server
   std::unique_ptr<grpc::Server> server_;
 };
 

@@ -12,12 +12,12 @@ namespace {
 using ::testing::HasSubstr;
 using RpcServerTest = RpcTest;
 
-TEST_F(RpcServerTest, BusyAddressIsExplained) {
+TEST_F(RpcServerTest, ExplainsBusyAddress) {
   RpcServerOptions options;
   options.listen = server_->address();
   try {
     RpcServer second(options, store_, blobs_, uploads_, SystemClock());
-    FAIL() << "two servers on one port";
+    FAIL() << "two servers share a port";
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("in use"));
     EXPECT_THAT(e.what(), HasSubstr("--listen"));
@@ -29,15 +29,15 @@ TEST_F(RpcServerTest, BusyAddressIsExplained) {
   EXPECT_TRUE(IsLoopback("localhost:1"));
   EXPECT_FALSE(IsLoopback("0.0.0.0:1"));
   EXPECT_FALSE(IsLoopback("127.0.0.1.example.org:1"));
-  EXPECT_FALSE(IsLoopback("127.1:1")) << "no address; names that begin so may be anybody's";
+  EXPECT_FALSE(IsLoopback("127.1:1")) << "a host name, not an address";
   EXPECT_THROW(IsLoopback("nonsense"), Error);
 }
 
-// The server's look at itself finds what clients would find, whatever it listens with.
-TEST_F(RpcServerTest, ALookAtItsPortFindsWhetherItAnswers) {
+// The self-probe sees the same as clients do, for each kind of address.
+TEST_F(RpcServerTest, ProbePortDetectsWhetherServerAnswers) {
   constexpr std::chrono::milliseconds kLimit(10'000);
   EXPECT_EQ(ProbePort({server_->address(), false}, kLimit), "");
-  EXPECT_NE(ProbePort({server_->address(), true}, kLimit), "") << "it speaks no TLS";
+  EXPECT_NE(ProbePort({server_->address(), true}, kLimit), "") << "server without TLS";
   TestAuthority ours(scratch_.path(), "ours");
   const CertificateFiles own = ours.Issue("server");
   for (const bool wants_certificate : {false, true}) {
@@ -49,7 +49,7 @@ TEST_F(RpcServerTest, ALookAtItsPortFindsWhetherItAnswers) {
                                wants_certificate ? ours.certificate() : std::filesystem::path()});
     RpcServer tls(options, store_, blobs_, uploads_, SystemClock());
     EXPECT_EQ(ProbePort({tls.address(), true}, kLimit), "") << wants_certificate;
-    EXPECT_NE(ProbePort({tls.address(), false}, kLimit), "") << "in the clear";
+    EXPECT_NE(ProbePort({tls.address(), false}, kLimit), "") << "probe without TLS";
   }
   RpcServerOptions options;
   options.listen = "unix:" + (scratch_.path() / "s").string();
@@ -57,7 +57,7 @@ TEST_F(RpcServerTest, ALookAtItsPortFindsWhetherItAnswers) {
   EXPECT_EQ(ProbePort({options.listen, false}, kLimit), "");
   local.reset();
   EXPECT_NE(ProbePort({options.listen, false}, kLimit), "");
-  // Somebody listens and never answers, as a server that has run out of descriptors.
+  // A socket that listens but never answers, like a server that has run out of descriptors.
   const ListenSockets deaf("127.0.0.1:0");
   EXPECT_NE(ProbePort({deaf.address(), false}, std::chrono::milliseconds(300)), "");
   EXPECT_NE(ProbePort({deaf.address(), true}, std::chrono::milliseconds(300)), "");

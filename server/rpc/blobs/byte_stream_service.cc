@@ -1,5 +1,5 @@
-// google.bytestream.ByteStream: both reactors hand each chunk to the executor, one at a time, so a
-// stream never holds more than one chunk in memory and never blocks a gRPC thread.
+// google.bytestream.ByteStream. Both reactors hand one chunk at a time to the executor, so a stream
+// holds at most one chunk in memory and never blocks a gRPC thread.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -19,7 +19,7 @@ using google::bytestream::WriteRequest;
 using google::bytestream::WriteResponse;
 
 constexpr int64_t kReadChunkBytes = 256 << 10;
-constexpr size_t kNameBytes = 1024;  // of a message besides its data
+constexpr size_t kNameBytes = 1024;  // size of a message besides its data
 
 class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
  public:
@@ -40,11 +40,11 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     if (!ok) return Finish(grpc::Status::CANCELLED);
     parts_.bulk.Post([this] { Step(); });
   }
-  // Called after Finish and after the last Step, which was what finished.
+  // Called after Finish and after the last Step.
   void OnDone() override { delete this; }
 
  private:
-  // Opens at the first call; then reads and sends one chunk, or finishes.
+  // The first call opens the blob; later calls read and send one chunk, or finish.
   void Step() {
     bool more = false;
     const grpc::Status status = Guard([&] {
@@ -57,12 +57,13 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     StartWrite(&response_);
   }
 
-  // Nobody reads. What was written is taken back, so that the write ends, too.
+  // The client does not read. Cancels the call, so that the pending write ends, too.
   void GiveUp() {
     context_.TryCancel();
     FinishGivenUp();
   }
-  // By whichever of the two, the write's end or the watch, comes last: this lives until then.
+  // Called by the end of the write or by the silence watch, whichever comes last; this object lives
+  // until then.
   void FinishGivenUp() {
     if (given_up_.exchange(true)) Finish(grpc::Status::CANCELLED);
   }
@@ -109,21 +110,21 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
     return true;
   }
 
-  // What was sent from its first to its last byte is known to be what was stored, or said not to
-  // be.
+  // A download of a whole blob verifies its digest.
   void RequireIntact() {
     if (!is_whole_ || sent_.FinishHex() == sha256_) return;
     if (parts_.blobs.SetAside(sha256_)) {
       throw ServiceError(
           ErrorReason::kBlobDamaged,
           "'{}' was damaged on the server's disk and is set aside; upload it again, or "
-          "run the job anew with skip_cache",
+          "run the job again with skip_cache",
           request_.resource_name());
     }
-    throw ServiceError(ErrorReason::kBlobMended,
-                       "'{}' was damaged on the server's disk while it was sent, and is whole now; "
-                       "download it again",
-                       request_.resource_name());
+    throw ServiceError(
+        ErrorReason::kBlobMended,
+        "'{}' was damaged on the server's disk while it was sent, and is repaired now; "
+        "download it again",
+        request_.resource_name());
   }
 
   const RpcParts& parts_;
@@ -149,7 +150,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
       : parts_(parts),
         response_(response),
         silence_(parts.silence, [this] { parts_.bulk.Post([this] { GiveUp(); }); }) {
-    // Nothing is read for whoever may not write, or has as many streams as he may.
+    // Nothing is read from callers without the role or above their limit of streams.
     const grpc::Status allowed = Guard([&] {
       call_ = Admit(parts_, Role::kSubmit, context);
       place_ = parts_.streams.writes.Take(call_->caller.project);
@@ -157,8 +158,8 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     allowed.ok() ? ReadNext() : Finish(allowed);
   }
   void OnReadDone(bool ok) override {
-    if (!silence_.Resume()) return;  // it is given up
-    // Refused here, so that no large message waits for its turn.
+    if (!silence_.Resume()) return;  // given up
+    // Checked before the message waits for the executor.
     const grpc::Status fits = Guard([&] {
       if (ok) RequireSmallChunk();
     });
@@ -181,14 +182,14 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     StartRead(&request_);
   }
 
-  // Others may have the place. The read that is under way ends with the call.
+  // Releases the place of the stream. The pending read ends with the call.
   void GiveUp() {
     End(Guard([&] {
       if (writer_) writer_->Sync();
       throw ServiceError(
           ErrorReason::kUploadSilent,
-          "nothing came for {} s; what came before is kept: ask QueryWriteStatus and go "
-          "on from there",
+          "the upload was silent for {} s; the received bytes are kept: call QueryWriteStatus and "
+          "continue from there",
           parts_.silence.limit().count() / 1000);
     }));
   }
@@ -203,17 +204,18 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
         static_cast<size_t>(parts_.limits.max_chunk_bytes) + kNameBytes) {
       return;
     }
-    throw InvalidArgument("a chunk of {} bytes; at most {} are allowed",
+    throw InvalidArgument("the chunk has {} bytes; at most {} are allowed",
                           request_.data().size(),
                           parts_.limits.max_chunk_bytes);
   }
 
-  // True when the RPC is answered.
+  // Returns whether the RPC has been answered.
   bool Store() {
     if (!writer_) {
       name_ = ParseUploadName(request_.resource_name());
       name_.owner = call_->caller.project;
-      // Others may have stored the same bytes: whoever has not shown them sends them.
+      // Another project may have stored the same bytes; projects that have not sent them must do
+      // so.
       if (HasBlob(parts_, call_->store, name_.digest)) {
         response_->set_committed_size(name_.digest.size_bytes);
         return true;
@@ -233,7 +235,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
     return true;
   }
 
-  // The client stopped without finish_write, or the connection broke: keep what came.
+  // The client stopped without finish_write, or the connection broke: keeps the received bytes.
   void EndOfStream() {
     const grpc::Status status = Guard([&] {
       if (!writer_) throw InvalidArgument("the stream ended before its first message");
@@ -247,7 +249,7 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   WriteRequest request_;
   std::string resource_;
   UploadName name_;
-  std::optional<Call> call_;  // nothing: refused
+  std::optional<Call> call_;  // empty: refused
   std::unique_ptr<UploadStore::Writer> writer_;
   StreamLimit::Place place_;
   SilenceWatch::Stream silence_;

@@ -11,7 +11,7 @@ namespace color3d::testing {
 namespace {
 using ByteStreamServiceTest = RpcTest;
 
-TEST_F(ByteStreamServiceTest, UploadResumesAtAnOffset) {
+TEST_F(ByteStreamServiceTest, UploadResumesAtOffset) {
   const std::string content(100'000, 'x');
   const v1::Digest digest = DigestOf(content);
   const std::string resource =
@@ -30,7 +30,7 @@ TEST_F(ByteStreamServiceTest, UploadResumesAtAnOffset) {
   ASSERT_TRUE(WriteAt(resource, 30'000, content.substr(30'000), true, &committed).ok());
   EXPECT_EQ(committed, 100'000);
   EXPECT_EQ(client_->Download(digest), content);
-  ASSERT_TRUE(WriteAt(resource, 0, "x", false, &committed).ok()) << "it is there already";
+  ASSERT_TRUE(WriteAt(resource, 0, "x", false, &committed).ok()) << "the blob is stored already";
   EXPECT_EQ(committed, 100'000);
 }
 
@@ -59,7 +59,7 @@ TEST_F(ByteStreamServiceTest, ReadsAnyRange) {
   EXPECT_EQ(read(-1, 0, &content).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
-TEST_F(ByteStreamServiceTest, CorruptUploadIsRefusedAndAbsent) {
+TEST_F(ByteStreamServiceTest, RefusesCorruptUpload) {
   const v1::Digest digest = DigestOf("right");
   const std::string resource = "uploads/u/blobs/" + digest.sha256() + "/5";
   const grpc::Status status = WriteAt(resource, 0, "wrong", true);
@@ -72,19 +72,19 @@ TEST_F(ByteStreamServiceTest, CorruptUploadIsRefusedAndAbsent) {
   grpc::ClientContext context;
   v1::FindMissingBlobsResponse response;
   ASSERT_TRUE(client_->blobs->FindMissingBlobs(&context, request, &response).ok());
-  ASSERT_EQ(response.missing_size(), 1) << "once, although named twice";
+  ASSERT_EQ(response.missing_size(), 1) << "listed once, although named twice";
   EXPECT_EQ(response.missing(0).sha256(), digest.sha256());
 }
 
-TEST_F(ByteStreamServiceTest, HostileResourceNames) {
+TEST_F(ByteStreamServiceTest, RefusesHostileResourceNames) {
   for (const char* resource : {"", "uploads/../blobs/x/1", "blobs/x", "uploads/u/blobs/zz/-1"}) {
     EXPECT_EQ(WriteAt(resource, 0, "x", false).error_code(), grpc::StatusCode::INVALID_ARGUMENT)
         << resource;
   }
 }
 
-// A disk that returns other bytes: the client is told, and an upload heals it.
-TEST_F(ByteStreamServiceTest, DamagedBlobsAreSaidToBeAndHealed) {
+// When the disk returns other bytes, the client gets an error and an upload repairs the blob.
+TEST_F(ByteStreamServiceTest, ReportsAndRepairsDamagedBlobs) {
   const std::string content(700'000, 'x');
   const v1::Digest digest = client_->Upload(content);
   const auto file = blobs_.Fetch(digest.sha256());
@@ -101,14 +101,14 @@ TEST_F(ByteStreamServiceTest, DamagedBlobsAreSaidToBeAndHealed) {
     return ReasonOfStatus(stream->Finish());
   };
   EXPECT_EQ(read(), "BLOB_DAMAGED");
-  EXPECT_EQ(blobs_.damaged(), 1) << "what a metric shows";
+  EXPECT_EQ(blobs_.damaged(), 1) << "shown by a metric";
   EXPECT_EQ(read(), "BLOB_MISSING");
   client_->Upload(content);
   EXPECT_EQ(client_->Download(digest), content);
 }
 
-// A disk that does not answer those who transfer keeps nobody else waiting.
-TEST_F(ByteStreamServiceTest, TransfersKeepNoOtherCallWaiting) {
+// A disk that blocks transfers does not delay other calls.
+TEST_F(ByteStreamServiceTest, TransfersDoNotDelayOtherCalls) {
   constexpr int kTransfers = 12;
   class HangingBlobs : public FileBlobStore {
    public:
@@ -151,7 +151,7 @@ TEST_F(ByteStreamServiceTest, TransfersKeepNoOtherCallWaiting) {
   }
 }
 
-// A place is for those who do something with it.
+// Silent streams lose their place.
 class SilentStreamsTest : public RpcTest {
  protected:
   SilentStreamsTest() {
@@ -176,7 +176,7 @@ class SilentStreamsTest : public RpcTest {
   std::unique_ptr<TestClient> other_;
 };
 
-TEST_F(SilentStreamsTest, AnUploadThatSendsNothingGivesItsPlaceBackAndGoesOn) {
+TEST_F(SilentStreamsTest, SilentUploadLosesPlaceAndResumes) {
   const std::string content = "0123456789";
   const v1::Digest digest = DigestOf(content);
   google::bytestream::WriteRequest request;
@@ -186,7 +186,7 @@ TEST_F(SilentStreamsTest, AnUploadThatSendsNothingGivesItsPlaceBackAndGoesOn) {
   std::vector<std::unique_ptr<grpc::ClientWriter<google::bytestream::WriteRequest>>> streams;
   std::deque<google::bytestream::WriteResponse> answers(4);
   for (size_t i = 0; i < 4; ++i) streams.push_back(other_->bytes->Write(&contexts[i], &answers[i]));
-  ASSERT_TRUE(streams[0]->Write(request));  // the others say nothing at all
+  ASSERT_TRUE(streams[0]->Write(request));  // the others send nothing
   ASSERT_TRUE(BecomesTrue([&] { return impatient_->open().uploads == 4; }));
   ASSERT_TRUE(BecomesTrue([&] { return impatient_->open().uploads == 0; })) << "for ever";
   for (const auto& stream : streams) {
@@ -203,8 +203,8 @@ TEST_F(SilentStreamsTest, AnUploadThatSendsNothingGivesItsPlaceBackAndGoesOn) {
   EXPECT_EQ(other_->Download(other_->Upload(content)), content);
 }
 
-TEST_F(SilentStreamsTest, ADownloadThatNobodyReadsGivesItsPlaceBack) {
-  const std::string content(8 << 20, 'x');  // more than lies in buffers on the way
+TEST_F(SilentStreamsTest, UnreadDownloadLosesPlace) {
+  const std::string content(8 << 20, 'x');  // more than the buffers on the way hold
   const v1::Digest digest = DigestOf(content);
   store_.HoldBlob("", blobs_.PutBytes(content));
   google::bytestream::ReadRequest request;
@@ -230,7 +230,7 @@ TEST_F(SilentStreamsTest, ADownloadThatNobodyReadsGivesItsPlaceBack) {
   }
 }
 
-TEST_F(SilentStreamsTest, ALiveStreamToWhichNoPictureComesEnds) {
+TEST_F(SilentStreamsTest, LiveStreamWithoutPicturesEnds) {
   grpc::ClientContext context;
   const auto stream = other_->colorizers->ColorizeImages(&context);
   v1::ColorizeImagesResponse response;

@@ -20,7 +20,7 @@ std::string_view AuthorizationOf(const grpc::CallbackServerContext& context) {
   return {entry->second.data(), entry->second.size()};
 }
 
-// Of the certificate that the client showed: its common name, then its alternative names.
+// Names of the client's certificate: common name, then alternative names.
 std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& context) {
   const auto identity = context.auth_context();
   std::vector<std::string> names;
@@ -39,7 +39,7 @@ std::string_view TokenOf(std::string_view authorization) {
                                             : std::string_view();
 }
 
-// Once a second at most: refusals must not fill the disk.
+// At most once a second, so that refusals do not fill the disk.
 void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContext& context) const {
   const int64_t now = std::chrono::duration_cast<std::chrono::seconds>(
                           std::chrono::steady_clock::now().time_since_epoch())
@@ -68,15 +68,16 @@ Caller Access::Require(Role role, const grpc::CallbackServerContext& context) co
 
 Caller Access::ByToken(std::string_view token, const grpc::CallbackServerContext& context) const {
   if (token.empty()) {
-    LogRefusal("it brings no token", context);
-    throw ServiceError(ErrorReason::kTokenMissing,
-                       "this server wants a token: `color3d --token-file FILE`, or COLOR3D_TOKEN");
+    LogRefusal("no token", context);
+    throw ServiceError(
+        ErrorReason::kTokenMissing,
+        "this server requires a token: use `color3d --token-file FILE` or COLOR3D_TOKEN");
   }
   const std::optional<TokenRecord> record = tokens_->Find(token);
   if (!record) {
-    LogRefusal("its token is unknown", context);
+    LogRefusal("unknown token", context);
     throw ServiceError(ErrorReason::kTokenUnknown,
-                       "this server does not know the token; ask who runs it for a fresh one");
+                       "this server does not know the token; ask its operator for a new one");
   }
   return {record->name, record->role, record->project};
 }
@@ -87,10 +88,11 @@ Caller Access::ByCertificate(const grpc::CallbackServerContext& context) const {
   if (!record) {
     const std::string name = names.empty() ? "" : names.front();
     LogRefusal("the certificate of '" + name + "' has no role", context);
-    throw ServiceError(ErrorReason::kCertificateUnknown,
-                       "this server gives the certificate of '{}' no role; ask who runs it to name "
-                       "it in --certificate-roles",
-                       name);
+    throw ServiceError(
+        ErrorReason::kCertificateUnknown,
+        "the certificate of '{}' has no role on this server; ask its operator to add "
+        "it to the file of --certificate-roles",
+        name);
   }
   return {record->name, record->role, record->project};
 }

@@ -1,5 +1,5 @@
-// Whether a call may be made: the token that it brings, or the certificate of its connection, and
-// what that allows. Thread-safe.
+// Authentication and authorization of calls, by token or by the certificate of the connection.
+// Thread-safe.
 #pragma once
 
 #include <grpcpp/server_context.h>
@@ -15,30 +15,30 @@
 
 namespace color3d {
 
-// Who calls, and for which project.
+// Authenticated caller and its project.
 struct Caller {
-  std::string name;  // empty: the server asks nobody who he is
+  std::string name;  // empty: the server does not authenticate
   Role role = Role::kAdmin;
   std::string project;
 };
 
-// For logs.
+// Name for logs.
 inline const char* NameOf(const Caller& caller) {
   return caller.name.empty() ? "somebody" : caller.name.c_str();
 }
 
-// What follows "Bearer " in the metadata "authorization"; empty for anything else.
+// Returns the part after "Bearer " of the metadata "authorization"; empty for other schemes.
 std::string_view TokenOf(std::string_view authorization);
 
 class Access {
  public:
-  // Both null: everybody may do everything. With both a call's token decides, and without one the
-  // certificate of its connection.
+  // Both null: every call is allowed. With both, the token of a call decides; a call without a
+  // token is judged by the certificate of its connection.
   explicit Access(std::shared_ptr<TokenBook> tokens,
                   std::shared_ptr<CertificateRoles> certificates = nullptr)
       : tokens_(std::move(tokens)), certificates_(std::move(certificates)) {}
 
-  // The token stands in the call's metadata: "authorization: Bearer TOKEN". Throws ServiceError
+  // Reads the token from the metadata "authorization: Bearer TOKEN". Throws ServiceError
   // TOKEN_MISSING or TOKEN_UNKNOWN (UNAUTHENTICATED), CERTIFICATE_UNKNOWN or ROLE_TOO_LOW
   // (PERMISSION_DENIED).
   Caller Require(Role role, const grpc::CallbackServerContext& context) const;

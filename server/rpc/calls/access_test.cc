@@ -1,4 +1,4 @@
-// Every RPC against every kind of caller, and TLS between those who believe each other and not.
+// Every RPC with every role of caller, and TLS with trusted and untrusted certificates.
 #include "server/rpc/calls/access.h"
 
 #include <google/protobuf/descriptor.h>
@@ -16,8 +16,8 @@ namespace color3d::testing {
 namespace {
 using grpc::StatusCode;
 
-// What those who may only look may do. All others want the role of a submitter: a new RPC is
-// guarded until it is named here.
+// RPCs that readers may call. All others require the role of a submitter: a new RPC is guarded
+// until it is listed here.
 const std::set<std::string> kLooking = {"GetScene",
                                         "ListScenes",
                                         "GetJob",
@@ -43,7 +43,7 @@ class AccessTest : public RpcTest {
     guarded_ = std::make_unique<RpcServer>(options_, store_, blobs_, uploads_, SystemClock());
   }
 
-  // The status of a call with an empty message, whatever its streams are.
+  // Status of a call with an empty message, for any kind of stream.
   static grpc::Status Call(const std::shared_ptr<grpc::Channel>& channel,
                            const std::string& method,
                            const std::string& authorization) {
@@ -83,7 +83,7 @@ class AccessTest : public RpcTest {
   std::string read_, submit_, admin_;
 };
 
-TEST_F(AccessTest, EveryRpcAsksWhoCalls) {
+TEST_F(AccessTest, EveryRpcRequiresRole) {
   Start();
   const auto channel = Open(grpc::InsecureChannelCredentials());
   int methods = 0;
@@ -107,7 +107,7 @@ TEST_F(AccessTest, EveryRpcAsksWhoCalls) {
         };
         EXPECT_EQ(call("").error_code(), StatusCode::UNAUTHENTICATED);
         EXPECT_EQ(ReasonOfStatus(call("")), "TOKEN_MISSING");
-        EXPECT_EQ(ReasonOfStatus(call(submit_)), "TOKEN_MISSING") << "not a bearer's";
+        EXPECT_EQ(ReasonOfStatus(call(submit_)), "TOKEN_MISSING") << "not a bearer token";
         EXPECT_EQ(ReasonOfStatus(call("Bearer " + std::string(68, 'x'))), "TOKEN_UNKNOWN");
         const grpc::Status reader = call("Bearer " + read_);
         if (kLooking.contains(name)) {
@@ -132,7 +132,7 @@ TEST_F(AccessTest, EveryRpcAsksWhoCalls) {
   EXPECT_GE(methods, 28);
 }
 
-TEST_F(AccessTest, TlsIsForThoseWhoBelieveEachOther) {
+TEST_F(AccessTest, TlsRequiresTrustedCertificates) {
   TestAuthority ours(scratch_.path(), "ours"), foreign(scratch_.path(), "foreign");
   const CertificateFiles server = ours.Issue("server");
   options_.credentials = MakeServerCredentials({server.certificate, server.key, {}});
@@ -169,13 +169,13 @@ TEST_F(AccessTest, TlsIsForThoseWhoBelieveEachOther) {
         .ok();
   };
   EXPECT_TRUE(answered(ours.Issue("client2")));
-  EXPECT_FALSE(answered({})) << "without a certificate of its own";
+  EXPECT_FALSE(answered({})) << "client without a certificate";
   EXPECT_FALSE(answered(foreign.Issue("stranger")));
   EXPECT_FALSE(answered(ours.Issue("late", -7200, -3600)));
 }
 
-// A certificate says who somebody is; what he may do stands in the file.
-TEST_F(AccessTest, ACertificateHasTheRoleThatTheFileGivesIt) {
+// A certificate identifies a caller; the file gives it a role.
+TEST_F(AccessTest, CertificateHasRoleOfFile) {
   TestAuthority ours(scratch_.path(), "ours");
   const CertificateFiles server = ours.Issue("server");
   const auto file = scratch_.path() / "roles";
@@ -201,7 +201,7 @@ TEST_F(AccessTest, ACertificateHasTheRoleThatTheFileGivesIt) {
   const grpc::Status nobody = call("nobody", kLook, "");
   EXPECT_EQ(nobody.error_code(), StatusCode::PERMISSION_DENIED);
   EXPECT_EQ(ReasonOfStatus(nobody), "CERTIFICATE_UNKNOWN");
-  // A token says more than the certificate under it.
+  // A token takes precedence over the certificate of the connection.
   guarded_.reset();
   options_.tokens = tokens;
   Start();
@@ -210,21 +210,21 @@ TEST_F(AccessTest, ACertificateHasTheRoleThatTheFileGivesIt) {
   EXPECT_EQ(ReasonOfStatus(call("guest", kPause, "")), "ROLE_TOO_LOW");
 }
 
-TEST_F(AccessTest, ARenewedCertificateNeedsNoRestart) {
+TEST_F(AccessTest, ReloadsRenewedCertificate) {
   TestAuthority before(scratch_.path(), "before"), after(scratch_.path(), "after");
   const CertificateFiles server = before.Issue("server");
   options_.credentials =
       MakeServerCredentials({server.certificate, server.key, {}}, std::chrono::seconds(1));
   Start();
   const auto connects = [&](const TestAuthority& authority) {
-    grpc::ChannelArguments own;  // no connection of another test's
+    grpc::ChannelArguments own;  // do not share a connection with another test
     own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
     return grpc::CreateCustomChannel(
                guarded_->address(), grpc::SslCredentials({ReadFile(authority.certificate())}), own)
         ->WaitForConnected(std::chrono::system_clock::now() + std::chrono::milliseconds(700));
   };
   EXPECT_TRUE(connects(before));
-  after.Issue("server");  // under the same names
+  after.Issue("server");  // same names
   bool renewed = false;
   for (int i = 0; i < 15 && !(renewed = connects(after)); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(500));

@@ -9,24 +9,24 @@
 namespace color3d::testing {
 namespace {
 
-TEST(CallMemory, WhoHoldsHisShareWaitsAndTheOthersGoOn) {
+TEST(CallMemoryTest, ClientAboveShareIsRefused) {
   CallMemory memory(100);
   memory.Add("one", 60);
   EXPECT_NO_THROW(memory.RequireShare("one"));
   memory.Add("other", 10);
   EXPECT_EQ(memory.held_bytes(), 70);
-  EXPECT_THROW(memory.RequireShare("one"), ServiceError) << "60 of 50";
-  EXPECT_NO_THROW(memory.RequireShare("one", 20)) << "40 of 50 without its own";
+  EXPECT_THROW(memory.RequireShare("one"), ServiceError) << "holds 60 of 50";
+  EXPECT_NO_THROW(memory.RequireShare("one", 20)) << "holds 40 of 50 without its own 20";
   EXPECT_NO_THROW(memory.RequireShare("other"));
-  EXPECT_NO_THROW(memory.RequireShare("a third, who has nothing yet"));
+  EXPECT_NO_THROW(memory.RequireShare("third client without memory"));
   memory.Add("other", -10);
-  EXPECT_NO_THROW(memory.RequireShare("one")) << "alone again";
+  EXPECT_NO_THROW(memory.RequireShare("one")) << "the only client again";
   memory.Add("one", 40);
   try {
     memory.RequireShare("one");
-    FAIL() << "100 of 100";
+    FAIL() << "holds 100 of 100";
   } catch (const ServiceError& e) {
-    EXPECT_EQ(e.code(), ErrorCode::kUnavailable) << "clients try such calls again";
+    EXPECT_EQ(e.code(), ErrorCode::kUnavailable) << "clients retry this code";
     EXPECT_EQ(e.reason(), ErrorReason::kOverloaded);
   }
   memory.Add("one", -100);
@@ -34,7 +34,7 @@ TEST(CallMemory, WhoHoldsHisShareWaitsAndTheOthersGoOn) {
   EXPECT_EQ(memory.held_bytes(), 0);
 }
 
-TEST(CallMemory, ClientsThatComeOneAfterTheOtherHoldABoundedSum) {
+TEST(CallMemoryTest, SumOfSharesIsBounded) {
   CallMemory memory(1 << 20);
   for (int i = 0; i < 100; ++i) {
     const std::string client = std::to_string(i);

@@ -32,7 +32,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
             const PeerObserver& peers,
             grpc::experimental::ServerRpcInfo* info)
       : observer_(observer), peers_(peers), info_(info), method_(info->method()) {}
-  // A call that was cancelled may end without a status of ours.
+  // Cancelled calls may end without a status of the service.
   ~CallWatch() override {
     if (!ended_) End(grpc::StatusCode::CANCELLED);
     if (!peer_.empty()) peers_.on_end(peer_);
@@ -87,7 +87,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
   const PeerObserver& peers_;
   grpc::experimental::ServerRpcInfo* const info_;
   const std::string method_;
-  std::string peer_;  // empty: nobody was told
+  std::string peer_;  // empty: on_begin was not called
   const SteadyClock::time_point start_ = SteadyClock::now();
   std::string request_id_, trace_;
   bool ended_ = false;
@@ -132,7 +132,7 @@ const char* StatusName(grpc::StatusCode code) {
 }
 
 std::string TraceIdOf(std::string_view traceparent) {
-  // version "-" trace id "-" parent id "-" flags; later versions may add to the end.
+  // version "-" trace id "-" parent id "-" flags; later versions may append fields.
   if (traceparent.size() < 55 || traceparent[2] != '-' || traceparent[35] != '-' ||
       traceparent[52] != '-') {
     return "";

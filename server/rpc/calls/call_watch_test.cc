@@ -9,10 +9,10 @@
 namespace color3d::testing {
 namespace {
 
-TEST(CallWatchTest, OnlyWholeTraceParentsCount) {
+TEST(CallWatchTest, TraceIdOfRejectsMalformedTraceParents) {
   const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736", rest = "-00f067aa0ba902b7-01";
   EXPECT_EQ(TraceIdOf("00-" + trace + rest), trace);
-  EXPECT_EQ(TraceIdOf("cc-" + trace + rest + "-what-comes-later"), trace);
+  EXPECT_EQ(TraceIdOf("cc-" + trace + rest + "-later-fields"), trace);
   for (const std::string& bad : {std::string(),
                                  "00-" + trace + rest + "-more",
                                  "ff-" + trace + rest,
@@ -66,7 +66,7 @@ class CallsTest : public RpcTest {
   std::unique_ptr<TestClient> caller_;
 };
 
-TEST_F(CallsTest, EachHasAnId) {
+TEST_F(CallsTest, EachCallHasId) {
   EXPECT_EQ(RequestIdFor("mine-1"), "mine-1");
   EXPECT_EQ(RequestIdFor("not [sane]=1").size(), 16u);
   const std::string one = RequestIdFor(""), other = RequestIdFor("");
@@ -74,7 +74,7 @@ TEST_F(CallsTest, EachHasAnId) {
   EXPECT_NE(one, other);
 }
 
-TEST_F(CallsTest, EachIsCountedByItsEnd) {
+TEST_F(CallsTest, CountsCallsByStatus) {
   RequestIdFor("");
   EXPECT_EQ(Ended("/color3d.v1.ServerService/GetServerInfo 0"), 1);
   EXPECT_THROW(caller_->Get("jobs/none"), std::runtime_error);
@@ -94,7 +94,7 @@ TEST_F(CallsTest, EachIsCountedByItsEnd) {
   EXPECT_EQ(Ended("/color3d.v1.JobService/WatchJobs 1"), 1);
 }
 
-TEST_F(CallsTest, AJobKnowsTheTraceThatMadeIt) {
+TEST_F(CallsTest, JobKeepsTraceOfItsCall) {
   const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736";
   grpc::ClientContext context;
   context.AddMetadata("traceparent", "00-" + trace + "-00f067aa0ba902b7-01");

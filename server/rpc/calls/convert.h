@@ -1,4 +1,4 @@
-// Store records as messages of the public API, resource names and page tokens.
+// Converts store records to messages of the public API; resource names and page tokens.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace color3d {
 v1::Digest ToProto(const FileDigest& digest);
 v1::Scene ToProto(const SceneRecord& scene);
 v1::Job ToProto(const JobRecord& job);
-// Name, parent, kind, state, attempt, progress and revision only.
+// Sets only name, parent, kind, state, attempt, progress and revision.
 v1::Job ToProgressProto(const JobRecord& job);
 v1::Colorizer ToProto(const ColorizerRecord& colorizer);
 google::protobuf::Timestamp ToTimestamp(int64_t ms);
@@ -28,17 +28,17 @@ void CheckName(std::string_view name, std::string_view collection);
 // Throws Error{kInvalidArgument} naming the digest.
 FileDigest FromProto(const v1::Digest& digest);
 
-// Page tokens are opaque to clients: the id of the last row, bound to the listing they belong to.
+// Page tokens are opaque to clients: id of the last row, bound to the listing they belong to.
 std::string MakePageToken(int64_t last_id, const std::string& listing);
-// 0 for an empty token. Throws Error{kInvalidArgument} for one of another listing.
+// Returns 0 for an empty token. Throws Error{kInvalidArgument} for a token of another listing.
 int64_t ParsePageToken(const std::string& token, const std::string& listing);
-// 1..1000; 0 means 50. Throws Error{kInvalidArgument}.
+// Returns 1..1000; 0 means 50. Throws Error{kInvalidArgument}.
 int PageSize(int requested);
 
-// A page of a list is about so long at most: it ends early, and the next one goes on.
+// Approximate maximum size of a page of a list: a longer page ends early.
 constexpr size_t kMaxPageBytes = 1 << 20;
-// What the records of one page may take. Older releases took longer specs: in lists theirs are left
-// out.
+// Memory for the records of one page. Longer specs, accepted by older releases, are left out of
+// lists.
 constexpr ListBudget kListBudget = {2 << 20, kMaxSpecBytes};
 
 template <typename Message>
@@ -47,10 +47,9 @@ size_t Put(Message message, Message* place) {
   return place->ByteSizeLong();
 }
 
-// Answers a List call: `read(before_id, limit, &is_cut)` gives records, newest first, and says
-// whether there are fewer than `limit` for what they take; `add(record)` puts one into the response
-// and says how long it is, bytes. `listing` says what is listed: page tokens of other listings are
-// refused.
+// Answers a List call. `read(before_id, limit, &is_cut)` returns records, newest first, and sets
+// `is_cut` if memory allows fewer than `limit`. `add(record)` appends a record to the response and
+// returns its size in bytes. Page tokens of a listing other than `listing` are refused.
 template <typename Request, typename Response, typename Read, typename Add>
 void AnswerPage(const Request& request,
                 const std::string& listing,
@@ -59,7 +58,7 @@ void AnswerPage(const Request& request,
                 const Add& add) {
   const auto size = static_cast<size_t>(PageSize(request.page_size()));
   bool is_cut = false;
-  // One more than fits tells whether there is another page.
+  // One record more than the page holds tells whether there is another page.
   const auto records =
       read(ParsePageToken(request.page_token(), listing), static_cast<int>(size) + 1, &is_cut);
   size_t added = 0;

@@ -57,7 +57,7 @@ google::rpc::Status Build(ErrorCode code,
                           const std::vector<FieldViolation>& violations) {
   google::rpc::Status status;
   status.set_code(GrpcCode(code));
-  // Trailers are text: paths of users may hold anything.
+  // Trailers are text, but paths may contain any byte.
   std::string text = CleanUtf8(message, kMaxMessageBytes);
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 32; }, ' ');

@@ -1,5 +1,5 @@
-// The one place where our errors become gRPC's: canonical code, one-line message, and details that
-// programs can read (ErrorInfo with a stable reason, BadRequest, RetryInfo).
+// Maps errors of the project to gRPC: canonical code, one-line message, and machine-readable
+// details (ErrorInfo with a stable reason, BadRequest, RetryInfo).
 #pragma once
 
 #include <grpcpp/support/status.h>
@@ -15,10 +15,10 @@ namespace color3d {
 
 grpc::Status ToGrpcStatus(const Error& error);
 
-// A job's stored error as google.rpc.Status.
+// Stored error of a job as google.rpc.Status.
 google::rpc::Status ToRpcStatus(const JobError& error);
 
-// Runs `body`; what it throws becomes the status. Errors of ours (INTERNAL, DATA_LOSS) are logged.
+// Runs `body` and returns the status of what it throws. INTERNAL and DATA_LOSS are logged.
 grpc::Status Guard(const std::function<void()>& body);
 
 // UNAVAILABLE with RetryInfo.

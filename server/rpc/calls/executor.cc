@@ -11,29 +11,29 @@ Executor::Executor(int threads, size_t max_waiting, int max_of_owner)
 
 Executor::~Executor() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   for (std::thread& thread : threads_) thread.join();
 }
 
 bool Executor::TryPost(std::function<void()> task, const std::string& owner) {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (waiting_ >= max_waiting_) return false;
     Add(std::move(task), owner);
   }
-  wake_.notify_one();
+  wake_.NotifyOne();
   return true;
 }
 
 void Executor::Post(std::function<void()> task, const std::string& owner) {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     Add(std::move(task), owner);
   }
-  wake_.notify_one();
+  wake_.NotifyOne();
 }
 
 void Executor::Add(std::function<void()> task, const std::string& owner) {
@@ -50,10 +50,12 @@ size_t Executor::NextTurn() const {
 }
 
 void Executor::Loop() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [this] { return NextTurn() < turns_.size() || (stopping_ && waiting_ == 0); });
-    const size_t turn = NextTurn();
+    size_t turn = NextTurn();
+    for (; turn == turns_.size() && !(stopping_ && waiting_ == 0); turn = NextTurn()) {
+      wake_.Wait(mutex_);
+    }
     if (turn == turns_.size()) return;
     const std::string owner = turns_[turn];
     turns_.erase(turns_.begin() + static_cast<std::ptrdiff_t>(turn));
@@ -63,14 +65,14 @@ void Executor::Loop() {
     --waiting_;
     ++line.running;
     if (!line.waiting.empty()) turns_.push_back(owner);
-    lock.unlock();
+    lock.Unlock();
     task();
     task = nullptr;
-    lock.lock();
+    lock.Lock();
     const auto done = lines_.find(owner);
     if (--done->second.running == 0 && done->second.waiting.empty()) lines_.erase(done);
-    // A task of the same owner may have waited for this one, and whoever stops for the last.
-    wake_.notify_all();
+    // Another task of this owner may wait for this one, and the destructor for the last.
+    wake_.NotifyAll();
   }
 }
 

@@ -1,32 +1,31 @@
-// A few threads for work that touches disk or the job store, so that gRPC's callback threads never
-// block. Whoever has much to do shares them with the others: tasks stand in a line of their
-// owner's, and lines take turns. Thread-safe.
+// Thread pool for work that touches disk or the job store, so that gRPC's callback threads never
+// block. Fair: each owner has its own queue, and the queues take turns. Thread-safe.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
 class Executor {
  public:
-  // `max_of_owner`: threads that one owner's tasks have at once.
+  // `max_of_owner`: maximum number of threads that run tasks of one owner at once.
   explicit Executor(int threads, size_t max_waiting = 2000, int max_of_owner = INT32_MAX);
-  // Runs what is queued, then stops.
+  // Runs all queued tasks, then stops.
   ~Executor();
   Executor(const Executor&) = delete;
   Executor& operator=(const Executor&) = delete;
 
-  // False when too much waits already: tell the client to come back later.
+  // Returns false if the queue is full; the client should retry later.
   bool TryPost(std::function<void()> task, const std::string& owner = "");
-  // Always accepted: for the next step of a stream, of which each has at most one.
+  // Always accepts: for the next step of a stream; each stream has at most one.
   void Post(std::function<void()> task, const std::string& owner = "");
 
  private:
@@ -36,19 +35,19 @@ class Executor {
   };
 
   void Loop();
-  // With the mutex held.
-  void Add(std::function<void()> task, const std::string& owner);
-  // The position in `turns_` of the next owner who may run a task; that of the end: none.
-  size_t NextTurn() const;
+  void Add(std::function<void()> task, const std::string& owner) COLOR3D_REQUIRES(mutex_);
+  // Returns the index in `turns_` of the next owner that may run a task, or its size if there is
+  // none.
+  size_t NextTurn() const COLOR3D_REQUIRES(mutex_);
 
   const size_t max_waiting_;
   const int max_of_owner_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::map<std::string, Line> lines_;  // by owner
-  std::deque<std::string> turns_;      // owners whose tasks wait
-  size_t waiting_ = 0;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  std::map<std::string, Line> lines_ COLOR3D_GUARDED_BY(mutex_);  // by owner
+  std::deque<std::string> turns_ COLOR3D_GUARDED_BY(mutex_);      // owners with waiting tasks
+  size_t waiting_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::vector<std::thread> threads_;
 };
 

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-TEST(ExecutorTest, WhoeverHasMuchToDoLetsOthersTakeTurns) {
+TEST(ExecutorTest, OwnersTakeTurns) {
   std::promise<void> go, done;
   std::mutex mutex;
   std::string order;
@@ -30,7 +30,7 @@ TEST(ExecutorTest, WhoeverHasMuchToDoLetsOthersTakeTurns) {
   EXPECT_EQ(order, "ababaa");
 }
 
-TEST(ExecutorTest, OneOwnerHasNotAllThreads) {
+TEST(ExecutorTest, LimitsThreadsOfOwner) {
   std::promise<void> release, other_ran;
   const auto released = release.get_future().share();
   std::atomic<int> running{0}, most{0};
@@ -49,14 +49,14 @@ TEST(ExecutorTest, OneOwnerHasNotAllThreads) {
     }
     executor.Post([&] { other_ran.set_value(); }, "b");
     EXPECT_EQ(other_ran.get_future().wait_for(std::chrono::seconds(20)), std::future_status::ready)
-        << "a thread was left for it";
+        << "a thread must be free for the other owner";
     release.set_value();
   }
   EXPECT_LE(most, 2);
-  EXPECT_EQ(running, 0) << "all of them ran before the end";
+  EXPECT_EQ(running, 0) << "the destructor runs all tasks";
 }
 
-TEST(ExecutorTest, BeyondItsLineItTakesNoMore) {
+TEST(ExecutorTest, RefusesTasksWhenQueueIsFull) {
   std::promise<void> go, begun;
   Executor executor(1, 2);
   executor.Post([&] {

@@ -62,9 +62,9 @@ void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more
   throw ServiceError(
       ErrorReason::kQuotaExceeded,
       fmt::format(
-          "your project has {:.1f} MiB on the server, files and rows of its scenes and jobs, "
-          "and {:.1f} MiB would come, at most {:.1f} MiB are allowed; delete jobs and scenes "
-          "that you need no more",
+          "your project stores {:.1f} MiB in files and rows of its scenes and jobs; {:.1f} MiB "
+          "more would exceed its quota of {:.1f} MiB; delete jobs and scenes that you do not "
+          "need",
           InMib(stored),
           InMib(more_bytes),
           InMib(most)),
@@ -74,7 +74,7 @@ void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more
 void RequireRoomForRows(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes) {
   RequireQuota(parts, store, more_bytes);
   const int64_t free = parts.blobs.FreeBytes();
-  // The store says what was found some seconds ago, and until when.
+  // The store's value is some seconds old; FreeBytes is current.
   if (free - more_bytes < parts.limits.low_space_bytes ||
       parts.store.Holds().contains(Hold::kStorage)) {
     throw ServiceError(ErrorReason::kStorageFull,

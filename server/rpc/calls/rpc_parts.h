@@ -1,4 +1,4 @@
-// What every RPC service is given: stores, executor, limits. References outlive the services.
+// Dependencies of the RPC services: stores, executors, limits. References outlive the services.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -38,29 +38,29 @@ struct ServiceLimits {
   int max_image_side_px = 30'000;
   int max_unfinished_jobs = 2'000;
   int max_chunk_bytes = 2 << 20;
-  // Streams that may be open at once.
+  // Maximum numbers of open streams.
   int max_watches = 1'000;
   int max_reads = 256;
   int max_writes = 128;
-  // An upload that sends nothing, or a download that nobody reads, for so long is ended.
+  // A silent upload or an unread download ends after this time.
   std::chrono::milliseconds stream_silence{60'000};
-  int max_connection_calls = 2'000;  // at once; further ones wait on the client's side
-  // Of unary calls, shared among connections (CallMemory), and gRPC's own buffers.
+  int max_connection_calls = 2'000;  // concurrent; further calls wait at the client
+  // Memory of unary calls, shared among connections (CallMemory), and of gRPC's own buffers.
   int64_t call_memory_bytes = int64_t{128} << 20;
   int64_t transport_memory_bytes = int64_t{512} << 20;
-  // Of each project; 0: no limit but those above.
+  // Limits of each project; 0: only the limits above apply.
   int project_max_unfinished_jobs = 0;
   int64_t project_max_stored_bytes = 0;
-  int project_max_streams = 0;  // of each kind
-  // Of each project.
+  int project_max_streams = 0;  // of each kind of stream
+  // Limits of each project.
   int64_t project_max_scenes = 10'000;
   int64_t project_max_uncommitted_scenes = 200;
-  int64_t max_manifest_bytes = 2 << 20;  // the paths of a scene's files, in sum
-  // Free space below which nothing is created.
+  int64_t max_manifest_bytes = 2 << 20;  // sum of the paths of a scene's files
+  // Minimum free space; below it nothing is created.
   int64_t low_space_bytes = 0;
 };
 
-// What a backend said of itself, or why it did not.
+// State of a backend as it reports it, or the problem of reaching it.
 struct BackendState {
   bool reachable = false;
   bool ready = false;
@@ -69,7 +69,7 @@ struct BackendState {
   int64_t max_pixels = 0;
   std::string problem;
 };
-// By name; blocks a few seconds at most, and is called from any thread of an executor.
+// Returns states by name. Blocks for at most a few seconds; called from any thread of an executor.
 using BackendProbe = std::function<std::map<std::string, BackendState>()>;
 
 struct StreamLimits {
@@ -77,13 +77,13 @@ struct StreamLimits {
 };
 
 struct RpcParts {
-  JobStore& store;  // of all projects; clients see theirs by Call::store
+  JobStore& store;  // of all projects; clients see theirs through Call::store
   BlobStore& blobs;
   UploadStore& uploads;
-  Executor& quick;   // reads of the job store and of the disk's cache: what answers GetJob
-  Executor& slow;    // what hashes, syncs, writes or asks others
-  Executor& bulk;    // blobs on their way: down- and uploads, of which one may hash 8 GiB
-  Executor& checks;  // reads whole scenes
+  Executor& quick;   // reads of the job store and of cached files, e.g. GetJob
+  Executor& slow;    // hashing, syncing, writing, remote calls
+  Executor& bulk;    // downloads and uploads of blobs; one may hash 8 GiB
+  Executor& checks;  // validation of whole scenes
   StreamLimits& streams;
   SilenceWatch& silence;
   CallMemory& memory;
@@ -95,37 +95,37 @@ struct RpcParts {
   UserModels models;
   FileDigests& digests;
   BackendProbe probe_backends;
-  std::filesystem::path job_logs;           // folder; empty: there are none
-  std::vector<std::string> notify_allowed;  // as CheckNotifyUrl
+  std::filesystem::path job_logs;           // folder; empty: no logs
+  std::vector<std::string> notify_allowed;  // see CheckNotifyUrl
   std::function<void()> drain;              // asks the program to end
-  std::function<bool()> make_room;          // as WithRoomMade; may be empty
+  std::function<bool()> make_room;          // see WithRoomMade; may be empty
 };
 
-// One call of somebody who may make it, and what his project sees.
+// An authorized call: caller, store of the caller's project, trace.
 struct Call {
   Caller caller;
   ProjectStore store;
-  std::string trace;  // W3C trace id that the call brings; empty: none
+  std::string trace;  // W3C trace id of the call; empty: none
 };
 // Throws as Access::Require.
 Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context);
 
-// Throws DRAINING.
+// Throws DRAINING if the server drains.
 void RequireNotDraining(const RpcParts& parts);
-// Whether the project holds the blob and it is there; it then stays for the time of grace.
+// Returns whether the project holds the blob and it is stored; then keeps it for the grace period.
 bool HasBlob(const RpcParts& parts, const ProjectStore& store, const FileDigest& blob);
-// Throws QUOTA_EXCEEDED where the project would have more bytes than it may.
+// Throws QUOTA_EXCEEDED if `more_bytes` exceed the quota of the project.
 void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes);
-// Before rows of so many bytes are written: throws QUOTA_EXCEEDED where the project would have more
-// than it may, STORAGE_FULL where the disk is nearly full or would be.
+// To be called before rows of `more_bytes` are written. Throws QUOTA_EXCEEDED if they exceed the
+// quota of the project, STORAGE_FULL if the disk is or would be nearly full.
 void RequireRoomForRows(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes);
 QueueLimits LimitsOfQueue(const RpcParts& parts);
 v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limits);
-// Why workers are given no job, for people; empty: they are.
+// Returns why workers get no jobs, for people; empty if they do.
 std::string WhyHeld(const RpcParts& parts);
 
-// Answers a unary call from that executor, in the line of the caller's project, where the caller
-// has the role: `body(call, request, response)` may block and throw.
+// Runs `body(call, request, response)` on the executor, in the queue of the caller's project, if
+// the caller has the role. `body` may block and throw.
 template <typename Request, typename Response, typename Body>
 grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Executor& executor,
@@ -156,7 +156,7 @@ grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
   return reactor;
 }
 
-// For what only looks, and for what writes, hashes or syncs.
+// For calls that only read, and for calls that write, hash or sync.
 template <typename Request, typename Response, typename Body>
 grpc::ServerUnaryReactor* AnswerRead(const RpcParts& parts,
                                      grpc::CallbackServerContext* context,
@@ -174,11 +174,11 @@ grpc::ServerUnaryReactor* AnswerWrite(const RpcParts& parts,
   return AnswerUnary(parts, parts.slow, Role::kSubmit, context, request, response, std::move(body));
 }
 
-// "8-4-4-4-12" hexadecimal digits, or empty. Throws Error{kInvalidArgument} otherwise.
+// Throws Error{kInvalidArgument} unless it is empty or "8-4-4-4-12" hexadecimal digits.
 void CheckRequestId(const std::string& request_id);
 std::string DigestOfMessage(const google::protobuf::Message& message);
 
-// Idempotency key of a request: method, its request_id, and a digest of everything else.
+// Idempotency key of a request: method, request_id, and a digest of all other fields.
 template <typename Request>
 RequestKey KeyOf(const std::string& method, const Request& request) {
   CheckRequestId(request.request_id());

@@ -12,28 +12,31 @@ SilenceWatch::SilenceWatch(std::chrono::milliseconds limit) : limit_(limit) {
 
 SilenceWatch::~SilenceWatch() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   thread_.join();
 }
 
 void SilenceWatch::Loop() {
   const auto tick =
       std::clamp(limit_ / 10, std::chrono::milliseconds(10), std::chrono::milliseconds(1'000));
-  std::unique_lock lock(mutex_);
-  while (!wake_.wait_for(lock, tick, [this] { return stopping_; })) {
+  MutexLock lock(mutex_);
+  while (true) {
+    const auto end = std::chrono::steady_clock::now() + tick;
+    while (!stopping_ && wake_.WaitUntil(mutex_, end)) continue;
+    if (stopping_) return;
     const auto now = std::chrono::steady_clock::now();
     std::vector<std::function<void()>> calls;
-    for (Stream* stream : streams_) {
-      if (!stream->waiting_ || stream->silent_ || now - stream->since_ < stream->limit_) continue;
-      stream->silent_ = true;
+    for (auto& [stream, state] : streams_) {
+      if (!state.waiting || state.silent || now - state.since < stream->limit_) continue;
+      state.silent = true;
       calls.push_back(stream->on_silence_);
     }
-    lock.unlock();
+    lock.Unlock();
     for (const auto& call : calls) call();
-    lock.lock();
+    lock.Lock();
   }
 }
 
@@ -43,25 +46,27 @@ SilenceWatch::Stream::Stream(SilenceWatch& watch,
     : watch_(watch),
       on_silence_(std::move(on_silence)),
       limit_(limit.count() > 0 ? limit : watch.limit_) {
-  std::lock_guard lock(watch_.mutex_);
-  watch_.streams_.insert(this);
+  const MutexLock lock(watch_.mutex_);
+  watch_.streams_.emplace(this, State());
 }
 
 SilenceWatch::Stream::~Stream() {
-  std::lock_guard lock(watch_.mutex_);
+  const MutexLock lock(watch_.mutex_);
   watch_.streams_.erase(this);
 }
 
 void SilenceWatch::Stream::Wait() {
-  std::lock_guard lock(watch_.mutex_);
-  waiting_ = true;
-  since_ = std::chrono::steady_clock::now();
+  const MutexLock lock(watch_.mutex_);
+  State& state = watch_.streams_.at(this);
+  state.waiting = true;
+  state.since = std::chrono::steady_clock::now();
 }
 
 bool SilenceWatch::Stream::Resume() {
-  std::lock_guard lock(watch_.mutex_);
-  waiting_ = false;
-  return !silent_;
+  const MutexLock lock(watch_.mutex_);
+  State& state = watch_.streams_.at(this);
+  state.waiting = false;
+  return !state.silent;
 }
 
 }  // namespace color3d

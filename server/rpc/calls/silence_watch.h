@@ -1,33 +1,32 @@
-// Streams whose other side does nothing for too long: an upload that sends nothing, a download that
-// nobody reads. Each holds a place that others could have. One thread of its own. Thread-safe.
+// Ends streams whose client is inactive for too long: a silent upload, an unread download. Each
+// holds a place that others need. Runs one thread. Thread-safe.
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
-#include <set>
+#include <map>
 #include <thread>
+
+#include "core/base/mutex.h"
 
 namespace color3d {
 
 class SilenceWatch {
  public:
-  // Stops to wait for a stream after `limit`.
+  // `limit`: maximum time to wait for the client of a stream.
   explicit SilenceWatch(std::chrono::milliseconds limit);
-  // No stream may be left.
+  // Requires: all streams are destroyed.
   ~SilenceWatch();
   SilenceWatch(const SilenceWatch&) = delete;
   SilenceWatch& operator=(const SilenceWatch&) = delete;
 
   std::chrono::milliseconds limit() const { return limit_; }
 
-  // One stream. It is either the other side's turn (between Wait and Resume) or ours.
+  // One stream. It waits for the client between Wait and Resume.
   class Stream {
    public:
-    // `on_silence` is called at most once, without a lock, on the watch's thread; from then on the
-    // stream is over, and only `on_silence` may let what it uses be destroyed.
-    // `limit` 0: the watch's own.
+    // `on_silence` is called at most once, without a lock, on the thread of the watch. After that
+    // only `on_silence` may destroy what the stream uses. `limit` 0: the limit of the watch.
     Stream(SilenceWatch& watch,
            std::function<void()> on_silence,
            std::chrono::milliseconds limit = std::chrono::milliseconds(0));
@@ -35,9 +34,9 @@ class SilenceWatch {
     Stream(const Stream&) = delete;
     Stream& operator=(const Stream&) = delete;
 
-    // From now on it is the other side's turn.
+    // Starts to wait for the client.
     void Wait();
-    // The other side has done something. False: too late, `on_silence` was called or will be.
+    // The client was active. Returns false if it was too late: `on_silence` was or will be called.
     bool Resume();
 
    private:
@@ -45,18 +44,20 @@ class SilenceWatch {
     SilenceWatch& watch_;
     const std::function<void()> on_silence_;
     const std::chrono::milliseconds limit_;
-    bool waiting_ = false, silent_ = false;
-    std::chrono::steady_clock::time_point since_;
   };
 
  private:
+  struct State {
+    bool waiting = false, silent = false;
+    std::chrono::steady_clock::time_point since;
+  };
   void Loop();
 
   const std::chrono::milliseconds limit_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::set<Stream*> streams_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  std::map<Stream*, State> streams_ COLOR3D_GUARDED_BY(mutex_);
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -1,24 +1,24 @@
-// How many streams of a kind may be open at once, in all and of one project. Thread-safe.
+// Limits the number of open streams of a kind, in all and of one project. Thread-safe.
 #pragma once
 
 #include <map>
-#include <mutex>
 #include <string>
 #include <utility>
 
+#include "core/base/mutex.h"
 #include "server/base/service_error.h"
 
 namespace color3d {
 
 class StreamLimit {
  public:
-  // `what`, in the plural, is for the message. `max_of_project` 0: no limit of its own. `shared`: a
-  // project may have no more than would stay free, so that one has half of all, two a third each,
-  // and so on, and there is always a place for the next one.
+  // `what`: plural noun for messages. `max_of_project` 0: no limit. `shared`: a project may have at
+  // most as many streams as stay free, so that one project gets half of all and two get a third
+  // each, and there is always a place for another project.
   StreamLimit(const char* what, int max, int max_of_project, bool shared = false)
       : what_(what), max_(max), max_of_project_(max_of_project), shared_(shared) {}
 
-  // One open stream; its place is free again when this is destroyed.
+  // Place of one open stream; released by its destructor.
   class Place {
    public:
     Place() = default;
@@ -40,26 +40,25 @@ class StreamLimit {
   };
 
   int open() {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return all_;
   }
 
-  // Throws Error{kResourceExhausted}: TOO_MANY_STREAMS, or QUOTA_EXCEEDED of the project's share.
+  // Throws Error{kResourceExhausted}: TOO_MANY_STREAMS, or QUOTA_EXCEEDED for the project's share.
   Place Take(const std::string& project) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto of_project = open_.find(project);
     const int own = of_project == open_.end() ? 0 : of_project->second;
     if (max_of_project_ > 0 && own >= max_of_project_) {
       throw ServiceError(
           ErrorReason::kQuotaExceeded,
-          fmt::format("{} {} of your project are open, which is as many as it may have; close some",
-                      own,
-                      what_),
+          fmt::format(
+              "{} {} of your project are open, which is its maximum; close some", own, what_),
           {{"project:" + project + " " + what_, fmt::format("{} of {}", own, max_of_project_)}});
     }
     if (all_ >= max_) {
       throw ServiceError(ErrorReason::kTooManyStreams,
-                         "{} {} are open, which is as many as this server allows; close some, or "
+                         "{} {} are open, which is the maximum of this server; close some, or "
                          "try again later",
                          max_,
                          what_);
@@ -82,7 +81,7 @@ class StreamLimit {
 
  private:
   void Free(const std::string& project) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     --all_;
     if (--open_[project] == 0) open_.erase(project);
   }
@@ -90,9 +89,9 @@ class StreamLimit {
   const char* what_;
   const int max_, max_of_project_;
   const bool shared_;
-  std::mutex mutex_;
-  int all_ = 0;
-  std::map<std::string, int> open_;  // by project
+  Mutex mutex_;
+  int all_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, int> open_ COLOR3D_GUARDED_BY(mutex_);  // by project
 };
 
 }  // namespace color3d

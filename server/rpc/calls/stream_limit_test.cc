@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-// As many as the project may have beside what is open.
+// Takes all places that the project may have besides those already taken.
 std::vector<StreamLimit::Place> TakeAll(StreamLimit& limit, const std::string& project) {
   std::vector<StreamLimit::Place> places;
   try {
@@ -18,18 +18,18 @@ std::vector<StreamLimit::Place> TakeAll(StreamLimit& limit, const std::string& p
   return places;
 }
 
-TEST(StreamLimitTest, WhoeverTakesAllThatHeMayLeavesRoomForTheNext) {
+TEST(StreamLimitTest, SharedLimitLeavesRoomForOtherProjects) {
   StreamLimit limit("uploads", 128, 0, /*shared=*/true);
   std::vector<StreamLimit::Place> first = TakeAll(limit, "a");
-  EXPECT_EQ(first.size(), 64u) << "half of all";
+  EXPECT_EQ(first.size(), 64u) << "half of all places";
   std::vector<StreamLimit::Place> second = TakeAll(limit, "b");
   EXPECT_EQ(second.size(), 32u);
   EXPECT_GT(TakeAll(limit, "c").size(), 0u);
   first.clear();
-  EXPECT_GT(TakeAll(limit, "b").size(), 10u) << "what is free again is shared anew";
+  EXPECT_GT(TakeAll(limit, "b").size(), 10u) << "released places are shared again";
 }
 
-TEST(StreamLimitTest, WithoutProjectsOneMayHaveAll) {
+TEST(StreamLimitTest, UnsharedLimitMayBeUsedByOne) {
   StreamLimit limit("uploads", 8, 0);
   std::vector<StreamLimit::Place> places;
   for (int i = 0; i < 8; ++i) places.push_back(limit.Take(""));

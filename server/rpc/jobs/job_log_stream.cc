@@ -16,8 +16,8 @@ namespace {
 constexpr size_t kChunkBytes = 64 << 10;
 constexpr std::chrono::milliseconds kPause{500};
 
-// One step at a time, each on the executor or after a pause; the step that has nothing more to do
-// finishes. A step holds a reference: what it sets off may finish the stream while it still runs.
+// Runs one step at a time, each on the executor or after a pause; the last step finishes. A step
+// holds a reference, because what it starts may finish the stream while the step still runs.
 class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
  public:
   JobLogStream(const RpcParts& parts,
@@ -47,7 +47,7 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
     if (next == Next::kWrite) return StartWrite(&chunk_);
     if (parts_.draining) return Finish(DrainingStatus());
     if (cancelled_) return Finish(grpc::Status::CANCELLED);
-    // A fresh one: the last one's callback may not have returned yet.
+    // A new alarm: the callback of the last one may not have returned yet.
     alarm_ = std::make_unique<grpc::Alarm>();
     alarm_->Set(std::chrono::system_clock::now() + kPause,
                 [this](bool) { cancelled_ ? Finish(grpc::Status::CANCELLED) : PostStep(); });
@@ -60,7 +60,7 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
       if (offset_ < 0) throw InvalidArgument("offset is {}; it must not be negative", offset_);
       place_ = parts_.streams.watches.Take(store_->project());
     }
-    // Asked first: what a finished job wrote is all there.
+    // Read before the file: the log of a finished job is complete.
     const bool finished = IsFinished(store_->GetJob(request_.name()).state);
     std::ifstream file(JobLogFile(parts_.job_logs, request_.name()), std::ios::binary);
     std::string* data = chunk_.mutable_data();
@@ -68,7 +68,7 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
     file.seekg(offset_);
     file.read(data->data(), static_cast<std::streamsize>(data->size()));
     data->resize(static_cast<size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-    data->resize(data->rfind('\n') + 1);  // whole lines; none: empty
+    data->resize(data->rfind('\n') + 1);  // whole lines only
     if (data->empty()) return finished || !request_.follow() ? Next::kEnd : Next::kPause;
     chunk_.set_offset(offset_);
     offset_ += static_cast<int64_t>(data->size());
@@ -79,7 +79,7 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
   const grpc::CallbackServerContext& context_;
   const v1::ReadJobLogRequest request_;
   std::shared_ptr<JobLogStream> self_;
-  std::optional<ProjectStore> store_;  // since the first step
+  std::optional<ProjectStore> store_;  // set by the first step
   StreamLimit::Place place_;
   int64_t offset_;
   v1::JobLogChunk chunk_;

@@ -1,4 +1,4 @@
-// JobService.ReadJobLog: a job's log file, read on as it grows.
+// JobService.ReadJobLog: streams the log file of a job while it grows.
 #pragma once
 
 #include <grpcpp/support/server_callback.h>
@@ -8,7 +8,7 @@
 
 namespace color3d {
 
-// A reactor that owns itself.
+// Returns a reactor that owns itself.
 grpc::ServerWriteReactor<v1::JobLogChunk>* StreamJobLog(const RpcParts& parts,
                                                         const grpc::CallbackServerContext& context,
                                                         const v1::ReadJobLogRequest& request);

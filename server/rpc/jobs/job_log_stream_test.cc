@@ -48,8 +48,8 @@ class JobLogStreamTest : public RpcTest {
   v1::Job job_ = client_->Create(ScriptedSpec(client_->MakeScene().name(), "a"));
 };
 
-TEST_F(JobLogStreamTest, FromAnyByteInWholeLines) {
-  EXPECT_EQ(ReadAll(0, false), "") << "nothing was written";
+TEST_F(JobLogStreamTest, ReadsWholeLinesFromOffset) {
+  EXPECT_EQ(ReadAll(0, false), "") << "nothing is written yet";
   const std::string line(999, 'x');
   std::string all;
   for (int i = 0; i < 200; ++i) all += line + "\n";
@@ -62,7 +62,7 @@ TEST_F(JobLogStreamTest, FromAnyByteInWholeLines) {
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
-TEST_F(JobLogStreamTest, FollowsUntilTheJobHasEnded) {
+TEST_F(JobLogStreamTest, FollowsUntilJobEnds) {
   Write("begins\n");
   std::thread later([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(700));
@@ -73,7 +73,7 @@ TEST_F(JobLogStreamTest, FollowsUntilTheJobHasEnded) {
   later.join();
 }
 
-TEST_F(JobLogStreamTest, ADrainEndsIt) {
+TEST_F(JobLogStreamTest, EndsOnDrain) {
   std::thread later([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     server_->StartDraining();
@@ -84,8 +84,8 @@ TEST_F(JobLogStreamTest, ADrainEndsIt) {
   later.join();
 }
 
-// Those who go in the middle of a pause take nothing away from under the step that began it.
-TEST_F(JobLogStreamTest, ReadersThatGoAwayEndTheirStreams) {
+// A client that disconnects during a pause must not invalidate the pending step.
+TEST_F(JobLogStreamTest, EndsWhenClientDisconnects) {
   constexpr int kReaders = 50;
   std::deque<grpc::ClientContext> contexts(kReaders);
   std::vector<std::unique_ptr<grpc::ClientReader<v1::JobLogChunk>>> streams;

@@ -21,7 +21,7 @@
 namespace color3d {
 namespace {
 
-// What the rows of a graph take, before it is known which of its blobs the project holds.
+// Size of the rows of a graph, before it is known which of its blobs the project holds.
 int64_t RowBytesOf(const NewGraph& graph) {
   int64_t bytes = 0;
   for (const NewJob& job : graph.jobs) {
@@ -43,17 +43,16 @@ void CheckBlobs(const RpcParts& parts, const ProjectStore& store, const v1::JobS
     }
   }
   if (missing.empty()) return;
-  throw ServiceError(
-      ErrorCode::kFailedPrecondition,
-      ErrorReason::kBlobMissing,
-      fmt::format(
-          "the spec names {} blobs that are not uploaded, first {}; upload them and try again",
-          missing.size(),
-          missing[0].field),
-      missing);
+  throw ServiceError(ErrorCode::kFailedPrecondition,
+                     ErrorReason::kBlobMissing,
+                     fmt::format("the spec names {} blobs that are not uploaded, the first is {}; "
+                                 "upload them and try again",
+                                 missing.size(),
+                                 missing[0].field),
+                     missing);
 }
 
-// The jobs that spec.inputs names, with their children.
+// Returns the jobs named in spec.inputs and their children.
 std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& spec) {
   if (spec.inputs_size() > 100) {
     throw InvalidArgument("spec.inputs has {} entries; at most 100 are allowed",
@@ -82,8 +81,8 @@ SceneFacts FactsOf(const SceneRecord& scene) {
           .is_splat = is_splat};
 }
 
-// The route's colorize_key_view job, by default the one that its scene's user accepted, and what it
-// read.
+// Returns the route's colorize_key_view job, by default the accepted one of its scene, and the
+// inputs of that job.
 SceneRouteInputs LoadRoute(const ProjectStore& store,
                            const v1::PersonalizeScenesSpec::SceneRoute& route) {
   CheckName(route.scene(), "scenes");
@@ -141,7 +140,7 @@ JobRecord CreateJobRecord(const RpcParts& parts,
     throw InvalidArgument("priority is {}; the range is 0 to 1000", priority);
   }
   if (!request.notify_url().empty()) CheckNotifyUrl(request.notify_url(), parts.notify_allowed);
-  // Whoever asks for work hears at once what would keep it waiting for a long time.
+  // Fails at once if a lack of space would keep the job waiting.
   RequireRoomForRows(parts, store, 0);
   CheckSpec(spec);
   CheckNames(spec, parts.models);
@@ -162,7 +161,7 @@ JobRecord CreateJobRecord(const RpcParts& parts,
   return job;
 }
 
-// With its place in the queue.
+// Job with its place in the queue.
 v1::Job ToWaitingProto(const ProjectStore& store, const JobRecord& job) {
   v1::Job proto = ToProto(job);
   const QueuePlace place = store.PlaceInQueue(job);
@@ -238,7 +237,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext*
         *out = ToProto(WithRoomMade(parts_.make_room, [&] {
           return call.store.Cancel(in.name(), KeyOf("CancelJob", in));
         }));
-        spdlog::info("[job={}] cancellation asked for", in.name());
+        spdlog::info("[job={}] cancellation requested", in.name());
       });
 }
 

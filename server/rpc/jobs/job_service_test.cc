@@ -10,7 +10,7 @@ namespace {
 using ::testing::HasSubstr;
 using JobServiceTest = RpcTest;
 
-TEST_F(JobServiceTest, RequestIdsAreIdempotentAndBound) {
+TEST_F(JobServiceTest, RequestIdIsIdempotentAndBoundToRequest) {
   const std::string scene = client_->MakeScene().name();
   const v1::JobSpec spec = ScriptedSpec(scene, "steps=1");
   const v1::Job first = client_->Create(spec, kUuid);
@@ -22,7 +22,7 @@ TEST_F(JobServiceTest, RequestIdsAreIdempotentAndBound) {
   EXPECT_EQ(client_->Children(scene).size(), 2u);
 }
 
-TEST_F(JobServiceTest, RefusedJobs) {
+TEST_F(JobServiceTest, RefusesBadJobs) {
   const std::string scene = client_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
@@ -45,7 +45,7 @@ TEST_F(JobServiceTest, RefusedJobs) {
   EXPECT_EQ(CreateStatus(spec).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
 }
 
-TEST_F(JobServiceTest, FullQueueSaysWhenToComeBack) {
+TEST_F(JobServiceTest, FullQueueGivesRetryDelay) {
   const std::string scene = client_->MakeScene().name();
   grpc::Status status;
   for (int i = 0; i < 30 && status.ok(); ++i) {
@@ -56,7 +56,7 @@ TEST_F(JobServiceTest, FullQueueSaysWhenToComeBack) {
   EXPECT_TRUE(HasRetryInfo(status));
 }
 
-TEST_F(JobServiceTest, ListsArePaged) {
+TEST_F(JobServiceTest, PagesLists) {
   const std::string scene = client_->MakeScene().name();
   for (int i = 0; i < 5; ++i) client_->Create(ScriptedSpec(scene, "steps=1", i + 1));
   std::set<std::string> names;
@@ -86,7 +86,7 @@ TEST_F(JobServiceTest, ListsArePaged) {
   EXPECT_EQ(scenes.scenes_size(), 1);
 }
 
-TEST_F(JobServiceTest, APageIsBoundedInBytes) {
+TEST_F(JobServiceTest, BoundsBytesOfPage) {
   const std::string scene = client_->MakeScene().name();
   NewGraph graph;
   graph.scene = scene;
@@ -95,7 +95,7 @@ TEST_F(JobServiceTest, APageIsBoundedInBytes) {
   v1::JobSpec spec = ScriptedSpec(scene, std::string(60'000, 's'));
   graph.jobs[0].spec = spec.SerializeAsString();
   for (int i = 0; i < 30; ++i) store_.CreateGraph(graph, {}, 1000);
-  // As older releases took them.
+  // Specs of this size were accepted by older releases.
   spec = ScriptedSpec(scene, std::string(7 << 20, 's'));
   graph.jobs[0].spec = spec.SerializeAsString();
   const std::string old = store_.CreateGraph(graph, {}, 1000).name;
@@ -119,7 +119,7 @@ TEST_F(JobServiceTest, APageIsBoundedInBytes) {
   EXPECT_EQ(names.size(), 31u);
   EXPECT_GE(pages, 2);
 
-  // Nor does a watch bring more than its reader takes.
+  // A watch is bounded, too.
   v1::WatchJobsRequest watch;
   watch.add_names(old);
   grpc::ClientContext context;
@@ -130,7 +130,7 @@ TEST_F(JobServiceTest, APageIsBoundedInBytes) {
   context.TryCancel();
 }
 
-TEST_F(JobServiceTest, ASpecHasALimit) {
+TEST_F(JobServiceTest, RefusesLongSpecs) {
   const std::string scene = client_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
@@ -146,7 +146,7 @@ TEST_F(JobServiceTest, ASpecHasALimit) {
   EXPECT_THAT(status.error_message(), HasSubstr("render.views[1] has 5000 bytes"));
 }
 
-TEST_F(JobServiceTest, CancelRetryDelete) {
+TEST_F(JobServiceTest, CancelsRetriesAndDeletes) {
   const std::string scene = client_->MakeScene().name();
   const std::string name = client_->Create(ScriptedSpec(scene, "steps=1")).name();
   v1::CancelJobRequest cancel;
@@ -193,10 +193,10 @@ TEST_F(JobServiceTest, DrainingRefusesJobsAndEndsStreams) {
   EXPECT_EQ(ReasonOfStatus(ended), "DRAINING");
   EXPECT_TRUE(HasRetryInfo(ended));
   EXPECT_EQ(ReasonOfStatus(CreateStatus(ScriptedSpec(scene, "steps=2"))), "DRAINING");
-  EXPECT_EQ(client_->Get(name).name(), name) << "reads go on";
+  EXPECT_EQ(client_->Get(name).name(), name) << "reads are still answered";
 }
 
-TEST_F(JobServiceTest, FailedJobsCarryTheirError) {
+TEST_F(JobServiceTest, FailedJobCarriesError) {
   const std::string scene = client_->MakeScene().name();
   const std::string name = client_->Create(ScriptedSpec(scene, "steps=1")).name();
   const auto job = store_.Claim("w", 60'000);

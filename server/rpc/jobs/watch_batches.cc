@@ -6,7 +6,7 @@
 namespace color3d {
 namespace {
 
-constexpr size_t kMaxBatches = 64;  // that are kept
+constexpr size_t kMaxBatches = 64;  // maximum number of cached batches
 
 }  // namespace
 
@@ -17,7 +17,7 @@ std::shared_ptr<const WatchBatch> WatchBatches::After(int64_t revision,
   std::shared_future<Batch> batch;
   bool is_ours = false;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (batches_.size() >= kMaxBatches) batches_.clear();
     std::shared_future<Batch>& known = batches_[{seen_by.project(), ids, revision}];
     is_ours = !known.valid();
@@ -29,14 +29,14 @@ std::shared_ptr<const WatchBatch> WatchBatches::After(int64_t revision,
       promise.set_value(std::make_shared<const WatchBatch>(Read(revision, ids, seen_by)));
     } catch (...) {
       promise.set_exception(std::current_exception());
-      Forget();  // whoever asks later tries again
+      Forget();  // later callers retry
     }
   }
   return batch.get();
 }
 
 void WatchBatches::Forget() {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   batches_.clear();
 }
 
@@ -44,7 +44,7 @@ WatchBatch WatchBatches::Read(int64_t revision,
                               const std::vector<int64_t>& ids,
                               const ProjectStore& seen_by) const {
   WatchBatch batch;
-  // Asked first: when all had finished before the events were read, those are complete.
+  // Read before the events: if all jobs had finished by then, the events are complete.
   batch.all_finished = store_.AllFinished(ids);
   batch.events = store_.EventsSince(revision, ids, kMaxEvents);
   std::vector<int64_t> progressed;

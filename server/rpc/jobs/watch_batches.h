@@ -1,22 +1,22 @@
-// What happened to watched jobs, read once for all who watch the same and have seen as much.
+// Cache of events of watched jobs, shared by watchers of the same jobs at the same revision.
 // Thread-safe.
 #pragma once
 
 #include <future>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <tuple>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/store/job_store.h"
 #include "server/store/project_store.h"
 
 namespace color3d {
 
 struct WatchBatch {
-  bool all_finished = false;  // `events` are then the last ones, unless they are kMaxEvents
+  bool all_finished = false;  // `events` are then the last ones, unless there are kMaxEvents
   std::vector<EventRecord> events;
   std::map<int64_t, JobRecord> progressed;  // by id
 };
@@ -27,11 +27,11 @@ class WatchBatches {
 
   explicit WatchBatches(JobStore& store) : store_(store) {}
 
-  // The events of these jobs after that revision.
+  // Returns the events of these jobs after `revision`.
   std::shared_ptr<const WatchBatch> After(int64_t revision,
                                           const std::vector<int64_t>& ids,
                                           const ProjectStore& seen_by);
-  // Something has happened since.
+  // Clears the cache: there are new events.
   void Forget();
 
  private:
@@ -43,8 +43,8 @@ class WatchBatches {
                   const ProjectStore& seen_by) const;
 
   JobStore& store_;
-  std::mutex mutex_;
-  std::map<Key, std::shared_future<Batch>> batches_;
+  Mutex mutex_;
+  std::map<Key, std::shared_future<Batch>> batches_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

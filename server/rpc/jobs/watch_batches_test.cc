@@ -19,16 +19,16 @@ class WatchBatchesTest : public RpcTest {
   const std::vector<int64_t> ids_ = ProjectStore(store_, "").ResolveWatch({name_});
 };
 
-TEST_F(WatchBatchesTest, WhoHasSeenAsMuchGetsTheSame) {
+TEST_F(WatchBatchesTest, SharesBatchesAtSameRevision) {
   const auto first = After(0);
   EXPECT_FALSE(first->events.empty());
   EXPECT_FALSE(first->all_finished);
   EXPECT_EQ(After(0), first);
-  EXPECT_NE(After(0, "another"), first) << "projects share nothing";
+  EXPECT_NE(After(0, "another"), first) << "not shared between projects";
   const auto later = After(first->events.back().revision);
   EXPECT_TRUE(later->events.empty());
   EXPECT_EQ(Work(), 2);
-  EXPECT_EQ(After(0), first) << "until it is said that something happened";
+  EXPECT_EQ(After(0), first) << "cached until Forget";
   batches_.Forget();
   const auto now = After(0);
   EXPECT_GT(now->events.size(), first->events.size());

@@ -14,21 +14,21 @@
 namespace color3d {
 namespace {
 using SteadyClock = std::chrono::steady_clock;
-// Whole jobs that wait to be written: so many, and fewer where they are long.
+// Maximum number of whole jobs that wait to be written; fewer if they are large.
 constexpr size_t kJobsAtOnce = 8;
 constexpr ListBudget kBudgetAtOnce = {128 << 10, kMaxSpecBytes};
 }  // namespace
 
-// One stream. gRPC calls (StartWrite, Finish) are decided under the mutex and made outside it: they
-// may call back into this object on the same thread. `writing_` or `finished_` marks them as
-// decided.
+// One stream. gRPC calls (StartWrite, Finish) are decided under the mutex but made outside of it,
+// because they may call back into this object on the same thread. `writing_` or `finished_` marks
+// them as decided.
 class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
  public:
   JobWatcher(WatchHub& hub, const v1::WatchJobsRequest& request)
       : hub_(hub), parts_(hub.parts_), request_(request) {}
 
-  // Keeps itself alive until OnDone; the executor and the hub hold references too.
-  // `store`: what the caller sees, where he is `allowed` to begin.
+  // Keeps itself alive until OnDone; the executor and the hub hold references, too. `store`: store
+  // of the caller's project. The stream fails unless `allowed` is OK.
   void Start(const std::shared_ptr<JobWatcher>& self,
              const grpc::Status& allowed,
              std::optional<ProjectStore> store) {
@@ -39,10 +39,10 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     parts_.quick.Post([self] { self->Begin(); });
   }
 
-  // From the poller: something happened to these jobs.
+  // Called by the poller when these jobs have new events.
   void Poke(const std::set<int64_t>& changed_jobs) {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       bool mine = false;
       for (const int64_t id : ids_) mine = mine || changed_jobs.count(id) > 0;
       if (!mine) return;
@@ -51,10 +51,10 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     Pump();
   }
 
-  // From the poller, every round: deferred progress and keepalive.
+  // Called by the poller in every round: sends deferred progress and keepalives.
   void Tick() {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!begun_ || finished_) return;
       const auto now = SteadyClock::now();
       for (auto it = deferred_.begin(); it != deferred_.end();) {
@@ -78,7 +78,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
 
   void End(const grpc::Status& status) {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!end_) end_ = status;
       queue_.clear();
     }
@@ -87,7 +87,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
 
   void OnWriteDone(bool ok) override {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       writing_ = false;
       last_write_ = SteadyClock::now();
     }
@@ -100,7 +100,8 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   }
 
  private:
-  // On the executor: checks the request, then sends the present state or goes on from a revision.
+  // Runs on the executor: checks the request, then sends the present state or continues from a
+  // revision.
   void Begin() {
     const grpc::Status status = Guard([&] {
       place_ = parts_.streams.watches.Take(store_->project());
@@ -118,7 +119,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
           store_->ResolveWatch({request_.names().begin(), request_.names().end()});
       JobsSnapshot snapshot;
       if (request_.after_revision() == 0) snapshot = store_->Snapshot(ids);
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       interval_ = std::chrono::milliseconds(interval);
       ids_ = ids;
       cursor_ = request_.after_revision() == 0 ? snapshot.revision : request_.after_revision();
@@ -134,17 +135,17 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       begun_ = true;
       dirty_ = true;
       last_write_ = SteadyClock::now();
-      // Whoever goes on is told at once that he is heard, though nothing may happen for long.
+      // A continued watch gets a keepalive at once, because the next event may be far away.
       if (request_.after_revision() > 0) last_write_ -= hub_.timing_.keepalive;
     });
     status.ok() ? Pump() : End(status);
   }
 
-  // On the executor: the next events of the watched jobs.
+  // Runs on the executor: reads the next events of the watched jobs.
   void Fetch() {
     const grpc::Status status = Guard([&] {
       const std::shared_ptr<const WatchBatch> batch = hub_.batches_.After(cursor_, ids_, *store_);
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       for (const EventRecord& event : batch->events) {
         cursor_ = event.revision;
         if (event.kind == EventKind::kState) {
@@ -162,19 +163,19 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       }
     });
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       fetching_ = false;
     }
     status.ok() ? Pump() : End(status);
   }
 
-  // On the executor: the jobs of the states that are to be written next. Those behind them wait as
-  // what they are in the table of events, so that a reader who is slow holds few whole jobs.
+  // Runs on the executor: loads the jobs of the next states to be written. Later entries keep only
+  // their event records, so that a slow reader holds few whole jobs.
   void Load() {
     const grpc::Status status = Guard([&] {
       std::vector<int64_t> wanted;
       {
-        std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size()); ++i) {
           if (!queue_[i].state) continue;
           const int64_t id = queue_[i].state->job_id;
@@ -188,15 +189,15 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
         const int64_t id = job.id;
         jobs.emplace(id, std::move(job));
       }
-      std::lock_guard lock(mutex_);
-      // What was queued meanwhile is behind; nothing with a state in front was taken.
+      const MutexLock lock(mutex_);
+      // Events queued meanwhile are behind; no entry with a state was removed from the front.
       for (size_t i = 0; i < std::min(kJobsAtOnce, queue_.size());) {
         Item& item = queue_[i];
         const auto job = item.state ? jobs.find(item.state->job_id) : jobs.end();
         if (job != jobs.end()) {
           item = {StateEvent(Then(job->second, *item.state), *item.state), std::nullopt};
         } else if (item.state && std::ranges::find(wanted, item.state->job_id) !=
-                                     wanted.end()) {  // it was deleted
+                                     wanted.end()) {  // the job was deleted
           queue_.erase(queue_.begin() + static_cast<std::ptrdiff_t>(i));
           continue;
         }
@@ -204,16 +205,16 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
       }
     });
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       loading_ = false;
     }
     status.ok() ? Pump() : End(status);
   }
 
-  // The job at the time of the event, as far as it is known.
+  // Returns the job at the time of the event, as far as it is known.
   static JobRecord Then(const JobRecord& job, const EventRecord& event) {
     JobRecord then = job;
-    if (then.state != event.state) {  // it has moved on since; what came later is not shown yet
+    if (then.state != event.state) {  // the job has changed since; later facts are not shown yet
       then.state = event.state;
       then.artifacts.clear();
       then.error.reset();
@@ -223,8 +224,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     return then;
   }
 
-  // With the mutex held.
-  void TakeProgress(const EventRecord& event, const JobRecord& job) {
+  void TakeProgress(const EventRecord& event, const JobRecord& job) COLOR3D_REQUIRES(mutex_) {
     v1::JobEvent progress;
     progress.set_revision(event.revision);
     progress.set_kind(v1::JobEvent::KIND_PROGRESS);
@@ -250,25 +250,25 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     return event;
   }
 
-  // With the mutex held. Revisions never go back: deferred progress takes the newest one sent.
-  void Queue(v1::JobEvent event) {
+  // Revisions never decrease: deferred progress gets the newest one sent.
+  void Queue(v1::JobEvent event) COLOR3D_REQUIRES(mutex_) {
     sent_revision_ = std::max(sent_revision_, event.revision());
     event.set_revision(sent_revision_);
     queue_.push_back({std::move(event), std::nullopt});
   }
-  void QueueState(const EventRecord& event) {
+  void QueueState(const EventRecord& event) COLOR3D_REQUIRES(mutex_) {
     sent_revision_ = std::max(sent_revision_, event.revision);
     queue_.push_back({{}, event});
   }
 
-  // Does the one thing that can be done next.
+  // Starts the next possible operation.
   void Pump() {
     enum class Next { kNothing, kWrite, kLoad, kFetch, kFinish } next = Next::kNothing;
     grpc::Status status;
     std::shared_ptr<JobWatcher> self;
     {
-      std::lock_guard lock(mutex_);
-      if (finished_ || writing_) return;  // self_ may be gone once finished
+      const MutexLock lock(mutex_);
+      if (finished_ || writing_) return;  // self_ may be gone after finished_ is set
       self = self_;
       if (!queue_.empty() && queue_.front().state) {
         if (loading_) return;
@@ -300,29 +300,29 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   const v1::WatchJobsRequest request_;
   std::shared_ptr<JobWatcher> self_;
   StreamLimit::Place place_;
+  std::optional<ProjectStore> store_;  // set by Start, if the caller is allowed
 
-  std::mutex mutex_;
-  std::vector<int64_t> ids_;  // fixed once begun_
-  std::chrono::milliseconds interval_{500};
-  int64_t cursor_ = 0;         // events up to here were taken
-  int64_t sent_revision_ = 0;  // newest that was queued for the client
+  Mutex mutex_;
+  std::vector<int64_t> ids_;  // constant once begun_ is set
+  std::chrono::milliseconds interval_ COLOR3D_GUARDED_BY(mutex_){500};
+  int64_t cursor_ = 0;                                    // last event that was read
+  int64_t sent_revision_ COLOR3D_GUARDED_BY(mutex_) = 0;  // newest revision queued for the client
   struct Item {
     v1::JobEvent event;
-    std::optional<EventRecord> state;  // its job is not loaded yet: `event` is empty
+    std::optional<EventRecord> state;  // the job is not loaded yet and `event` is empty
   };
-  std::deque<Item> queue_;
-  v1::JobEvent current_;  // being written
-  std::map<int64_t, v1::JobEvent> deferred_;
-  std::map<int64_t, SteadyClock::time_point> progress_sent_;
-  SteadyClock::time_point last_write_;
-  std::optional<grpc::Status> end_;
-  std::optional<ProjectStore> store_;
-  bool begun_ = false;
-  bool dirty_ = false;
-  bool fetching_ = false;
-  bool loading_ = false;
-  bool writing_ = false;
-  bool finished_ = false;
+  std::deque<Item> queue_ COLOR3D_GUARDED_BY(mutex_);
+  v1::JobEvent current_;  // message being written
+  std::map<int64_t, v1::JobEvent> deferred_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<int64_t, SteadyClock::time_point> progress_sent_ COLOR3D_GUARDED_BY(mutex_);
+  SteadyClock::time_point last_write_ COLOR3D_GUARDED_BY(mutex_);
+  std::optional<grpc::Status> end_ COLOR3D_GUARDED_BY(mutex_);
+  bool begun_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool dirty_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool fetching_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool loading_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool writing_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool finished_ COLOR3D_GUARDED_BY(mutex_) = false;
 };
 
 WatchHub::WatchHub(const RpcParts& parts, WatchTiming timing)
@@ -334,10 +334,10 @@ WatchHub::WatchHub(const RpcParts& parts, WatchTiming timing)
 WatchHub::~WatchHub() {
   Drain();
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   thread_.join();
 }
 
@@ -349,7 +349,7 @@ grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const grpc::CallbackServ
   watcher->Start(watcher, allowed, store);
   bool draining = false;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining = draining_;
   }
   if (draining) watcher->End(DrainingStatus());
@@ -359,7 +359,7 @@ grpc::ServerWriteReactor<v1::JobEvent>* WatchHub::Watch(const grpc::CallbackServ
 void WatchHub::Drain() {
   std::vector<std::shared_ptr<JobWatcher>> all;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
     for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
   }
@@ -367,25 +367,28 @@ void WatchHub::Drain() {
 }
 
 void WatchHub::Register(const std::shared_ptr<JobWatcher>& watcher) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watchers_[watcher.get()] = watcher;
 }
 
 void WatchHub::Unregister(JobWatcher* watcher) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watchers_.erase(watcher);
 }
 
 void WatchHub::Loop() {
-  std::unique_lock lock(mutex_);
-  while (!wake_.wait_for(lock, timing_.poll, [this] { return stopping_; })) {
-    lock.unlock();
+  MutexLock lock(mutex_);
+  while (true) {
+    const auto end = SteadyClock::now() + timing_.poll;
+    while (!stopping_ && wake_.WaitUntil(mutex_, end)) continue;
+    if (stopping_) return;
+    lock.Unlock();
     try {
       Poll();
     } catch (const std::exception& e) {
       spdlog::warn("cannot read job events: {}", e.what());
     }
-    lock.lock();
+    lock.Lock();
   }
 }
 
@@ -400,7 +403,7 @@ void WatchHub::Poll() {
   if (!changed.empty()) batches_.Forget();
   std::vector<std::shared_ptr<JobWatcher>> all;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
   }
   for (const auto& watcher : all) {

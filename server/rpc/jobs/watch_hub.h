@@ -1,16 +1,16 @@
-// WatchJobs streams. One thread polls the store's event table for all of them; a stream keeps only
-// its position in that table, so a slow reader costs bounded memory and loses no state change.
+// WatchJobs streams. One thread polls the event table of the store for all of them. A stream keeps
+// only its position in that table, so a slow reader costs bounded memory and misses no state
+// change.
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <vector>
 
 #include "color3d/v1/job.grpc.pb.h"
+#include "core/base/mutex.h"
 #include "server/rpc/calls/rpc_parts.h"
 #include "server/rpc/jobs/watch_batches.h"
 
@@ -26,7 +26,7 @@ struct WatchTiming {
 class WatchHub {
  public:
   WatchHub(const RpcParts& parts, WatchTiming timing);
-  // Ends all streams (UNAVAILABLE) and stops polling. Before the executor is destroyed.
+  // Ends all streams (UNAVAILABLE) and stops polling. Must run before the executor is destroyed.
   ~WatchHub();
   WatchHub(const WatchHub&) = delete;
   WatchHub& operator=(const WatchHub&) = delete;
@@ -46,12 +46,12 @@ class WatchHub {
   const RpcParts& parts_;
   const WatchTiming timing_;
   WatchBatches batches_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
-  bool draining_ = false;
-  std::map<JobWatcher*, std::shared_ptr<JobWatcher>> watchers_;
-  int64_t revision_ = 0;  // poller only
+  Mutex mutex_;
+  CondVar wake_;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool draining_ COLOR3D_GUARDED_BY(mutex_) = false;
+  std::map<JobWatcher*, std::shared_ptr<JobWatcher>> watchers_ COLOR3D_GUARDED_BY(mutex_);
+  int64_t revision_ = 0;  // used by the poller only
   std::thread thread_;
 };
 

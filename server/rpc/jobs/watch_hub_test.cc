@@ -10,7 +10,7 @@ namespace color3d::testing {
 namespace {
 using WatchHubTest = RpcTest;
 
-TEST_F(WatchHubTest, WatchShowsEveryStateAndEnds) {
+TEST_F(WatchHubTest, ShowsEveryStateAndEnds) {
   const std::string scene = client_->MakeScene().name();
   const std::string name = client_->Create(ScriptedSpec(scene, "steps=1")).name();
   v1::WatchJobsRequest request;
@@ -36,9 +36,9 @@ TEST_F(WatchHubTest, WatchShowsEveryStateAndEnds) {
   EXPECT_THAT(states,
               ::testing::ElementsAre(
                   v1::Job::STATE_QUEUED, v1::Job::STATE_RUNNING, v1::Job::STATE_SUCCEEDED));
-  EXPECT_EQ(event.job().artifacts_size(), 1) << "the last state is complete";
+  EXPECT_EQ(event.job().artifacts_size(), 1) << "last state has the artifacts";
 
-  // A connection that broke after RUNNING goes on from there.
+  // A client whose connection broke after RUNNING continues from there.
   request.set_after_revision(revisions.at(1));
   grpc::ClientContext resumed_context;
   auto resumed = client_->jobs->WatchJobs(&resumed_context, request);
@@ -54,7 +54,7 @@ TEST_F(WatchHubTest, WatchShowsEveryStateAndEnds) {
   EXPECT_EQ(future->Finish().error_code(), grpc::StatusCode::OUT_OF_RANGE);
 }
 
-TEST_F(WatchHubTest, WatchCoalescesProgressAndKeepsAlive) {
+TEST_F(WatchHubTest, CoalescesProgressAndKeepsAlive) {
   const std::string scene = client_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
@@ -88,7 +88,7 @@ TEST_F(WatchHubTest, WatchCoalescesProgressAndKeepsAlive) {
   stream->Finish();
 }
 
-TEST_F(WatchHubTest, ManyWatchersOfWhichSomeStall) {
+TEST_F(WatchHubTest, ServesManyWatchersWhenSomeStall) {
   const std::string scene = client_->MakeScene().name();
   const std::string name = client_->Create(ScriptedSpec(scene, "steps=1")).name();
   v1::WatchJobsRequest request;
@@ -99,9 +99,9 @@ TEST_F(WatchHubTest, ManyWatchersOfWhichSomeStall) {
     contexts.push_back(std::make_unique<grpc::ClientContext>());
     streams.push_back(client_->jobs->WatchJobs(contexts.back().get(), request));
   }
-  EXPECT_EQ(client_->Get(name).state(), v1::Job::STATE_BLOCKED) << "unary calls are answered";
+  EXPECT_EQ(client_->Get(name).state(), v1::Job::STATE_BLOCKED) << "unary calls are still answered";
   EXPECT_EQ(Work(), 2);
-  for (size_t i = 0; i < streams.size(); i += 2) {  // every other one is never read
+  for (size_t i = 0; i < streams.size(); i += 2) {  // every other stream is never read
     v1::JobEvent event;
     while (streams[i]->Read(&event)) {
     }
@@ -112,7 +112,7 @@ TEST_F(WatchHubTest, ManyWatchersOfWhichSomeStall) {
   for (size_t i = 1; i < streams.size(); i += 2) streams[i]->Finish();
 }
 
-TEST_F(WatchHubTest, StreamsAreLimited) {
+TEST_F(WatchHubTest, LimitsStreams) {
   const std::string name =
       client_->Create(ScriptedSpec(client_->MakeScene().name(), "steps=1")).name();
   v1::WatchJobsRequest request;

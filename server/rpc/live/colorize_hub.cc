@@ -11,9 +11,9 @@
 
 namespace color3d {
 
-// One stream. What to do next is decided under the mutex and done outside it, for gRPC may call
-// back on the same thread; the flags `reading_`, `starting_read_`, `writing_` and `finished_` mark
-// what is decided.
+// One stream. The next operation is decided under the mutex and started outside of it, because gRPC
+// may call back on the same thread. `reading_`, `starting_read_`, `writing_` and `finished_` mark
+// decided operations.
 class ColorizeStream final
     : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>,
       public std::enable_shared_from_this<ColorizeStream> {
@@ -28,16 +28,16 @@ class ColorizeStream final
         place_(std::move(place)),
         deadline_(context->deadline()) {}
 
-  // Takes no more pictures, answers those that are here, then ends with `status`.
+  // Reads no more pictures, answers the pending ones, then ends with `status`.
   void End(const grpc::Status& status) {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (!end_) end_ = status;
     }
     Pump();
   }
 
-  // Before it is pumped for the first time.
+  // Must be called before the first Pump.
   void WatchSilence() {
     silence_.emplace(
         parts_.silence,
@@ -55,7 +55,7 @@ class ColorizeStream final
           return NoteTurn();
         case Step::kRead: {
           StartRead(&incoming_);
-          std::lock_guard lock(mutex_);
+          const MutexLock lock(mutex_);
           starting_read_ = false;
           break;
         }
@@ -71,10 +71,10 @@ class ColorizeStream final
   void OnReadDone(bool ok) override {
     std::shared_ptr<Picture> picture;
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       reading_ = false;
       if (!ok) {
-        if (!end_) end_ = grpc::Status::OK;  // the client has sent all
+        if (!end_) end_ = grpc::Status::OK;  // the client has sent all pictures
       } else if (!end_) {
         picture = std::make_shared<Picture>();
         picture->hold = hub_.client_.Hold();
@@ -91,7 +91,7 @@ class ColorizeStream final
 
   void OnWriteDone(bool ok) override {
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       writing_ = false;
       --hub_.pictures_;
     }
@@ -103,14 +103,14 @@ class ColorizeStream final
  private:
   enum class Step { kNothing, kRead, kWrite, kFinish };
   struct Picture {
-    std::shared_ptr<void> hold;  // on the worker, until the picture is answered
+    std::shared_ptr<void> hold;  // keeps the worker running until the picture is answered
     v1::ColorizeImagesRequest request;
     v1::ColorizeImagesResponse response;
     std::shared_ptr<InferenceClient::Call> call = std::make_shared<InferenceClient::Call>();
   };
 
   Step Decide() {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (finished_) return Step::kNothing;
     if (!writing_ && !replies_.empty()) {
       outgoing_ = std::move(replies_.front());
@@ -133,14 +133,15 @@ class ColorizeStream final
   }
 
   static grpc::Status SilentStatus(std::chrono::milliseconds limit) {
-    return ToGrpcStatus(ServiceError(ErrorReason::kStreamSilent,
-                                     "no picture came for {} s; open another stream for the next",
-                                     limit.count() / 1000));
+    return ToGrpcStatus(
+        ServiceError(ErrorReason::kStreamSilent,
+                     "the stream was idle for {} s; open another one for the next picture",
+                     limit.count() / 1000));
   }
 
-  // Silence is the client's when all that it sent is answered.
+  // Silence counts only while no picture is pending.
   void NoteTurn() {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const bool waits = reading_ && !writing_ && !end_ && pictures_.empty() && replies_.empty();
     if (waits == waits_for_client_) return;
     waits_for_client_ = waits;
@@ -151,7 +152,7 @@ class ColorizeStream final
     }
   }
 
-  // On the executor.
+  // Runs on the executor.
   void Forward(const std::shared_ptr<Picture>& picture) {
     const grpc::Status status = Guard([&] {
       ResolveColorizeRequest(
@@ -176,7 +177,7 @@ class ColorizeStream final
       response.mutable_error()->set_message(status.error_message());
     }
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       pictures_.erase(picture);
       if (abandoned_) {
         --hub_.pictures_;
@@ -187,7 +188,7 @@ class ColorizeStream final
     Pump();
   }
 
-  // What is too large for a message is the project's blob from now on.
+  // An answer that is too large for a message is stored as a blob of the project.
   grpc::Status TakeAnswer(const std::shared_ptr<Picture>& picture) {
     v1::ColorizeImagesResponse& response = picture->response;
     internal::v1::ColorizeImageResponse& answer = picture->call->response;
@@ -203,11 +204,11 @@ class ColorizeStream final
     });
   }
 
-  // Nobody reads any more: what is under way is cancelled, what is done is thrown away.
+  // The client is gone: cancels pending pictures and drops finished ones.
   void Abandon() {
     std::vector<std::shared_ptr<Picture>> under_way;
     {
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       abandoned_ = true;
       end_ = grpc::Status::CANCELLED;
       hub_.pictures_ -= static_cast<int>(replies_.size());
@@ -226,23 +227,24 @@ class ColorizeStream final
   v1::ColorizeImagesRequest incoming_;
   v1::ColorizeImagesResponse outgoing_;
 
-  std::mutex mutex_;
-  bool reading_ = false;
-  bool starting_read_ = false;
-  bool writing_ = false;
-  bool abandoned_ = false;
-  bool finished_ = false;
-  bool waits_for_client_ = false;
+  Mutex mutex_;
+  bool reading_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool starting_read_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool writing_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool abandoned_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool finished_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool waits_for_client_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::optional<SilenceWatch::Stream> silence_;
-  grpc::Status last_status_;         // set once, when finished_ is
-  std::optional<grpc::Status> end_;  // how the stream will end; no more pictures are taken
-  std::set<std::shared_ptr<Picture>> pictures_;  // under way
-  std::deque<v1::ColorizeImagesResponse> replies_;
+  grpc::Status last_status_;  // set once, together with finished_
+  std::optional<grpc::Status> end_
+      COLOR3D_GUARDED_BY(mutex_);  // how the stream will end; set: no more pictures are read
+  std::set<std::shared_ptr<Picture>> pictures_ COLOR3D_GUARDED_BY(mutex_);  // pending pictures
+  std::deque<v1::ColorizeImagesResponse> replies_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 namespace {
 
-// A stream that is over before it begins.
+// A stream that is refused at once.
 class RefusedStream final
     : public grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse> {
  public:
@@ -253,7 +255,7 @@ class RefusedStream final
 grpc::Status NoWorkerStatus() {
   return ToGrpcStatus(ServiceError(ErrorReason::kNoInferenceWorker,
                                    "this server has no inference worker: install color3d-worker "
-                                   "beside color3d-server and start it anew"));
+                                   "beside color3d-server and restart it"));
 }
 
 }  // namespace
@@ -276,7 +278,7 @@ grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* 
       std::make_shared<ColorizeStream>(*this, context, call->store, std::move(place));
   stream->WatchSilence();
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (draining_) return new RefusedStream(DrainingStatus());
     streams_.insert(stream);
   }
@@ -287,7 +289,7 @@ grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* 
 void ColorizeHub::Drain() {
   std::set<std::shared_ptr<ColorizeStream>> streams;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = true;
     streams = streams_;
   }
@@ -295,7 +297,7 @@ void ColorizeHub::Drain() {
 }
 
 void ColorizeHub::Unregister(ColorizeStream* stream) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   streams_.erase(stream->shared_from_this());
 }
 

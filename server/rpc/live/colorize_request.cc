@@ -35,7 +35,7 @@ void TakePicture(const RpcParts& parts,
                  v1::ColorizeImagesRequest* request,
                  internal::v1::ColorizeImageRequest* call) {
   if (request->image().empty() == !request->has_image_digest()) {
-    throw InvalidArgument("a picture is given by one of image and image_digest");
+    throw InvalidArgument("set exactly one of image and image_digest");
   }
   if (request->image().size() > kMaxImageBytes) {
     throw ServiceError(ErrorReason::kImageTooLarge,
@@ -60,7 +60,7 @@ ColorizerRecord NewestOf(const ProjectStore& store, const std::string& scene) {
   CheckName(scene, "scenes");
   const auto newest = store.ListColorizers(scene, 0, 1);
   if (!newest.empty()) return newest[0];
-  store.GetScene(scene);  // says so when there is no such scene
+  store.GetScene(scene);  // throws if there is no such scene
   throw ServiceError(
       ErrorReason::kColorizerNotFound,
       "{} has no colorizer yet: run a {} or a {} job of it first, or send a coloured "
@@ -85,7 +85,8 @@ ColorizerRecord FindColorizer(const ProjectStore& store, const v1::ColorizeImage
   return record;
 }
 
-// Which weights it was trained with. They may have changed since: the worker compares digests.
+// Encoder that the colorizer was trained with. Its file may have changed since: the worker compares
+// digests.
 std::string EncoderOf(const ProjectStore& store, const ColorizerRecord& record) {
   return ParseSpec(store.GetJob(record.job).spec, record.job).personalize().encoder();
 }
@@ -104,7 +105,7 @@ void ResolveColorizeRequest(const RpcParts& parts,
   response->set_request_id(request->request_id());
   const bool trained = !request->colorizer().empty() || !request->scene().empty();
   if (trained == request->has_example()) {
-    throw InvalidArgument("name what colours the picture: a colorizer, a scene, or an example");
+    throw InvalidArgument("set one of colorizer, scene and example");
   }
   TakePicture(parts, store, request, call);
   if (request->has_example()) {

@@ -1,5 +1,4 @@
-// What a ColorizeImages request asks for: checked, and with names resolved to blobs. May block on
-// the store.
+// Checks a ColorizeImages request and resolves its names to blobs. May block on the store.
 #pragma once
 
 #include "color3d/internal/v1/inference.pb.h"
@@ -8,9 +7,9 @@
 
 namespace color3d {
 
-// Fills the call to the worker (taking the picture's bytes out of `request`), and in `response`
-// what is known before: request_id, colorizer, scene. Throws ServiceError: no such colorizer, a
-// scene without one, a colorizer of another scene, a missing blob, a picture of more than 3 MiB.
+// Fills the call to the worker (moving the picture out of `request`) and, in `response`,
+// request_id, colorizer and scene. Throws ServiceError: no such colorizer, a scene without one, a
+// colorizer of another scene, a missing blob, a picture of more than 3 MiB.
 void ResolveColorizeRequest(const RpcParts& parts,
                             const ProjectStore& store,
                             v1::ColorizeImagesRequest* request,

@@ -20,18 +20,18 @@ using std::chrono::system_clock;
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  // A worker takes a second or two to start: look for it often.
+  // A worker takes a second or two to start, so reconnect often.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 300);
-  // A picture that kills the worker must not be sent to the next one by itself.
+  // A picture that kills a worker must not be retried by gRPC.
   arguments.SetInt(GRPC_ARG_ENABLE_RETRIES, 0);
   // Each worker has a connection of its own.
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   return grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
 }
 
-// Statuses without details are the transport's, not the worker's.
+// Statuses without details come from the transport, not from the worker.
 grpc::Status Explained(const grpc::Status& status, bool our_limit) {
   if (status.ok() || !status.error_details().empty()) return status;
   if (status.error_code() == grpc::StatusCode::CANCELLED) return status;
@@ -46,7 +46,7 @@ grpc::Status Explained(const grpc::Status& status, bool our_limit) {
       ServiceError(ErrorReason::kInferenceLost, "{}; send the picture again", what));
 }
 
-// A status without details is the transport's own word, after the worker had been reached.
+// A status without details comes from the transport, after the worker was reached.
 PoisonWatch::End EndOf(const grpc::Status& status) {
   if (status.ok() || !status.error_details().empty()) return PoisonWatch::End::kAnswered;
   return status.error_code() == grpc::StatusCode::UNAVAILABLE ? PoisonWatch::End::kWorkerDied
@@ -54,9 +54,10 @@ PoisonWatch::End EndOf(const grpc::Status& status) {
 }
 
 grpc::Status PoisonStatus() {
-  return ToGrpcStatus(ServiceError(ErrorReason::kPictureKillsWorker,
-                                   "the inference worker died of this picture, alone with it: see "
-                                   "the server's log; send it smaller, or as another file"));
+  return ToGrpcStatus(
+      ServiceError(ErrorReason::kPictureKillsWorker,
+                   "the inference worker died while this was its only picture: see "
+                   "the server's log; send the picture smaller or in another format"));
 }
 
 }  // namespace
@@ -77,8 +78,8 @@ void InferenceClient::Start(const std::shared_ptr<Call>& call,
   Order order{call, deadline, std::move(done), {}};
   bool is_poison = false;
   {
-    std::lock_guard lock(mutex_);
-    // Taken of whole pictures only where a worker has died: else there is nothing to compare with.
+    const MutexLock lock(mutex_);
+    // Digests are computed only after a worker has died; before there is nothing to compare with.
     if (!watch_.IsEmpty()) order.picture = DigestOfMessage(call->request);
     is_poison = watch_.IsPoison(order.picture);
     if (!is_poison) waiting_.push_back(order);
@@ -89,8 +90,8 @@ void InferenceClient::Start(const std::shared_ptr<Call>& call,
 void InferenceClient::Pump() {
   std::vector<Order> sent;
   {
-    std::lock_guard lock(mutex_);
-    // In their order: a suspect holds up those behind it until it has been sent.
+    const MutexLock lock(mutex_);
+    // In order of arrival: a suspect delays those behind it until it has been sent.
     while (!waiting_.empty() && watch_.MaySend(waiting_.front().picture)) {
       watch_.OnSent(waiting_.front().picture);
       sent.push_back(std::move(waiting_.front()));
@@ -108,7 +109,7 @@ void InferenceClient::Send(const Order& order) {
   call.context.set_wait_for_ready(true);
   std::shared_ptr<Stub> stub;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stub = stub_;
   }
   stub->async()->ColorizeImage(&call.context,
@@ -117,7 +118,7 @@ void InferenceClient::Send(const Order& order) {
                                [this, order, stub, our_limit](const grpc::Status& status) {
                                  OnEnd(order, stub, status);
                                  Pump();
-                                 // The last: this object may be gone afterwards.
+                                 // Must come last: this object may be destroyed afterwards.
                                  order.done(Explained(status, our_limit));
                                });
 }
@@ -128,9 +129,10 @@ void InferenceClient::OnEnd(const Order& order,
   const PoisonWatch::End end = EndOf(status);
   const bool died = end == PoisonWatch::End::kWorkerDied;
   const LivePicture picture = died ? DigestOfMessage(order.call->request) : order.picture;
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   watch_.OnEnd(picture, end);
-  // What is sent next must not end with the dead worker's connection, and be taken for its killer.
+  // A new connection, so that the next picture does not fail with the dead worker's one and is not
+  // mistaken for its cause.
   if (died && stub == stub_) {
     stub_ = internal::v1::InferenceService::NewStub(MakeChannel(link_.target));
   }

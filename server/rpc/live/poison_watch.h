@@ -1,5 +1,5 @@
-// Which live pictures may be with the inference worker together, so that one that kills it is found
-// out. Not thread-safe.
+// Decides which live pictures may be with the inference worker together, so that a picture that
+// kills it is identified. Not thread-safe.
 #pragma once
 
 #include <deque>
@@ -8,26 +8,27 @@
 
 namespace color3d {
 
-using LivePicture = std::string;  // digest of all that the worker is sent
+using LivePicture = std::string;  // digest of the whole request to the worker
 
 class PoisonWatch {
  public:
-  // No worker has died with a picture that is remembered.
+  // No picture is remembered as suspect or poison.
   bool IsEmpty() const { return suspects_.empty() && poison_.empty(); }
-  // It was alone with a worker that died.
+  // The picture was alone with a worker that died.
   bool IsPoison(const LivePicture& picture) const { return poison_.contains(picture); }
-  // It was with a worker that died, with others: it must be alone now.
+  // The picture was with others at a worker that died: it must be sent alone now.
   bool IsSuspect(const LivePicture& picture) const { return suspects_.contains(picture); }
 
-  // Whether it may be sent now. A suspect waits for all others to be answered, and they for it.
+  // Returns whether the picture may be sent now. A suspect waits until no other is pending, and the
+  // others wait for it.
   bool MaySend(const LivePicture& picture) const;
   void OnSent(const LivePicture& picture);
-  enum class End { kAnswered, kWorkerDied, kUnknown };  // unknown: cancelled, too late
+  enum class End { kAnswered, kWorkerDied, kUnknown };  // kUnknown: cancelled, timed out
   void OnEnd(const LivePicture& picture, End end);
 
  private:
   static constexpr size_t kMostRemembered = 10'000;
-  // The oldest is forgotten.
+  // Adds a picture; forgets the oldest one beyond the limit.
   void Remember(const LivePicture& picture, std::set<LivePicture>* names);
 
   int under_way_ = 0;

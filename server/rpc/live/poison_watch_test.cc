@@ -6,25 +6,25 @@ namespace color3d {
 namespace {
 using End = PoisonWatch::End;
 
-TEST(PoisonWatch, OneThatKillsIsFoundAndTakesNoOtherWithIt) {
+TEST(PoisonWatchTest, IdentifiesPictureThatKillsWorker) {
   PoisonWatch watch;
   for (const char* picture : {"good", "bad", "other"}) {
     ASSERT_TRUE(watch.MaySend(picture));
     watch.OnSent(picture);
   }
-  watch.OnEnd("other", End::kAnswered);  // answered before it happened
+  watch.OnEnd("other", End::kAnswered);  // answered before the worker died
   watch.OnEnd("good", End::kWorkerDied);
   watch.OnEnd("bad", End::kWorkerDied);
   EXPECT_FALSE(watch.IsPoison("good"));
   EXPECT_FALSE(watch.IsSuspect("other"));
-  // They come again.
+  // Both are sent again.
   watch.OnSent("other");
-  EXPECT_FALSE(watch.MaySend("good")) << "another one is with the worker";
+  EXPECT_FALSE(watch.MaySend("good")) << "another picture is with the worker";
   watch.OnEnd("other", End::kAnswered);
   ASSERT_TRUE(watch.MaySend("good"));
   watch.OnSent("good");
   EXPECT_FALSE(watch.MaySend("bad"));
-  EXPECT_FALSE(watch.MaySend("other")) << "nobody joins a suspect";
+  EXPECT_FALSE(watch.MaySend("other")) << "a suspect must be alone";
   watch.OnEnd("good", End::kAnswered);
   EXPECT_FALSE(watch.IsSuspect("good"));
   ASSERT_TRUE(watch.MaySend("bad"));
@@ -34,7 +34,7 @@ TEST(PoisonWatch, OneThatKillsIsFoundAndTakesNoOtherWithIt) {
   EXPECT_TRUE(watch.MaySend("good"));
 }
 
-TEST(PoisonWatch, RemembersSoManyAndNoMore) {
+TEST(PoisonWatchTest, BoundsRememberedPictures) {
   PoisonWatch watch;
   for (int i = 0; i < 20'001; ++i) {
     watch.OnSent(std::to_string(i));

@@ -83,7 +83,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerCont
         CheckName(in.name(), "scenes");
         const RequestKey key = KeyOf("CommitScene", in);
         const SceneRecord scene = call.store.GetScene(in.name());
-        if (scene.state == SceneState::kActive) {  // committed before: immutable, nothing to check
+        if (scene.state == SceneState::kActive) {  // committed before, hence immutable
           *out = ToProto(scene);
           return;
         }

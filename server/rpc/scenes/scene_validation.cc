@@ -26,9 +26,9 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int64_t kMaxTransformsBytes = int64_t{64} << 20;  // 10,000 photos need about 10
-constexpr int64_t kMaxTimesBytes = int64_t{16} << 20;       // with the longest names about 10
+constexpr int64_t kMaxTimesBytes = int64_t{16} << 20;       // about 10 with the longest names
 
-// Reads it all. Mapped, what a disk does not give would be a signal that ends the server.
+// Reads the whole file. An unreadable page of a mapped file would end the server by a signal.
 bool IsReadable(int fd, size_t size, const std::function<bool()>& is_cancelled) {
   std::vector<char> piece(std::min<size_t>(size, 1 << 20));
   for (size_t at = 0; at < size;) {
@@ -40,7 +40,7 @@ bool IsReadable(int fd, size_t size, const std::function<bool()>& is_cancelled) 
   return true;
 }
 
-// A file's bytes mapped read-only: pages come and go, the heap does not grow.
+// Read-only memory map of a file, so that the heap does not grow.
 class MappedFile {
  public:
   MappedFile(const fs::path& path, int64_t size, const std::function<bool()>& is_cancelled)
@@ -79,7 +79,7 @@ bool IsTransforms(const std::string& path) {
   return path == BaseName(path) && IsTransformsFile(path);
 }
 
-// Empty: it is one.
+// Returns why the file is not a transforms.json; empty if it is.
 std::string WhyNoTransforms(std::string_view bytes, bool needs_frames) {
   const TransformsOutline outline = OutlineOfTransforms(bytes);
   if (!outline.error.empty()) return "is not JSON: " + outline.error;
@@ -87,7 +87,7 @@ std::string WhyNoTransforms(std::string_view bytes, bool needs_frames) {
   return outline.frames == 0 && needs_frames ? "has no \"frames\"" : "";
 }
 
-// Of a scene without photographs.
+// Number of splats of a scene without photos.
 int CountSplats(const std::vector<SceneFileRecord>& files) {
   return static_cast<int>(std::count_if(files.begin(), files.end(), [](const auto& file) {
     return HasSplatExtension(file.path) && !IsAugmentFile(file.path);
@@ -100,7 +100,7 @@ int CountFilms(const std::vector<SceneFileRecord>& files) {
   }));
 }
 
-// What is wrong with the files of a scene. Equal files are read once.
+// Problems of the files of a scene. Equal files are read once.
 class FileChecks {
  public:
   FileChecks(const BlobStore& blobs,
@@ -108,12 +108,12 @@ class FileChecks {
              const std::function<bool()>& is_cancelled)
       : blobs_(blobs), limits_(limits), is_cancelled_(is_cancelled) {}
 
-  // One file's violation; counts it when it is a good photograph.
+  // Adds the violation of a file, if any; counts good photos.
   void Check(const SceneFileRecord& file, bool is_held, SceneCheck* check);
   std::vector<FieldViolation> violations;
 
  private:
-  // Empty: nothing. What is told of a picture is told of the path that it was read for.
+  // Empty: no problem. The message about a picture names the path that it was read for.
   struct Problem {
     std::string path, text;
   };
@@ -124,7 +124,7 @@ class FileChecks {
   const BlobStore& blobs_;
   const ServiceLimits& limits_;
   const std::function<bool()>& is_cancelled_;
-  // By digest, and the part that the file plays.
+  // By digest and role of the file.
   std::map<std::pair<std::string, Part>, Problem> known_;
 };
 
@@ -162,10 +162,10 @@ void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* ch
   const bool is_photo = HasImageExtension(file.path);
   const bool is_transforms = IsTransforms(file.path);
   const bool is_augmentation = IsAugmentFile(file.path), is_mask = IsMaskFile(file.path);
-  if (is_mask && !is_photo) return refuse("is no picture (PNG); remove it from masks/");
+  if (is_mask && !is_photo) return refuse("is not a PNG picture; remove it from masks/");
   if (is_augmentation && !is_photo) {
-    return refuse(
-        fmt::format("is no picture ({}); remove it from augment/", ReadableImageFormats()));
+    return refuse(fmt::format("is not a readable picture ({}); remove it from augment/",
+                              ReadableImageFormats()));
   }
   const int64_t max_bytes = is_transforms ? kMaxTransformsBytes : kMaxTimesBytes;
   if ((is_transforms || file.path == kTimesFile) && file.digest.size_bytes > max_bytes) {
@@ -193,7 +193,7 @@ void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* ch
   for (size_t i = 0; i < std::min<size_t>(3, violations.size()); ++i) {
     const FieldViolation& violation = violations[i];
     if (i > 0) message += "; ";
-    // Probe errors already begin with the file's name.
+    // Errors of the probe already begin with the name of the file.
     const bool named =
         violation.field.empty() || violation.description.find(violation.field) != std::string::npos;
     message += (named ? "" : violation.field + " ") + violation.description;
@@ -253,7 +253,7 @@ SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLim
           {{"files.path", file.path().substr(0, 200)}});
     }
     if (!paths.insert(file.path()).second) {
-      throw InvalidArgument("the path '{}' is there twice", file.path());
+      throw InvalidArgument("the path '{}' is listed twice", file.path());
     }
     record.files.push_back({file.path(), FromProto(file.digest())});
   }
@@ -285,7 +285,7 @@ SceneCheck CheckScene(const SceneRecord& scene,
   const std::vector<ColmapPlace> models = ColmapPlaces(paths);
   if (!models.empty() && !models[0].whole) {
     violations.push_back({models[0].files[0],
-                          "belongs to a COLMAP model that is not whole: cameras, images and "
+                          "belongs to an incomplete COLMAP model: cameras, images and "
                           "points3D are needed, all .bin or all .txt"});
   }
   size_t missing = 0;
@@ -297,23 +297,22 @@ SceneCheck CheckScene(const SceneRecord& scene,
   if (check.layout == CaptureLayout::kSplat) {
     if (const int splats = CountSplats(scene.files); splats > 1) {
       violations.push_back({"",
-                            fmt::format("the scene holds {} splats and no photographs; give one "
-                                        "splat a scene",
+                            fmt::format("the scene holds {} splats and no photos; give one "
+                                        "splat per scene",
                                         splats)});
     }
   } else if (check.layout == CaptureLayout::kFilm || check.layout == CaptureLayout::kFilms) {
     if (CountFilms(scene.files) > 0 && check.photo_count > 0) {
       violations.push_back(
-          {"", "the scene holds pictures in frames/ and video files; give one of them"});
+          {"", "the scene holds pictures in frames/ and video files; give one of the two"});
     }
   } else if (missing == 0 && check.photo_count == 0 && CountFilms(scene.files) == 0) {
     violations.push_back({"",
-                          fmt::format("the scene holds no photographs ({}), no splat (.ply, .sog, "
+                          fmt::format("the scene holds no photos ({}), no splat (.ply, .sog, "
                                       ".spz) and no film (.mp4, .mov, .mkv, ...)",
                                       ReadableImageEndings())});
   } else if (missing == 0 && check.photo_count == 1) {
-    violations.push_back(
-        {"", "the scene holds one photograph; at least 3 that overlap are needed"});
+    violations.push_back({"", "the scene holds one photo; at least 3 that overlap are needed"});
   }
   if (!violations.empty()) ThrowInvalid(scene, violations);
   return check;

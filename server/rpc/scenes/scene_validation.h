@@ -1,5 +1,5 @@
-// What CreateScene takes, and what CommitScene checks before a scene becomes immutable: every blob
-// there, every file what it claims to be, enough photographs, a layout we know.
+// Validation of scenes: requests of CreateScene, and the files of a scene before CommitScene makes
+// it immutable (all blobs stored, all files valid, enough photos, a known layout).
 #pragma once
 
 #include <functional>
@@ -11,9 +11,9 @@
 
 namespace color3d {
 
-// The scene that a request declares, under a new id where it names none. Throws
+// Returns the scene that a request declares, with a new id if it names none. Throws
 // Error{kInvalidArgument}: bad id, too many files, paths that are too long in sum, a path that is
-// unsafe (UNSAFE_PATH), there twice or both file and folder, no digest.
+// unsafe (UNSAFE_PATH), listed twice or both file and folder, no digest.
 SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLimits& limits);
 
 struct SceneCheck {
@@ -21,8 +21,8 @@ struct SceneCheck {
   int photo_count = 0;
 };
 
-// Of blobs that the project of `store` holds; each is read once, whatever paths it has.
-// `is_cancelled` is asked while they are read: then throws Error{kCancelled}. Throws
+// Checks blobs that the project of `store` holds; each is read once, whatever number of paths it
+// has. Throws Error{kCancelled} once `is_cancelled` returns true. Throws
 // ServiceError{kInvalidArgument, SCENE_INVALID} with one violation for each bad file; its message
 // names the first three and counts the rest.
 SceneCheck CheckScene(const SceneRecord& scene,

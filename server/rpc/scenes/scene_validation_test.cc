@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 using SceneValidationTest = RpcTest;
 
-TEST_F(SceneValidationTest, CommitChecksEveryFile) {
+TEST_F(SceneValidationTest, CommitChecksAllFiles) {
   v1::Scene scene;
   grpc::Status status = Commit({{"a.png", TinyPng()},
                                 {"b.jpg", "no image"},
@@ -29,21 +29,21 @@ TEST_F(SceneValidationTest, CommitChecksEveryFile) {
   EXPECT_THAT(status.error_message(), HasSubstr("b.jpg"));
   EXPECT_THAT(status.error_message(), HasSubstr("was not uploaded"));
   status = Commit({{"a.png", TinyPng()}}, &scene);
-  EXPECT_THAT(status.error_message(), HasSubstr("one photograph"));
+  EXPECT_THAT(status.error_message(), HasSubstr("one photo;"));
   status = Commit({{"notes.txt", "hello"}}, &scene);
-  EXPECT_THAT(status.error_message(), HasSubstr("no photographs"));
+  EXPECT_THAT(status.error_message(), HasSubstr("no photos"));
   EXPECT_EQ(Commit({{"../a.png", TinyPng()}}, &scene).error_code(),
             grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(Commit({{"a", "1"}, {"a/b", "2"}}, &scene).error_code(),
             grpc::StatusCode::INVALID_ARGUMENT);
 }
 
-// What a disk does not give is said; mapped, it would end the server.
-TEST_F(SceneValidationTest, APhotoThatCannotBeReadIsNamed) {
+// Read errors of the disk are reported; in a memory map they would end the server.
+TEST_F(SceneValidationTest, NamesUnreadablePhoto) {
   class LossyBlobs : public FileBlobStore {
    public:
     using FileBlobStore::FileBlobStore;
-    bool Touch(const FileDigest&) const override { return true; }  // it was whole a moment ago
+    bool Touch(const FileDigest&) const override { return true; }  // it was readable a moment ago
   };
   const LossyBlobs lossy(scratch_.path() / "blobs", BlobStoreOptions{0});
   const FileDigest blob = blobs_.PutBytes(TinyPng());
@@ -63,7 +63,7 @@ TEST_F(SceneValidationTest, APhotoThatCannotBeReadIsNamed) {
   }
 }
 
-TEST_F(SceneValidationTest, ManyBadFilesFitIntoTheStatus) {
+TEST_F(SceneValidationTest, ManyBadFilesFitIntoStatus) {
   std::vector<std::pair<std::string, std::string>> files;
   for (int i = 0; i < 300; ++i) {
     files.push_back({"a/rather/long/path/for/a/photograph/" + std::to_string(i) + ".jpg", "bad"});
@@ -74,7 +74,7 @@ TEST_F(SceneValidationTest, ManyBadFilesFitIntoTheStatus) {
   EXPECT_THAT(status.error_message(), HasSubstr("and 297 more"));
 }
 
-TEST_F(SceneValidationTest, PicturesInAugmentAreCheckedButNoPhotos) {
+TEST_F(SceneValidationTest, AugmentPicturesAreCheckedButNotCounted) {
   v1::Scene scene;
   ASSERT_TRUE(
       Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"augment/c.png", TinyPng()}}, &scene)
@@ -90,7 +90,7 @@ TEST_F(SceneValidationTest, PicturesInAugmentAreCheckedButNoPhotos) {
   EXPECT_EQ(bad.field_violations(1).field(), "augment/notes.txt");
 }
 
-TEST_F(SceneValidationTest, LayoutsAreRecognised) {
+TEST_F(SceneValidationTest, DetectsLayouts) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}}, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);
@@ -101,7 +101,7 @@ TEST_F(SceneValidationTest, LayoutsAreRecognised) {
                                                             {"sparse/0/cameras.bin", "1"},
                                                             {"sparse/0/images.bin", "2"}};
   const grpc::Status status = Commit(files, &scene);
-  EXPECT_THAT(status.error_message(), HasSubstr("not whole"));
+  EXPECT_THAT(status.error_message(), HasSubstr("incomplete COLMAP model"));
   files.push_back({"sparse/0/points3D.bin", "3"});
   ASSERT_TRUE(Commit(files, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_COLMAP);
@@ -114,7 +114,7 @@ TEST_F(SceneValidationTest, LayoutsAreRecognised) {
               HasSubstr("transforms.json"));
 }
 
-TEST_F(SceneValidationTest, PosesAreRecognisedWhereverTheImportReadsThem) {
+TEST_F(SceneValidationTest, DetectsPosesWhereImportReadsThem) {
   v1::Scene scene;
   std::vector<std::pair<std::string, std::string>> photos = {{"images/a.png", TinyPng()},
                                                              {"images/b.png", TinyPng()}};
@@ -126,7 +126,7 @@ TEST_F(SceneValidationTest, PosesAreRecognisedWhereverTheImportReadsThem) {
     ASSERT_TRUE(Commit(files, &scene).ok()) << folder;
     EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_COLMAP) << folder;
   }
-  // A whole model makes up for parts of another.
+  // A complete model makes up for an incomplete one.
   auto files = photos;
   for (const char* name : {"sparse/0/cameras.bin",
                            "sparse/1/cameras.bin",
@@ -145,7 +145,7 @@ TEST_F(SceneValidationTest, PosesAreRecognisedWhereverTheImportReadsThem) {
   files.emplace_back("transforms.json", "{\n\"frames\": oops}");
   EXPECT_THAT(Commit(files, &scene).error_message(),
               HasSubstr("transforms.json is not JSON: parse error at line 2"));
-  // Of files with equal bytes only the one that needs frames is refused for want of them.
+  // Of files with equal bytes only the one that needs frames is refused for missing frames.
   files = photos;
   files.emplace_back("transforms_test.json", R"({"frames": []})");
   files.emplace_back("transforms_train.json", R"({"frames": []})");
@@ -153,7 +153,7 @@ TEST_F(SceneValidationTest, PosesAreRecognisedWhereverTheImportReadsThem) {
               HasSubstr("transforms_train.json has no \"frames\""));
 }
 
-TEST_F(SceneValidationTest, TimesGoWithAColmapModel) {
+TEST_F(SceneValidationTest, AcceptsTimesBesideColmapModel) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"images/a.png", TinyPng()},
                       {"images/b.png", TinyPng()},
@@ -178,7 +178,7 @@ class CountingBlobs : public FileBlobStore {
   mutable std::atomic<int> fetched{0};
 };
 
-TEST_F(SceneValidationTest, ABlobIsReadOnceWhateverPathsItHas) {
+TEST_F(SceneValidationTest, ReadsBlobOnceForAllPaths) {
   const CountingBlobs counting(scratch_.path() / "blobs", BlobStoreOptions{0});
   const ProjectStore store(store_, "");
   SceneRecord scene;
@@ -201,7 +201,7 @@ TEST_F(SceneValidationTest, ABlobIsReadOnceWhateverPathsItHas) {
   EXPECT_EQ(CheckScene(scene, counting, store, {}, [] { return false; }).photo_count, 50);
 }
 
-TEST_F(SceneValidationTest, WhoIsGoneIsCheckedNoFurther) {
+TEST_F(SceneValidationTest, StopsWhenCancelled) {
   const CountingBlobs counting(scratch_.path() / "blobs", BlobStoreOptions{0});
   const ProjectStore store(store_, "");
   SceneRecord scene;
@@ -219,8 +219,8 @@ TEST_F(SceneValidationTest, WhoIsGoneIsCheckedNoFurther) {
   EXPECT_EQ(counting.fetched, 3);
 }
 
-// A project that commits much, over a disk that does not answer, leaves threads to the others.
-TEST_F(SceneValidationTest, CommitsOfOneProjectLeaveRoomForThoseOfAnother) {
+// A project with many commits over a blocked disk leaves threads to other projects.
+TEST_F(SceneValidationTest, CommitsOfProjectsAreFair) {
   class HangingBlobs : public FileBlobStore {
    public:
     using FileBlobStore::FileBlobStore;
@@ -273,7 +273,7 @@ TEST_F(SceneValidationTest, CommitsOfOneProjectLeaveRoomForThoseOfAnother) {
   for (std::thread& commit : commits) commit.join();
 }
 
-TEST_F(SceneValidationTest, PathsHaveALimitInSum) {
+TEST_F(SceneValidationTest, LimitsSumOfPaths) {
   v1::CreateSceneRequest request;
   for (int i = 0; i < 3000; ++i) {
     v1::SceneFile* file = request.add_files();
@@ -289,7 +289,7 @@ TEST_F(SceneValidationTest, PathsHaveALimitInSum) {
   }
 }
 
-TEST_F(SceneValidationTest, TimesHaveALimit) {
+TEST_F(SceneValidationTest, LimitsSizeOfTimes) {
   const ProjectStore store(store_, "");
   const FileDigest blob = blobs_.PutBytes(std::string((16 << 20) + 1, '#'));
   store.HoldBlob(blob);
@@ -304,7 +304,7 @@ TEST_F(SceneValidationTest, TimesHaveALimit) {
   }
 }
 
-TEST_F(SceneValidationTest, MasksAreNoPhotos) {
+TEST_F(SceneValidationTest, MasksAreNotPhotos) {
   v1::Scene scene;
   std::vector<std::pair<std::string, std::string>> files = {
       {"images/a.png", TinyPng()}, {"images/b.png", TinyPng()}, {"masks/a.png", TinyPng()}};
@@ -317,7 +317,7 @@ TEST_F(SceneValidationTest, MasksAreNoPhotos) {
   EXPECT_THAT(Commit(files, &scene).error_message(), HasSubstr("masks/a.txt"));
 }
 
-TEST_F(SceneValidationTest, ScenesThatMoveAreRecognised) {
+TEST_F(SceneValidationTest, DetectsDynamicScenes) {
   v1::Scene scene;
   const std::string films = R"({"frames": [{"file_path": "a.mp4"}, {"file_path": "b.mp4"}]})";
   ASSERT_TRUE(Commit({{"a.mp4", "1"}, {"b.mp4", "2"}, {"transforms.json", films}}, &scene).ok());
@@ -341,7 +341,7 @@ TEST_F(SceneValidationTest, ScenesThatMoveAreRecognised) {
   EXPECT_EQ(scene.photo_count(), 2);
 }
 
-TEST_F(SceneValidationTest, AFilmIsOneVideoOrPicturesInFrames) {
+TEST_F(SceneValidationTest, FilmIsVideoOrFolderOfFrames) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"walk.MP4", "any bytes: the import reads them"}}, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_FILM);
@@ -351,19 +351,19 @@ TEST_F(SceneValidationTest, AFilmIsOneVideoOrPicturesInFrames) {
   EXPECT_EQ(scene.photo_count(), 2);
   EXPECT_THAT(Commit({{"a.mp4", "1"}, {"frames/b.png", TinyPng()}}, &scene).error_message(),
               HasSubstr("pictures in frames/ and video files"));
-  // Beside photos it says nothing.
+  // A film beside photos is ignored.
   ASSERT_TRUE(Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"c.mp4", "1"}}, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);
 }
 
-TEST_F(SceneValidationTest, OneSplatIsASceneWithoutPhotos) {
+TEST_F(SceneValidationTest, AcceptsOneSplatWithoutPhotos) {
   v1::Scene scene;
   ASSERT_TRUE(Commit({{"bust.PLY", "ply"}}, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_SPLAT);
   EXPECT_EQ(scene.photo_count(), 0);
   EXPECT_THAT(Commit({{"a.ply", "ply"}, {"b.sog", "PK"}}, &scene).error_message(),
               HasSubstr("2 splats"));
-  // Beside photos it says nothing.
+  // A splat beside photos is ignored.
   ASSERT_TRUE(
       Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"points.ply", "ply"}}, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);

@@ -41,7 +41,7 @@ class Outliner : public nlohmann::json_sax<json> {
 
  private:
   bool Value() {
-    if (depth_ == 1 && at_frames_) outline_.frames = 0;  // as readers do: the last one counts
+    if (depth_ == 1 && at_frames_) outline_.frames = 0;  // like readers: the last one counts
     if (depth_ == 2 && in_frames_) ++outline_.frames;
     return true;
   }

@@ -1,4 +1,4 @@
-// What the server wants to know of a transforms.json before a worker reads it. A pure function.
+// Outline of a transforms.json, checked by the server before a worker reads it. Pure function.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +8,13 @@
 namespace color3d {
 
 struct TransformsOutline {
-  bool is_object = false;  // well-formed JSON, and an object
-  int64_t frames = 0;      // entries of the list "frames"
-  std::string error;       // where it is not well-formed: "parse error at line 3, column 7: ..."
+  bool is_object = false;  // well-formed JSON with an object at its root
+  int64_t frames = 0;      // number of entries of the list "frames"
+  std::string error;       // if not well-formed: "parse error at line 3, column 7: ..."
 };
 
-// What other programs write beyond JSON (base/json_text.h) is well-formed. Reads along without
-// building a tree: memory does not grow with the file, but for its longest string and its depth.
+// Accepts common extensions of JSON (base/json_text.h). Parses without building a tree: memory is
+// bounded by the longest string and the depth, not by the size of the file.
 TransformsOutline OutlineOfTransforms(std::string_view json);
 
 }  // namespace color3d

@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST(TransformsOutline, CountsFrames) {
+TEST(TransformsOutlineTest, CountsFrames) {
   EXPECT_EQ(
       OutlineOfTransforms(R"({"w": 1, "frames": [{"a": [1]}, {"frames": [1, 2]}, 3]})").frames, 3);
   EXPECT_EQ(OutlineOfTransforms(R"({"a": {"frames": [1, 2]}})").frames, 0);
@@ -19,28 +19,28 @@ TEST(TransformsOutline, CountsFrames) {
   EXPECT_TRUE(OutlineOfTransforms("{}").is_object);
 }
 
-TEST(TransformsOutline, WhatIsNoObjectIsSaid) {
+TEST(TransformsOutlineTest, ReportsWhenRootIsNotObject) {
   for (const char* text : {"", "[1, 2]", "7", "{", R"({"frames": [1, 2)", "{]", "\xff\xfe"}) {
     EXPECT_FALSE(OutlineOfTransforms(text).is_object) << text;
     EXPECT_EQ(OutlineOfTransforms(text).frames, 0) << text;
   }
 }
 
-TEST(TransformsOutline, WhatIsNotWellFormedIsNamedByLine) {
+TEST(TransformsOutlineTest, NamesLineOfSyntaxError) {
   EXPECT_NE(OutlineOfTransforms("{\n\"frames\": [1 2]}").error.find("line 2"), std::string::npos);
   EXPECT_EQ(OutlineOfTransforms("[1]").error, "");
 }
 
-TEST(TransformsOutline, WhatOtherProgramsWriteIsRead) {
+TEST(TransformsOutlineTest, AcceptsExtensionsOfJson) {
   const TransformsOutline outline =
       OutlineOfTransforms("\xef\xbb\xbf{\"frames\": [{\"a\": NaN,}, {\"a\": -Infinity},],}");
   EXPECT_TRUE(outline.is_object);
   EXPECT_EQ(outline.frames, 2);
 }
 
-TEST(TransformsOutline, MemoryDoesNotGrowWithTheFile) {
+TEST(TransformsOutlineTest, MemoryIsBounded) {
 #ifdef __SANITIZE_THREAD__
-  GTEST_SKIP() << "most of the memory is ThreadSanitizer's";
+  GTEST_SKIP() << "ThreadSanitizer dominates the memory";
 #endif
   std::string text = "{\"frames\": [";
   for (int i = 0; i < 3'000'000; ++i) text += "[1,2],";
