@@ -4,86 +4,71 @@
 #include "core/catalogue/artifacts.h"
 
 namespace color3d {
+namespace {
+
+std::vector<Stage> WithArtifacts(std::vector<Stage> stages) {
+  for (Stage& stage : stages) {
+    for (const Artifact& artifact : ArtifactCatalogue()) {
+      if (artifact.stage == nullptr || std::string_view(artifact.stage) != stage.kind) continue;
+      stage.leaves.push_back(artifact.name);
+      if (artifact.is_result) stage.results.push_back(artifact.name);
+    }
+  }
+  return stages;
+}
+
+}  // namespace
 
 const std::vector<Stage>& StageCatalogue() {
   using namespace artifact;
-  static const std::vector<Stage> catalogue = {
-      {.kind = kind::kImportScene,
-       .leaves = {kScene, kImportFacts, kSfmLog, kGivenViews, kMovingRegions, kGivenGeometry},
-       .results = {kSfmLog}},
+  static const std::vector<Stage> catalogue = WithArtifacts({
+      {.kind = kind::kImportScene},
       {.kind = kind::kSelectKeyView,
        .needs = {kScene},
-       .reads = {kImportFacts, kGeometry},  // geometry of an earlier job, if it is given one
-       .leaves = {kKeyView, kKeyViewGray, kKeyViewRanking},
-       .results = {kKeyView, kKeyViewGray, kKeyViewRanking},
+       .reads = {kImportFacts, kGeometry},  // the latter of an earlier job
        .brings_prerequisites = true},
-      {.kind = kind::kColorizeKeyView,
-       .needs = {kScene, kKeyView},
-       .leaves = {kKeyColor, kKeyColorFacts, kKeyColorRegions, kKeyViewColored},
-       .results = {kKeyColorFacts, kKeyColorRegions, kKeyViewColored},
-       .brings_prerequisites = true},
+      {.kind = kind::kColorizeKeyView, .needs = {kScene, kKeyView}, .brings_prerequisites = true},
       {.kind = kind::kReconstructGeometry,
        .needs = {kScene},
        .reads = {kGivenGeometry, kMovingRegions},  // the former in place of training
-       .leaves = {kGeometry, kMemoryPlan},
        .brings_prerequisites = true,
        .resumes = true,
        .keeps_time_limit = true},
       {.kind = kind::kCarryColor,
        .needs = {kScene, kKeyView, kKeyColor, kGeometry},
-       .leaves = {kCarried, kCarryFacts},
        .resumes = true},
       {.kind = kind::kGenerateAugmentations,
        .needs = {kScene, kKeyView, kKeyColor},
-       .reads = {kGeometry, kCarryFacts},
-       .leaves = {kAugmentationFacts, kAugmentations, kAugmentationSheet},
-       .results = {kAugmentationSheet}},
+       .reads = {kGeometry, kCarryFacts}},
       {.kind = kind::kPersonalize,
        .needs = {kScene, kKeyView, kKeyColor},
        .reads = {kAugmentationFacts, kAugmentations, kCarried, kGeometry},
-       .leaves = {kColorizer},
-       .results = {kColorizer},
        .runs_in_batch = true,
        .resumes = true,
        .keeps_time_limit = true},
       {.kind = kind::kColorizeViews,
        .needs = {kScene, kColorizer},
        .reads = {kCarried, kCarryFacts, kGeometry},
-       .leaves = {kViewsAb, kProvenance},
        .resumes = true},
       {.kind = kind::kCorrectColors,
        .needs = {kScene, kKeyView, kKeyColor, kColorizer, kViewsAb},
-       .reads = {kGeometry, kProvenance},
-       .leaves = {kCorrectedAb, kCorrectedProvenance, kCorrections, kPaint},
-       .results = {kCorrections, kPaint}},
+       .reads = {kGeometry, kProvenance}},
       {.kind = kind::kSolveChroma,
        .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry},
        .reads = {kProvenance, kCorrectedAb, kCorrectedProvenance},
-       .leaves = {kModel},
-       .results = {kModel},
        .resumes = true,
        .keeps_time_limit = true},
-      {.kind = kind::kExport,
-       .needs = {kScene, kModel},
-       .reads = {kKeyView},
-       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments, kViewPage, kExportScores},
-       .results = {kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments, kViewPage}},
+      {.kind = kind::kExport, .needs = {kScene, kModel}, .reads = {kKeyView}},
       {.kind = kind::kRender,
        .needs = {kScene, kModel},
-       // of films and what moves
-       .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb, kImportFacts},
-       .leaves = {kRenders, kMovie, kFilm, kFilms, kFilmFrames, kFrames},
-       .results = {kRenders, kMovie, kFilm, kFilms, kFilmFrames}},
+       // the reads: for films and dynamic scenes
+       .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb, kImportFacts}},
       {.kind = kind::kEvaluate,
        .needs = {kScene, kViewsAb, kModel},
-       .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance},
-       .leaves = {kScores, kTruths, kColored2d}},
-      // Its report reads what all the others have left.
-      {.kind = kind::kColorizeScene,
-       .leaves = {kReport, kMetrics, kAllCurves, kPlan},
-       .results = {kReport, kMetrics, kAllCurves, kPlan}},
+       .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance}},
+      {.kind = kind::kColorizeScene},  // its report reads the artifacts of all others
       {.kind = kind::kPersonalizeScenes},
-  };
+  });
   return catalogue;
 }
 
@@ -103,13 +88,8 @@ const Stage& StageOf(std::string_view kind) {
 }
 
 const Stage* StageThatLeaves(std::string_view artifact) {
-  for (const Stage& stage : StageCatalogue()) {
-    for (const std::string_view made : stage.leaves) {
-      const bool below = made.ends_with('/') && artifact.starts_with(made);
-      if (artifact == made || below) return &stage;
-    }
-  }
-  return nullptr;
+  const Artifact* found = FindArtifact(artifact);
+  return found != nullptr && found->stage != nullptr ? FindStage(found->stage) : nullptr;
 }
 
 }  // namespace color3d

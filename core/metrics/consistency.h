@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "core/base/image.h"
@@ -82,6 +84,12 @@ struct Consistency {
   double tc_short = 0.0;  // mean over the pairs of squared_rgb
   double tc_long = 0.0;
   double tc = 0.0;  // mean of both; the one that there is when the other has no match
+
+  // The metrics by their keys (core/catalogue/metrics.h).
+  std::map<std::string, double> Figures() const {
+    return {
+        {"me", me}, {"me_de00", me_de00}, {"tc", tc}, {"tc_short", tc_short}, {"tc_long", tc_long}};
+  }
 };
 
 // Sums up pairs. A plain value.

@@ -209,6 +209,15 @@ void ChromaAlongMotion::Add(const ChromaAlongMotion& other) {
   chroma += other.chroma;
 }
 
+std::map<std::string, double> TemporalConsistency::Figures() const {
+  std::map<std::string, double> figures = {
+      {"followed", followed}, {"tc_chroma", tc_chroma}, {"chroma", chroma}, {"cdc", cdc}};
+  for (size_t d = 0; d < kCdcDistances.size(); ++d) {
+    figures["cdc_" + std::to_string(kCdcDistances[d])] = cdc_at[d];
+  }
+  return figures;
+}
+
 std::vector<TemporalConsistency> MeasureTemporalConsistency(const TemporalSource& source,
                                                             ThreadPool& pool,
                                                             const CancellationToken& cancel) {

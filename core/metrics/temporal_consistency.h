@@ -5,6 +5,8 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "core/base/cancellation.h"
@@ -49,6 +51,9 @@ struct TemporalConsistency {
   double chroma = 0.0;                // mean |ab| of these: where it is small, so is tc_chroma
   double cdc = 0.0;                   // mean of cdc_at, of the distances that there are
   std::array<double, 3> cdc_at = {};  // by kCdcDistances, nats
+
+  // The metrics by their keys (core/catalogue/metrics.h): "cdc_1" is at a distance of 1 frame.
+  std::map<std::string, double> Figures() const;
 };
 
 // Frames are numbered as the source likes; all pictures of a frame have one size.

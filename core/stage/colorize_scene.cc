@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "core/catalogue/metrics.h"
 #include "core/catalogue/stages.h"
 #include "core/image/codec.h"
 #include "core/report/curves.h"
@@ -13,6 +14,7 @@
 #include "core/report/scene_plan.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_view_ranking.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
 #include "core/stage/report/repeat_section.h"
@@ -32,18 +34,26 @@ ReportPicture Picture(const StageContext& context, const std::string& name, std:
   return {std::move(caption), EncodeJpeg(FitWithin(image, kReportSidePx), 88)};
 }
 
-// The means by how views are held out, where that is more than one way.
+std::vector<std::string> KeysInOrder(const ordered_json& object) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.push_back(key);
+  return InMetricOrder(std::move(keys));
+}
+
+// The means for each way in which views are held out, if there are several.
 void AddByHeldOut(const ordered_json& scores, ordered_json* metrics) {
   if (!scores.contains("held_out") || scores.at("held_out").size() < 2) return;
   for (const auto& [how, means] : scores.at("held_out").items()) {
-    for (const char* name :
-         {"views", "psnr_rgb", "psnr_l", "delta_e00_chroma", "delta_e00_chroma_2d"}) {
-      if (means.contains(name)) (*metrics)[fmt::format("{}_{}", name, how)] = means.at(name);
+    (*metrics)[fmt::format("views_{}", how)] = means.at("views");
+    for (const std::string& key : KeysInOrder(means)) {
+      const Metric* metric = FindMetric(key).metric;
+      if (key == "views" || (metric != nullptr && !metric->by_held_out)) continue;
+      (*metrics)[fmt::format("{}_{}", key, how)] = means.at(key);
     }
   }
 }
 
-// Keys in the order in which people read them.
+// metrics.json, in the order in which it is read.
 ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                             const std::vector<std::string>& keys,
                             const std::optional<NextKeyViewFacts>& next,
@@ -54,22 +64,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
   if (context.HasInput(artifact::kScores)) {
     const auto scores = ReadJson(context, artifact::kScores);
     const auto& mean = scores.at("mean");
-    for (const char* name : {"psnr_rgb",
-                             "ssim_rgb",
-                             "psnr_l",
-                             "ab_rmse",
-                             "delta_e00",
-                             "delta_e00_chroma",
-                             "delta_e00_chroma_2d",
-                             "delta_e00_chroma_bound",
-                             "delta_e00_gray",
-                             "colorfulness",
-                             "colorfulness_truth",
-                             "colorfulness_ratio",
-                             "colorfulness_ratio_2d",
-                             "colorfulness_ratio_bound"}) {
-      if (mean.contains(name)) metrics[name] = mean.at(name);
-    }
+    for (const std::string& key : KeysInOrder(mean)) metrics[key] = mean.at(key);
     AddByHeldOut(scores, &metrics);
   }
   metrics["key_views"] = keys;
@@ -132,11 +127,13 @@ std::optional<SceneMotion> MotionOf(const Scene& scene,
   return motion;
 }
 
+// Negative if no stage of the kind has run.
 double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kind) {
+  double seconds = -1.0;
   for (const StageSummary& s : stages) {
-    if (s.kind == kind && s.state == "SUCCEEDED") return s.seconds;
+    if (s.kind == kind && s.state == "SUCCEEDED") seconds = std::max(seconds, 0.0) + s.seconds;
   }
-  return -1.0;
+  return seconds;
 }
 
 std::string OfMotion(const FilmFindings& film, const Scene& scene) {
@@ -179,12 +176,20 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   plan_facts.has_distortion = facts.undistorted;
   plan_facts.has_sparse_points = !facts.random_points;
   plan_facts.has_truth = has_truth;
-  plan_facts.key_view_given = context.HasInput(artifact::kKeyView) &&
-                              ReadJson(context, artifact::kKeyView).at("strategy") == "manual";
+  plan_facts.has_augmentations = context.HasInput(artifact::kAugmentationFacts);
+  plan_facts.has_corrections = context.HasInput(artifact::kCorrections);
+  if (context.HasInput(artifact::kKeyView)) {
+    const std::string strategy = ReadJson(context, artifact::kKeyView).at("strategy");
+    plan_facts.key_view_given = strategy == "manual";
+    plan_facts.key_view_strategy = StrategyInWords(strategy);
+  }
   plan_facts.views = static_cast<int>(scene.views.size());
   const Camera camera = scene.views.at(0).camera.FitWithin(kReportSidePx);
   plan_facts.megapixels_per_view = 1e-6 * camera.width * camera.height;
   std::vector<PlanStep> plan = PlanScene(plan_facts);
+  for (const StageSummary& s : stages) {
+    if (s.state == "SKIPPED") SkipStep(s.kind, s.skip_reason, &plan);
+  }
   for (PlanStep& step : plan) {
     if (step.needed && !step.stage.empty()) step.measured_seconds = SecondsOf(stages, step.stage);
   }
@@ -211,11 +216,6 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
                       .reason = left_out.at("reason")});
     }
   }
-  for (const StageSummary& s : stages) {
-    if (s.state == "SKIPPED") {
-      plan.push_back({.step = s.kind, .needed = false, .reason = s.skip_reason});
-    }
-  }
   return plan;
 }
 
@@ -230,7 +230,7 @@ std::string Summary(const Scene& scene,
   return fmt::format("{} {}{} ({} held out){}. {} in {} s of computing.",
                      scene.views.size(),
                      is_film ? "frames" : "views",
-                     time.is_dynamic ? fmt::format(" of {} moments", time.time_steps) : "",
+                     time.is_dynamic ? fmt::format(" of {} times", time.time_steps) : "",
                      scene.HeldOutViews().size(),
                      keys.empty() ? std::string()
                                   : fmt::format(", all colours from the key {} {}",
@@ -240,25 +240,18 @@ std::string Summary(const Scene& scene,
                      static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
 }
 
-// The few figures that people ask for first.
+// The most important metrics, in words.
 std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& metrics) {
   std::vector<std::pair<std::string, std::string>> headline;
-  const auto add = [&](const char* name, const char* label, const char* form, double scale) {
-    if (!metrics.contains(name) || !metrics.at(name).is_number()) return;
-    headline.emplace_back(label,
-                          fmt::format(fmt::runtime(form), scale * metrics.at(name).get<double>()));
-  };
-  add("delta_e00_chroma", "colour error, CIEDE2000", "{:.2f}", 1.0);
-  add("delta_e00_gray", "... if left grey", "{:.2f}", 1.0);
-  add("psnr_rgb", "PSNR of held-out views", "{:.1f} dB", 1.0);
-  add("share_seen", "seen in a key view", "{:.0f} %", 100.0);
-  add("share_guessed", "guessed", "{:.0f} %", 100.0);
-  add("gaussians", "Gaussians", "{:.0f}", 1.0);
-  add("seconds_total", "computing", "{:.0f} s", 1.0);
+  for (const Metric& metric : MetricCatalogue()) {
+    const auto found = metrics.find(metric.key);
+    if (!metric.in_headline || found == metrics.end() || !found->is_number()) continue;
+    headline.emplace_back(metric.label, MetricText(metric.key, found->get<double>()));
+  }
   return headline;
 }
 
-// What there is of the key view's pictures.
+// The pictures of the key view that there are.
 ReportRow KeyPictures(const std::string& name, const StageContext& context) {
   ReportRow row{name, {}};
   if (context.HasInput(artifact::kKeyViewGray)) {

@@ -232,13 +232,9 @@ class HeldOutScores {
 };
 
 ordered_json JsonOf(const Consistency& c) {
-  return {{"pairs", c.pairs},
-          {"matches", c.matches},
-          {"me", c.me},
-          {"me_de00", c.me_de00},
-          {"tc_short", c.tc_short},
-          {"tc_long", c.tc_long},
-          {"tc", c.tc}};
+  ordered_json json{{"pairs", c.pairs}, {"matches", c.matches}};
+  for (const auto& [name, value] : c.Figures()) json[name] = value;
+  return json;
 }
 
 ordered_json JsonOf(const SceneConsistency& scores) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/catalogue/metrics.h"
 #include "core/stage/run_stages.h"
 #include "tests/support/stages/evaluated_scene.h"
 
@@ -47,6 +48,12 @@ TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
   EXPECT_LT(scores.at("consistency").at("truth").at("me_de00"),
             scores.at("consistency").at("colored_views").at("me_de00"));
   EXPECT_FALSE(scores.contains("sources"));
+  for (const json& metrics : {mean, scores.at("consistency").at("rendered")}) {
+    for (const auto& [key, value] : metrics.items()) {
+      EXPECT_NE(FindMetric(key).metric, nullptr)
+          << key << " has no row in core/catalogue/metrics.cc";
+    }
+  }
   options.training_truth.clear();
   EXPECT_THROW(Evaluated(options), Error);
 }

@@ -26,7 +26,7 @@ class ConfidenceTest : public EvaluatedSceneTest {
   std::string ExportedPly() {
     inputs_[artifact::kModel] = scratch_.path() / "out/model.c3g";
     StageContext context = MakeContext();
-    RunExport({.ply = true, .sog = false, .confidence = true}, context);
+    RunExport({.formats = {ExportFormat::kPly}, .confidence = true}, context);
     return ReadFile(scratch_.path() / "out/scene.ply");
   }
 };
@@ -68,7 +68,7 @@ TEST_F(ConfidenceTest, JobsWithoutProvenanceHaveNone) {
   EXPECT_THAT(ExportedPly(), testing::Not(testing::HasSubstr("confidence")));
   EXPECT_THAT(observer_.text, testing::HasSubstr("has no confidence"));
   StageContext context = MakeContext();
-  EXPECT_THROW(RunExport({.ply = false, .splat = true, .confidence = true}, context), Error);
+  EXPECT_THROW(RunExport({.formats = {ExportFormat::kSplat}, .confidence = true}, context), Error);
 }
 
 }  // namespace

@@ -1,9 +1,11 @@
 #include "server/planning/planner.h"
 
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "core/catalogue/stages.h"
+#include "server/planning/asked_formats.h"
 #include "server/planning/colorize_scene_graph.h"
 #include "server/planning/graph_builder.h"
 #include "server/planning/job_spec.h"
@@ -34,14 +36,11 @@ void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
     spec.mutable_generate_augmentations()->set_samples(SamplesOf(spec.generate_augmentations()));
   }
   TakeEncoderOfColorizer(*builder, &spec);
-  const v1::ExportSpec& files = spec.export_();
-  const bool nothing_to_do = spec.has_export_() && files.has_ply() && !files.ply() &&
-                             !files.sog() && !files.spz() && !files.glb() && !files.splat();
-  builder->Add(
-      std::move(spec),
-      nothing_to_do
-          ? "export.ply is false and no other file is asked for: there is nothing to export"
-          : "");
+  std::string skip_reason;
+  if (spec.has_export_() && AskedFormats(spec.export_()).empty()) {
+    skip_reason = "there is nothing to export; ask for " + ExportFormatNames();
+  }
+  builder->Add(std::move(spec), skip_reason);
 }
 
 // What was submitted over its preset. A given import has settled what a new one would be asked for:

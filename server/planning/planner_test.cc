@@ -1,9 +1,11 @@
 #include "server/planning/planner.h"
 
 #include <gmock/gmock.h>
+#include <google/protobuf/text_format.h>
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string>
 
 #include "core/catalogue/stages.h"
 #include "server/planning/job_spec.h"
@@ -303,7 +305,7 @@ TEST(Planner, BadOptionsNameFieldValueAndRange) {
               HasSubstr("view is required"));
 }
 
-TEST(Planner, ExportOfNothingIsSkipped) {
+TEST(Planner, SkipsAnExportOfNothingOnly) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_export_()->set_ply(false);
@@ -318,9 +320,11 @@ TEST(Planner, ExportOfNothingIsSkipped) {
               HasSubstr("ply"));
   spec.mutable_export_()->set_splat(true);
   EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
-  spec.mutable_export_()->clear_splat();
-  spec.mutable_export_()->set_sog(true);
-  EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
+  for (const char* option : {"sog: true", "splat4d: true", "moments: 3"}) {
+    ASSERT_TRUE(google::protobuf::TextFormat::ParseFromString(std::string("ply: false ") + option,
+                                                              spec.mutable_export_()));
+    EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "") << option;
+  }
 }
 
 JobRecord Done(const std::string& kind) {

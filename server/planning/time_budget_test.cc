@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/catalogue/stages.h"
+#include "proto/option_text.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/spec_check.h"
 #include "tests/support/service/planned_graphs.h"
@@ -29,11 +30,29 @@ TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
 TEST(Planner, ASplatsGeometryTakesNoTime) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
-  const SceneFacts splat = {.photos = kSplatViews, .has_poses = true, .is_splat = true};
+  const SceneFacts splat = {.has_poses = true, .is_splat = true};
   const NewGraph graph = PlanJob(spec, {}, splat);
   const double personalize = SpecOf(graph, "personalize").personalize().time_limit_seconds();
   const double chroma = SpecOf(graph, "solve_chroma").solve_chroma().time_limit_seconds();
   EXPECT_NEAR(personalize + chroma + FixedSeconds(splat), 90.0, 1e-6);
+}
+
+TEST(Planner, BudgetsAllViewsOfASplat) {
+  const SceneFacts splat = {.has_poses = true, .is_splat = true};
+  const SceneFacts photos = {.photos = 200, .has_poses = true};
+  v1::ImportSceneSpec import;
+  EXPECT_EQ(FixedSeconds(splat, import), FixedSeconds({.photos = 24, .has_poses = true}));
+  import.set_splat_views(200);
+  EXPECT_EQ(FixedSeconds(splat, import), FixedSeconds(photos));
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  *spec.mutable_colorize_scene()->mutable_import_scene() = import;
+  EXPECT_THROW(PlanJob(spec, {}, splat), Error) << "200 views take more than 90 s";
+}
+
+TEST(Planner, DefaultNumberOfSplatViewsIsThatOfTheApi) {
+  const auto* field = v1::ImportSceneSpec::descriptor()->FindFieldByName("splat_views");
+  EXPECT_EQ(InfoOf(field).default_value(), std::to_string(kSplatViews));
 }
 
 double PersonalizeSeconds(const v1::JobSpec& spec, const SceneFacts& facts) {

@@ -73,7 +73,7 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
 SceneFacts FactsOf(const SceneRecord& scene) {
   const bool is_splat = scene.layout == StoredLayout::kSplat;
   const bool is_film = scene.layout == StoredLayout::kFilm;
-  return {.photos = is_splat ? kSplatViews : scene.photo_count,
+  return {.photos = scene.photo_count,
           .has_poses = scene.layout != StoredLayout::kPhotos && !is_film &&
                        scene.layout != StoredLayout::kFilms,
           .augment_files = static_cast<int>(
