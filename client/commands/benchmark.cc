@@ -112,21 +112,23 @@ const BenchmarkView* FindView(const std::vector<BenchmarkView>& views, const std
 }
 
 // What carry_color would say, but not before the geometry has been made.
-void CheckMoreKeys(const ColorizeOptions& options, const Selection& selection) {
-  for (const std::string& text : options.more_keys) {
-    const MoreKey key = ParseMoreKey(text);
+void CheckAdditionalKeyViews(const ColorizeOptions& options, const Selection& selection) {
+  for (const std::string& text : options.additional_key_views) {
+    const AdditionalKeyView key = ParseAdditionalKeyView(text);
     const std::string& wanted = key.view;
     const BenchmarkView* view = FindView(selection.views, wanted);
     if (view == nullptr) continue;
     if (view->held_out) {
       throw InvalidArgument(
-          "--more-key {}: the view {} is held out for evaluation and cannot be a key view",
+          "--add-key-view {}: the view {} is held out for evaluation and cannot be a key view",
           wanted,
           view->name);
     }
     if (!key.HasRange() && selection.IsKey(view->name)) {
       throw InvalidArgument(
-          "--more-key {}: the view {} is the key view already; name each once", wanted, view->name);
+          "--add-key-view {}: the view {} is the key view already; name each once",
+          wanted,
+          view->name);
     }
   }
 }
@@ -141,7 +143,7 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
   std::map<std::string, const LocalFile*> originals;
   for (const LocalFile& photo : folder.photos) originals[photo.path] = &photo;
   std::vector<UploadFile> uploads;
-  std::map<std::string, v1::Digest> of_further_key;
+  std::map<std::string, v1::Digest> color_of_key;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);
     const bool is_key = selection.IsKey(view.name) && !options.color.Given();
@@ -163,7 +165,7 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
     if (is_key && view.name == selection.key_views[0]) {
       *colorize->mutable_key_color()->mutable_image() = digest;
     } else if (is_key) {
-      of_further_key[view.name] = digest;
+      color_of_key[view.name] = digest;
     }
     if (!view.held_out && !is_bound) continue;
     v1::TruthImage* truth = view.held_out ? colorize->add_truth() : colorize->add_training_truth();
@@ -171,9 +173,9 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
     *truth->mutable_image() = digest;
   }
   for (size_t i = 1; i < selection.key_views.size(); ++i) {
-    v1::FurtherKeyView* further = colorize->mutable_carry_color()->add_further_key_views();
-    further->set_view(selection.key_views[i]);
-    *further->mutable_color()->mutable_image() = of_further_key.at(selection.key_views[i]);
+    v1::FurtherKeyView* added = colorize->mutable_carry_color()->add_further_key_views();
+    added->set_view(selection.key_views[i]);
+    *added->mutable_color()->mutable_image() = color_of_key.at(selection.key_views[i]);
   }
   return uploads;
 }
@@ -213,14 +215,14 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
       [&](int64_t done, int64_t total) { display.OnTransfer("uploading", done, total); });
   const Selection selection = SelectKeyView(connection, context, options, scene.name(), display);
 
-  CheckMoreKeys(options, selection);
+  CheckAdditionalKeyViews(options, selection);
   v1::JobSpec spec = ColorizeSpec(options, scene.name());
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
   colorize->set_key_view(selection.key_views[0]);
   if (options.color.Given()) {
     *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
   }
-  AddMoreKeys(connection, options, colorize);
+  AddKeyViews(connection, options, colorize);
   const auto uploads = AddTrueColors(options, folder, copies, selection, colorize);
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);

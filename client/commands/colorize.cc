@@ -47,18 +47,18 @@ class Colorize {
           options_.photos);
     }
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
-    for (const std::string& text : options_.more_keys) {
-      const MoreKey key = ParseMoreKey(text);
+    for (const std::string& text : options_.additional_key_views) {
+      const AdditionalKeyView key = ParseAdditionalKeyView(text);
       RequirePhoto(folder_, key.view);
       if (key.HasRange() && ((!options_.film && !folder_.film) || options_.poses)) {
         throw InvalidArgument(
-            "--more-key {}: a range of time is for films without poses; leave {} out",
+            "--add-key-view {}: a range of time is for films without poses; leave {} out",
             key.view,
             options_.poses ? "it or --poses" : "it");
       }
       if (!key.HasRange() && fs::path(key.view).replace_extension() ==
                                  fs::path(options_.key_view).replace_extension()) {
-        throw InvalidArgument("--more-key {}: it is the key view already", key.view);
+        throw InvalidArgument("--add-key-view {}: it is the key view already", key.view);
       }
     }
     RequireOutBesidePhotos(out_, folder_);
@@ -137,7 +137,7 @@ class Colorize {
     }
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     spec.mutable_colorize_scene()->clear_select_key_view();
-    AddMoreKeys(*connection_, options_, spec.mutable_colorize_scene());
+    AddKeyViews(*connection_, options_, spec.mutable_colorize_scene());
     for (const std::string& input : WithItsInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }
@@ -174,7 +174,7 @@ class Colorize {
     v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
     colorize->set_key_view(KeyView());
     *colorize->mutable_key_color() = UploadKeyColor(*connection_, options_.color);
-    AddMoreKeys(*connection_, options_, colorize);
+    AddKeyViews(*connection_, options_, colorize);
     display_.Say("key view " + (colorize->key_view().empty() ? std::string("will be selected")
                                                              : colorize->key_view()));
     return spec;

@@ -18,6 +18,7 @@
 #include "client/options/key_color_flags.h"
 #include "core/base/error.h"
 #include "core/catalogue/artifacts.h"
+#include "core/catalogue/limits.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {
@@ -155,7 +156,7 @@ ExitCode Key::Select() {
     std::vector<std::string> command = {"colorize", "--scene", scene, "-o", "OUT"};
     command.insert(command.end(), {"--key-view", choice.view, "--key-color", "COLOURED.png"});
     for (size_t i = 1; i < choice.views.size(); ++i) {
-      command.insert(command.end(), {"--more-key", choice.views[i] + "=COLOURED.png"});
+      command.insert(command.end(), {"--add-key-view", choice.views[i] + "=COLOURED.png"});
     }
     PrintText(fmt::format("key views  {}\n           {}\nColour each, and give them together\n{}",
                           fmt::join(choice.views, ", "),
@@ -325,7 +326,7 @@ void AddKeyCommands(CLI::App& app, Context& context) {
           options->count,
           "So many photos, chosen together for the least error that is expected; of a film "
           "one a shot, the longest first")
-      ->check(CLI::Range(1, 17));
+      ->check(CLI::Range(1, kMaxAdditionalKeyViews + 1));
   select->add_option(
       "--encoder", options->encoder, "Weights that this server knows, to compare by");
   select->add_option("--features", options->features, "CLIP weights that this server knows");

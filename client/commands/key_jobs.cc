@@ -25,7 +25,10 @@ void FindNewest(Connection& connection, KeyState* state) {
     for (const v1::Job& job : jobs.jobs()) {
       if (job.state() != v1::Job::STATE_SUCCEEDED || !job.parent().empty()) continue;
       if (job.kind() == kind::kSelectKeyView && !state->selected) state->selected = job;
-      if (job.kind() == kind::kColorizeKeyView && !state->colored) state->colored = job;
+      if (job.kind() == kind::kColorizeKeyView && !state->colored &&
+          job.spec().colorize_key_view().view().empty()) {
+        state->colored = job;
+      }
     }
     if (jobs.next_page_token().empty()) return;
     request.set_page_token(jobs.next_page_token());

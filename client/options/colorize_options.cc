@@ -11,6 +11,7 @@
 #include "client/options/option_fields.h"
 #include "client/options/preset_file.h"
 #include "core/base/error.h"
+#include "core/catalogue/limits.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {
@@ -99,8 +100,6 @@ std::string ComplaintOfImport(const std::string& setting) {
   return Complaint(setting);
 }
 
-constexpr size_t kMaxMoreKeys = 16;
-
 // What preset, file and settings say, and --poses, before the other flags of this command.
 v1::ColorizeSceneSpec Chosen(const ColorizeOptions& options) {
   v1::ColorizeSceneSpec spec = ReadPreset(options.preset);
@@ -148,17 +147,19 @@ void ColorizeOptions::Check() const {
   if (keys > 1 && !benchmark) {
     throw InvalidArgument(
         "--keys is a part of the score, where photos have true colours; it needs --benchmark. To "
-        "colour several photos, see `color3d key select --count` and --more-key");
+        "colour several photos, see `color3d key select --count` and --add-key-view");
   }
-  if (keys > 1 && (!more_keys.empty() || color.Given())) {
-    throw InvalidArgument("--keys chooses the key views and takes their true colours; leave out {}",
-                          more_keys.empty() ? "the other source of colour" : "--more-key");
-  }
-  if (more_keys.size() > kMaxMoreKeys) {
+  if (keys > 1 && (!additional_key_views.empty() || color.Given())) {
     throw InvalidArgument(
-        "--more-key is given {} times; at most {} are taken", more_keys.size(), kMaxMoreKeys);
+        "--keys chooses the key views and takes their true colours; leave out {}",
+        additional_key_views.empty() ? "the other source of colour" : "--add-key-view");
   }
-  for (const std::string& text : more_keys) ParseMoreKey(text);
+  if (additional_key_views.size() > size_t{kMaxAdditionalKeyViews}) {
+    throw InvalidArgument("--add-key-view is given {} times; at most {} are taken",
+                          additional_key_views.size(),
+                          kMaxAdditionalKeyViews);
+  }
+  for (const std::string& text : additional_key_views) ParseAdditionalKeyView(text);
   // What is drawn for a view that is known beforehand cannot be scored against that view.
   const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
   if (benchmark && for_one_view) {
@@ -171,7 +172,7 @@ void ColorizeOptions::Check() const {
 namespace {
 
 // "10-14.5", "10-" or "-14.5"; false for other text.
-bool ParseRange(std::string_view text, MoreKey* key) {
+bool ParseRange(std::string_view text, AdditionalKeyView* key) {
   const auto seconds = [](std::string_view number, std::optional<double>* to) {
     if (number.empty()) return true;
     double value = 0.0;
@@ -187,41 +188,42 @@ bool ParseRange(std::string_view text, MoreKey* key) {
 
 // Takes the range of time off the end of `value`, where it has one. A file may be called
 // "a@2x.png".
-void TakeRange(std::string* value, MoreKey* key) {
+void TakeRange(std::string* value, AdditionalKeyView* key) {
   const size_t at = value->rfind('@');
   if (at == std::string::npos) return;
   const std::string range = value->substr(at + 1);
   if (range.find_first_not_of("0123456789.-") != std::string::npos) return;
   if (!ParseRange(range, key)) {
     throw InvalidArgument(
-        "--more-key {}: '{}' is no range of time; write seconds of the film, BEGIN-END, e.g. "
+        "--add-key-view {}: '{}' is no range of time; write seconds of the film, BEGIN-END, e.g. "
         "@10-14.5, or @10- for up to its end",
         key->view,
         "@" + range);
   }
   if (key->begin_s && key->end_s && *key->end_s < *key->begin_s) {
-    throw InvalidArgument("--more-key {}: the range of time ends at {} s, before it begins at {} s",
-                          key->view,
-                          *key->end_s,
-                          *key->begin_s);
+    throw InvalidArgument(
+        "--add-key-view {}: the range of time ends at {} s, before it begins at {} s",
+        key->view,
+        *key->end_s,
+        *key->begin_s);
   }
   value->resize(at);
 }
 
 }  // namespace
 
-MoreKey ParseMoreKey(const std::string& text) {
+AdditionalKeyView ParseAdditionalKeyView(const std::string& text) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
     throw InvalidArgument(
-        "--more-key wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
+        "--add-key-view wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
         "VIEW=POINTS.json, VIEW=auto), of a film also VIEW=COLOURED.png@BEGIN-END, in seconds; "
         "'{}' "
         "is not of that form",
         text);
   }
   std::string value = text.substr(equals + 1);
-  MoreKey key{text.substr(0, equals), {}};
+  AdditionalKeyView key{text.substr(0, equals), {}};
   TakeRange(&value, &key);
   if (value == "auto") {
     key.color.automatic = true;
@@ -233,21 +235,21 @@ MoreKey ParseMoreKey(const std::string& text) {
   try {
     key.color.Check();
   } catch (const Error& e) {
-    throw Error(e.code(), "--more-key {}: {}", key.view, e.what());
+    throw Error(e.code(), "--add-key-view {}: {}", key.view, e.what());
   }
   return key;
 }
 
-void AddMoreKeys(Connection& connection,
+void AddKeyViews(Connection& connection,
                  const ColorizeOptions& options,
                  v1::ColorizeSceneSpec* spec) {
-  for (const std::string& text : options.more_keys) {
-    const MoreKey key = ParseMoreKey(text);
-    v1::FurtherKeyView* further = spec->mutable_carry_color()->add_further_key_views();
-    further->set_view(key.view);
-    *further->mutable_color() = UploadKeyColor(connection, key.color);
-    if (key.begin_s) further->set_begin_s(*key.begin_s);
-    if (key.end_s) further->set_end_s(*key.end_s);
+  for (const std::string& text : options.additional_key_views) {
+    const AdditionalKeyView key = ParseAdditionalKeyView(text);
+    v1::FurtherKeyView* added = spec->mutable_carry_color()->add_further_key_views();
+    added->set_view(key.view);
+    *added->mutable_color() = UploadKeyColor(connection, key.color);
+    if (key.begin_s) added->set_begin_s(*key.begin_s);
+    if (key.end_s) added->set_end_s(*key.end_s);
   }
 }
 
@@ -283,12 +285,17 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("-o,--out", o->out, "Folder for the results")->required();
   DeclareKeyColorFlags(app, &o->color);
   app.add_option("--key-view", o->key_view, "Photo that is the key view; default: selected");
-  app.add_option("--more-key",
-                 o->more_keys,
-                 "VIEW=COLOURED.png: a further key view, for what the first one does not show; its "
-                 "colours never replace those of the key views before it. In a film it colours the "
-                 "frames that are nearer to it; VIEW=COLOURED.png@10-14.5: from second 10 to 14.5, "
-                 "before all others, and no frame outside. May be repeated");
+  const auto add_key_views = [o](const std::vector<std::string>& views) {
+    o->additional_key_views.insert(o->additional_key_views.end(), views.begin(), views.end());
+  };
+  app.add_option_function<std::vector<std::string>>(
+      "--add-key-view",
+      add_key_views,
+      "VIEW=COLOURED.png: an additional key view, for the parts that those before it do not show; "
+      "their colours are kept. In a film it colours the frames that are nearest to it; "
+      "VIEW=COLOURED.png@10-14.5 recolours seconds 10 to 14.5 and no other frame. May be repeated");
+  app.add_option_function<std::vector<std::string>>("--more-key", add_key_views)
+      ->group("");  // the former name
   app.add_option("--preset",
                  o->preset,
                  fmt::format("How much time quality is worth: {}; or a file of your own (`color3d "
@@ -306,7 +313,7 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_option("--keys",
                  o->keys,
                  "With --benchmark: so many key views, chosen together, each in its true colours")
-      ->check(CLI::Range(1, static_cast<int>(kMaxMoreKeys) + 1))
+      ->check(CLI::Range(1, kMaxAdditionalKeyViews + 1))
       ->capture_default_str();
   app.add_flag(
       "--bound",

@@ -19,9 +19,9 @@ struct ColorizeOptions {
   std::string scene;   // "scenes/ID", whose accepted key view is used
   std::string out;
   KeyColorFlags color;
-  std::string masks;                   // folder; empty: none
-  std::vector<std::string> more_keys;  // as ParseMoreKey takes them, in order of importance
-  std::string key_view;                // view name or stem; empty: selected
+  std::string masks;                              // folder; empty: none
+  std::vector<std::string> additional_key_views;  // ParseAdditionalKeyView; in order of importance
+  std::string key_view;                           // view name or stem; empty: selected
   std::string encoder;  // weights by name in the server's configuration; empty: the embedded one
   std::string preset = "fast";  // of the server's, or a file of the user's own
   bool film = false;            // the photos are frames of a film
@@ -42,21 +42,21 @@ struct ColorizeOptions {
   void Check() const;
 };
 
-// A further key view: the photo's name and where its colour comes from.
-struct MoreKey {
+// An additional key view: the photo's name and the source of its colour.
+struct AdditionalKeyView {
   std::string view;
   KeyColorFlags color;
-  // Of a film: the range of time that it counts in alone, seconds; either end may be open.
+  // Films only: the range of time that it recolours, seconds; either end may be open.
   std::optional<double> begin_s = {};
   std::optional<double> end_s = {};
   bool HasRange() const { return begin_s || end_s; }
 };
 // "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto", and "@BEGIN-END" behind it or not. Throws
 // Error{kInvalidArgument} for other text, and what checking the file throws.
-MoreKey ParseMoreKey(const std::string& text);
+AdditionalKeyView ParseAdditionalKeyView(const std::string& text);
 
-// Uploads the pictures of the further key views and names them in the spec.
-void AddMoreKeys(Connection& connection,
+// Uploads the pictures of the additional key views and names them in the spec.
+void AddKeyViews(Connection& connection,
                  const ColorizeOptions& options,
                  v1::ColorizeSceneSpec* spec);
 

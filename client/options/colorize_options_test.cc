@@ -1,5 +1,6 @@
 #include "client/options/colorize_options.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +10,7 @@
 #include "client/options/preset_file.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/catalogue/limits.h"
 
 namespace color3d::client {
 namespace {
@@ -185,24 +187,34 @@ TEST_F(ColorizeOptionsTest, APresetIsANameOrAFile) {
               AllOf(HasSubstr("fast, best, paper"), HasSubstr("no such file")));
 }
 
-TEST_F(ColorizeOptionsTest, AFurtherKeyViewMayHaveARangeOfTime) {
-  const MoreKey range = ParseMoreKey("f000012=auto@10-14.5");
+TEST_F(ColorizeOptionsTest, ReadsAdditionalKeyViewsWithRange) {
+  const AdditionalKeyView range = ParseAdditionalKeyView("f000012=auto@10-14.5");
   EXPECT_EQ(range.view, "f000012");
   EXPECT_TRUE(range.color.automatic);
   EXPECT_EQ(range.begin_s, 10.0);
   EXPECT_EQ(range.end_s, 14.5);
-  EXPECT_EQ(ParseMoreKey("a=auto@0.25-").begin_s, 0.25);
-  EXPECT_FALSE(ParseMoreKey("a=auto@0.25-").end_s);
-  EXPECT_FALSE(ParseMoreKey("a=auto@-3").begin_s);
-  EXPECT_FALSE(ParseMoreKey("a=auto").HasRange());
-  EXPECT_THAT(Complaint({"--more-key=a=auto@5-2"}),
+  EXPECT_EQ(ParseAdditionalKeyView("a=auto@0.25-").begin_s, 0.25);
+  EXPECT_FALSE(ParseAdditionalKeyView("a=auto@0.25-").end_s);
+  EXPECT_FALSE(ParseAdditionalKeyView("a=auto@-3").begin_s);
+  EXPECT_FALSE(ParseAdditionalKeyView("a=auto").HasRange());
+  EXPECT_THAT(Complaint({"--add-key-view=a=auto@5-2"}),
               HasSubstr("ends at 2 s, before it begins at 5"));
   for (const char* text : {"@10", "@-", "@", "@1-2-3", "@1.2.3-4"}) {
-    EXPECT_THAT(Complaint({std::string("--more-key=a=auto") + text}),
+    EXPECT_THAT(Complaint({std::string("--add-key-view=a=auto") + text}),
                 HasSubstr("is no range of time; write seconds of the film, BEGIN-END"))
         << text;
   }
-  EXPECT_THAT(Complaint({"--more-key=a=painted@2x.png"}), HasSubstr("painted@2x.png"));
+  EXPECT_THAT(Complaint({"--add-key-view=a=painted@2x.png"}), HasSubstr("painted@2x.png"));
+}
+
+TEST_F(ColorizeOptionsTest, TakesKeyViewsByFormerFlagToo) {
+  EXPECT_THAT(Complaint({"--more-key=a=auto@5-2"}), HasSubstr("--add-key-view a: the range"));
+  std::vector<std::string> arguments;
+  for (int i = 0; i <= kMaxAdditionalKeyViews; ++i) {
+    arguments.push_back(
+        fmt::format("--{}=view{}=auto", i % 2 == 0 ? "add-key-view" : "more-key", i));
+  }
+  EXPECT_THAT(Complaint(arguments), HasSubstr("--add-key-view is given 17 times; at most 16"));
 }
 
 TEST_F(ColorizeOptionsTest, WhatIsWrongInAPresetFileIsToldWithItsLine) {

@@ -1,6 +1,6 @@
-// Colour of one view carried into another through geometry (METHOD.md "Stage 2", "Reading order"):
-// rendered depth tells where the surface behind each pixel lies in the source picture, depth and
-// luminance tell whether the source sees the same thing. Pure functions, thread-safe.
+// Carries the colours of one view into another through geometry (METHOD.md "Stage 2", "Reading
+// order"). Rendered depth gives the place of each pixel's surface in the source picture; depth and
+// luminance decide whether the source sees the same surface. Pure functions, thread-safe.
 #pragma once
 
 #include "core/base/image.h"
@@ -8,24 +8,25 @@
 
 namespace color3d {
 
-// What is known of a view without colour. All pictures have the size of `camera`.
+// A view without colour. All pictures have the size of `camera`.
 struct SurfaceView {
   Camera camera;
   Pose cam_from_world;
   Image luminance;  // 1 channel, L 0..100
-  Image depth;      // 1 channel, scene units; 0: nothing there
+  Image depth;      // 1 channel, scene units; 0: no surface
 };
 
 struct CarryOptions {
-  // Depth of the surface against the source's depth there, relative, 1e-4..1: confidence falls to
-  // 1/e.
+  // Relative difference between the depth of the surface and the source's depth at which confidence
+  // falls to 1/e, 1e-4..1.
   double depth_tolerance = 0.03;
-  // Difference of the mean L of a small window, L units, 1..100: confidence falls to 1/e.
+  // Difference of the mean L of a small window at which confidence falls to 1/e, 1..100.
   double luminance_tolerance = 20.0;
-  // What is left of the window's structure, as a share of it: confidence falls to 1/e.
+  // Residual of the window's structure, relative to the structure, at which confidence falls to
+  // 1/e.
   double structure_tolerance = 0.7;
-  // Registration by optical flow on top of geometry: displacement at which confidence falls to
-  // 1/e, 0.1..10; 0: no registration.
+  // Displacement found by optical flow, after geometry, at which confidence falls to 1/e, 0.1..10;
+  // 0: no registration by flow.
   double flow_tolerance_px = 4.0;
   void Validate() const;
   bool operator==(const CarryOptions&) const = default;
@@ -36,19 +37,19 @@ struct CarriedColor {
   Image confidence;  // 1 channel, 0..1
 };
 
-// `ab`: 2 channels, and `confidence` (1 channel 0..1, or empty: 1 everywhere), of the source view.
+// `ab` (2 channels) and `confidence` (1 channel, 0..1; empty: 1 everywhere) are the source view's.
 CarriedColor CarryColor(const SurfaceView& source,
                         const Image& ab,
                         const Image& confidence,
                         const SurfaceView& target,
                         const CarryOptions& options);
 
-// Takes `other` where `color` is less sure: per pixel the surer of two attempts at the same source.
+// Replaces each pixel of `color` by that of `other` where `other` is more confident.
 void TakeSurer(const CarriedColor& other, CarriedColor* color);
-// Adds a source of lower rank: its colours count only as far as `color` leaves room, so that two
-// sources never average.
+// Adds a source of lower rank. Its confidence is multiplied by 1 - that of `color`, so that it
+// fills what is open and changes nothing that is known.
 void FillFrom(const CarriedColor& other, CarriedColor* color);
-// Share of the pixels of confidence above `least`.
+// Share of the pixels whose confidence is above `least`, 0..1.
 double Coverage(const CarriedColor& color, float least);
 
 }  // namespace color3d

@@ -61,7 +61,7 @@ Seen Look(double x, double y, double occluder = 0.0) {
   return out;
 }
 
-TEST(Carry, ColoursOfAPlaneArriveWhereTheGeometrySays) {
+TEST(Carry, CarriesColorsOfPlaneByGeometry) {
   const Seen source = Look(0.0, 0.0), target = Look(0.5, -0.2);
   const CarriedColor carried =
       CarryColor(source.surface, source.ab, {}, target.surface, CarryOptions{});
@@ -79,7 +79,7 @@ TEST(Carry, ColoursOfAPlaneArriveWhereTheGeometrySays) {
   for (int y = 0; y < kHeight; ++y) EXPECT_EQ(carried.confidence.At(0, y, kWidth - 2), 0.0f);
 }
 
-TEST(Carry, WhatTheSourceCannotSeeIsNotCarried) {
+TEST(Carry, SkipsOccludedPixels) {
   // From the source's place the square hides wall that the target sees.
   const Seen source = Look(0.0, 0.0, 0.25), target = Look(0.6, 0.0, 0.25);
   const CarriedColor carried =
@@ -100,7 +100,7 @@ TEST(Carry, WhatTheSourceCannotSeeIsNotCarried) {
   EXPECT_LT(wrong, hidden / 50);
 }
 
-TEST(Carry, OtherLuminanceIsNotTrusted) {
+TEST(Carry, DistrustsOtherLuminance) {
   const Seen source = Look(0.0, 0.0);
   Seen target = Look(0.2, 0.0);
   Random random(3);
@@ -112,7 +112,7 @@ TEST(Carry, OtherLuminanceIsNotTrusted) {
   EXPECT_LT(Coverage(carried, 0.25f), 0.1);
 }
 
-TEST(Carry, ADarkerExposureStillCounts) {
+TEST(Carry, AcceptsDarkerExposure) {
   const Seen source = Look(0.0, 0.0);
   Seen target = Look(0.2, 0.0);
   for (float& value : target.surface.luminance.data) value = 0.85f * value;
@@ -121,7 +121,7 @@ TEST(Carry, ADarkerExposureStillCounts) {
   EXPECT_GT(Coverage(carried, 0.25f), 0.7);
 }
 
-TEST(Carry, NothingComesFromNothing) {
+TEST(Carry, CarriesNothingWithoutGeometry) {
   Seen source = Look(0.0, 0.0), target = Look(0.1, 0.0);
   target.surface.depth = Image(kWidth, kHeight, 1);  // no geometry at all
   const CarriedColor carried =
@@ -130,7 +130,7 @@ TEST(Carry, NothingComesFromNothing) {
   for (float value : carried.ab.data) EXPECT_EQ(value, 0.0f);
 }
 
-TEST(Carry, PicturesOfAnotherSizeAreRefused) {
+TEST(Carry, RefusesPicturesOfOtherSize) {
   Seen source = Look(0.0, 0.0);
   Seen target = source;
   target.surface.depth = Image(3, 3, 1);
@@ -143,7 +143,7 @@ TEST(Carry, PicturesOfAnotherSizeAreRefused) {
   }
 }
 
-TEST(Carry, ASecondSourceFillsButNeverAverages) {
+TEST(Carry, SecondSourceFillsWithoutAveraging) {
   CarriedColor first{Image(2, 1, 2), Image(2, 1, 1)};
   CarriedColor second = first;
   first.ab.data = {50, 0, 50, 0};
@@ -157,8 +157,8 @@ TEST(Carry, ASecondSourceFillsButNeverAverages) {
   EXPECT_EQ(first.confidence.data[1], 0.5f);
 }
 
-// What personalization refuses a scene for.
-TEST(Carry, ConfidencesOfManyKeyViewsStayWithinOneAtEverySize) {
+// Personalization refuses confidences above 1.
+TEST(Carry, KeepsConfidencesWithinOne) {
   Random random(3);
   for (int trial = 0; trial < 200; ++trial) {
     const int width = 1 + static_cast<int>(random.NextUniform(0, 60));
@@ -185,7 +185,7 @@ TEST(Carry, ConfidencesOfManyKeyViewsStayWithinOneAtEverySize) {
   }
 }
 
-TEST(PlaneSweep, FindsTheDepthOfAWallAndOfWhatStandsBeforeIt) {
+TEST(PlaneSweep, FindsDepthOfWallAndForeground) {
   const Seen reference = Look(0.0, 0.0, 0.25), left = Look(-0.3, 0.0, 0.25),
              right = Look(0.3, 0.1, 0.25);
   const auto posed = [](const Seen& seen) {
@@ -207,8 +207,8 @@ TEST(PlaneSweep, FindsTheDepthOfAWallAndOfWhatStandsBeforeIt) {
   EXPECT_GT(right_square, 0.8 * square);
 }
 
-// In every photo something of its own stands before the same part of the wall.
-TEST(PlaneSweep, WhatIsMaskedOutIsNotMatched) {
+// In each photo another object occludes the same part of the wall.
+TEST(PlaneSweep, DoesNotMatchMaskedPixels) {
   Seen seen[3] = {Look(0.0, 0.0), Look(-0.3, 0.0), Look(0.3, 0.1)};
   Image mask(kWidth, kHeight, 1, 1.0f);
   Random random(4);
@@ -247,7 +247,7 @@ TEST(PlaneSweep, WhatIsMaskedOutIsNotMatched) {
   EXPECT_EQ(right(&whole, &whole), plain) << "a mask that leaves all changes nothing";
 }
 
-TEST(PlaneSweep, BadRangesAndNoSourcesAreRefused) {
+TEST(PlaneSweep, RefusesEmptyRangesAndNoSources) {
   const Seen seen = Look(0.0, 0.0);
   const PosedLuminance view{
       seen.surface.camera, seen.surface.cam_from_world, &seen.surface.luminance};
@@ -257,7 +257,7 @@ TEST(PlaneSweep, BadRangesAndNoSourcesAreRefused) {
   EXPECT_THROW(SweepPlanes(view, {view}, 1, 2, PlaneSweepOptions{.planes = 4}, {}), Error);
 }
 
-TEST(PlaneSweep, AFlatPictureGivesFiniteDepthsInRange) {
+TEST(PlaneSweep, GivesFiniteDepthsWithoutTexture) {
   Seen seen = Look(0.0, 0.0), other = Look(0.3, 0.0);
   for (Seen* s : {&seen, &other}) {
     for (float& value : s->surface.luminance.data) value = 42.0f;
@@ -275,7 +275,7 @@ TEST(PlaneSweep, AFlatPictureGivesFiniteDepthsInRange) {
   }
 }
 
-TEST(StereoViews, PrefersSomeParallaxAndLeavesOutViewsThatLookElsewhere) {
+TEST(StereoViews, PrefersSomeParallaxAndOverlap) {
   Scene scene;
   for (double x : {0.0, 0.01, 0.6, 3.9}) {
     View view;
@@ -303,7 +303,8 @@ class FusionTest : public testing::Test {
         inferred_(32, 24, 2, -20.0f) {}
 
   FusedColor Fuse(const Image& distance = {}, const Image& guess = {}) {
-    return FuseColors(luminance_, carried_, inferred_, distance, guess, FusionOptions{}, pool_, {});
+    return FuseColors(
+        {luminance_, carried_, inferred_, distance, guess}, FusionOptions{}, pool_, {});
   }
 
   ThreadPool pool_{1};
@@ -312,13 +313,13 @@ class FusionTest : public testing::Test {
   Image inferred_;
 };
 
-TEST_F(FusionTest, WithoutCarriedColoursTheInferredOnesAreKept) {
+TEST_F(FusionTest, KeepsInferredColorsWithoutCarried) {
   const FusedColor fused = Fuse();
   for (float value : fused.ab.data) EXPECT_NEAR(value, -20.0f, 0.1);
   for (size_t i = 0; i < luminance_.PlaneSize(); ++i) EXPECT_EQ(fused.provenance.Plane(2)[i], 1.0f);
 }
 
-TEST_F(FusionTest, AGapAmongCarriedColoursIsFilledFromAroundIt) {
+TEST_F(FusionTest, FillsGapsFromCarriedNeighbors) {
   for (float& value : carried_.confidence.data) value = 1.0f;
   for (int y = 10; y < 13; ++y) {
     for (int x = 14; x < 17; ++x) carried_.confidence.At(0, y, x) = 0.0f;
@@ -329,7 +330,7 @@ TEST_F(FusionTest, AGapAmongCarriedColoursIsFilledFromAroundIt) {
   EXPECT_GT(fused.provenance.At(1, 2, 2), 0.85f);
 }
 
-TEST_F(FusionTest, AnEdgeOfLuminanceKeepsColoursApart) {
+TEST_F(FusionTest, KeepsColorsApartAtEdges) {
   for (int y = 0; y < 24; ++y) {
     for (int x = 0; x < 32; ++x) {
       if (x < 16) {
@@ -343,7 +344,7 @@ TEST_F(FusionTest, AnEdgeOfLuminanceKeepsColoursApart) {
   EXPECT_LT(fused.ab.At(0, 12, 24), -15.0f);
 }
 
-TEST_F(FusionTest, StrangePlacesTakeTheFadedGuessAndSharesSumToOne) {
+TEST_F(FusionTest, TakesFadedGuessFarFromTraining) {
   Image distance(32, 24, 1), guess(32, 24, 2, 10.0f);
   for (int y = 0; y < 24; ++y) {
     for (int x = 0; x < 32; ++x) {
@@ -362,7 +363,7 @@ TEST_F(FusionTest, StrangePlacesTakeTheFadedGuessAndSharesSumToOne) {
   EXPECT_NEAR(fused.provenance.At(0, 12, 28), 0.9, 1e-5);
 }
 
-TEST_F(FusionTest, AColourfulGuessDecidesWhereThingsAreStrangeAndNowhereElse) {
+TEST_F(FusionTest, TakesColorfulGuessFarFromTrainingOnly) {
   const Image guess(32, 24, 2, -30.0f);
   inferred_ = Image(32, 24, 2, 8.0f);
   const FusedColor strange = Fuse(Image(32, 24, 1, 3.2f), guess);
@@ -372,7 +373,7 @@ TEST_F(FusionTest, AColourfulGuessDecidesWhereThingsAreStrangeAndNowhereElse) {
   EXPECT_NEAR(known.ab.At(0, 12, 12), 8.0, 0.5);
 }
 
-TEST_F(FusionTest, MisfittingPicturesAreRefused) {
+TEST_F(FusionTest, RefusesPicturesOfOtherSize) {
   inferred_ = Image(5, 5, 2);
   EXPECT_THROW(Fuse(), Error);
 }

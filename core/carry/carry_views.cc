@@ -9,9 +9,9 @@
 namespace color3d {
 namespace {
 
-constexpr float kMinOpacity = 0.5f;    // of the Gaussians, for a depth to count
-constexpr size_t kEnoughTracked = 30;  // points of structure-from-motion that suffice
-constexpr int kSurfaceGridPx = 16;     // else: one rendered depth per so many px
+constexpr float kMinOpacity = 0.5f;    // least opacity of a rendered depth
+constexpr size_t kEnoughTracked = 30;  // tracked points of a view that suffice
+constexpr int kSurfaceGridPx = 16;     // distance of the rendered depths that replace them
 
 }  // namespace
 
@@ -39,7 +39,7 @@ ViewSurfaces SurfaceMaker::Make(int view) const {
   for (size_t i = 0; i < surface.depth.data.size(); ++i) {
     if (surface.opacity.data[i] < kMinOpacity) surface.depth.data[i] = 0.0f;
   }
-  // What is masked out has no surface: nothing is carried there or from there.
+  // Masked pixels have no surface, so that nothing is carried to or from them.
   ClearMasked(images_.Mask(view).get(), &surface.depth);
   ViewSurfaces surfaces;
   surfaces.rendered = {camera, pose, *images_.Luminance(view), std::move(surface.depth)};
@@ -48,8 +48,8 @@ ViewSurfaces SurfaceMaker::Make(int view) const {
 }
 
 std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rendered) const {
-  const StereoPlan plan =
-      PlanStereo(scene_, view, PointsOf(view, rendered), OfMoment(view), depth_sources_);
+  const StereoPlan plan = PlanStereo(
+      scene_, view, SurfacePoints(view, rendered), TrainingViewsOfTime(view), depth_sources_);
   if (plan.sources.empty()) return std::nullopt;
   std::vector<std::shared_ptr<const Image>> pictures, masks;  // keeps them alive
   const auto posed = [&](int index) {
@@ -70,8 +70,8 @@ std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rend
   return swept;
 }
 
-// Training views that show the same: photos of a still place, or frames of one moment.
-std::vector<int> SurfaceMaker::OfMoment(int view) const {
+// Training views of the same time; all of them in static scenes.
+std::vector<int> SurfaceMaker::TrainingViewsOfTime(int view) const {
   std::vector<int> same;
   for (const int other : training_) {
     if (scene_.views[other].time_s() == scene_.views[view].time_s()) same.push_back(other);
@@ -79,8 +79,9 @@ std::vector<int> SurfaceMaker::OfMoment(int view) const {
   return same;
 }
 
-// Points that the view sees: tracked ones, or the Gaussians' surface.
-std::vector<Eigen::Vector3d> SurfaceMaker::PointsOf(int view, const SurfaceView& rendered) const {
+// Points that the view sees: tracked ones, or else points of the rendered surface.
+std::vector<Eigen::Vector3d> SurfaceMaker::SurfacePoints(int view,
+                                                         const SurfaceView& rendered) const {
   if (tracked_[view].size() >= kEnoughTracked) return tracked_[view];
   std::vector<Eigen::Vector3d> points;
   const Camera& camera = rendered.camera;

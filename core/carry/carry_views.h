@@ -1,5 +1,5 @@
-// Colour carried from all key views into a view. Where the surfaces of a view lie is asked twice,
-// of the Gaussians and of the photographs themselves, and per pixel the surer answer counts.
+// Carries colours from all key views into a view. Surfaces come from two depth maps, one rendered
+// from the Gaussians and one swept from the photos; each pixel takes the more confident result.
 // Thread-safe after construction.
 #pragma once
 
@@ -17,10 +17,10 @@ namespace color3d {
 
 struct ViewSurfaces {
   SurfaceView rendered;              // depth of the Gaussians
-  std::optional<SurfaceView> swept;  // by plane sweep; none when no other view shows the same
+  std::optional<SurfaceView> swept;  // by plane sweep; none when no other view overlaps
 };
 
-// What a camera sees of the geometry: depth and opacity, 1 channel each, at the view's moment.
+// Depth and opacity of the geometry at the view's time, 1 channel each.
 struct RenderedSurface {
   Image depth;
   Image opacity;
@@ -30,9 +30,9 @@ using SurfaceRenderer = std::function<RenderedSurface(int view, const Camera& ca
 
 class SurfaceMaker {
  public:
-  // Surfaces have the size of `images`; planes are swept at the size of `sweep_images` with at most
-  // `depth_sources` training views each, of the same moment where views have one. The references
-  // must outlive the object.
+  // Surfaces have the size of `images`. Planes are swept at the size of `sweep_images` against at
+  // most `depth_sources` training views, which have the view's time if views have times. The
+  // references must outlive the object.
   SurfaceMaker(const Scene& scene,
                const ViewImages& images,
                const ViewImages& sweep_images,
@@ -45,8 +45,8 @@ class SurfaceMaker {
 
  private:
   std::optional<SurfaceView> Sweep(int view, const SurfaceView& rendered) const;
-  std::vector<int> OfMoment(int view) const;
-  std::vector<Eigen::Vector3d> PointsOf(int view, const SurfaceView& rendered) const;
+  std::vector<int> TrainingViewsOfTime(int view) const;
+  std::vector<Eigen::Vector3d> SurfacePoints(int view, const SurfaceView& rendered) const;
 
   const Scene& scene_;
   const ViewImages& images_;
@@ -65,7 +65,7 @@ struct ColoredKeyView {
   CarriedColor color;
 };
 
-// Of a later key view's colours only those count that the ones before it have not given.
+// Carries from all key views; each gives only the colours that those before it do not give.
 CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
                           const ViewSurfaces& target,
                           const CarryOptions& options);

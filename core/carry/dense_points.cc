@@ -20,12 +20,12 @@ struct SweptView {
   Camera camera;
   Pose pose;
   Image luminance;           // of the size of the camera
-  Image mask;                // of the same; empty: all counts
+  Image mask;                // of the same size; empty: nothing is masked
   std::vector<int> sources;  // views
-  Image depth;               // empty when no other view shows the same
+  Image depth;               // empty when no other view overlaps
 };
 
-// The mask of a view with what moves on its own; empty: all counts.
+// The mask of a view and its moving objects; empty: nothing is masked.
 Image MaskOf(int view, const ViewImages& images, const StillRegions& still, const Camera& size) {
   Image both;
   for (const auto& mask : {images.Mask(view), still ? still(view) : nullptr}) {
@@ -50,7 +50,7 @@ SweptView Reduced(const Scene& scene,
   return swept;
 }
 
-// Depth of swept[view], by as many others of `candidates` as there may be.
+// Sweeps the depth of swept[view] against some of `candidates`.
 void Sweep(const Scene& scene,
            int view,
            const std::vector<int>& candidates,
@@ -72,9 +72,9 @@ void Sweep(const Scene& scene,
   swept[view].sources = plan.sources;
 }
 
-// How much farther, relatively, `view` itself says that its surface lies than `point`; NaN where it
-// says nothing.
-double Farther(const SweptView& view, const Eigen::Vector3d& point) {
+// Depth of the surface that `view` measures at `point`, relative to the depth of `point`, minus 1.
+// NaN where it measures none.
+double RelativeExcess(const SweptView& view, const Eigen::Vector3d& point) {
   const Eigen::Vector3d p = view.pose.Apply(point);
   if (view.depth.data.empty() || !(p.z() > 0.0)) return std::nan("");
   const Eigen::Vector2d pixel = view.camera.Project(p);
@@ -83,7 +83,7 @@ double Farther(const SweptView& view, const Eigen::Vector3d& point) {
   return depth > 0.0 ? depth / p.z() - 1.0 : std::nan("");
 }
 
-// The points that `view` adds to those of the views before it.
+// Points that no view before `view` has given.
 std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
                                   int view,
                                   const DensePointsOptions& options) {
@@ -102,10 +102,10 @@ std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
       double sum = 0.0;
       bool given = false;
       for (const int source : own.sources) {
-        const double farther = Farther(swept[source], world);
-        if (!(std::abs(farther) < options.tolerance)) continue;
+        const double excess = RelativeExcess(swept[source], world);
+        if (!(std::abs(excess) < options.tolerance)) continue;
         given = given || source < view;
-        sum += farther;
+        sum += excess;
         point.views.push_back(source);
       }
       if (given || static_cast<int>(point.views.size()) <= needed) continue;
@@ -119,7 +119,7 @@ std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
   return points;
 }
 
-// The training views of each moment, in the order of time.
+// The training views of each time, in order of time.
 std::vector<std::vector<int>> Moments(const Scene& scene) {
   std::map<double, std::vector<int>> moments;
   for (const int view : scene.TrainingViews()) moments[scene.views[view].time_s()].push_back(view);
@@ -130,10 +130,11 @@ std::vector<std::vector<int>> Moments(const Scene& scene) {
 
 struct SweepPlan {
   std::vector<int> views;                    // ascending
-  std::vector<std::vector<int>> candidates;  // by view of the scene: what it may be compared with
+  std::vector<std::vector<int>> candidates;  // views to compare with, by view of the scene
 };
 
-// Whole moments, evenly spread over time; of a single moment, or where none has two views, views.
+// All views of some times, evenly spread. Evenly spread views when there is one time, or one view
+// of each.
 SweepPlan PlanSweeps(const Scene& scene, size_t most) {
   std::vector<std::vector<int>> moments = Moments(scene);
   SweepPlan plan;

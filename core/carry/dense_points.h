@@ -1,6 +1,6 @@
-// Points of the surfaces that several photos agree on: depth by plane sweep for each training view,
-// checked against the others. A denser start for the Gaussians than structure-from-motion's points
-// alone. Pure function but for the pool's threads.
+// Dense surface points from plane sweeps: the depth of each training view, checked against other
+// views. A denser start for the Gaussians than the points of structure-from-motion. Stateless; runs
+// on the pool's threads.
 #pragma once
 
 #include <functional>
@@ -15,22 +15,23 @@
 namespace color3d {
 
 struct DensePointsOptions {
-  int max_views = 32;       // evenly spaced ones of the training views, of whole moments
+  int max_views = 32;       // training views, evenly spread; all views of a time or none
   int depth_sources = 4;    // views that each view is compared with, 1..16
-  int depth_side_px = 200;  // at which depth is measured
+  int depth_side_px = 200;  // longer side of the depth maps
   PlaneSweepOptions sweep;
-  int agreeing = 2;         // of the sources, for a depth to count; or all when fewer
+  int agreeing = 2;         // sources that must confirm a depth; all when there are fewer
   double tolerance = 0.01;  // relative difference of depth
   int max_points = 20'000;  // evenly thinned above that
 };
 
-// Points carry the views that agree, ascending; none is one that an earlier view gave already.
-// Held-out views are not looked at. No points where no view is known to observe any of the scene's
-// own. Where a moment has several training views, they are compared with each other alone: at
-// other moments things may be elsewhere. `still` (empty, or null for a view: not known): 1 channel
-// of the view's working size, 0 where something moves on its own, which counts as masked. Called
-// from several threads at once. Throws Error{kCancelled}.
+// Static regions of a view: 1 channel of the view's working size, 0 on moving objects; null: not
+// known. Called from several threads at once.
 using StillRegions = std::function<std::shared_ptr<const Image>(int view)>;
+
+// Returns points with the views that confirm them, ascending; no point repeats one of an earlier
+// view. Held-out views are not used. Empty when no view observes a point of the scene. The training
+// views of one time, where there are several, are compared with each other alone. Pixels that are
+// not `still` count as masked; empty: all are. Throws Error{kCancelled}.
 std::vector<SparsePoint> DensePoints(const Scene& scene,
                                      const ViewImages& images,
                                      const DensePointsOptions& options,

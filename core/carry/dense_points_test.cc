@@ -65,7 +65,7 @@ class DensePointsTest : public testing::Test {
   Scene scene_;
 };
 
-TEST_F(DensePointsTest, LieOnTheWallAndOnlyOnce) {
+TEST_F(DensePointsTest, LieOnWallWithoutRepetition) {
   const std::vector<SparsePoint> points =
       Points(2, {.depth_side_px = kWidth, .max_points = 1'000'000});
   // One picture of the wall, and what the last camera shows beyond it.
@@ -75,13 +75,13 @@ TEST_F(DensePointsTest, LieOnTheWallAndOnlyOnce) {
   for (const SparsePoint& point : points) {
     squares += std::pow(point.position.z() - kDepth, 2);
     ASSERT_GE(point.views.size(), 3u);  // itself and two that agree
-    ASSERT_GT(point.views.front(), 0);  // the held-out one is not looked at
+    ASSERT_GT(point.views.front(), 0);  // the held-out view is not used
     ASSERT_TRUE(std::is_sorted(point.views.begin(), point.views.end()));
   }
   EXPECT_LT(std::sqrt(squares / static_cast<double>(points.size())), 0.02 * kDepth);
 }
 
-TEST_F(DensePointsTest, MaskedPartsOfPhotosHaveAndConfirmNone) {
+TEST_F(DensePointsTest, MaskedPixelsGiveAndConfirmNone) {
   Image mask(kWidth, kHeight, 1, 1.0f);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth / 2; ++x) mask.At(0, y, x) = 0.0f;
@@ -103,7 +103,7 @@ TEST_F(DensePointsTest, MaskedPartsOfPhotosHaveAndConfirmNone) {
   }
 }
 
-TEST_F(DensePointsTest, WhatMovesOnItsOwnHasNone) {
+TEST_F(DensePointsTest, MovingObjectsHaveNone) {
   const auto right = std::make_shared<const Image>([] {
     Image still(kWidth, kHeight, 1);
     for (int y = 0; y < kHeight; ++y) {
@@ -129,8 +129,8 @@ TEST_F(DensePointsTest, WhatMovesOnItsOwnHasNone) {
   }
 }
 
-// The same cameras at four moments; the wall has another picture at each.
-TEST_F(DensePointsTest, MomentsOfSeveralCamerasAreTakenWholeAndNeverMixed) {
+// The same cameras at four times; the wall has another picture at each.
+TEST_F(DensePointsTest, ViewsOfOneTimeAreComparedAlone) {
   Scene rig = scene_;
   for (int moment = 1; moment < 4; ++moment) {
     for (int i = 0; i < 6; ++i) rig.views.push_back(scene_.views[i]);
@@ -160,13 +160,13 @@ TEST_F(DensePointsTest, MomentsOfSeveralCamerasAreTakenWholeAndNeverMixed) {
   EXPECT_EQ(seen, (std::set<int>{0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17}));
 }
 
-TEST_F(DensePointsTest, OneCameraThatMovesIsComparedOverTime) {
+TEST_F(DensePointsTest, FramesOfOneCameraAreComparedOverTime) {
   for (int v = 0; v < 6; ++v) scene_.views[v].moment = Moment{0.1 * v, 0};
   EXPECT_GT(Points(2, {.depth_side_px = kWidth, .max_points = 1'000'000}).size(),
             0.8 * kWidth * kHeight);
 }
 
-TEST_F(DensePointsTest, AreThinnedEvenlyAndTheSameForEveryThreadCount) {
+TEST_F(DensePointsTest, DoNotDependOnThreads) {
   const std::vector<SparsePoint> one = Points(1, {.depth_side_px = kWidth, .max_points = 500});
   const std::vector<SparsePoint> three = Points(3, {.depth_side_px = kWidth, .max_points = 500});
   ASSERT_EQ(one.size(), 500u);
@@ -182,7 +182,7 @@ TEST_F(DensePointsTest, AreThinnedEvenlyAndTheSameForEveryThreadCount) {
   EXPECT_GT(highest, 1.2);
 }
 
-TEST_F(DensePointsTest, ThereAreNoneWithoutNeighboursOrPoints) {
+TEST_F(DensePointsTest, NoneWithoutNeighborsOrPoints) {
   Scene lonely = scene_;
   lonely.points.clear();
   QuietRun run(1);

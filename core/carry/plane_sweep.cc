@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kCensusRadius = 3;  // every second pixel of a 7x7 window
 constexpr int kCensusBits = 24;
-constexpr uint8_t kUnknownCost = 11;  // of a pixel that a source does not show: about chance
+constexpr uint8_t kUnknownCost = 11;  // for pixels that a source does not show; about chance
 constexpr int kCostScale = 8;         // fixed point of aggregated costs
 constexpr size_t kBlock = 256;        // pixels whose costs are sorted together
 
@@ -65,8 +65,8 @@ uint8_t CountBits(uint32_t x) {
   return static_cast<uint8_t>(x + (x >> 8) + (x >> 16));
 }
 
-// Of `count` pixels from `first` on, the sum of the `kept` smallest of the sources' costs: each
-// source's cost sinks through the sorted ones, for all pixels of a block at once.
+// Sums the `kept` smallest costs of the sources, for `count` pixels from `first` on. The cost of
+// each source is inserted into the sorted ones, for all pixels of a block at once.
 void SumSmallest(const std::vector<std::vector<uint8_t>>& costs,
                  size_t first,
                  size_t count,
@@ -143,7 +143,8 @@ void WarpThroughPlane(const PosedLuminance& reference,
     float* out = warped->data.data() + static_cast<size_t>(y) * width;
     uint8_t* ok = valid->data() + static_cast<size_t>(y) * width;
     const float py = y + 0.5f;
-    // Where the pixels of a row fall: apart from the sampling, as compilers vectorise it.
+    // Places of the pixels of a row; a loop apart from the sampling, so that compilers vectorise
+    // it.
     for (int x = 0; x < width; ++x) {
       const float px = x + 0.5f;
       const float w = h(2, 0) * px + h(2, 1) * py + h(2, 2);
@@ -300,7 +301,7 @@ void AggregateDirection(const CostVolume& volume,
   }
 }
 
-// Best plane with a parabola through its neighbours, and how far behind the best other plane lies.
+// Best plane, refined by a parabola through its neighbours, and its lead over the best other plane.
 void PickPlane(const int16_t* sum, int planes, double* plane, double* margin) {
   int best = 0;
   for (int d = 1; d < planes; ++d) {

@@ -1,6 +1,6 @@
 // Dense depth of a posed view from its neighbours: plane sweep (Collins 1996) on census costs
-// (Zabih & Woodfill 1994) with semi-global aggregation (Hirschmueller 2008). Luminance only, so it
-// works on monochrome photos and bears changes of exposure. Pure functions, thread-safe.
+// (Zabih & Woodfill 1994) with semi-global aggregation (Hirschmueller 2008). Uses luminance alone,
+// so it works on monochrome photos and under changes of exposure. Pure functions, thread-safe.
 #pragma once
 
 #include <vector>
@@ -15,15 +15,15 @@ struct PosedLuminance {
   Camera camera;  // of the picture
   Pose cam_from_world;
   const Image* luminance = nullptr;  // 1 channel, L 0..100
-  const Image* mask = nullptr;       // 1 channel of 0 and 1; what is 0 is not matched; null: all is
+  const Image* mask = nullptr;       // 1 channel, 0 where not to be matched, else 1; null: all 1
 };
 
 inline constexpr int kMaxSweepSources = 16;
 
 struct PlaneSweepOptions {
   int planes = 96;  // evenly spaced in inverse depth, 8..512
-  // Penalties of semi-global matching for a change by one plane and by more, bits of the census;
-  // the latter is divided by 1 + |dL| / edge_contrast at edges of L.
+  // Penalties of semi-global matching for a change by one plane and by several, bits of the census.
+  // The latter is divided by 1 + |dL| / edge_contrast.
   double small_step = 1.5;
   double large_step = 16.0;
   double edge_contrast = 8.0;
@@ -32,8 +32,8 @@ struct PlaneSweepOptions {
 };
 
 struct DepthMap {
-  Image depth;       // 1 channel, camera depth in scene units; where masked out, as beside it
-  Image confidence;  // 1 channel, 0..1: how clearly the best plane beats all others
+  Image depth;       // 1 channel, camera depth in scene units; masked pixels take their neighbours'
+  Image confidence;  // 1 channel, 0..1: lead of the best plane over all others
 };
 
 // `nearest` and `farthest`: > 0, camera depth. `sources`: 1..kMaxSweepSources. Throws

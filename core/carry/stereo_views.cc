@@ -11,7 +11,7 @@ namespace {
 constexpr double kBestAngleDegrees = 8.0;
 constexpr double kAngleSpreadBelow = 4.0;
 constexpr double kAngleSpreadAbove = 12.0;
-// The range of depths: quantiles of the surface, widened.
+// Quantiles of the surface's depth, and the factors that widen the range between them.
 constexpr double kNearQuantile = 0.02, kFarQuantile = 0.98;
 constexpr double kNearMargin = 0.75, kFarMargin = 1.6;
 
@@ -20,7 +20,7 @@ bool Sees(const View& view, const Eigen::Vector3d& point) {
   return p.z() > 1e-6 && view.camera.Contains(view.camera.Project(p));
 }
 
-// How useful parallax under this angle is, 0..1.
+// Weight of the parallax between two directions, 0..1.
 double AngleWeight(const Eigen::Vector3d& to_first, const Eigen::Vector3d& to_second) {
   const double cosine = to_first.normalized().dot(to_second.normalized());
   const double degrees = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;

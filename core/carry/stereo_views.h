@@ -1,4 +1,4 @@
-// Which views to match a view with, and between which depths. Pure functions, thread-safe.
+// Chooses the views to match a view with, and the range of depths. Pure functions, thread-safe.
 #pragma once
 
 #include <vector>
@@ -16,9 +16,9 @@ struct StereoPlan {
 // Positions (scene frame) of the tracked points that each view sees, by view.
 std::vector<std::vector<Eigen::Vector3d>> TrackedPoints(const Scene& scene);
 
-// `surface`: points (scene frame) that `view` sees. Sources are those of `candidates` that see many
-// of them under angles of some degrees: enough parallax to measure depth, not so much that pictures
-// differ. No sources when no candidate sees any.
+// Chooses the candidates that see many points of `surface` under a parallax of some degrees, which
+// is enough to measure depth and keeps pictures alike. `surface`: points that `view` sees, scene
+// frame. No sources when no candidate sees a point.
 StereoPlan PlanStereo(const Scene& scene,
                       int view,
                       const std::vector<Eigen::Vector3d>& surface,

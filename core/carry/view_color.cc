@@ -2,12 +2,14 @@
 
 #include <algorithm>
 
+#include "core/carry/confidence.h"
+
 namespace color3d {
 namespace {
 
 constexpr double kWorthGuessing = 0.02;  // share of a view's pixels
 
-// Whether enough of the view is strange to the colorizer and was not carried either.
+// Whether enough of the view is far from the training pictures and has no carried colour.
 bool WantsGuess(const CarriedColor& carried, const Image& distance, const FusionOptions& options) {
   size_t strange = 0;
   for (size_t i = 0; i < distance.data.size(); ++i) {
@@ -22,15 +24,14 @@ bool WantsGuess(const CarriedColor& carried, const Image& distance, const Fusion
 
 // 1 where what was carried decides alone.
 Image SurelyCarried(const CarriedColor& carried) {
-  constexpr float kSure = 0.5f;
   Image sure = carried.confidence;
-  for (float& value : sure.data) value = value > kSure ? 1.0f : 0.0f;
+  for (float& value : sure.data) value = value > kDecisiveConfidence ? 1.0f : 0.0f;
   return sure;
 }
 
-// The colorizer is not asked about places that are known: what was carried there stands for its
-// answer, so that it does not pull towards anything else.
-void AnswerKnown(const CarriedColor& carried, const Image& known, Image* inferred_ab) {
+// The colorizer infers no colour for known pixels: their carried colour takes its place, so that
+// nothing pulls them elsewhere.
+void CopyKnown(const CarriedColor& carried, const Image& known, Image* inferred_ab) {
   for (size_t i = 0; i < known.data.size(); ++i) {
     if (known.data[i] == 0.0f) continue;
     for (int c = 0; c < 2; ++c) inferred_ab->Plane(c)[i] = carried.ab.Plane(c)[i];
@@ -48,16 +49,11 @@ FusedColor ColorOfView(const Image& luminance,
   options.relative_chroma = sources.relative_chroma;
   const Image known = SurelyCarried(carried);
   InferredColor inferred = sources.infer(luminance, known);
-  AnswerKnown(carried, known, &inferred.ab);
+  CopyKnown(carried, known, &inferred.ab);
   const bool guess = WantsGuess(carried, inferred.distance, options);
-  return FuseColors(luminance,
-                    carried,
-                    inferred.ab,
-                    inferred.distance,
-                    guess ? sources.guess(luminance) : Image(),
-                    options,
-                    pool,
-                    cancel);
+  const Image guessed = guess ? sources.guess(luminance) : Image();
+  return FuseColors(
+      {luminance, carried, inferred.ab, inferred.distance, guessed}, options, pool, cancel);
 }
 
 }  // namespace color3d

@@ -41,6 +41,7 @@ std::vector<Artifact> MakeCatalogue() {
       {kKeyColorFacts, kind::kColorizeKeyView, kJson, true},
       {kKeyColorRegions, kind::kColorizeKeyView, kJpeg, true},
       {kKeyViewColored, kind::kColorizeKeyView, kPng, true},
+      {kKeyViews, kind::kColorizeKeyView, kBinary, true},  // each file as above
       {kGeometry, kind::kReconstructGeometry, kBinary},
       {kMemoryPlan, kind::kReconstructGeometry, kJson},
       {kCarried, kind::kCarryColor, kPng},

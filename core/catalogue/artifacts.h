@@ -28,6 +28,9 @@ inline constexpr char kKeyColor[] = "key_color.png";               // ab, undist
 inline constexpr char kKeyColorFacts[] = "key_color.json";         // the source of the colour
 inline constexpr char kKeyColorRegions[] = "key_color_regions.jpg";  // regions of a prompt's words
 inline constexpr char kKeyViewColored[] = "key_view_colored.png";    // for users
+// Additional key views: a folder each, "1/" and so on in the order in which they were given, with
+// the artifacts that colorize_key_view wrote for it.
+inline constexpr char kKeyViews[] = "key_views/";
 inline constexpr char kGeometry[] = "geometry.c3g";  // Gaussians with luminance only
 inline constexpr char kMemoryPlan[] = "memory_plan.json";
 inline constexpr char kCarried[] = "carried/";       // view's stem + ".png": ab and confidence

@@ -27,7 +27,9 @@ const std::vector<Stage>& StageCatalogue() {
        .needs = {kScene},
        .reads = {kImportFacts, kGeometry},  // the latter of an earlier job
        .brings_prerequisites = true},
-      {.kind = kind::kColorizeKeyView, .needs = {kScene, kKeyView}, .brings_prerequisites = true},
+      {.kind = kind::kColorizeKeyView,
+       .needs = {kScene, kKeyView},  // kKeyView for the first key view only
+       .brings_prerequisites = true},
       {.kind = kind::kReconstructGeometry,
        .needs = {kScene},
        .reads = {kGivenGeometry, kMovingRegions},  // the former in place of training
@@ -36,6 +38,7 @@ const std::vector<Stage>& StageCatalogue() {
        .keeps_time_limit = true},
       {.kind = kind::kCarryColor,
        .needs = {kScene, kKeyView, kKeyColor, kGeometry},
+       .reads = {kKeyViews},
        .resumes = true},
       {.kind = kind::kGenerateAugmentations,
        .needs = {kScene, kKeyView, kKeyColor},
@@ -52,7 +55,7 @@ const std::vector<Stage>& StageCatalogue() {
        .resumes = true},
       {.kind = kind::kCorrectColors,
        .needs = {kScene, kKeyView, kKeyColor, kColorizer, kViewsAb},
-       .reads = {kGeometry, kProvenance}},
+       .reads = {kGeometry, kProvenance, kKeyViews}},
       {.kind = kind::kSolveChroma,
        .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry},
        .reads = {kProvenance, kCorrectedAb, kCorrectedProvenance},

@@ -12,17 +12,17 @@
 namespace color3d {
 namespace {
 
-constexpr int kSidePx = 160;  // pictures that are compared
+constexpr int kSidePx = 160;  // longer side of the compared pictures
 
-// Of each frame of a shot, from the one before it.
+// Motion of each frame of a shot from the one before it.
 std::vector<double> MotionOf(const FilmFrames& frames,
                              const std::vector<int>& shot,
                              ThreadPool& pool,
                              const CancellationToken& cancel) {
-  constexpr int64_t kAtOnce = 64;  // memory does not grow with the film
+  constexpr int64_t kAtOnce = 64;  // frames; bounds memory
   const auto count = static_cast<int64_t>(shot.size());
   std::vector<double> motion(shot.size(), 0.0);
-  std::vector<Image> pictures(kAtOnce + 1);  // the first is the last one of those before
+  std::vector<Image> pictures(kAtOnce + 1);  // the first is the last one of the block before
   for (int64_t begin = 0; begin < count; begin += kAtOnce) {
     const int64_t size = std::min(kAtOnce, count - begin);
     pool.ForEach(size, [&](int64_t i, int) {

@@ -1,5 +1,5 @@
-// Which frames of a film are coloured on their own, and which take their colours from those, by
-// motion (METHOD.md "Film"): how many depends on how much moves, not on frames per second.
+// Chooses the frames of a film that get colours of their own; other frames take theirs from these
+// by optical flow (METHOD.md "Film"). Their number depends on motion, not on frames per second.
 #pragma once
 
 #include <vector>
@@ -11,14 +11,14 @@
 namespace color3d {
 
 struct AnchorOptions {
-  // MotionOf each step, summed over the frames around one anchor, from first to last.
+  // MotionOf, summed over the steps between the frames of one anchor.
   double most_motion = 0.1;  // 0..1; 0: each frame is an anchor
   int most_frames = 12;      // 1..1000
   void Validate() const;     // throws Error{kInvalidArgument}
 };
 
-// The middle frame of each run of frames of one shot, ascending; each other frame belongs to the
-// nearest anchor of its shot. Throws Error{kCancelled}.
+// Returns the middle frame of each run of frames of a shot, ascending. Every other frame belongs to
+// the nearest anchor of its shot. Throws Error{kCancelled}.
 std::vector<int> AnchorFrames(const FilmFrames& frames,
                               const AnchorOptions& options,
                               ThreadPool& pool,

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/carry/confidence.h"
 #include "core/film/frame_motion.h"
 #include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
@@ -37,7 +38,7 @@ Image Moved(const Image& flow) {
   return place;
 }
 
-// One step further, along flow to the next frame and back.
+// Extends the track along the flow to the next frame and back.
 FilmTrack Step(const FilmTrack& track, const Image& there, const Image& back) {
   FilmTrack further{SampledAt(track.in_key, Moved(back)), track.in_frame};
   const Image step = SampledAt(there, track.in_frame);
@@ -45,10 +46,10 @@ FilmTrack Step(const FilmTrack& track, const Image& there, const Image& back) {
   return further;
 }
 
-// L against what is around it: exposure and contrast of a place do not count.
+// L relative to its surroundings, independent of exposure and contrast.
 Image LocalContrast(const Image& luminance) {
   constexpr int kRadius = 7;
-  constexpr float kGrain = 4.0f;  // L^2, of plain surfaces
+  constexpr float kGrain = 4.0f;  // variance of grain, L^2
   const Image mean = BoxMean(luminance, kRadius);
   Image out(luminance.width, luminance.height, 1), square = out;
   for (size_t i = 0; i < out.data.size(); ++i) {
@@ -62,7 +63,7 @@ Image LocalContrast(const Image& luminance) {
   return out;
 }
 
-// Where two pictures of local contrast differ around a pixel: 0 to 2.
+// Mean difference of two pictures of local contrast around each pixel, 0..2.
 Image Unlike(const Image& one, const Image& other) {
   Image difference(one.width, one.height, 1);
   for (size_t i = 0; i < difference.data.size(); ++i) {
@@ -71,14 +72,14 @@ Image Unlike(const Image& one, const Image& other) {
   return BoxMean(difference, kWindowRadius);
 }
 
-// Steps drift: what is left between a picture and another, warped to it by `place`, is taken out
+// Corrects drift: moves `place` along the flow between a picture and the other one warped to it,
 // where that makes them more alike.
 void Register(const Image& picture,
               const Image& contrast,
               const Image& other,
               const Image& other_contrast,
               Image* place) {
-  constexpr float kMostPx = 6.0f;  // more is no drift but another thing
+  constexpr float kMostPx = 6.0f;  // a longer flow is no drift
   constexpr float kLeastGain = 0.02f;
   Image rest = DenseFlow(picture, SampledAt(other, *place));
   for (size_t i = 0; i < rest.PlaneSize(); ++i) {
@@ -100,8 +101,8 @@ bool Inside(float x, float y, int width, int height) {
          y <= static_cast<float>(height) - 0.5f;
 }
 
-// How surely the pixels of a picture lie at `place` in another, 0..1; `back` leads from there to
-// the picture.
+// Confidence that the pixels of a picture lie at `place` in another one, 0..1. `back` leads from
+// there to the picture.
 Image ConfidenceOf(const Image& place,
                    const Image& back,
                    const Image& contrast,
@@ -127,16 +128,17 @@ Image ConfidenceOf(const Image& place,
   return confidence;
 }
 
-// Places of a picture in another, and how sure each is.
+// Places of a picture's pixels in another one, with their confidence.
 struct Places {
   Image place;
   Image confidence;
 };
 
 void TakeWhereSurer(const Places& found, Places* followed) {
-  constexpr float kSure = 0.5f, kLeastGain = 0.3f;
+  constexpr float kLeastGain = 0.3f;  // of confidence
   for (size_t i = 0; i < found.confidence.data.size(); ++i) {
-    if (found.confidence.data[i] < std::max(kSure, followed->confidence.data[i] + kLeastGain)) {
+    if (found.confidence.data[i] <
+        std::max(kDecisiveConfidence, followed->confidence.data[i] + kLeastGain)) {
       continue;
     }
     followed->confidence.data[i] = found.confidence.data[i];
@@ -145,14 +147,14 @@ void TakeWhereSurer(const Places& found, Places* followed) {
 }
 
 constexpr double kMuchLost = 0.1;
-constexpr double kFollowedEnough = 0.9;  // mean confidence from which nothing is looked for
+constexpr double kFollowedEnough = 0.9;  // mean confidence from which features are not matched
 
 double MeanOf(const Image& image) {
   const double sum = std::accumulate(image.data.begin(), image.data.end(), 0.0);
   return sum / static_cast<double>(image.data.size());
 }
 
-// What features find again, where that is surer than what was followed.
+// Takes the tracks that features find, where they are more confident than flow.
 void TakeFoundAgain(const FoundAgain& again,
                     const Image& frame,
                     const Image& contrast,
@@ -196,13 +198,13 @@ CarriedColor ColorOf(const FilmKey& key,
   return color;
 }
 
-// A walk away from a key frame, and the frames on it that the key frame colours.
+// A walk away from a key frame over the frames that it colours.
 struct Walk {
   const FilmKey* key = nullptr;
   int direction = 1;
   std::vector<int> frames;  // in the order of the walk
-  size_t nearest = 0;       // of them: those that no key frame is nearer to, which come first
-  FilmWalk before;          // track null: it begins at the key frame
+  size_t nearest = 0;       // number of the first ones, to which no key frame is nearer
+  FilmWalk before;          // track null: the walk begins at the key frame
 
   void Drop(size_t count) {
     frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(count));
@@ -210,7 +212,7 @@ struct Walk {
   }
 };
 
-// Goes along a walk, one frame after the other.
+// Goes along a walk frame by frame.
 class Walker {
  public:
   Walker(const Walk& walk,
@@ -307,12 +309,12 @@ class Walker {
   std::shared_ptr<const FilmTrack> track_;
 };
 
-// Leaves out what is done.
+// Drops the frames that are done.
 void TakeUp(const std::vector<FilmWalk>& walks, Walk* walk) {
   for (const FilmWalk& done : walks) {
     if (done.key != walk->key->frame || done.direction != walk->direction) continue;
     const auto last = std::find(walk->frames.begin(), walk->frames.end(), done.frame);
-    if (last == walk->frames.end()) return;  // of other keys
+    if (last == walk->frames.end()) return;  // a walk of other key frames
     if (!done.track && last + 1 != walk->frames.end()) return;
     walk->Drop(static_cast<size_t>(last - walk->frames.begin()) + 1);
     walk->before = done;
@@ -332,7 +334,7 @@ std::vector<Walk> WalksOf(const FilmFrames& frames,
     for (const int direction : {1, -1}) {
       Walk walk{&key, direction, {}, 0, {}};
       for (int i = key.frame + direction; i >= 0 && i < count; i += direction) {
-        // Frames with faults lie between those of a shot.
+        // Frames with faults may lie between the frames of a shot.
         const bool is_nearest = near[i].nearest == key.frame;
         if (!is_nearest && !(with_second && near[i].second == key.frame)) continue;
         walk.frames.push_back(i);
@@ -342,7 +344,7 @@ std::vector<Walk> WalksOf(const FilmFrames& frames,
       if (!walk.frames.empty()) walks.push_back(std::move(walk));
     }
   }
-  // The longest first, so that threads end together.
+  // The longest walks first, so that threads end together.
   std::stable_sort(walks.begin(), walks.end(), [](const Walk& x, const Walk& y) {
     return x.frames.size() > y.frames.size();
   });

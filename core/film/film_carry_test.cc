@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWidth = 160, kHeight = 112;
 
-// Texture of its own for each place, seen from a camera that pans and zooms.
+// A texture without repetition, seen from a camera that pans and zooms.
 struct Scenery {
   double pan_px = 2.0, zoom = 0.0;
   int seed = 1;
@@ -104,7 +104,7 @@ Deviation ErrorOf(const CarriedColor& color, const Image& truth) {
   return {weight > 0.0 ? sum / weight : 0.0, covered / static_cast<double>(truth.PlaneSize())};
 }
 
-TEST(FilmCarry, ColorsFollowTheCameraWithoutDrift) {
+TEST(FilmCarry, FollowsCameraWithoutDrift) {
   const Scenery scenery{.pan_px = 1.5, .zoom = 0.004};
   const auto colors = Carry(scenery, std::vector<int>(31, 0), {KeyOf(scenery, 15)});
   ASSERT_EQ(colors.size(), 31u);
@@ -115,7 +115,7 @@ TEST(FilmCarry, ColorsFollowTheCameraWithoutDrift) {
   }
 }
 
-TEST(FilmCarry, TheNearestKeyFrameOfTheShotColors) {
+TEST(FilmCarry, TakesNearestKeyFrameOfShot) {
   const Scenery scenery{.pan_px = 0.0};
   FilmKey red = KeyOf(scenery, 2), green = KeyOf(scenery, 9);
   red.color.ab = Image(kWidth, kHeight, 2, 40.0f);
@@ -132,7 +132,7 @@ TEST(FilmCarry, TheNearestKeyFrameOfTheShotColors) {
   for (const int frame : {6, 7, 8, 9, 10, 11}) EXPECT_NEAR(color(frame), -40.0f, 1e-3) << frame;
 }
 
-TEST(FilmCarry, ALaterKeyFrameChangesOnlyTheFramesNearerToIt) {
+TEST(FilmCarry, AdditionalKeyFrameChangesNearerFramesOnly) {
   const Scenery scenery{.pan_px = 1.5};
   FilmKey later = KeyOf(scenery, 16);
   for (float& v : later.color.ab.data) v = -v;
@@ -143,13 +143,13 @@ TEST(FilmCarry, ALaterKeyFrameChangesOnlyTheFramesNearerToIt) {
     EXPECT_EQ(before.at(i).ab.data == after.at(i).ab.data, i <= 10) << i;  // 10: as far from both
     EXPECT_EQ(before.at(i).confidence.data == after.at(i).confidence.data, i <= 10) << i;
   }
-  // Never a mean of what the two say.
+  // Never a mean of both.
   Image opposite = scenery.Ab(13);
   for (float& v : opposite.data) v = -v;
   EXPECT_LT(ErrorOf(after.at(13), opposite).weighted, 1.5);
 }
 
-TEST(FilmCarry, TheNearestIsTheNearestInTime) {
+TEST(FilmCarry, NearestMeansNearestInTime) {
   FilmFrames frames{{0, 0, 0, 0, 0, 1, 0}, {}};
   const auto owners = [&] {
     std::vector<int> nearest, second;
@@ -166,9 +166,8 @@ TEST(FilmCarry, TheNearestIsTheNearestInTime) {
   EXPECT_EQ(owners().second, (std::vector<int>{2, 0, 0, 0, 0, -1, 2}));
 }
 
-// What the camera shows of the left end at first and of the right end at last is in one key frame
-// each.
-TEST(FilmCarry, TheSecondKeyFrameIsHandedOverWhenTheNearestIsThere) {
+// The left end is seen in the first key frame only, the right end in the last one.
+TEST(FilmCarry, PassesSecondKeyFrameAfterNearest) {
   const Scenery scenery{.pan_px = 5.0};
   const std::vector<FilmKey> keys = {KeyOf(scenery, 2), KeyOf(scenery, 9)};
   const FilmFrames frames{std::vector<int>(12, 0), [&](int frame) {
@@ -216,7 +215,7 @@ TEST(FilmCarry, TheSecondKeyFrameIsHandedOverWhenTheNearestIsThere) {
   }
 }
 
-TEST(FilmCarry, WhatCannotBeFollowedIsNotClaimed) {
+TEST(FilmCarry, LostPixelsHaveNoConfidence) {
   const Scenery fast{.pan_px = 90.0};
   const auto colors = Carry(fast, std::vector<int>(6, 0), {KeyOf(fast, 0)});
   EXPECT_LT(ErrorOf(colors.at(5), fast.Ab(5)).coverage, 0.3);
@@ -238,8 +237,8 @@ TEST(FilmCarry, WhatCannotBeFollowedIsNotClaimed) {
                  });
 }
 
-// Behind a board that passes between them, flow from frame to frame loses everything.
-TEST(FilmCarry, WhatComesBackIsFoundAgain) {
+// Flow from frame to frame loses everything behind a board that passes.
+TEST(FilmCarry, FindsReappearingRegions) {
   const Scenery scenery{.pan_px = 3.0};
   const FilmFrames frames{std::vector<int>(5, 0), [&](int frame) {
                             Image l = scenery.Luminance(frame);
@@ -257,7 +256,7 @@ TEST(FilmCarry, WhatComesBackIsFoundAgain) {
       });
 }
 
-TEST(FilmCarry, InterruptedWalksGoOnToTheSameBits) {
+TEST(FilmCarry, ResumedWalksGiveTheSameBits) {
   const Scenery scenery{.pan_px = 1.5};
   const std::vector<FilmKey> keys = {KeyOf(scenery, 3), KeyOf(scenery, 9)};
   const std::vector<int> shots(14, 0);
@@ -301,7 +300,7 @@ TEST(FilmCarry, InterruptedWalksGoOnToTheSameBits) {
     EXPECT_EQ(colors.at(frame).ab.data, color.ab.data) << frame;
     EXPECT_EQ(colors.at(frame).confidence.data, color.confidence.data) << frame;
   }
-  // What is at its end reads nothing any more.
+  // A finished walk reads no more frames.
   read.clear();
   FilmResume resume{{}, {}};
   for (const auto& [place, walk] : walks) resume.walks.push_back(walk);
@@ -310,7 +309,7 @@ TEST(FilmCarry, InterruptedWalksGoOnToTheSameBits) {
   EXPECT_TRUE(read.empty());
 }
 
-TEST(FilmCarry, SmallAndWrong) {
+TEST(FilmCarry, TakesSmallFilmsAndRefusesWrongKeys) {
   const Scenery still{.pan_px = 0.0};
   EXPECT_EQ(Carry(still, {0}, {KeyOf(still, 0)}).size(), 1u);
   EXPECT_THROW(Carry(still, {0, 0}, {KeyOf(still, 2)}), Error);

@@ -14,13 +14,13 @@ namespace color3d {
 namespace {
 
 constexpr int kFeatures = 3000;
-constexpr double kLeastContrast = 0.02;  // of features: plain surfaces count, too
+constexpr double kLeastContrast = 0.02;  // of features; low, so that weak texture counts
 constexpr int kMostPlanes = 3;
 constexpr size_t kLeastOfPlane = 12;  // features
 constexpr double kOnPlanePx = 4.0;
 constexpr int kTries = 2000;
 constexpr double kSurely = 0.999;
-constexpr double kMostScale = 5.0;  // of lengths
+constexpr double kMostScale = 5.0;  // change of lengths
 
 LocalFeatures FeaturesOf(const Image& luminance) {
   Image gray = luminance;
@@ -50,7 +50,8 @@ bool IsPlausible(const cv::Matx33d& h) {
   return area > 1.0 / (kMostScale * kMostScale) && area < kMostScale * kMostScale;
 }
 
-// From the frame to the key frame; what one plane has explained is left to the next.
+// Homographies from the frame to the key frame. Each is fitted to the matches that those before it
+// do not explain.
 std::vector<cv::Matx33d> PlanesOf(Matches matches) {
   std::vector<cv::Matx33d> planes;
   for (int i = 0; i < kMostPlanes && matches.in_key.size() >= kLeastOfPlane; ++i) {
@@ -81,7 +82,7 @@ Image PlaceOnPlane(const cv::Matx33d& h, const Image& picture) {
     for (int x = 0; x < picture.width; ++x) {
       const cv::Vec3d p = h * cv::Vec3d(x, y, 1.0);
       const double w = p[2] > 1e-6 ? p[2] : 1e-6;
-      // Far outside is far enough.
+      // Places far outside need no exact value.
       place.At(0, y, x) = static_cast<float>(std::clamp(p[0] / w, -1e4, 1e4));
       place.At(1, y, x) = static_cast<float>(std::clamp(p[1] / w, -1e4, 1e4));
     }
@@ -89,7 +90,7 @@ Image PlaceOnPlane(const cv::Matx33d& h, const Image& picture) {
   return place;
 }
 
-// Where the pixels of `picture` lie in `other`: on the plane, and flow around it.
+// Places of the pixels of `picture` in `other`: by the homography, refined by flow.
 Image Refined(const cv::Matx33d& h, const Image& picture, const Image& other) {
   const Image place = PlaceOnPlane(h, picture);
   const Image rest = DenseFlow(picture, SampledAt(other, place));

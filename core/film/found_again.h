@@ -1,5 +1,5 @@
-// Places of a key frame that are found again in a frame far from it by local features, where steps
-// from frame to frame lost them: behind something that passed, or in a jump too wide for flow.
+// Finds regions of a key frame by local features in frames where tracking by flow lost them: behind
+// an occlusion, or after a jump too wide for flow.
 #pragma once
 
 #include <vector>
@@ -10,10 +10,10 @@
 
 namespace color3d {
 
-// Both ways between a key frame and another: 2 channels, x and y in px.
+// Correspondences between a key frame and another frame: 2 channels, x and y in px.
 struct FilmTrack {
-  Image in_key;    // where each pixel of the frame lies in the key frame
-  Image in_frame;  // where each pixel of the key frame lies in the frame
+  Image in_key;    // place in the key frame of each pixel of the frame
+  Image in_frame;  // place in the frame of each pixel of the key frame
 };
 
 class FoundAgain {
@@ -22,8 +22,8 @@ class FoundAgain {
   explicit FoundAgain(const Image& key);
 
   const Image& key() const { return key_; }
-  // What the frame may show of the key frame, each as one plane moves and flow around it (DIS); the
-  // plane that most features agree on first. None where features do not agree. Thread-safe.
+  // Candidate tracks: each is a homography refined by optical flow (DIS), those with most features
+  // first. Empty when features do not agree. Thread-safe.
   std::vector<FilmTrack> TracksTo(const Image& frame, const CancellationToken& cancel) const;
 
  private:

@@ -21,15 +21,15 @@ namespace color3d {
 namespace {
 
 constexpr int kDistances[] = {1, 2, 4, 8};
-constexpr float kSureCyclePx = 1.0f;   // there and back again
-constexpr float kLeastTexture = 0.4f;  // mean gradient of what a model is fitted to, L per px
+constexpr float kSureCyclePx = 1.0f;   // forward-backward error
+constexpr float kLeastTexture = 0.4f;  // mean gradient of samples, L per px
 constexpr int kSampleStepPx = 6;
 constexpr size_t kLeastSamples = 100;
 constexpr double kStillPx = 0.3;
 constexpr double kLeastMotionPx = 1.0;
-constexpr double kNoiseFactor = 4.0 * 1.4826;  // four deviations, from a median
-// A homography that explains nearly as much as a fundamental matrix is the better account: the
-// matrix would be free to explain what moves, too.
+constexpr double kNoiseFactor = 4.0 * 1.4826;  // four standard deviations, from a median
+// A homography that explains nearly as much as a fundamental matrix is preferred, since the matrix
+// may explain moving objects, too.
 constexpr double kTurnShare = 0.9;
 
 struct Flow {
@@ -52,7 +52,7 @@ Image Texture(const Image& luminance) {
   return BoxMean(gradient, 3);
 }
 
-// Of `from`, whose pixels go `there`; those of the other frame go `back`.
+// Reliable flow of `from`. `there`: from it to the other frame; `back`: from that one.
 Flow SureFlow(const Image& from, const Image& there, const Image& back) {
   Flow flow{there, std::vector<char>(from.PlaneSize(), 0), {}, Texture(from)};
   for (int y = 0; y < from.height; ++y) {
@@ -73,15 +73,15 @@ Flow SureFlow(const Image& from, const Image& there, const Image& back) {
   return flow;
 }
 
-// What the camera's motion makes of a pixel, as a function of its place in both frames.
-class Account {
+// A model of the camera's motion between two frames.
+class CameraModel {
  public:
-  static Account Of(const cv::Matx33d& matrix, CameraMotion motion) { return {matrix, motion}; }
-  static Account Still() { return {cv::Matx33d::eye(), CameraMotion::kStill}; }
+  static CameraModel Of(const cv::Matx33d& matrix, CameraMotion motion) { return {matrix, motion}; }
+  static CameraModel Still() { return {cv::Matx33d::eye(), CameraMotion::kStill}; }
 
   CameraMotion motion() const { return motion_; }
-  // px between where the pixel went and where the camera takes it: the distance from the
-  // homography's place, or Sampson's from the epipolar lines.
+  // Distance in px between the pixel's place and the model's: from the homography's place, or
+  // Sampson's distance from the epipolar lines.
   double Residual(double x, double y, double tx, double ty) const {
     const cv::Vec3d p(x, y, 1.0), q(tx, ty, 1.0);
     const cv::Vec3d l = matrix_ * p;
@@ -94,13 +94,13 @@ class Account {
   }
 
  private:
-  Account(const cv::Matx33d& matrix, CameraMotion motion) : matrix_(matrix), motion_(motion) {}
+  CameraModel(const cv::Matx33d& matrix, CameraMotion motion) : matrix_(matrix), motion_(motion) {}
 
   cv::Matx33d matrix_;
   CameraMotion motion_;
 };
 
-std::vector<double> ResidualsOf(const Account& account, const Flow& flow) {
+std::vector<double> ResidualsOf(const CameraModel& account, const Flow& flow) {
   std::vector<double> residuals;
   residuals.reserve(flow.sample.size());
   const int width = flow.there.width;
@@ -118,8 +118,8 @@ double ShareBelow(const std::vector<double>& values, double limit) {
   return static_cast<double>(below) / static_cast<double>(values.size());
 }
 
-// Of one motion of the camera; nullopt when none explains the flow.
-std::optional<Account> Explain(const Flow& flow) {
+// Fits a model; nothing when none explains the flow.
+std::optional<CameraModel> Explain(const Flow& flow) {
   std::vector<cv::Point2d> from, to;
   const int width = flow.there.width;
   for (const int at : flow.sample) {
@@ -127,18 +127,18 @@ std::optional<Account> Explain(const Flow& flow) {
     from.emplace_back(x, y);
     to.emplace_back(x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
   }
-  std::optional<Account> turn, moved;
+  std::optional<CameraModel> turn, moved;
   try {
     constexpr int kIterations = 2000;
     constexpr double kConfidence = 0.999;
     const cv::Mat h = cv::findHomography(
         from, to, cv::USAC_MAGSAC, kLeastMotionPx, cv::noArray(), kIterations, kConfidence);
-    if (h.rows == 3) turn = Account::Of(cv::Matx33d(h), CameraMotion::kTurn);
-    // Least median of squares: what explains the larger half best wins, however well another matrix
-    // explains what moves, too. It would win by the count of what lies below a threshold.
+    if (h.rows == 3) turn = CameraModel::Of(cv::Matx33d(h), CameraMotion::kTurn);
+    // Least median of squares takes the matrix that explains the larger half best. A count of
+    // inliers could prefer one that explains moving objects, too.
     const cv::Mat f = cv::findFundamentalMat(
         from, to, cv::FM_LMEDS, kLeastMotionPx, kConfidence, kIterations, cv::noArray());
-    if (f.rows == 3) moved = Account::Of(cv::Matx33d(f), CameraMotion::kMoved);
+    if (f.rows == 3) moved = CameraModel::Of(cv::Matx33d(f), CameraMotion::kMoved);
   } catch (const cv::Exception& e) {
     throw Error(ErrorCode::kInternal, "the motion of the camera failed: {}", e.err);
   }
@@ -168,8 +168,8 @@ PairResidual Compare(const Image& from, const Image& there, const Image& back) {
   const Flow flow = SureFlow(from, there, back);
   if (flow.sample.size() < kLeastSamples) return result;
   result.background_px = MedianLength(flow);
-  const std::optional<Account> account =
-      result.background_px < kStillPx ? Account::Still() : Explain(flow);
+  const std::optional<CameraModel> account =
+      result.background_px < kStillPx ? CameraModel::Still() : Explain(flow);
   if (!account) return result;
   result.motion = account->motion();
   const double noise_px = kNoiseFactor * Median(ResidualsOf(*account, flow));
@@ -180,7 +180,7 @@ PairResidual Compare(const Image& from, const Image& there, const Image& back) {
       if (!flow.sure[at]) continue;
       const double residual =
           account->Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
-      // The error of flow goes with the inverse of the gradient.
+      // The error of flow is inversely proportional to the gradient.
       const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
       result.excess.data[at] =
           static_cast<float>(residual / std::max(kLeastMotionPx, noise_px * std::max(1.0, plain)));
@@ -189,7 +189,7 @@ PairResidual Compare(const Image& from, const Image& there, const Image& back) {
   return result;
 }
 
-// Counts over the neighbours of one frame, per pixel; empty before the first one.
+// Votes of the neighbours of one frame, per pixel; empty before the first vote.
 struct Votes {
   std::vector<uint8_t> moving, all;
 };
@@ -205,7 +205,7 @@ void Add(const PairResidual& pair, Votes* votes) {
   }
 }
 
-// Plain surfaces of what moves: the flow tells nothing there.
+// Fills holes of moving regions, where weak texture gives no flow.
 void FillHoles(cv::Mat* regions) {
   constexpr double kLargestShare = 0.01;  // of the picture
   std::vector<std::vector<cv::Point>> outlines;
@@ -218,7 +218,7 @@ void FillHoles(cv::Mat* regions) {
   }
 }
 
-// Most say so; without specks and holes, grown over the soft edges of the flow.
+// Regions by majority vote, without specks and holes, dilated over the soft edges of the flow.
 Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
   cv::Mat moving(height, width, CV_8U);
   for (int y = 0; y < height; ++y) {
@@ -250,7 +250,7 @@ int NeighborCount(int frame, int count) {
   return neighbors;
 }
 
-// The frames from `begin` to `end`, each with its neighbours behind it.
+// Pairs of the frames from `begin` to `end` with the neighbours after them.
 std::vector<std::pair<int, int>> PairsFrom(int begin, int end, int count) {
   std::vector<std::pair<int, int>> pairs;
   for (int frame = begin; frame < end; ++frame) {
@@ -261,8 +261,8 @@ std::vector<std::pair<int, int>> PairsFrom(int begin, int end, int count) {
   return pairs;
 }
 
-// Of frames spread over the shot: each with the next one and with all of its like.
-std::vector<std::pair<int, int>> TellingPairs(int count) {
+// Pairs of frames spread over the shot: each with the next frame, and with one another.
+std::vector<std::pair<int, int>> SpreadPairs(int count) {
   constexpr int kPlaces = 6;
   std::set<int> places;
   for (int i = 0; i < kPlaces; ++i) places.insert(i * (count - 1) / (kPlaces - 1));
@@ -285,7 +285,7 @@ PairResidual CompareFrames(const Image& from, const Image& to) {
 ShotMotion MotionOfCamera(const ShotFrames& frames,
                           ThreadPool& pool,
                           const CancellationToken& cancel) {
-  const std::vector<std::pair<int, int>> pairs = TellingPairs(frames.count);
+  const std::vector<std::pair<int, int>> pairs = SpreadPairs(frames.count);
   std::vector<double> shift(pairs.size(), -1.0);
   pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
@@ -306,7 +306,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
                              ThreadPool& pool,
                              const CancellationToken& cancel,
                              const std::function<void(int frame, const Image& moving)>& on_frame) {
-  constexpr int kAtOnce = 16;  // frames: what is told of more is not held
+  constexpr int kAtOnce = 16;  // frames; bounds memory
   ShotMotion motion = MotionOfCamera(frames, pool, cancel);
   std::mutex adding, handing_over;
   std::vector<Votes> votes(frames.count);
@@ -314,7 +314,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
   for (int begin = 0; begin < frames.count; begin += kAtOnce) {
     const int end = std::min(begin + kAtOnce, frames.count);
     const std::vector<std::pair<int, int>> pairs = PairsFrom(begin, end, frames.count);
-    // One pair of flows tells of both frames.
+    // One pair of flows gives votes for both frames.
     pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
       cancel.ThrowIfCancelled();
       const auto [earlier, later] = pairs[i];
@@ -326,7 +326,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
       Add(of_earlier, &votes[earlier]);
       Add(of_later, &votes[later]);
     });
-    // All that there is to be told of these has been.
+    // All votes for these frames are in.
     pool.ForEach(end - begin, [&](int64_t i, int) {
       const int frame = begin + static_cast<int>(i);
       const auto picture = frames.luminance(frame);
@@ -357,7 +357,7 @@ double FootRow(const Image& moving) {
   cv::Mat labels, statistics, centers;
   const int count = cv::connectedComponentsWithStats(is_moving, labels, statistics, centers);
   int largest = 0, foot = -1;
-  for (int i = 1; i < count; ++i) {  // 0 is what stands still
+  for (int i = 1; i < count; ++i) {  // 0 is the background
     const int area = statistics.at<int>(i, cv::CC_STAT_AREA);
     if (area <= largest) continue;
     largest = area;

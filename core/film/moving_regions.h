@@ -1,6 +1,6 @@
-// What moves on its own in a film, told from what only the camera moves (METHOD.md "Poses of
-// films"): the residual of optical flow against the epipolar geometry of two frames. Pure
-// functions, thread-safe.
+// Separates moving objects in a film from the motion of the camera (METHOD.md "Poses of films") by
+// the residual of optical flow against the epipolar geometry of two frames. Pure functions,
+// thread-safe.
 #pragma once
 
 #include <functional>
@@ -12,30 +12,29 @@
 
 namespace color3d {
 
-inline constexpr int kMotionSidePx =
-    480;  // longer side of the pictures that thresholds are made for
+inline constexpr int kMotionSidePx = 480;  // longer side of the pictures that the thresholds assume
 
-// The frames of one shot, in their order.
+// The frames of one shot, in order.
 struct ShotFrames {
   int count = 0;
   // L in 0..100, 1 channel, all of one size. Called from several threads at once.
   std::function<std::shared_ptr<const Image>(int frame)> luminance;
 };
 
-// How the camera moved between two frames, by the simplest account that explains the flow.
+// Motion of the camera between two frames: the simplest model that explains the flow.
 enum class CameraMotion {
   kUnknown,  // too little texture, or nothing in common
-  kStill,    // the flow of most is nearly nothing
-  kTurn,     // a homography: a turn, a zoom, or a plane
-  kMoved,    // a fundamental matrix
+  kStill,    // most pixels have nearly no flow
+  kTurn,     // homography: a rotation, a zoom, or a planar scene
+  kMoved,    // fundamental matrix
 };
 
 struct PairResidual {
   CameraMotion motion = CameraMotion::kUnknown;
-  double background_px = 0.0;  // median length of the flow where it is sure
-  // 1 channel, per pixel of `from`: px by which the flow departs from what the camera explains, as
-  // a multiple of what noise may do there (1 px or more; more where there is little texture). Above
-  // 1 it moves; < 0 where the flow is not sure (hidden in the other frame, or beyond its border).
+  double background_px = 0.0;  // median length of the reliable flow
+  // 1 channel, per pixel of `from`: residual of the flow against the model, divided by the noise
+  // expected there (1 px or more, more where texture is weak). Above 1: moving. < 0: unreliable
+  // flow (occluded, or beyond the border of the other frame).
   Image excess;
 };
 
@@ -44,31 +43,31 @@ struct PairResidual {
 PairResidual CompareFrames(const Image& from, const Image& to);
 
 struct ShotMotion {
-  // Median over pairs of frames, near and far ones, of PairResidual::background_px; 0 when there is
-  // no pair that tells.
+  // Median of PairResidual::background_px over near and far pairs of frames; 0 without a usable
+  // pair.
   double background_px = 0.0;
-  int pairs = 0;  // that tell
+  int pairs = 0;  // usable ones
   // Less than 0.3 px in nine tenths of the pairs.
   bool camera_stands_still = false;
-  double moving_share = 0.0;  // the motion energy: share of all pixels that move on their own, 0..1
+  double moving_share = 0.0;  // motion energy: share of all pixels on moving objects, 0..1
 };
 
-// Looks at a few pairs, near and far, only: whether the camera moves at all. moving_share stays 0.
+// Measures the camera's motion from a few near and far pairs. Leaves moving_share at 0.
 ShotMotion MotionOfCamera(const ShotFrames& frames,
                           ThreadPool& pool,
                           const CancellationToken& cancel);
 
-// The same, and hands every frame's regions over, in any order, from several threads, one after
-// the other: 1 channel, 1 where most of the neighbours at distance 1, 2, 4 and 8 that tell say that
-// something moves (grown by a few px), else 0. What moves along its epipolar line, straight towards
-// or away with a camera that goes ahead, is not told from what stands nearer or farther away.
+// Also calls `on_frame` with the moving regions of each frame, in any order, from several threads,
+// one call at a time: 1 channel, 1 where most of the usable neighbours at distance 1, 2, 4 and 8
+// see motion (dilated by a few px), else 0. Motion along epipolar lines, as of objects ahead of a
+// camera that drives forward, is not distinguished from depth.
 ShotMotion FindMovingRegions(const ShotFrames& frames,
                              ThreadPool& pool,
                              const CancellationToken& cancel,
                              const std::function<void(int frame, const Image& moving)>& on_frame);
 
-// Where the largest region of what moves stands: its lowest row, as a share of the picture's height
-// from its top; < 0 when less than 0.3 % of the picture moves. `moving` as FindMovingRegions says.
+// Lowest row of the largest moving region, as a share of the picture's height from the top; < 0
+// when less than 0.3 % of the picture moves. `moving`: as FindMovingRegions passes it.
 double FootRow(const Image& moving);
 
 }  // namespace color3d

@@ -85,7 +85,7 @@ double AgreementWithTruth(const Found& found, const Film& film) {
   return both / either;
 }
 
-TEST(MovingRegions, WhatMovesBeforeAMovingCameraIsFound) {
+TEST(MovingRegions, FindsMovingObjectBeforeMovingCamera) {
   const Film film;
   const Found found = Find(film);
   EXPECT_GT(AgreementWithTruth(found, film), 0.6);
@@ -94,18 +94,18 @@ TEST(MovingRegions, WhatMovesBeforeAMovingCameraIsFound) {
   EXPECT_NEAR(found.motion.moving_share, 0.08, 0.04);
 }
 
-TEST(MovingRegions, AlsoInGrain) {
+TEST(MovingRegions, FindsMovingObjectInGrain) {
   const Film film{.noise = 3.0};
   EXPECT_GT(AgreementWithTruth(Find(film), film), 0.6);
 }
 
-TEST(MovingRegions, NothingMovesInAStillPlace) {
+TEST(MovingRegions, FindsNothingInStaticScene) {
   const Found found = Find({.board_step = 0.0});
   EXPECT_LT(found.motion.moving_share, 0.01);
   EXPECT_FALSE(found.motion.camera_stands_still);
 }
 
-TEST(MovingRegions, ACameraThatStandsStillIsToldAndTheMoverFound) {
+TEST(MovingRegions, DetectsStillCamera) {
   const Film film{.step = 0.0, .noise = 1.0};
   const Found found = Find(film);
   EXPECT_TRUE(found.motion.camera_stands_still);
@@ -113,15 +113,15 @@ TEST(MovingRegions, ACameraThatStandsStillIsToldAndTheMoverFound) {
   EXPECT_GT(AgreementWithTruth(found, film), 0.6);
 }
 
-TEST(MovingRegions, ACameraThatTurnsDoesNotStandStill) {
+TEST(MovingRegions, TurningCameraIsNotStill) {
   const Film film{.step = 0.0, .turn = {0.002, 0.01, 0.0}};
   const Found found = Find(film);
   EXPECT_FALSE(found.motion.camera_stands_still);
   EXPECT_GT(AgreementWithTruth(found, film), 0.6);
 }
 
-// Each pair of frames is measured once, in blocks of frames from the shot's beginning on.
-TEST(MovingRegions, NeitherThreadsNorTheShotsBeginningChangeWhatIsFound) {
+// Each pair of frames is measured once, in blocks of frames from the beginning of the shot.
+TEST(MovingRegions, DoNotDependOnThreadsOrFirstFrame) {
   const Film film{.step = 0.0, .noise = 1.0};
   constexpr int kLater = 3, kCount = 24, kFarthest = 8;
   const Found found = Find(film, 0, kCount, 1), later = Find(film, kLater, kCount, 3);
@@ -131,7 +131,7 @@ TEST(MovingRegions, NeitherThreadsNorTheShotsBeginningChangeWhatIsFound) {
   EXPECT_GT(found.motion.moving_share, 0.01);
 }
 
-TEST(MovingRegions, AccountsOfTwoFrames) {
+TEST(MovingRegions, ModelsOfTwoFrames) {
   const Film still{.step = 0.0}, turning{.step = 0.0, .turn = {0.0, 0.01, 0.0}}, moving;
   EXPECT_EQ(CompareFrames(still.Luminance(3), still.Luminance(5)).motion, CameraMotion::kStill);
   EXPECT_EQ(CompareFrames(turning.Luminance(3), turning.Luminance(5)).motion, CameraMotion::kTurn);
@@ -142,7 +142,7 @@ TEST(MovingRegions, AccountsOfTwoFrames) {
   EXPECT_THROW(CompareFrames(Image(320, 240, 1), Image(300, 240, 1)), Error);
 }
 
-TEST(MovingRegions, FlatFramesAndSingleFramesTellNothing) {
+TEST(MovingRegions, FlatAndSingleFramesGiveNothing) {
   ThreadPool pool(2);
   for (const int count : {0, 1, 5}) {
     int handed_over = 0;

@@ -5,10 +5,11 @@
 #include <map>
 #include <utility>
 
+#include "core/carry/confidence.h"
+
 namespace color3d {
 namespace {
 
-constexpr float kFound = 0.5f;        // confidence
 constexpr double kLeastFound = 0.15;  // share of the frame
 
 }  // namespace
@@ -36,11 +37,11 @@ ReturningShots::ReturningShots(const FilmFrames& frames,
       pool_(pool),
       cancel_(cancel),
       pictures_(keys.size()),
-      again_(keys.size()) {
+      regions_(keys.size()) {
   pool.ForEach(static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
     pictures_[i] = frames.luminance(keys[i].frame);
-    again_[i].emplace(*pictures_[i]);
+    regions_[i].emplace(*pictures_[i]);
   });
 }
 
@@ -49,12 +50,12 @@ std::optional<FilmKey> ReturningShots::KeyAt(int frame) const {
   std::vector<CarriedColor> colors(keys_.size());
   pool_.ForEach(static_cast<int64_t>(keys_.size()), [&](int64_t i, int) {
     cancel_.ThrowIfCancelled();
-    colors[i] = CarryFoundAgain(keys_[i], *again_[i], *luminance, options_, cancel_);
+    colors[i] = CarryFoundAgain(keys_[i], *regions_[i], *luminance, options_, cancel_);
   });
   std::optional<FilmKey> found;
   double most = kLeastFound;
   for (CarriedColor& color : colors) {
-    const double share = Coverage(color, kFound);
+    const double share = Coverage(color, kDecisiveConfidence);
     if (share <= most) continue;
     most = share;
     found = {frame, std::move(color)};

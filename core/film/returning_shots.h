@@ -1,4 +1,4 @@
-// Shots of a film that show the place of a key frame again, behind a cut (METHOD.md "Film").
+// Finds shots of a film that show the place of a key frame again after a cut (METHOD.md "Film").
 #pragma once
 
 #include <memory>
@@ -11,10 +11,11 @@
 
 namespace color3d {
 
-// The middle frames of shots of two frames or more that have none of `keys` (frames). Ascending.
+// Middle frames of the shots with two frames or more that contain none of the frames `keys`,
+// ascending.
 std::vector<int> MiddlesWithoutKey(const std::vector<int>& shot, const std::vector<int>& keys);
 
-// Looks for key frames in such shots. What features need of a key frame is made once for all shots.
+// Looks for key frames in such shots. Features of a key frame are computed once for all shots.
 class ReturningShots {
  public:
   // The references must outlive the object.
@@ -24,8 +25,8 @@ class ReturningShots {
                  ThreadPool& pool,
                  const CancellationToken& cancel);
 
-  // A frame as a key frame of its shot, when it surely shows what one of the key frames shows, in
-  // the colours of the one of which most is found again. Throws Error{kCancelled}.
+  // Returns the frame as a key frame of its shot, in the colours of the key frame of which it shows
+  // most; nothing when it shows too little of all. Throws Error{kCancelled}.
   std::optional<FilmKey> KeyAt(int frame) const;
 
  private:
@@ -35,7 +36,7 @@ class ReturningShots {
   ThreadPool& pool_;
   const CancellationToken& cancel_;
   std::vector<std::shared_ptr<const Image>> pictures_;  // of the key frames
-  std::vector<std::optional<FoundAgain>> again_;        // of the key frames
+  std::vector<std::optional<FoundAgain>> regions_;      // of the key frames
 };
 
 }  // namespace color3d

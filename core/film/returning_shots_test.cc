@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kWidth = 200, kHeight = 140, kNoise = 400;
 
-// Smooth noise, of which a camera shows a part.
+// Smooth noise; the camera shows a part of it.
 class Place {
  public:
   explicit Place(uint64_t seed) : noise_(kNoise, kNoise, 1) {
@@ -50,7 +50,7 @@ class ReturningShotsTest : public ::testing::Test {
   }
   const Place one_{1}, other_{2};
   mutable std::array<std::atomic<int>, 9> reads_{};  // of each frame
-  // There, elsewhere, back again, and a flash.
+  // A place, another place, the first one again, and a flash.
   const FilmFrames frames_{{0, 0, 0, 1, 1, 2, 2, 2, 3}, [this](int frame) {
                              ++reads_[frame];
                              const bool elsewhere = frame == 3 || frame == 4;
@@ -60,7 +60,7 @@ class ReturningShotsTest : public ::testing::Test {
   CancellationToken cancel_;
 };
 
-TEST_F(ReturningShotsTest, ThePlaceThatIsShownAgainHasItsColors) {
+TEST_F(ReturningShotsTest, ReturningPlaceTakesItsColors) {
   const auto found = Find(6, {KeyAt(3, -30.0f), KeyAt(1, 30.0f)});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->frame, 6);
@@ -71,13 +71,13 @@ TEST_F(ReturningShotsTest, ThePlaceThatIsShownAgainHasItsColors) {
       << "what the key frame does not show";
 }
 
-TEST_F(ReturningShotsTest, AnotherPlaceIsNotTakenForIt) {
+TEST_F(ReturningShotsTest, DoesNotMatchOtherPlaces) {
   EXPECT_FALSE(Find(3, {KeyAt(1, 30.0f)}));
   EXPECT_FALSE(Find(6, {KeyAt(3, 30.0f)}));
   EXPECT_FALSE(Find(6, {}));
 }
 
-TEST_F(ReturningShotsTest, FeaturesOfAKeyFrameAreMadeOnceForAllShots) {
+TEST_F(ReturningShotsTest, ComputesFeaturesOncePerKeyFrame) {
   const std::vector<FilmKey> keys = {KeyAt(1, 30.0f)};
   reads_[1] = 0;
   const ReturningShots returning(frames_, keys, {}, pool_, cancel_);
@@ -87,7 +87,7 @@ TEST_F(ReturningShotsTest, FeaturesOfAKeyFrameAreMadeOnceForAllShots) {
   EXPECT_EQ(reads_[1], 1);
 }
 
-TEST(ReturningShots, OnlyShotsWithoutAKeyFrameAreAsked) {
+TEST(ReturningShots, LooksAtShotsWithoutKeyFrameOnly) {
   const std::vector<int> shot = {0, 0, 0, 1, 1, 5, 2, 5, 5, 7};
   EXPECT_EQ(MiddlesWithoutKey(shot, {1}), (std::vector<int>{4, 7}));
   EXPECT_EQ(MiddlesWithoutKey(shot, {1, 8}), (std::vector<int>{4}));

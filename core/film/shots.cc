@@ -10,14 +10,13 @@
 namespace color3d {
 namespace {
 
-constexpr double kBlankDeviation = 1.5;  // of L; grain of a blank frame stays below
-constexpr int kMaxShiftPx = 5;           // of the thumbnails: a fast pan
-// Unlikeness from which two frames are of two shots, and how much it must stand out of what is
-// usual around there.
+constexpr double kBlankDeviation = 1.5;  // of L; more than the grain of a blank frame
+constexpr int kMaxShiftPx = 5;           // between thumbnails, in a fast pan
+// Least unlikeness at a cut, and its least ratio to the usual one around it.
 constexpr double kCutUnlikeness = 0.55;
 constexpr double kCutOverUsual = 2.5;
 constexpr int kUsualFrames = 6;  // to either side
-constexpr int kMostAlien = 2;    // torn frames side by side
+constexpr int kMostAlien = 2;    // successive torn frames
 
 Image Normalised(const Image& image) {
   const TonesOfPicture tones(image);
@@ -53,7 +52,7 @@ double UnlikenessOf(const Image& one, const Image& other) {
   return best;
 }
 
-// Of the steps between the frames around the one between frames k and k + 1.
+// Usual unlikeness of the steps around the one between frames k and k + 1.
 double Usual(const std::vector<double>& steps, int k) {
   std::vector<double> around;
   for (int i = std::max(0, k - kUsualFrames);
@@ -79,7 +78,7 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   const int count = static_cast<int>(thumbnails.size());
   result.fault.assign(count, FrameFault::kNone);
   result.shot.assign(count, 0);
-  std::vector<int> kept;  // frames that show something
+  std::vector<int> kept;  // frames that are not blank
   std::vector<Image> normalised;
   for (int i = 0; i < count; ++i) {
     const Image& image = thumbnails[i];
@@ -101,7 +100,7 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   const auto is_cut = [&](int k) {
     return steps[k] > kCutUnlikeness && steps[k] > kCutOverUsual * Usual(steps, k);
   };
-  // A cut to, and one from, a frame or few whose neighbours are alike.
+  // One or two frames between two cuts are alien if the frames around them are alike.
   const int count_of_steps = static_cast<int>(steps.size());
   std::vector<bool> cut(steps.size(), false);
   for (int k = 0; k < count_of_steps; ++k) cut[k] = is_cut(k);
@@ -113,7 +112,7 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
       std::fill_n(cut.begin() + k, aliens + 1, false);
     }
   }
-  // Frames with faults get the numbers behind.
+  // Frames with faults are numbered behind the shots.
   int shot = 0;
   for (size_t k = 0; k < kept.size(); ++k) {
     if (k > 0 && cut[k - 1]) {

@@ -1,5 +1,5 @@
-// Where a film is cut, and which of its frames show nothing of use, from small pictures of all
-// frames (METHOD.md "Film"). Pure functions, thread-safe.
+// Finds the cuts of a film and its useless frames from thumbnails of all frames (METHOD.md "Film").
+// Pure functions, thread-safe.
 #pragma once
 
 #include <vector>
@@ -8,20 +8,20 @@
 
 namespace color3d {
 
-inline constexpr int kShotThumbnailPx = 64;  // longer side of the small pictures
+inline constexpr int kShotThumbnailPx = 64;  // longer side of the thumbnails
 
 enum class FrameFault {
   kNone,
-  kBlank,  // black, white or of one grey all over
-  kAlien,  // it, or it and the next, unlike the frames around, which are alike: torn, or a flash
+  kBlank,  // uniformly black, white or grey
+  kAlien,  // one or two frames between frames that are alike, but unlike them: torn, or a flash
 };
 
 struct FilmShots {
-  // Of each frame, counted from 0. A frame with a fault is a shot of its own, numbered behind the
-  // others; the frames before and after it go on as one shot where they show the same.
+  // Number of each frame's shot, from 0. A frame with a fault is a shot of its own, numbered behind
+  // the others; the frames around it are one shot if they show the same.
   std::vector<int> shot;
   std::vector<FrameFault> fault;
-  std::vector<int> cuts;  // the frames that begin the second shot and those after it, ascending
+  std::vector<int> cuts;  // first frames of all shots but the first, ascending
   int count = 0;
 };
 
@@ -29,9 +29,8 @@ struct FilmShots {
 // Error{kInvalidArgument} for other channels or sizes.
 FilmShots FindShots(const std::vector<Image>& thumbnails);
 
-// How unlike two such pictures are: the mean difference of their normalised L under the best shift
-// by a few px; 0: the same but for exposure, near 1: nothing in common. For FindShots and its
-// tests.
+// Mean difference of the normalised L of two thumbnails under the best shift by a few px. 0: equal
+// but for exposure; near 1: nothing in common. For FindShots and its tests.
 double Unlikeness(const Image& one, const Image& other);
 
 }  // namespace color3d

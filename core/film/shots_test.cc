@@ -16,7 +16,7 @@ namespace {
 
 using testing::ElementsAre;
 
-// A place of its own for each `seed`; `shift` px: the camera moves; `gain`: exposure.
+// Another place for each `seed`. `shift`: of the camera, px; `gain`: exposure.
 Image Place(int seed, double shift, double gain = 1.0) {
   Image image(64, 40, 1);
   for (int y = 0; y < image.height; ++y) {
@@ -33,7 +33,7 @@ Image Place(int seed, double shift, double gain = 1.0) {
   return image;
 }
 
-TEST(Shots, CutsAreFoundAndMotionIsNone) {
+TEST(Shots, FindsCutsAndIgnoresMotion) {
   std::vector<Image> frames;
   for (int i = 0; i < 10; ++i) frames.push_back(Place(1, 1.5 * i));
   for (int i = 0; i < 7; ++i) frames.push_back(Place(2, -2.5 * i));
@@ -49,7 +49,7 @@ TEST(Shots, CutsAreFoundAndMotionIsNone) {
   EXPECT_THAT(shots.cuts, ElementsAre(10, 17, 18));
 }
 
-TEST(Shots, FaultsDoNotCutWhatGoesOn) {
+TEST(Shots, FaultyFramesDoNotCutShots) {
   std::vector<Image> frames;
   for (int i = 0; i < 12; ++i) frames.push_back(Place(1, i, 1.0 + 0.2 * (i % 2)));  // it flickers
   frames[3] = Image(64, 40, 1, 0.5f);
@@ -66,7 +66,7 @@ TEST(Shots, FaultsDoNotCutWhatGoesOn) {
   EXPECT_EQ(shots.shot[8], 3);
 }
 
-TEST(Shots, TwoTornFramesSideBySideDoNotCutEither) {
+TEST(Shots, TwoTornFramesDoNotCutShots) {
   for (const int second : {9, 10}) {  // torn alike, or each in its own way
     std::vector<Image> frames;
     for (int i = 0; i < 14; ++i) frames.push_back(Place(1, i));
@@ -80,7 +80,7 @@ TEST(Shots, TwoTornFramesSideBySideDoNotCutEither) {
   }
 }
 
-TEST(Shots, AShortShotElsewhereIsAShot) {
+TEST(Shots, FindsShortShots) {
   std::vector<Image> frames;
   for (int i = 0; i < 8; ++i) frames.push_back(Place(1, i));
   for (int i = 0; i < 2; ++i) frames.push_back(Place(9, i));
@@ -90,7 +90,7 @@ TEST(Shots, AShortShotElsewhereIsAShot) {
   EXPECT_THAT(shots.fault, testing::Each(FrameFault::kNone));
 }
 
-TEST(Shots, FewFramesAndBadOnes) {
+TEST(Shots, TakesFewFramesAndRefusesBadOnes) {
   EXPECT_EQ(FindShots({}).count, 0);
   EXPECT_EQ(FindShots({Place(1, 0)}).count, 1);
   EXPECT_EQ(FindShots({Image(64, 40, 1, 0.0f)}).count, 1);
@@ -99,7 +99,7 @@ TEST(Shots, FewFramesAndBadOnes) {
   EXPECT_THROW(FindShots({Image(64, 40, 3)}), Error);
 }
 
-// What the films that people really have look like; cuts were counted by eye.
+// Real films; cuts were counted by eye.
 TEST(Shots, RealFilms) {
   const std::filesystem::path data = std::filesystem::path(COLOR3D_SHARED_DATA);
   if (!std::filesystem::exists(data / "video")) GTEST_SKIP() << "no films";

@@ -21,13 +21,13 @@ struct WeightedColor {
   }
 };
 
-// A place of a frame, and what to read its planes with.
+// A place in a frame, and the weights that sample its planes.
 struct Place {
   Place(const Image& frame, float at_x, float at_y)
       : x(at_x), y(at_y), pixels(frame.width, frame.height, at_x, at_y) {}
 
-  // Goes on to where it lies in the next frame; false where flow does not surely tell. The flow
-  // back is that of the nearest pixel.
+  // Moves to the place in the next frame; false where forward and backward flow disagree. The
+  // backward flow is that of the nearest pixel.
   bool Follow(const Image& there, const Image& back) {
     const float dx = pixels.Of(there.Plane(0)), dy = pixels.Of(there.Plane(1));
     const float next_x = x + dx, next_y = y + dy;
@@ -46,8 +46,8 @@ struct Place {
   BilinearPlace pixels;
 };
 
-// To a row of frame `index`: what the frames behind it (direction 1) or before it (-1) show where
-// its pixels go. Frame by frame, so that few planes are read at a time.
+// Adds to a row of frame `index` the colours along its pixels' tracks into the frames after it
+// (direction 1) or before it (-1). Frame by frame, so that few planes are read at a time.
 void AddFollowed(const std::vector<FrameInMotion>& frames,
                  int index,
                  int direction,

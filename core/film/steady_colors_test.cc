@@ -50,7 +50,7 @@ class SteadyColorsTest : public ::testing::Test {
   std::vector<std::shared_ptr<const FlowPair>> flows_;
 };
 
-TEST_F(SteadyColorsTest, ColoursThatMoveAlongStay) {
+TEST_F(SteadyColorsTest, KeepsColorsThatMoveAlong) {
   for (int i = 0; i < kFrames; ++i) Add(Ramp(2.0f * i), i > 0 ? Motion(2.0f) : nullptr);
   const Image steady = Steady(4);
   for (int y = 0; y < kHeight; ++y) {
@@ -61,7 +61,7 @@ TEST_F(SteadyColorsTest, ColoursThatMoveAlongStay) {
   }
 }
 
-TEST_F(SteadyColorsTest, WhatDiffersFromFrameToFrameIsAveraged) {
+TEST_F(SteadyColorsTest, AveragesFlicker) {
   Random random(3);
   for (int i = 0; i < kFrames; ++i) {
     Image noise = Ramp(0.0f);
@@ -78,16 +78,16 @@ TEST_F(SteadyColorsTest, WhatDiffersFromFrameToFrameIsAveraged) {
   EXPECT_NEAR(after / before, 1.0 / kFrames, 0.02);
 }
 
-TEST_F(SteadyColorsTest, WhatIsNotFollowedHasNoSay) {
+TEST_F(SteadyColorsTest, IgnoresUntrackedPixels) {
   Add(Ramp(100.0f), nullptr);
-  // There and back do not agree.
+  // Forward and backward flow disagree.
   Add(Ramp(0.0f), std::make_shared<const FlowPair>(FlowPair{Field(3, 0), Field(3, 0)}));
   // A cut.
   Add(Ramp(-100.0f), nullptr);
   EXPECT_EQ(Steady(1).data, pictures_[1].data);
 }
 
-TEST_F(SteadyColorsTest, WithoutReachNothingChanges) {
+TEST_F(SteadyColorsTest, ChangesNothingWithoutReach) {
   Add(Ramp(0.0f), nullptr);
   Add(Ramp(50.0f), Motion(0.0f));
   EXPECT_EQ(Steady(0, {.reach = 0}).data, pictures_[0].data);

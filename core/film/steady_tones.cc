@@ -18,19 +18,19 @@ namespace {
 
 constexpr int kTones = 17;            // of a curve
 constexpr int kReach = 12;            // frames to either side
-constexpr int kKnots = 15;            // of a step: quantiles of what both frames show
-constexpr double kLeastShare = 0.15;  // of the pixels, that must be found again
+constexpr int kKnots = 15;            // of a step: quantiles of the matched pixels
+constexpr double kLeastShare = 0.15;  // of the pixels that must be matched
 constexpr double kCyclePx = 1.0;
-constexpr double kSteadyL = 0.2;  // jumps that are no more than what measuring gives
+constexpr double kSteadyL = 0.2;  // jumps within the error of measurement
 
 double ToneAt(int i) { return 100.0 * i / (kTones - 1); }
 
-// How tones of a frame look in the next one, at ascending tones of both.
+// Map from the tones of a frame to those of the next one, both ascending.
 struct ToneStep {
   std::array<double, kKnots> from{}, to{};
 };
 
-// Between knots straight, beyond them the last one's difference.
+// Linear between knots; beyond them the difference of the last knot.
 double Mapped(double tone,
               const std::array<double, kKnots>& from,
               const std::array<double, kKnots>& to) {
@@ -42,7 +42,7 @@ double Mapped(double tone,
   return std::lerp(to[above - 1], to[above], share);
 }
 
-// For flow: exposure and contrast do not count.
+// Normalises exposure and contrast for optical flow.
 Image ForFlow(const Image& picture) {
   const TonesOfPicture tones(picture);
   const double deviation = std::max(1.0, tones.deviation);
@@ -53,7 +53,7 @@ Image ForFlow(const Image& picture) {
   return out;
 }
 
-// Tones of places of one frame and of where flow finds them in the other.
+// Collects the tones of matched places in both frames.
 void CollectPairs(const Image& one,
                   const Image& other,
                   const Image& flow,
@@ -78,7 +78,7 @@ std::array<double, kKnots> Quantiles(std::vector<float> values) {
   std::array<double, kKnots> knots{};
   const size_t n = values.size();
   for (int k = 0; k < kKnots; ++k) {
-    // The mean around the quantile: steadier than one value.
+    // The mean around the quantile is steadier than a single value.
     const size_t begin = n * k / kKnots, end = std::max(begin + 1, n * (k + 1) / kKnots);
     double sum = 0.0;
     for (size_t i = begin; i < end; ++i) sum += values[i];
@@ -89,11 +89,11 @@ std::array<double, kKnots> Quantiles(std::vector<float> values) {
   return knots;
 }
 
-// None where too little is found again: exposure is then taken to stay.
+// Nothing where too few pixels match; the exposure then counts as unchanged.
 std::optional<ToneStep> StepBetween(const Image& one, const Image& next) {
   const Image flow_one = ForFlow(one), flow_next = ForFlow(next);
   const Image there = DenseFlow(flow_one, flow_next), back = DenseFlow(flow_next, flow_one);
-  // Both ways, so that sampling blurs both alike.
+  // In both directions, so that sampling blurs both frames alike.
   std::vector<float> of_one, of_next;
   CollectPairs(one, next, there, back, &of_one, &of_next);
   CollectPairs(next, one, back, there, &of_next, &of_one);
@@ -104,8 +104,8 @@ std::optional<ToneStep> StepBetween(const Image& one, const Image& next) {
   return ToneStep{Quantiles(std::move(of_one)), Quantiles(std::move(of_next))};
 }
 
-// L by which steps differ from those before and after them, in the mean: exposure that jumps. What
-// goes on evenly, a fade or a bias of the measuring, counts nothing.
+// Mean difference in L between a step and those before and after it: jumps of exposure. Even
+// changes, as in a fade, count nothing.
 double Jumps(const std::vector<std::optional<ToneStep>>& steps) {
   double sum = 0.0;
   int count = 0;
@@ -119,7 +119,7 @@ double Jumps(const std::vector<std::optional<ToneStep>>& steps) {
   return count > 0 ? sum / count : 0.0;
 }
 
-// The value at 0 of the line through the points (offset, value), those far from it counting little.
+// Value at 0 of a line through the points (offset, value), fitted robustly.
 double LineAtZero(const std::vector<double>& offsets, const std::vector<double>& values) {
   constexpr int kRounds = 3;
   std::vector<double> weights, rests(values.size());
@@ -152,7 +152,7 @@ double LineAtZero(const std::vector<double>& offsets, const std::vector<double>&
   return at_zero;
 }
 
-// Of the frame at `at` of a shot; steps[k] leads from its frame k to k + 1.
+// Curve of the frame at `at` of a shot. steps[k] leads from its frame k to k + 1.
 ToneCurve CurveOf(const std::vector<std::optional<ToneStep>>& steps, int at) {
   const int count = static_cast<int>(steps.size()) + 1;
   const int first = std::max(0, at - kReach), last = std::min(count - 1, at + kReach);

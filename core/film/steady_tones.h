@@ -1,7 +1,6 @@
-// Flicker of exposure taken out of a film (METHOD.md "Film"): for each frame the monotone curve
-// that gives its tones what the same places have in the frames around it. What moves, comes or goes
-// does not count: tones are compared where optical flow finds the same place again. Pure functions,
-// thread-safe.
+// Removes flicker of exposure from a film (METHOD.md "Film"): computes for each frame the monotone
+// curve that maps its tones to those of the frames around it. Tones are compared along optical
+// flow, so that moving objects do not count. Pure functions, thread-safe.
 #pragma once
 
 #include <vector>
@@ -12,28 +11,27 @@
 
 namespace color3d {
 
-inline constexpr int kTonePicturePx = 112;  // longer side of the small pictures
+inline constexpr int kTonePicturePx = 112;  // longer side of the thumbnails
 
-// L to L, 0..100, at tones that are evenly spread from 0 to 100; never falls. Empty: nothing
-// changes.
+// Monotone map of L to L, 0..100, at evenly spread tones from 0 to 100. Empty: identity.
 using ToneCurve = std::vector<float>;
 
 struct SteadyTones {
   std::vector<ToneCurve> curves;  // of each frame
-  // L by which the same places differ from a frame to the next of its shot, in the mean.
+  // Mean difference in L between the same places of a frame and the next one of its shot.
   double flicker_before = 0.0;
   double flicker_after = 0.0;
 };
 
-// `pictures`: 1 channel, L in 0..100, equal sizes, in the order of the film; `shot` of each:
-// exposure is compared within a shot only. Throws Error{kInvalidArgument} for other channels, sizes
-// or counts, Error{kCancelled}.
+// `pictures`: 1 channel, L in 0..100, equal sizes, in the order of the film. `shot`: of each
+// picture; exposure is compared within a shot only. Throws Error{kInvalidArgument} for other
+// channels, sizes or counts, Error{kCancelled}.
 SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
                             const std::vector<int>& shot,
                             ThreadPool& pool,
                             const CancellationToken& cancel);
 
-// The picture (1 channel, L) under the curve.
+// Applies the curve to a picture of L, 1 channel.
 Image Toned(Image luminance, const ToneCurve& curve);
 
 }  // namespace color3d

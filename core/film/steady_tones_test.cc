@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kWidth = 112, kHeight = 84;
 
-// A wall that the camera pans along, and a dark thing that walks before it, in fixed grain.
+// A pan along a wall with a dark moving object before it, in fixed grain.
 Image Scenery(int frame, double pan_px) {
   Image image(kWidth, kHeight, 1);
   std::mt19937 grain(static_cast<unsigned>(frame));
@@ -62,7 +62,7 @@ SteadyTones Find(const std::vector<Image>& pictures, std::vector<int> shots = {}
   return FindSteadyTones(pictures, shots, pool, cancel);
 }
 
-// What exposure makes of a tone, from a frame to the next, in the mean over tones of 25..75.
+// Change of tones by exposure from a frame to the next, mean over tones of 25..75.
 double FlickerOf(const std::vector<Exposure>& exposures, const std::vector<ToneCurve>& curves) {
   const auto seen = [&](size_t frame, float tone) {
     Image pixel(1, 1, 1, exposures[frame].Of(tone));
@@ -78,7 +78,7 @@ double FlickerOf(const std::vector<Exposure>& exposures, const std::vector<ToneC
   return sum / count;
 }
 
-TEST(SteadyTones, FlickerFallsToLessThanAFifth) {
+TEST(SteadyTones, ReducesFlickerToAFifth) {
   constexpr int kFrames = 40;
   for (const double pan_px : {0.0, 1.5}) {
     const std::vector<Exposure> exposures = Flicker(kFrames);
@@ -101,7 +101,7 @@ TEST(SteadyTones, FlickerFallsToLessThanAFifth) {
   }
 }
 
-TEST(SteadyTones, WhatDoesNotFlickerStays) {
+TEST(SteadyTones, KeepsSteadyFilms) {
   for (const double pan_px : {0.0, 1.5, 4.0}) {
     std::vector<Image> pictures;
     for (int i = 0; i < 30; ++i) pictures.push_back(Scenery(i, pan_px));
@@ -118,7 +118,7 @@ TEST(SteadyTones, WhatDoesNotFlickerStays) {
   }
 }
 
-TEST(SteadyTones, ASlowFadeIsNoFlicker) {
+TEST(SteadyTones, KeepsSlowFades) {
   std::vector<Image> pictures;
   for (int i = 0; i < 30; ++i) {
     pictures.push_back(Exposed(Scenery(i, 0.5), {0.6 + 0.4 * i / 29.0, 0.0}));
@@ -129,7 +129,7 @@ TEST(SteadyTones, ASlowFadeIsNoFlicker) {
   }
 }
 
-TEST(SteadyTones, ShotsDoNotMixAndFewFramesStay) {
+TEST(SteadyTones, TreatsShotsApartAndKeepsFewFrames) {
   std::vector<Image> pictures;
   std::vector<int> shots;
   for (int i = 0; i < 20; ++i) {
@@ -170,7 +170,7 @@ TEST(SteadyTones, RealFilms) {
   }
 }
 
-TEST(SteadyTones, EmptyAndWhiteFramesGiveFiniteCurves) {
+TEST(SteadyTones, GivesFiniteCurvesForFlatFrames) {
   std::vector<Image> pictures;
   for (int i = 0; i < 8; ++i) pictures.push_back(Image(kWidth, kHeight, 1, i % 2 ? 100.0f : 0.0f));
   const SteadyTones tones = Find(pictures);

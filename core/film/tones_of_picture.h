@@ -1,5 +1,5 @@
-// Mean and deviation of a picture's tones, by which exposure and contrast are taken out. Internal
-// to the film module.
+// Mean and standard deviation of a picture's tones, to normalise exposure and contrast. Internal to
+// the film module.
 #pragma once
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "core/base/base64.h"
+#include "core/base/text/base64.h"
 #include "core/report/page_style.h"
 #include "core/report/plot.h"
 
@@ -109,8 +109,8 @@ std::string ViewsHtml(const std::vector<ReportView>& views) {
   return html + "</details></section>";
 }
 
-std::string KeyViewHtml(const ReportKeyView& key) {
-  std::string html = ChapterStart("Key view") + Paragraphs(key.notes);
+std::string KeyViewHtml(const std::string& title, const ReportKeyView& key) {
+  std::string html = ChapterStart(title) + Paragraphs(key.notes);
   html += RowHtml(key.pictures);
   if (!key.color_facts.empty()) {
     html += "<h3>Its colour</h3><div class=\"box\"><table>";
@@ -278,7 +278,10 @@ std::string RenderReport(const ReportData& data) {
     html += "<p class=\"warn\">" + EscapeHtml(warning) + "</p>";
   }
   if (!data.key_view.pictures.pictures.empty() || !data.key_view.ranking.bytes.empty()) {
-    html += KeyViewHtml(data.key_view);
+    html += KeyViewHtml("Key view", data.key_view);
+  }
+  for (const ReportKeyView& key : data.additional_key_views) {
+    html += KeyViewHtml("Additional key view", key);
   }
   for (const ReportSection& section : data.sections) html += SectionHtml(section);
   html += ViewsHtml(data.views);

@@ -49,7 +49,7 @@ struct ReportRow {
   std::vector<ReportPicture> pictures;
 };
 
-// How the key view was chosen and where its colour comes from.
+// How a key view was chosen and the source of its colour.
 struct ReportKeyView {
   ReportRow pictures;
   std::vector<std::string> notes;  // paragraphs of plain text
@@ -78,7 +78,8 @@ struct ReportData {
   std::string summary;    // one paragraph of plain text
   std::string view_page;  // file beside the report that shows the scene in 3D; empty: none
   ReportKeyView key_view;
-  std::vector<ReportSection> sections;  // between the key view and the views
+  std::vector<ReportKeyView> additional_key_views;  // a chapter each behind it
+  std::vector<ReportSection> sections;              // between the key view and the views
   // Those with a render and something beside it can be chosen in the slider, the first one first.
   std::vector<ReportView> views;
   std::vector<std::pair<std::string, std::string>> headline;  // a few figures, for people

@@ -85,5 +85,17 @@ TEST(Report, KeyViewSectionTellsChoiceAndColour) {
   EXPECT_EQ(RenderReport({}).find("Key view"), std::string::npos);
 }
 
+TEST(Report, ShowsEachAdditionalKeyView) {
+  ReportData data;
+  data.additional_key_views.resize(2);
+  data.additional_key_views[0].pictures = {"b.jpg", {{"as captured", "\x89PNG"}}};
+  data.additional_key_views[1].pictures = {"c.jpg", {{"as captured", "\x89PNG"}}};
+  data.additional_key_views[1].color_facts = {{"source", "backend"}};
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("b.jpg"), std::string::npos);
+  EXPECT_LT(html.find("b.jpg"), html.find("c.jpg"));
+  EXPECT_NE(html.find("<td>source</td><td>backend</td>"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace color3d

@@ -87,12 +87,12 @@ class CarryStageTest : public StageTest {
     }
     return "nothing";
   }
-  FurtherKeyView Further(int view, const Image& srgb) {
-    FurtherKeyView further{scene_.views[view].name, {}};
-    further.color.source = ColorizeKeyViewOptions::Source::kImage;
-    further.color.file = scratch_.path() / ("further" + std::to_string(view) + ".png");
-    WriteFileAtomic(further.color.file, EncodePng16(srgb));
-    return further;
+  std::string AddKeyViewIn(int view, const Image& srgb) {
+    ColorizeKeyViewOptions key;
+    key.view = scene_.views[view].name;
+    key.file = scratch_.path() / ("key" + std::to_string(view) + ".png");
+    WriteFileAtomic(key.file, EncodePng16(srgb));
+    return AddKeyView(key);
   }
 
   Scene scene_;
@@ -159,14 +159,14 @@ TEST_F(CarryStageTest, NothingIsCarriedFromOrToWhatIsMaskedOut) {
   EXPECT_LT(carried_of_half(Carried(0), kWidth / 2), 0.6) << "from it";
 }
 
-TEST_F(CarryStageTest, AFurtherKeyViewFillsTheRestAndContradictsNothing) {
+TEST_F(CarryStageTest, AdditionalKeyViewFillsWhatIsOpen) {
   // A second key view in another colour: only what the first does not show may be its.
   Image other = truth_[4];
   for (size_t i = 0; i < other.PlaneSize(); ++i) {
     other.Plane(1)[i] = -20.0f;
     other.Plane(2)[i] = 0.0f;
   }
-  options_.further = {Further(4, SrgbFromLab(other))};
+  options_.additional_key_views = {AddKeyViewIn(4, SrgbFromLab(other))};
   const nlohmann::json facts = Run();
   EXPECT_EQ(facts["key_views"], nlohmann::json({"p1.png", "p4.png"}));
   EXPECT_GT(facts["views"][3]["coverage"], 0.85);
@@ -181,15 +181,18 @@ TEST_F(CarryStageTest, AFurtherKeyViewFillsTheRestAndContradictsNothing) {
   EXPECT_GT(filled, 70);
 }
 
-TEST_F(CarryStageTest, FurtherKeyViewsThatCannotBeAreRefused) {
-  options_.further = {Further(0, SrgbFromLab(truth_[0]))};
-  EXPECT_THAT(Complaint(), HasSubstr("held out"));
-  options_.further = {Further(1, SrgbFromLab(truth_[1]))};
-  EXPECT_THAT(Complaint(), HasSubstr("key view already"));
-  options_.further = {{"nowhere.png", {}}};
-  EXPECT_THAT(Complaint(), HasSubstr("nowhere.png"));
-  options_.further = {Further(3, Image(7, 5, 3, 0.4f))};
-  EXPECT_THAT(Complaint(), HasSubstr("7x5"));
+TEST_F(CarryStageTest, RefusesUnfitAdditionalKeyViews) {
+  const auto complaint = [&](const std::string& view) {
+    options_.additional_key_views = {view};
+    return Complaint();
+  };
+  EXPECT_THAT(complaint("p0.png"), HasSubstr("held out"));
+  EXPECT_THAT(complaint("p1"), HasSubstr("key view already"));
+  EXPECT_THAT(complaint("nowhere.png"), HasSubstr("nowhere.png"));
+  EXPECT_THAT(complaint("p3.png"),
+              HasSubstr("colours of the additional key view p3.png are missing"));
+  options_.additional_key_views.assign(17, "p3.png");
+  EXPECT_THAT(Complaint(), HasSubstr("at most 16"));
 }
 
 TEST_F(CarryStageTest, AKeyViewThatShowsNothingOfTheOthersIsSaid) {

@@ -1,4 +1,4 @@
-// The stage carry_color on a film: key frames that are given later.
+// The stage carry_color on a film with an additional key view.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include "core/color/lab.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_views.h"
 #include "core/stage/run_stages.h"
-#include "core/stage/sources/further_colors.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
@@ -35,9 +35,9 @@ Image LabOf(int frame) {
   return lab;
 }
 
-class LaterKeyFrameTest : public StageTest {
+class AdditionalKeyFrameTest : public StageTest {
  protected:
-  LaterKeyFrameTest() {
+  AdditionalKeyFrameTest() {
     for (int i = 0; i < kFrames; ++i) {
       View view;
       view.name = view.image_file = fmt::format("f{:02}.png", i);
@@ -66,7 +66,7 @@ class LaterKeyFrameTest : public StageTest {
     return files;
   }
   // The frame in one other colour, of which the columns from `begin` to `end` are painted.
-  FurtherKeyView Painted(int view, int begin, int end) {
+  std::string AddPainted(int view, int begin, int end) {
     Image lab = LabOf(view);
     std::fill_n(lab.Plane(1), lab.PlaneSize(), -25.0f);
     std::fill_n(lab.Plane(2), lab.PlaneSize(), -5.0f);
@@ -76,19 +76,19 @@ class LaterKeyFrameTest : public StageTest {
     for (int y = 0; y < kHeight; ++y) {
       for (int x = begin; x < end; ++x) painted.At(3, y, x) = 1.0f;
     }
-    FurtherKeyView further{scene_.views[view].name, {}};
-    further.color.source = ColorizeKeyViewOptions::Source::kImage;
-    further.color.file = scratch_.path() / "painted.png";
-    WriteFileAtomic(further.color.file, EncodePng16(painted));
-    return further;
+    ColorizeKeyViewOptions key;
+    key.view = scene_.views[view].name;
+    key.file = scratch_.path() / "painted.png";
+    WriteFileAtomic(key.file, EncodePng16(painted));
+    return AddKeyView(key);
   }
   Scene scene_;
 };
 
-TEST_F(LaterKeyFrameTest, ChangesTheFramesNearerToItAndWhatIsOpenInOthers) {
+TEST_F(AdditionalKeyFrameTest, ChangesNearerFramesAndFillsOthers) {
   CarryColorOptions options;
   const auto before = Run(options);
-  options.further = {Painted(12, 0, kWidth)};
+  options.additional_key_views = {AddPainted(12, 0, kWidth)};
   const auto after = Run(options);
   int filled = 0;
   for (int i = 0; i < kFrames; ++i) {
@@ -109,10 +109,10 @@ TEST_F(LaterKeyFrameTest, ChangesTheFramesNearerToItAndWhatIsOpenInOthers) {
   EXPECT_GT(filled, 5 * kHeight) << "the right ends of the frames, which the first does not show";
 }
 
-TEST_F(LaterKeyFrameTest, WhatIsNotPaintedKeepsItsColor) {
+TEST_F(AdditionalKeyFrameTest, KeepsColorOfUnpaintedParts) {
   CarryColorOptions options;
   const AbMap before = DecodeAbPng(Run(options)[13], "before");
-  options.further = {Painted(12, 0, kWidth / 2)};
+  options.additional_key_views = {AddPainted(12, 0, kWidth / 2)};
   const AbMap after = DecodeAbPng(Run(options)[13], "after");
   const Image truth = LabOf(13);
   double painted = 0.0, kept = 0.0, sure = 0.0, was_sure = 0.0;
@@ -128,12 +128,13 @@ TEST_F(LaterKeyFrameTest, WhatIsNotPaintedKeepsItsColor) {
   EXPECT_GT(sure, 0.7 * was_sure);
 }
 
-// Of a reduced column, two thirds are painted.
-TEST_F(LaterKeyFrameTest, TheBorderOfWhatIsPaintedIsNoPaler) {
+// Two thirds of a column of the reduced picture are painted.
+TEST_F(AdditionalKeyFrameTest, BorderOfPaintIsNotPaler) {
   constexpr int kSide = 64, kBorder = 28;
   const ViewImages images(scene_, scratch_.path(), kSide);
-  StageContext context = MakeContext();
-  const CarriedColor color = ColorOfFurther(Painted(12, 0, 43), 12, scene_, images, context);
+  AddPainted(12, 0, 43);
+  const StageContext context = MakeContext();
+  const CarriedColor color = ReadAdditionalKeyColor(context, scene_, 12, images);
   const int y = color.ab.height / 2;
   EXPECT_NEAR(color.confidence.At(0, y, kBorder - 1), 1.0, 1e-4);
   EXPECT_NEAR(color.confidence.At(0, y, kBorder), 2.0 / 3.0, 0.02);

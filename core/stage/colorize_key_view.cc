@@ -6,7 +6,9 @@
 #include "core/scene/key_photo.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_views.h"
 #include "core/stage/run_stages.h"
+#include "core/stage/sources/given_colors.h"
 #include "core/stage/sources/key_color_sources.h"
 
 namespace color3d {
@@ -24,7 +26,9 @@ std::vector<std::string> NotesOnGivenPicture(const ColorizeKeyViewOptions& optio
 
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
-  const int key = ReadKeyView(context, scene);
+  const bool additional = !options.view.empty();
+  const int key =
+      additional ? FindAdditionalKeyView(scene, options.view) : ReadKeyView(context, scene);
   KeyPhoto photo;
   photo.srgb =
       ReadKeyPhoto(context.scene_folder() / scene.views[key].image_file, context.MemoryBytes());
@@ -42,13 +46,19 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   }
   // Everything after this works on undistorted pictures.
   const ViewImages images(scene, context.scene_folder(), 0, 0);
-  Image confidence = result.confidence.Empty() ? Image() : images.Undistort(key, result.confidence);
-  if (options.source != ColorizeKeyViewOptions::Source::kImage) {
-    // None at all says that the user left a place unpainted; what a source says is more.
-    for (float& value : confidence.data) value = std::max(value, kLeastConfidence);
+  CarriedColor color;
+  if (result.confidence.Empty()) {
+    color.ab = images.Undistort(key, result.ab);
+  } else if (additional) {
+    color = UndistortGiven(result.ab, result.confidence, key, images);
+  } else {
+    color = {images.Undistort(key, result.ab), images.Undistort(key, result.confidence)};
   }
-  context.WriteOutput(artifact::kKeyColor,
-                      EncodeAbPng(images.Undistort(key, result.ab), confidence));
+  if (options.source != ColorizeKeyViewOptions::Source::kImage) {
+    // Confidence 0 marks places that the user left unpainted.
+    for (float& value : color.confidence.data) value = std::max(value, kLeastConfidence);
+  }
+  context.WriteOutput(artifact::kKeyColor, EncodeAbPng(color.ab, color.confidence));
   context.WriteOutput(artifact::kKeyViewColored,
                       EncodePng8(SrgbFromLab(JoinLab(photo.luminance, result.ab))));
   if (!result.regions.Empty()) {

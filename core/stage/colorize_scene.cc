@@ -96,7 +96,9 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
   }
   metrics["seconds_total"] = total;
   for (const StageSummary& s : stages) {
-    if (s.state == "SUCCEEDED") metrics["seconds_" + s.kind] = s.seconds;
+    if (s.state != "SUCCEEDED") continue;
+    const std::string name = "seconds_" + s.kind;
+    metrics[name] = metrics.value(name, 0.0) + s.seconds;  // several key views are jobs of one kind
   }
   if (peak > 0) metrics["peak_memory_bytes"] = peak;
   return metrics;
@@ -293,6 +295,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   data.summary = Summary(scene, IsColoredAsFilm(context, scene), metrics, keys);
   if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
   data.key_view = ReportOfKeyView(KeyPictures(key ? scene.views[*key].name : "", context), context);
+  data.additional_key_views = ReportOfAdditionalKeyViews(scene, kReportSidePx, context);
   std::vector<CurvePoint> personalization;
   std::partition_copy(curves.begin(),
                       curves.end(),

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/range_check.h"
+#include "core/carry/confidence.h"
 #include "core/color/lab.h"
 #include "core/colorizer/corrector.h"
 #include "core/image/codec.h"
@@ -118,7 +119,7 @@ void WarnIfOffTheGeometry(const Painted& painted, const std::string& name, Stage
       "reaches other views by looks alone");
 }
 
-Painted ReadCorrection(const FurtherKeyView& wanted,
+Painted ReadCorrection(const ColorCorrection& wanted,
                        const ColoredViews& views,
                        StageContext& context) {
   const int index = views.scene().FindView(wanted.view);
@@ -129,7 +130,7 @@ Painted ReadCorrection(const FurtherKeyView& wanted,
   Painted painted{index, {views.Picture(index), {}, {}}};
   Correction& correction = painted.correction;
   const GivenColors given =
-      ReadGivenColors(wanted.color,
+      ReadGivenColors(wanted.colors,
                       ReadKeyPhoto(context.scene_folder() / view.image_file, context.MemoryBytes()),
                       correction.picture.ab,
                       context);
@@ -146,7 +147,7 @@ Painted ReadCorrection(const FurtherKeyView& wanted,
   return painted;
 }
 
-std::vector<Painted> ReadCorrections(const std::vector<FurtherKeyView>& wanted,
+std::vector<Painted> ReadCorrections(const std::vector<ColorCorrection>& wanted,
                                      const ColoredViews& views,
                                      StageContext& context) {
   std::vector<Painted> painted;
@@ -169,8 +170,8 @@ std::vector<Painted> ReadCorrections(const std::vector<FurtherKeyView>& wanted,
 // What was corrected is the user's: seen.
 void CountAsSeen(const Image& share, Image* provenance) {
   for (size_t i = 0; i < share.data.size(); ++i) {
-    for (int c = 0; c < 3; ++c) provenance->Plane(c)[i] *= 1.0f - share.data[i];
-    provenance->Plane(1)[i] += share.data[i];
+    for (int c = 0; c < kProvenancePlanes; ++c) provenance->Plane(c)[i] *= 1.0f - share.data[i];
+    provenance->Plane(kSeenPlane)[i] += share.data[i];
   }
 }
 
@@ -225,9 +226,16 @@ nlohmann::ordered_json WriteProposals(const std::vector<ProposedPlace>& proposed
 }  // namespace
 
 void CorrectColorsOptions::Validate() const {
-  if (corrections.size() > kMaxCorrections) {
+  const size_t count = corrections.size() + ranges.size();
+  if (count > kMaxCorrections) {
     throw InvalidArgument(
-        "{} corrections were given; at most {} are taken", corrections.size(), kMaxCorrections);
+        "{} corrections were given; at most {} are taken", count, kMaxCorrections);
+  }
+  if (!corrections.empty() && !ranges.empty()) {
+    throw InvalidArgument(
+        "the correction of {} has no range of time, as a film's must (begin_s, end_s); to colour "
+        "the film anew from it, make it an additional key view",
+        corrections.front().view);
   }
   RangeCheck("correction option")("proposals", proposals, 0, kMaxProposals);
 }
@@ -236,9 +244,8 @@ void RunCorrectColors(const CorrectColorsOptions& options,
                       StageContext& context,
                       const std::string& encoder) {
   options.Validate();
-  const auto has_range = [](const FurtherKeyView& correction) { return correction.HasRange(); };
-  if (std::any_of(options.corrections.begin(), options.corrections.end(), has_range)) {
-    return RecolorRanges(options.corrections, ReadScene(context), encoder, context);
+  if (!options.ranges.empty()) {
+    return RecolorRanges(options.ranges, ReadScene(context), encoder, context);
   }
   const ColoredViews views(context);
   const Scene& scene = views.scene();

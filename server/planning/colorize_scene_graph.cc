@@ -186,7 +186,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
   const ColorizeSceneSpec& given = submitted.colorize_scene();
   if (scene.select_key_view().count() > 1) {
     throw InvalidArgument(
-        "select_key_view.count is {}, but this job colours one key view; select several by a {} "
+        "select_key_view.count is {}, but this job selects one key view; select several by a {} "
         "job, and name all but the first in carry_color.further_key_views",
         scene.select_key_view().count(),
         kind::kSelectKeyView);

@@ -3,9 +3,11 @@
 #include <set>
 #include <utility>
 
+#include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
+#include "server/planning/key_view_jobs.h"
 #include "server/planning/spec_check.h"
 
 namespace color3d {
@@ -43,6 +45,10 @@ GraphBuilder::GraphBuilder(const v1::JobSpec& submitted,
                             input.name,
                             input.scene,
                             submitted.scene());
+    }
+    if (input.kind == kind::kColorizeKeyView &&
+        ColorsAdditionalKeyView(ParseSpec(input.spec, input.name))) {
+      continue;
     }
     const auto [it, fresh] = given_.emplace(input.kind, input);
     if (!fresh && it->second.name != input.name) {
@@ -111,6 +117,19 @@ void GraphBuilder::LinkIfThere(const std::string& provider, NewJob* job) const {
   }
 }
 
+int GraphBuilder::AddKeyView(const v1::FurtherKeyView& view) {
+  v1::JobSpec spec = StageSpec(kind::kColorizeKeyView);
+  spec.mutable_colorize_key_view()->set_view(view.view());
+  *spec.mutable_colorize_key_view()->mutable_source() = view.color();
+  NewJob job;
+  job.kind = kind::kColorizeKeyView;
+  Provide(artifact::kScene, job.kind, &job);
+  job.spec = DeterministicBytes(spec);
+  for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
+  graph_.jobs.push_back(std::move(job));
+  return static_cast<int>(graph_.jobs.size()) - 1;
+}
+
 void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   NewJob job;
   job.kind = KindOf(spec);
@@ -126,6 +145,12 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
     if (linked.insert(provider).second) LinkIfThere(provider, &job);
   }
   fill_unset_(&spec);
+  if (skip_reason.empty()) {
+    for (v1::FurtherKeyView* view : AdditionalKeyViews(&spec)) {
+      job.inputs.push_back(AddKeyView(*view));
+      view->clear_color();
+    }
+  }
   job.spec = DeterministicBytes(spec);
   for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
   planned_[job.kind] = static_cast<int>(graph_.jobs.size());

@@ -17,8 +17,9 @@ class GraphBuilder {
   // Fills in what the user left open in a stage's options.
   using FillUnset = std::function<void(v1::JobSpec*)>;
 
-  // `submitted` outlives the builder. `inputs`: the jobs that it names, with their children. Throws
-  // Error{kInvalidArgument} for inputs of another scene and for two jobs of one kind.
+  // `submitted` must outlive the builder. `inputs`: the jobs that it names, with their children;
+  // jobs that coloured additional key views are passed over. Throws Error{kInvalidArgument} for
+  // inputs of another scene and for two jobs of one kind.
   GraphBuilder(const v1::JobSpec& submitted,
                const std::vector<JobRecord>& inputs,
                FillUnset fill_unset);
@@ -32,7 +33,8 @@ class GraphBuilder {
   // Appends the job, skipped when there is a reason to. What its stage needs comes from earlier
   // jobs of the graph, then from given inputs, then, where the submitted stage may bring them
   // along, from jobs that are added for it; what it only reads when it is there, from the first
-  // two. Throws ServiceError INPUT_MISSING naming an artifact that nothing provides.
+  // two. Each additional key view in its options is coloured by a job that is appended before it.
+  // Throws ServiceError INPUT_MISSING naming an artifact that nothing provides.
   void Add(v1::JobSpec spec, const std::string& skip_reason = "");
 
   // Appends the submitted job as the parent of all others: it waits for them and for the inputs.
@@ -41,6 +43,8 @@ class GraphBuilder {
   NewGraph Take() { return std::move(graph_); }
 
  private:
+  // Appends the colorize_key_view job of an additional key view and returns its position.
+  int AddKeyView(const v1::FurtherKeyView& view);
   void Provide(const std::string& artifact, const std::string& for_kind, NewJob* job);
   void LinkIfThere(const std::string& provider, NewJob* job) const;
 

@@ -104,6 +104,8 @@ TEST(Planner, AKeyFrameWithARangeOfTimeCorrectsTheColoredFilm) {
   const NewGraph with = PlanJob(spec, {}, film);
   const v1::JobSpec correct = SpecOf(with, "correct_colors");
   ASSERT_EQ(correct.correct_colors().corrections_size(), 1);
+  EXPECT_FALSE(correct.correct_colors().corrections(0).has_color());
+  EXPECT_EQ(with.jobs.size(), without.jobs.size() + 1) << "its colours are a job's";
   EXPECT_EQ(correct.correct_colors().corrections(0).end_s(), 14.5);
   EXPECT_EQ(with.jobs[IndexOf(with, "correct_colors")].skip_reason, "");
   EXPECT_THAT(InputKinds(with, "render"), Contains("correct_colors"));

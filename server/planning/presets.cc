@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "server/planning/key_view_jobs.h"
 #include "server/planning/preset_files.h"
 
 namespace color3d {
@@ -59,8 +60,6 @@ void MergeOver(const Message& given, Message* base) {
   base->MergeFrom(*rest);
 }
 
-bool HasRange(const v1::FurtherKeyView& key) { return key.has_begin_s() || key.has_end_s(); }
-
 // Key views that count in a range of time correct the coloured film: nothing before is made anew.
 void TakeRangesAsCorrections(v1::ColorizeSceneSpec* spec) {
   auto* further = spec->mutable_carry_color()->mutable_further_key_views();
@@ -91,7 +90,7 @@ v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
   v1::ColorizeSceneSpec merged = OptionsOf(given.preset());
   MergeOver(given, &merged);
   TakeRangesAsCorrections(&merged);
-  // A preset that carries no colour does so where further key views need it.
+  // A preset that carries no colour does so where additional key views need it.
   if (!merged.carry_color().further_key_views().empty()) {
     merged.mutable_carry_color()->clear_skip();
   }

@@ -23,7 +23,7 @@ const v1::ColorizeSceneSpec& OptionsOf(v1::Preset preset);
 
 // What was given, over its preset; stages without a size of their own take the scene's. Whatever
 // has a value in `given` keeps it, but for enums that are set to "unspecified"; lists and sources
-// of colour are taken whole. Further key views with a range of time become corrections.
+// of colour are taken whole. Additional key views with a range of time become corrections.
 v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given);
 
 // The same for the options of one stage: `spec`'s, over those that `scene` (as WithPreset returns

@@ -95,7 +95,7 @@ TEST(WithPreset, ASizeOfAStagesOwnWinsOverTheScenes) {
   EXPECT_EQ(merged.render().max_side_px(), 100);
 }
 
-TEST(WithPreset, FurtherKeyViewsAreCarriedWhateverThePresetSays) {
+TEST(WithPreset, AdditionalKeyViewsAreCarriedInEveryPreset) {
   v1::ColorizeSceneSpec given = Given(v1::PRESET_PAPER);
   given.mutable_carry_color()->add_further_key_views()->set_view("a");
   EXPECT_FALSE(WithPreset(given).carry_color().skip());

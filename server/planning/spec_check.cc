@@ -10,6 +10,7 @@
 #include "core/catalogue/stages.h"
 #include "proto/option_text.h"
 #include "server/base/service_error.h"
+#include "server/planning/key_view_jobs.h"
 
 namespace color3d {
 namespace {
@@ -215,8 +216,6 @@ void CheckStrategy(const v1::SelectKeyViewSpec& spec, const std::string& path) {
   }
 }
 
-bool HasRange(const v1::FurtherKeyView& key) { return key.has_begin_s() || key.has_end_s(); }
-
 void CheckRange(const v1::FurtherKeyView& key, const std::string& entry) {
   if (!key.has_begin_s() || !key.has_end_s() || key.end_s() >= key.begin_s()) return;
   Reject(entry + ".end_s",
@@ -304,6 +303,11 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
   if (!has_inputs || spec.has_key_color() || in_options) {
     CheckKeyColor(in_options ? spec.colorize_key_view().source() : spec.key_color(), "key_color");
+  }
+  if (!spec.colorize_key_view().view().empty()) {
+    Reject(fmt::format("{}.view", kind::kColorizeKeyView),
+           " is set, but a whole scene names its key view in key_view and additional ones in "
+           "carry_color.further_key_views");
   }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
   CheckCarryColor(spec.carry_color(), /*of_whole_scene=*/true, kind::kCarryColor);

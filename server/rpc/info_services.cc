@@ -1,7 +1,7 @@
 #include "server/rpc/info_services.h"
 
 #include "core/base/memory.h"
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "core/catalogue/stages.h"
 #include "server/ops/process.h"
 #include "server/planning/presets.h"

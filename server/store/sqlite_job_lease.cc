@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "server/base/service_error.h"
 #include "server/store/schema.h"
 #include "server/store/sqlite_db.h"

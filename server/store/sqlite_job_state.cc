@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <deque>
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "server/base/service_error.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"

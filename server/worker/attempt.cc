@@ -15,6 +15,7 @@
 #include "server/base/service_error.h"
 #include "server/ops/process.h"
 #include "server/planning/job_spec.h"
+#include "server/planning/key_view_jobs.h"
 #include "server/planning/stage_key.h"
 #include "server/worker/blob_checkpoints.h"
 #include "server/worker/told_paths.h"
@@ -165,8 +166,15 @@ void Attempt::Prepare() {
     manifest += file.path + '\n' + file.digest.sha256 + '\n';
     keeper_.token().ThrowIfCancelled();
   }
+  int additional_key_views = 0;
   for (const JobRecord& input : context_.store.GetInputs(job_.id)) {
-    for (const ArtifactRecord& artifact : input.artifacts) {
+    // Their artifacts have the names of the first key view's.
+    std::string folder;
+    if (ColorsAdditionalKeyView(ParseSpec(input.spec, input.name))) {
+      folder = fmt::format("{}{}/", artifact::kKeyViews, ++additional_key_views);
+    }
+    for (ArtifactRecord artifact : input.artifacts) {
+      artifact.name = folder + artifact.name;
       if (!input_artifacts_.emplace(artifact.name, artifact).second) continue;
       const fs::path path = scratch_ / "inputs" / artifact.name;
       LinkOrCopy(context_.blobs.Fetch(artifact.digest.sha256), path);

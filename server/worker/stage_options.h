@@ -15,7 +15,7 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
 HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
 AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec& spec);
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed);
-// Further key views are set by the caller, which holds the blobs.
+// Additional key views are set by the caller.
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec);
 // Corrections are set by the caller, which holds the blobs.
 CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec);

@@ -8,6 +8,7 @@
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 #include "server/backends/grpc_colorizer.h"
+#include "server/planning/key_view_jobs.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
 #include "server/store/job.h"
@@ -90,28 +91,57 @@ ColorizeKeyViewOptions SourceOptionsFrom(const v1::KeyColorSource& source, BlobS
 ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, BlobSource& blobs) {
   ColorizeKeyViewOptions options = SourceOptionsFrom(spec.source(), blobs);
   options.hints = HintOptionsFrom(spec);
+  options.view = spec.view();
   return options;
 }
 
-FurtherKeyView FurtherFrom(const v1::FurtherKeyView& spec, BlobSource& blobs) {
-  FurtherKeyView further{spec.view(), SourceOptionsFrom(spec.color(), blobs)};
-  if (spec.has_begin_s()) further.begin_s = spec.begin_s();
-  if (spec.has_end_s()) further.end_s = spec.end_s();
-  return further;
+// Throws when a job was planned by a version whose stages coloured additional key views themselves.
+void RequireColoredBefore(const v1::FurtherKeyView& key) {
+  if (!key.has_color()) return;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "an earlier version of the server planned this job without a job that colours the "
+              "additional key view {}; submit it again",
+              key.view());
 }
 
-CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec, BlobSource& blobs) {
+CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec) {
   CarryColorOptions options = CarryOptionsFrom(spec);
-  for (const v1::FurtherKeyView& further : spec.further_key_views()) {
-    options.further.push_back(FurtherFrom(further, blobs));
+  for (const v1::FurtherKeyView& key : spec.further_key_views()) {
+    RequireColoredBefore(key);
+    options.additional_key_views.push_back(key.view());
   }
   return options;
+}
+
+PaintedColors PaintedFrom(const v1::KeyColorSource& source, BlobSource& blobs) {
+  using Kind = PaintedColors::Kind;
+  switch (source.source_case()) {
+    case v1::KeyColorSource::kStrokes:
+      return {Kind::kStrokes, blobs.Fetch(source.strokes().sha256()), {}};
+    case v1::KeyColorSource::kPoints:
+      return {Kind::kPoints,
+              blobs.Fetch(source.points().sha256()),
+              FetchIf(source.has_labels(), source.labels(), blobs)};
+    case v1::KeyColorSource::kImage:
+      return {Kind::kPicture, blobs.Fetch(source.image().sha256()), {}};
+    default:
+      throw InvalidArgument(
+          "a correction takes strokes, points or a picture, no other source of colour");
+  }
 }
 
 CorrectColorsOptions CorrectOptions(const v1::CorrectColorsSpec& spec, BlobSource& blobs) {
   CorrectColorsOptions options = CorrectOptionsFrom(spec);
   for (const v1::FurtherKeyView& correction : spec.corrections()) {
-    options.corrections.push_back(FurtherFrom(correction, blobs));
+    if (!HasRange(correction)) {
+      options.corrections.push_back({correction.view(), PaintedFrom(correction.color(), blobs)});
+      continue;
+    }
+    RequireColoredBefore(correction);
+    RangeKeyView& range = options.ranges.emplace_back();
+    range.view = correction.view();
+    if (correction.has_begin_s()) range.begin_s = correction.begin_s();
+    if (correction.has_end_s()) range.end_s = correction.end_s();
   }
   return options;
 }
@@ -203,7 +233,7 @@ class CoreStageRunner : public StageRunner {
         return RunPersonalize(
             PersonalizeOptions(spec.personalize(), context), context, spec.personalize().encoder());
       case JobSpec::kCarryColor:
-        return RunCarryColor(CarryOptions(spec.carry_color(), blobs), context);
+        return RunCarryColor(CarryOptions(spec.carry_color()), context);
       case JobSpec::kCorrectColors:
         return RunCorrectColors(
             CorrectOptions(spec.correct_colors(), blobs), context, spec.correct_colors().encoder());

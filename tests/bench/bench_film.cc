@@ -227,11 +227,18 @@ class FilmBench {
       return inside / std::max(count, 1);
     };
     const double was = errors();
+    pipeline_.Run(
+        kind::kColorizeKeyView,
+        [&](StageContext& context) {
+          const Scene scene = ReadScene(context);
+          const View& view = scene.views[scene.FindView(args_.recolor_view)];
+          RunColorizeKeyView({.file = context.scene_folder() / view.image_file, .view = view.name},
+                             context);
+        },
+        std::string(artifact::kKeyViews) + "1/");
     pipeline_.Run(kind::kCorrectColors, [&](StageContext& context) {
-      const Scene scene = ReadScene(context);
-      FurtherKeyView key{args_.recolor_view, {}, args_.recolor_s[0], args_.recolor_s[1]};
-      key.color.file = context.scene_folder() / scene.views[scene.FindView(key.view)].image_file;
-      RunCorrectColors({.corrections = {key}, .proposals = 0}, context);
+      const RangeKeyView key{args_.recolor_view, args_.recolor_s[0], args_.recolor_s[1]};
+      RunCorrectColors({.ranges = {key}, .proposals = 0}, context);
     });
     const double seconds = Seconds() - before;
     return {{"colors", "recolored"},

@@ -62,7 +62,9 @@ void LocalPipeline::TakeAll() {
   for (const std::string& name : ListFiles(out_folder_)) Take(name, out_folder_ / name);
 }
 
-void LocalPipeline::Run(const std::string& kind, const std::function<void(StageContext&)>& stage) {
+void LocalPipeline::Run(const std::string& kind,
+                        const std::function<void(StageContext&)>& stage,
+                        const std::string& folder) {
   NoCheckpoints none;
   SayingObserver observer(kind, say_);
   CurveRecorder recorder(kind, observer, none);
@@ -70,7 +72,7 @@ void LocalPipeline::Run(const std::string& kind, const std::function<void(StageC
   const ScratchFolder scratch;
   StageContext context({.scene_folder = scene_folder_,
                         .inputs = artifacts_,
-                        .output_folder = out_folder_,
+                        .output_folder = out_folder_ / folder,
                         .scratch_folder = scratch.path(),
                         .threads = threads_,
                         .seed = seed_},
@@ -82,7 +84,8 @@ void LocalPipeline::Run(const std::string& kind, const std::function<void(StageC
   if (!recorder.points().empty()) {
     context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(recorder.points()));
   }
-  for (const std::string& name : context.outputs()) artifacts_[name] = out_folder_ / name;
+  for (const std::string& name : context.outputs())
+    artifacts_[folder + name] = out_folder_ / folder / name;
   summaries_.push_back(
       {.kind = kind, .state = "SUCCEEDED", .seconds = seconds, .warnings = observer.warnings});
   if (say_) say_(fmt::format("{} took {:.1f} s", kind, seconds));

@@ -23,8 +23,11 @@ class LocalPipeline {
 
   // The first stage, with every eighth view held out.
   void ImportScene();
-  // Runs `stage` as job kind `kind` with all artifacts made so far as inputs.
-  void Run(const std::string& kind, const std::function<void(StageContext&)>& stage);
+  // Runs `stage` as job kind `kind` with all artifacts made so far as inputs. `folder`: of its own
+  // artifacts, ends in "/"; empty: none.
+  void Run(const std::string& kind,
+           const std::function<void(StageContext&)>& stage,
+           const std::string& folder = "");
 
   // What an earlier run left, as if its stage had run: one artifact, or all in `out_folder`.
   void Take(const std::string& name, const std::filesystem::path& file) { artifacts_[name] = file; }

@@ -267,7 +267,8 @@ TEST_F(FilmTest, ARangeOfTimeIsRecoloredAndNothingElseIsMadeAnew) {
       "--film", "--key-view", "n108", "--key-color", Path("painted.png").string()};
   const auto with = [&](const std::string& range) {
     std::vector<std::string> arguments = film;
-    arguments.insert(arguments.end(), {"--more-key", "n112=" + Path("red.png").string() + range});
+    arguments.insert(arguments.end(),
+                     {"--add-key-view", "n112=" + Path("red.png").string() + range});
     return Colorize(Path("frames"), arguments);
   };
   const ProcessResult before = Colorize(Path("frames"), film);
@@ -316,7 +317,7 @@ TEST_F(FilmTest, ARangeOfTimeIsRecoloredAndNothingElseIsMadeAnew) {
     EXPECT_THAT(result.err, HasSubstr(complaint));
   }
   std::vector<std::string> as_photos = film;
-  as_photos[0] = "--more-key=n112=auto@0.4-0.56";
+  as_photos[0] = "--add-key-view=n112=auto@0.4-0.56";
   EXPECT_THAT(Colorize(Path("frames"), as_photos).err, HasSubstr("is for films without poses"));
 }
 

@@ -140,6 +140,46 @@ TEST_F(KeyColorTest, ABackendThatIsDownFailsTheJobWithARemedyAndARetryFindsItUp)
   EXPECT_EQ(NewestJob("colorize_key_view").state(), v1::Job::STATE_SUCCEEDED);
 }
 
+TEST_F(KeyColorTest, RetryColorsOnlyTheKeyViewThatFailed) {
+  auto backend = std::make_unique<ExampleBackend>(Path("backend"), "127.0.0.1:0");
+  const std::string address = backend->address();
+  ASSERT_NE(address, "");
+  backend.reset();
+  StartServer({"--backend", "example=" + address, "--retry-backoff-ms", "50"});
+  WriteProceduralScene(Path("room"), SmallRoom(4, /*gray=*/true));
+  const json additional = {{"view", "view003.png"}, {"color", {{"backend", "example"}}}};
+  const json options = {{"keyView", "view001.png"},
+                        {"keyColor", {{"automatic", true}}},
+                        {"carryColor", {{"furtherKeyViews", {additional}}}}};
+  WriteFileAtomic(Path("spec.json"),
+                  json{{"scene", CreateScene(Path("room"))}, {"colorizeScene", options}}.dump());
+  ASSERT_EQ(Client({"job", "submit", Path("spec.json").string()}).exit_code, 0);
+  const std::string parent = NewestJob("colorize_scene").name();
+  const auto key_view = [&](bool is_additional) {
+    for (const v1::Job& job : server().ListJobs()) {
+      if (job.kind() == "colorize_key_view" &&
+          job.spec().colorize_key_view().view().empty() != is_additional) {
+        return job;
+      }
+    }
+    return v1::Job();
+  };
+  const auto reaches = [&](bool is_additional, v1::Job::State state) {
+    return WaitUntil([&] { return key_view(is_additional).state() == state; }, seconds(120));
+  };
+  ASSERT_TRUE(reaches(true, v1::Job::STATE_FAILED)) << key_view(true).error().message();
+  EXPECT_NE(key_view(true).error().message().find("cannot be reached"), std::string::npos);
+  ASSERT_TRUE(reaches(false, v1::Job::STATE_SUCCEEDED));
+  const int attempts = key_view(false).attempt();
+  backend = std::make_unique<ExampleBackend>(Path("backend"), address);
+  const ProcessResult retried = Client({"job", "retry", parent});
+  ASSERT_EQ(retried.exit_code, 0) << retried.err;
+  ASSERT_TRUE(reaches(true, v1::Job::STATE_SUCCEEDED)) << key_view(true).error().message();
+  EXPECT_EQ(key_view(false).attempt(), attempts);
+  EXPECT_EQ(key_view(false).state(), v1::Job::STATE_SUCCEEDED);
+  EXPECT_EQ(Client({"job", "cancel", parent}).exit_code, 0);
+}
+
 TEST_F(KeyColorTest, CancellingTheJobStopsTheBackendsWork) {
   const ExampleBackend backend(Path("backend"), "127.0.0.1:0", {"--delay-ms", "5000"});
   StartServer({"--backend", "slow=" + backend.address()});

@@ -69,14 +69,19 @@ TEST_F(KeyTest, SelectColorLookAcceptAndColorTheSceneWithoutDoingItAgain) {
   const ProcessResult more = Client({"colorize",
                                      "--scene",
                                      scene,
-                                     "--more-key",
+                                     "--add-key-view",
                                      other + "=" + (Path("room") / "truth" / other).string(),
                                      "-o",
                                      Path("more").string(),
                                      "--detach"});
   ASSERT_EQ(more.exit_code, 0) << more.out << more.err;
   const v1::ColorizeSceneSpec spec = NewestJob("colorize_scene").spec().colorize_scene();
-  EXPECT_EQ(spec.carry_color().further_key_views_size(), 1) << "--more-key was not heeded";
+  EXPECT_EQ(spec.carry_color().further_key_views_size(), 1) << "--add-key-view was not heeded";
+  const v1::Job additional = NewestJob("colorize_key_view");
+  EXPECT_EQ(additional.spec().colorize_key_view().view(), other);
+  ExpectRefusal(Client({"key", "accept", scene, "--job", additional.name()}),
+                2,
+                {"additional key view", other});
 }
 
 TEST_F(KeyTest, AnotherViewAndAnOlderColorCanBeTaken) {

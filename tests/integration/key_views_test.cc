@@ -32,35 +32,65 @@ class KeyViewsTest : public ServiceTest {
 };
 
 // Larger than what the colorizer trains on, so that carried colours and their confidences, which
-// are 1 in the further key views, are reduced on the way (334 px to 267: the mean of ones rounds to
-// above 1).
-TEST_F(KeyViewsTest, ThreeKeyViewsGoThrough) {
+// are 1 in the additional key views, are reduced on the way (334 px to 267: the mean of ones rounds
+// to above 1).
+TEST_F(KeyViewsTest, ColorsThreeKeyViewsOnceAndReportsThem) {
   ProceduralSceneOptions room = SmallRoom(6, /*gray=*/true);
   room.width = 500;
   room.height = 334;
   WriteProceduralScene(Path("room"), room);
-  const ProcessResult result = Client({"colorize",
-                                       Path("room").string(),
-                                       "-o",
-                                       Path("out").string(),
-                                       "--key-color",
-                                       Truth("view002.png"),
-                                       "--more-key",
-                                       "view000.png=" + Truth("view000.png"),
-                                       "--more-key",
-                                       "view005=" + Truth("view005.png"),
-                                       "--max-side",
-                                       "500",
-                                       "--max-gaussians",
-                                       "15000",
-                                       "--geometry-iterations",
-                                       "150",
-                                       "--colorizer-iterations",
-                                       "10",
-                                       "--chroma-iterations",
-                                       "10"});
+  const std::vector<std::string> command = {"colorize",
+                                            Path("room").string(),
+                                            "-o",
+                                            Path("out").string(),
+                                            "--key-color",
+                                            Truth("view002.png"),
+                                            "--add-key-view",
+                                            "view000.png=" + Truth("view000.png"),
+                                            "--add-key-view",
+                                            "view005=" + Truth("view005.png"),
+                                            "--max-side",
+                                            "500",
+                                            "--max-gaussians",
+                                            "15000",
+                                            "--geometry-iterations",
+                                            "150",
+                                            "--colorizer-iterations",
+                                            "10",
+                                            "--chroma-iterations",
+                                            "10"};
+  const ProcessResult result = Client(command);
   ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_EQ(NewestJob("carry_color").spec().carry_color().further_key_views_size(), 2);
+  const std::string report = ReadFile(Path("out") / "report.html");
+  size_t chapters = 0;
+  for (size_t at = 0; (at = report.find("<h2>Additional key view", at)) != std::string::npos;
+       ++at) {
+    ++chapters;
+  }
+  EXPECT_EQ(chapters, 2u);
+  EXPECT_EQ(Result("out", "key_views/1/key_color.json").at("view"), "view000.png");
+  EXPECT_EQ(Result("out", "key_views/2/key_color.json").at("view"), "view005.png");
+  EXPECT_FALSE(IsGray(ReadImage(Path("out") / "key_views/2/key_view_colored.png")));
+  EXPECT_EQ(Result("out", "metrics.json").at("key_views"),
+            json({"view002.png", "view000.png", "view005.png"}));
+
+  const auto key_views = [&] {
+    std::vector<v1::Job> jobs;
+    for (const v1::Job& job : server().ListJobs()) {
+      if (job.kind() == "colorize_key_view") jobs.push_back(job);
+    }
+    return jobs;
+  };
+  ASSERT_EQ(key_views().size(), 3u);
+  const ProcessResult again =
+      Client(command + std::vector<std::string>{"--set", "solve_chroma.saturation=1.2"});
+  ASSERT_EQ(again.exit_code, 0) << again.out << again.err;
+  const auto both = key_views();
+  ASSERT_EQ(both.size(), 6u);
+  EXPECT_EQ(
+      std::count_if(both.begin(), both.end(), [](const v1::Job& job) { return job.cached(); }), 3);
+  EXPECT_TRUE(NewestJob("carry_color").cached());
 }
 
 TEST_F(KeyViewsTest, ABenchmarkChoosesSeveralAndTheGeometryIsMadeOnce) {
@@ -82,15 +112,15 @@ TEST_F(KeyViewsTest, ABenchmarkChoosesSeveralAndTheGeometryIsMadeOnce) {
   EXPECT_EQ(made, 1);
   ExpectRefusal(benchmark("many", {"--keys", "8"}), 2, {"8 key views", "7 training views"});
   ExpectRefusal(benchmark("both", {"--keys", "2", "--auto"}), 2, {"--keys", "true colours"});
-  ExpectRefusal(benchmark("more", {"--keys", "2", "--more-key", "view001=auto"}),
+  ExpectRefusal(benchmark("more", {"--keys", "2", "--add-key-view", "view001=auto"}),
                 2,
-                {"leave out --more-key"});
-  ExpectRefusal(benchmark("none", {"--more-key", "view099=auto"}), 2, {"view099"});
-  ExpectRefusal(benchmark("same", {"--key-view", "view004", "--more-key", "view004.png=auto"}),
+                {"leave out --add-key-view"});
+  ExpectRefusal(benchmark("none", {"--add-key-view", "view099=auto"}), 2, {"view099"});
+  ExpectRefusal(benchmark("same", {"--key-view", "view004", "--add-key-view", "view004.png=auto"}),
                 2,
                 {"the key view already"});
   ExpectRefusal(benchmark("held", {"--key-view", "view000"}), 2, {"view000", "held out"});
-  ExpectRefusal(benchmark("held2", {"--key-view", "view004", "--more-key", "view000=auto"}),
+  ExpectRefusal(benchmark("held2", {"--key-view", "view004", "--add-key-view", "view000=auto"}),
                 2,
                 {"view000", "held out"});
 

@@ -63,8 +63,8 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
   if (cuts.empty()) return;
   context.progress().OnWarning(fmt::format(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
-      "by likeness. Colour a frame of each (further key views; the selection of several names one "
-      "a shot)",
+      "by likeness. Colour a frame of each (additional key views; the selection of several names "
+      "one a shot)",
       NamesOfFrames(cuts),
       cuts.size() + 1));
 }

@@ -1,12 +1,12 @@
 // Options of the stage carry_color.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "core/carry/carry.h"
 #include "core/carry/plane_sweep.h"
 #include "core/film/film_carry.h"
-#include "core/stage/options/key_color_options.h"
 
 namespace color3d {
 
@@ -16,8 +16,11 @@ struct CarryColorOptions {
   int depth_sources = 4;    // views that each view is compared with, 1..16
   PlaneSweepOptions sweep;
   CarryOptions carry;
-  FilmCarryOptions film;                // of a film: by motion
-  std::vector<FurtherKeyView> further;  // in the order of their importance, at most 16
+  FilmCarryOptions film;  // of films
+  // Names or unique file stems, in order of importance, at most kMaxAdditionalKeyViews. Each gives
+  // only the colours that the key views before it do not give. In a film it colours the frames of
+  // its shot that are nearest to it.
+  std::vector<std::string> additional_key_views;
   void Validate() const;
   bool operator==(const CarryColorOptions&) const = default;
 };

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,22 +29,8 @@ struct ColorizeKeyViewOptions {
   std::string prompt;                             // prompt; backend, may be empty
   std::string name;  // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
+  std::string view;  // additional key view: name or unique file stem; empty: the chosen key view
   bool operator==(const ColorizeKeyViewOptions&) const = default;
-};
-
-// A key view beside the first one. Of its colours only those are taken that the key views before it
-// have not given already; so they never contradict. In a film it colours the frames of its shot
-// that are nearer to it and what is open in others, and has what is not painted from the key views
-// before it.
-struct FurtherKeyView {
-  std::string view;  // name or unique file stem
-  ColorizeKeyViewOptions color;
-  // Of a correction of a film: the frames of its shot that it counts in, seconds of the film, both
-  // ends included; nothing: from the beginning, to the end.
-  std::optional<double> begin_s = {};
-  std::optional<double> end_s = {};
-  bool HasRange() const { return begin_s || end_s; }
-  bool operator==(const FurtherKeyView&) const = default;
 };
 
 }  // namespace color3d

@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/carry/confidence.h"
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/corrector.h"
 #include "core/film/film_carry.h"
@@ -21,8 +22,8 @@
 #include "core/scene/view_images.h"
 #include "core/stage/film/between_anchors.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_views.h"
 #include "core/stage/recolor/time_ranges.h"
-#include "core/stage/sources/further_colors.h"
 
 namespace color3d {
 namespace {
@@ -79,7 +80,6 @@ struct Told {
 // What is surely followed is as it was painted or left. Elsewhere what the film shows of other key
 // frames stays, as changed. `is_old`: 1 where the colours are not those of key frames of the range.
 CarriedColor KnownOf(const Told& told, Image* is_old) {
-  constexpr float kSure = 0.5f;
   const int width = told.before.width, height = told.before.height;
   CarriedColor known{Image(width, height, 2), Image(width, height, 1)};
   *is_old = Image(width, height, 1);
@@ -87,13 +87,13 @@ CarriedColor KnownOf(const Told& told, Image* is_old) {
     const float followed = told.painted.confidence.data[i];
     const float painted = followed * std::clamp(told.painted.ab.Plane(2)[i], 0.0f, 1.0f);
     const float left = followed - painted;
-    const float seen = told.provenance.Empty() ? 0.0f : told.provenance.Plane(1)[i];
+    const float seen = told.provenance.Empty() ? 0.0f : told.provenance.Plane(kSeenPlane)[i];
     const Image* from = &told.painted.ab;
     known.confidence.data[i] = painted;
-    if (left > kSure) {
+    if (left > kDecisiveConfidence) {
       from = &told.before;
       known.confidence.data[i] = left;
-    } else if (painted <= kSure && seen > kSure) {
+    } else if (painted <= kDecisiveConfidence && seen > kDecisiveConfidence) {
       from = &told.changed;
       known.confidence.data[i] = seen;
     }
@@ -106,13 +106,13 @@ CarriedColor KnownOf(const Told& told, Image* is_old) {
 // What does not come from key frames of the range comes from where it came, changed or not.
 void TakeShares(const Told& told, const Image& is_old, Image* provenance) {
   for (size_t i = 0; i < provenance->PlaneSize(); ++i) {
-    const float seen = is_old.data[i] > 0.0f ? 0.0f : provenance->Plane(1)[i];
+    const float seen = is_old.data[i] > 0.0f ? 0.0f : provenance->Plane(kSeenPlane)[i];
     const float change = told.change_share.Empty() ? 0.0f : told.change_share.data[i];
-    for (int c = 0; c < 3; ++c) {
-      const float was =
-          told.provenance.Empty() ? (c == 2 ? 1.0f : 0.0f) : told.provenance.Plane(c)[i];
-      const float is = c == 2 ? was + change * (1.0f - was) : was * (1.0f - change);
-      provenance->Plane(c)[i] = (c == 1 ? seen : 0.0f) + (1.0f - seen) * is;
+    for (int c = 0; c < kProvenancePlanes; ++c) {
+      const float was = told.provenance.Empty() ? (c == kInferredPlane ? 1.0f : 0.0f)
+                                                : told.provenance.Plane(c)[i];
+      const float is = c == kInferredPlane ? was + change * (1.0f - was) : was * (1.0f - change);
+      provenance->Plane(c)[i] = (c == kSeenPlane ? seen : 0.0f) + (1.0f - seen) * is;
     }
   }
 }
@@ -146,7 +146,7 @@ class RangeColorer {
     std::vector<Correction> corrections;
     for (const RecoloredRange::Key& key : range_.keys) {
       CarriedColor color =
-          ColorOfFurther(*key.given, key.view, film_.scene, film_.images, film_.context);
+          ReadAdditionalKeyColor(film_.context, film_.scene, key.view, film_.images);
       const std::vector<float>& painted = color.confidence.data;
       if (std::none_of(painted.begin(), painted.end(), [](float p) { return p > 0.0f; })) {
         throw InvalidArgument("nothing is painted on the key view {} that would recolour its range",
@@ -325,7 +325,7 @@ nlohmann::ordered_json FactsOf(const std::vector<RecoloredRange>& ranges, const 
 
 }  // namespace
 
-void RecolorRanges(const std::vector<FurtherKeyView>& keys,
+void RecolorRanges(const std::vector<RangeKeyView>& keys,
                    const Scene& scene,
                    const std::string& encoder,
                    StageContext& context) {

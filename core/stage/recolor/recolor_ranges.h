@@ -6,13 +6,13 @@
 
 #include "core/scene/scene.h"
 #include "core/stage/context/stage_context.h"
-#include "core/stage/options/key_color_options.h"
+#include "core/stage/options/correct_colors_options.h"
 
 namespace color3d {
 
 // Colours the frames of the ranges anew: kCorrectedAb and kCorrectedProvenance of each, and
 // kCorrections. Other frames are not read. `encoder`: as RunColorizeViews'.
-void RecolorRanges(const std::vector<FurtherKeyView>& keys,
+void RecolorRanges(const std::vector<RangeKeyView>& keys,
                    const Scene& scene,
                    const std::string& encoder,
                    StageContext& context);

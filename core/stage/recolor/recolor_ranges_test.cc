@@ -1,4 +1,4 @@
-// The stage correct_colors on a film: key frames that count in a range of time.
+// The stage correct_colors on a film: key views that recolour a range of time.
 #include "core/stage/recolor/recolor_ranges.h"
 
 #include <fmt/format.h>
@@ -52,10 +52,10 @@ Scene FilmOf(int frames) {
   return scene;
 }
 
-FurtherKeyView KeyOf(const std::string& view,
-                     std::optional<double> begin_s,
-                     std::optional<double> end_s) {
-  return {view, {}, begin_s, end_s};
+RangeKeyView KeyOf(const std::string& view,
+                   std::optional<double> begin_s,
+                   std::optional<double> end_s) {
+  return {view, begin_s, end_s};
 }
 
 class RecolorRangesTest : public StageTest {
@@ -72,28 +72,17 @@ class RecolorRangesTest : public StageTest {
     Image ab(kWidth, kHeight, 2);
     std::copy_n(truth.Plane(1), ab.data.size(), ab.data.begin());
     AddInput(artifact::kKeyColor, EncodeAbPng(ab));
-    Run([](StageContext& context) { RunCarryColor({}, context); });
-    Run([](StageContext& context) { RunPersonalize({.iterations = 0}, context); });
-    Run([](StageContext& context) { RunColorizeViews(kWidth, context); });
+    RunForInputs([](StageContext& context) { RunCarryColor({}, context); });
+    RunForInputs([](StageContext& context) { RunPersonalize({.iterations = 0}, context); });
+    RunForInputs([](StageContext& context) { RunColorizeViews(kWidth, context); });
   }
-  // What a stage leaves is read by those after it; its names.
-  template <class Stage>
-  std::vector<std::string> Run(const Stage& stage) {
-    StageContext context = MakeContext();
-    stage(context);
-    for (const std::string& name : context.outputs()) {
-      AddInput(name, ReadFile(scratch_.path() / "out" / name));
-    }
-    return context.outputs();
-  }
-  std::vector<std::string> Recolor(const std::vector<FurtherKeyView>& keys) {
-    return Run([&](StageContext& context) {
-      RunCorrectColors({.corrections = keys, .proposals = 0}, context);
+  std::vector<std::string> Recolor(const std::vector<RangeKeyView>& keys) {
+    return RunForInputs([&](StageContext& context) {
+      RunCorrectColors({.ranges = keys, .proposals = 0}, context);
     });
   }
   // The frame in one other colour between two columns.
-  FurtherKeyView Painted(
-      int view, double begin_s, double end_s, float a = -25.0f, int from = 0, int to = kWidth) {
+  std::filesystem::path PaintedFile(int view, float a = -25.0f, int from = 0, int to = kWidth) {
     Image lab = LabOf(view);
     std::fill_n(lab.Plane(1), lab.PlaneSize(), a);
     std::fill_n(lab.Plane(2), lab.PlaneSize(), -5.0f);
@@ -103,10 +92,16 @@ class RecolorRangesTest : public StageTest {
     for (int y = 0; y < kHeight; ++y) {
       for (int x = from; x < to; ++x) painted.At(3, y, x) = 1.0f;
     }
-    FurtherKeyView key = KeyOf(scene_.views[view].name, begin_s, end_s);
-    key.color.file = scratch_.path() / fmt::format("painted{}_{}.png", view, from);
-    WriteFileAtomic(key.color.file, EncodePng16(painted));
-    return key;
+    const auto file = scratch_.path() / fmt::format("painted{}_{}.png", view, from);
+    WriteFileAtomic(file, EncodePng16(painted));
+    return file;
+  }
+  RangeKeyView Painted(
+      int view, double begin_s, double end_s, float a = -25.0f, int from = 0, int to = kWidth) {
+    ColorizeKeyViewOptions key;
+    key.view = scene_.views[view].name;
+    key.file = PaintedFile(view, a, from, to);
+    return KeyOf(AddKeyView(key), begin_s, end_s);
   }
   // The colours that the film is delivered with.
   std::vector<Image> Film() {
@@ -128,7 +123,7 @@ double MeanOff(const Image& ab, float a, int from = 4, int to = kWidth - 4) {
   return sum / ((to - from) * (kHeight - 8));
 }
 
-TEST_F(RecolorRangesTest, FramesOutsideAreTheSameToTheByteAndThoseInsideAreAsPainted) {
+TEST_F(RecolorRangesTest, ChangesFramesOfTheRangeOnly) {
   const std::vector<Image> before = Film();
   const auto left = Recolor({Painted(9, 0.24, 0.48)});
   EXPECT_EQ(left.size(), 2 * 7u + 1) << "colours and shares of seven frames";
@@ -150,7 +145,7 @@ TEST_F(RecolorRangesTest, FramesOutsideAreTheSameToTheByteAndThoseInsideAreAsPai
       R"([{"view":"f09.png","first":"f06.png","last":"f12.png","begin_s":0.24,"end_s":0.48}])");
 }
 
-TEST_F(RecolorRangesTest, WhatIsNotPaintedStaysAsItWas) {
+TEST_F(RecolorRangesTest, KeepsColorOfUnpaintedParts) {
   const std::vector<Image> before = Film();
   Recolor({Painted(9, 0.2, 0.48, -25.0f, 0, kWidth / 2)});
   const std::vector<Image> after = Film();
@@ -164,7 +159,7 @@ TEST_F(RecolorRangesTest, WhatIsNotPaintedStaysAsItWas) {
   }
 }
 
-TEST_F(RecolorRangesTest, SeveralRangesAndSeveralKeyFramesOfOne) {
+TEST_F(RecolorRangesTest, TakesSeveralRangesAndKeyViews) {
   Recolor({Painted(2, 0.08, 0.32), Painted(8, 0.08, 0.32, 25.0f), Painted(14, 0.56, 0.6, 12.0f)});
   const std::vector<Image> after = Film();
   const std::pair<int, float> expected[] = {{2, -25.0f}, {8, 25.0f}, {14, 12.0f}, {15, 12.0f}};
@@ -175,21 +170,23 @@ TEST_F(RecolorRangesTest, SeveralRangesAndSeveralKeyFramesOfOne) {
   EXPECT_GT(MeanOff(after[16], 12.0f), 4.0);
 }
 
-TEST_F(RecolorRangesTest, ACorrectionWithoutARangeAmongThemIsRefused) {
+TEST_F(RecolorRangesTest, RefusesCorrectionsWithoutRangeBesideThem) {
+  CorrectColorsOptions options{.ranges = {KeyOf("f09.png", 0.24, 0.48)}};
+  EXPECT_NO_THROW(options.Validate());
+  options.corrections = {{"f03.png", {}}};
   try {
-    Recolor({Painted(9, 0.24, 0.48), KeyOf("f03.png", {}, {})});
+    options.Validate();
     FAIL() << "it was taken";
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("f03.png has no range of time"));
   }
 }
 
-// Those of views that are proposed are made again, not kept of all.
-TEST_F(RecolorRangesTest, PicturesToPaintOnHaveTheColorsOfTheCorrectedFilm) {
-  FurtherKeyView correction = Painted(9, 0.0, 0.0, -25.0f, 0, kWidth / 2);
-  correction.begin_s = correction.end_s = std::nullopt;
-  Run([&](StageContext& context) {
-    RunCorrectColors({.corrections = {correction}, .proposals = 3}, context);
+// They are computed once more for the proposed views, so that not all have to be kept.
+TEST_F(RecolorRangesTest, PicturesToPaintOnHaveCorrectedColors) {
+  const PaintedColors colors{PaintedColors::Kind::kPicture, PaintedFile(9, -25.0f, 0, kWidth / 2)};
+  RunForInputs([&](StageContext& context) {
+    RunCorrectColors({.corrections = {{"f09.png", colors}}, .proposals = 3}, context);
   });
   const std::vector<Image> after = Film();
   const StageContext context = MakeContext();
@@ -207,7 +204,7 @@ TEST_F(RecolorRangesTest, PicturesToPaintOnHaveTheColorsOfTheCorrectedFilm) {
   }
 }
 
-std::string Complaint(const std::vector<FurtherKeyView>& keys, const Scene& scene) {
+std::string Complaint(const std::vector<RangeKeyView>& keys, const Scene& scene) {
   try {
     RangesOf(keys, scene);
   } catch (const Error& e) {
@@ -217,10 +214,10 @@ std::string Complaint(const std::vector<FurtherKeyView>& keys, const Scene& scen
   return "nothing";
 }
 
-TEST(RangesOf, FramesOfTheShotWithinTheRange) {
+TEST(RangesOfTest, AreFramesOfTheShotWithinTheTime) {
   Scene scene = FilmOf(10);
   for (int i = 6; i < 10; ++i) scene.views[i].moment->shot = 1;
-  const auto views = [&](const FurtherKeyView& key) { return RangesOf({key}, scene)[0].views; };
+  const auto views = [&](const RangeKeyView& key) { return RangesOf({key}, scene)[0].views; };
   EXPECT_THAT(views(KeyOf("f04.png", 0.12, 0.32)), ElementsAre(3, 4, 5)) << "up to the cut";
   EXPECT_THAT(views(KeyOf("f08", 0.32, {})), ElementsAre(8, 9)) << "to the end";
   EXPECT_THAT(views(KeyOf("f02", {}, 0.1)), ElementsAre(0, 1, 2)) << "from the beginning";
@@ -231,7 +228,7 @@ TEST(RangesOf, FramesOfTheShotWithinTheRange) {
   EXPECT_EQ(RangesOf({KeyOf("f04", 0.12, 0.4), KeyOf("f08", 0.12, 0.4)}, scene).size(), 2u);
 }
 
-TEST(RangesOf, ThatCannotBeAreRefused) {
+TEST(RangesOfTest, RefusesImpossibleRanges) {
   Scene scene = FilmOf(10);
   EXPECT_THAT(Complaint({KeyOf("f04", 0.2, 0.1)}, scene), HasSubstr("before it begins at 0.2 s"));
   for (const auto& [begin_s, end_s] :
@@ -246,7 +243,6 @@ TEST(RangesOf, ThatCannotBeAreRefused) {
               HasSubstr("f04.png and f07.png share some frames"));
   EXPECT_THAT(Complaint({KeyOf("f04", 0.1, 0.2), KeyOf("f04.png", 0.1, 0.2)}, scene),
               HasSubstr("given twice"));
-  EXPECT_THAT(Complaint({KeyOf("f04", {}, {})}, scene), HasSubstr("no range of time"));
   scene.views[4].held_out = true;
   EXPECT_THAT(Complaint({KeyOf("f04", 0.1, 0.2)}, scene), HasSubstr("held out"));
   for (int i = 0; i < 10; ++i) scene.views[i].cam_from_world.translation = {0.1 * i, 0.0, 0.0};

@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/median.h"
-#include "core/stage/sources/further_colors.h"
+#include "core/stage/formats/key_views.h"
 
 namespace color3d {
 namespace {
@@ -28,23 +28,17 @@ FilmTime TimeOf(const Scene& scene) {
   return {times.front(), times.back() + (steps.empty() ? 0.0 : Median(std::move(steps)))};
 }
 
-std::string RangeText(const FurtherKeyView& key) {
+std::string RangeText(const RangeKeyView& key) {
   return (key.begin_s ? fmt::format("from {} s ", *key.begin_s) : "from the beginning ") +
          (key.end_s ? fmt::format("to {} s", *key.end_s) : "to the end");
 }
 
-bool IsInside(const FurtherKeyView& key, double time_s) {
+bool IsInside(const RangeKeyView& key, double time_s) {
   return time_s >= key.begin_s.value_or(time_s) - kSameTime &&
          time_s <= key.end_s.value_or(time_s) + kSameTime;
 }
 
-void CheckRange(const FurtherKeyView& key, const View& view, const FilmTime& film) {
-  if (!key.HasRange()) {
-    throw InvalidArgument(
-        "the correction of {} has no range of time, as a film's must (begin_s, end_s); to colour "
-        "the film anew from it, make it a further key view",
-        view.name);
-  }
+void CheckRange(const RangeKeyView& key, const View& view, const FilmTime& film) {
   if (key.begin_s && key.end_s && *key.end_s < *key.begin_s) {
     throw InvalidArgument(
         "the range of the key view {} ends at {} s, before it begins at {} s; swap them",
@@ -104,7 +98,7 @@ void AddTo(std::vector<RecoloredRange>* ranges,
 
 }  // namespace
 
-std::vector<RecoloredRange> RangesOf(const std::vector<FurtherKeyView>& keys, const Scene& scene) {
+std::vector<RecoloredRange> RangesOf(const std::vector<RangeKeyView>& keys, const Scene& scene) {
   if (!scene.IsFilm()) {
     throw InvalidArgument("the key view {} has a range of time, but {}; leave the range out{}",
                           keys.front().view,
@@ -114,8 +108,8 @@ std::vector<RecoloredRange> RangesOf(const std::vector<FurtherKeyView>& keys, co
   }
   const FilmTime film = TimeOf(scene);
   std::vector<RecoloredRange> ranges;
-  for (const FurtherKeyView& key : keys) {
-    const int view = ViewOfFurther(key, scene);
+  for (const RangeKeyView& key : keys) {
+    const int view = FindAdditionalKeyView(scene, key.view);
     CheckRange(key, scene.views[view], film);
     std::vector<int> views = scene.FramesOfShotOf(view);
     std::erase_if(views, [&](int v) { return !IsInside(key, scene.views[v].time_s()); });

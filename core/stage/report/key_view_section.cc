@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "core/image/codec.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_views.h"
 
 namespace color3d {
 namespace {
@@ -43,6 +46,17 @@ void AddColor(const ordered_json& facts, ReportKeyView* report) {
   }
 }
 
+void AddRegions(const std::string& folder, const StageContext& context, ReportKeyView* report) {
+  const std::string regions = folder + artifact::kKeyColorRegions;
+  if (!context.HasInput(regions)) return;
+  report->pictures.pictures.push_back(
+      {"what each colour of the prompt was taken for", context.ReadInput(regions)});
+}
+
+ReportPicture SmallPicture(std::string caption, const Image& image, int side_px) {
+  return {std::move(caption), EncodeJpeg(FitWithin(image, side_px), 88)};
+}
+
 }  // namespace
 
 ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context) {
@@ -54,14 +68,33 @@ ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context) {
   if (context.HasInput(artifact::kKeyColorFacts)) {
     AddColor(ReadJson(context, artifact::kKeyColorFacts), &report);
   }
-  if (context.HasInput(artifact::kKeyColorRegions)) {
-    report.pictures.pictures.push_back({"what each colour of the prompt was taken for",
-                                        context.ReadInput(artifact::kKeyColorRegions)});
-  }
+  AddRegions("", context, &report);
   if (context.HasInput(artifact::kKeyViewRanking)) {
     report.ranking = {"All candidates, best first", context.ReadInput(artifact::kKeyViewRanking)};
   }
   return report;
+}
+
+std::vector<ReportKeyView> ReportOfAdditionalKeyViews(const Scene& scene,
+                                                      int side_px,
+                                                      const StageContext& context) {
+  std::vector<ReportKeyView> reports;
+  for (const std::string& folder : AdditionalKeyViewFolders(context)) {
+    const ordered_json facts = ReadJson(context, folder + artifact::kKeyColorFacts);
+    const View& view = scene.views[scene.FindView(facts.value("view", ""))];
+    const std::string colored = folder + artifact::kKeyViewColored;
+    ReportKeyView report;
+    report.pictures = {
+        view.name,
+        {SmallPicture("as captured", ReadImage(context.scene_folder() / view.image_file), side_px),
+         SmallPicture("coloured: gives the colours that the key views before it do not give",
+                      DecodeImage(context.ReadInput(colored), colored),
+                      side_px)}};
+    AddColor(facts, &report);
+    AddRegions(folder, context, &report);
+    reports.push_back(std::move(report));
+  }
+  return reports;
 }
 
 }  // namespace color3d

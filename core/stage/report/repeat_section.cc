@@ -43,11 +43,11 @@ std::string RangeFlags(size_t number, const StageContext& context) {
   };
   std::string flags;
   for (const auto& range : facts.value("recolored", nlohmann::ordered_json::array())) {
-    flags += " --more-key " + ShellWord(fmt::format("{}=COLOURED_{}.png@{}-{}",
-                                                    range.at("view").get<std::string>(),
-                                                    number++,
-                                                    seconds(range, "begin_s"),
-                                                    seconds(range, "end_s")));
+    flags += " --add-key-view " + ShellWord(fmt::format("{}=COLOURED_{}.png@{}-{}",
+                                                        range.at("view").get<std::string>(),
+                                                        number++,
+                                                        seconds(range, "begin_s"),
+                                                        seconds(range, "end_s")));
   }
   return flags;
 }
@@ -65,7 +65,8 @@ void AddHowToRepeat(const std::vector<std::string>& keys,
                                       ShellWord(keys.front()),
                                       color);
     for (size_t i = 1; i < keys.size(); ++i) {
-      command += " --more-key " + ShellWord(keys[i] + "=COLOURED_" + std::to_string(i) + ".png");
+      command +=
+          " --add-key-view " + ShellWord(keys[i] + "=COLOURED_" + std::to_string(i) + ".png");
     }
     command += RangeFlags(keys.size(), context);
     data->repeat.push_back(command);

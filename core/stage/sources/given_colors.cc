@@ -18,8 +18,6 @@
 namespace color3d {
 namespace {
 
-using Source = ColorizeKeyViewOptions::Source;
-
 constexpr int64_t kMaxHintsBytes = 1 << 26;
 constexpr float kGivenAlpha = 0.5f;
 constexpr double kSameShape = 0.01;   // relative difference of aspect ratios
@@ -80,11 +78,9 @@ GivenColors FromPicture(const Image& painted, const Image& srgb, const Image& cu
   return colors;
 }
 
-GivenColors FromHints(const ColorizeKeyViewOptions& options,
-                      const Image& srgb,
-                      StageContext& context) {
-  const auto hints = ParseHintsJson(ReadFile(options.file, kMaxHintsBytes));
-  const Image labels = options.labels.empty() ? Image() : ReadStoredValues(options.labels);
+GivenColors FromHints(const PaintedColors& painted, const Image& srgb, StageContext& context) {
+  const auto hints = ParseHintsJson(ReadFile(painted.file, kMaxHintsBytes));
+  const Image labels = painted.labels.empty() ? Image() : ReadStoredValues(painted.labels);
   const bool asks_automatic = std::any_of(hints.begin(), hints.end(), [](const ColorHint& hint) {
     return hint.fill == ColorHint::Fill::kAutomatic;
   });
@@ -99,21 +95,19 @@ GivenColors FromHints(const ColorizeKeyViewOptions& options,
       srgb);
 }
 
-GivenColors Read(const ColorizeKeyViewOptions& options,
+GivenColors Read(const PaintedColors& painted,
                  const Image& srgb,
                  const Image& current_ab,
                  StageContext& context) {
-  switch (options.source) {
-    case Source::kStrokes:
-      return FromMap(HintsOfStrokes(ReadPainted(options.file, srgb)), srgb);
-    case Source::kPoints:
-      return FromHints(options, srgb, context);
-    case Source::kImage:
-      return FromPicture(ReadPainted(options.file, srgb), srgb, current_ab);
-    default:
-      throw InvalidArgument(
-          "a correction takes strokes, points or a picture, no other source of colour");
+  switch (painted.kind) {
+    case PaintedColors::Kind::kStrokes:
+      return FromMap(HintsOfStrokes(ReadPainted(painted.file, srgb)), srgb);
+    case PaintedColors::Kind::kPoints:
+      return FromHints(painted, srgb, context);
+    case PaintedColors::Kind::kPicture:
+      break;
   }
+  return FromPicture(ReadPainted(painted.file, srgb), srgb, current_ab);
 }
 
 }  // namespace
@@ -123,11 +117,11 @@ Image PaintablePhoto(const Image& srgb, const Image& ab) {
   return SrgbFromLab(JoinLab(luminance, Resize(ab, srgb.width, srgb.height)));
 }
 
-GivenColors ReadGivenColors(const ColorizeKeyViewOptions& options,
+GivenColors ReadGivenColors(const PaintedColors& painted,
                             const Image& srgb,
                             const Image& current_ab,
                             StageContext& context) {
-  GivenColors colors = Read(options, srgb, current_ab, context);
+  GivenColors colors = Read(painted, srgb, current_ab, context);
   const auto given = [](float value) { return value > 0.0f; };
   if (std::none_of(colors.given.data.begin(), colors.given.data.end(), given)) {
     throw InvalidArgument("it changes no pixel of the photo");

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-using Source = ColorizeKeyViewOptions::Source;
+using Kind = PaintedColors::Kind;
 using testing::HasSubstr;
 
 class GivenColorsTest : public StageTest {
@@ -26,17 +26,15 @@ class GivenColorsTest : public StageTest {
     }
     ab_ = Image(12, 8, 2, 12.0f);
   }
-  GivenColors Read(Source source, const Image& picture) {
-    ColorizeKeyViewOptions options;
-    options.source = source;
-    options.file = scratch_.path() / "given.png";
-    WriteFileAtomic(options.file, EncodePng8(picture));
+  GivenColors Read(Kind kind, const Image& picture) {
+    const PaintedColors painted{kind, scratch_.path() / "given.png", {}};
+    WriteFileAtomic(painted.file, EncodePng8(picture));
     StageContext context = MakeContext();
-    return ReadGivenColors(options, photo_, ab_, context);
+    return ReadGivenColors(painted, photo_, ab_, context);
   }
-  std::string Refusal(Source source, const Image& picture) {
+  std::string Refusal(Kind kind, const Image& picture) {
     try {
-      Read(source, picture);
+      Read(kind, picture);
     } catch (const Error& e) {
       return e.what();
     }
@@ -63,30 +61,29 @@ void PaintBox(int left, int top, int width, int height, Image* picture) {
   }
 }
 
-TEST_F(GivenColorsTest, APictureThatWasPaintedOnCountsWhereItWasChanged) {
+TEST_F(GivenColorsTest, PictureCountsWhereItWasChanged) {
   Image painted = PaintablePhoto(photo_, ab_);
   PaintBox(10, 5, 8, 6, &painted);
-  const GivenColors given = Read(Source::kImage, painted);
+  const GivenColors given = Read(Kind::kPicture, painted);
   EXPECT_EQ(Sum(given.given), 48.0);
   EXPECT_EQ(given.given.At(0, 6, 12), 1.0f);
   EXPECT_LT(given.ab.At(0, 6, 12), -30.0f) << "green";
 }
 
-TEST_F(GivenColorsTest, StrokesOnALayerOfAnotherSizeButTheSameShape) {
+TEST_F(GivenColorsTest, TakesStrokesOfAnotherSize) {
   Image layer(96, 64, 4);
   PaintBox(20, 10, 16, 12, &layer);
-  const GivenColors given = Read(Source::kStrokes, layer);
+  const GivenColors given = Read(Kind::kStrokes, layer);
   EXPECT_NEAR(Sum(given.given), 48.0, 4.0);
   EXPECT_LT(given.ab.At(0, 7, 13), -30.0f);
 }
 
-TEST_F(GivenColorsTest, WhatCannotBeUsedIsRefused) {
-  EXPECT_THAT(Refusal(Source::kImage, PaintablePhoto(photo_, ab_)), HasSubstr("no pixel"));
+TEST_F(GivenColorsTest, RefusesUnusablePictures) {
+  EXPECT_THAT(Refusal(Kind::kPicture, PaintablePhoto(photo_, ab_)), HasSubstr("no pixel"));
   Image other_shape(48, 48, 4);
   PaintBox(2, 2, 8, 8, &other_shape);
-  EXPECT_THAT(Refusal(Source::kStrokes, other_shape), HasSubstr("48x48"));
-  EXPECT_THAT(Refusal(Source::kImage, Image(96, 64, 3, 0.5f)), HasSubstr("96x64"));
-  EXPECT_THAT(Refusal(Source::kAutomatic, photo_), HasSubstr("strokes, points or a picture"));
+  EXPECT_THAT(Refusal(Kind::kStrokes, other_shape), HasSubstr("48x48"));
+  EXPECT_THAT(Refusal(Kind::kPicture, Image(96, 64, 3, 0.5f)), HasSubstr("96x64"));
 }
 
 }  // namespace

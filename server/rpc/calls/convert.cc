@@ -4,7 +4,7 @@
 
 #include <charconv>
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
 #include "server/rpc/calls/error_mapping.h"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "google/rpc/error_details.pb.h"
 #include "server/base/service_error.h"
 

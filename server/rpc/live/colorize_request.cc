@@ -1,6 +1,6 @@
 #include "server/rpc/live/colorize_request.h"
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"

@@ -1,10 +1,29 @@
 #include "server/rpc/scenes/scene_service.h"
 
+#include "core/base/error.h"
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
+#include "server/planning/key_view_jobs.h"
 #include "server/rpc/calls/convert.h"
 #include "server/rpc/scenes/scene_validation.h"
 #include "server/storage/ballast.h"
 
 namespace color3d {
+namespace {
+
+void RequireChosenKeyView(const JobRecord& job) {
+  if (job.kind != kind::kColorizeKeyView) return;
+  const v1::JobSpec spec = ParseSpec(job.spec, job.name);
+  if (!ColorsAdditionalKeyView(spec)) return;
+  throw InvalidArgument(
+      "{} colours the additional key view {}; accept a job that colours the key view which {} "
+      "chose",
+      job.name,
+      spec.colorize_key_view().view(),
+      kind::kSelectKeyView);
+}
+
+}  // namespace
 grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerContext* context,
                                                         const v1::CreateSceneRequest* request,
                                                         v1::Scene* response) {
@@ -83,7 +102,10 @@ grpc::ServerUnaryReactor* SceneServiceImpl::AcceptKeyColor(grpc::CallbackServerC
   return AnswerWrite(
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
         CheckName(in.name(), "scenes");
-        if (!in.job().empty()) CheckName(in.job(), "jobs");
+        if (!in.job().empty()) {
+          CheckName(in.job(), "jobs");
+          RequireChosenKeyView(call.store.GetJob(in.job()));
+        }
         RequireRoomForRows(parts_, call.store, 0);
         *out = ToProto(call.store.AcceptKeyColor(in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
       });

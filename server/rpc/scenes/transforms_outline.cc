@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/base/json_text.h"
+#include "core/base/text/json_text.h"
 
 namespace color3d {
 namespace {

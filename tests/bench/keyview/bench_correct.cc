@@ -31,12 +31,12 @@ constexpr float kOneThing = 15.0f;
 
 // A disc, as far as it shows the thing in its middle, in the mean of the photo's true colours
 // there, or in these colours themselves.
-FurtherKeyView Stroke(const Arguments& args,
-                      const Scene& scene,
-                      int view,
-                      int middle_x,  // px of the photo
-                      int middle_y,
-                      int number) {
+ColorCorrection Stroke(const Arguments& args,
+                       const Scene& scene,
+                       int view,
+                       int middle_x,  // px of the photo
+                       int middle_y,
+                       int number) {
   const std::filesystem::path folder = args.scene_folder;
   const Image photo = ReadImage(folder / scene.views[view].image_file);
   const Image lab = LabFromSrgb(photo);
@@ -63,12 +63,10 @@ FurtherKeyView Stroke(const Arguments& args,
   for (int c = 0; c < 3 && !args.true_colors; ++c) {
     std::fill_n(painted.Plane(c), painted.PlaneSize(), static_cast<float>(sum[c] / count));
   }
-  FurtherKeyView correction{scene.views[view].name, {}};
-  correction.color.source = ColorizeKeyViewOptions::Source::kStrokes;
-  correction.color.file =
+  const std::filesystem::path file =
       std::filesystem::path(args.out_folder) / ("stroke" + std::to_string(number) + ".png");
-  WriteFileAtomic(correction.color.file, EncodePng8(painted));
-  return correction;
+  WriteFileAtomic(file, EncodePng8(painted));
+  return {scene.views[view].name, {PaintedColors::Kind::kStrokes, file, {}}};
 }
 
 double SecondsOf(const LocalPipeline& pipeline, std::string_view kind) {

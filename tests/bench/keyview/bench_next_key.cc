@@ -54,16 +54,19 @@ Problem ReadProblem(const Arguments& args) {
 
 // Colours all views from the key view and `second` (-1: none) and leaves them in the pipeline.
 void ColorAll(const Arguments& args, const Problem& problem, int second, LocalPipeline* pipeline) {
-  pipeline->Run(kind::kCarryColor, [&](StageContext& c) {
-    CarryColorOptions options;
-    options.max_side_px = args.side_px;
-    if (second >= 0) {
-      const View& view = problem.scene.views[second];
-      options.further.push_back({view.name, {}});
-      options.further.back().color.file = c.scene_folder() / view.image_file;
-    }
-    RunCarryColor(options, c);
-  });
+  CarryColorOptions options;
+  options.max_side_px = args.side_px;
+  if (second >= 0) {
+    const View& view = problem.scene.views[second];
+    options.additional_key_views = {view.name};
+    pipeline->Run(
+        kind::kColorizeKeyView,
+        [&](StageContext& c) {
+          RunColorizeKeyView({.file = c.scene_folder() / view.image_file, .view = view.name}, c);
+        },
+        std::string(artifact::kKeyViews) + "1/");
+  }
+  pipeline->Run(kind::kCarryColor, [&](StageContext& c) { RunCarryColor(options, c); });
   pipeline->Run(kind::kPersonalize, [&](StageContext& c) {
     ColorizerOptions options;
     options.iterations = args.iterations;

@@ -12,7 +12,8 @@
 #include "core/base/files.h"
 #include "core/image/codec.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/stage/context/stage_context.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/run_stages.h"
 
 namespace color3d {
 
@@ -57,6 +58,22 @@ class StageTest : public ::testing::Test {
     WriteFileAtomic(path, bytes);
     inputs_[name] = path;
   }
+  // Runs a stage and adds what it leaves to the inputs, below `folder`. Returns the names.
+  template <class Stage>
+  std::vector<std::string> RunForInputs(const Stage& stage, const std::string& folder = "") {
+    StageContext context = MakeContext();
+    stage(context);
+    for (const std::string& name : context.outputs()) {
+      AddInput(folder + name, ReadFile(scratch_.path() / "out" / name));
+    }
+    return context.outputs();
+  }
+  // Colours an additional key view and adds it to the inputs. Returns its name.
+  std::string AddKeyView(const ColorizeKeyViewOptions& options) {
+    RunForInputs([&](StageContext& context) { RunColorizeKeyView(options, context); },
+                 artifact::kKeyViews + std::to_string(++added_key_views_) + "/");
+    return options.view;
+  }
 
   ScratchFolder scratch_;
   std::map<std::string, std::filesystem::path> inputs_;
@@ -67,6 +84,7 @@ class StageTest : public ::testing::Test {
   int64_t memory_bytes_ = 0;
   std::map<std::string, std::filesystem::path> models_;
   RemoteColorizerFactory remote_;
+  int added_key_views_ = 0;
   int added_ = 0;  // inputs, those that were replaced too
 };
 

@@ -1,4 +1,4 @@
-#include "core/base/address.h"
+#include "core/base/text/address.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

@@ -1,4 +1,4 @@
-#include "core/base/name_order.h"
+#include "core/base/text/name_order.h"
 
 #include <cctype>
 #include <cstddef>

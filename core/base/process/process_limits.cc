@@ -1,4 +1,4 @@
-#include "core/base/process_limits.h"
+#include "core/base/process/process_limits.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

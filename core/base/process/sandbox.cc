@@ -1,4 +1,4 @@
-#include "core/base/sandbox.h"
+#include "core/base/process/sandbox.h"
 
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
@@ -7,8 +7,8 @@
 
 #include <atomic>
 
-#include "core/base/landlock.h"
-#include "core/base/syscall_filter.h"
+#include "core/base/process/landlock.h"
+#include "core/base/process/syscall_filter.h"
 
 namespace color3d {
 namespace {

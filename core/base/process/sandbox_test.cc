@@ -1,4 +1,4 @@
-#include "core/base/sandbox.h"
+#include "core/base/process/sandbox.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -20,7 +20,7 @@
 #include <thread>
 
 #include "core/base/files.h"
-#include "core/base/landlock.h"
+#include "core/base/process/landlock.h"
 
 namespace color3d {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/base/cancellation.h"
-#include "core/base/process_limits.h"
-#include "core/base/sandbox.h"
+#include "core/base/process/process_limits.h"
+#include "core/base/process/sandbox.h"
 
 namespace color3d {
 

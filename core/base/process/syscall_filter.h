@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "core/base/sandbox.h"
+#include "core/base/process/sandbox.h"
 
 namespace color3d {
 

@@ -1,4 +1,4 @@
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/base/subprocess.h"
+#include "core/base/process/subprocess.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -14,8 +14,8 @@
 #include <string_view>
 #include <thread>
 
-#include "core/base/environment.h"
 #include "core/base/error.h"
+#include "core/base/process/environment.h"
 
 namespace color3d {
 namespace {

@@ -2,7 +2,7 @@
 // only.
 #pragma once
 
-#include "core/base/sandbox.h"
+#include "core/base/process/sandbox.h"
 
 namespace color3d {
 

@@ -1,4 +1,4 @@
-#include "core/base/subprocess.h"
+#include "core/base/process/subprocess.h"
 
 #include <gtest/gtest.h>
 

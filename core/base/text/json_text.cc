@@ -1,4 +1,4 @@
-#include "core/base/json_text.h"
+#include "core/base/text/json_text.h"
 
 #include <algorithm>
 #include <cctype>
@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 
 namespace color3d {
 namespace {

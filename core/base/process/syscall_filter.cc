@@ -1,4 +1,4 @@
-#include "core/base/syscall_filter.h"
+#include "core/base/process/syscall_filter.h"
 
 #include <linux/seccomp.h>
 #include <sched.h>

@@ -1,4 +1,4 @@
-#include "core/base/landlock.h"
+#include "core/base/process/landlock.h"
 
 #include <fcntl.h>
 #include <linux/landlock.h>

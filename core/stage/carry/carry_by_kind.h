@@ -1,0 +1,33 @@
+// How the colours of key views are carried into all other views: one function for each kind of
+// scene, of which carry_color.cc chooses one. Each writes kCarried and kCarryFacts and goes on
+// where a killed worker has stopped.
+#pragma once
+
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "core/splat/model/gaussian_model.h"
+#include "core/stage/context/stage_context.h"
+#include "core/stage/options/carry_color_options.h"
+
+namespace color3d {
+
+struct CarryInputs {
+  const CarryColorOptions& options;
+  const Scene& scene;
+  std::vector<int> key_views;     // indices, in order of importance
+  const GaussianModel& geometry;  // empty for films
+};
+
+// Static scenes: by depth and visibility.
+void CarryStatic(const CarryInputs& inputs, StageContext& context);
+
+// Films without geometry: by optical flow within a shot, and by local features into shots without a
+// key view.
+void CarryFilm(const CarryInputs& inputs, StageContext& context);
+
+// Dynamic scenes: by optical flow along the cameras that took a key view, from their frames of the
+// same time by depth and visibility into those of other cameras.
+void CarryDynamic(const CarryInputs& inputs, StageContext& context);
+
+}  // namespace color3d

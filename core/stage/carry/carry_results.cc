@@ -1,0 +1,50 @@
+#include "core/stage/carry/carry_results.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/carry/confidence.h"
+#include "core/stage/formats/carry_facts.h"
+
+namespace color3d {
+namespace {
+
+constexpr double kSmallCoverage = 0.01;  // below, the user is warned
+
+// Mean over the views that are not key views.
+double MeanCoverage(const std::vector<double>& coverage, const std::vector<int>& key_views) {
+  double sum = 0.0;
+  for (size_t i = 0; i < coverage.size(); ++i) {
+    if (std::find(key_views.begin(), key_views.end(), static_cast<int>(i)) == key_views.end()) {
+      sum += coverage[i];
+    }
+  }
+  const size_t others = coverage.size() - key_views.size();
+  return others > 0 ? sum / static_cast<double>(others) : 1.0;
+}
+
+}  // namespace
+
+double CoveredShare(const CarriedColor& color) { return Coverage(color, kCoveredConfidence); }
+
+void WriteCoverage(const CarryInputs& inputs,
+                   const std::vector<double>& coverage,
+                   StageContext& context) {
+  const std::vector<View>& views = inputs.scene.views;
+  CarryFacts facts;
+  for (const int view : inputs.key_views) facts.key_views.push_back(views[view].name);
+  const double mean = MeanCoverage(coverage, inputs.key_views);
+  facts.coverage = mean;
+  for (size_t i = 0; i < coverage.size(); ++i) facts.view_coverage[views[i].name] = coverage[i];
+  context.progress().OnError(0, "coverage", mean);
+  if (mean < kSmallCoverage) {
+    context.progress().OnWarning(
+        fmt::format("the key view shows only {:.1f} % of what the other views show; their colours "
+                    "are inferred from likeness. Colour a second key view, or choose another one",
+                    100.0 * mean));
+  }
+  WriteCarryFacts(facts, context);
+}
+
+}  // namespace color3d

@@ -1,0 +1,80 @@
+#include "core/stage/carry/carry_through_geometry.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/image/codec.h"
+#include "core/scene/photo_masks.h"
+#include "core/splat/raster/render.h"
+#include "core/stage/carry/carry_results.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/carry_checkpoint.h"
+#include "core/stage/formats/key_views.h"
+
+namespace color3d {
+namespace {
+
+SurfaceRenderer RendererOf(const Scene& scene, const GaussianModel& geometry) {
+  return [&scene, &geometry](int index, const Camera& camera) {
+    ThreadPool one(1);
+    const View& view = scene.views[index];
+    RenderedView seen = RenderView(geometry, camera, view.cam_from_world, one, 0.0f, view.time_s());
+    return RenderedSurface{std::move(seen.median_depth), std::move(seen.opacity)};
+  };
+}
+
+}  // namespace
+
+SceneSurfaces::SceneSurfaces(const CarryInputs& inputs, int64_t cache_bytes, StageContext& context)
+    : images_(inputs.scene, context.scene_folder(), inputs.options.max_side_px, cache_bytes),
+      sweep_images_(
+          inputs.scene, context.scene_folder(), inputs.options.depth_side_px, cache_bytes),
+      maker_(inputs.scene,
+             images_,
+             sweep_images_,
+             RendererOf(inputs.scene, inputs.geometry),
+             inputs.options.depth_sources,
+             inputs.options.sweep,
+             context.cancel()) {}
+
+std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
+                                                const SceneSurfaces& surfaces,
+                                                StageContext& context) {
+  const ViewImages& images = surfaces.images();
+  std::vector<ColoredKeyView> keys;
+  for (const int view : inputs.key_views) {
+    context.cancel().ThrowIfCancelled();
+    ColoredKeyView key{view, surfaces.Of(view), {}};
+    if (keys.empty()) {
+      const Camera& camera = key.surfaces.rendered.camera;
+      key.color = ReadKeyColor(context, camera.width, camera.height);
+      ClearMasked(images.Mask(view).get(), &key.color.confidence);
+    } else {
+      key.color = CarryFromAll(keys, key.surfaces, inputs.options.carry);
+      FillFrom(ReadAdditionalKeyColor(context, inputs.scene, view, images), &key.color);
+    }
+    keys.push_back(std::move(key));
+  }
+  return keys;
+}
+
+void CarryIntoViews(const CarryInputs& inputs,
+                    const std::vector<ColoredKeyView>& keys,
+                    const std::function<CarriedColor(int view)>& carry,
+                    StageContext& context) {
+  CarryCheckpoint done(inputs.scene, context);
+  const std::vector<int> order = inputs.scene.ViewsInOrderOfTime();
+  context.pool().ForEach(static_cast<int64_t>(order.size()), [&](int64_t index, int) {
+    context.cancel().ThrowIfCancelled();
+    const int view = order[index];
+    if (done.WasDone(view)) return;
+    const auto key = std::find_if(
+        keys.begin(), keys.end(), [&](const ColoredKeyView& k) { return k.view == view; });
+    const bool is_key = key != keys.end();
+    const CarriedColor color = is_key ? key->color : carry(view);
+    done.Add(view, is_key ? 1.0 : CoveredShare(color), EncodeAbPng(color.ab, color.confidence));
+  });
+  WriteCoverage(inputs, done.coverage(), context);
+}
+
+}  // namespace color3d

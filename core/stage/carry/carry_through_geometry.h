@@ -1,0 +1,42 @@
+// What carrying by depth and visibility has in common for static and dynamic scenes.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/carry/carry_views.h"
+#include "core/scene/view_images.h"
+#include "core/stage/carry/carry_by_kind.h"
+
+namespace color3d {
+
+// The photos of a scene and the surfaces that they show. Thread-safe after construction.
+class SceneSurfaces {
+ public:
+  // `cache_bytes`: of decoded photos, and again of those that depth is measured on. `inputs` and
+  // `context` must outlive the object.
+  SceneSurfaces(const CarryInputs& inputs, int64_t cache_bytes, StageContext& context);
+
+  const ViewImages& images() const { return images_; }
+  ViewSurfaces Of(int view) const { return maker_.Make(view); }
+
+ private:
+  const ViewImages images_;
+  const ViewImages sweep_images_;
+  const SurfaceMaker maker_;
+};
+
+// The key views with their colours. Each additional one has the colours that those before it give
+// it, and its own where they give none.
+std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
+                                                const SceneSurfaces& surfaces,
+                                                StageContext& context);
+
+// Writes the colours of all views: those of key views as they are, of other ones as `carry` gives
+// them. `carry` is called from several threads, for views of one time after each other.
+void CarryIntoViews(const CarryInputs& inputs,
+                    const std::vector<ColoredKeyView>& keys,
+                    const std::function<CarriedColor(int view)>& carry,
+                    StageContext& context);
+
+}  // namespace color3d
