@@ -8,6 +8,7 @@
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
+#include "server/planning/key_view_jobs.h"
 #include "server/planning/presets.h"
 
 namespace color3d {
@@ -160,7 +161,7 @@ void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const bool has_poses =
       facts.is_film && scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO;
   for (const v1::FurtherKeyView& correction : scene.correct_colors().corrections()) {
-    const bool has_range = correction.has_begin_s() || correction.has_end_s();
+    const bool has_range = HasRange(correction);
     if (facts.is_film && !has_range) {
       throw InvalidArgument(
           "corrections are for places that are reconstructed; colour further frames of the film as "
