@@ -15,7 +15,7 @@ namespace {
 constexpr int kPageSize = 200;
 constexpr int kMaxPages = 50;
 
-// Newest first; stops as soon as both have been found.
+// Newest first; stops when both are found.
 void FindNewest(Connection& connection, KeyState* state) {
   v1::ListJobsRequest request;
   request.set_parent(state->scene.name());
@@ -71,7 +71,7 @@ KeyViewChoice ReadChoice(Connection& connection, const v1::Job& job) {
     return choice;
   }
   throw Error(ErrorCode::kNotFound,
-              "{} read no key view: its {} job is gone; select again",
+              "{} has no key view: its {} job was deleted; select again",
               job.name(),
               kind::kSelectKeyView);
 }

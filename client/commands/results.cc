@@ -75,7 +75,7 @@ void PrepareOut(const fs::path& out) {
 
 namespace {
 
-// `go_on`: how to fetch the rest when the server is gone.
+// `go_on`: the remedy if the server is lost.
 std::vector<std::string> Fetch(Connection& connection,
                                const std::vector<v1::Artifact>& artifacts,
                                const fs::path& out,
@@ -110,11 +110,8 @@ std::vector<std::string> DownloadArtifacts(Connection& connection,
                                            const std::vector<v1::Artifact>& artifacts,
                                            const fs::path& out,
                                            ProgressDisplay& display) {
-  return Fetch(connection,
-               artifacts,
-               out,
-               display,
-               "run the command again: what is there is not fetched again");
+  return Fetch(
+      connection, artifacts, out, display, "run the command again: downloaded files are kept");
 }
 
 std::vector<std::string> DownloadResults(Connection& connection,
@@ -127,12 +124,12 @@ std::vector<std::string> DownloadResults(Connection& connection,
                  {job.artifacts().begin(), job.artifacts().end()},
                  out,
                  display,
-                 "fetch the rest with `" + FetchCommand(context, job, out) + "`");
+                 "download the rest with `" + FetchCommand(context, job, out) + "`");
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kCancelled) throw;
     throw CommandFailure(
         ExitCode::kDetached,
-        fmt::format("{} is done, its results are partly here; fetch them with `{}`",
+        fmt::format("{} is done, but its results are incomplete here; download them with `{}`",
                     job.name(),
                     FetchCommand(context, job, out)));
   }

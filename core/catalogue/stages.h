@@ -30,6 +30,10 @@ inline constexpr char kPersonalizeScenes[] = "personalize_scenes";
 
 struct Stage {
   const char* kind;
+  // Its step in the plan of a scene (plan.json) and the reason for which a scene needs it. nullptr
+  // for kinds that are graphs of the others.
+  const char* step = nullptr;
+  const char* purpose = nullptr;
   std::vector<const char*> needs = {};  // artifacts that it cannot run without
   std::vector<const char*> reads = {};  // artifacts that it reads if they are among its inputs
   // Artifacts that it writes, some of them only if there is something to write, and those of them

@@ -16,11 +16,11 @@
 namespace color3d {
 namespace {
 
-constexpr int kStretch = 16;  // neighbouring frames that one thread compares
+constexpr int kStretch = 16;  // number of neighbouring frames that one thread compares
 constexpr size_t kMostStretches = 16;
 constexpr int kReach = kCdcDistances.back();
 
-// Frames [begin, end) of a shot, each compared with those before it.
+// Frames [begin, end) of a shot; each is compared with earlier ones.
 struct Stretch {
   const std::vector<int>* shot = nullptr;
   int begin = 1;
@@ -38,7 +38,7 @@ std::vector<Stretch> StretchesOf(const std::vector<std::vector<int>>& shots) {
   return EvenlyOf(std::move(stretches), kMostStretches);
 }
 
-// One colouring of a stretch.
+// Sums for one colouring of a stretch.
 struct Sums {
   ChromaAlongMotion chroma;
   std::array<double, 3> divergence = {};
@@ -74,10 +74,10 @@ TemporalConsistency Result(const Sums& sums) {
   return result;
 }
 
-// What is kept of a frame while later ones are compared with it.
+// Data of earlier frames that later frames are compared with.
 struct Remembered {
   Image ab;                               // of the last frame only
-  std::deque<ColorHistogram> histograms;  // the last one in front
+  std::deque<ColorHistogram> histograms;  // the newest first
 };
 
 std::vector<Sums> Compare(const Stretch& stretch,
@@ -155,7 +155,7 @@ FollowedPixels FollowBack(const Image& luminance, const Image& luminance_before)
   const Image forth = DenseFlow(luminance_before, luminance);
   const int width = luminance.width, height = luminance.height;
   FollowedPixels followed{Image(width, height, 2), std::vector<char>(luminance.PlaneSize(), 0)};
-  constexpr int kSmallestSide = 32;  // below, flow is 0 and means nothing
+  constexpr int kSmallestSide = 32;  // optical flow of smaller pictures is 0
   const bool too_small = std::min(width, height) < kSmallestSide;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {

@@ -16,14 +16,10 @@ constexpr double kSecondsPerRemapMegapixel = 0.01;
 constexpr double kSecondsPerFeatureMegapixel = 0.5;
 constexpr double kFullyDynamic = 0.5;  // motion energy
 
-std::string WhyKeyView(const PlanFacts& f) {
-  if (f.key_view_given) return "the key view was given";
-  if (f.key_view_strategy.empty()) return "the key view is chosen among the views";
-  return "the key view is chosen by " + f.key_view_strategy;
-}
+constexpr char kNothingReconstructed[] = "nothing is reconstructed of a film";
 
 std::string WhyTime(const PlanFacts& f) {
-  if (f.is_film) return "nothing is reconstructed of a film";
+  if (f.is_film) return kNothingReconstructed;
   if (!f.is_dynamic) return "all photos show one time";
   std::string why = fmt::format("the views show {} time steps, seen by {} camera{}",
                                 f.time_steps,
@@ -42,6 +38,71 @@ PlanStep TimeStep(const PlanFacts& f) {
       .step = "deformation_over_time", .needed = needed, .reason = WhyTime(f), .motion = f.motion};
 }
 
+// Adapts the step of a stage, as the catalogue has it, to the scene.
+void Decide(const PlanFacts& f, PlanStep* step) {
+  const auto leave_out = [step](const char* reason) {
+    step->needed = false;
+    step->reason = reason;
+  };
+  if (step->stage == kind::kImportScene) {
+    step->estimated_seconds = kPosesSecondsPerPhoto * f.views;
+    if (f.has_poses) leave_out("the scene comes with camera poses");
+    if (f.is_film) leave_out("frames of a film are coloured along the optical flow");
+  } else if (step->stage == kind::kSelectKeyView) {
+    step->estimated_seconds = kSecondsPerFeatureMegapixel * f.views * f.megapixels_per_view;
+    if (!f.key_view_strategy.empty()) {
+      step->reason = "the key view is chosen by " + f.key_view_strategy;
+    }
+    if (f.key_view_given) leave_out("the key view was given");
+  } else if (step->stage == kind::kReconstructGeometry) {
+    if (f.geometry_given) leave_out("the scene's Gaussians were given");
+    if (f.is_film) leave_out(kNothingReconstructed);
+  } else if (step->stage == kind::kCarryColor) {
+    if (f.is_film) step->reason = "colours are carried along the optical flow";
+  } else if (step->stage == kind::kGenerateAugmentations) {
+    if (!f.has_augmentations) leave_out("the colorizer learns from the key views alone");
+  } else if (step->stage == kind::kCorrectColors) {
+    if (!f.has_corrections) leave_out("nothing is to be corrected");
+  } else if (step->stage == kind::kSolveChroma || step->stage == kind::kExport) {
+    if (f.is_film) leave_out(kNothingReconstructed);
+  } else if (step->stage == kind::kRender) {
+    if (f.is_film) step->reason = "the coloured frames become a film";
+  } else if (step->stage == kind::kEvaluate) {
+    step->reason = f.has_truth
+                       ? "true colours of held-out views were given"
+                       : "no true colours were given: the views are compared with each other only";
+  }
+}
+
+// Parts of the stage that may be left out.
+void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep>* plan) {
+  const auto add = [plan](const char* step, bool needed, const char* reason, double seconds = 0.0) {
+    plan->push_back(
+        {.step = step, .needed = needed, .reason = reason, .estimated_seconds = seconds});
+  };
+  if (stage == kind::kImportScene) {
+    add("undistortion",
+        f.has_distortion,
+        f.has_distortion ? "the cameras have lens distortion" : "no camera has lens distortion",
+        kSecondsPerRemapMegapixel * f.views * f.megapixels_per_view);
+    add("random_points",
+        !f.has_sparse_points && !f.is_film,
+        f.is_film             ? kNothingReconstructed
+        : f.has_sparse_points ? "the scene has sparse points to start from"
+                              : "the scene has no sparse points to start from",
+        0.1);
+  } else if (stage == kind::kReconstructGeometry) {
+    add("warm_up_in_three_channels",
+        false,
+        "three equal luminance channels are one channel: one is rasterised");
+    plan->push_back(TimeStep(f));
+  } else if (stage == kind::kSolveChroma) {
+    add("view_dependent_chroma",
+        false,
+        "chroma hardly depends on the direction: degree 0 suffices unless another is asked for");
+  }
+}
+
 }  // namespace
 
 std::string ClassOf(const SceneMotion& motion) {
@@ -51,90 +112,14 @@ std::string ClassOf(const SceneMotion& motion) {
 }
 
 std::vector<PlanStep> PlanScene(const PlanFacts& f) {
-  const double megapixels = f.views * f.megapixels_per_view;
-  const char* film = "nothing is reconstructed of a film";
   std::vector<PlanStep> plan;
-  const auto add = [&plan](const char* step,
-                           bool needed,
-                           std::string reason,
-                           const char* stage = "",
-                           double seconds = 0.0) {
-    plan.push_back({step, needed, std::move(reason), seconds, -1.0, stage});
-  };
-  add("structure_from_motion",
-      !f.has_poses && !f.is_film,
-      f.is_film     ? "frames of a film are coloured along the optical flow"
-      : f.has_poses ? "the scene comes with camera poses"
-                    : "the photos come without camera poses",
-      kind::kImportScene,
-      kPosesSecondsPerPhoto * f.views);
-  add("undistortion",
-      f.has_distortion,
-      f.has_distortion ? "the cameras have lens distortion" : "no camera has lens distortion",
-      "",
-      kSecondsPerRemapMegapixel * megapixels);
-  add("random_points",
-      !f.has_sparse_points && !f.is_film,
-      f.is_film             ? film
-      : f.has_sparse_points ? "the scene has sparse points to start from"
-                            : "the scene has no sparse points to start from",
-      "",
-      0.1);
-  add("key_view_selection",
-      !f.key_view_given,
-      WhyKeyView(f),
-      kind::kSelectKeyView,
-      kSecondsPerFeatureMegapixel * megapixels);
-  add("key_view_color",
-      true,
-      "all colours of the scene come from its key views",
-      kind::kColorizeKeyView);
-  add("luminance_geometry",
-      !f.geometry_given && !f.is_film,
-      f.is_film          ? film
-      : f.geometry_given ? "the scene's Gaussians were given"
-                         : "every scene needs geometry",
-      kind::kReconstructGeometry);
-  add("carried_color",
-      true,
-      f.is_film ? "colours are carried along the optical flow"
-                : "colours are carried to every view that sees the same surface",
-      kind::kCarryColor);
-  add("augmentations",
-      f.has_augmentations,
-      f.has_augmentations ? "the colorizer also learns from generated pictures"
-                          : "the colorizer learns from the key views alone",
-      kind::kGenerateAugmentations);
-  add("personalization",
-      true,
-      "surfaces that no key view shows get the colours of similar ones",
-      kind::kPersonalize);
-  add("view_colors", true, "every view gets a colour at every pixel", kind::kColorizeViews);
-  add("corrections",
-      f.has_corrections,
-      f.has_corrections ? "corrections were given" : "nothing is to be corrected",
-      kind::kCorrectColors);
-  add("chroma",
-      !f.is_film,
-      f.is_film ? film : "a and b are fitted on the finished geometry",
-      kind::kSolveChroma);
-  add("warm_up_in_three_channels",
-      false,
-      "three equal luminance channels are one channel: one is rasterised");
-  add("view_dependent_chroma",
-      false,
-      "chroma hardly depends on the direction: degree 0 suffices unless another is asked for");
-  plan.push_back(TimeStep(f));
-  add("export", !f.is_film, f.is_film ? film : "viewers read files of their own", kind::kExport);
-  add("render",
-      true,
-      f.is_film ? "the coloured frames become a film" : "the report shows rendered views",
-      kind::kRender);
-  add("evaluation",
-      true,
-      f.has_truth ? "true colours of held-out views were given"
-                  : "no true colours were given: the views are compared with each other only",
-      kind::kEvaluate);
+  for (const Stage& stage : StageCatalogue()) {
+    if (stage.step == nullptr) continue;
+    PlanStep step{.step = stage.step, .reason = stage.purpose, .stage = stage.kind};
+    Decide(f, &step);
+    plan.push_back(std::move(step));
+    AddParts(f, stage.kind, &plan);
+  }
   return plan;
 }
 

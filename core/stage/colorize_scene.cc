@@ -28,7 +28,7 @@ using nlohmann::ordered_json;
 
 constexpr int kReportSidePx = 540;
 
-// A picture for the page: small enough to embed many.
+// A picture for the page, small enough to embed many.
 ReportPicture Picture(const StageContext& context, const std::string& name, std::string caption) {
   const Image image = DecodeImage(context.ReadInput(name), name);
   return {std::move(caption), EncodeJpeg(FitWithin(image, kReportSidePx), 88)};
@@ -98,7 +98,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
   for (const StageSummary& s : stages) {
     if (s.state != "SUCCEEDED") continue;
     const std::string name = "seconds_" + s.kind;
-    metrics[name] = metrics.value(name, 0.0) + s.seconds;  // several key views are jobs of one kind
+    metrics[name] = metrics.value(name, 0.0) + s.seconds;  // key views are several jobs of one kind
   }
   if (peak > 0) metrics["peak_memory_bytes"] = peak;
   return metrics;
@@ -113,7 +113,7 @@ std::vector<CurvePoint> CollectCurves(const StageContext& context) {
   return curves;
 }
 
-// Nothing of photos, nor before there is geometry.
+// nullopt for photos, and without geometry.
 std::optional<SceneMotion> MotionOf(const Scene& scene,
                                     const std::vector<CurvePoint>& curves,
                                     const StageContext& context) {
@@ -138,13 +138,13 @@ double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kin
   return seconds;
 }
 
-std::string OfMotion(const FilmFindings& film, const Scene& scene) {
-  std::string text = scene.relief       ? "the camera stands still, which tells no depth"
+std::string DescribeMotion(const FilmFindings& film, const Scene& scene) {
+  std::string text = scene.relief       ? "the camera stands still, so that depth is unknown"
                      : film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
                      : film.camera_stands_still ? "the camera stands still"
                                                 : "no poses were found";
   if (film.motion_energy >= 0.0) {
-    text += fmt::format("; {:.1f} % of the picture moves on its own", 100.0 * film.motion_energy);
+    text += fmt::format("; {:.1f} % of the picture is moving objects", 100.0 * film.motion_energy);
   }
   return text;
 }
@@ -167,7 +167,8 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
                                   const std::optional<SceneMotion>& motion,
                                   bool has_truth,
                                   const StageContext& context) {
-  if (!context.HasInput(artifact::kImportFacts)) return {};  // nobody knows what was planned
+  if (!context.HasInput(artifact::kImportFacts))
+    return {};  // the facts that the plan depends on are unknown
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   PlanFacts plan_facts;
   plan_facts.is_film = IsColoredAsFilm(context, scene);
@@ -201,7 +202,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     }
   };
   add_reason(kind::kImportScene, facts.sfm_plan);
-  if (facts.film) add_reason(kind::kImportScene, OfMotion(*facts.film, scene));
+  if (facts.film) add_reason(kind::kImportScene, DescribeMotion(*facts.film, scene));
   if (scene.relief) {
     add_reason(kind::kReconstructGeometry,
                "2.5D: depth is assumed, ground in front of an upright backdrop");
@@ -225,7 +226,7 @@ std::string Summary(const Scene& scene,
                     bool is_film,
                     const ordered_json& metrics,
                     const std::vector<std::string>& keys) {
-  const std::string of_model =
+  const std::string result =
       is_film ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
   PlanFacts time;
   AddTime(scene, &time);
@@ -238,7 +239,7 @@ std::string Summary(const Scene& scene,
                                   : fmt::format(", all colours from the key {} {}",
                                                 keys.size() == 1 ? "view" : "views",
                                                 fmt::join(keys, ", ")),
-                     of_model,
+                     result,
                      static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
 }
 
@@ -260,8 +261,8 @@ ReportRow KeyPictures(const std::string& name, const StageContext& context) {
     row.pictures.push_back(Picture(context, artifact::kKeyViewGray, "as captured"));
   }
   if (context.HasInput(artifact::kKeyViewColored)) {
-    row.pictures.push_back(
-        Picture(context, artifact::kKeyViewColored, "coloured: all colours come from here"));
+    row.pictures.push_back(Picture(
+        context, artifact::kKeyViewColored, "coloured: all colours of the scene come from here"));
   }
   return row;
 }

@@ -20,7 +20,7 @@ class EvaluateTest : public EvaluatedSceneTest {
   }
 };
 
-TEST_F(EvaluateTest, WithoutTruthTheViewsAreStillCompared) {
+TEST_F(EvaluateTest, ComparesViewsWithoutTruth) {
   const json scores = Evaluated({});
   EXPECT_TRUE(scores.at("views").empty());
   const json& consistency = scores.at("consistency");
@@ -32,7 +32,7 @@ TEST_F(EvaluateTest, WithoutTruthTheViewsAreStillCompared) {
   EXPECT_FALSE(consistency.contains("truth"));
 }
 
-TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
+TEST_F(EvaluateTest, ScoresTheBoundOfTheReconstruction) {
   EvaluateOptions options;
   options.truth = {TruthOf("p0.png")};
   options.training_truth = {TruthOf("p1.png")};
@@ -58,7 +58,7 @@ TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
   EXPECT_THROW(Evaluated(options), Error);
 }
 
-TEST_F(EvaluateTest, OfASceneThatMovesCamerasOfOneMomentAreComparedAndGapsAreTold) {
+TEST_F(EvaluateTest, ComparesCamerasOfOneTimeInDynamicScenes) {
   scene_.views[0].moment = Moment{0.0, 1};  // its camera is held out
   scene_.views[1].moment = Moment{0.0, 0};
   scene_.views[2].moment = Moment{0.5, 0};
@@ -76,7 +76,7 @@ TEST_F(EvaluateTest, OfASceneThatMovesCamerasOfOneMomentAreComparedAndGapsAreTol
   EXPECT_EQ(camera.at("delta_e00_chroma"), scores.at("mean").at("delta_e00_chroma"));
 }
 
-TEST_F(EvaluateTest, ErrorsAreToldBySource) {
+TEST_F(EvaluateTest, ReportsErrorsBySource) {
   AddProvenance("p0.png", Halves({0.0f, 1.0f, 0.0f}, {1.0f, 0.0f, 0.0f}));
   EvaluateOptions options;
   options.truth = {TruthOf("p0.png")};
@@ -86,7 +86,7 @@ TEST_F(EvaluateTest, ErrorsAreToldBySource) {
   EXPECT_FALSE(sources.contains("delta_e00_inferred"));
 }
 
-TEST_F(EvaluateTest, WhatIsMaskedOutIsNotScored) {
+TEST_F(EvaluateTest, DoesNotScoreMaskedPixels) {
   EvaluateOptions options;
   options.truth = {TruthOf("p0.png")};
   Image truth = ReadImage(options.truth[0].file);

@@ -21,8 +21,8 @@
 namespace color3d {
 namespace {
 
-constexpr int kSidePx = 500;      // of the pictures that colours are refined on
-constexpr size_t kMaxViews = 32;  // of them, spread evenly
+constexpr int kSidePx = 500;      // longer side of the renders that colours are refined on
+constexpr size_t kMaxViews = 32;  // number of these renders, evenly spread
 
 std::vector<RgbView> ViewsToCompare(const Scene& scene, std::vector<std::string>* names) {
   std::vector<RgbView> views;
@@ -45,7 +45,7 @@ nlohmann::ordered_json ScoresOf(const RgbRefinement& refinement,
           {"unrefined_worst_psnr_db_vs_lab", refinement.before.worst_psnr_db}};
 }
 
-// Writes the formats one by one. What several of them share is computed for the first one.
+// Writes the formats one by one. Data that several formats need is computed once.
 class Exporter {
  public:
   Exporter(const ExportOptions& options, const Scene& scene, StageContext& context)
@@ -120,7 +120,7 @@ class Exporter {
     context_.WriteOutput(InfoOf(format).artifact, bytes);
   }
 
-  // Of several files the view page shows the last one, which is the smaller.
+  // The view page shows the last of these files, which is the smaller one.
   void WriteForPage(const char* name, std::string bytes) {
     context_.WriteOutput(name, bytes);
     page_file_ = {name, std::move(bytes)};

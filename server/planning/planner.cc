@@ -16,7 +16,7 @@
 namespace color3d {
 namespace {
 
-// A colorize_views or correct_colors job that names no encoder works with that of the given
+// Sets the encoder of a colorize_views or correct_colors job, if it is unset, to that of the input
 // personalize job.
 void TakeEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
   std::string* encoder = nullptr;
@@ -43,8 +43,8 @@ void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
   builder->Add(std::move(spec), skip_reason);
 }
 
-// What was submitted over its preset. A given import has settled what a new one would be asked for:
-// a film's poses, its part and its stride.
+// The submitted options over their preset, with the options of the import among the inputs: poses,
+// range and stride of a film are fixed by it.
 v1::ColorizeSceneSpec SceneOf(const v1::JobSpec& submitted, const std::vector<JobRecord>& inputs) {
   v1::ColorizeSceneSpec scene = WithPreset(submitted.colorize_scene());
   for (const JobRecord& input : inputs) {

@@ -61,7 +61,7 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
             Sha256Hex("key"));
 }
 
-TEST(Planner, CorrectionsAreLeftOutProposedOrMadeBeforeTheChroma) {
+TEST(Planner, CorrectionsPrecedeChroma) {
   const NewGraph without = PlanJob(SceneSpec(), {}, kTwentyPhotos);
   EXPECT_THAT(without.jobs[IndexOf(without, "correct_colors")].skip_reason, HasSubstr("nothing"));
 
@@ -82,7 +82,7 @@ TEST(Planner, CorrectionsAreLeftOutProposedOrMadeBeforeTheChroma) {
   EXPECT_THROW(PlanJob(spec, {}, kTwentyPhotos), Error);
 }
 
-TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
+TEST(Planner, ExplicitFieldsWinOverThePreset) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
   spec.mutable_colorize_scene()->mutable_personalize()->set_iterations(7);
@@ -130,7 +130,7 @@ TEST(Planner, TruthGoesToEvaluation) {
   EXPECT_EQ(graph.jobs.back().blobs.size(), 3u);
 }
 
-TEST(Planner, SingleStagesBringSimplePrerequisites) {
+TEST(Planner, SingleStagesBringPrerequisites) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   *spec.mutable_colorize_key_view()->mutable_source()->mutable_image() = SomeDigest("key");
@@ -184,7 +184,7 @@ TEST(Planner, OtherStagesNameTheMissingInput) {
   EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("scenes/other"));
 }
 
-TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
+TEST(Planner, SkipsAugmentationsUnlessRequested) {
   v1::JobSpec spec = SceneSpec();
   NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
@@ -226,7 +226,7 @@ TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
   EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
 }
 
-TEST(Planner, SeveralKeyViewsAreSelectedBeforeTheSceneIsColored) {
+TEST(Planner, RefusesToSelectSeveralKeyViews) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->mutable_select_key_view()->set_count(3);
   EXPECT_THAT(PlanError(spec).message, HasSubstr("further_key_views"));
@@ -258,7 +258,7 @@ std::vector<v1::ColorizeKeyViewSpec> KeyViewsRead(const NewGraph& graph, const s
   return read;
 }
 
-TEST(Planner, EachAdditionalKeyViewIsAJobOfItsOwn) {
+TEST(Planner, EachAdditionalKeyViewIsAJob) {
   v1::JobSpec spec = SceneSpec();
   v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
   AddKeyView("b", scene->mutable_carry_color());
@@ -342,7 +342,7 @@ TEST(Planner, AugmentationOptionsAreChecked) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("0 to 64"));
 }
 
-TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
+TEST(Planner, RefusesStagesThatAreNotBuilt) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_reconstruct_dense();
@@ -430,7 +430,7 @@ JobRecord Done(const std::string& kind) {
   return job;
 }
 
-TEST(PlanColorizeScene, TakesAnAcceptedKeyViewInPlaceOfMakingItsOwn) {
+TEST(PlanColorizeScene, TakesAnAcceptedKeyView) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_colorize_scene();

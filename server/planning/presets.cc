@@ -28,7 +28,7 @@ std::vector<Preset> ReadPresets() {
   return presets;
 }
 
-// A choice between sources is one value: parts of two of them would make a third that nobody gave.
+// True for messages that are replaced as a whole: merging two sources of colour would make a third.
 bool IsOneValue(const Message& message) {
   return message.GetDescriptor()->real_oneof_decl_count() > 0;
 }
@@ -39,7 +39,7 @@ void MergeOver(const Message& given, Message* base) {
   const Reflection* reflection = given.GetReflection();
   std::vector<const FieldDescriptor*> fields;
   reflection->ListFields(given, &fields);
-  const std::unique_ptr<Message> rest(given.New());  // what MergeFrom is right for
+  const std::unique_ptr<Message> rest(given.New());  // the fields left to MergeFrom
   rest->CopyFrom(given);
   for (const FieldDescriptor* field : fields) {
     if (field->is_repeated()) {
@@ -60,7 +60,7 @@ void MergeOver(const Message& given, Message* base) {
   base->MergeFrom(*rest);
 }
 
-// Key views that count in a range of time correct the coloured film: nothing before is made anew.
+// Makes corrections of key views with a range of time: the film coloured before is reused.
 void TakeRangesAsCorrections(v1::ColorizeSceneSpec* spec) {
   auto* further = spec->mutable_carry_color()->mutable_further_key_views();
   if (std::none_of(further->begin(), further->end(), HasRange)) return;
@@ -90,7 +90,7 @@ v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
   v1::ColorizeSceneSpec merged = OptionsOf(given.preset());
   MergeOver(given, &merged);
   TakeRangesAsCorrections(&merged);
-  // A preset that carries no colour does so where additional key views need it.
+  // Additional key views need carry_color, even if the preset skips it.
   if (!merged.carry_color().further_key_views().empty()) {
     merged.mutable_carry_color()->clear_skip();
   }
@@ -104,7 +104,7 @@ v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
 }
 
 void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
-  if (spec->has_colorize_views()) {  // has no options of its own in a ColorizeSceneSpec
+  if (spec->has_colorize_views()) {  // not a field of ColorizeSceneSpec
     auto* views = spec->mutable_colorize_views();
     if (!views->has_max_side_px()) views->set_max_side_px(scene.max_side_px());
     return;

@@ -12,8 +12,8 @@ using nlohmann::json;
 
 namespace {
 
-// A checkpoint: these bytes, then records:
-//   {"view": name, "coverage": 0..1, "png": bytes}       a view that is done; the last one counts
+// First bytes of a checkpoint; records follow:
+//   {"view": name, "coverage": 0..1, "png": bytes}       a finished view; the last one counts
 //   {"key": name, "direction": 1 or -1, "frame": name, "moved": longer sides,
 //    "wanted": 0..1, "width": px, "height": px, "in_key": bytes, "in_frame": bytes}
 //                                                        a walk of a film; no maps at its end

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Length (uint64) and CBOR.
+// A record: its length (uint64) and CBOR.
 void Write(const json& record, std::ostream& out) {
   std::string bytes;
   json::to_cbor(record, bytes);

@@ -12,7 +12,8 @@ using nlohmann::json;
 
 namespace {
 
-// How a checkpoint begins; then records {"view": name, "ab": bytes, "provenance": bytes}, of PNG.
+// First bytes of a checkpoint; records follow: {"view": name, "ab": bytes, "provenance": bytes},
+// PNG.
 constexpr char kMagic[] = "views 1\n";
 
 std::string BytesAt(const json& record, const char* name) {

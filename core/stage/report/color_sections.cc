@@ -20,8 +20,9 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kPictureSidePx = 400;
-constexpr size_t kMaxRows = 20;     // of the table
-constexpr size_t kMaxPictures = 4;  // views shown with their provenance, of all certainties
+constexpr size_t kMaxRows = 20;  // of a table
+constexpr size_t kMaxPictures =
+    4;  // views shown with their provenance, from the least to the most certain
 
 std::string Percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
 
@@ -68,7 +69,7 @@ void ColorFacts::ReadProvenance() {
   }
 }
 
-// All 0 without such views.
+// All 0 if there are no such views.
 SourceShares ColorFacts::MeanShares(bool scored_only) const {
   SourceShares mean;
   double count = 0.0;
@@ -170,8 +171,9 @@ std::string ColorFacts::SourceSummary() const {
   if (!views_.empty()) {
     const SourceShares mean = MeanShares(/*scored_only=*/false);
     summary = fmt::format(
-        "{} of all pixels show what a key view shows, {} resemble something in it, and {} are a "
-        "guess. ",
+        "{} of all pixels show a surface that a key view shows, {} resemble something in it, and "
+        "{} "
+        "are guessed. ",
         Percent(mean.seen),
         Percent(mean.inferred),
         Percent(mean.guessed));
@@ -263,7 +265,7 @@ ReportSection ColorFacts::SourceSection() const {
   const std::string summary = SourceSummary();
   if (!summary.empty()) section.notes.push_back(summary);
   if (!augmentations_.empty()) {
-    section.notes.push_back(fmt::format("Beside the key views, the colorizer learnt from {}.",
+    section.notes.push_back(fmt::format("Beside the key views, the colorizer was trained on {}.",
                                         fmt::join(augmentations_, ", ")));
   }
   if (next_) {
@@ -334,22 +336,23 @@ ReportSection ColorFacts::SteadinessSection() const {
 
 namespace {
 
-// What the curves of personalization say, in words; nothing without two points of held-out error.
+// Describes the curves of personalization; empty for fewer than two points of held-out error.
 std::vector<std::string> NotesOnPersonalization(const std::vector<CurvePoint>& curves) {
   std::vector<CurvePoint> errors;
   std::string stopped;
   for (const CurvePoint& point : curves) {
     if (point.error_name == "validation_delta_e00") errors.push_back(point);
     if (point.error_name == "stopped_early_iteration") {
-      stopped = fmt::format(" Training ended at iteration {} because it hardly fell any more.",
-                            point.iteration);
+      stopped =
+          fmt::format(" Training ended at iteration {} because the error hardly fell any more.",
+                      point.iteration);
     }
   }
   if (errors.size() < 2) return {};
   const CurvePoint &first = errors.front(), &last = errors.back();
   return {fmt::format(
-      "Augmentations of the key view are kept from training; their colour error (CIEDE2000) went "
-      "from {:.1f} after {:.0f} s to {:.1f} after {:.0f} s.{}",
+      "The colour error (CIEDE2000) on augmentations of the key view that are kept out of training "
+      "went from {:.1f} after {:.0f} s to {:.1f} after {:.0f} s.{}",
       first.value,
       first.seconds,
       last.value,
@@ -365,7 +368,7 @@ ReportSection ColorFacts::PersonalizationSection(std::vector<CurvePoint> curves)
   section.notes = NotesOnPersonalization(curves);
   section.curves = std::move(curves);
   if (context_.HasInput(artifact::kAugmentationSheet)) {
-    section.wide = {"what it learnt from besides the key view",
+    section.wide = {"training pictures beside the key view",
                     context_.ReadInput(artifact::kAugmentationSheet)};
   }
   return section;

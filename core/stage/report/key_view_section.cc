@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// As people read it: no quotes and braces, numbers with four digits.
+// A JSON value for users: without quotes and braces, numbers with four digits.
 std::string FactText(const ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_float()) return fmt::format("{:.4g}", value.get<double>());

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-// One word for a shell, whatever the name has in it.
+// Quotes a name as one word of a shell.
 std::string ShellWord(const std::string& text) {
   std::string word = "'";
   for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
@@ -23,8 +23,7 @@ void AddDigest(const char* name, const StageContext& context, ReportData* data) 
                            DigestFile(context.Input(name)).sha256);
 }
 
-// The flags that name a source of the key view's colour; empty for one whose text or file is not
-// kept.
+// The flags for the source of the colour of the key view; empty if its text or file is not kept.
 std::string ColorFlags(bool has_truth, const StageContext& context) {
   if (has_truth) return " --benchmark";
   if (!context.HasInput(artifact::kKeyColorFacts)) return "";
@@ -34,7 +33,7 @@ std::string ColorFlags(bool has_truth, const StageContext& context) {
   return source == "automatic" ? " --auto" : "";
 }
 
-// Those of the key views that recolour ranges of a film; `number`: of the first one's picture.
+// The flags for key views that recolour ranges of a film. `number`: that of the first picture.
 std::string RangeFlags(size_t number, const StageContext& context) {
   if (!context.HasInput(artifact::kCorrections)) return "";
   const auto facts = ReadJson(context, artifact::kCorrections);

@@ -15,7 +15,7 @@ namespace {
 
 class ReportViewsTest : public EvaluatedSceneTest {};
 
-TEST_F(ReportViewsTest, EveryViewHasItsPhotoAndARenderOfTheModel) {
+TEST_F(ReportViewsTest, EveryViewHasPhotoAndRender) {
   AddInput(ViewArtifact(artifact::kTruths, scene_.views[1], ".jpg"),
            EncodeJpeg(Image(48, 32, 3, 0.5f)));
   StageContext context = MakeContext();
@@ -32,7 +32,7 @@ TEST_F(ReportViewsTest, EveryViewHasItsPhotoAndARenderOfTheModel) {
   EXPECT_EQ(with_truth, 1u);
 }
 
-TEST_F(ReportViewsTest, AReportOfHalfFinishedWorkShowsWhatThereIs) {
+TEST_F(ReportViewsTest, ReportsUnfinishedWork) {
   StageContext context = MakeContext();  // no key view, no scores, no export, no import facts
   RunReport({{.kind = "solve_chroma", .state = "SUCCEEDED", .seconds = 2.0}}, context);
   EXPECT_THAT(context.outputs(), testing::Contains(artifact::kReport));
@@ -43,7 +43,7 @@ TEST_F(ReportViewsTest, AReportOfHalfFinishedWorkShowsWhatThereIs) {
   EXPECT_THAT(html, testing::Not(testing::HasSubstr("view.html")));
 }
 
-TEST_F(ReportViewsTest, PlanAndMetricsTellWhetherAPosedFilmMoves) {
+TEST_F(ReportViewsTest, TellsWhetherAPosedFilmMoves) {
   for (int i = 0; i < 3; ++i) scene_.views[i].moment = Moment{0.5 * i, 0};
   AddInput(artifact::kScene, SceneToJson(scene_));
   AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = "film"}));
@@ -83,7 +83,9 @@ TEST_F(ReportViewsTest, PlanNamesTheStrategyAndEveryStage) {
       EXPECT_EQ(step.at("needed"), false);
       EXPECT_EQ(step.at("reason"), "for this test");
     }
-    if (step.at("step") == "export") EXPECT_EQ(step.at("measured_seconds"), 2.0);
+    if (step.at("step") == "export") {
+      EXPECT_EQ(step.at("measured_seconds"), 2.0);
+    }
   }
 }
 
@@ -104,7 +106,7 @@ TEST_F(ReportViewsTest, UnknownMetricsDoNotVanish) {
   EXPECT_THAT(html, testing::HasSubstr("flicker"));
 }
 
-TEST(SourceOverlay, TellsSourcesApartByLightnessAndPatternNotByHueAlone) {
+TEST(SourceOverlay, SourcesDifferByLightnessAndPattern) {
   const Image photo(32, 16, 3, 0.6f);
   const auto shaded = [&](float guessed, float seen, float inferred) {
     Image shares(32, 16, 3);
