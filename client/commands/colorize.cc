@@ -139,7 +139,7 @@ class Colorize {
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     spec.mutable_colorize_scene()->clear_select_key_view();
     AddKeyViews(*connection_, options_, spec.mutable_colorize_scene());
-    for (const std::string& input : WithItsInputs(*connection_, *state.accepted)) {
+    for (const std::string& input : JobAndInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }
     display_.Say(fmt::format("key view {}, as accepted ({})",
@@ -223,12 +223,12 @@ class Colorize {
                  {"files", files},
                  {"key_view", view}});
     } else {
-      PrintText(HowToGoOn(view));
+      PrintText(NextCommands(view));
     }
     return ExitCode::kOk;
   }
 
-  std::string HowToGoOn(const std::string& view) const {
+  std::string NextCommands(const std::string& view) const {
     const std::string picture = (out_ / artifact::kKeyViewGray).string();
     const std::string again = "  color3d " + ShellLine(context_.arguments);
     return "The key view is " + view + ", saved as " + picture +

@@ -84,9 +84,9 @@ ExitCode Apply(const Context& context, const ColorizerOptions& options) {
   } else {
     source.colorizer = ResourceName(options.name, "colorizers");
   }
-  return Conclude(context,
-                  ColorizeToFiles(connection, source, pictures, options.live, options.out),
-                  options.out);
+  return PrintSummary(context,
+                      ColorizeToFiles(connection, source, pictures, options.live, options.out),
+                      options.out);
 }
 
 }  // namespace

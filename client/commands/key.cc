@@ -61,7 +61,7 @@ class Key {
     spec.set_scene(scene);
     return spec;
   }
-  bool AsksForImport() const {
+  bool HasImportOptions() const {
     return ImportSpec(options_.import, "").import_scene().ByteSizeLong() > 0;
   }
   // Submits the selection, with the import if options for it are given.
@@ -78,7 +78,7 @@ class Key {
   };
   Fetched Fetch(const v1::Job& submitted) {
     std::vector<std::string> jobs = {submitted.name()};
-    if (AsksForImport()) {  // submitted with the selection
+    if (HasImportOptions()) {  // submitted with the selection
       jobs.insert(jobs.begin(), submitted.spec().inputs().begin(), submitted.spec().inputs().end());
     }
     const v1::Job job = Follow(jobs);
@@ -92,7 +92,7 @@ class Key {
     return "  " + CommandLine(context_, std::move(arguments)) + "\n";
   }
   // The next commands for the chosen view.
-  std::string HowToColor(const std::string& scene) const;
+  std::string NextCommands(const std::string& scene) const;
 
   const Context& context_;
   const KeyOptions& options_;
@@ -116,13 +116,13 @@ v1::Job Key::SubmitSelection(const std::string& scene) {
   if (options_.count > 1) select->set_count(options_.count);
   select->set_encoder(options_.encoder);
   select->set_features(options_.features);
-  if (AsksForImport()) {  // else the default import
+  if (HasImportOptions()) {  // else the default import
     spec.add_inputs(SubmitJob(connection_, ImportSpec(options_.import, scene)).name());
   }
   return SubmitJob(connection_, spec);
 }
 
-std::string Key::HowToColor(const std::string& scene) const {
+std::string Key::NextCommands(const std::string& scene) const {
   std::vector<std::string> again = {"key", "select", scene, "--view", "NAME"};
   if (options_.import.hold_out) again.emplace_back("--hold-out");
   if (options_.import.deflicker) again.emplace_back("--deflicker");
@@ -169,17 +169,17 @@ ExitCode Key::Select() {
                         choice.description,
                         (out / artifact::kKeyViewGray).string(),
                         (out / artifact::kKeyViewRanking).string(),
-                        HowToColor(scene)));
+                        NextCommands(scene)));
   return ExitCode::kOk;
 }
 
 std::vector<std::string> Key::SelectionFor(const std::string& scene) {
-  if (!options_.view.empty() || AsksForImport()) {
+  if (!options_.view.empty() || HasImportOptions()) {
     const v1::Job select = SubmitSelection(scene);
-    return WithItsInputs(connection_, select);
+    return JobAndInputs(connection_, select);
   }
   const KeyState state = ReadKeyState(connection_, scene);
-  if (state.selected) return WithItsInputs(connection_, *state.selected);
+  if (state.selected) return JobAndInputs(connection_, *state.selected);
   return {};  // selected by the server
 }
 
@@ -254,7 +254,7 @@ ExitCode Key::Show() {
   text += state.accepted
               ? "colour the scene\n" + Command({"colorize", "--scene", scene, "-o", "OUT"})
           : state.colored ? "accept the colour\n" + Command({"key", "accept", scene})
-                          : HowToColor(scene);
+                          : NextCommands(scene);
   PrintText(text);
   return ExitCode::kOk;
 }

@@ -49,7 +49,7 @@ KeyState ReadKeyState(Connection& connection, const std::string& scene) {
   return state;
 }
 
-std::vector<std::string> WithItsInputs(Connection& connection, const v1::Job& job) {
+std::vector<std::string> JobAndInputs(Connection& connection, const v1::Job& job) {
   std::vector<std::string> names(job.spec().inputs().begin(), job.spec().inputs().end());
   for (const v1::Job& child : ListChildren(connection, job.name())) names.push_back(child.name());
   names.push_back(job.name());
@@ -57,7 +57,7 @@ std::vector<std::string> WithItsInputs(Connection& connection, const v1::Job& jo
 }
 
 KeyViewChoice ReadChoice(Connection& connection, const v1::Job& job) {
-  for (const std::string& name : WithItsInputs(connection, job)) {
+  for (const std::string& name : JobAndInputs(connection, job)) {
     const v1::Job input = name == job.name() ? job : GetJob(connection, name);
     if (input.kind() != kind::kSelectKeyView) continue;
     const auto json = nlohmann::json::parse(

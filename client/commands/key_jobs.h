@@ -23,7 +23,7 @@ struct KeyState {
 KeyState ReadKeyState(Connection& connection, const std::string& scene);
 
 // Returns the job and its inputs: the inputs of a job that continues from it.
-std::vector<std::string> WithItsInputs(Connection& connection, const v1::Job& job);
+std::vector<std::string> JobAndInputs(Connection& connection, const v1::Job& job);
 
 // key_view.json of a select_key_view job, or of the one that a colorize_key_view job read.
 struct KeyViewChoice {

@@ -145,7 +145,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
   return summary;
 }
 
-ExitCode Conclude(const Context& context, const LiveSummary& summary, const fs::path& out) {
+ExitCode PrintSummary(const Context& context, const LiveSummary& summary, const fs::path& out) {
   if (context.json) {
     nlohmann::ordered_json json = summary.ToJson();
     json["out"] = out.string();

@@ -39,8 +39,8 @@ LiveSummary ColorizeToFiles(Connection& connection,
                             const std::filesystem::path& out);
 
 // Prints the summary; returns its exit code.
-ExitCode Conclude(const Context& context,
-                  const LiveSummary& summary,
-                  const std::filesystem::path& out);
+ExitCode PrintSummary(const Context& context,
+                      const LiveSummary& summary,
+                      const std::filesystem::path& out);
 
 }  // namespace color3d::client

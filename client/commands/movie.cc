@@ -111,7 +111,7 @@ v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1
   v1::JobSpec spec;
   spec.set_scene(of.spec().scene());
   spec.set_skip_cache(options.skip_cache);
-  for (const std::string& input : WithItsInputs(connection, of)) spec.add_inputs(input);
+  for (const std::string& input : JobAndInputs(connection, of)) spec.add_inputs(input);
   v1::RenderSpec* render = spec.mutable_render();
   for (const std::string& view : options.views) render->add_views(view);
   if (options.max_side_px) {

@@ -104,7 +104,7 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
   }
   pictures = Spread(pictures, key, options.count);
   if (pictures.empty()) throw InvalidArgument("there is no photo but the key view");
-  return Conclude(
+  return PrintSummary(
       context,
       ColorizeToFiles(
           connection, source, pictures, {.max_side_px = options.max_side_px}, options.out),

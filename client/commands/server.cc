@@ -37,7 +37,7 @@ std::string DescribeBackend(const v1::BackendStatus& backend) {
   return text + "\n";
 }
 
-std::string OfLimit(const std::string& used, const std::string& limit, bool is_limited) {
+std::string UsageOfLimit(const std::string& used, const std::string& limit, bool is_limited) {
   return is_limited ? used + " of " + limit : used;
 }
 
@@ -48,12 +48,12 @@ std::string DescribeUsage(const v1::ProjectUsage& usage,
                      label,
                      role.empty() ? "" : role + " in ",
                      usage.project().empty() ? "no project" : "the project " + usage.project(),
-                     OfLimit(HumanBytes(usage.stored_bytes()),
-                             HumanBytes(usage.max_stored_bytes()),
-                             usage.max_stored_bytes() > 0),
-                     OfLimit(fmt::to_string(usage.unfinished_jobs()),
-                             fmt::to_string(usage.max_unfinished_jobs()),
-                             usage.max_unfinished_jobs() > 0));
+                     UsageOfLimit(HumanBytes(usage.stored_bytes()),
+                                  HumanBytes(usage.max_stored_bytes()),
+                                  usage.max_stored_bytes() > 0),
+                     UsageOfLimit(fmt::to_string(usage.unfinished_jobs()),
+                                  fmt::to_string(usage.max_unfinished_jobs()),
+                                  usage.max_unfinished_jobs() > 0));
 }
 
 std::string Describe(const v1::ServerInfo& info) {

@@ -96,7 +96,7 @@ fs::path Download(const Context& context, const ViewOptions& options) {
 
 // Starts `program` on a file in a session of its own, because it may become the browser and must
 // outlive this process. Returns false if it is missing or fails within two seconds.
-bool StartApart(const char* program, const fs::path& file) {
+bool StartDetached(const char* program, const fs::path& file) {
   posix_spawnattr_t attributes;
   posix_spawn_file_actions_t actions;
   posix_spawnattr_init(&attributes);
@@ -126,10 +126,10 @@ bool StartApart(const char* program, const fs::path& file) {
 // Opens the page in the default browser. Returns false if there is no desktop or it fails.
 bool OpenInBrowser(const fs::path& page) {
 #if defined(__APPLE__)
-  return StartApart("open", page);
+  return StartDetached("open", page);
 #else
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return false;
-  return StartApart("xdg-open", page);
+  return StartDetached("xdg-open", page);
 #endif
 }
 

@@ -94,7 +94,7 @@ std::vector<Sums> Compare(const Stretch& stretch,
     Image luminance;
     FollowedPixels followed;
     if (i + 1 >= stretch.begin) luminance = source.luminance(frame);
-    if (compared) followed = FollowBack(luminance, luminance_before);
+    if (compared) followed = FollowToPreviousFrame(luminance, luminance_before);
     for (size_t k = 0; k < colorings; ++k) {
       const Image lab = source.colorings[k](frame);
       const ColorHistogram histogram = HistogramOf(SrgbFromLab(lab));
@@ -150,7 +150,7 @@ double Divergence(const ColorHistogram& one, const ColorHistogram& other) {
   return std::max(0.0, sum / static_cast<double>(one.size()));
 }
 
-FollowedPixels FollowBack(const Image& luminance, const Image& luminance_before) {
+FollowedPixels FollowToPreviousFrame(const Image& luminance, const Image& luminance_before) {
   const Image back = DenseFlow(luminance, luminance_before);
   const Image forth = DenseFlow(luminance_before, luminance);
   const int width = luminance.width, height = luminance.height;

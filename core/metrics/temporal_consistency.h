@@ -31,7 +31,7 @@ struct FollowedPixels {
 };
 // Optical flow of a frame to the frame before. Requires: 1 channel each, L 0..100, equal sizes. No
 // pixel is sure in pictures that are too small for optical flow.
-FollowedPixels FollowBack(const Image& luminance, const Image& luminance_before);
+FollowedPixels FollowToPreviousFrame(const Image& luminance, const Image& luminance_before);
 
 // Sums over pairs of neighbouring frames. A plain value.
 struct ChromaAlongMotion {

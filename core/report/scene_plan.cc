@@ -18,7 +18,7 @@ constexpr double kFullyDynamic = 0.5;  // motion energy
 
 constexpr char kNothingReconstructed[] = "nothing is reconstructed of a film";
 
-std::string WhyTime(const PlanFacts& f) {
+std::string MotionReason(const PlanFacts& f) {
   if (f.is_film) return kNothingReconstructed;
   if (!f.is_dynamic) return "all photos show one time";
   std::string why = fmt::format("the views show {} time steps, seen by {} camera{}",
@@ -26,7 +26,7 @@ std::string WhyTime(const PlanFacts& f) {
                                 f.cameras,
                                 f.cameras == 1 ? "" : "s");
   if (!f.motion) return why;
-  const std::string found = ClassOf(*f.motion);
+  const std::string found = MotionClass(*f.motion);
   if (!f.motion->moves) return why + "; " + found + ": nothing moves in their geometry";
   if (!f.motion->share) return why + "; something moves in their geometry";
   return why + fmt::format("; {}: {:.1f} % of the pixels move", found, 100.0 * *f.motion->share);
@@ -34,8 +34,10 @@ std::string WhyTime(const PlanFacts& f) {
 
 PlanStep TimeStep(const PlanFacts& f) {
   const bool needed = f.is_dynamic && !f.is_film && (!f.motion || f.motion->moves);
-  return {
-      .step = "deformation_over_time", .needed = needed, .reason = WhyTime(f), .motion = f.motion};
+  return {.step = "deformation_over_time",
+          .needed = needed,
+          .reason = MotionReason(f),
+          .motion = f.motion};
 }
 
 // Adapts the step of a stage, as the catalogue has it, to the scene.
@@ -105,7 +107,7 @@ void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep
 
 }  // namespace
 
-std::string ClassOf(const SceneMotion& motion) {
+std::string MotionClass(const SceneMotion& motion) {
   if (!motion.moves) return "static";
   if (!motion.share) return "";
   return *motion.share < kFullyDynamic ? "partly dynamic" : "fully dynamic";
@@ -139,7 +141,7 @@ std::string PlanToJson(const std::vector<PlanStep>& steps) {
                                  {"reason", s.reason},
                                  {"estimated_seconds", s.estimated_seconds}};
     if (s.measured_seconds >= 0.0) entry["measured_seconds"] = s.measured_seconds;
-    if (s.motion && !ClassOf(*s.motion).empty()) entry["motion"] = ClassOf(*s.motion);
+    if (s.motion && !MotionClass(*s.motion).empty()) entry["motion"] = MotionClass(*s.motion);
     if (s.motion && s.motion->share) entry["moving_share"] = *s.motion->share;
     array.push_back(std::move(entry));
   }

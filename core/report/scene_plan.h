@@ -15,7 +15,7 @@ struct SceneMotion {
 };
 // "static", "partly dynamic" or, if half of the pixels move, "fully dynamic"; empty if something
 // moves and the share was not measured.
-std::string ClassOf(const SceneMotion& motion);
+std::string MotionClass(const SceneMotion& motion);
 
 struct PlanStep {
   std::string step;  // e.g. "structure_from_motion"

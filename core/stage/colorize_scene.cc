@@ -86,7 +86,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
     const size_t count = ParseGaussians(context.ReadInput(artifact::kModel)).size();
     if (count > 0) metrics["gaussians"] = count;
   }
-  if (motion && !ClassOf(*motion).empty()) metrics["motion"] = ClassOf(*motion);
+  if (motion && !MotionClass(*motion).empty()) metrics["motion"] = MotionClass(*motion);
   if (motion && motion->share) metrics["moving_share"] = *motion->share;
   double total = 0.0;
   int64_t peak = 0;
@@ -295,8 +295,8 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
   data.summary = Summary(scene, IsColoredAsFilm(context, scene), metrics, keys);
   if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
-  data.key_view = ReportOfKeyView(KeyPictures(key ? scene.views[*key].name : "", context), context);
-  data.additional_key_views = ReportOfAdditionalKeyViews(scene, kReportSidePx, context);
+  data.key_view = KeyViewChapter(KeyPictures(key ? scene.views[*key].name : "", context), context);
+  data.additional_key_views = AdditionalKeyViewChapters(scene, kReportSidePx, context);
   std::vector<CurvePoint> personalization;
   std::partition_copy(curves.begin(),
                       curves.end(),

@@ -84,7 +84,7 @@ void CheckGiven(const std::map<std::string, JobRecord>& given, const ColorizeSce
 }
 
 // Copies options of the scene that belong to the stage but stand outside the field of its name.
-void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
+void CopySceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
   switch (spec->stage_case()) {
     case JobSpec::kSelectKeyView:
       if (options.key_view().empty()) return;
@@ -199,10 +199,10 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     const std::string kind = stage.kind;
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
     JobSpec spec = builder->StageSpec(kind);
-    TakeSceneOptions(scene, &spec);
+    CopySceneOptions(scene, &spec);
     if (kind == kind::kPersonalize && facts.is_film) {
       *spec.mutable_personalize() = scene.personalize();
-      LearnAtTheSizeOfFrames(scene.max_side_px(), spec.mutable_personalize());
+      TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
     if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);

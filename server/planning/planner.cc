@@ -18,7 +18,7 @@ namespace {
 
 // Sets the encoder of a colorize_views or correct_colors job, if it is unset, to that of the input
 // personalize job.
-void TakeEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
+void SetEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
   std::string* encoder = nullptr;
   if (spec->has_colorize_views()) encoder = spec->mutable_colorize_views()->mutable_encoder();
   if (spec->has_correct_colors()) encoder = spec->mutable_correct_colors()->mutable_encoder();
@@ -35,7 +35,7 @@ void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
   if (spec.has_generate_augmentations()) {
     spec.mutable_generate_augmentations()->set_samples(SamplesOf(spec.generate_augmentations()));
   }
-  TakeEncoderOfColorizer(*builder, &spec);
+  SetEncoderOfColorizer(*builder, &spec);
   std::string skip_reason;
   if (spec.has_export_() && AskedFormats(spec.export_()).empty()) {
     skip_reason = "there is nothing to export; ask for " + ExportFormatNames();

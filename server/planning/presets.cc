@@ -61,7 +61,7 @@ void MergeOver(const Message& given, Message* base) {
 }
 
 // Makes corrections of key views with a range of time: the film coloured before is reused.
-void TakeRangesAsCorrections(v1::ColorizeSceneSpec* spec) {
+void MoveRangesToCorrections(v1::ColorizeSceneSpec* spec) {
   auto* further = spec->mutable_carry_color()->mutable_further_key_views();
   if (std::none_of(further->begin(), further->end(), HasRange)) return;
   v1::CorrectColorsSpec* corrections = spec->mutable_correct_colors();
@@ -89,7 +89,7 @@ const v1::ColorizeSceneSpec& OptionsOf(v1::Preset preset) {
 v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
   v1::ColorizeSceneSpec merged = OptionsOf(given.preset());
   MergeOver(given, &merged);
-  TakeRangesAsCorrections(&merged);
+  MoveRangesToCorrections(&merged);
   // Additional key views need carry_color, even if the preset skips it.
   if (!merged.carry_color().further_key_views().empty()) {
     merged.mutable_carry_color()->clear_skip();
@@ -120,7 +120,7 @@ void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
   MergeOver(*own, given);
 }
 
-void LearnAtTheSizeOfFrames(int frames_max_side_px, v1::PersonalizeSpec* spec) {
+void TrainAtFrameSize(int frames_max_side_px, v1::PersonalizeSpec* spec) {
   constexpr int kMostLearntAtPx = 800;
   if (spec->has_max_side_px() || spec->recipe() == v1::PersonalizeSpec::RECIPE_PAPER) return;
   spec->set_max_side_px(std::min(frames_max_side_px, kMostLearntAtPx));

@@ -31,6 +31,6 @@ void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec);
 
 // Films: trains the colorizer at the size of the coloured frames, up to 800 px
 // (tests/bench/RESULTS.md), unless a size or the recipe of the paper is requested.
-void LearnAtTheSizeOfFrames(int frames_max_side_px, v1::PersonalizeSpec* spec);
+void TrainAtFrameSize(int frames_max_side_px, v1::PersonalizeSpec* spec);
 
 }  // namespace color3d

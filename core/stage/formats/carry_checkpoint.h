@@ -27,7 +27,7 @@ class CarryCheckpoint {
   // Writes the output, reports progress, saves a checkpoint when it is due. `coverage`: 0..1.
   void Add(int view, double coverage, const std::string& png);
   // Reports progress of other work.
-  void Tell(const std::string& message) const;
+  void ReportProgress(const std::string& message) const;
   // Requires: the view was added. Returns its output.
   std::string Png(int view) const;
   // Replaces the output of a view, saves a checkpoint when it is due.
@@ -40,7 +40,7 @@ class CarryCheckpoint {
   void SetWalk(const FilmWalk& walk);
 
  private:
-  void TakeUp(const nlohmann::json& record);
+  void Restore(const nlohmann::json& record);
   void Keep(size_t view, double coverage, const std::string& png);
   void SaveWhenDue();
 

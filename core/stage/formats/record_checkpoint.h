@@ -24,7 +24,7 @@ class RecordCheckpoint {
   // Calls `take` for the records of the last checkpoint, if `check` accepts all of them. `check`
   // throws nlohmann::json::exception or Error{kNotFound, kDataLoss} for an invalid record; the
   // checkpoint is then ignored with a warning.
-  void TakeUp(const OnRecord& check, const OnRecord& take);
+  void Restore(const OnRecord& check, const OnRecord& take);
   // Adds a record to this checkpoint and all later ones.
   void Append(const nlohmann::json& record);
   // Saves a checkpoint when it is due: the appended records, then those of `latest`. Throws

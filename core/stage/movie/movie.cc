@@ -52,7 +52,7 @@ double TimeInScene(double time_s, double last_s, const std::string& what) {
 }
 
 // Times in a file of cameras. Throws if only some of its frames have one.
-bool TakeTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations* stations) {
+bool ReadTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations* stations) {
   if (!scene.IsDynamic()) return false;
   const bool has_times = file[0].time_s.has_value();
   const double last_s = scene.Times().back();
@@ -79,7 +79,7 @@ Stations CamerasOfFile(const RenderOptions& options, const Scene& scene, const C
   for (const FileCamera& camera : file) {
     stations.cameras.push_back({camera.camera, camera.cam_from_world});
   }
-  stations.have_times = TakeTimes(file, scene, &stations);
+  stations.have_times = ReadTimes(file, scene, &stations);
   return stations;
 }
 
@@ -164,7 +164,7 @@ Camera PictureOf(const RenderOptions& options, const Stations& stations, const V
       kLeastSidePx);
 }
 
-Stations StationsOf(const RenderOptions& options, const Scene& scene, int home) {
+Stations PathStations(const RenderOptions& options, const Scene& scene, int home) {
   using Path = RenderOptions::Path;
   switch (options.path) {
     case Path::kCameras:
@@ -214,7 +214,7 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
                                  const GaussianModel& model,
                                  StageContext& context) {
   const View& view = scene.views[home];
-  Stations stations = StationsOf(options, scene, home);
+  Stations stations = PathStations(options, scene, home);
   const Camera picture = PictureOf(options, stations, view);
   for (PathCamera& station : stations.cameras) {
     station.camera = CoverPicture(station.camera, picture.width, picture.height);
@@ -235,16 +235,16 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   if (!told && scene.IsDynamic()) SpreadTimes(options.bounce, scene, &frames);
   if (!options.time_s) return frames;
   const double time_s =
-      TimeInScene(*options.time_s, scene.Times().back(), "the moment that is asked for (time_s)");
+      TimeInScene(*options.time_s, scene.Times().back(), "the requested time (time_s)");
   for (PathCamera& frame : frames) frame.time_s = time_s;
   return frames;
 }
 
 // Clock for frames at the times of the scene; nullopt for evenly spaced frames.
-std::optional<FilmClock> OwnClock(const RenderOptions& options,
-                                  const Scene& scene,
-                                  const std::vector<PathCamera>& frames,
-                                  const StageContext& context) {
+std::optional<FilmClock> ClockOfScene(const RenderOptions& options,
+                                      const Scene& scene,
+                                      const std::vector<PathCamera>& frames,
+                                      const StageContext& context) {
   const bool own = !options.frames && !options.time_s && frames.size() > 1 && scene.IsDynamic() &&
                    options.path != RenderOptions::Path::kCameras && IsOneByOne(options, scene);
   if (!own || !TimesAreSeconds(scene, FindImportFacts(context))) return std::nullopt;
@@ -290,21 +290,19 @@ void RenderMovie(const RenderOptions& options,
                  const GaussianModel& model,
                  StageContext& context) {
   if (!scene.IsDynamic() && (options.path == RenderOptions::Path::kStill || options.time_s)) {
-    throw InvalidArgument(
-        "this scene has no times: a camera that stands still, or a moment, is of use for a scene "
-        "that moves");
+    throw InvalidArgument("this scene has no times: path still and time_s need a dynamic scene");
   }
   const int home = HomeView(scene, context);
   const std::vector<PathCamera> frames = FramesOf(options, scene, home, model, context);
   if (options.pictures && frames.size() > kMaxMoviePictures) {
     throw InvalidArgument(
-        "{} frames are too many to keep as pictures; at most {} are: ask for "
-        "fewer frames or only for the video",
+        "{} frames are too many to keep as pictures; the limit is {}: ask for "
+        "fewer frames, or for the video only",
         frames.size(),
         kMaxMoviePictures);
   }
   const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
-  const std::optional<FilmClock> clock = OwnClock(options, scene, frames, context);
+  const std::optional<FilmClock> clock = ClockOfScene(options, scene, frames, context);
   std::optional<Mp4Writer> movie;
   if (options.video) {
     movie.emplace(file, MovieOf(options, scene, home, frames, clock, context));

@@ -11,12 +11,12 @@ namespace color3d {
 
 // The key view: its choice and the source of its colour, as far as there are artifacts. Throws
 // Error{kInvalidArgument} if an artifact is damaged.
-ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context);
+ReportKeyView KeyViewChapter(ReportRow pictures, const StageContext& context);
 
 // The additional key views: the photo, its colours, and their source. Pictures fit within
 // `side_px`. Throws Error{kInvalidArgument} if an artifact is damaged.
-std::vector<ReportKeyView> ReportOfAdditionalKeyViews(const Scene& scene,
-                                                      int side_px,
-                                                      const StageContext& context);
+std::vector<ReportKeyView> AdditionalKeyViewChapters(const Scene& scene,
+                                                     int side_px,
+                                                     const StageContext& context);
 
 }  // namespace color3d

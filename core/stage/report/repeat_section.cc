@@ -78,9 +78,10 @@ void AddHowToRepeat(const std::vector<std::string>& keys,
   if (!data->view_page.empty()) data->repeat.push_back("color3d view OUT");
   if (!data->repeat.empty()) {
     data->repeat_notes.push_back(
-        "PHOTOS is the folder of the photos, OUT one for the results, COLOURED.png the key view as "
-        "it was coloured. Add the preset and other options that differed from the defaults. The "
-        "same seed on the same kind of machine gives the same result.");
+        "PHOTOS is the folder of the photos, OUT a folder for the results, COLOURED.png the "
+        "coloured "
+        "key view. Add the preset and other options that differed from the defaults. The same seed "
+        "on the same kind of machine gives the same result.");
   }
   data->facts.emplace_back("Color3D", COLOR3D_VERSION);
   data->facts.emplace_back("seed", std::to_string(context.seed()));
@@ -90,8 +91,8 @@ void AddHowToRepeat(const std::vector<std::string>& keys,
   data->facts.emplace_back(
       "licence of the embedded weights",
       "The project's code is Apache-2.0. The embedded weights were trained on photographs that are "
-      "given for non-commercial research; use them in that spirit. Weights and backends of your "
-      "own have their own licence.");
+      "provided for non-commercial research; use them accordingly. Your own weights and backends "
+      "have their own licences.");
 }
 
 }  // namespace color3d
