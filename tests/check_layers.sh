@@ -165,7 +165,7 @@ public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
-public server/planning job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
+public server/planning asked_formats job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store job job_store project_store sqlite_job_store store_file user_models

@@ -1,5 +1,7 @@
 #include "server/worker/stage_options.h"
 
+#include "server/planning/asked_formats.h"
+
 namespace color3d {
 namespace {
 
@@ -171,13 +173,8 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
 
 ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   ExportOptions options;
-  if (spec.has_ply()) options.ply = spec.ply();
-  options.sog = spec.has_sog() ? spec.sog() : options.ply;
-  options.spz = spec.spz();
+  options.formats = AskedFormats(spec);
   if (spec.has_spz_version()) options.spz_version = spec.spz_version();
-  options.glb = spec.glb();
-  options.splat = spec.splat();
-  if (spec.has_splat4d()) options.splat4d = spec.splat4d();
   options.confidence = spec.confidence();
   options.moments = spec.moments();
   return options;

@@ -154,7 +154,7 @@ RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
 
 ColorizerOptions PersonalizeOptions(v1::PersonalizeSpec spec, const StageContext& context) {
   // As a part of colorize_scene it has its size already.
-  if (ReadScene(context).IsFilm()) LearnAtTheSizeOfFrames(kDefaultMaxSidePx, &spec);
+  if (ReadScene(context).IsFilm()) TrainAtFrameSize(kDefaultMaxSidePx, &spec);
   return ColorizerOptionsFrom(spec, context.seed());
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "core/catalogue/film_rate.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/film_import/film_frames.h"
@@ -35,8 +36,6 @@ Image MovieFrame(const Image& picture) {
   return out;
 }
 
-constexpr double kUsualRate = 25.0;  // frames a second, where times are no seconds
-
 FilmClock ClockOfFilm(const Scene& scene,
                       const std::vector<int>& frames,
                       const StageContext& context) {
@@ -44,7 +43,7 @@ FilmClock ClockOfFilm(const Scene& scene,
   std::vector<double> times;
   for (size_t i = 0; i < frames.size(); ++i) {
     times.push_back(seconds ? scene.views[frames[i]].time_s()
-                            : static_cast<double>(i) / kUsualRate);
+                            : static_cast<double>(i) / kDefaultFramesPerSecond);
   }
   return ClockOf(times);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/catalogue/metrics.h"
 #include "core/color/lab.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
@@ -62,6 +63,9 @@ TEST_F(TemporalScoresTest, FramesAreComparedInTheOrderOfTimeWithinTheirShots) {
   EXPECT_FALSE(temporal.contains("truth"));
   EXPECT_FALSE(temporal.contains("rendered"));
   const json& frames = temporal.at("colored_views");
+  for (const auto& [key, value] : frames.items()) {
+    EXPECT_NE(FindMetric(key).metric, nullptr) << key << " has no row in core/catalogue/metrics.cc";
+  }
   EXPECT_EQ(frames.at("pairs"), 4);
   EXPECT_GT(frames.at("followed"), 0.5);
   // In time: 14, 10, 10, 14, 10; so three of four pairs differ by 4 in a and in b. 8 bits of ab.

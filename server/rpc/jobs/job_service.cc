@@ -71,7 +71,7 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
 
 SceneFacts FactsOf(const SceneRecord& scene) {
   const bool is_splat = scene.layout == CaptureLayout::kSplat;
-  return {.photos = is_splat ? kSplatViews : scene.photo_count,
+  return {.photos = scene.photo_count,
           .has_poses = InfoOf(scene.layout).has_poses,
           .augment_files = static_cast<int>(
               std::count_if(scene.files.begin(),
