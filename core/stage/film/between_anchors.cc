@@ -10,12 +10,12 @@
 namespace color3d {
 namespace {
 
-constexpr int kColorChannels = 3;  // a, b and the share that is guessed
+constexpr int kColorChannels = 3;  // a, b and the guessed share
 constexpr float kFollowed = 0.5f;  // confidence from which motion tells
 const float kJustFollowed = std::nextafter(kFollowed, 1.0f);
 constexpr float kAnswerFollowed = 0.2f;  // and from which an answer goes along with it
 
-// 1 where the frame's own sources need not be asked.
+// 1 where no colour needs to be inferred.
 Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
   Image known = carried_surely;
   for (size_t i = 0; i < known.data.size(); ++i) {
@@ -24,13 +24,13 @@ Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
   return known;
 }
 
-// What the anchors tell of a frame stands for what its sources would.
+// Infers the colours of a frame where the anchors are not sure, and takes theirs elsewhere.
 InferredColor AnswerOf(const CarriedColor& of_anchors,
                        const Image& carried_surely,
                        const Image& luminance,
                        const ColorSources& sources) {
   InferredColor answer;
-  if (ShareOpen(carried_surely, of_anchors) > kWorthAsking) {
+  if (ShareOpen(carried_surely, of_anchors) > kWorthInferring) {
     answer = sources.infer(luminance, KnownOf(of_anchors, carried_surely));
   } else {
     answer = {Image(luminance.width, luminance.height, 2),
@@ -120,7 +120,7 @@ FusedColor ColorBetweenAnchors(const Image& luminance,
   };
   ThreadPool one(1);
   FusedColor fused = ColorOfView(luminance, carried, with_anchors, one, cancel);
-  // What an anchor was given as a guess is one here, too.
+  // Guessed colours of an anchor count as guessed here, too.
   for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
     if (of_anchors.confidence.data[i] <= kFollowed) continue;
     float& inferred = fused.provenance.Plane(2)[i];

@@ -13,10 +13,10 @@ using nlohmann::json;
 namespace {
 
 // A checkpoint: these bytes, then records:
-//   {"view": name, "coverage": 0..1, "png": bytes}       a view that is done; the last one counts
+//   {"view": name, "coverage": 0..1, "png": bytes}       a finished view; the last record counts
 //   {"key": name, "direction": 1 or -1, "frame": name, "moved": longer sides,
 //    "wanted": 0..1, "width": px, "height": px, "in_key": bytes, "in_frame": bytes}
-//                                                        a walk of a film; no maps at its end
+//                                                        a walk of a film; without maps at its end
 constexpr char kMagic[] = "carry 3\n";
 
 json::binary_t BytesOf(const Image& map) {

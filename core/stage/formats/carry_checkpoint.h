@@ -1,6 +1,6 @@
-// The views that carry_color has finished, kept in checkpoints so that a killed worker's successor
-// does not carry into them again. They wait in a file of the scratch folder: memory does not grow
-// with their number. Thread-safe but for the constructor.
+// Checkpoints of the views that carry_color has finished, so that the successor of a killed worker
+// does not carry into them again. They are collected in a file of the scratch folder to bound
+// memory. Thread-safe but for the constructor.
 #pragma once
 
 #include <map>
@@ -19,24 +19,25 @@ namespace color3d {
 
 class CarryCheckpoint {
  public:
-  // Takes up the checkpoint, if there is one, and writes the outputs of its views. One that is
-  // damaged is reported as a warning and ignored. The references must outlive the object.
+  // Resumes from the checkpoint, if there is one, and writes the outputs of its views. A damaged
+  // one is ignored with a warning. The references must outlive the object.
   CarryCheckpoint(const Scene& scene, StageContext& context);
 
-  // The checkpoint has it: nothing is left to do for this view.
+  // Whether the checkpoint contains the view, which needs no work then.
   bool WasDone(int view) const { return was_done_[static_cast<size_t>(view)] != 0; }
-  // Writes the output, reports progress, saves a checkpoint when it is time. `coverage`: 0..1.
+  // Writes the output, reports progress, and saves a checkpoint when one is due. `coverage`: 0..1.
   void Add(int view, double coverage, const std::string& png);
-  // Reports what is done beside that.
+  // Reports other work as progress.
   void Tell(const std::string& message) const;
-  // The output of a view that was added.
+  // Returns the output of a view that was added.
   std::string Png(int view) const;
-  // Writes another one in its place, saves a checkpoint when it is time.
+  // Replaces that output, and saves a checkpoint when one is due.
   void Replace(int view, double coverage, const std::string& png);
-  // By view; once all are there.
+  // By view. Requires: all views were added.
   const std::vector<double>& coverage() const { return coverage_; }
 
-  // Of a film: how far its walks were, and how far this one is now; told before the frame is added.
+  // Films only: the walks of the checkpoint, and the state of a walk, set before its frame is
+  // added.
   std::vector<FilmWalk> Walks() const;
   void SetWalk(const FilmWalk& walk);
 
