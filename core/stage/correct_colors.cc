@@ -138,7 +138,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
   if (const auto mask = views.images().Mask(index)) {
     ClearMasked(mask.get(), &correction.painted);
     if (Mean(correction.painted) == 0.0) {
-      throw InvalidArgument("it paints masked pixels only; paint others");
+      throw InvalidArgument("all that it paints is masked out; paint other pixels");
     }
   }
   WarnIfOffTheGeometry(painted, view.name, context);
