@@ -247,9 +247,7 @@ class FullStore : public SqliteJobStore {
   std::vector<std::string> ExpireLeasesOf(const std::string&) override { throw Full(); }
 
  private:
-  static Error Full() {
-    return ServiceError(ErrorCode::kResourceExhausted, "STORAGE_FULL", "full");
-  }
+  static Error Full() { return ServiceError(ErrorReason::kStorageFull, "full"); }
 };
 
 TEST_F(MaintenanceTest, AServerOnAFullDiskLivesAndStarts) {

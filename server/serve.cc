@@ -12,10 +12,10 @@
 #include <thread>
 #include <vector>
 
-#include "core/base/address.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/memory.h"
+#include "core/base/text/address.h"
 #include "server/access/certificate_roles.h"
 #include "server/access/notify_targets.h"
 #include "server/access/tls.h"

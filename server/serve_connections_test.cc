@@ -13,8 +13,8 @@
 #include <cstring>
 #include <string_view>
 
-#include "core/base/address.h"
 #include "core/base/files.h"
+#include "core/base/text/address.h"
 #include "tests/support/service/server_process.h"
 
 namespace color3d::testing {

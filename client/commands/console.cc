@@ -9,7 +9,7 @@
 
 #include "client/lib/rpc_error.h"
 #include "core/base/error.h"
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 
 namespace color3d::client {
 namespace {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/address.h"
 #include "core/base/files.h"
+#include "core/base/text/address.h"
 
 namespace color3d::client {
 namespace {

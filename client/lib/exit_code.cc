@@ -11,6 +11,9 @@ ExitCode ExitCodeOf(ErrorCode code) {
     case ErrorCode::kNotFound:
     case ErrorCode::kAlreadyExists:
     case ErrorCode::kUnimplemented:
+    case ErrorCode::kOutOfRange:
+    case ErrorCode::kUnauthenticated:
+    case ErrorCode::kPermissionDenied:
       return ExitCode::kBadInput;
     case ErrorCode::kUnavailable:
     case ErrorCode::kDeadlineExceeded:

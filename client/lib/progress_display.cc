@@ -10,7 +10,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/text.h"
 #include "core/base/error.h"
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {

@@ -76,8 +76,8 @@ bool RpcError::IsTurnedAway() const {
   const bool is_full = std::ranges::any_of(violations_, [](const auto& entry) {
     return entry.field.ends_with("stored_bytes") || entry.field.ends_with(" scenes");
   });
-  return reason_ == "QUEUE_FULL" || reason_ == "TOO_MANY_STREAMS" ||
-         (reason_ == "QUOTA_EXCEEDED" && !is_full);
+  return HasReason(ErrorReason::kQueueFull) || HasReason(ErrorReason::kTooManyStreams) ||
+         (HasReason(ErrorReason::kQuotaExceeded) && !is_full);
 }
 
 bool RpcError::IsUnreachable() const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/catalogue/error_reasons.h"
 #include "google/rpc/status.pb.h"
 
 namespace color3d::client {
@@ -27,6 +28,7 @@ class RpcError : public Error {
   grpc::StatusCode grpc_code() const { return grpc_code_; }
   // google.rpc.ErrorInfo.reason, e.g. "DRAINING"; empty when the error is the transport's.
   const std::string& reason() const { return reason_; }
+  bool HasReason(ErrorReason reason) const { return reason_ == ErrorReasonName(reason); }
   // google.rpc.BadRequest or QuotaFailure, in the server's order.
   const std::vector<FieldViolation>& violations() const { return violations_; }
   // The same call may succeed later: the connection broke, the server is overloaded or has ended

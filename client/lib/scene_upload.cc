@@ -11,7 +11,7 @@
 #include "client/lib/text.h"
 #include "core/base/files.h"
 #include "core/base/parallel.h"
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "core/image/probe/probe.h"
 
 namespace color3d::client {

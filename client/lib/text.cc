@@ -6,7 +6,7 @@
 #include <cmath>
 #include <ctime>
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {

@@ -115,8 +115,8 @@ class Upload {
 
   void ThrowIfFinal(const grpc::Status& status) const {
     const RpcError error(status);
-    if (error.reason() == "DIGEST_MISMATCH") throw Changed();
-    const bool again = error.IsTransient() || error.reason() == "OFFSET_MISMATCH" ||
+    if (error.HasReason(ErrorReason::kDigestMismatch)) throw Changed();
+    const bool again = error.IsTransient() || error.HasReason(ErrorReason::kOffsetMismatch) ||
                        error.grpc_code() == grpc::StatusCode::ABORTED ||
                        error.grpc_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
     if (!again) throw error;

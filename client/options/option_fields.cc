@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "core/base/error.h"
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 #include "proto/option_text.h"
 
 namespace color3d::client {

@@ -11,8 +11,8 @@
 #include "client/options/option_fields.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/json_text.h"
-#include "core/base/lower_case.h"
+#include "core/base/text/json_text.h"
+#include "core/base/text/lower_case.h"
 #include "proto/option_text.h"
 
 namespace color3d::client {

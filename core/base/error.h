@@ -24,6 +24,10 @@ enum class ErrorCode {
   kInternal,     // our own bug
   kUnavailable,  // try again later
   kDataLoss,     // stored bytes are not what was written
+  // Appended: the numbers of the codes above stand in stored jobs.
+  kOutOfRange,        // the position lies outside of what is kept
+  kUnauthenticated,   // no valid credentials
+  kPermissionDenied,  // valid credentials that do not allow the call
 };
 
 // `message` names the offending value and what to do about it, in one line.
@@ -67,6 +71,12 @@ inline const char* ErrorCodeName(ErrorCode code) {
       return "UNAVAILABLE";
     case ErrorCode::kDataLoss:
       return "DATA_LOSS";
+    case ErrorCode::kOutOfRange:
+      return "OUT_OF_RANGE";
+    case ErrorCode::kUnauthenticated:
+      return "UNAUTHENTICATED";
+    case ErrorCode::kPermissionDenied:
+      return "PERMISSION_DENIED";
   }
   return "INTERNAL";
 }

@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "core/base/files.h"
-#include "core/base/process_limits.h"
+#include "core/base/process/process_limits.h"
 
 namespace color3d {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/carry/confidence.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
 
@@ -75,7 +76,9 @@ Correspondence Correspond(const SurfaceView& source, const SurfaceView& target, 
   return out;
 }
 
-constexpr float kSeen = 0.05f;  // least visibility that is compared
+constexpr float kMinVisibility = static_cast<float>(kMinMatchProbability);
+// Factor on the match probability of a pixel that is registered off the source's surfaces.
+constexpr float kUnregistered = 0.3f;
 
 // The source's L at the target's pixels; the target's own L where the source does not see them.
 Image WarpedLuminance(const SurfaceView& source,
@@ -84,7 +87,7 @@ Image WarpedLuminance(const SurfaceView& source,
   Image warped = target.luminance;
   for (int y = 0; y < warped.height; ++y) {
     for (int x = 0; x < warped.width; ++x) {
-      if (map.visible.At(0, y, x) < kSeen) continue;
+      if (map.visible.At(0, y, x) < kMinVisibility) continue;
       warped.At(0, y, x) =
           Read(source.luminance, 0, map.position.At(0, y, x), map.position.At(1, y, x));
     }
@@ -102,8 +105,8 @@ Correspondence Register(const Correspondence& map, const Image& flow, double tol
       const double tx = x + 0.5 + fx, ty = y + 0.5 + fy;
       const int xi = static_cast<int>(std::floor(tx)), yi = static_cast<int>(std::floor(ty));
       if (xi < 0 || yi < 0 || xi >= flow.width || yi >= flow.height ||
-          map.visible.At(0, yi, xi) < kSeen) {
-        out.visible.At(0, y, x) *= 0.3f;
+          map.visible.At(0, yi, xi) < kMinVisibility) {
+        out.visible.At(0, y, x) *= kUnregistered;
         continue;
       }
       // Within a pixel the map is followed linearly: position at the nearest pixel plus the rest.
@@ -120,7 +123,7 @@ Correspondence Register(const Correspondence& map, const Image& flow, double tol
 // Difference of two pictures in a window, which is clipped at the borders.
 struct WindowDifference {
   double offset;     // difference of the means
-  double structure;  // root mean square of what is left, over 1 + that of the pictures themselves
+  double structure;  // root mean square of what is left, over kNoise + that of the pictures
 };
 
 WindowDifference CompareWindows(const Image& a, const Image& b, int x, int y) {
@@ -186,7 +189,7 @@ CarriedColor CarryColor(const SurfaceView& source,
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const double visible = map.visible.At(0, y, x);
-      if (visible < kSeen) continue;
+      if (visible < kMinVisibility) continue;
       const double sx = map.position.At(0, y, x), sy = map.position.At(1, y, x);
       const WindowDifference d = CompareWindows(target.luminance, warped, x, y);
       const double offset = d.offset / options.luminance_tolerance;

@@ -303,7 +303,8 @@ class FusionTest : public testing::Test {
         inferred_(32, 24, 2, -20.0f) {}
 
   FusedColor Fuse(const Image& distance = {}, const Image& guess = {}) {
-    return FuseColors(luminance_, carried_, inferred_, distance, guess, FusionOptions{}, pool_, {});
+    return FuseColors(
+        {luminance_, carried_, inferred_, distance, guess}, FusionOptions{}, pool_, {});
   }
 
   ThreadPool pool_{1};

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/carry/confidence.h"
 #include "core/grid/edge_weights.h"
 #include "core/grid/grid_solver.h"
 
@@ -38,8 +39,8 @@ double SmoothStep(double x, double begin, double end) {
 }
 
 struct GuessShare {
-  double share = 0.0;   // of the prior
-  double colour = 0.0;  // of the guess that is added for it
+  double share = 0.0;  // of the prior
+  double color = 0.0;  // of the guess that is added for it
 };
 
 GuessShare ShareOfGuess(double distance, double chroma, const FusionOptions& options) {
@@ -68,15 +69,12 @@ void FusionOptions::Validate() const {
   check("bold_chroma_ends", bold_chroma_ends, bold_chroma_begins + 1e-6, 400);
 }
 
-FusedColor FuseColors(const Image& luminance,
-                      const CarriedColor& carried,
-                      const Image& inferred,
-                      const Image& distance,
-                      const Image& guessed,
+FusedColor FuseColors(const FusionSources& sources,
                       const FusionOptions& options,
                       ThreadPool& pool,
                       const CancellationToken& cancel) {
   options.Validate();
+  const auto& [luminance, carried, inferred, distance, guessed] = sources;
   CheckSize("carried", carried.ab, 2, luminance);
   CheckSize("confidence", carried.confidence, 1, luminance);
   CheckSize("inferred", inferred, 2, luminance);
@@ -84,7 +82,7 @@ FusedColor FuseColors(const Image& luminance,
   if (!guessed.Empty()) CheckSize("guessed", guessed, 2, luminance);
   const size_t pixels = luminance.PlaneSize();
   FusedColor out{Image(luminance.width, luminance.height, 2),
-                 Image(luminance.width, luminance.height, 3)};
+                 Image(luminance.width, luminance.height, kProvenancePlanes)};
   GridSystem system = SystemOfLuminance(luminance, options.edge_sigma, pool);
   std::vector<float> target(2 * pixels);
   for (size_t i = 0; i < pixels; ++i) {
@@ -103,15 +101,16 @@ FusedColor FuseColors(const Image& luminance,
     const double scale = options.relative_chroma.Scale(luminance.data[i]);
     for (int c = 0; c < 2; ++c) {
       const double prior =
-          (1.0 - guess.share) * inferred.Plane(c)[i] + guess.colour * (c == 0 ? guess_a : guess_b);
+          (1.0 - guess.share) * inferred.Plane(c)[i] + guess.color * (c == 0 ? guess_a : guess_b);
       target[c * pixels + i] =
           static_cast<float>((seen * carried.ab.Plane(c)[i] + pull * prior) / (total * scale));
     }
     system.data[static_cast<int64_t>(i)] = static_cast<float>(total);
     const double share_seen = seen / total;
-    out.provenance.Plane(0)[i] = static_cast<float>((1.0 - share_seen) * guess.share);
-    out.provenance.Plane(1)[i] = static_cast<float>(share_seen);
-    out.provenance.Plane(2)[i] = static_cast<float>((1.0 - share_seen) * (1.0 - guess.share));
+    out.provenance.Plane(kGuessedPlane)[i] = static_cast<float>((1.0 - share_seen) * guess.share);
+    out.provenance.Plane(kSeenPlane)[i] = static_cast<float>(share_seen);
+    out.provenance.Plane(kInferredPlane)[i] =
+        static_cast<float>((1.0 - share_seen) * (1.0 - guess.share));
   }
   GridSolveOptions solve;
   solve.tolerance = kTolerance;

@@ -7,6 +7,7 @@
 #include "core/base/image.h"
 #include "core/base/parallel.h"
 #include "core/carry/carry.h"
+#include "core/carry/confidence.h"
 #include "core/color/relative_chroma.h"
 
 namespace color3d {
@@ -18,7 +19,7 @@ struct FusionOptions {
   // neighbours of equal luminance with 1.
   double inferred_weight = 0.1;
   // Carried colours below this confidence are not used, 0..1.
-  double min_confidence = 0.05;
+  double min_confidence = kMinMatchProbability;
   // Luminance difference (L units) at which neighbours half agree, as for hints.
   double edge_sigma = 1.0;
   // Feature distances (ColorPrediction::distance) where the automatic guess begins to replace the
@@ -40,18 +41,23 @@ struct FusionOptions {
 
 struct FusedColor {
   Image ab;          // 2 channels, Lab units
-  Image provenance;  // 3 channels, shares 0..1 that sum to 1: guessed, seen, inferred
+  Image provenance;  // planes as in ProvenancePlane
 };
 
-// `inferred`: 2 channels; `distance`: 1 channel or empty (nothing is guessed then); `guessed`: 2
-// channels or empty (the guess is grey then). All of the luminance's size. Solves the screened
-// system of hints.h on the view's own luminance, so that small gaps of what was carried are filled
-// from around them.
-FusedColor FuseColors(const Image& luminance,
-                      const CarriedColor& carried,
-                      const Image& inferred,
-                      const Image& distance,
-                      const Image& guessed,
+// The sources of one view's colour, all of the luminance's size. The references must outlive the
+// call.
+struct FusionSources {
+  const Image& luminance;       // 1 channel, L 0..100
+  const CarriedColor& carried;  // confidence 0 where nothing was carried
+  const Image& inferred;        // 2 channels, Lab units
+  const Image& distance;        // 1 channel, feature distance; empty: nothing is guessed
+  const Image& guessed;         // 2 channels, Lab units; empty: the guess is grey
+};
+
+// Solves the screened system of core/grid/grid_solver.h on the view's own luminance, so that small
+// gaps in the carried colours are filled from their surroundings. Throws Error{kInvalidArgument}
+// for sizes that differ.
+FusedColor FuseColors(const FusionSources& sources,
                       const FusionOptions& options,
                       ThreadPool& pool,
                       const CancellationToken& cancel);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/carry/confidence.h"
+
 namespace color3d {
 namespace {
 
@@ -22,9 +24,8 @@ bool WantsGuess(const CarriedColor& carried, const Image& distance, const Fusion
 
 // 1 where what was carried decides alone.
 Image SurelyCarried(const CarriedColor& carried) {
-  constexpr float kSure = 0.5f;
   Image sure = carried.confidence;
-  for (float& value : sure.data) value = value > kSure ? 1.0f : 0.0f;
+  for (float& value : sure.data) value = value > kDecisiveConfidence ? 1.0f : 0.0f;
   return sure;
 }
 
@@ -50,14 +51,9 @@ FusedColor ColorOfView(const Image& luminance,
   InferredColor inferred = sources.infer(luminance, known);
   CopyKnown(carried, known, &inferred.ab);
   const bool guess = WantsGuess(carried, inferred.distance, options);
-  return FuseColors(luminance,
-                    carried,
-                    inferred.ab,
-                    inferred.distance,
-                    guess ? sources.guess(luminance) : Image(),
-                    options,
-                    pool,
-                    cancel);
+  const Image guessed = guess ? sources.guess(luminance) : Image();
+  return FuseColors(
+      {luminance, carried, inferred.ab, inferred.distance, guessed}, options, pool, cancel);
 }
 
 }  // namespace color3d

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 
 namespace color3d {
 

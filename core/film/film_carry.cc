@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
+#include "core/carry/confidence.h"
 #include "core/film/frame_motion.h"
 #include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
@@ -134,9 +135,10 @@ struct Places {
 };
 
 void TakeWhereSurer(const Places& found, Places* followed) {
-  constexpr float kSure = 0.5f, kLeastGain = 0.3f;
+  constexpr float kLeastGain = 0.3f;  // of confidence
   for (size_t i = 0; i < found.confidence.data.size(); ++i) {
-    if (found.confidence.data[i] < std::max(kSure, followed->confidence.data[i] + kLeastGain)) {
+    if (found.confidence.data[i] <
+        std::max(kDecisiveConfidence, followed->confidence.data[i] + kLeastGain)) {
       continue;
     }
     followed->confidence.data[i] = found.confidence.data[i];

@@ -5,10 +5,11 @@
 #include <map>
 #include <utility>
 
+#include "core/carry/confidence.h"
+
 namespace color3d {
 namespace {
 
-constexpr float kFound = 0.5f;        // confidence
 constexpr double kLeastFound = 0.15;  // share of the frame
 
 }  // namespace
@@ -54,7 +55,7 @@ std::optional<FilmKey> ReturningShots::KeyAt(int frame) const {
   std::optional<FilmKey> found;
   double most = kLeastFound;
   for (CarriedColor& color : colors) {
-    const double share = Coverage(color, kFound);
+    const double share = Coverage(color, kDecisiveConfidence);
     if (share <= most) continue;
     most = share;
     found = {frame, std::move(color)};

@@ -17,7 +17,7 @@
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "core/base/parallel.h"
-#include "core/base/process_limits.h"
+#include "core/base/process/process_limits.h"
 #include "core/base/random.h"
 #include "core/image/area_reducer.h"
 #include "core/image/codec.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
-#include "core/base/subprocess.h"
+#include "core/base/process/subprocess.h"
 #include "core/image/codec.h"
 #include "core/report/report_page.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "core/base/base64.h"
+#include "core/base/text/base64.h"
 #include "core/report/page_style.h"
 #include "core/report/plot.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/base/files.h"
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 

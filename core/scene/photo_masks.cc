@@ -9,7 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 #include "core/image/codec.h"
 #include "core/scene/named_files.h"
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/range_check.h"
+#include "core/carry/confidence.h"
 #include "core/color/lab.h"
 #include "core/colorizer/corrector.h"
 #include "core/image/codec.h"
@@ -168,8 +169,8 @@ std::vector<Painted> ReadCorrections(const std::vector<ColorCorrection>& wanted,
 // Counts corrected pixels as seen.
 void CountAsSeen(const Image& share, Image* provenance) {
   for (size_t i = 0; i < share.data.size(); ++i) {
-    for (int c = 0; c < 3; ++c) provenance->Plane(c)[i] *= 1.0f - share.data[i];
-    provenance->Plane(1)[i] += share.data[i];
+    for (int c = 0; c < kProvenancePlanes; ++c) provenance->Plane(c)[i] *= 1.0f - share.data[i];
+    provenance->Plane(kSeenPlane)[i] += share.data[i];
   }
 }
 

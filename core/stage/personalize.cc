@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/evenly.h"
+#include "core/carry/confidence.h"
 #include "core/color/lab.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
@@ -62,7 +63,6 @@ TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageConte
 constexpr int kMaxCarriedViews = 12;
 constexpr size_t kMaxViewsToLookAt = 120;  // of a film
 constexpr double kMinCoverage = 0.05;
-constexpr float kMinConfidence = 0.3f;
 constexpr double kCarriedShare = 0.5;  // of the samples
 
 std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
@@ -76,10 +76,10 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
     const auto luminance = images.Luminance(view);
     CarriedColor carried =
         ReadCarried(context, scene.views[view], luminance->width, luminance->height);
-    const double coverage = Coverage(carried, kMinConfidence);
+    const double coverage = Coverage(carried, kTrainingConfidence);
     if (coverage < kMinCoverage) continue;
     for (float& value : carried.confidence.data) {
-      if (value < kMinConfidence) value = 0.0f;
+      if (value < kTrainingConfidence) value = 0.0f;
     }
     // The best so far, best first; those of equal coverage in their order.
     const auto place =

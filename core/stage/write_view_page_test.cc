@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/base/base64.h"
+#include "core/base/text/base64.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/view/view_page.h"
 #include "tests/support/stages/stage_fixture.h"

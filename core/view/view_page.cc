@@ -7,8 +7,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/base/base64.h"
 #include "core/base/error.h"
+#include "core/base/text/base64.h"
 #include "core/view/path/turn.h"
 #include "core/view/view_assets.h"
 

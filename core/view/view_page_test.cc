@@ -5,8 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/base/base64.h"
 #include "core/base/error.h"
+#include "core/base/text/base64.h"
 
 namespace color3d {
 namespace {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cctype>
 
-#include "core/base/address.h"
 #include "core/base/error.h"
+#include "core/base/text/address.h"
 
 namespace color3d {
 namespace {

@@ -11,7 +11,7 @@
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
@@ -20,8 +20,6 @@
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr char kUnreadable[] = "BLOB_UNREADABLE";
 
 Error Refused(const fs::path& folder, const char* why) {
   return Error(ErrorCode::kFailedPrecondition, "{} {}", folder.string(), why);
@@ -42,7 +40,7 @@ Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& p
   if (error == std::errc::io_error) return Copy::kDamaged;
   if (::access(from.c_str(), R_OK) != 0) {
     throw ServiceError(
-        ErrorCode::kUnavailable, kUnreadable, "cannot read {}: {}", from.string(), error.message());
+        ErrorReason::kBlobUnreadable, "cannot read {}: {}", from.string(), error.message());
   }
   if (error) {
     throw Error(ErrorCode::kUnavailable,
@@ -82,7 +80,7 @@ CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const D
     try {
       if (source.Look(sha256)) copy = CopyBlob(source.Fetch(sha256), sha256, part);
     } catch (const Error& e) {
-      if (ReasonOf(e) != kUnreadable) throw;
+      if (!HasReason(e, ErrorReason::kBlobUnreadable)) throw;
       result.unreadable.push_back(sha256 + ": " + e.what());
       continue;
     }

@@ -11,7 +11,7 @@
 #include <memory>
 #include <mutex>
 
-#include "core/base/address.h"
+#include "core/base/text/address.h"
 
 namespace color3d {
 namespace {

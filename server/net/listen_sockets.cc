@@ -16,8 +16,8 @@
 #include <memory>
 #include <string_view>
 
-#include "core/base/address.h"
 #include "core/base/error.h"
+#include "core/base/text/address.h"
 
 namespace color3d {
 namespace {

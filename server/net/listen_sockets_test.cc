@@ -11,9 +11,9 @@
 #include <cstring>
 #include <functional>
 
-#include "core/base/address.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/text/address.h"
 
 namespace color3d {
 namespace {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string_view>
 
-#include "core/base/address.h"
+#include "core/base/text/address.h"
 
 namespace color3d {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "server/access/notify_targets.h"
 #include "server/notify/webhook.h"
 #include "server/ops/log_time.h"

@@ -238,7 +238,7 @@ class FullStore : public SqliteJobStore {
   void RequireRoom() {
     if (!is_full) return;
     ++refused;
-    throw ServiceError(ErrorCode::kResourceExhausted, "STORAGE_FULL", "full");
+    throw ServiceError(ErrorReason::kStorageFull, "full");
   }
 };
 

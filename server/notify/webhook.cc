@@ -10,9 +10,9 @@
 #include <memory>
 #include <string_view>
 
-#include "core/base/base64.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/text/base64.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "server/ops/log_time.h"
 
 namespace color3d {

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "core/catalogue/stages.h"
+#include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
@@ -39,8 +39,7 @@ void CheckGivenJob(const JobRecord& job, bool asked_for, const std::string& miss
         missing);
   }
   if (job.state != JobState::kSucceeded) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "INPUT_MISSING",
+    throw ServiceError(ErrorReason::kInputMissing,
                        "the input {} is {}, it must have succeeded",
                        job.name,
                        JobStateName(job.state));

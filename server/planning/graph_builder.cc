@@ -5,10 +5,10 @@
 
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
+#include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/spec_check.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
@@ -83,8 +83,7 @@ void GraphBuilder::Provide(const std::string& artifact, const std::string& for_k
   if (given != given_.end()) {
     const JobRecord& input = given->second;
     if (IsFinished(input.state) && input.state != JobState::kSucceeded) {
-      throw ServiceError(ErrorCode::kFailedPrecondition,
-                         "INPUT_MISSING",
+      throw ServiceError(ErrorReason::kInputMissing,
                          "{} needs {}, but the input {} is {}; retry it first",
                          for_kind,
                          artifact,
@@ -95,8 +94,7 @@ void GraphBuilder::Provide(const std::string& artifact, const std::string& for_k
     return;
   }
   if (!StageOf(submitted_kind_).brings_prerequisites) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "INPUT_MISSING",
+    throw ServiceError(ErrorReason::kInputMissing,
                        "{} needs {}; add the {} job of this scene to spec.inputs",
                        for_kind,
                        artifact,

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace {

@@ -9,8 +9,8 @@
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 #include "proto/option_text.h"
+#include "server/base/service_error.h"
 #include "server/planning/key_view_jobs.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
@@ -22,7 +22,7 @@ constexpr int kMaxRepeated = 10'000;
 constexpr size_t kMaxTextBytes = 4096;
 
 [[noreturn]] void Reject(const std::string& path, const std::string& why) {
-  throw ServiceError(ErrorCode::kInvalidArgument, "BAD_OPTION", path + why, {{path, path + why}});
+  throw ServiceError(ErrorReason::kBadOption, path + why, {{path, path + why}});
 }
 
 void CheckNumber(const FieldDescriptor* field, double value, const std::string& path) {
@@ -332,8 +332,7 @@ void CheckSpec(const v1::JobSpec& spec) {
   const std::string kind = KindOf(spec);
   if (FindStage(kind) == nullptr) {
     throw ServiceError(
-        ErrorCode::kUnimplemented,
-        "NOT_BUILT",
+        ErrorReason::kNotBuilt,
         fmt::format("{} is not built yet; GetServerInfo lists the job kinds that are", kind));
   }
   if (spec.ByteSizeLong() > kMaxSpecBytes) {

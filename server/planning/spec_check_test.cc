@@ -7,10 +7,10 @@
 
 #include <map>
 
+#include "server/base/service_error.h"
 #include "server/planning/planner.h"
 #include "server/planning/spec_names.h"
 #include "server/planning/stage_key.h"
-#include "server/service_error.h"
 
 namespace color3d {
 namespace {
@@ -34,7 +34,7 @@ std::string CheckMessage(Change change) {
     CheckSpec(spec);
   } catch (const ServiceError& e) {
     EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
-    EXPECT_EQ(e.reason(), "BAD_OPTION");
+    EXPECT_EQ(e.reason(), ErrorReason::kBadOption);
     return e.what();
   }
   return "accepted";
@@ -118,7 +118,7 @@ std::string NameError(const v1::JobSpec& spec, const UserModels& models) {
     CheckNames(spec, models);
   } catch (const ServiceError& e) {
     EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
-    return e.reason() + ": " + e.what();
+    return ReasonOf(e) + ": " + e.what();
   }
   return "";
 }
@@ -184,7 +184,7 @@ std::string CheckRender(Change change, bool of_whole_scene = false) {
   try {
     CheckSpec(spec);
   } catch (const ServiceError& e) {
-    EXPECT_EQ(e.reason(), "BAD_OPTION");
+    EXPECT_EQ(e.reason(), ErrorReason::kBadOption);
     return e.what();
   }
   return "accepted";

@@ -1,7 +1,7 @@
 #include "server/planning/spec_names.h"
 
 #include "proto/option_text.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace {
@@ -39,7 +39,7 @@ template <typename Value>
 void Require(const std::vector<NameUse>& uses,
              const std::map<std::string, Value>& known,
              const std::string& what,
-             const std::string& reason,
+             ErrorReason reason,
              const std::string& remedy) {
   for (const NameUse& use : uses) {
     if (known.contains(use.name)) continue;
@@ -49,8 +49,7 @@ void Require(const std::vector<NameUse>& uses,
         use.name,
         NamesOf(known),
         remedy);
-    throw ServiceError(
-        ErrorCode::kInvalidArgument, reason, use.field + why, {{use.field, use.field + why}});
+    throw ServiceError(reason, use.field + why, {{use.field, use.field + why}});
   }
 }
 
@@ -64,8 +63,12 @@ SpecNames NamesIn(const v1::JobSpec& spec) {
 
 void CheckNames(const v1::JobSpec& spec, const UserModels& models) {
   const SpecNames names = NamesIn(spec);
-  Require(names.models, models.files, "model", "UNKNOWN_MODEL", "--model NAME=FILE");
-  Require(names.backends, models.backends, "backend", "UNKNOWN_BACKEND", "--backend NAME=ADDRESS");
+  Require(names.models, models.files, "model", ErrorReason::kUnknownModel, "--model NAME=FILE");
+  Require(names.backends,
+          models.backends,
+          "backend",
+          ErrorReason::kUnknownBackend,
+          "--backend NAME=ADDRESS");
 }
 
 }  // namespace color3d

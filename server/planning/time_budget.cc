@@ -8,7 +8,7 @@
 
 #include "core/catalogue/stages.h"
 #include "proto/option_text.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace {
@@ -84,8 +84,7 @@ TimeBudget DivideTimeBudget(double seconds,
                             const v1::ImportSceneSpec& import) {
   const double rest = seconds - FixedSeconds(facts, import);
   if (rest < kMinScheduledSeconds) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "BAD_OPTION",
+    throw ServiceError(ErrorReason::kBadOption,
                        TooShort(seconds, facts, import),
                        {{fmt::format("spec.{}.time_budget_seconds", kind::kColorizeScene),
                          "too short for this scene"}});

@@ -2,7 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "server/rpc/convert.h"
+#include "server/rpc/calls/convert.h"
 #include "server/storage/collector.h"
 
 namespace color3d {

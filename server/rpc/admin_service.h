@@ -2,7 +2,7 @@
 #pragma once
 
 #include "color3d/v1/admin.grpc.pb.h"
-#include "server/rpc/rpc_parts.h"
+#include "server/rpc/calls/rpc_parts.h"
 
 namespace color3d {
 

@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
@@ -71,7 +71,7 @@ class FullStore : public SqliteJobStore {
 
  private:
   void RequireRoom() const {
-    if (is_full) throw ServiceError(ErrorCode::kResourceExhausted, "STORAGE_FULL", "full");
+    if (is_full) throw ServiceError(ErrorReason::kStorageFull, "full");
   }
 };
 

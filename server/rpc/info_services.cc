@@ -1,11 +1,11 @@
 #include "server/rpc/info_services.h"
 
 #include "core/base/memory.h"
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "core/catalogue/stages.h"
 #include "server/ops/process.h"
 #include "server/planning/presets.h"
-#include "server/rpc/convert.h"
+#include "server/rpc/calls/convert.h"
 
 namespace color3d {
 namespace {

@@ -3,8 +3,8 @@
 
 #include "color3d/v1/colorizer.grpc.pb.h"
 #include "color3d/v1/server.grpc.pb.h"
+#include "server/rpc/calls/rpc_parts.h"
 #include "server/rpc/live/colorize_hub.h"
-#include "server/rpc/rpc_parts.h"
 
 namespace color3d {
 

@@ -9,10 +9,10 @@
 
 #include "server/net/descriptors.h"
 #include "server/rpc/admin_service.h"
-#include "server/rpc/blob_service.h"
+#include "server/rpc/blobs/blob_service.h"
 #include "server/rpc/info_services.h"
-#include "server/rpc/job_service.h"
-#include "server/rpc/scene_service.h"
+#include "server/rpc/jobs/job_service.h"
+#include "server/rpc/scenes/scene_service.h"
 
 namespace color3d {
 namespace {

@@ -8,10 +8,10 @@
 
 #include "server/net/connection_gate.h"
 #include "server/net/listen_sockets.h"
-#include "server/rpc/call_watch.h"
+#include "server/rpc/calls/call_watch.h"
+#include "server/rpc/calls/rpc_parts.h"
+#include "server/rpc/jobs/watch_hub.h"
 #include "server/rpc/live/colorize_hub.h"
-#include "server/rpc/rpc_parts.h"
-#include "server/rpc/watch_hub.h"
 
 namespace grpc {
 class Server;

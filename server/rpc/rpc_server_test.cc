@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/base/address.h"
+#include "core/base/text/address.h"
 #include "server/access/tls.h"
 #include "server/net/port_probe.h"
 #include "tests/support/service/rpc_fixture.h"

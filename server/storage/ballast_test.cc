@@ -25,7 +25,7 @@ TEST_F(StorageTest, BallastTakesSpaceUntilItIsGivenUp) {
 TEST_F(StorageTest, WhatFreesSpaceIsDoneAgainOnceThereIsRoom) {
   int tries = 0, rooms = 0;
   const auto full_at_first = [&] {
-    if (++tries == 1) throw ServiceError(ErrorCode::kResourceExhausted, "STORAGE_FULL", "full");
+    if (++tries == 1) throw ServiceError(ErrorReason::kStorageFull, "full");
     return tries;
   };
   const std::function<bool()> make_room = [&] { return ++rooms == 1; };

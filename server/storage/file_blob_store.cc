@@ -16,7 +16,7 @@
 
 #include "core/base/files.h"
 #include "core/base/folder_walk.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -50,8 +50,7 @@ std::optional<struct stat> StatusOf(const fs::path& path) {
   const int error = errno;
   if (error == ENOENT || error == ENOTDIR) return std::nullopt;
   throw ServiceError(
-      ErrorCode::kUnavailable,
-      "BLOB_UNREADABLE",
+      ErrorReason::kBlobUnreadable,
       "cannot look at the blob {}: {}; its owner, rights and disk on the server need "
       "a look",
       path.filename().string(),
@@ -119,8 +118,7 @@ std::optional<StoredBlob> FileBlobStore::Look(const std::string& sha256) const {
 fs::path FileBlobStore::Fetch(const std::string& sha256) const {
   const fs::path path = PathOf(sha256);
   if (const auto status = StatusOf(path); !status || !S_ISREG(status->st_mode)) {
-    throw ServiceError(
-        ErrorCode::kNotFound, "BLOB_MISSING", "the blob {} is not stored; upload it", sha256);
+    throw ServiceError(ErrorReason::kBlobMissing, "the blob {} is not stored; upload it", sha256);
   }
   return path;
 }
@@ -163,8 +161,7 @@ void FileBlobStore::ThrowFull(int64_t bytes, int64_t free) const {
                 "the folder {} is gone; is its disk still there?",
                 folder_.string());
   }
-  throw ServiceError(ErrorCode::kResourceExhausted,
-                     "STORAGE_FULL",
+  throw ServiceError(ErrorReason::kStorageFull,
                      "{} more bytes do not fit: {} are free on the server's disk and promised to "
                      "nobody, of which {} are kept in reserve; delete jobs or scenes, or add disk "
                      "space",
@@ -202,7 +199,7 @@ FileDigest FileBlobStore::PutBytes(std::string_view bytes) {
     WriteFileAtomic(path, bytes);
   } catch (const Error& e) {
     if (e.code() == ErrorCode::kResourceExhausted) {
-      throw ServiceError(e.code(), "STORAGE_FULL", e.what());
+      throw ServiceError(ErrorReason::kStorageFull, e.what());
     }
     throw;
   }

@@ -9,7 +9,7 @@
 #include <ctime>
 
 #include "core/base/folder_walk.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -51,8 +51,7 @@ std::string OwnerOf(const std::string& part) {
 [[noreturn]] void ThrowWriteError(const std::string& what) {
   const int error = errno;
   if (error == ENOSPC || error == EDQUOT) {
-    throw ServiceError(ErrorCode::kResourceExhausted,
-                       "STORAGE_FULL",
+    throw ServiceError(ErrorReason::kStorageFull,
                        "{}: the server's disk is full; what was sent is kept, resume later",
                        what);
   }
@@ -117,8 +116,7 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
     for (const auto& [other, bytes] : owned) others += other == part ? 0 : bytes;
     if (!owned.contains(part) && owned.size() >= kMaxUnfinished) {
       throw ServiceError(
-          ErrorCode::kResourceExhausted,
-          "QUOTA_EXCEEDED",
+          ErrorReason::kQuotaExceeded,
           fmt::format("{} uploads of your project are unfinished, which is as many as "
                       "it may have; finish some, or wait a day until they are removed",
                       owned.size()),
@@ -144,8 +142,7 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
     ThrowWriteError("cannot open an upload");
   writer->size_ = status.st_size;
   if (offset != writer->size_) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "OFFSET_MISMATCH",
+    throw ServiceError(ErrorReason::kOffsetMismatch,
                        "the upload has {} bytes, the write starts at {}; ask QueryWriteStatus and "
                        "go on from there",
                        writer->size_,
@@ -177,8 +174,7 @@ UploadStore::Writer::~Writer() {
 
 void UploadStore::Writer::RequireOwner() const {
   if (generation_ != session_->generation) {
-    throw ServiceError(ErrorCode::kAborted,
-                       "UPLOAD_TAKEN_OVER",
+    throw ServiceError(ErrorReason::kUploadTakenOver,
                        "another connection goes on with this upload; ask QueryWriteStatus");
   }
 }
@@ -187,17 +183,14 @@ void UploadStore::Writer::Append(int64_t offset, std::string_view data) {
   std::lock_guard lock(session_->mutex);
   RequireOwner();
   if (offset != size_) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "OFFSET_MISMATCH",
+    throw ServiceError(ErrorReason::kOffsetMismatch,
                        "a write at offset {} follows one that ended at {}",
                        offset,
                        size_);
   }
   if (size_ + static_cast<int64_t>(data.size()) > name_.digest.size_bytes) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "SIZE_MISMATCH",
-                       "more bytes than the announced {}",
-                       name_.digest.size_bytes);
+    throw ServiceError(
+        ErrorReason::kSizeMismatch, "more bytes than the announced {}", name_.digest.size_bytes);
   }
   while (!data.empty()) {
     const ssize_t put = ::write(fd_, data.data(), data.size());
@@ -220,8 +213,7 @@ void UploadStore::Writer::Finish() {
   std::lock_guard lock(session_->mutex);
   RequireOwner();
   if (size_ != name_.digest.size_bytes) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "SIZE_MISMATCH",
+    throw ServiceError(ErrorReason::kSizeMismatch,
                        "the upload ends after {} of the announced {} bytes",
                        size_,
                        name_.digest.size_bytes);
@@ -230,8 +222,7 @@ void UploadStore::Writer::Finish() {
   const FileDigest actual = DigestFile(path);
   if (actual.sha256 != name_.digest.sha256) {
     ::unlink(path.c_str());
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "DIGEST_MISMATCH",
+    throw ServiceError(ErrorReason::kDigestMismatch,
                        "the bytes have the digest {}, announced was {}; upload the file again",
                        actual.sha256,
                        name_.digest.sha256);

@@ -81,16 +81,14 @@ TEST_F(UploadStoreTest, WhatAnOwnerHasUnderWayIsCounted) {
     uploads.Open({"look", DigestOf(""), owner}, 0, [&](int64_t bytes) { seen = bytes; });
     return seen;
   };
-  const auto refuse = [](int64_t) {
-    throw ServiceError(ErrorCode::kResourceExhausted, "TOO_MUCH", "no");
-  };
+  const auto refuse = [](int64_t) { throw ServiceError(ErrorReason::kQuotaExceeded, "no"); };
   auto first = uploads_.Open(abc, 0), second = uploads_.Open(de, 0);
   EXPECT_EQ(look(uploads_), 5);
   EXPECT_EQ(look(uploads_, "cellar"), 0);
   EXPECT_EQ(ReasonThrown([&] {
               uploads_.Open({"u3", DigestOf("x"), "attic"}, 0, refuse);
             }),
-            "TOO_MUCH");
+            "QUOTA_EXCEEDED");
   EXPECT_EQ(look(uploads_), 5) << "what was refused takes nothing";
   first->Append(0, "a");
   first.reset();

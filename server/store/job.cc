@@ -8,6 +8,10 @@
 
 namespace color3d {
 
+JobError MakeJobError(ErrorReason reason, std::string message) {
+  return {ErrorReasonCode(reason), ErrorReasonName(reason), std::move(message)};
+}
+
 Clocks SystemClocks() {
   return {SystemClock(), [] {
             return std::chrono::duration_cast<std::chrono::milliseconds>(

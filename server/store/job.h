@@ -10,6 +10,7 @@
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/catalogue/error_reasons.h"
 
 namespace color3d {
 
@@ -63,9 +64,10 @@ struct JobUsage {
 
 struct JobError {
   ErrorCode code = ErrorCode::kInternal;
-  std::string reason;  // UPPER_SNAKE_CASE
+  std::string reason;  // ErrorReasonName(), or the name of the code
   std::string message;
 };
+JobError MakeJobError(ErrorReason reason, std::string message);
 
 struct JobRecord {
   int64_t id = 0;      // grows with creation

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace {
@@ -29,7 +29,7 @@ std::vector<Record> AsNamed(std::vector<Record> records) {
 
 void ProjectStore::RequireOwn(const std::string& job) const {
   if (store_->GetJob(job).project == project_) return;
-  throw ServiceError(ErrorCode::kNotFound, "JOB_NOT_FOUND", "there is no job '{}'", job);
+  throw ServiceError(ErrorReason::kJobNotFound, "there is no job '{}'", job);
 }
 
 RequestKey ProjectStore::Own(RequestKey request) const {
@@ -39,7 +39,7 @@ RequestKey ProjectStore::Own(RequestKey request) const {
 
 std::string ProjectStore::Stored(const std::string& scene) const {
   if (PublicScene(scene) != scene) {
-    throw ServiceError(ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '{}'", scene);
+    throw ServiceError(ErrorReason::kSceneNotFound, "there is no scene '{}'", scene);
   }
   return StoredScene(scene, project_);
 }

@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <exception>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 
 namespace color3d {
 namespace {
@@ -22,30 +22,25 @@ std::atomic<int64_t> g_steps{0};
   switch (code & 0xff) {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
-      throw ServiceError(ErrorCode::kUnavailable, "STORE_BUSY", "{}; try again", text);
+      throw ServiceError(ErrorReason::kStoreBusy, "{}; try again", text);
     case SQLITE_FULL:
-      throw ServiceError(
-          ErrorCode::kResourceExhausted, "STORAGE_FULL", "{}; free some disk space", text);
+      throw ServiceError(ErrorReason::kStorageFull, "{}; free some disk space", text);
     case SQLITE_READONLY:
     case SQLITE_CANTOPEN:
     case SQLITE_PERM:
-      throw ServiceError(ErrorCode::kFailedPrecondition,
-                         "STORE_NOT_WRITABLE",
-                         "{}; check the permissions of the data directory",
-                         text);
+      throw ServiceError(
+          ErrorReason::kStoreNotWritable, "{}; check the permissions of the data directory", text);
     case SQLITE_CORRUPT:
     case SQLITE_NOTADB:
-      throw ServiceError(ErrorCode::kDataLoss,
-                         "STORE_CORRUPT",
+      throw ServiceError(ErrorReason::kStoreCorrupt,
                          "{}; restore jobs.db from a backup or start with a fresh --data-dir",
                          text);
     default:
       // The log's index says of a full disk that it cannot grow.
       if (db != nullptr && (sqlite3_system_errno(db) == ENOSPC || code == SQLITE_IOERR_SHMSIZE)) {
-        throw ServiceError(
-            ErrorCode::kResourceExhausted, "STORAGE_FULL", "{}; free some disk space", text);
+        throw ServiceError(ErrorReason::kStorageFull, "{}; free some disk space", text);
       }
-      throw ServiceError(ErrorCode::kInternal, "STORE_ERROR", text);
+      throw ServiceError(ErrorReason::kStoreError, text);
   }
 }
 

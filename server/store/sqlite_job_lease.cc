@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "core/base/utf8.h"
-#include "server/service_error.h"
+#include "core/base/text/utf8.h"
+#include "server/base/service_error.h"
 #include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"
@@ -17,8 +17,7 @@ namespace {
 constexpr size_t kMaxMessageBytes = 1000;
 
 ServiceError LeaseLost(const Lease& lease) {
-  return ServiceError(ErrorCode::kAborted,
-                      "LEASE_LOST",
+  return ServiceError(ErrorReason::kLeaseLost,
                       "this worker no longer holds job {} (epoch {})",
                       lease.job_id,
                       lease.epoch);
@@ -39,8 +38,7 @@ bool IsRetryable(ErrorCode code) {
 void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
   SqliteStatement server(db.handle(), "select version from server");
   if (server.Step() && server.Text(0) != options_.program_version) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "WORKER_VERSION",
+    throw ServiceError(ErrorReason::kWorkerVersion,
                        "this worker is of version '{}', the server of '{}'; start workers of the "
                        "server's own release",
                        options_.program_version,
@@ -49,8 +47,7 @@ void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
   // Builds of one release may differ in that, too.
   SqliteStatement schema(db.handle(), "select version from schema_version");
   if (schema.Step() && schema.Int(0) != kSchemaVersion) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "WORKER_VERSION",
+    throw ServiceError(ErrorReason::kWorkerVersion,
                        "this worker's job store has version {}, the server's version {}; start "
                        "workers of the server's own build",
                        kSchemaVersion,
@@ -372,14 +369,15 @@ int SqliteJobStore::ReapExpired() {
     } else if (job.attempt < job.max_attempts) {
       Requeue(db, job, /*count_as_lost=*/true);
     } else {
-      EndFailed(db,
-                job.id,
-                {ErrorCode::kInternal,
-                 "WORKER_LOST",
-                 fmt::format("the worker died or hung in each of {} attempts (last: {}); see its "
-                             "log, and how much memory the job needs",
-                             job.attempt,
-                             job.worker)});
+      EndFailed(
+          db,
+          job.id,
+          MakeJobError(
+              ErrorReason::kWorkerLost,
+              fmt::format("the worker died or hung in each of {} attempts (last: {}); see its "
+                          "log, and how much memory the job needs",
+                          job.attempt,
+                          job.worker)));
     }
   }
   transaction.Commit();

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <deque>
 
-#include "core/base/utf8.h"
-#include "server/service_error.h"
+#include "core/base/text/utf8.h"
+#include "server/base/service_error.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/store/sqlite_rows.h"
@@ -18,12 +18,8 @@ namespace {
 constexpr size_t kMaxErrorBytes = 4000;
 
 ServiceError WrongState(const JobRecord& job, const std::string& remedy) {
-  return ServiceError(ErrorCode::kFailedPrecondition,
-                      "WRONG_STATE",
-                      "{} is {}; {}",
-                      job.name,
-                      JobStateName(job.state),
-                      remedy);
+  return ServiceError(
+      ErrorReason::kWrongState, "{} is {}; {}", job.name, JobStateName(job.state), remedy);
 }
 
 bool CanBeRetried(const JobRecord& job) {
@@ -147,8 +143,7 @@ namespace {
 
 void RequireActive(const SceneRecord& scene) {
   if (scene.state == SceneState::kActive) return;
-  throw ServiceError(ErrorCode::kFailedPrecondition,
-                     "SCENE_NOT_ACTIVE",
+  throw ServiceError(ErrorReason::kSceneNotActive,
                      "the scene '{}' is not committed; upload its files and call CommitScene first",
                      PublicScene(scene.name));
 }
@@ -211,16 +206,14 @@ void SqliteJobStore::RequireRoom(SqliteDatabase& db,
   unfinished.Bind(project);
   unfinished.Step();
   if (unfinished.Int(0) + jobs > limits.all) {
-    throw ServiceError(ErrorCode::kResourceExhausted,
-                       "QUEUE_FULL",
+    throw ServiceError(ErrorReason::kQueueFull,
                        "{} jobs wait or run, at most {} are allowed; try again later",
                        unfinished.Int(0),
                        limits.all);
   }
   if (unfinished.Int(1) + jobs > limits.of_project) {
     throw ServiceError(
-        ErrorCode::kResourceExhausted,
-        "QUOTA_EXCEEDED",
+        ErrorReason::kQuotaExceeded,
         fmt::format(
             "{} jobs of your project wait or run and {} would come, at most {} are allowed; "
             "wait for some, or cancel them",
@@ -328,8 +321,7 @@ void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, boo
   SqliteStatement lost(db.handle(), "select lost_input from job where job_id=?");
   lost.Bind(job.id);
   if (lost.Step() && !lost.Text(0).empty()) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "INPUT_DELETED",
+    throw ServiceError(ErrorReason::kInputDeleted,
                        "{} reads results of {}, which was deleted; submit the work anew",
                        job.name,
                        lost.Text(0));

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_rows.h"
 
@@ -34,7 +34,7 @@ SqliteJobStore::~SqliteJobStore() = default;
 namespace {
 
 ServiceError NoSuchJob(const std::string& name) {
-  return ServiceError(ErrorCode::kNotFound, "JOB_NOT_FOUND", "there is no job '{}'", name);
+  return ServiceError(ErrorReason::kJobNotFound, "there is no job '{}'", name);
 }
 
 }  // namespace
@@ -144,8 +144,7 @@ std::optional<std::string> SqliteJobStore::CheckRequest(SqliteDatabase& db,
   select.Bind(request.method, request.id);
   if (!select.Step()) return std::nullopt;
   if (select.Text(0) != request.body_sha256) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "REQUEST_ID_REUSED",
+    throw ServiceError(ErrorReason::kRequestIdReused,
                        "request_id '{}' was used for another {} request; choose a fresh one",
                        request.id,
                        request.method);
@@ -218,8 +217,7 @@ std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision,
                          "coalesce((select seq from sqlite_sequence where name='job_event'), 0)");
   bounds.Step();
   if (revision < bounds.Int(0) || revision > bounds.Int(1)) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "REVISION_COMPACTED",
+    throw ServiceError(ErrorReason::kRevisionCompacted,
                        "events after revision {} are not kept (kept: {} to {}); get the jobs again "
                        "and watch from revision 0",
                        revision,

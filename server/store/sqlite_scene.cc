@@ -3,7 +3,7 @@
 
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/store/sqlite_rows.h"
@@ -15,8 +15,7 @@ SceneRecord SqliteJobStore::RequireScene(SqliteDatabase& db,
   SqliteStatement select(db.handle(), SelectScene("where name=?"));
   select.Bind(name);
   if (!select.Step()) {
-    throw ServiceError(
-        ErrorCode::kNotFound, "SCENE_NOT_FOUND", "there is no scene '{}'", PublicScene(name));
+    throw ServiceError(ErrorReason::kSceneNotFound, "there is no scene '{}'", PublicScene(name));
   }
   SceneRecord scene = SceneFromRow(select);
   if (!with_files) return scene;
@@ -38,8 +37,7 @@ void SqliteJobStore::RequireRoomForScene(SqliteDatabase& db,
   if (!select.Step()) return;
   const auto refuse = [&](const char* what, int64_t count, int64_t most, const char* remedy) {
     throw ServiceError(
-        ErrorCode::kResourceExhausted,
-        "QUOTA_EXCEEDED",
+        ErrorReason::kQuotaExceeded,
         fmt::format(
             "your project has {} {}, at most {} are allowed; {}", count, what, most, remedy),
         {{"project:" + project + " scenes", fmt::format("{} of {}", count, most)}});
@@ -65,8 +63,7 @@ SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record,
   SqliteStatement existing(db.handle(), "select 1 from scene where name=?");
   existing.Bind(record.name);
   if (existing.Step()) {
-    throw ServiceError(ErrorCode::kAlreadyExists,
-                       "SCENE_EXISTS",
+    throw ServiceError(ErrorReason::kSceneExists,
                        "the scene '{}' exists; choose another scene_id",
                        PublicScene(record.name));
   }
@@ -155,8 +152,7 @@ SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
                             PublicScene(name));
     }
     if (record.state != JobState::kSucceeded) {
-      throw ServiceError(ErrorCode::kFailedPrecondition,
-                         "WRONG_STATE",
+      throw ServiceError(ErrorReason::kWrongState,
                          "{} is {}; only a key view that has been coloured can be accepted",
                          job,
                          JobStateName(record.state));
@@ -178,8 +174,7 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
   SqliteStatement busy(db.handle(), "select name from job where scene=? and end_ms=0 limit 1");
   busy.Bind(name);
   if (busy.Step()) {
-    throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "SCENE_IN_USE",
+    throw ServiceError(ErrorReason::kSceneInUse,
                        "{} of the scene '{}' is not finished; cancel it or wait for it",
                        busy.Text(0),
                        PublicScene(name));
@@ -256,10 +251,8 @@ ColorizerRecord SqliteJobStore::GetColorizer(const std::optional<std::string>& p
                            IsColorizer("a", "j") + " order by a.job_id limit 1"));
   select.Bind(!project, project.value_or(""), "", sha256);
   if (!select.Step()) {
-    throw ServiceError(ErrorCode::kNotFound,
-                       "COLORIZER_NOT_FOUND",
-                       "there is no colorizer 'colorizers/{}'",
-                       sha256);
+    throw ServiceError(
+        ErrorReason::kColorizerNotFound, "there is no colorizer 'colorizers/{}'", sha256);
   }
   return ColorizerFromRow(select);
 }

@@ -7,7 +7,7 @@
 #include <system_error>
 
 #include "core/base/files.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/store_file.h"
@@ -28,8 +28,7 @@ std::optional<int64_t> VersionOf(SqliteDatabase& db) {
 }
 
 ServiceError WrongVersion(int64_t version, const char* remedy) {
-  return ServiceError(ErrorCode::kFailedPrecondition,
-                      "STORE_VERSION",
+  return ServiceError(ErrorReason::kStoreVersion,
                       "the job store has version {}, this program reads version {}; {}",
                       version,
                       kSchemaVersion,
@@ -132,8 +131,7 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
   }
   if (role == StoreRole::kWorker) {
     if (!version) {
-      throw ServiceError(ErrorCode::kFailedPrecondition,
-                         "STORE_NOT_READY",
+      throw ServiceError(ErrorReason::kStoreNotReady,
                          "{} has no tables; start color3d-server serve, which makes them",
                          file.string());
     }

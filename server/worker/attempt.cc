@@ -12,11 +12,11 @@
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "core/catalogue/artifacts.h"
+#include "server/base/service_error.h"
 #include "server/ops/process.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/stage_key.h"
-#include "server/service_error.h"
 #include "server/worker/blob_checkpoints.h"
 #include "server/worker/told_paths.h"
 
@@ -136,14 +136,13 @@ void Attempt::Run() {
     }
   } catch (const fs::filesystem_error& e) {
     const bool full = e.code() == std::errc::no_space_on_device;
-    HandleError({full ? ErrorCode::kResourceExhausted : ErrorCode::kInternal,
-                 full ? "STORAGE_FULL" : "INTERNAL",
-                 std::string(e.what()) + (full ? "; free some disk space" : "")});
+    HandleError(full ? MakeJobError(ErrorReason::kStorageFull,
+                                    std::string(e.what()) + "; free some disk space")
+                     : JobError{ErrorCode::kInternal, "", e.what()});
   } catch (const std::exception& e) {
-    HandleError(
-        IsOutOfMemory(e)
-            ? OutOfMemory(e)
-            : JobError{ErrorCode::kInternal, "INTERNAL", std::string("unexpected: ") + e.what()});
+    HandleError(IsOutOfMemory(e)
+                    ? OutOfMemory(e)
+                    : JobError{ErrorCode::kInternal, "", std::string("unexpected: ") + e.what()});
   }
 }
 
@@ -153,11 +152,11 @@ JobError Attempt::OutOfMemory(const std::exception& e) const {
                OwnMemoryBytes() >> 20,
                MemoryRemedy(),
                e.what());
-  return {ErrorCode::kResourceExhausted,
-          "OUT_OF_MEMORY",
-          fmt::format("{} ran out of memory; use fewer or smaller pictures (max_side_px), or {}",
-                      job_.kind,
-                      MemoryRemedy())};
+  return MakeJobError(
+      ErrorReason::kOutOfMemory,
+      fmt::format("{} ran out of memory; use fewer or smaller pictures (max_side_px), or {}",
+                  job_.kind,
+                  MemoryRemedy()));
 }
 
 void Attempt::Prepare() {
@@ -260,8 +259,7 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
 void Attempt::RequireModelsUnchanged() const {
   for (const auto& [name, model] : models_) {
     if (IdentityOf(model.file) == model.identity) continue;
-    throw ServiceError(ErrorCode::kAborted,
-                       "MODEL_CHANGED",
+    throw ServiceError(ErrorReason::kModelChanged,
                        "the file of the model '{}' ({}) was replaced while {} ran; retry the job",
                        name,
                        model.file.string(),
@@ -330,7 +328,7 @@ void Attempt::Publish(const StageOutput& output) {
   for (const ArtifactRecord& artifact : publication.artifacts) {
     if (context_.blobs.Touch(artifact.digest)) continue;
     throw ServiceError(ErrorCode::kUnavailable,
-                       "BLOB_MISSING",
+                       ErrorReason::kBlobMissing,
                        "the result {} of {} is gone from the blob store before it was published",
                        artifact.name,
                        job_.kind);
@@ -361,7 +359,7 @@ void Attempt::HandleError(const JobError& found) {
   if (error.message != found.message) spdlog::warn("{} {}", tag_, found.message);
   keeper_.Stop();
   // The stage may learn of a lost lease (saving a checkpoint) before the heartbeat does.
-  const bool lost = error.reason == "LEASE_LOST";
+  const bool lost = error.reason == ErrorReasonName(ErrorReason::kLeaseLost);
   // Room first: on a full disk the store could not even write that the job failed.
   std::error_code ignored;
   fs::remove_all(scratch_, ignored);
@@ -386,19 +384,18 @@ void Attempt::Conclude(JobStore& store, StopReason reason, const JobError& error
       spdlog::warn("{} lost its lease; nothing is published", tag_);
       return;
     case StopReason::kCancelled:
-      store.Fail(keeper_.lease(), {ErrorCode::kCancelled, "CANCELLED", "cancelled"}, usage);
+      store.Fail(keeper_.lease(), {ErrorCode::kCancelled, "", "cancelled"}, usage);
       return LogEnd("was cancelled");
     case StopReason::kDraining:
       store.Release(keeper_.lease(), usage);
       return LogEnd("was released for another worker");
     case StopReason::kStuck:
-      store.Fail(
-          keeper_.lease(),
-          {ErrorCode::kDeadlineExceeded,
-           "STAGE_STUCK",
-           fmt::format(
-               "{} made no progress for {} s", job_.kind, context_.timing.stuck.count() / 1000)},
-          usage);
+      store.Fail(keeper_.lease(),
+                 MakeJobError(ErrorReason::kStageStuck,
+                              fmt::format("{} made no progress for {} s",
+                                          job_.kind,
+                                          context_.timing.stuck.count() / 1000)),
+                 usage);
       return LogEnd("was stuck");
     case StopReason::kNone:
       break;

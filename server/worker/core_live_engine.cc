@@ -10,7 +10,7 @@
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/worker/colorizer_cache.h"
 #include "server/worker/live_engine.h"
 
@@ -74,7 +74,7 @@ std::shared_ptr<const Encoder> CoreLiveEngine::FindEncoder(const std::string& na
   const auto file = setup_.models.files.find(name);
   if (file == setup_.models.files.end()) {
     throw ServiceError(ErrorCode::kFailedPrecondition,
-                       "UNKNOWN_MODEL",
+                       ErrorReason::kUnknownModel,
                        "the colorizer was trained with the encoder '{}', which this server does "
                        "not have; it has: {}; start it with --model {}=FILE",
                        name,
@@ -103,8 +103,7 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   const Image srgb = DecodeImage(bytes, "the example");
   const Image lab = LabFromSrgb(FitWithin(srgb, kExampleSidePx));
   if (srgb.channels != 3 || MeasureChroma(lab).IsGray()) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "NO_COLOR",
+    throw ServiceError(ErrorReason::kNoColor,
                        "the example has no colour; send the coloured key view");
   }
   ColorizerOptions options;

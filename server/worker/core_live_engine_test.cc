@@ -10,7 +10,7 @@
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/tensor_file.h"
 #include "core/image/codec.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/storage/file_blob_store.h"
 #include "server/worker/live_engine.h"
 

@@ -6,15 +6,14 @@
 #include <utility>
 
 #include "core/base/memory.h"
-#include "server/rpc/error_mapping.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
+#include "server/rpc/calls/error_mapping.h"
 
 namespace color3d {
 namespace {
 
 grpc::Status EndingStatus() {
-  return ToGrpcStatus(ServiceError(ErrorCode::kUnavailable,
-                                   "INFERENCE_LOST",
+  return ToGrpcStatus(ServiceError(ErrorReason::kInferenceLost,
                                    "the inference worker is ending; send the picture again"));
 }
 
@@ -28,8 +27,7 @@ void RethrowNamingMemory(const std::exception_ptr& error) {
   } catch (const std::exception& e) {
     const auto* ours = dynamic_cast<const Error*>(&e);
     if ((ours != nullptr && ours->code() != ErrorCode::kInternal) || !IsOutOfMemory(e)) throw;
-    throw ServiceError(ErrorCode::kResourceExhausted,
-                       "OUT_OF_MEMORY",
+    throw ServiceError(ErrorReason::kOutOfMemory,
                        "the picture takes more memory than there is; send a smaller one, or {}",
                        MemoryRemedy());
   }

@@ -11,7 +11,7 @@
 #include <cstring>
 #include <map>
 
-#include "core/base/environment.h"
+#include "core/base/process/environment.h"
 #include "server/ops/process_state.h"
 
 namespace color3d {

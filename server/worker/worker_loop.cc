@@ -8,8 +8,8 @@
 #include "color3d/v1/job.pb.h"
 #include "core/base/memory.h"
 #include "core/catalogue/stages.h"
+#include "server/base/service_error.h"
 #include "server/ops/process.h"
-#include "server/service_error.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/worker/attempt.h"
@@ -164,8 +164,7 @@ void WorkerLoop::Run() {
       }
       worked = Turn();
     } catch (const std::exception& e) {
-      const auto* error = dynamic_cast<const ServiceError*>(&e);
-      if (error != nullptr && error->reason() == "WORKER_VERSION") throw;
+      if (HasReason(e, ErrorReason::kWorkerVersion)) throw;
       spdlog::error("{}: {}", id_, e.what());
     }
     if (!worked) std::this_thread::sleep_for(options_.poll);

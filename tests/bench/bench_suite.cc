@@ -7,7 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/subprocess.h"
+#include "core/base/process/subprocess.h"
 #include "core/stage/formats/artifact_io.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/suite_results.h"

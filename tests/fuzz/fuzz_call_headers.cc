@@ -4,8 +4,8 @@
 #include <string_view>
 
 #include "server/access/notify_targets.h"
-#include "server/rpc/access.h"
-#include "server/rpc/call_watch.h"
+#include "server/rpc/calls/access.h"
+#include "server/rpc/calls/call_watch.h"
 #include "tests/fuzz/request_checks.h"
 
 namespace color3d {

@@ -6,7 +6,7 @@
 #include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
 #include "server/planning/stage_key.h"
-#include "server/rpc/convert.h"
+#include "server/rpc/calls/convert.h"
 #include "tests/fuzz/request_checks.h"
 
 namespace color3d {

@@ -4,7 +4,7 @@
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
-#include "server/rpc/convert.h"
+#include "server/rpc/calls/convert.h"
 #include "server/rpc/live/colorize_request.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"

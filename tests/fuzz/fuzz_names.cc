@@ -2,8 +2,8 @@
 #include <string_view>
 
 #include "server/access/tokens.h"
-#include "server/rpc/blob_service.h"
-#include "server/rpc/convert.h"
+#include "server/rpc/blobs/blob_service.h"
+#include "server/rpc/calls/convert.h"
 #include "tests/fuzz/request_checks.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

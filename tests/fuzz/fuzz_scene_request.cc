@@ -1,7 +1,7 @@
 // Fuzz target: CreateScene requests, and what CommitScene checks of the scene that they declare.
 #include "core/base/files.h"
-#include "server/rpc/convert.h"
-#include "server/rpc/scene_validation.h"
+#include "server/rpc/calls/convert.h"
+#include "server/rpc/scenes/scene_validation.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
 #include "tests/fuzz/request_checks.h"

@@ -5,7 +5,7 @@
 
 #include "core/scene/formats/camera_file.h"
 #include "core/scene/formats/transforms_frame.h"
-#include "server/rpc/transforms_outline.h"
+#include "server/rpc/scenes/transforms_outline.h"
 #include "tests/fuzz/fuzz_target.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

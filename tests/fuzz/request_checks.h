@@ -9,7 +9,7 @@
 #include <initializer_list>
 #include <utility>
 
-#include "server/rpc/error_mapping.h"
+#include "server/rpc/calls/error_mapping.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace color3d {

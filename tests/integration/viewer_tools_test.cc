@@ -7,7 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/subprocess.h"
+#include "core/base/process/subprocess.h"
 #include "core/splat/export/export.h"
 #include "core/splat/export/sog/sog.h"
 #include "core/splat/export/spz/spz.h"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "client/lib/photos/passed_over_files.h"
-#include "core/base/lower_case.h"
-#include "core/base/name_order.h"
+#include "core/base/text/lower_case.h"
+#include "core/base/text/name_order.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 

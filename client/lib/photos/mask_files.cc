@@ -9,7 +9,7 @@
 #include "client/lib/photos/passed_over_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 #include "core/image/probe/orientation.h"
 #include "core/image/probe/probe.h"
 

@@ -4,7 +4,7 @@
 #include <cctype>
 #include <iterator>
 
-#include "core/base/lower_case.h"
+#include "core/base/text/lower_case.h"
 #include "core/image/probe/probe_formats.h"
 
 namespace color3d {

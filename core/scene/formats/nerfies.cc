@@ -9,7 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/json_text.h"
+#include "core/base/text/json_text.h"
 #include "core/scene/formats/npy.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/formats/within_reach.h"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/error.h"
-#include "core/base/json_text.h"
+#include "core/base/text/json_text.h"
 #include "core/scene/formats/within_reach.h"
 
 namespace color3d {

@@ -11,7 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/memory.h"
-#include "core/base/subprocess.h"
+#include "core/base/process/subprocess.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

@@ -7,7 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/sandbox.h"
+#include "core/base/process/sandbox.h"
 #include "tests/support/quiet_run.h"
 
 namespace color3d {

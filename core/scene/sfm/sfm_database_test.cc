@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/sandbox.h"
+#include "core/base/process/sandbox.h"
 
 namespace color3d {
 namespace {

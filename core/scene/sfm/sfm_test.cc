@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "core/scene/formats/scene_readers.h"
-#include "core/scene/import_options.h"
+#include "core/scene/import/import.h"
 #include "core/scene/sfm/parallax.h"
 #include "core/scene/sfm/sfm_photos.h"
 #include "tests/support/quiet_run.h"

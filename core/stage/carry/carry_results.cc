@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
+#include "core/carry/confidence.h"
 #include "core/stage/formats/carry_facts.h"
 
 namespace color3d {
 namespace {
 
-constexpr float kCovered = 0.25f;        // confidence from which a pixel counts as covered
 constexpr double kSmallCoverage = 0.01;  // below, the user is warned
 
 // Mean over the views that are not key views.
@@ -26,7 +26,7 @@ double MeanCoverage(const std::vector<double>& coverage, const std::vector<int>&
 
 }  // namespace
 
-double CoveredShare(const CarriedColor& color) { return Coverage(color, kCovered); }
+double CoveredShare(const CarriedColor& color) { return Coverage(color, kCoveredConfidence); }
 
 void WriteCoverage(const CarryInputs& inputs,
                    const std::vector<double>& coverage,

@@ -5,21 +5,21 @@
 #include <utility>
 #include <vector>
 
+#include "core/carry/confidence.h"
 #include "core/image/fill_holes.h"
 
 namespace color3d {
 namespace {
 
 constexpr int kColorChannels = 3;  // a, b and the guessed share
-constexpr float kFollowed = 0.5f;  // confidence from which motion tells
-const float kJustFollowed = std::nextafter(kFollowed, 1.0f);
+const float kJustFollowed = std::nextafter(kDecisiveConfidence, 1.0f);
 constexpr float kAnswerFollowed = 0.2f;  // and from which an answer goes along with it
 
 // 1 where no colour needs to be inferred.
 Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
   Image known = carried_surely;
   for (size_t i = 0; i < known.data.size(); ++i) {
-    if (of_anchors.confidence.data[i] > kFollowed) known.data[i] = 1.0f;
+    if (of_anchors.confidence.data[i] > kDecisiveConfidence) known.data[i] = 1.0f;
   }
   return known;
 }
@@ -36,12 +36,12 @@ InferredColor AnswerOf(const CarriedColor& of_anchors,
     answer = {Image(luminance.width, luminance.height, 2),
               Image(luminance.width, luminance.height, 1)};
     Image followed = of_anchors.confidence;
-    for (float& value : followed.data) value = value > kFollowed ? 1.0f : 0.0f;
+    for (float& value : followed.data) value = value > kDecisiveConfidence ? 1.0f : 0.0f;
     std::copy_n(of_anchors.ab.data.begin(), answer.ab.data.size(), answer.ab.data.begin());
     FillHoles(followed, &answer.ab);
   }
   for (size_t i = 0; i < luminance.PlaneSize(); ++i) {
-    if (of_anchors.confidence.data[i] <= kFollowed) continue;
+    if (of_anchors.confidence.data[i] <= kDecisiveConfidence) continue;
     for (int c = 0; c < 2; ++c) answer.ab.Plane(c)[i] = of_anchors.ab.Plane(c)[i];
     if (!answer.distance.Empty()) answer.distance.data[i] = 0.0f;
   }
@@ -55,7 +55,8 @@ FilmKey AnchorAsKey(int frame, const FusedColor& color) {
   Image channels(width, height, kColorChannels);
   std::copy(color.ab.data.begin(), color.ab.data.end(), channels.data.begin());
   for (size_t i = 0; i < channels.PlaneSize(); ++i) {
-    const float guessed = color.provenance.Plane(0)[i], inferred = color.provenance.Plane(2)[i];
+    const float guessed = color.provenance.Plane(kGuessedPlane)[i],
+                inferred = color.provenance.Plane(kInferredPlane)[i];
     channels.Plane(2)[i] = guessed / std::max(guessed + inferred, 1e-6f);
   }
   return {frame, {std::move(channels), Image(width, height, 1, 1.0f)}};
@@ -68,8 +69,8 @@ CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, doub
   for (size_t i = 0; i < before.confidence.data.size(); ++i) {
     float& confidence = before.confidence.data[i];
     const float other = behind.confidence.data[i];
-    float weight = confidence > kFollowed ? confidence * (1.0f - share_behind) : 0.0f;
-    float other_weight = other > kFollowed ? other * share_behind : 0.0f;
+    float weight = confidence > kDecisiveConfidence ? confidence * (1.0f - share_behind) : 0.0f;
+    float other_weight = other > kDecisiveConfidence ? other * share_behind : 0.0f;
     confidence = std::max(confidence, other);
     const float sum = weight + other_weight;
     if (sum == 0.0f) continue;
@@ -85,7 +86,8 @@ double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors
   const std::vector<float>& one = carried_confidence.data;
   const std::vector<float>& other = of_anchors.confidence.data;
   size_t open = 0;
-  for (size_t i = 0; i < one.size(); ++i) open += one[i] <= kFollowed && other[i] <= kFollowed;
+  for (size_t i = 0; i < one.size(); ++i)
+    open += one[i] <= kDecisiveConfidence && other[i] <= kDecisiveConfidence;
   return static_cast<double>(open) / static_cast<double>(one.size());
 }
 
@@ -93,7 +95,8 @@ size_t FillOpen(const CarriedColor& others, CarriedColor* color) {
   size_t filled = 0;
   for (size_t i = 0; i < others.confidence.data.size(); ++i) {
     float& confidence = color->confidence.data[i];
-    if (confidence > kFollowed || others.confidence.data[i] <= kFollowed) continue;
+    if (confidence > kDecisiveConfidence || others.confidence.data[i] <= kDecisiveConfidence)
+      continue;
     confidence = others.confidence.data[i];
     for (int c = 0; c < others.ab.channels; ++c) color->ab.Plane(c)[i] = others.ab.Plane(c)[i];
     ++filled;
@@ -122,10 +125,10 @@ FusedColor ColorBetweenAnchors(const Image& luminance,
   FusedColor fused = ColorOfView(luminance, carried, with_anchors, one, cancel);
   // Guessed colours of an anchor count as guessed here, too.
   for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
-    if (of_anchors.confidence.data[i] <= kFollowed) continue;
-    float& inferred = fused.provenance.Plane(2)[i];
+    if (of_anchors.confidence.data[i] <= kDecisiveConfidence) continue;
+    float& inferred = fused.provenance.Plane(kInferredPlane)[i];
     const float guessed = inferred * std::clamp(of_anchors.ab.Plane(2)[i], 0.0f, 1.0f);
-    fused.provenance.Plane(0)[i] += guessed;
+    fused.provenance.Plane(kGuessedPlane)[i] += guessed;
     inferred -= guessed;
   }
   return fused;

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/carry/confidence.h"
 #include "core/film/anchor_frames.h"
 #include "core/film/film_carry.h"
 #include "core/film/steady_colors.h"
@@ -52,7 +53,7 @@ struct Colored {
 constexpr double kWorthGuessing = 0.02;  // least guessed share of an anchor
 
 double ShareGuessed(const FusedColor& color) {
-  const float* guessed = color.provenance.Plane(0);
+  const float* guessed = color.provenance.Plane(kGuessedPlane);
   const auto pixels = static_cast<std::ptrdiff_t>(color.provenance.PlaneSize());
   return std::accumulate(guessed, guessed + pixels, 0.0) / static_cast<double>(pixels);
 }

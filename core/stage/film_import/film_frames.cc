@@ -11,7 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/name_order.h"
+#include "core/base/text/name_order.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/probe/probe.h"

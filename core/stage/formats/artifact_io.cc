@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/carry/confidence.h"
 #include "core/image/codec.h"
 #include "core/image/fill_holes.h"
 #include "core/image/weighted_resize.h"
@@ -187,7 +188,8 @@ Image ReadViewConfidence(const StageContext& context, const View& view, int widt
   if (shares.Empty()) return {};
   Image confidence(width, height, 1);
   for (size_t i = 0; i < confidence.data.size(); ++i) {
-    confidence.data[i] = std::min(1.0f, shares.Plane(1)[i] + 0.5f * shares.Plane(2)[i]);
+    confidence.data[i] =
+        ShownConfidence(shares.Plane(kSeenPlane)[i], shares.Plane(kInferredPlane)[i]);
   }
   return confidence;
 }

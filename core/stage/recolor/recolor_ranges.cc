@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/carry/confidence.h"
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/corrector.h"
 #include "core/film/film_carry.h"
@@ -80,7 +81,6 @@ struct FrameToRecolor {
 // seen colours of other key views, as changed. `is_old`: 1 where they are not of the range's key
 // views.
 CarriedColor KnownColors(const FrameToRecolor& frame, Image* is_old) {
-  constexpr float kSure = 0.5f;
   const int width = frame.before.width, height = frame.before.height;
   CarriedColor known{Image(width, height, 2), Image(width, height, 1)};
   *is_old = Image(width, height, 1);
@@ -88,13 +88,13 @@ CarriedColor KnownColors(const FrameToRecolor& frame, Image* is_old) {
     const float followed = frame.painted.confidence.data[i];
     const float painted = followed * std::clamp(frame.painted.ab.Plane(2)[i], 0.0f, 1.0f);
     const float left = followed - painted;
-    const float seen = frame.provenance.Empty() ? 0.0f : frame.provenance.Plane(1)[i];
+    const float seen = frame.provenance.Empty() ? 0.0f : frame.provenance.Plane(kSeenPlane)[i];
     const Image* from = &frame.painted.ab;
     known.confidence.data[i] = painted;
-    if (left > kSure) {
+    if (left > kDecisiveConfidence) {
       from = &frame.before;
       known.confidence.data[i] = left;
-    } else if (painted <= kSure && seen > kSure) {
+    } else if (painted <= kDecisiveConfidence && seen > kDecisiveConfidence) {
       from = &frame.changed;
       known.confidence.data[i] = seen;
     }
@@ -107,13 +107,13 @@ CarriedColor KnownColors(const FrameToRecolor& frame, Image* is_old) {
 // Pixels without colours of the range's key views keep their provenance, but for inferred changes.
 void SetProvenance(const FrameToRecolor& frame, const Image& is_old, Image* provenance) {
   for (size_t i = 0; i < provenance->PlaneSize(); ++i) {
-    const float seen = is_old.data[i] > 0.0f ? 0.0f : provenance->Plane(1)[i];
+    const float seen = is_old.data[i] > 0.0f ? 0.0f : provenance->Plane(kSeenPlane)[i];
     const float change = frame.change_share.Empty() ? 0.0f : frame.change_share.data[i];
-    for (int c = 0; c < 3; ++c) {
-      const float was =
-          frame.provenance.Empty() ? (c == 2 ? 1.0f : 0.0f) : frame.provenance.Plane(c)[i];
-      const float is = c == 2 ? was + change * (1.0f - was) : was * (1.0f - change);
-      provenance->Plane(c)[i] = (c == 1 ? seen : 0.0f) + (1.0f - seen) * is;
+    for (int c = 0; c < kProvenancePlanes; ++c) {
+      const float was = frame.provenance.Empty() ? (c == kInferredPlane ? 1.0f : 0.0f)
+                                                 : frame.provenance.Plane(c)[i];
+      const float is = c == kInferredPlane ? was + change * (1.0f - was) : was * (1.0f - change);
+      provenance->Plane(c)[i] = (c == kSeenPlane ? seen : 0.0f) + (1.0f - seen) * is;
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/carry/confidence.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
@@ -24,8 +25,8 @@ constexpr size_t kMaxPictures = 4;  // views shown with their provenance, of all
 std::string Percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
 
 SourceShares SharesOf(const Image& provenance) {
-  double sum[3] = {0.0, 0.0, 0.0};
-  for (int c = 0; c < 3; ++c) {
+  double sum[kProvenancePlanes] = {0.0, 0.0, 0.0};
+  for (int c = 0; c < kProvenancePlanes; ++c) {
     const float* plane = provenance.Plane(c);
     for (size_t i = 0; i < provenance.PlaneSize(); ++i) sum[c] += plane[i];
   }

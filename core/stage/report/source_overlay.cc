@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "core/carry/confidence.h"
 #include "core/image/codec.h"
 
 namespace color3d {
@@ -21,7 +22,8 @@ Image ShadeBySource(const Image& photo, const Image& provenance) {
       const float gray =
           0.3f * photo.At(0, y, x) + 0.59f * photo.At(1, y, x) + 0.11f * photo.At(2, y, x);
       const float base = 0.18f + 0.78f * gray;  // shades are seen on black, too
-      const float guessed = shares.At(0, y, x), inferred = shares.At(2, y, x);
+      const float guessed = shares.At(kGuessedPlane, y, x),
+                  inferred = shares.At(kInferredPlane, y, x);
       const bool stripe = (x + y) / kStripePx % 2 == 0;
       const float orange = guessed * (stripe ? 0.85f : 0.15f), blue = 0.45f * inferred;
       for (int c = 0; c < 3; ++c) {

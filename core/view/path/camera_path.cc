@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "core/base/error.h"
-#include "core/base/name_order.h"
+#include "core/base/text/name_order.h"
 #include "core/view/path/turn.h"
 #include "core/view/stand.h"
 

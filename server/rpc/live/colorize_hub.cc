@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "server/rpc/convert.h"
+#include "server/base/service_error.h"
+#include "server/rpc/calls/convert.h"
 #include "server/rpc/live/colorize_request.h"
-#include "server/service_error.h"
 
 namespace color3d {
 
@@ -133,8 +133,7 @@ class ColorizeStream final
   }
 
   static grpc::Status SilentStatus(std::chrono::milliseconds limit) {
-    return ToGrpcStatus(ServiceError(ErrorCode::kUnavailable,
-                                     "STREAM_SILENT",
+    return ToGrpcStatus(ServiceError(ErrorReason::kStreamSilent,
                                      "no picture came for {} s; open another stream for the next",
                                      limit.count() / 1000));
   }
@@ -252,8 +251,7 @@ class RefusedStream final
 };
 
 grpc::Status NoWorkerStatus() {
-  return ToGrpcStatus(ServiceError(ErrorCode::kFailedPrecondition,
-                                   "NO_INFERENCE_WORKER",
+  return ToGrpcStatus(ServiceError(ErrorReason::kNoInferenceWorker,
                                    "this server has no inference worker: install color3d-worker "
                                    "beside color3d-server and start it anew"));
 }

@@ -10,8 +10,8 @@
 #include <set>
 
 #include "color3d/v1/colorizer.grpc.pb.h"
+#include "server/rpc/calls/rpc_parts.h"
 #include "server/rpc/live/inference_client.h"
-#include "server/rpc/rpc_parts.h"
 
 namespace color3d {
 

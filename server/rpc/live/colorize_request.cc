@@ -1,10 +1,10 @@
 #include "server/rpc/live/colorize_request.h"
 
-#include "core/base/utf8.h"
+#include "core/base/text/utf8.h"
 #include "core/catalogue/stages.h"
+#include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
-#include "server/rpc/convert.h"
-#include "server/service_error.h"
+#include "server/rpc/calls/convert.h"
 
 namespace color3d {
 namespace {
@@ -21,8 +21,7 @@ std::string RequireBlob(const RpcParts& parts,
   const FileDigest blob = FromProto(digest);
   if (!HasBlob(parts, store, blob)) {
     throw ServiceError(
-        ErrorCode::kNotFound,
-        "BLOB_MISSING",
+        ErrorReason::kBlobMissing,
         "{} names the blob {}, which is not stored with {} bytes; upload it and try again",
         field,
         blob.sha256,
@@ -39,8 +38,7 @@ void TakePicture(const RpcParts& parts,
     throw InvalidArgument("a picture is given by one of image and image_digest");
   }
   if (request->image().size() > kMaxImageBytes) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "IMAGE_TOO_LARGE",
+    throw ServiceError(ErrorReason::kImageTooLarge,
                        "image has {} bytes, at most 3 MiB are allowed; upload it as a blob and "
                        "send its image_digest",
                        request->image().size());
@@ -64,8 +62,7 @@ ColorizerRecord NewestOf(const ProjectStore& store, const std::string& scene) {
   if (!newest.empty()) return newest[0];
   store.GetScene(scene);  // says so when there is no such scene
   throw ServiceError(
-      ErrorCode::kNotFound,
-      "COLORIZER_NOT_FOUND",
+      ErrorReason::kColorizerNotFound,
       "{} has no colorizer yet: run a {} or a {} job of it first, or send a coloured "
       "picture as `example`",
       scene,
@@ -79,8 +76,7 @@ ColorizerRecord FindColorizer(const ProjectStore& store, const v1::ColorizeImage
   ColorizerRecord record =
       store.GetColorizer(request.colorizer().substr(request.colorizer().find('/') + 1));
   if (!request.scene().empty() && request.scene() != record.scene) {
-    throw ServiceError(ErrorCode::kInvalidArgument,
-                       "OTHER_SCENE",
+    throw ServiceError(ErrorReason::kOtherScene,
                        "{} was made for {}, not for {}; leave out one of the two",
                        request.colorizer(),
                        record.scene,

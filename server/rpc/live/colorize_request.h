@@ -4,7 +4,7 @@
 
 #include "color3d/internal/v1/inference.pb.h"
 #include "color3d/v1/colorizer.pb.h"
-#include "server/rpc/rpc_parts.h"
+#include "server/rpc/calls/rpc_parts.h"
 
 namespace color3d {
 

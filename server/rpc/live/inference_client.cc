@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "server/rpc/error_mapping.h"
-#include "server/rpc/rpc_parts.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
+#include "server/rpc/calls/error_mapping.h"
+#include "server/rpc/calls/rpc_parts.h"
 
 namespace color3d {
 namespace {
@@ -43,7 +43,7 @@ grpc::Status Explained(const grpc::Status& status, bool our_limit) {
           : fmt::format("the inference worker ended before it had coloured this picture ({})",
                         status.error_message());
   return ToGrpcStatus(
-      ServiceError(ErrorCode::kUnavailable, "INFERENCE_LOST", "{}; send the picture again", what));
+      ServiceError(ErrorReason::kInferenceLost, "{}; send the picture again", what));
 }
 
 // A status without details is the transport's own word, after the worker had been reached.
@@ -54,8 +54,7 @@ PoisonWatch::End EndOf(const grpc::Status& status) {
 }
 
 grpc::Status PoisonStatus() {
-  return ToGrpcStatus(ServiceError(ErrorCode::kFailedPrecondition,
-                                   "PICTURE_KILLS_WORKER",
+  return ToGrpcStatus(ServiceError(ErrorReason::kPictureKillsWorker,
                                    "the inference worker died of this picture, alone with it: see "
                                    "the server's log; send it smaller, or as another file"));
 }

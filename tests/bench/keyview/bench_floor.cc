@@ -115,7 +115,7 @@ void AddErrorsOfAll(const Image& truth, const CarriedColor& color, ThreadPool& p
     std::fill_n(mean.Plane(c), mean.PlaneSize(), static_cast<float>(sums[c] / sums[2]));
   }
   const FusedColor fused =
-      FuseColors(LuminanceOfLab(truth), color, mean, {}, {}, FusionOptions{}, pool, {});
+      FuseColors({LuminanceOfLab(truth), color, mean, {}, {}}, FusionOptions{}, pool, {});
   AddErrors(truth, {fused.ab, Image(truth.width, truth.height, 1, 1.0f)}, 0.0f, error);
 }
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/service_error.h"
+#include "core/base/error.h"
 #include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
 
@@ -52,9 +52,7 @@ class Faults {
   }
 
  private:
-  [[noreturn]] void Throw() const {
-    throw ServiceError(code_, "INJECTED", "the disk did not answer");
-  }
+  [[noreturn]] void Throw() const { throw Error(code_, "the disk did not answer"); }
 
   const int target_;
   const bool after_;

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/base/files.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/store/sqlite_job_store.h"
 
 namespace color3d {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/base/digest.h"
+#include "server/base/service_error.h"
 #include "server/planning/planner.h"
-#include "server/service_error.h"
 
 namespace color3d {
 

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/base/files.h"
-#include "server/service_error.h"
+#include "server/base/service_error.h"
 #include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 

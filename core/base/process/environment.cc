@@ -1,0 +1,46 @@
+#include "core/base/process/environment.h"
+
+extern char** environ;
+
+namespace color3d {
+
+bool IsHandedOn(std::string_view variable) {
+  // With "=": the whole name; without: how names begin.
+  for (const std::string_view name : {"PATH=",
+                                      "LANG=",
+                                      "LC_",
+                                      "TZ=",
+                                      "HOME=",
+                                      "TMPDIR=",  // where things are
+                                      "LD_LIBRARY_PATH=",
+                                      "LD_PRELOAD=",
+                                      "GLIBC_TUNABLES=",
+                                      "MALLOC_",
+                                      "FAKETIME",
+                                      "OMP_",
+                                      "OPENBLAS_",
+                                      "COLOR3D_ISA=",
+                                      "COLOR3D_TEST_",  // how it is computed
+                                      "SSL_CERT_FILE=",
+                                      "SSL_CERT_DIR=",
+                                      "GRPC_DEFAULT_SSL_ROOTS_FILE_PATH=",
+                                      "GRPC_VERBOSITY=",
+                                      "GRPC_TRACE=",
+                                      "ASAN_OPTIONS=",
+                                      "LSAN_OPTIONS=",
+                                      "TSAN_OPTIONS=",
+                                      "UBSAN_OPTIONS="}) {
+    if (variable.starts_with(name)) return true;
+  }
+  return false;
+}
+
+std::vector<std::string> EnvironmentToHandOn() {
+  std::vector<std::string> variables;
+  for (char** e = environ; *e != nullptr; ++e) {
+    if (IsHandedOn(*e)) variables.emplace_back(*e);
+  }
+  return variables;
+}
+
+}  // namespace color3d

@@ -1,0 +1,38 @@
+// Runs a child program with limits, a log file and cancellation, in a sandbox where one is given;
+// never leaves one behind.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/process/process_limits.h"
+#include "core/base/process/sandbox.h"
+
+namespace color3d {
+
+struct SubprocessOptions {
+  std::vector<std::string> arguments;    // arguments[0] is looked up on PATH
+  std::vector<std::string> environment;  // "NAME=value", besides what is handed on (environment.h)
+  std::filesystem::path log_path;        // stdout and stderr are appended here; empty: discarded
+  std::chrono::seconds timeout{3600};
+  ProcessLimits limits;
+  std::optional<SandboxRules> sandbox;  // the program itself may be read besides
+};
+
+struct SubprocessResult {
+  int exit_code = 0;  // 128 + signal when killed
+  int signal = 0;     // that killed it; 0: it ended by itself
+  bool timed_out = false;
+  double seconds = 0.0;
+};
+
+// Starts the child in its own process group, waits, and kills the whole group on time-out or
+// cancellation (then throws Error{kCancelled}). The child dies with us. Throws
+// Error{kFailedPrecondition} when the program is not installed.
+SubprocessResult RunSubprocess(const SubprocessOptions& options, const CancellationToken& cancel);
+
+}  // namespace color3d

@@ -1,0 +1,287 @@
+// google.bytestream.ByteStream: both reactors hand each chunk to the executor, one at a time, so a
+// stream never holds more than one chunk in memory and never blocks a gRPC thread.
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <optional>
+
+#include "server/base/service_error.h"
+#include "server/rpc/blobs/blob_service.h"
+
+namespace color3d {
+namespace {
+using google::bytestream::ReadRequest;
+using google::bytestream::ReadResponse;
+using google::bytestream::WriteRequest;
+using google::bytestream::WriteResponse;
+
+constexpr int64_t kReadChunkBytes = 256 << 10;
+constexpr size_t kNameBytes = 1024;  // of a message besides its data
+
+class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
+ public:
+  BlobReader(const RpcParts& parts,
+             grpc::CallbackServerContext& context,
+             const ReadRequest& request)
+      : parts_(parts),
+        context_(context),
+        request_(request),
+        silence_(parts.silence, [this] { GiveUp(); }) {
+    parts_.bulk.Post([this] { Step(); });
+  }
+  ~BlobReader() override {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  void OnWriteDone(bool ok) override {
+    if (!silence_.Resume()) return FinishGivenUp();
+    if (!ok) return Finish(grpc::Status::CANCELLED);
+    parts_.bulk.Post([this] { Step(); });
+  }
+  // Called after Finish and after the last Step, which was what finished.
+  void OnDone() override { delete this; }
+
+ private:
+  // Opens at the first call; then reads and sends one chunk, or finishes.
+  void Step() {
+    bool more = false;
+    const grpc::Status status = Guard([&] {
+      if (fd_ < 0) Open();
+      more = NextChunk();
+      if (!more) RequireIntact();
+    });
+    if (!status.ok() || !more) return Finish(status);
+    silence_.Wait();
+    StartWrite(&response_);
+  }
+
+  // Nobody reads. What was written is taken back, so that the write ends, too.
+  void GiveUp() {
+    context_.TryCancel();
+    FinishGivenUp();
+  }
+  // By whichever of the two, the write's end or the watch, comes last: this lives until then.
+  void FinishGivenUp() {
+    if (given_up_.exchange(true)) Finish(grpc::Status::CANCELLED);
+  }
+
+  void Open() {
+    const Call call = Admit(parts_, Role::kRead, context_);
+    place_ = parts_.streams.reads.Take(call.caller.project);
+    const FileDigest digest = ParseBlobName(request_.resource_name());
+    if (!HasBlob(parts_, call.store, digest)) {
+      throw ServiceError(ErrorReason::kBlobMissing, "'{}' is not stored", request_.resource_name());
+    }
+    if (request_.read_offset() < 0 || request_.read_limit() < 0) {
+      throw InvalidArgument("read_offset and read_limit must not be negative");
+    }
+    if (request_.read_offset() > digest.size_bytes) {
+      throw ServiceError(ErrorReason::kOffsetBeyondEnd,
+                         "read_offset is {}, the blob has {} bytes",
+                         request_.read_offset(),
+                         digest.size_bytes);
+    }
+    offset_ = request_.read_offset();
+    is_whole_ = offset_ == 0;
+    sha256_ = digest.sha256;
+    end_ = digest.size_bytes;
+    if (request_.read_limit() > 0) {
+      is_whole_ &= request_.read_limit() >= end_;
+      end_ = std::min(end_, offset_ + request_.read_limit());
+    }
+    fd_ = ::open(parts_.blobs.Fetch(digest.sha256).c_str(), O_RDONLY | O_CLOEXEC);
+    if (fd_ < 0) throw Error(ErrorCode::kInternal, "cannot open a stored blob");
+  }
+
+  bool NextChunk() {
+    if (offset_ >= end_) return false;
+    std::string* data = response_.mutable_data();
+    data->resize(static_cast<size_t>(std::min(kReadChunkBytes, end_ - offset_)));
+    const ssize_t got = ::pread(fd_, data->data(), data->size(), offset_);
+    if (got <= 0) {
+      throw Error(ErrorCode::kDataLoss, "'{}' is shorter on disk", request_.resource_name());
+    }
+    data->resize(static_cast<size_t>(got));
+    offset_ += got;
+    if (is_whole_) sent_.Update(*data);
+    return true;
+  }
+
+  // What was sent from its first to its last byte is known to be what was stored, or said not to
+  // be.
+  void RequireIntact() {
+    if (!is_whole_ || sent_.FinishHex() == sha256_) return;
+    if (parts_.blobs.SetAside(sha256_)) {
+      throw ServiceError(
+          ErrorReason::kBlobDamaged,
+          "'{}' was damaged on the server's disk and is set aside; upload it again, or "
+          "run the job anew with skip_cache",
+          request_.resource_name());
+    }
+    throw ServiceError(ErrorReason::kBlobMended,
+                       "'{}' was damaged on the server's disk while it was sent, and is whole now; "
+                       "download it again",
+                       request_.resource_name());
+  }
+
+  const RpcParts& parts_;
+  grpc::CallbackServerContext& context_;
+  const ReadRequest request_;
+  ReadResponse response_;
+  int fd_ = -1;
+  int64_t offset_ = 0;
+  int64_t end_ = 0;
+  bool is_whole_ = false;
+  std::string sha256_;
+  Sha256 sent_;
+  StreamLimit::Place place_;
+  std::atomic<bool> given_up_{false};
+  SilenceWatch::Stream silence_;
+};
+
+class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
+ public:
+  BlobWriter(const RpcParts& parts,
+             const grpc::CallbackServerContext& context,
+             WriteResponse* response)
+      : parts_(parts),
+        response_(response),
+        silence_(parts.silence, [this] { parts_.bulk.Post([this] { GiveUp(); }); }) {
+    // Nothing is read for whoever may not write, or has as many streams as he may.
+    const grpc::Status allowed = Guard([&] {
+      call_ = Admit(parts_, Role::kSubmit, context);
+      place_ = parts_.streams.writes.Take(call_->caller.project);
+    });
+    allowed.ok() ? ReadNext() : Finish(allowed);
+  }
+  void OnReadDone(bool ok) override {
+    if (!silence_.Resume()) return;  // it is given up
+    // Refused here, so that no large message waits for its turn.
+    const grpc::Status fits = Guard([&] {
+      if (ok) RequireSmallChunk();
+    });
+    if (fits.ok()) return parts_.bulk.Post([this, ok] { ok ? Consume() : EndOfStream(); });
+    WriteRequest().Swap(&request_);
+    parts_.bulk.Post([this, fits] { End(fits); });
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  void Consume() {
+    bool finished = false;
+    const grpc::Status status = Guard([&] { finished = Store(); });
+    if (status.ok() && !finished) return ReadNext();
+    End(status);
+  }
+
+  void ReadNext() {
+    silence_.Wait();
+    StartRead(&request_);
+  }
+
+  // Others may have the place. The read that is under way ends with the call.
+  void GiveUp() {
+    End(Guard([&] {
+      if (writer_) writer_->Sync();
+      throw ServiceError(
+          ErrorReason::kUploadSilent,
+          "nothing came for {} s; what came before is kept: ask QueryWriteStatus and go "
+          "on from there",
+          parts_.silence.limit().count() / 1000);
+    }));
+  }
+
+  void End(const grpc::Status& status) {
+    writer_.reset();
+    Finish(status);
+  }
+
+  void RequireSmallChunk() const {
+    if (request_.ByteSizeLong() <=
+        static_cast<size_t>(parts_.limits.max_chunk_bytes) + kNameBytes) {
+      return;
+    }
+    throw InvalidArgument("a chunk of {} bytes; at most {} are allowed",
+                          request_.data().size(),
+                          parts_.limits.max_chunk_bytes);
+  }
+
+  // True when the RPC is answered.
+  bool Store() {
+    if (!writer_) {
+      name_ = ParseUploadName(request_.resource_name());
+      name_.owner = call_->caller.project;
+      // Others may have stored the same bytes: whoever has not shown them sends them.
+      if (HasBlob(parts_, call_->store, name_.digest)) {
+        response_->set_committed_size(name_.digest.size_bytes);
+        return true;
+      }
+      writer_ = parts_.uploads.Open(name_, request_.write_offset(), [this](int64_t bytes) {
+        RequireQuota(parts_, call_->store, bytes);
+      });
+      resource_ = request_.resource_name();
+    } else if (!request_.resource_name().empty() && request_.resource_name() != resource_) {
+      throw InvalidArgument("resource_name changes within the stream");
+    }
+    writer_->Append(request_.write_offset(), request_.data());
+    if (!request_.finish_write()) return false;
+    response_->set_committed_size(writer_->Sync());
+    writer_->Finish();
+    call_->store.HoldBlob(name_.digest);
+    return true;
+  }
+
+  // The client stopped without finish_write, or the connection broke: keep what came.
+  void EndOfStream() {
+    const grpc::Status status = Guard([&] {
+      if (!writer_) throw InvalidArgument("the stream ended before its first message");
+      response_->set_committed_size(writer_->Sync());
+    });
+    End(status);
+  }
+
+  const RpcParts& parts_;
+  WriteResponse* response_;
+  WriteRequest request_;
+  std::string resource_;
+  UploadName name_;
+  std::optional<Call> call_;  // nothing: refused
+  std::unique_ptr<UploadStore::Writer> writer_;
+  StreamLimit::Place place_;
+  SilenceWatch::Stream silence_;
+};
+
+}  // namespace
+
+grpc::ServerWriteReactor<ReadResponse>* ByteStreamServiceImpl::Read(
+    grpc::CallbackServerContext* context, const ReadRequest* request) {
+  return new BlobReader(parts_, *context, *request);
+}
+
+grpc::ServerReadReactor<WriteRequest>* ByteStreamServiceImpl::Write(
+    grpc::CallbackServerContext* context, WriteResponse* response) {
+  return new BlobWriter(parts_, *context, response);
+}
+
+grpc::ServerUnaryReactor* ByteStreamServiceImpl::QueryWriteStatus(
+    grpc::CallbackServerContext* context,
+    const google::bytestream::QueryWriteStatusRequest* request,
+    google::bytestream::QueryWriteStatusResponse* response) {
+  return AnswerWrite(
+      parts_,
+      context,
+      request,
+      response,
+      [this](const Call& call, const auto& in, google::bytestream::QueryWriteStatusResponse* out) {
+        UploadName name = ParseUploadName(in.resource_name());
+        name.owner = call.caller.project;
+        const bool complete = HasBlob(parts_, call.store, name.digest);
+        out->set_complete(complete);
+        out->set_committed_size(complete ? name.digest.size_bytes
+                                         : parts_.uploads.CommittedSize(name));
+      });
+}
+
+}  // namespace color3d

@@ -1,0 +1,98 @@
+#include "server/rpc/calls/access.h"
+
+#include <grpc/grpc_security_constants.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <optional>
+#include <vector>
+
+#include "server/base/service_error.h"
+
+namespace color3d {
+namespace {
+
+constexpr std::string_view kScheme = "Bearer ";
+
+std::string_view AuthorizationOf(const grpc::CallbackServerContext& context) {
+  const auto entry = context.client_metadata().find("authorization");
+  if (entry == context.client_metadata().end()) return {};
+  return {entry->second.data(), entry->second.size()};
+}
+
+// Of the certificate that the client showed: its common name, then its alternative names.
+std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& context) {
+  const auto identity = context.auth_context();
+  std::vector<std::string> names;
+  for (const char* property : {GRPC_X509_CN_PROPERTY_NAME, GRPC_X509_SAN_PROPERTY_NAME}) {
+    for (const grpc::string_ref& name : identity->FindPropertyValues(property)) {
+      names.emplace_back(name.data(), name.size());
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+std::string_view TokenOf(std::string_view authorization) {
+  return authorization.starts_with(kScheme) ? authorization.substr(kScheme.size())
+                                            : std::string_view();
+}
+
+// Once a second at most: refusals must not fill the disk.
+void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContext& context) const {
+  const int64_t now = std::chrono::duration_cast<std::chrono::seconds>(
+                          std::chrono::steady_clock::now().time_since_epoch())
+                          .count();
+  if (last_refusal_s_.exchange(now) != now) {
+    spdlog::warn("a call from {} was refused: {}", context.peer(), why);
+  }
+}
+
+Caller Access::Require(Role role, const grpc::CallbackServerContext& context) const {
+  if (!tokens_ && !certificates_) return {};
+  const std::string_view token = TokenOf(AuthorizationOf(context));
+  const bool by_token = tokens_ && (!certificates_ || !token.empty());
+  const Caller caller = by_token ? ByToken(token, context) : ByCertificate(context);
+  if (caller.role < role) {
+    LogRefusal(caller.name + " may only " + RoleName(caller.role), context);
+    throw ServiceError(ErrorReason::kRoleTooLow,
+                       "the {} of '{}' has the role {}; this call needs {}",
+                       by_token ? "token" : "certificate",
+                       caller.name,
+                       RoleName(caller.role),
+                       RoleName(role));
+  }
+  return caller;
+}
+
+Caller Access::ByToken(std::string_view token, const grpc::CallbackServerContext& context) const {
+  if (token.empty()) {
+    LogRefusal("it brings no token", context);
+    throw ServiceError(ErrorReason::kTokenMissing,
+                       "this server wants a token: `color3d --token-file FILE`, or COLOR3D_TOKEN");
+  }
+  const std::optional<TokenRecord> record = tokens_->Find(token);
+  if (!record) {
+    LogRefusal("its token is unknown", context);
+    throw ServiceError(ErrorReason::kTokenUnknown,
+                       "this server does not know the token; ask who runs it for a fresh one");
+  }
+  return {record->name, record->role, record->project};
+}
+
+Caller Access::ByCertificate(const grpc::CallbackServerContext& context) const {
+  const std::vector<std::string> names = CertificateNames(context);
+  const std::optional<CertificateRecord> record = certificates_->Find(names);
+  if (!record) {
+    const std::string name = names.empty() ? "" : names.front();
+    LogRefusal("the certificate of '" + name + "' has no role", context);
+    throw ServiceError(ErrorReason::kCertificateUnknown,
+                       "this server gives the certificate of '{}' no role; ask who runs it to name "
+                       "it in --certificate-roles",
+                       name);
+  }
+  return {record->name, record->role, record->project};
+}
+
+}  // namespace color3d

@@ -1,0 +1,236 @@
+// Every RPC against every kind of caller, and TLS between those who believe each other and not.
+#include "server/rpc/calls/access.h"
+
+#include <google/protobuf/descriptor.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <gtest/gtest.h>
+
+#include <set>
+#include <thread>
+
+#include "server/access/tls.h"
+#include "tests/support/service/rpc_fixture.h"
+#include "tests/support/service/test_certificates.h"
+
+namespace color3d::testing {
+namespace {
+using grpc::StatusCode;
+
+// What those who may only look may do. All others want the role of a submitter: a new RPC is
+// guarded until it is named here.
+const std::set<std::string> kLooking = {"GetScene",
+                                        "ListScenes",
+                                        "GetJob",
+                                        "ListJobs",
+                                        "WatchJobs",
+                                        "ReadJobLog",
+                                        "Read",
+                                        "GetServerInfo",
+                                        "GetColorizer",
+                                        "ListColorizers"};
+
+class AccessTest : public RpcTest {
+ protected:
+  AccessTest() {
+    const auto file = scratch_.path() / "tokens";
+    read_ = AddToken(file, "reader", Role::kRead);
+    submit_ = AddToken(file, "submitter", Role::kSubmit);
+    admin_ = AddToken(file, "admin", Role::kAdmin);
+    options_.listen = "127.0.0.1:0";
+    options_.tokens = std::make_shared<TokenBook>(file);
+  }
+  void Start() {
+    guarded_ = std::make_unique<RpcServer>(options_, store_, blobs_, uploads_, SystemClock());
+  }
+
+  // The status of a call with an empty message, whatever its streams are.
+  static grpc::Status Call(const std::shared_ptr<grpc::Channel>& channel,
+                           const std::string& method,
+                           const std::string& authorization) {
+    grpc::GenericStub stub(channel);
+    grpc::CompletionQueue queue;
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(10));
+    if (!authorization.empty()) context.AddMetadata("authorization", authorization);
+    const auto call = stub.PrepareCall(&context, method, &queue);
+    const auto wait = [&] {
+      void* tag = nullptr;
+      bool ok = false;
+      queue.Next(&tag, &ok);
+      return ok;
+    };
+    call->StartCall(nullptr);
+    wait();
+    grpc::Slice empty;
+    call->WriteLast(grpc::ByteBuffer(&empty, 1), grpc::WriteOptions(), nullptr);
+    wait();
+    grpc::ByteBuffer answer;
+    do {
+      call->Read(&answer, nullptr);
+    } while (wait());
+    grpc::Status status;
+    call->Finish(&status, nullptr);
+    wait();
+    return status;
+  }
+  std::shared_ptr<grpc::Channel> Open(
+      const std::shared_ptr<grpc::ChannelCredentials>& credentials) const {
+    return grpc::CreateChannel(guarded_->address(), credentials);
+  }
+
+  RpcServerOptions options_;
+  std::unique_ptr<RpcServer> guarded_;
+  std::string read_, submit_, admin_;
+};
+
+TEST_F(AccessTest, EveryRpcAsksWhoCalls) {
+  Start();
+  const auto channel = Open(grpc::InsecureChannelCredentials());
+  int methods = 0;
+  for (const google::protobuf::FileDescriptor* file :
+       {v1::Scene::descriptor()->file(),
+        v1::FindMissingBlobsRequest::descriptor()->file(),
+        v1::CreateJobRequest::descriptor()->file(),
+        v1::Colorizer::descriptor()->file(),
+        v1::ServerInfo::descriptor()->file(),
+        v1::CollectRequest::descriptor()->file(),
+        google::bytestream::ReadRequest::descriptor()->file()}) {
+    ASSERT_GT(file->service_count(), 0) << file->name();
+    for (int s = 0; s < file->service_count(); ++s) {
+      for (int m = 0; m < file->service(s)->method_count(); ++m) {
+        ++methods;
+        const std::string name = file->service(s)->method(m)->name();
+        const bool is_admins = file->service(s)->name() == "AdminService";
+        SCOPED_TRACE(name);
+        const auto call = [&](const std::string& authorization) {
+          return Call(channel, "/" + file->service(s)->full_name() + "/" + name, authorization);
+        };
+        EXPECT_EQ(call("").error_code(), StatusCode::UNAUTHENTICATED);
+        EXPECT_EQ(ReasonOfStatus(call("")), "TOKEN_MISSING");
+        EXPECT_EQ(ReasonOfStatus(call(submit_)), "TOKEN_MISSING") << "not a bearer's";
+        EXPECT_EQ(ReasonOfStatus(call("Bearer " + std::string(68, 'x'))), "TOKEN_UNKNOWN");
+        const grpc::Status reader = call("Bearer " + read_);
+        if (kLooking.contains(name)) {
+          EXPECT_NE(reader.error_code(), StatusCode::PERMISSION_DENIED);
+        } else {
+          EXPECT_EQ(reader.error_code(), StatusCode::PERMISSION_DENIED);
+          EXPECT_EQ(ReasonOfStatus(reader), "ROLE_TOO_LOW");
+        }
+        if (is_admins) {
+          EXPECT_EQ(ReasonOfStatus(call("Bearer " + submit_)), "ROLE_TOO_LOW");
+        }
+        for (const std::string& token : {submit_, admin_}) {
+          if (is_admins && token == submit_) continue;
+          const StatusCode code = call("Bearer " + token).error_code();
+          EXPECT_NE(code, StatusCode::UNAUTHENTICATED);
+          EXPECT_NE(code, StatusCode::PERMISSION_DENIED);
+          EXPECT_NE(code, StatusCode::UNIMPLEMENTED);
+        }
+      }
+    }
+  }
+  EXPECT_GE(methods, 28);
+}
+
+TEST_F(AccessTest, TlsIsForThoseWhoBelieveEachOther) {
+  TestAuthority ours(scratch_.path(), "ours"), foreign(scratch_.path(), "foreign");
+  const CertificateFiles server = ours.Issue("server");
+  options_.credentials = MakeServerCredentials({server.certificate, server.key, {}});
+  Start();
+  const auto connects = [&](const std::shared_ptr<grpc::ChannelCredentials>& credentials) {
+    return Open(credentials)
+        ->WaitForConnected(std::chrono::system_clock::now() + std::chrono::seconds(2));
+  };
+  const auto believing = [](const TestAuthority& authority, const CertificateFiles& own = {}) {
+    const auto pem = [](const std::filesystem::path& file) {
+      return file.empty() ? std::string() : ReadFile(file);
+    };
+    return grpc::SslCredentials({pem(authority.certificate()), pem(own.key), pem(own.certificate)});
+  };
+  EXPECT_TRUE(connects(believing(ours)));
+  EXPECT_FALSE(connects(believing(foreign)));
+  const auto in_the_clear = Call(Open(grpc::InsecureChannelCredentials()),
+                                 "/color3d.v1.ServerService/GetServerInfo",
+                                 "Bearer " + admin_);
+  EXPECT_EQ(in_the_clear.error_code(), StatusCode::UNAVAILABLE);
+  EXPECT_TRUE(
+      Call(Open(believing(ours)), "/color3d.v1.ServerService/GetServerInfo", "Bearer " + read_)
+          .ok());
+
+  guarded_.reset();
+  options_.credentials =
+      MakeServerCredentials({server.certificate, server.key, ours.certificate()});
+  Start();
+  EXPECT_TRUE(connects(believing(ours, ours.Issue("client"))));
+  const auto answered = [&](const CertificateFiles& own) {
+    return Call(Open(believing(ours, own)),
+                "/color3d.v1.ServerService/GetServerInfo",
+                "Bearer " + read_)
+        .ok();
+  };
+  EXPECT_TRUE(answered(ours.Issue("client2")));
+  EXPECT_FALSE(answered({})) << "without a certificate of its own";
+  EXPECT_FALSE(answered(foreign.Issue("stranger")));
+  EXPECT_FALSE(answered(ours.Issue("late", -7200, -3600)));
+}
+
+// A certificate says who somebody is; what he may do stands in the file.
+TEST_F(AccessTest, ACertificateHasTheRoleThatTheFileGivesIt) {
+  TestAuthority ours(scratch_.path(), "ours");
+  const CertificateFiles server = ours.Issue("server");
+  const auto file = scratch_.path() / "roles";
+  WriteFileAtomic(file, "chief admin\nguest read\n");
+  options_.credentials =
+      MakeServerCredentials({server.certificate, server.key, ours.certificate()});
+  options_.certificates = std::make_shared<CertificateRoles>(file);
+  const auto call = [&](const std::string& name, const char* method, const std::string& token) {
+    const CertificateFiles own = ours.Issue(name);
+    return Call(Open(grpc::SslCredentials(
+                    {ReadFile(ours.certificate()), ReadFile(own.key), ReadFile(own.certificate)})),
+                method,
+                token.empty() ? "" : "Bearer " + token);
+  };
+  constexpr char kLook[] = "/color3d.v1.ServerService/GetServerInfo";
+  constexpr char kPause[] = "/color3d.v1.AdminService/PauseQueue";
+  const auto tokens = options_.tokens;
+  options_.tokens = nullptr;
+  Start();
+  EXPECT_TRUE(call("chief", kPause, "").ok());
+  EXPECT_TRUE(call("guest", kLook, "").ok());
+  EXPECT_EQ(ReasonOfStatus(call("guest", kPause, "")), "ROLE_TOO_LOW");
+  const grpc::Status nobody = call("nobody", kLook, "");
+  EXPECT_EQ(nobody.error_code(), StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(ReasonOfStatus(nobody), "CERTIFICATE_UNKNOWN");
+  // A token says more than the certificate under it.
+  guarded_.reset();
+  options_.tokens = tokens;
+  Start();
+  EXPECT_EQ(ReasonOfStatus(call("chief", kPause, read_)), "ROLE_TOO_LOW");
+  EXPECT_TRUE(call("guest", kPause, admin_).ok());
+  EXPECT_EQ(ReasonOfStatus(call("guest", kPause, "")), "ROLE_TOO_LOW");
+}
+
+TEST_F(AccessTest, ARenewedCertificateNeedsNoRestart) {
+  TestAuthority before(scratch_.path(), "before"), after(scratch_.path(), "after");
+  const CertificateFiles server = before.Issue("server");
+  options_.credentials =
+      MakeServerCredentials({server.certificate, server.key, {}}, std::chrono::seconds(1));
+  Start();
+  const auto connects = [&](const TestAuthority& authority) {
+    grpc::ChannelArguments own;  // no connection of another test's
+    own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    return grpc::CreateCustomChannel(
+               guarded_->address(), grpc::SslCredentials({ReadFile(authority.certificate())}), own)
+        ->WaitForConnected(std::chrono::system_clock::now() + std::chrono::milliseconds(700));
+  };
+  EXPECT_TRUE(connects(before));
+  after.Issue("server");  // under the same names
+  bool renewed = false;
+  for (int i = 0; i < 15 && !(renewed = connects(after)); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  }
+  EXPECT_TRUE(renewed);
+}
+
+}  // namespace
+}  // namespace color3d::testing
